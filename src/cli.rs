@@ -1,7 +1,7 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{
-    atlas, build, compare, info, map, merge, new, preset, prove, reproduce, simulate, ssp, sweep, tune,
+    atlas, build, compare, info, map, merge, new, page, preset, prove, reproduce, simulate, ssp, sweep, tune,
 };
 use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -36,6 +36,7 @@ enum Command {
     Map(map::Map),
     Ssp(ssp::Ssp),
     Preset(preset::Preset),
+    Page(page::Page),
     Prove(prove::Prove),
     /// Writes what a shell needs to complete this command
     ///
@@ -116,6 +117,12 @@ pub fn main() -> ExitCode {
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Preset(args) => preset::run(&args).map(|text| {
             print!("{text}");
+            ExitCode::SUCCESS
+        }),
+        Command::Page(args) => page::run(&args).map(|files| {
+            for file in files {
+                println!("{}", file.display());
+            }
             ExitCode::SUCCESS
         }),
         Command::Prove(args) => prove::run(&args).map(|(folders, good)| {

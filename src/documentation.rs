@@ -47,13 +47,19 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     out += &enumerations(d);
     put!(
         out,
+        "<h2>In a web browser</h2>\n<p><code>fmu page {}</code>, in the workspace that built this FMU, writes one HTML file that runs \
+         the model: sliders, plots, and a link that repeats a run, without a network or an installation.</p>\n",
+        escape(&d.name),
+    );
+    put!(
+        out,
         "<h2>License</h2>\n<p>{} <br>{}. The full texts, and those of the libraries in the binary, are in \
          <a href=\"licenses/license.txt\">licenses/license.txt</a>.</p>\n",
         escape(&d.copyright),
         escape(&d.license),
     );
     let (contents, body) = with_contents(&out);
-    document(d.model_name(), STYLE, &format!("{header}{contents}<main>\n{body}</main>\n"))
+    document(d.model_name(), "", STYLE, &format!("{header}{contents}<main>\n{body}</main>\n"))
 }
 
 /// The icon of the FMU as part of the page: an SVG document without its declaration, which the name beside it describes.

@@ -3,7 +3,7 @@
 //! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
 //! - [`workspace`], [`target`], [`compile`], [`pack`], [`documentation`], [`icons`], [`licenses`], [`mod@reference`],
 //!   [`release`]: from Rust sources to `.fmu` files.
-//! - [`preset`]: an FMU with other start values, from its archive.
+//! - [`preset`]: an FMU with other start values, from its archive; [`page`]: a page that runs an FMU in a browser.
 //! - [`message`]: errors, warnings and notes on standard error.
 //! - [`ssp`], [`ssv`]: write systems and parameter values.
 //!
@@ -20,6 +20,7 @@ pub mod icons;
 pub mod licenses;
 pub mod message;
 pub mod pack;
+pub mod page;
 pub mod picture;
 pub mod preset;
 pub mod reference;

@@ -91,6 +91,32 @@ impl PresetFmu {
         &self.own
     }
 
+    /// The model as the archive has it, with its default experiment, and the file that feeds it.
+    ///
+    /// # Errors
+    /// The binary knows no presets.
+    pub fn archived(&self) -> Result<(Description, Option<Vec<u8>>)> {
+        let mut description = if self.values.is_empty() { self.own.clone() } else { self.described(None)? };
+        description.title = (self.md.model_name != description.name).then(|| self.md.model_name.clone());
+        self.take_experiment(&mut description, None);
+        Ok((description, self.stimuli().map(<[u8]>::to_vec)))
+    }
+
+    /// The default experiment of the archive, or another course.
+    fn take_experiment(&self, description: &mut Description, course: Option<&Course>) {
+        let of_archive = &self.md.default_experiment;
+        let experiment = &mut description.experiment;
+        let stop = course.map(|course| course.stop).or(of_archive.stop);
+        let step = course.and_then(|course| course.step).or(of_archive.step);
+        (experiment.stop, experiment.step) = (stop.unwrap_or(experiment.stop), step.unwrap_or(experiment.step));
+    }
+
+    /// The file that feeds the default experiment of the archive.
+    fn stimuli(&self) -> Option<&[u8]> {
+        let packed = self.files.iter().find(|(name, _)| name.starts_with(FOLDER) && name.ends_with("_in.csv"));
+        packed.map(|(_, bytes)| bytes.as_slice())
+    }
+
     /// The names that an earlier preset has set and this one has not.
     pub fn earlier(&self) -> Vec<&str> {
         self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
@@ -140,11 +166,7 @@ impl PresetFmu {
     pub fn write(self, title: Option<&str>, course: Option<&Course>, out: &Path) -> Result<Vec<String>> {
         let moment = Moment::of_environment()?;
         let mut description = self.described(title)?;
-        let of_archive = &self.md.default_experiment;
-        let experiment = &mut description.experiment;
-        let stop = course.map(|course| course.stop).or(of_archive.stop);
-        let step = course.and_then(|course| course.step).or(of_archive.step);
-        (experiment.stop, experiment.step) = (stop.unwrap_or(experiment.stop), step.unwrap_or(experiment.step));
+        self.take_experiment(&mut description, course);
         let changes = changes(&description, &self.own);
         let mut files: BTreeMap<String, Entry> = self
             .files
@@ -214,10 +236,9 @@ impl PresetFmu {
         course: Option<&Course>,
         dir: &Path,
     ) -> Result<BTreeMap<String, Entry>> {
-        let packed = self.files.iter().find(|(name, _)| name.starts_with(FOLDER) && name.ends_with("_in.csv"));
         let stimuli = dir.join(reference::STIMULI);
         // Without a file, the inputs keep their start values.
-        if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(packed.map(|(_, bytes)| &bytes[..])) {
+        if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(self.stimuli()) {
             fs::write(&stimuli, bytes)?;
         }
         reference::files(archive, description, &stimuli, None).or_else(|why| {

@@ -12,6 +12,9 @@ pub const ZIG: &str = "pip install cargo-zigbuild ziglang";
 /// Makes Cargo build the standard library from source.
 pub(crate) const BUILD_STD: &str = "CARGO_UNSTABLE_BUILD_STD";
 
+/// The target of the modules that pages run. It has no platform of FMI: nothing here loads them natively.
+pub const MODULE: &str = "wasm32-unknown-unknown";
+
 /// A target that can be built here.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Target {
@@ -86,10 +89,7 @@ impl Tools {
             return Err(wrong(format!("importers on Linux do not load a library for {environment}; take {instead}")));
         }
         let linker = self.linker(triple, platform, environment).map_err(wrong)?;
-        let libraries = text.lines().find(|line| Path::new(line).is_absolute()).unwrap_or_default();
-        if !has_std(Path::new(libraries)) && env::var_os(BUILD_STD).is_none() {
-            return Err(wrong(format!("Rust's standard library for it is missing: rustup target add {triple}")));
-        }
+        has_std(&text, triple).map_err(wrong)?;
         Ok(Target { triple: triple.into(), platform, is_host: triple == self.host, linker })
     }
 
@@ -119,6 +119,17 @@ impl Tools {
             Platform::X64Windows | Platform::ArmWindows => Ok(Linker::Usual),
         }
     }
+}
+
+/// Checks that the modules of pages can be built here.
+///
+/// # Errors
+/// The standard library for them is missing; the error says how to get it.
+pub fn has_modules() -> Result<()> {
+    let mut rustc = rustc();
+    rustc.args(["--print", "target-libdir", "--target", MODULE]);
+    let output = rustc.stdin(Stdio::null()).output().context("rustc cannot be run")?;
+    has_std(&String::from_utf8_lossy(&output.stdout), MODULE).map_err(|cause| anyhow!("{MODULE}: {cause}"))
 }
 
 /// The compiler.
@@ -156,10 +167,16 @@ fn zig() -> Result<(), String> {
     }
 }
 
-fn has_std(libraries: &Path) -> bool {
+/// Checks that there is a standard library for a target, or that Cargo builds one. `printed` has its folder in a line of what
+/// rustc prints.
+fn has_std(printed: &str, triple: &str) -> Result<(), String> {
+    let libraries = printed.lines().find(|line| Path::new(line).is_absolute()).unwrap_or_default();
     let is_std = |name: &str| name.starts_with("libstd-");
-    let files = libraries.read_dir().into_iter().flatten().flatten();
-    files.into_iter().any(|file| file.file_name().to_str().is_some_and(is_std))
+    let mut files = Path::new(libraries).read_dir().into_iter().flatten().flatten();
+    if files.any(|file| file.file_name().to_str().is_some_and(is_std)) || env::var_os(BUILD_STD).is_some() {
+        return Ok(());
+    }
+    Err(format!("Rust's standard library for it is missing: rustup target add {triple}"))
 }
 
 /// A program in `PATH`.

@@ -12,7 +12,7 @@ const MAX_ITERATIONS: usize = 100;
 
 /// The result of an update of the discrete states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Update {
+pub struct Updated {
     /// What the event did.
     pub outcome: Outcome,
     /// Time in s of the next time event, if there is one.
@@ -51,14 +51,14 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// Tunable parameters that do not fit together, or what the model reports.
-    pub fn update_discrete(&mut self) -> Result<Update, Fault> {
+    pub fn update_discrete(&mut self) -> Result<Updated, Fault> {
         self.stale |= self.exchanges();
         let current = &mut self.current;
         if current.dirty {
             current.block.model = current.judged()?;
             current.dirty = false;
         }
-        let mut update = Update::default();
+        let mut update = Updated::default();
         if const { E::CAN.clocked.is_some() } {
             self.tick_all()?;
         }

@@ -1,12 +1,13 @@
 //! `fmu build`: compiles models and packs them.
 
+use super::page::{self, Page};
 use super::tune;
 use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
 use crate::message;
 use crate::pack::{self, Entry, Moment};
-use crate::target::{Target, Tools, ZIG};
+use crate::target::{Target, Tools, ZIG, has_modules};
 use crate::workspace::{Package, Workspace, output_folder};
 use crate::{reference, release};
 use anyhow::{Context, Result, anyhow, bail};
@@ -44,7 +45,7 @@ use std::path::{Path, PathBuf};
 /// prints what they need. CARGO_TARGET_TRIPLE_LINKER (spelled as Cargo does) selects another linker.
 ///
 /// --release-dir DIR writes all files of a release: the archives, with a binary for each of Linux, Windows and macOS that can be
-/// built here; SHA256SUMS; sbom.cdx.json with the crates in them and their licenses (CycloneDX); and, in the workspace that has
+/// built here; pages/NAME.html (fmu page); SHA256SUMS; sbom.cdx.json with the crates in them and their licenses (CycloneDX); and, in the workspace that has
 /// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library if cargo-zigbuild builds them.
 ///   fmu build --release-dir release
 ///
@@ -235,6 +236,13 @@ fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
         written.push(path);
         packages.push(package.into());
     }
+    match has_modules() {
+        Ok(()) => {
+            let (fmus, package, module, site) = (args.fmus.clone(), Vec::new(), None, None);
+            written.extend(page::run(&Page { fmus, package, out: Some(folder.join("pages")), module, site })?);
+        }
+        Err(why) => message::note(&format!("left out: pages that run the FMUs: {why:#}")),
+    }
     packages.dedup();
     let others = release::finish(&workspace, &packages, folder, &written, moment)?;
     Ok(written.into_iter().chain(others).collect())
@@ -344,7 +352,7 @@ fn notes(models: &[Model]) -> Vec<String> {
 }
 
 /// The selected packages, by package name or by FMU name; the two differ only in how words are joined.
-fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
+pub(super) fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'a Package>> {
     let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
     if all.is_empty() {
         bail!(

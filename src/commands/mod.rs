@@ -7,6 +7,7 @@ pub mod info;
 pub mod map;
 pub mod merge;
 pub mod new;
+pub mod page;
 pub mod preset;
 pub mod prove;
 pub mod reproduce;

@@ -181,15 +181,15 @@ fn a_run_costs_microseconds() {
     );
     let plan = Plan::new(&Definition::parse(&text).unwrap(), Path::new("")).unwrap();
     let variables = plan.bind(["d.plant.motor.R_s", "d.tau_load"]).unwrap();
-    let columns = [vec![3.0; 5000], vec![0.5; 5000]];
-    let columns = [columns[0].as_slice(), columns[1].as_slice()];
+    // Rounds shorter than a turn of the processor: the best of many has the machine for itself.
+    let columns: [&[f64]; 2] = [&[3.0; 50], &[0.5; 50]];
     let once = || {
         let begun = Instant::now();
         let outcomes = plan.run_many(&variables, &columns, 1, &|_| ControlFlow::Continue(())).unwrap();
         assert!(outcomes.errors.iter().all(Option::is_none));
-        begun.elapsed().as_secs_f64() / 5000.0
+        begun.elapsed().as_secs_f64() / 50.0
     };
-    let best = (0..5).map(|_| once()).fold(f64::INFINITY, f64::min);
+    let best = (0..500).map(|_| once()).fold(f64::INFINITY, f64::min);
     println!("{:.2} us a run of one period", 1e6 * best);
     assert!(best < 50e-6, "{:.1} us", 1e6 * best);
 }

@@ -1,11 +1,11 @@
 //! The C interface: the only place with `unsafe`. It turns pointers into Rust values and decides nothing.
 //!
 //! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` holds the calls that both standards
-//! share, [`fmi2`] and [`fmi3`] the tables of
-//! their functions, from which [`export!`](crate::export) makes C functions.
+//! share, [`fmi2`] and [`fmi3`] the tables of their functions, from which [`export!`](crate::export) makes C functions.
 
 pub mod callbacks;
 mod calls;
+mod fault;
 pub mod fmi2;
 pub mod fmi3;
 mod gate;
@@ -108,11 +108,17 @@ fn changes_on_loading<M: Model>(made: &Made<M>, resources: Option<&Path>) -> Res
     Ok(before == blob::write(&fresh())? && before != blob::write(&loaded)?)
 }
 
-/// A panic becomes a log message, so the hook that would print it is silenced. The hook is the binary's own: a cdylib
-/// has its own standard library.
+/// A panic becomes a log message, so the hook that would print it is silenced; where a panic ends the program, the hook keeps its
+/// text. The hook is the binary's own: a cdylib has its own standard library.
 pub fn quiet() {
     static ONCE: Once = Once::new();
-    ONCE.call_once(|| set_hook(Box::new(|_| {})));
+    ONCE.call_once(|| set_hook(Box::new(fault::keep)));
+}
+
+/// The text of the panic that ended the last call, NULL if none did: for a host whose calls end without an answer, where panics
+/// do not unwind.
+pub fn fault() -> types::Text {
+    fault::text()
 }
 
 /// What an importer says about the instance that it wants.
@@ -236,8 +242,15 @@ macro_rules! export {
 
             const _: () = $crate::check::<This>();
 
+            #[cfg(not(target_family = "wasm"))]
             $crate::export_fmi2!(This);
             $crate::export_fmi3!(This);
+
+            #[cfg(panic = "abort")]
+            #[unsafe(no_mangle)]
+            pub(crate) extern "C" fn fmu_fault() -> Text {
+                $crate::abi::fault()
+            }
 
             #[unsafe(no_mangle)]
             pub(crate) unsafe extern "C" fn fmu_description(

@@ -16,6 +16,9 @@ const BASE: &str = include_str!("base.css");
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("plot.js");
 
+/// Functions for axes, in JavaScript: `find`, `ticks`, `minus`, `onAxis`, `shown`.
+pub const AXIS: &str = include_str!("axis.js");
+
 /// Escapes text for HTML.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
@@ -26,12 +29,13 @@ pub fn swatch(ink: Ink) -> String {
     format!("<span class=\"swatch\" style=\"background:{ink}\"></span>")
 }
 
-/// A document with the common style and a `style` of its own; `body` is the content of the element of this name.
-pub fn document(title: &str, style: &str, body: &str) -> String {
+/// A document with the common style and a `style` of its own; `head` stands before it, and `body` is the content of the element of
+/// this name.
+pub fn document(title: &str, head: &str, style: &str, body: &str) -> String {
     let title = escape(title);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{title}</title>\n\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<style>\n{BASE}{style}</style>\n</head>\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n{head}<style>\n{BASE}{style}</style>\n</head>\n\
          <body>\n{body}</body>\n</html>\n"
     )
 }
@@ -40,8 +44,8 @@ pub fn document(title: &str, style: &str, body: &str) -> String {
 pub fn page(title: &str, body: &str) -> String {
     // Only figures need the script.
     let script =
-        if body.contains("class=\"figure\"") { format!("<script>\n{SCRIPT}</script>\n") } else { String::new() };
-    document(title, STYLE, &format!("<main>\n<h1>{}</h1>\n{body}</main>\n{script}", escape(title)))
+        if body.contains("class=\"figure\"") { format!("<script>\n{SCRIPT}{AXIS}</script>\n") } else { String::new() };
+    document(title, "", STYLE, &format!("<main>\n<h1>{}</h1>\n{body}</main>\n{script}", escape(title)))
 }
 
 /// A figure with its data, for a [`page`]; `instead` is HTML for browsers without JavaScript.

@@ -28,33 +28,6 @@ const make = (parent, name, attributes = {}, text = "") => {
 };
 const put = (element, attributes) => Object.entries(attributes).forEach(([key, value]) => element.setAttribute(key, value));
 
-// Index of the first of x that is not below t.
-function find(x, t) {
-  let low = 0, high = x.length;
-  while (low < high) {
-    const middle = (low + high) >> 1;
-    if (x[middle] < t) low = middle + 1; else high = middle;
-  }
-  return low;
-}
-
-// Round places for the lines of an axis, and the decimals of their numbers.
-function ticks(low, high, most) {
-  const rough = (high - low) / most, power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((k) => k * power >= 0.999 * rough);
-  const places = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step && places.length < 50; k++) places.push(k * step);
-  return [places, Math.min(12, Math.max(0, -Math.floor(Math.log10(step * 1.001))))];
-}
-
-const minus = (text) => text.replace(/-/g, "\u2212");
-const onAxis = (x, decimals) => minus(Math.abs(x) >= 1e6 || (decimals > 6 && x) ? x.toExponential(2) : (x + 0).toFixed(decimals));
-const shown = (x) => {
-  if (!Number.isFinite(x)) return "\u2013";
-  const size = Math.abs(x);
-  return minus(size >= 1e6 || (size > 0 && size < 1e-4) ? x.toExponential(3) : String(Number(x.toPrecision(5))));
-};
-
 // A range of the horizontal axis that panels share, and the cursor there.
 class View {
   constructor(from, to) { Object.assign(this, { full: [from, to], from, to, at: null, panels: [] }); }

@@ -1,0 +1,246 @@
+//! The pages that run FMUs in a browser: what `page.toml` says, what a page holds, and its runs.
+#![allow(missing_docs)]
+
+mod common;
+
+use drive::PmsmDrive;
+use fmu::page::own::{Own, Run};
+use fmu::page::{Source, judged, page};
+use fmu_core::{Block, Description, Elapsed, Model, Slot, Step};
+use serde_json::{Value, json};
+use std::f64::consts::PI;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+const OWN: &str = include_str!("../fmus/pmsm-drive/page.toml");
+
+fn drive() -> Description {
+    Description::of::<PmsmDrive>().unwrap()
+}
+
+fn presets() -> Vec<Run> {
+    judged(&drive(), Some((Path::new("page.toml"), OWN))).unwrap().presets
+}
+
+/// Sets a variable of a model by its name.
+fn set<M: Model>(block: &mut Block<M>, name: &str, value: &Value) {
+    let at = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name)).unwrap();
+    match (M::TABLE.entry(block, at).unwrap().1, value) {
+        (Slot::Real(x), value) => *x = value.as_f64().unwrap(),
+        (Slot::Boolean(x), Value::Bool(on)) => *x = *on,
+        (Slot::Enumeration(x), value) => assert!(x.set(value.as_i64().unwrap().try_into().unwrap())),
+        _ => panic!("{name}"),
+    }
+}
+
+/// The named real values of a model.
+fn values<M: Model>(block: &mut Block<M>, names: &[String]) -> Vec<f64> {
+    let find = |name: &String| (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == *name));
+    let places: Vec<usize> = names.iter().map(|name| find(name).unwrap()).collect();
+    let mut one = |at: usize| match M::TABLE.entry(block, at).unwrap().1 {
+        Slot::Real(x) => *x,
+        Slot::Boolean(x) => f64::from(u8::from(*x)),
+        Slot::Enumeration(x) => x.get().into(),
+        _ => panic!("{at}"),
+    };
+    places.into_iter().map(&mut one).collect()
+}
+
+/// A run of the page, natively: a row at the start and after every step.
+fn run<M: Model>(run: &Run, names: &[String]) -> Vec<Vec<f64>> {
+    let mut block = Block::<M>::default();
+    run.set.iter().for_each(|(name, value)| set(&mut block, name, value));
+    block.initialize();
+    let experiment = M::INFO.experiment;
+    let (mut now, mut rows) = (Elapsed::ZERO, vec![values(&mut block, names)]);
+    let stop = run.stop.unwrap_or(experiment.stop);
+    let mut k = 0_u32;
+    while f64::from(k) < ((stop - experiment.start) / experiment.step).round() {
+        for (_, name, value) in run.events.iter().filter(|event| event.0 == u64::from(k)) {
+            set(&mut block, name, value);
+            block.model.derive();
+        }
+        block.step(&Step { start: now, h: experiment.step }).unwrap();
+        now = now.plus(experiment.step);
+        rows.push(values(&mut block, names));
+        k += 1;
+    }
+    rows
+}
+
+/// Every figure in the text of a preset is one of its run.
+#[test]
+fn the_presets_show_what_their_texts_say() {
+    let names = ["speed", "theta_e", "theta_est", "i_d", "u_share"].map(String::from);
+    let shown = |title: &str| -> (Vec<Vec<f64>>, Vec<f64>) {
+        let preset = presets().into_iter().find(|preset| preset.title == title).unwrap();
+        let rows = run::<PmsmDrive>(&preset, &names);
+        let error = |row: &Vec<f64>| {
+            let x = row[2] - row[1];
+            (x - 2.0 * PI * (x / (2.0 * PI)).round()).to_degrees()
+        };
+        let errors = rows.iter().map(error).collect();
+        (rows, errors)
+    };
+    let near = |what: &str, got: f64, wanted: f64| {
+        assert!((got / wanted - 1.0).abs() < 0.01, "{what}: {got}, not {wanted}");
+    };
+    let (_, error) = shown("Start from any angle");
+    let aligned = error.iter().rposition(|x| x.abs() > 1.0).unwrap() + 1;
+    near("s to 1 degree", 1e-3 * f64::from(u16::try_from(aligned).unwrap()), 0.339);
+    let (rows, error) = shown("Load step at standstill");
+    near("dip in rpm", rows.iter().map(|row| row[0]).fold(0.0, f64::min) * 30.0 / PI, -127.4);
+    near("error in degrees", error.last().unwrap().abs(), 35.38);
+    let (_, error) = shown("Load step at 1000 rpm");
+    near("error in degrees", error.last().unwrap().abs(), 0.1232);
+    let (_, error) = shown("Wrong resistance");
+    near("error in degrees before", error[790].abs(), 3.46);
+    near("error in degrees after", error.last().unwrap().abs(), 8.24);
+    let (_, error) = shown("Another estimator");
+    assert!(error.last().unwrap().abs() < 0.001, "{}", error.last().unwrap());
+    let (rows, _) = shown("Field weakening");
+    near("i_d in A", rows.last().unwrap()[3], -6.19);
+    near("share of the voltage", rows.last().unwrap()[4], 0.949);
+}
+
+/// A page of this text, or why there is none.
+fn refused(own: &str) -> String {
+    judged(&drive(), Some((Path::new("page.toml"), own))).err().map(|e| e.to_string()).unwrap_or_default()
+}
+
+#[test]
+fn what_is_wrong_in_a_page_toml_is_named() {
+    let preset = |body: &str| format!("[[preset]]\ntitle = \"P\"\n{body}");
+    let arrow = |body: &str| format!("[[plane]]\ntitle = \"T\"\narrows = [{{ name = \"a\", {body} }}]");
+    let full = "full = 1.0";
+    for (own, why) in [
+        ("colour = 1", "line 1: unknown field `colour`"),
+        ("inputs = [\"speed_reff\"]", "inputs: PmsmDrive has no variable speed_reff; did you mean speed_ref?"),
+        ("inputs = [\"speed\"]", "inputs: speed is not an input"),
+        ("parameters = [\"tau_load\"]", "parameters: tau_load is not a parameter"),
+        (
+            "[range]\n\"plant.motor.R_s\" = [\"-1 Ohm\", 3]",
+            "range of plant.motor.R_s: plant.motor.R_s = -1 Ohm is not greater",
+        ),
+        ("[range]\nspeed_ref = [\"1 V\", \"2 V\"]", "range of speed_ref: "),
+        ("[range]\nspeed_ref = [2, 1]", "range of speed_ref: 2 is not below 1"),
+        ("[[plot]]\ntitle = \"A\"\ncurves = [\"plant.motor.R_s\"]", "plot \"A\": plant.motor.R_s is not a curve"),
+        ("[[plot]]\ntitle = \"A\"\ncurves = []", "plot \"A\": has no curve"),
+        (
+            "[[plot]]\ntitle = \"A\"\ncurves = [\"speed\"]\n[[plot]]\ntitle = \"A\"\ncurves = [\"i_d\"]",
+            "two plots have the name \"A\"",
+        ),
+        ("[[difference]]\nname = \"speed\"\nof = [\"speed\", \"speed_est\"]", "a variable has this name"),
+        (&arrow(&format!("d = [\"speeed\"], q = [], {full}")), "arrow \"a\": PmsmDrive has no variable speeed"),
+        (&arrow(&format!("d = [[1, [2, 3]]], q = [], {full}")), "a product has names and numbers only"),
+        (&arrow("d = [1], q = [], full = \"0 Wb\""), "full = 0 Wb is not a number above 0"),
+        (&arrow("d = [1], q = [], full = \"1 parsec\""), "full = 1 parsec is not a number above 0 with a unit"),
+        (&preset("set = { \"plant.motor.R_s\" = 0 }"), "set: plant.motor.R_s = 0 is not greater than 0"),
+        (&preset("set = { speed = 1 }"), "set: speed is not an input or a parameter with one value"),
+        (&preset("set = { \"controller.estimator\" = \"Magic\" }"), "is not one of Rasmussen, DirectEmf"),
+        (
+            &preset("events = [[2.0, \"tau_load\", 1]]\nstop = 1"),
+            "event at 2 s: it is not between the start and the stop, 1 s",
+        ),
+        (&preset("events = [[0.0005, \"tau_load\", 1]]"), "event at 0.0005 s: it is between two steps of 0.001 s"),
+        (&preset("events = [[0.1, \"plant.motor.psi_M\", 1]]"), "does not change in a run"),
+        (&preset("stop = -1"), "stop = -1 s is not after the start"),
+        (&preset("rate = -1"), "rate is not a finite number"),
+        (&preset("").repeat(2), "two presets have the name \"P\""),
+    ] {
+        let got = refused(own);
+        assert!(got.starts_with("page.toml: ") && got.contains(why) && !got.contains('\n'), "{own}\n{got}\nnot {why}");
+    }
+    let many = (0..51).fold(String::new(), |all, k| all + &format!("[[preset]]\ntitle = \"{k}\"\n"));
+    assert!(refused(&many).contains("51 presets, and 50 are the most"));
+    assert!(Own::read(&" ".repeat(1 << 21)).unwrap_err().contains("are the most"));
+}
+
+/// A module as far as a page judges it.
+fn module(of: &Description) -> Vec<u8> {
+    [b"\0asm\x01\0\0\0", "fmi3DoStep __indirect_function_table ".as_bytes(), of.token.as_bytes()].concat()
+}
+
+fn source<'a>(of: &'a Description, plain: &'a Description, module: &'a [u8]) -> Source<'a> {
+    let own = Some((Path::new("page.toml"), OWN));
+    Source { description: of, plain, module, own, stimuli: None, licenses: "MIT" }
+}
+
+#[test]
+fn a_page_stands_alone_and_knows_the_model() {
+    let of = drive();
+    let module = module(&of);
+    let html = page(&source(&of, &of, &module)).unwrap();
+    assert_eq!(html, page(&source(&of, &of, &module)).unwrap(), "two pages of one model differ");
+    common::pages::stands_alone(&html, |_| false);
+    let json = html.split_once("id=\"fmu\">").unwrap().1.split_once("</script>").unwrap().0;
+    let json: Value = serde_json::from_str(json).unwrap();
+    let variable =
+        |name: &str| json["variables"].as_array().unwrap().iter().find(|v| v["name"] == name).unwrap().clone();
+    assert_eq!(variable("speed_ref")["display"][0], "rpm");
+    assert_eq!(variable("plant.motor.R_s")["range"], json!([0.5, 5.0]));
+    assert_eq!(variable("controller.estimator")["type"], "Estimator");
+    assert_eq!((json["presets"].as_array().unwrap().len(), &json["starts"]), (6, &json!([])));
+    assert_eq!(json["differences"][0]["like"]["display"][0], "deg");
+    // Start values of a preset archive travel in the page; the author's presets are for other ones.
+    let mut other = of.clone();
+    let at = other.variables.iter().position(|v| v.name == "plant.motor.R_s").unwrap();
+    other.variables[at].start = Some(vec![fmu_core::description::Value::Real(0.775)]);
+    let html = page(&source(&other, &of, &module)).unwrap();
+    assert!(html.contains("\"starts\":[[\"plant.motor.R_s\",0.775]]") && html.contains("Default experiment"));
+}
+
+#[test]
+fn another_module_is_refused() {
+    let of = drive();
+    let good = module(&of);
+    for (module, why) in [
+        (b"\x7fELF".to_vec(), "not one of WebAssembly"),
+        (good[..8].to_vec(), "no function fmi3DoStep"),
+        (good[..18].to_vec(), "does not export its table"),
+        (good[..good.len() - 1].to_vec(), "lacks the token"),
+    ] {
+        let said = page(&source(&of, &of, &module)).unwrap_err().to_string();
+        assert!(said.contains(why), "{said}");
+    }
+}
+
+/// Pages in a Chromium: the bits of native runs in every column, states, live changes, addresses, faults, widths, keys.
+#[test]
+#[ignore = "opt-in: cargo test --test page browser -- --ignored (needs Chromium and Rust's standard library for WebAssembly)"]
+fn pages_in_a_browser() {
+    let folder = common::python::scratch().join("run-pages");
+    let _ = std::fs::remove_dir_all(&folder);
+    std::fs::create_dir_all(&folder).unwrap();
+    let make = |arguments: &[&str]| {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_fmu")).arg("page").args(arguments).arg("--out").arg(&folder).output();
+        let output = output.unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    make(&["PmsmDrive"]);
+    make(&["--package", "own-fmu", "--package", "faulty-fmu"]);
+    let bytes = |name: &str| std::fs::metadata(folder.join(name)).unwrap().len();
+    println!("PmsmDrive.html {} bytes, RcCircuit.html {} bytes", bytes("PmsmDrive.html"), bytes("RcCircuit.html"));
+    assert!(bytes("PmsmDrive.html") <= 600_000 && bytes("RcCircuit.html") <= 260_000);
+    // The experiment of the reference: start angle, speed step, load step, in all real outputs.
+    let experiment = Run {
+        title: "bits".into(),
+        text: String::new(),
+        set: vec![("plant.initial.theta_e".into(), json!(3.0))],
+        events: vec![(400, "speed_ref".into(), json!(100.0)), (700, "tau_load".into(), json!(1.5))],
+        stop: Some(1.0),
+        rate: Some(0.0),
+        compare: false,
+    };
+    let outputs = drive().variables.into_iter();
+    let names: Vec<String> =
+        outputs.filter(|v| v.causality == fmu_core::Causality::Output && !v.is_array()).map(|v| v.name).collect();
+    let rows = run::<PmsmDrive>(&experiment, &names);
+    let bits: Vec<Vec<String>> =
+        rows.iter().map(|row| row.iter().map(|x| format!("{:016x}", x.to_bits())).collect()).collect();
+    let expected = json!({ "run": experiment.json(), "names": names, "rows": bits });
+    let path: PathBuf = folder.join("expected.json");
+    std::fs::write(&path, expected.to_string()).unwrap();
+    common::python::pytest("pages", "run-pages", &["test_run_page.py"], &[("FMU_PAGES", &folder)]);
+}
