@@ -53,8 +53,9 @@ impl Model for RcCircuit {
         author: "You",
         license: "MIT",
         copyright: "Copyright (c) 2026 You",
-        experiment: Experiment { start: 0.0, stop: 5.0, step: 0.1 },
+        experiment: Experiment { stop: 5.0, step: 0.1, ..Experiment::DEFAULT },
         documentation: "<p>R C du<sub>c</sub>/dt = u − u<sub>c</sub></p>",
+        ..Info::DEFAULT
     };
 
     // Name, unit, range and place of every variable; names must differ, or this does not compile.

@@ -130,17 +130,16 @@ impl PresetFmu {
     pub fn set(&mut self, name: &str, text: &str, unit: Option<&str>) -> Result<()> {
         let model = &self.own.name;
         let Some((variable, element)) = find(&self.own, &self.reader, name) else {
-            let names = self.own.variables.iter().filter(|v| v.causality.is_settable()).map(|v| v.name.as_str());
+            let names = self.own.variables.iter().filter(|v| v.takes_start()).map(|v| v.name.as_str());
             bail!("{model} has no variable {name}{}", suggest(name, names));
         };
-        let what = match variable.causality {
-            Causality::Input | Causality::Parameter => None,
-            Causality::Output => Some("an output"),
-            Causality::CalculatedParameter => Some("a calculated parameter"),
-            Causality::Local => Some("a local variable"),
-        };
-        if let Some(what) = what {
-            bail!("{name} is {what}: a preset has start values of inputs and parameters");
+        if !variable.takes_start() {
+            let what = match variable.causality {
+                Causality::Output => "an output",
+                Causality::CalculatedParameter => "a calculated parameter",
+                _ => "a local variable",
+            };
+            bail!("{name} is {what}: a preset has start values of inputs and parameters, and of exact variables");
         }
         let read = self.reader.variable(&variable.name).context(variable.name.clone())?;
         let own_unit = read.unit.as_deref().unwrap_or("1");

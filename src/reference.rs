@@ -113,7 +113,7 @@ pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>
     for (input, schedule) in fed {
         system.input(&format!("fmu.{input}"), schedule)?;
     }
-    let Experiment { start, stop, step } = *experiment;
+    let Experiment { start, stop, step, .. } = *experiment;
     if (stop - start) / step > MOST_STEPS {
         bail!("the default experiment has more than {MOST_STEPS:e} steps");
     }
@@ -127,7 +127,7 @@ const EDGE: f64 = 1e-3;
 /// Rows of the inputs as the run feeds them: held over its communication steps. A change is over just before its communication
 /// point, so an importer with shorter steps feeds the same, and straight lines connect the rows.
 fn held(fed: &[(String, Schedule)], experiment: &Experiment) -> String {
-    let Experiment { start, stop, step } = *experiment;
+    let Experiment { start, stop, step, .. } = *experiment;
     let at = |t: f64| fed.iter().map(|(_, schedule)| schedule.at(t)).collect::<Vec<f64>>();
     let digits = (4.0 - step.log10()).ceil().clamp(0.0, 17.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 17")]
@@ -192,7 +192,7 @@ mod tests {
     /// give what the run held.
     #[test]
     fn the_inputs_say_the_steps_of_their_reference() {
-        let experiment = Experiment { start: 0.0, stop: 1.0, step: 0.25 };
+        let experiment = Experiment { stop: 1.0, step: 0.25, ..Experiment::DEFAULT };
         let lines = |points: &[(f64, f64)]| Schedule::lines(points.to_vec()).unwrap();
         let fed = [
             ("a".to_owned(), lines(&[(0.0, 0.0), (0.25, 0.0), (0.75, 10.0), (1.0, 10.0)])),

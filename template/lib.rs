@@ -46,8 +46,9 @@ impl Model for Body {
         author: "The authors of {package}",
         license: "LicenseRef-proprietary",
         copyright: "Copyright (c) {year} the authors of {package}",
-        experiment: Experiment { start: 0.0, stop: 1000.0, step: 1.0 },
+        experiment: Experiment { stop: 1000.0, step: 1.0, ..Experiment::DEFAULT },
         documentation: "<p>C dT/dt = heat − G (T − T_ambient)</p>",
+        ..Info::DEFAULT
     };
 
     // Every variable once: name, unit, description, place, range.

@@ -157,6 +157,18 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             "t: only a parameter of a type other than text",
             5,
         ),
+        row(
+            "started",
+            r#"V::parameter("x", &VOLT, "", |m| &mut m.u).exact()"#,
+            "x: only an output or a local variable can be exact",
+            5,
+        ),
+        row(
+            "constant",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).as_output()"#,
+            "x: only a constant can be made an output",
+            5,
+        ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two show in the table, whose start is in line 3.
@@ -178,6 +190,27 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
             EXPORT + 1,
         ),
         model("number", ("<Self, 1>", "<Self, 12>"), "the above error was encountered while instantiating", 17),
+        model(
+            "stops",
+            ("Ball: ContinuousTime", "Ball: ContinuousTime + EventMode"),
+            "`Ball` does not stop at its events",
+            EXPORT,
+        ),
+        model(
+            "tolerance",
+            (
+                r#"name: "Ball","#,
+                r#"name: "Ball", experiment: Experiment { tolerance: Some(0.0), ..Experiment::DEFAULT },"#,
+            ),
+            "Ball: the tolerance of the experiment must be greater than 0",
+            EXPORT,
+        ),
+        model(
+            "category",
+            (r#"name: "Ball","#, r#"name: "Ball", categories: &[("logEvents", "")],"#),
+            "logEvents: two log categories have this name",
+            EXPORT,
+        ),
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
         enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),
         enumeration("start", "", "#[derive(Default)]\nstruct M { fan: Fan }", "`Fan: Default` is not satisfied", 9),

@@ -186,7 +186,7 @@ impl Model for PmsmDrive {
     const INFO: Info = Info {
         name: "PmsmDrive",
         description: "Sensorless drive: permanent-magnet synchronous machine, inverter and controller in one",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
+        experiment: Experiment { stop: 1.0, step: 1e-3, ..Experiment::DEFAULT },
         documentation: crate::documentation::DRIVE,
         ..drive_base::PROJECT
     };

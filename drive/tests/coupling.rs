@@ -153,7 +153,7 @@ fn a_lost_rotor_at_speed_is_not_blamed_on_the_resistance() {
         now = step.end();
         speed += tau / 0.01 * step.h;
         angle += speed * step.h;
-        let mut sink = |key: &'static str, text: &dyn Fn() -> String| told.push((key, text()));
+        let mut sink = |(_, key, text): fmu_core::log::Said<'_>| told.push((key, text()));
         drive.model.warn(&mut Warnings::to(&mut sink));
     }
     println!("{:?} {:?}", told.first(), told.last());

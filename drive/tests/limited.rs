@@ -74,7 +74,7 @@ fn warnings(tau: f64, set: impl FnOnce(&mut PmsmDrive)) -> Vec<(&'static str, St
         let step = Step { start: now, h: 1e-3 };
         drive.step(&step).unwrap();
         now = step.end();
-        let mut sink = |key: &'static str, message: &dyn Fn() -> String| told.push((key, message()));
+        let mut sink = |(_, key, message): fmu_core::log::Said<'_>| told.push((key, message()));
         drive.model.warn(&mut Warnings::to(&mut sink));
     }
     told

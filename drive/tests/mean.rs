@@ -482,7 +482,7 @@ fn a_request_beyond_the_limits_is_clipped_and_told() {
         assert_eq!((out.current_limited, out.voltage_limited), (told, false), "{out:?}");
         assert!(out.weakens && out.tau_max < 110.0 && out.tau_max > 100.0, "{out:?}");
         let mut messages = Vec::new();
-        let mut sink = |key: &'static str, message: &dyn Fn() -> String| messages.push((key, message()));
+        let mut sink = |(_, key, message): fmu_core::log::Said<'_>| messages.push((key, message()));
         block.model.warn(&mut Warnings::to(&mut sink));
         assert_eq!(messages.iter().any(|(key, text)| *key == "tau_ref" && text.contains("tau_ref = 200 N.m")), told);
     }

@@ -408,7 +408,7 @@ fn a_delay_of_no_sample_is_refused_with_events() {
 fn a_lost_rotor_is_warned_of() {
     let warnings = |controller: &SensorlessController| {
         let mut found = Vec::new();
-        let mut sink = |key: &'static str, text: &dyn Fn() -> String| found.push((key, text()));
+        let mut sink = |(_, key, text): fmu_core::log::Said<'_>| found.push((key, text()));
         controller.warn(&mut Warnings::to(&mut sink));
         found
     };

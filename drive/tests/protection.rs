@@ -68,7 +68,7 @@ impl Run {
 
     fn warning(&self) -> String {
         let mut said = String::new();
-        self.drive.model.warn(&mut Warnings::to(&mut |_, text| said += &text()));
+        self.drive.model.warn(&mut Warnings::to(&mut |(_, _, text)| said += &text()));
         said
     }
 }

@@ -261,7 +261,7 @@ fn a_clipped_request_is_told() {
         let mut drive = Drive::imposed(&a(), |_| ());
         drive.settle(seconds, 2000.0, tau);
         let (out, mut messages) = (&drive.pair.controller.out, Vec::new());
-        let mut sink = |key: &'static str, message: &dyn Fn() -> String| messages.push((key, message()));
+        let mut sink = |(_, key, message): fmu_core::log::Said<'_>| messages.push((key, message()));
         drive.pair.controller.model.warn(&mut Warnings::to(&mut sink));
         assert!((out.tau_max - 24.9058).abs() < 1e-3 && (out.tau_min + 32.8101).abs() < 1e-3, "{out:?}");
         assert!(out.weakens && (out.u_share - 0.95).abs() < 2e-3, "{out:?}");

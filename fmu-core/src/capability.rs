@@ -5,12 +5,14 @@
 
 use crate::clock::Clocked;
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
-use crate::events::{Events, Indicator, Next, Outcome, Sampled};
+use crate::events::{EventMode, Events, Indicator, Next, Outcome, Sampled, Stop};
 use crate::intermediate::Intermediate;
 use crate::log::Warnings;
+use crate::model::Block;
+use crate::row::Slot;
 use crate::rules::can_be_state;
 use crate::variable::Meta;
-use crate::{Elapsed, Fault, Hash, Model};
+use crate::{Elapsed, Fault, Hash, Model, Step};
 use std::marker::PhantomData;
 
 /// A model with warnings for the importer's log.
@@ -82,6 +84,9 @@ pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs
 /// [`CompletedSteps::complete`].
 pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
 
+/// [`EventMode::to_event`].
+pub type ToEvent<M> = fn(&mut M, &Step) -> Result<Stop, Fault>;
+
 /// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
 /// implements the trait of its name.
 pub struct Capabilities<M: Model> {
@@ -91,6 +96,8 @@ pub struct Capabilities<M: Model> {
     pub events: Option<Eventful<M>>,
     /// Functions of a [`Sampled`] model.
     pub samples: Option<Samples<M>>,
+    /// Function of a model with [`EventMode`].
+    pub to_event: Option<ToEvent<M>>,
     /// Functions of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
     /// Function of a model that follows [`CompletedSteps`].
@@ -99,6 +106,8 @@ pub struct Capabilities<M: Model> {
     pub clocked: Option<ClockFunctions<M>>,
     /// The partitions of a [`Clocked`] model can be scheduled one by one (Scheduled Execution).
     pub scheduled: bool,
+    /// The model is not for Co-Simulation.
+    pub exchange_only: bool,
     /// [`Intermediate::longest`].
     pub intermediate: Option<fn(&M) -> f64>,
     /// Function of a model that [`Warns`].
@@ -112,10 +121,12 @@ impl<M: Model> Capabilities<M> {
         continuous: None,
         events: None,
         samples: None,
+        to_event: None,
         tangent: None,
         complete: None,
         clocked: None,
         scheduled: false,
+        exchange_only: false,
         intermediate: None,
         warn: None,
     };
@@ -165,6 +176,14 @@ impl<M: Model> Capabilities<M> {
         Self { samples: Some(samples), ..self.Events() }
     }
 
+    /// Adds [`EventMode`].
+    pub const fn EventMode(self) -> Self
+    where
+        M: EventMode,
+    {
+        Self { to_event: Some(M::to_event), ..self }
+    }
+
     /// Adds [`Differentiable`].
     pub const fn Differentiable(self) -> Self
     where
@@ -205,6 +224,11 @@ impl<M: Model> Capabilities<M> {
         Self { scheduled: true, ..self }
     }
 
+    /// Leaves out Co-Simulation: for equations that need the importer's solver. Nobody calls [`Model::advance`].
+    pub const fn ModelExchangeOnly(self) -> Self {
+        Self { exchange_only: true, ..self }
+    }
+
     /// Adds [`Intermediate`].
     pub const fn Intermediate(self) -> Self
     where
@@ -228,9 +252,11 @@ impl<M: Model> Capabilities<M> {
         self.continuous.is_some() || self.events.is_some() || self.clocked.is_some()
     }
 
-    /// Co-simulation with Event Mode (FMI 3.0), and for a sampled model without states of its own early return.
+    /// Co-simulation with Event Mode (FMI 3.0): for a model with clocks, and with early return for a sampled model without states
+    /// of its own and for one with [`EventMode`].
     pub const fn event_mode(&self) -> bool {
-        self.samples.is_some() && self.continuous.is_none() || self.clocked.is_some()
+        let sampled = self.samples.is_some() && self.continuous.is_none();
+        self.to_event.is_some() || sampled || self.clocked.is_some()
     }
 
     /// The states; none for a model without [`ContinuousTime`].
@@ -264,6 +290,19 @@ impl<M: Model> Capabilities<M> {
         self.states().iter().map(row).collect()
     }
 
+    /// What variable `index` is, and where the importer's start value of it goes: to the state itself for the row of a state.
+    /// `rows` are those of [`rows`](Self::rows).
+    pub fn place<'a>(
+        &self,
+        block: &'a mut Block<M>,
+        rows: &[usize],
+        index: usize,
+    ) -> Option<(&'static Meta, Slot<'a>)> {
+        let Some(state) = rows.iter().position(|&row| row == index) else { return M::TABLE.entry(block, index) };
+        let (meta, _) = M::TABLE.entry(block, index)?;
+        Some((meta, Slot::Real((self.states()[state].at)(&mut block.model))))
+    }
+
     /// Hash of the model's table and of all that the capabilities add to its interface.
     pub const fn hash(&self) -> Hash {
         let mut hash = M::HASH;
@@ -282,6 +321,12 @@ impl<M: Model> Capabilities<M> {
         while i < self.indicators().len() {
             hash = hash.text(self.indicators()[i].name);
             i += 1;
+        }
+        if self.to_event.is_some() {
+            hash = hash.text("EventMode");
+        }
+        if self.exchange_only {
+            hash = hash.text("ModelExchangeOnly");
         }
         if self.complete.is_some() {
             hash = hash.text("CompletedSteps");

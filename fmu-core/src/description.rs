@@ -11,7 +11,7 @@ use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
 use crate::need::Need;
 use crate::probe;
-use crate::row::{Row, Slot};
+use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
@@ -40,6 +40,9 @@ pub struct Description {
     pub token: String,
     /// Recommended experiment.
     pub experiment: Experiment,
+    /// Log categories of the model's own: names and descriptions.
+    #[serde(default)]
+    pub categories: Vec<(String, String)>,
     /// Body of the documentation page, an HTML fragment.
     pub documentation: String,
     /// The variables in the order of their value references, without `time`.
@@ -67,6 +70,9 @@ pub struct ModelExchange {
     pub completed_steps: bool,
     /// Scheduled Execution (FMI 3.0).
     pub scheduled: bool,
+    /// There is no Co-Simulation.
+    #[serde(default)]
+    pub only: bool,
 }
 
 /// A variable of the description.
@@ -99,7 +105,10 @@ pub struct Variable {
     pub unbounded: bool,
     /// Extents of an array, whose elements are row by row; empty for a scalar.
     pub shape: Vec<usize>,
-    /// Start values (one, or one per element) of variables that the importer may set; `None` for calculated ones.
+    /// The importer may set the start value of this output or local variable.
+    #[serde(default)]
+    pub exact: bool,
+    /// Start values (one, or one per element) of variables that the importer may set and of constants; `None` for calculated ones.
     pub start: Option<Vec<Value>>,
     /// Value references that the initial value depends on; `None` for variables that are not initial unknowns.
     pub initial_dependencies: Option<Vec<u32>>,
@@ -206,6 +215,7 @@ impl Description {
 
     fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
         let states = can.rows()?;
+        probe::keeps_starts(can, &block, &states)?;
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
         block.initialize();
@@ -216,9 +226,8 @@ impl Description {
         for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
-            let told = meta.causality.is_settable() || meta.variability == Variability::Constant;
-            let start = (told && !matches!(slot, Slot::Clock(None))).then(|| value(&slot));
-            if told {
+            let start = (meta.has_start() && !matches!(slot, Slot::Clock(None))).then(|| value(&slot));
+            if start.is_some() {
                 check_start(&name, meta, &slot)?;
             }
             if element > 0 {
@@ -279,6 +288,7 @@ impl Description {
             event_mode: can.event_mode(),
             completed_steps: can.complete.is_some(),
             scheduled: can.scheduled,
+            only: can.exchange_only,
         });
         let info = M::INFO;
         Ok(Self {
@@ -291,6 +301,7 @@ impl Description {
             copyright: info.copyright.into(),
             token: can.hash().guid().as_str().into(),
             experiment: info.experiment,
+            categories: info.categories.iter().map(|&(name, about)| (name.into(), about.into())).collect(),
             documentation: info.documentation.into(),
             variables,
             terminals,
@@ -382,6 +393,11 @@ impl Variable {
         Range { min, max, above: self.above, below: self.below }
     }
 
+    /// Whether the importer sets it before the simulation starts.
+    pub fn takes_start(&self) -> bool {
+        self.causality.is_settable() || self.exact
+    }
+
     /// Whether it has elements, each with a value reference in FMI 2.0.
     pub fn is_array(&self) -> bool {
         !self.shape.is_empty()
@@ -427,6 +443,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
             ([], n) => n.into_iter().collect(),
             (shape, _) => shape.to_vec(),
         },
+        exact: meta.exact,
         start: start.map(|x| vec![x]),
         initial_dependencies: None,
         dependencies: None,
@@ -478,6 +495,11 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Text(x) => Value::Text((*x).clone()),
         Slot::Said(x) => Value::Text((*x).into()),
         Slot::Clock(x) => Value::Real(x.as_ref().map_or(f64::NAN, |x| **x)),
+        Slot::Constant(Constant::Real(x)) => Value::Real(*x),
+        Slot::Constant(Constant::Float32(x)) => Value::Real((*x).into()),
+        Slot::Constant(Constant::Integer(x)) => Value::Integer(*x),
+        Slot::Constant(Constant::Boolean(x)) => Value::Boolean(*x),
+        Slot::Constant(Constant::Enumeration(x)) => Value::Integer((*x).into()),
         Slot::Binary(x) => Value::Binary(x.to_vec()),
     }
 }

@@ -1,6 +1,6 @@
 //! Capabilities of a model with events: instants at which the importer stops, exchanges values and lets the model act.
 
-use crate::{Elapsed, Fault, Model, SampleGrid};
+use crate::{ContinuousTime, Elapsed, Fault, Model, SampleGrid, Step};
 
 /// Maximum number of samples in one event or communication step: bounds its duration for any time and any period.
 const MAX_SAMPLES: f64 = 1e7;
@@ -191,6 +191,33 @@ pub trait Events: Model {
 
     /// When the next event is due, after everything that is due at `now` was done.
     fn next(&self, now: Elapsed) -> Next;
+}
+
+/// Where a step towards an event came to an end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stop {
+    /// The instant, not after the end of the step: the model's state is of this instant.
+    pub at: Elapsed,
+    /// An event is to be handled at this instant.
+    pub event: bool,
+    /// [`Model::advance`] would handle it at once, even at the end of a step; otherwise one at the end belongs to the next step.
+    pub settles: bool,
+}
+
+/// A model with states and events whose importer may handle the events in Co-Simulation: Event Mode and early return of FMI 3.0
+/// (3.0.2, 2.3.5, 4.1.3 and 4.2.1). With any use of the two, the results are those of [`Model::advance`].
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` does not stop at its events: it lacks the capability `EventMode`",
+    note = "write `impl EventMode for {Self}`, or remove `EventMode` from the line that exports the model"
+)]
+pub trait EventMode: ContinuousTime + Events {
+    /// Advances the state up to the first event after the beginning of the step, or to its end. A step begins as one of
+    /// [`Model::advance`] does: what is due at its beginning is done there. [`integrate::to_event`](crate::integrate::to_event) and
+    /// [`integrate::euler_to_event`](crate::integrate::euler_to_event) are implementations in one line.
+    ///
+    /// # Errors
+    /// As [`Model::advance`].
+    fn to_event(&mut self, step: &Step) -> Result<Stop, Fault>;
 }
 
 /// A model that acts at the instants k T only, like a digital controller: it reads its inputs at an instant, and shows

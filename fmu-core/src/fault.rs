@@ -1,19 +1,27 @@
-//! Error messages of a model: one sentence with the variable, its value and the allowed values.
+//! Error messages of a model: one sentence with the variable, its value and the allowed values. And the one that is no error: the
+//! end of the simulation.
 
-use std::fmt::Display;
+use crate::Elapsed;
+use std::fmt::{self, Display};
 
 /// An error of the caller or of the model, with a message for users who do not know the code.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{message}")]
-pub struct Fault {
-    #[expect(clippy::box_collection, reason = "one pointer: a result returns in a register")]
-    message: Box<String>,
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault(
+    /// One pointer: a result returns in a register.
+    Box<Content>,
+);
+
+#[derive(Clone, Debug, PartialEq)]
+struct Content {
+    message: String,
+    /// The simulation ends here.
+    end: Option<Elapsed>,
 }
 
 impl Fault {
     /// A fault with free text.
     pub fn new(message: impl Into<String>) -> Self {
-        Self { message: Box::new(message.into()) }
+        Self(Box::new(Content { message: message.into(), end: None }))
     }
 
     /// A variable with a value that is not allowed.
@@ -21,8 +29,28 @@ impl Fault {
         Self::new(format!("{name} = {value} is not allowed: {allowed}"))
     }
 
+    /// No error: the model has come to its end, and the simulation ends at `at`. [`Model::advance`](crate::Model::advance) returns
+    /// it with the state of that instant; the importer learns it as the standards have it, and steps no further.
+    pub fn end(at: Elapsed) -> Self {
+        let message = format!("the model ends the simulation {} s after the start", at.seconds());
+        Self(Box::new(Content { message, end: Some(at) }))
+    }
+
+    /// The instant of the end, if this is not an error.
+    pub fn ends(&self) -> Option<Elapsed> {
+        self.0.end
+    }
+
     /// The message.
     pub fn message(&self) -> &str {
-        &self.message
+        &self.0.message
     }
 }
+
+impl Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.message)
+    }
+}
+
+impl std::error::Error for Fault {}

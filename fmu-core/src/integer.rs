@@ -1,7 +1,7 @@
 //! The integer types of FMI 3.0, and a row of constructors for each. In FMI 2.0 all are Integer, of 32 bits: a value outside of
 //! it is an error of the call that would carry it.
 
-use crate::row::{Access, Row};
+use crate::row::{Access, Constant, Row};
 use crate::variable::{Causality, Kind, Range, Variability};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
@@ -17,7 +17,7 @@ pub trait Whole: Debug {
 
 /// The types, one a line: its name in FMI 3.0, the type in Rust, and the constructors.
 macro_rules! integers {
-    ($($name:ident $type:ident $input:ident $output:ident $local:ident $parameter:ident;)*) => {
+    ($($name:ident $type:ident $input:ident $output:ident $local:ident $parameter:ident $constant:ident;)*) => {
         /// An integer type of FMI 3.0.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
         pub enum IntegerType {
@@ -66,6 +66,12 @@ macro_rules! integers {
                 integers!($name $type $output Output Discrete "An output");
                 integers!($name $type $local Local Discrete "A local variable");
                 integers!($name $type $parameter Parameter Fixed "A parameter");
+
+                #[doc = concat!("A constant of the type ", stringify!($name), ": `", stringify!($type), "`.")]
+                pub const fn $constant(name: &'static str, description: &'static str, value: $type) -> Self {
+                    let access = Access::Constant(Constant::Integer(value as i128));
+                    Self::new(name, description, Kind::Integer(IntegerType::$name), access).constant_local()
+                }
             }
         )*
     };
@@ -83,14 +89,14 @@ macro_rules! integers {
 }
 
 integers! {
-    Int32 i32 integer_input integer_output integer_local integer_parameter;
-    Int8 i8 int8_input int8_output int8_local int8_parameter;
-    UInt8 u8 uint8_input uint8_output uint8_local uint8_parameter;
-    Int16 i16 int16_input int16_output int16_local int16_parameter;
-    UInt16 u16 uint16_input uint16_output uint16_local uint16_parameter;
-    UInt32 u32 uint32_input uint32_output uint32_local uint32_parameter;
-    Int64 i64 int64_input int64_output int64_local int64_parameter;
-    UInt64 u64 uint64_input uint64_output uint64_local uint64_parameter;
+    Int32 i32 integer_input integer_output integer_local integer_parameter integer_constant;
+    Int8 i8 int8_input int8_output int8_local int8_parameter int8_constant;
+    UInt8 u8 uint8_input uint8_output uint8_local uint8_parameter uint8_constant;
+    Int16 i16 int16_input int16_output int16_local int16_parameter int16_constant;
+    UInt16 u16 uint16_input uint16_output uint16_local uint16_parameter uint16_constant;
+    UInt32 u32 uint32_input uint32_output uint32_local uint32_parameter uint32_constant;
+    Int64 i64 int64_input int64_output int64_local int64_parameter int64_constant;
+    UInt64 u64 uint64_input uint64_output uint64_local uint64_parameter uint64_constant;
 }
 
 impl IntegerType {

@@ -1,12 +1,24 @@
 //! Co-simulation of a model that is given by its derivatives, its events or its samples: the whole of its
 //! [`advance`](crate::Model::advance) in one line.
 //!
+//! | | integrates | events |
+//! |---|---|---|
+//! | [`smooth`] | by Runge-Kutta | none |
+//! | [`hybrid`], [`to_event`] | by Runge-Kutta | where they are due |
+//! | [`euler`] | by Euler's method on a grid | none |
+//! | [`euler_hybrid`], [`euler_to_event`] | by Euler's method on a grid | at the next point of the grid |
+//! | [`sampled`] | nothing | samples |
+//!
 //! The classical Runge-Kutta method with equal substeps; an indicator's change of sign is located by regula
 //! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
 
+mod euler;
+
+pub use euler::{euler, euler_hybrid, euler_to_event};
+
 use crate::events::{bounded_by, grid};
 use crate::rules::check_number;
-use crate::{ContinuousTime, Elapsed, Events, Fault, Sampled, Step};
+use crate::{ContinuousTime, Elapsed, Events, Fault, Outcome, Sampled, Step, Stop};
 
 /// Maximum number of substeps in one communication step.
 const MAX_SUBSTEPS: f64 = 1e8;
@@ -47,14 +59,39 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
 /// step belongs to the next one.
 ///
 /// # Errors
-/// Those of [`smooth`] and of [`Events::event`]; events without end.
+/// Those of [`smooth`] and of [`Events::event`], [`Fault::end`] among them; events without end.
 pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     model: &mut M,
     step: &Step,
     longest: f64,
 ) -> Result<(), Fault> {
+    let stop = run::<M, N>(model, step, longest, false)?;
+    model.begin(stop.at);
+    Ok(())
+}
+
+/// [`hybrid`] up to the first event after the beginning of the step, which the importer handles:
+/// [`EventMode::to_event`](crate::EventMode::to_event) in one line.
+///
+/// # Errors
+/// As [`hybrid`].
+pub fn to_event<M: ContinuousTime + Events, const N: usize>(
+    model: &mut M,
+    step: &Step,
+    longest: f64,
+) -> Result<Stop, Fault> {
+    run::<M, N>(model, step, longest, true)
+}
+
+/// Integrates to the end of the step, or only to the first event.
+fn run<M: ContinuousTime + Events, const N: usize>(
+    model: &mut M,
+    step: &Step,
+    longest: f64,
+    stops: bool,
+) -> Result<Stop, Fault> {
     const { check_number::<M>(M::STATES.len(), N) };
-    const { assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for") };
+    const { check_indicators::<M>() };
     let (mut now, end) = (step.start, step.end());
     let count = substeps(step.h, longest)?;
     let (mut budget, mut located) = (count + MAX_SUBSTEPS, count + MAX_LOCATED);
@@ -82,11 +119,18 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
         }
         now = now.plus(passed.unwrap_or(h));
         if passed.is_some() || (model.next(now).is_due(now) && end.since(now) > model.next(now).width(now)) {
+            if stops {
+                return Ok(Stop { at: now, event: true, settles: passed.is_some() });
+            }
             handle(model, now)?;
         }
     }
-    model.begin(end);
-    Ok(())
+    Ok(Stop { at: end, event: stops && model.next(end).is_due(end), settles: false })
+}
+
+/// The event indicators fit.
+const fn check_indicators<M: Events>() {
+    assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for");
 }
 
 /// Advances a model that acts at its sample instants only, with the inputs held.
@@ -109,15 +153,22 @@ pub fn sampled<M: Sampled>(model: &mut M, step: &Step) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Handles an event at `now` until it needs no further update.
+/// Handles an event at `now` until it needs no further update, or ends the simulation.
 fn handle<M: Events>(model: &mut M, now: Elapsed) -> Result<(), Fault> {
     model.begin(now);
     for _ in 0..MAX_ITERATIONS {
-        if !model.event(now)?.again {
-            return Ok(());
+        match model.event(now)? {
+            Outcome { terminate: true, .. } => return Err(Fault::end(now)),
+            Outcome { again: false, .. } => return Ok(()),
+            _ => {}
         }
     }
     Err(Fault::new(format!("the event at {} s after the start does not settle", now.seconds())))
+}
+
+/// Whether an indicator has changed its sign.
+fn crossed(before: &[f64], after: &[f64]) -> bool {
+    before.iter().zip(after).any(|(a, b)| (*a > 0.0) != (*b > 0.0))
 }
 
 /// One substep of `h` (s), or a part of it that ends just after an indicator has changed its sign: its length.
@@ -132,7 +183,7 @@ fn substep<M: ContinuousTime + Events, const N: usize>(
     model.indicators(now, &mut before[..count]);
     rk4::<M, N>(model, now, h)?;
     model.indicators(now.plus(h), &mut after[..count]);
-    let crossed = |z: &[f64; MAX_INDICATORS]| (0..count).any(|i| (before[i] > 0.0) != (z[i] > 0.0));
+    let crossed = |z: &[f64; MAX_INDICATORS]| crossed(&before[..count], z);
     if !crossed(&after) {
         return Ok(None);
     }
@@ -184,13 +235,23 @@ fn rk4<M: ContinuousTime, const N: usize>(model: &mut M, now: Elapsed, h: f64) -
             sum[i] += weight * k[i];
         }
     }
-    let end: [f64; N] = std::array::from_fn(|i| start[i] + h / 6.0 * sum[i]);
+    let end = std::array::from_fn(|i| start[i] + h / 6.0 * sum[i]);
+    arrive(model, now, &start, &end)
+}
+
+/// Writes the states at the end of a substep from `now`; back to those of its `start` if one is not finite.
+fn arrive<M: ContinuousTime, const N: usize>(
+    model: &mut M,
+    now: Elapsed,
+    start: &[f64; N],
+    end: &[f64; N],
+) -> Result<(), Fault> {
     if let Some(i) = (0..N).find(|&i| !end[i].is_finite()) {
-        write::<M, N>(model, &start);
+        write::<M, N>(model, start);
         let at = now.seconds();
         return Err(Fault::value(M::STATES[i].name, end[i], format_args!("a finite number, {at} s after the start")));
     }
-    write::<M, N>(model, &end);
+    write::<M, N>(model, end);
     Ok(())
 }
 

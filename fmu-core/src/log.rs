@@ -23,17 +23,29 @@ pub const CATEGORIES: &[(&str, &str)] = &[
 /// In FMI 2.0 only: all categories at once.
 pub const ALL: &str = "logAll";
 
-/// Where a model puts its warnings.
-pub struct Warnings<'a>(&'a mut dyn FnMut(&'static str, &dyn Fn() -> String));
+/// Most categories of a model's own.
+pub const OWN: usize = 32 - CATEGORIES.len();
+
+/// What a model has to say: the category, a key that identifies the message, and a closure that formats it.
+pub type Said<'a> = (&'static str, &'static str, &'a dyn Fn() -> String);
+
+/// Where a model puts its warnings, and messages of its own categories.
+pub struct Warnings<'a>(&'a mut dyn FnMut(Said<'_>));
 
 impl<'a> Warnings<'a> {
-    /// Warnings that `sink` receives: a key that identifies the message, and a closure that formats it.
-    pub fn to(sink: &'a mut dyn FnMut(&'static str, &dyn Fn() -> String)) -> Self {
+    /// Messages that `sink` receives.
+    pub fn to(sink: &'a mut dyn FnMut(Said<'_>)) -> Self {
         Self(sink)
     }
 
     /// Warns with the text that `message` formats; warnings with one `key` appear at most once in a second.
     pub fn warn(&mut self, key: &'static str, message: impl Fn() -> String) {
-        (self.0)(key, &message);
+        (self.0)((WARNING, key, &message));
+    }
+
+    /// Logs into one of the categories of [`Info::categories`](crate::Info::categories) the text that `message` formats;
+    /// messages with one `key` appear at most once in a second.
+    pub fn log(&mut self, category: &'static str, key: &'static str, message: impl Fn() -> String) {
+        (self.0)((category, key, &message));
     }
 }

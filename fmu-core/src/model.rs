@@ -21,6 +21,9 @@ pub struct Info {
     pub copyright: &'static str,
     /// Recommended experiment.
     pub experiment: Experiment,
+    /// Log categories of the model's own, besides those of the standards: names and descriptions. [`Warns`](crate::Warns) logs
+    /// into them.
+    pub categories: &'static [(&'static str, &'static str)],
     /// Body of the documentation page: an HTML fragment (equations, how to connect); the variables are added to it.
     pub documentation: &'static str,
 }
@@ -34,7 +37,8 @@ impl Info {
         author: "",
         license: "",
         copyright: "",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-3 },
+        experiment: Experiment::DEFAULT,
+        categories: &[],
         documentation: "",
     };
 }
@@ -48,6 +52,17 @@ pub struct Experiment {
     pub stop: f64,
     /// Recommended communication step size.
     pub step: f64,
+    /// Recommended relative tolerance of the importer's solver.
+    #[serde(default)]
+    pub tolerance: Option<f64>,
+    /// The step of the model's own solver in Co-Simulation, if it is fixed: `fixedInternalStepSize` of FMI 3.0.
+    #[serde(default)]
+    pub fixed_step: Option<f64>,
+}
+
+impl Experiment {
+    /// From 0 to 1 s in steps of 1 ms: `Experiment { stop: 10.0, ..Experiment::DEFAULT }`.
+    pub const DEFAULT: Self = Self { start: 0.0, stop: 1.0, step: 1e-3, tolerance: None, fixed_step: None };
 }
 
 /// How an importer uses a model.
@@ -170,7 +185,8 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Advances the state by one step with the inputs held.
     ///
     /// # Errors
-    /// Gives the reason why the step is impossible, for example a state that is no longer finite.
+    /// Gives the reason why the step is impossible, for example a state that is no longer finite. [`Fault::end`] is no
+    /// failure: the simulation ends inside the step, and the state is that of its end.
     fn advance(&mut self, step: &Step) -> Result<(), Fault>;
 }
 

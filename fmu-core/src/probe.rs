@@ -1,11 +1,11 @@
 //! Finds dependencies by running the model itself: each known is changed alone, at several operating points; every
 //! unknown that changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
-use crate::Elapsed;
 use crate::capability::Capabilities;
 use crate::model::{Block, Model};
 use crate::row::Slot;
-use crate::variable::{Causality, Kind, Variability};
+use crate::variable::{Causality, Kind, Meta, Variability};
+use crate::{Elapsed, Fault};
 
 /// Operating points tried, the start values among them.
 const POINTS: u32 = 64;
@@ -16,18 +16,38 @@ pub(crate) const NOW: usize = usize::MAX;
 /// For each variable, the indices that it depends on; derivatives follow the table. `None` for a variable that is not an unknown.
 type Dependencies = Vec<Option<Vec<usize>>>;
 
+/// Checks that the start value of an exact variable stays what the importer has set.
+pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Result<(), Fault> {
+    let mut draw = Draw(3);
+    for (index, meta) in metas(fresh).into_iter().enumerate().filter(|(_, meta)| meta.exact) {
+        let mut block = fresh.clone();
+        change(can, &mut block, states, index, &mut draw);
+        let set = can.place(&mut block, states, index).map(|(_, slot)| slot.bits());
+        block.initialize();
+        let shown = M::TABLE.entry(&mut block, index).map(|(_, slot)| slot.bits());
+        if set != shown {
+            let name = M::TABLE.locate(index).map_or_else(|| meta.name.into(), |(name, ..)| name);
+            return Err(Fault::new(format!(
+                "{name} is exact, and does not keep the value that the importer sets: `initialize` overwrites it, or its row \
+                 leads to an output instead of the model"
+            )));
+        }
+    }
+    Ok(())
+}
+
 /// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
 pub(crate) fn initial_dependencies<M: Model>(
     can: &Capabilities<M>,
     fresh: &Block<M>,
     states: &[usize],
 ) -> Dependencies {
-    let causality = causalities(fresh);
-    let knowns: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
-    let mut found = Found::new(causality.len() + states.len());
+    let metas = metas(fresh);
+    let knowns: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
+    let mut found = Found::new(metas.len() + states.len());
     let mut draw = Draw(1);
     for point in 0..POINTS {
-        let base = operating_point(fresh, point, &knowns, &mut draw);
+        let base = operating_point(can, states, fresh, point, &knowns, &mut draw);
         let start = |mut block: Block<M>| {
             block.initialize();
             values(can, block, Elapsed::ZERO)
@@ -35,7 +55,7 @@ pub(crate) fn initial_dependencies<M: Model>(
         let before = start(base.clone());
         for &known in &knowns {
             let mut changed = base.clone();
-            change::<M>(&mut changed, known, &mut draw);
+            change(can, &mut changed, states, known, &mut draw);
             found.compare(known, &before, &start(changed));
         }
     }
@@ -43,8 +63,8 @@ pub(crate) fn initial_dependencies<M: Model>(
         found.suspect(known);
     }
     let unknown = |i: usize| {
-        let calculated = |&(c, _): &(Causality, _)| matches!(c, Causality::Output | Causality::CalculatedParameter);
-        states.contains(&i) || causality.get(i).is_none_or(calculated)
+        let calculated = |c| matches!(c, Causality::Output | Causality::CalculatedParameter);
+        metas.get(i).is_none_or(|meta| !meta.has_start() && (states.contains(&i) || calculated(meta.causality)))
     };
     found.list(unknown)
 }
@@ -52,14 +72,14 @@ pub(crate) fn initial_dependencies<M: Model>(
 /// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
 /// for any values of the parameters.
 pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
-    let causality = causalities(fresh);
-    let known = |&(c, v): &(Causality, Variability)| c == Causality::Input || v == Variability::Tunable;
-    let mut found = Found::new(causality.len() + states.len());
+    let metas = metas(fresh);
+    let known = |meta: &Meta| meta.causality == Causality::Input || meta.variability == Variability::Tunable;
+    let mut found = Found::new(metas.len() + states.len());
     let mut draw = Draw(2);
-    let settable: Vec<usize> = (0..causality.len()).filter(|&i| causality[i].0.is_settable()).collect();
+    let settable: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
     let points = if can.model_exchange() { POINTS } else { 0 };
     for point in 0..points {
-        let mut base = operating_point(fresh, point, &settable, &mut draw);
+        let mut base = operating_point(can, states, fresh, point, &settable, &mut draw);
         base.initialize();
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
         if let Some(events) = &can.events {
@@ -73,10 +93,10 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
             shift(can, &mut base, states, i, &mut draw);
         }
         let before = observed(can, base.clone(), now);
-        for known in (0..causality.len()).filter(|&i| known(&causality[i])) {
+        for known in (0..metas.len()).filter(|&i| known(metas[i])) {
             let mut changed = base.clone();
-            change::<M>(&mut changed, known, &mut draw);
-            if causality[known].0 == Causality::Parameter {
+            change(can, &mut changed, states, known, &mut draw);
+            if metas[known].causality == Causality::Parameter {
                 changed.model.derive();
             }
             found.compare(known, &before, &observed(can, changed, now));
@@ -90,11 +110,11 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
         found.compare(NOW, &before, &observed(can, base, now));
     }
     if can.model_exchange() {
-        for input in settable.into_iter().filter(|&i| causality[i].0 == Causality::Input).filter(is_opaque::<M>) {
+        for input in settable.into_iter().filter(|&i| metas[i].causality == Causality::Input).filter(is_opaque::<M>) {
             found.suspect(input);
         }
     }
-    found.list(|i| causality.get(i).is_none_or(|(c, _)| *c == Causality::Output))
+    found.list(|i| metas.get(i).is_none_or(|meta| meta.causality == Causality::Output))
 }
 
 /// Whether a variable is a text or bytes: which of them mean something is not known, so none is tried.
@@ -104,11 +124,18 @@ fn is_opaque<M: Model>(&index: &usize) -> bool {
 }
 
 /// The start values first; then other values for about half of the inputs and parameters.
-fn operating_point<M: Model>(fresh: &Block<M>, point: u32, settable: &[usize], draw: &mut Draw) -> Block<M> {
+fn operating_point<M: Model>(
+    can: &Capabilities<M>,
+    states: &[usize],
+    fresh: &Block<M>,
+    point: u32,
+    settable: &[usize],
+    draw: &mut Draw,
+) -> Block<M> {
     let mut block = fresh.clone();
     for &i in settable {
         if point > 0 && draw.below(2) == 0 {
-            change::<M>(&mut block, i, draw);
+            change(can, &mut block, states, i, draw);
         }
     }
     block
@@ -156,9 +183,9 @@ impl Found {
     }
 }
 
-fn causalities<M: Model>(fresh: &Block<M>) -> Vec<(Causality, Variability)> {
+fn metas<M: Model>(fresh: &Block<M>) -> Vec<&'static Meta> {
     let mut block = fresh.clone();
-    let one = |i| M::TABLE.entry(&mut block, i).map(|(meta, _)| (meta.causality, meta.variability));
+    let one = |i| M::TABLE.entry(&mut block, i).map(|(meta, _)| meta);
     (0..M::TABLE.len()).map_while(one).collect()
 }
 
@@ -194,8 +221,8 @@ fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize]
 }
 
 /// Sets variable `index` to another value that is allowed.
-fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
-    let Some((meta, slot)) = M::TABLE.entry(block, index) else { return };
+fn change<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], index: usize, draw: &mut Draw) {
+    let Some((meta, slot)) = can.place(block, states, index) else { return };
     match slot {
         Slot::Real(x) => {
             // The magnitude of a value that is 0 at the start is not known: from 1 to 1000 times the nominal value.
@@ -231,7 +258,7 @@ fn change<M: Model>(block: &mut Block<M>, index: usize, draw: &mut Draw) {
                 x.set(other);
             }
         }
-        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Clock(_) => {}
+        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Constant(_) | Slot::Clock(_) => {}
     }
 }
 

@@ -15,7 +15,7 @@ use crate::need::Need;
 use crate::reals::{Inputs, Interval};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
-pub use slot::Slot;
+pub use slot::{Constant, Slot};
 use std::mem::MaybeUninit;
 
 /// The interface of a part for a table that does not know its type.
@@ -40,7 +40,9 @@ pub(crate) enum Access<W: 'static> {
     Text(fn(&mut W) -> &mut String),
     Said(fn(&W) -> &str),
     Binary(fn(&mut W) -> &mut Bytes),
-    Constant(&'static str),
+    ConstantText(&'static str),
+    Constant(Constant),
+    Constants(&'static [f64]),
     /// A clock, and where its interval is.
     Clock(Option<fn(&mut W) -> &mut f64>),
     Part {
@@ -144,6 +146,29 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
 /// ```
 ///
+/// Start values that the importer may set ([`exact`](Row::exact)), and constants of every type:
+///
+/// ```
+/// # use fmu_core::unit::{KELVIN, METER_PER_S};
+/// # use fmu_core::{Row, Table, enumeration, table};
+/// # enumeration! { enum Fan("FanMode", "") { 1 Off ""; 2 On ""; } }
+/// # struct Model { t: f64, count: i32 }
+/// # type V = Row<Model>;
+/// const TABLE: &Table<Model> = table![
+///     V::output("T", &KELVIN, "Starts where the importer wants it", |m| &mut m.t).exact(),
+///     V::integer_local("count", "So does this", |m| &mut m.count).exact(),
+///     V::constant("v_min", &METER_PER_S, "For inspection", 0.1),
+///     V::integer_constant("poles", "An output; uint8_constant and so on for the other integers", 8).as_output(),
+///     V::boolean_constant("sealed", "True", true),
+///     V::enumeration_constant::<Fan>("fan", "Turns", Fan::On as i32),
+///     V::float32_constant("single", &KELVIN, "In single precision", 293.15),
+///     V::array_constant("levels", &KELVIN, "Three", &[280.0, 290.0, 300.0]),
+/// ];
+/// # let mut model = Model { t: 0.0, count: 0 };
+/// assert_eq!(TABLE.tell_name(&model, "levels"), Some("levels = 280 K".into()));
+/// # impl Clone for Model { fn clone(&self) -> Self { Self { ..*self } } }
+/// ```
+///
 /// A part has a table of its own, which the whole sees under a prefix:
 ///
 /// ```
@@ -187,6 +212,7 @@ impl<W: 'static> Row<W> {
             nominal: None,
             unbounded: false,
             mean: false,
+            exact: false,
             need: Need::Always,
             clocks: "",
             intermediate: false,

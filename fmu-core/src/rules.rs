@@ -2,7 +2,8 @@
 
 use crate::capability::Exported;
 use crate::clock::word;
-use crate::model::Model;
+use crate::log;
+use crate::model::{Experiment, Info, Model};
 use crate::row::{Access, Row};
 use crate::variable::{Causality, Kind, Meta, Variability};
 
@@ -17,6 +18,11 @@ pub const fn check<E: Exported>() {
     let rule =
         "INFO.name must be a C identifier, as modelIdentifier of FMI is: a letter or _, then letters, digits and _";
     demand(is_identifier(model), model, rule);
+    check_info(&E::Model::INFO);
+    let complete = E::CAN.to_event.is_none() || (E::CAN.continuous.is_some() && E::CAN.events.is_some());
+    let exchanges = !E::CAN.exchange_only || (E::CAN.model_exchange() && E::CAN.to_event.is_none());
+    demand(exchanges, model, "ModelExchangeOnly is for a model with states or events, and without EventMode");
+    demand(complete, model, "EventMode is for a model that is exported with ContinuousTime and Events");
     let (rows, states, can) = (E::Model::TABLE.rows, E::CAN.states().len(), E::CAN);
     let mut i = 0;
     check_intermediate::<E>(model);
@@ -31,6 +37,34 @@ pub const fn check<E: Exported>() {
         }
         check_state(rows, model, name);
         i += 1;
+    }
+}
+
+/// Checks the experiment and the log categories.
+#[track_caller]
+const fn check_info(info: &Info) {
+    let Experiment { tolerance, fixed_step, .. } = info.experiment;
+    demand(is_positive(tolerance), info.name, "the tolerance of the experiment must be greater than 0");
+    demand(is_positive(fixed_step), info.name, "the fixed step of the experiment must be greater than 0");
+    demand(info.categories.len() <= log::OWN, info.name, "the model has more log categories than a log has room for");
+    let mut i = 0;
+    while i < info.categories.len() {
+        let name = info.categories[i].0;
+        let mut other = 0;
+        while other < log::CATEGORIES.len() + i {
+            let taken = if other < i { info.categories[other].0 } else { log::CATEGORIES[other - i].0 };
+            demand(!same_text(name, taken), name, "two log categories have this name");
+            other += 1;
+        }
+        demand(!name.is_empty() && !same_text(name, log::ALL), name, "a log category needs a name of its own");
+        i += 1;
+    }
+}
+
+const fn is_positive(x: Option<f64>) -> bool {
+    match x {
+        Some(x) => x > 0.0 && x < f64::INFINITY,
+        None => true,
     }
 }
 

@@ -6,7 +6,7 @@
 use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::reals::Inputs;
-use crate::row::{Access, Node, Row, Slot};
+use crate::row::{Access, Constant, Node, Row, Slot};
 use crate::rules::{demand, same_text};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Variability};
@@ -192,9 +192,11 @@ impl<W: 'static> Table<W> {
             Access::List(items) => items.find(whole, usize::from(place.inner))?,
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
-            Access::Constant(text) => Slot::Said(text),
             Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
             Access::Binary(get) => Slot::Binary(get(whole)),
+            Access::ConstantText(text) => Slot::Said(text),
+            Access::Constant(x) => Slot::Constant(*x),
+            Access::Constants(all) => Slot::Constant(Constant::Real(*all.get(usize::from(place.inner))?)),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
         };
         Some((&row.meta, slot))
@@ -263,7 +265,7 @@ impl<W: 'static> Table<W> {
                 Slot::Text(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Clock(x) => x.map(|x| ptr::from_ref(x).addr()),
                 Slot::Binary(x) => Some(ptr::from_ref(x).addr()),
-                Slot::Said(_) => None,
+                Slot::Said(_) | Slot::Constant(_) => None,
             });
             address == Some(wanted)
         });
@@ -283,7 +285,11 @@ impl<W: 'static> Table<W> {
 
     fn tell_index(&self, whole: &mut W, index: usize) -> Option<String> {
         let (meta, slot) = self.entry(whole, index)?;
-        let value = if let Slot::Enumeration(x) = &slot { item(meta, x.get()) } else { slot.to_string() };
+        let value = match &slot {
+            Slot::Enumeration(x) => item(meta, x.get()),
+            Slot::Constant(Constant::Enumeration(x)) => item(meta, *x),
+            other => other.to_string(),
+        };
         let unit = if let Kind::Real(of) | Kind::Float32(of) = meta.kind { of.unit.name } else { "" };
         let space = if unit.is_empty() { "" } else { " " };
         Some(format!("{} = {value}{space}{unit}", self.locate(index)?.0))

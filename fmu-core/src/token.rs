@@ -76,6 +76,9 @@ impl Hash {
         if !meta.clocks.is_empty() {
             hash = hash.text("on").text(meta.clocks);
         }
+        if meta.exact {
+            hash = hash.text("exact");
+        }
         if meta.intermediate {
             hash = hash.text("intermediate");
         }

@@ -139,6 +139,7 @@ impl std::fmt::Display for Range {
 }
 
 /// All properties of a variable except the location of its value.
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Meta {
     /// Name, relative to the part that it belongs to.
@@ -159,6 +160,8 @@ pub struct Meta {
     pub unbounded: bool,
     /// The value is a mean over the last communication step.
     pub mean: bool,
+    /// The importer may set the start value of this output or local variable.
+    pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
     /// Names of the clocks that it is on, with spaces between them; empty for none.
@@ -169,6 +172,18 @@ pub struct Meta {
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.
     pub shape: &'static [usize],
+}
+
+impl Meta {
+    /// Whether the importer sets it before the simulation starts.
+    pub fn takes_start(&self) -> bool {
+        self.causality.is_settable() || self.exact
+    }
+
+    /// Whether the description has a start value.
+    pub fn has_start(&self) -> bool {
+        self.takes_start() || self.variability == Variability::Constant
+    }
 }
 
 /// Where an element of an array is, as names have it: `[2]`, or `[1,2]` in a matrix that is stored row by row.

@@ -43,8 +43,11 @@ const PART: &Table<Part_> = table![
 
 impl<const VALUE: u8> Model for Heater<VALUE> {
     type Outputs = None_;
-    const INFO: Info =
-        Info { name: "Heater", experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 }, ..Info::DEFAULT };
+    const INFO: Info = Info {
+        name: "Heater",
+        experiment: Experiment { stop: 1.0, step: 0.1, ..Experiment::DEFAULT },
+        ..Info::DEFAULT
+    };
     const TABLE: &'static Table<Block<Self>> = table![
         Row::input("u", &VOLT, "Voltage", |m: &mut Block<Self>| &mut m.model.u).optional(),
         Row::input("bias", &VOLT, "Bias", |m: &mut Block<Self>| &mut m.model.bias).read_with("on", "true"),

@@ -63,7 +63,7 @@ impl Model for Small {
         name: "Small",
         description: "A test",
         version: "1",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
+        experiment: Experiment { stop: 1.0, step: 0.1, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![

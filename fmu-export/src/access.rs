@@ -30,11 +30,11 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
             _ => true,
         },
         Causality::Parameter => match state {
-            State::Step | State::Event | State::Activation => meta.variability == Variability::Tunable,
+            State::Step | State::Event | State::Activation | State::Ended => meta.variability == Variability::Tunable,
             State::Continuous | State::Intermediate | State::ClockUpdate => false,
             _ => true,
         },
-        _ => false,
+        _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),
     }
 }
 

@@ -8,7 +8,7 @@ use crate::message;
 use fmu_core::{Elapsed, Exported, Fault, Model, Next, Outcome, SampleGrid};
 
 /// Maximum number of updates of one event that an instance does by itself.
-const MAX_ITERATIONS: usize = 100;
+pub(crate) const MAX_ITERATIONS: usize = 100;
 
 /// The result of an update of the discrete states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -155,10 +155,11 @@ impl<E: Exported> Instance<E> {
             *(state.at)(&mut self.current.block.model) = *x;
         }
         self.settle();
+        self.stale = true;
         Ok(())
     }
 
-    /// Sets one state of a model with several.
+    /// Sets one state of a model with several: in Model Exchange, or its start value.
     pub(crate) fn set_state(&mut self, i: usize, x: f64) {
         *(E::CAN.states()[i].at)(&mut self.current.block.model) = x;
         self.settle();
@@ -168,7 +169,6 @@ impl<E: Exported> Instance<E> {
         if let Some(continuous) = &E::CAN.continuous {
             (continuous.settle)(&mut self.current.block.model);
         }
-        self.stale = true;
     }
 
     /// Reads all states.

@@ -119,6 +119,14 @@ impl<E: Exported> Instance<E> {
         let last = parts.done >= parts.count;
         let next = if last { parts.start.plus(parts.h) } else { self.current.elapsed.plus(h) };
         parts.stepped = self.advance(t, h, next)?;
+        if parts.stepped.terminate {
+            if E::CAN.event_mode() && self.early_return {
+                parts.stepped.early |= self.current.end < parts.end;
+            } else {
+                (self.current.elapsed, self.current.end) = (parts.start.plus(parts.h), parts.end);
+            }
+            return Ok(Then::Done(parts.stepped));
+        }
         // An event ends the step where the importer takes steps that end early.
         if parts.stepped.early || (parts.stepped.event && self.early_return && !last) {
             return Ok(Then::Done(Stepped { early: true, ..parts.stepped }));

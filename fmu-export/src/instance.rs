@@ -1,15 +1,18 @@
 //! An instance of a model as an importer sees it, without C: names, times, saved states, messages.
 
 use crate::clocks::Clocks;
+use crate::exchange::MAX_ITERATIONS;
 use crate::inside::Inside;
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
 use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
-use fmu_core::log::Warnings;
+use fmu_core::capability::{Eventful, ToEvent};
+use fmu_core::log::WARNING;
+use fmu_core::log::{Said, Warnings};
 use fmu_core::resource::Shelf;
-use fmu_core::{Block, Elapsed, Exported, Fault, Interface, Model, Range, SampleGrid, Step};
+use fmu_core::{Block, Elapsed, Exported, Fault, Interface, Model, Outcome, Range, SampleGrid, Step};
 use std::ffi::CString;
 
 /// Why a call failed.
@@ -34,6 +37,8 @@ pub struct Stepped {
     pub event: bool,
     /// The step ended before the next communication point.
     pub early: bool,
+    /// The model has ended the simulation.
+    pub terminate: bool,
 }
 
 /// One instance. Its functions assume that the lifecycle admits them: that is judged at the gate.
@@ -188,18 +193,43 @@ impl<E: Exported> Instance<E> {
         let current = &mut self.current;
         let handles_events = current.life.handles_events();
         if E::CAN.event_mode() && E::CAN.clocked.is_none() && (handles_events || self.early_return) {
-            return self.step_to_event(t, h);
+            return match E::CAN.to_event {
+                Some(to_event) => self.step_to_stop(to_event, t, h),
+                None => self.step_to_event(t, h),
+            };
         }
         if E::CAN.continuous.is_some() && !current.slopes.is_empty() {
-            self.step_on_slopes(h)?;
+            if let Err(fault) = self.step_on_slopes(h) {
+                return self.end_or_fail(fault, t, h);
+            }
         } else {
-            current.block.model.advance(&Step { start: current.elapsed, h })?;
+            if let Err(fault) = current.block.model.advance(&Step { start: current.elapsed, h }) {
+                return self.end_or_fail(fault, t, h);
+            }
             current.block.model.output(next, &mut current.block.out);
         }
         self.current.elapsed = next;
         self.current.end = t + h;
         self.warn();
         Ok(Stepped::default())
+    }
+
+    /// What a step comes to that was not done to its end: the model ends the simulation (FMI 2.0.5, 4.2.2 and 4.2.3; FMI 3.0.2,
+    /// 4.2.1), or the step fails. Where no early return is allowed, FMI 3.0 has no time before the end of the step.
+    #[cold]
+    fn end_or_fail(&mut self, fault: Fault, t: f64, h: f64) -> Result<Stepped, Fault> {
+        let Some(at) = fault.ends() else { return Err(fault) };
+        let current = &mut self.current;
+        let end = current.elapsed.plus(h);
+        let inside = end.since(at) > f64::EPSILON * h;
+        let early = inside && (self.standard == Standard::Fmi2 || (E::CAN.event_mode() && self.early_return));
+        (current.elapsed, current.end) =
+            if early { (at, current.experiment.map_or(0.0, |e| e.start) + at.seconds()) } else { (end, t + h) };
+        current.life.end();
+        current.block.model.output(current.elapsed, &mut current.block.out);
+        self.log.event(|| format!("{}: {fault}", self.name));
+        self.warn();
+        Ok(Stepped { early, terminate: true, ..Stepped::default() })
     }
 
     /// A step of a sampled model for an importer that handles its events, or takes steps that end early. Every sample
@@ -246,26 +276,70 @@ impl<E: Exported> Instance<E> {
     pub(crate) fn warn_of(&mut self, key: &'static str, message: impl FnOnce() -> String) {
         let now = self.current.elapsed.seconds();
         self.warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
-        if self.log.hears_warnings() && !self.warned.iter().any(|&(other, _)| other == key) {
+        let heard = self.log.hears_model(&[]);
+        if heard && !self.warned.iter().any(|&(other, _)| other == key) {
             self.warned.push((key, now));
-            self.log.warning(&format!("{}: at {} s: {}", self.name, self.current.end, message()));
+            self.log.said(WARNING, &[], &format!("{}: at {} s: {}", self.name, self.current.end, message()));
         }
+    }
+
+    /// A step of a model with states for an importer that handles its events, or takes steps that end early. What the importer
+    /// does not handle happens as in [`Model::advance`].
+    fn step_to_stop(&mut self, to_event: ToEvent<E::Model>, t: f64, h: f64) -> Result<Stepped, Fault> {
+        let Some(events) = &E::CAN.events else { return Ok(Stepped::default()) };
+        let event_mode = self.current.life.handles_events();
+        let (mut start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
+        let mut stepped = Stepped::default();
+        let stop = loop {
+            let rest = if start == self.current.elapsed { h } else { end.since(start) };
+            let stop = match to_event(&mut self.current.block.model, &Step { start, h: rest }) {
+                Ok(stop) => stop,
+                Err(fault) => return self.end_or_fail(fault, t, h),
+            };
+            let inside = stop.event && end.since(stop.at) > f64::EPSILON * h;
+            if !inside || self.early_return {
+                (stepped.event, stepped.early) = (stop.event && event_mode, inside);
+                break stop;
+            }
+            // The next part of the step begins with this event.
+            start = stop.at;
+        };
+        let current = &mut self.current;
+        if !event_mode {
+            (events.begin)(&mut current.block.model, stop.at);
+            if stop.settles
+                && !stepped.early
+                && let Err(fault) = settle(events, &mut current.block.model, stop.at)
+            {
+                return self.end_or_fail(fault, t, h);
+            }
+        }
+        let current = &mut self.current;
+        (current.elapsed, current.end) = if stepped.early {
+            (stop.at, current.experiment.map_or(0.0, |e| e.start) + stop.at.seconds())
+        } else {
+            (end, t + h)
+        };
+        current.block.model.output(current.elapsed, &mut current.block.out);
+        self.warn();
+        Ok(stepped)
     }
 
     /// Lets the model warn, if anyone listens.
     #[inline]
     pub(crate) fn warn(&mut self) {
         let Some(warn) = E::CAN.warn else { return };
-        if !self.log.hears_warnings() {
+        let own = E::Model::INFO.categories;
+        if !self.log.hears_model(own) {
             return;
         }
         let Self { current, log, warned, name, .. } = self;
         let now = current.elapsed.seconds();
         warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
-        let mut sink = |key: &'static str, message: &dyn Fn() -> String| {
-            if !warned.iter().any(|&(other, _)| other == key) {
+        let mut sink = |(category, key, message): Said<'_>| {
+            if log.hears(category, own) && !warned.iter().any(|&(other, _)| other == key) {
                 warned.push((key, now));
-                log.warning(&format!("{name}: at {} s: {}", current.end, message()));
+                log.said(category, own, &format!("{name}: at {} s: {}", current.end, message()));
             }
         };
         warn(&current.block.model, &mut Warnings::to(&mut sink));
@@ -341,4 +415,16 @@ impl<E: Exported> Instance<E> {
     pub(crate) fn exchanges(&self) -> bool {
         E::CAN.model_exchange() && self.current.life.interface() == Interface::ModelExchange
     }
+}
+
+/// Handles an event at `now` until it needs no further update.
+fn settle<M: Model>(events: &Eventful<M>, model: &mut M, now: Elapsed) -> Result<(), Fault> {
+    for _ in 0..MAX_ITERATIONS {
+        match (events.event)(model, now)? {
+            Outcome { terminate: true, .. } => return Err(Fault::end(now)),
+            Outcome { again: false, .. } => return Ok(()),
+            _ => {}
+        }
+    }
+    Err(Fault::new(format!("the event at {} s after the start does not settle", now.seconds())))
 }

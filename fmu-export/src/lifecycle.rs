@@ -37,6 +37,9 @@ pub enum State {
     Event,
     /// Continuous-Time Mode of Model Exchange.
     Continuous,
+    /// Co-simulation after a step in which the model has ended the simulation: `stepFailed` of FMI 2.0, Step Mode of FMI 3.0,
+    /// where no step follows.
+    Ended,
     /// Intermediate Update Mode of co-simulation in FMI 3.0: while the importer's callback runs.
     Intermediate,
     /// Clock Activation Mode of Scheduled Execution.
@@ -46,12 +49,13 @@ pub enum State {
 }
 
 impl State {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,
         Self::Event,
         Self::Continuous,
+        Self::Ended,
         Self::Terminated,
         Self::Error,
         Self::Intermediate,
@@ -60,7 +64,7 @@ impl State {
     ];
 
     /// Those in which no call is under way; Clock Activation Mode takes the place of Step Mode in Scheduled Execution.
-    const REST: [Self; 7] = {
+    const REST: [Self; 8] = {
         let [rest @ .., _, _, _] = Self::ALL;
         rest
     };
@@ -81,6 +85,7 @@ impl fmt::Display for State {
             Self::Error => "Error",
             Self::Event => "Event Mode",
             Self::Continuous => "Continuous-Time Mode",
+            Self::Ended => "Ended by the model",
             Self::Intermediate => "Intermediate Update Mode",
             Self::Activation => "Clock Activation Mode",
             Self::ClockUpdate => "Clock Update Mode",
@@ -265,7 +270,7 @@ impl Call {
     const fn row(self) -> Row {
         use Next::{Start, Stay, To};
         use State::{
-            Activation, ClockUpdate, Continuous, Error, Event, Initialization, Instantiated, Intermediate, Step,
+            Activation, ClockUpdate, Continuous, Ended, Error, Event, Initialization, Instantiated, Intermediate, Step,
             Terminated,
         };
         match self {
@@ -276,22 +281,26 @@ impl Call {
             Self::SetupExperiment => any(each(&[Instantiated], &[]), Stay),
             Self::EnterInitialization => any(both(&[Instantiated]), To(Initialization)),
             Self::ExitInitialization => any(both(&[Initialization]), Start),
-            Self::Terminate => any(both(&[Step, Event, Continuous]), To(Terminated)),
+            Self::Terminate => any(both(&[Step, Event, Continuous, Ended]), To(Terminated)),
             Self::Reset => any(both(&State::REST), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, 4.2.4).
-            Self::Get => any(each(&[Initialization, Step, Event, Continuous, Terminated, Error], &State::ALL), Stay),
+            Self::Get => {
+                any(each(&[Initialization, Step, Event, Continuous, Ended, Terminated, Error], &State::ALL), Stay)
+            }
             Self::Set => any(
                 each(
                     &[Instantiated, Initialization, Step, Event, Continuous],
-                    &[Instantiated, Initialization, Step, Event, Continuous, Intermediate],
+                    &[Instantiated, Initialization, Step, Event, Continuous, Ended, Intermediate],
                 ),
                 Stay,
             ),
             Self::DoStep => stepping(both(&[Step]), Stay),
             // A state that an error left behind is of no use.
-            Self::SaveState => any(both(&[Instantiated, Initialization, Step, Event, Continuous, Terminated]), Stay),
-            Self::Status => stepping(each(&[Step, Terminated], &[]), Stay),
+            Self::SaveState => {
+                any(both(&[Instantiated, Initialization, Step, Event, Continuous, Ended, Terminated]), Stay)
+            }
+            Self::Status => stepping(each(&[Step, Ended, Terminated], &[]), Stay),
             // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3).
             Self::EnterEvent => {
                 Row { event: States::of(&[Step]), ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event)) }
@@ -319,13 +328,13 @@ impl Call {
             Self::Count => exchange(each(&[], &[Instantiated, Initialization, Event, Continuous, Terminated]), Stay),
             Self::Sensitivity => any(
                 each(
-                    &[Initialization, Step, Event, Continuous, Terminated, Error],
-                    &[Initialization, Step, Event, Continuous, Terminated],
+                    &[Initialization, Step, Event, Continuous, Ended, Terminated, Error],
+                    &[Initialization, Step, Event, Continuous, Ended, Terminated],
                 ),
                 Stay,
             ),
             Self::OutputDerivatives => {
-                stepping(each(&[Step, Terminated, Error], &[Step, Terminated, Intermediate]), Stay)
+                stepping(each(&[Step, Ended, Terminated, Error], &[Step, Ended, Terminated, Intermediate]), Stay)
             }
             Self::InputDerivatives => stepping(each(&[Instantiated, Initialization, Step], &[]), Stay),
             Self::GetClock => clocks(&[Event], &[Activation, ClockUpdate]),
@@ -386,8 +395,8 @@ impl Allowed {
     }
 }
 
-/// The state of one instance and the interface that it was made for. It changes in [`Life::after`] and nowhere else; a
-/// restored FMU state brings its own.
+/// The state of one instance and the interface that it was made for. It changes in [`Life::after`] and
+/// [`Life::end`] and nowhere else; a restored FMU state brings its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Life {
     state: State,
@@ -421,6 +430,11 @@ impl Life {
     /// Whether the importer handles events.
     pub const fn handles_events(self) -> bool {
         matches!(self.interface, Interface::EventMode | Interface::ModelExchange)
+    }
+
+    /// Records that the model has ended the simulation in a step.
+    pub const fn end(&mut self) {
+        self.state = State::Ended;
     }
 
     /// Records that a call succeeded, with the [next](Call::next) state, or failed.

@@ -2,7 +2,7 @@
 
 use crate::lifecycle::Standard;
 use fmu_core::Fault;
-use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS, WARNING};
+use fmu_core::log::{ALL, CATEGORIES, DISCARD, ERROR, EVENTS, OWN, WARNING};
 
 /// A status as both standards number it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,9 +18,13 @@ pub enum Status {
     Error = 3,
 }
 
-/// Position of [`WARNING`] in [`CATEGORIES`].
-const WARNINGS: usize = 1;
-const _: () = assert!(matches!(CATEGORIES[WARNINGS].0.as_bytes(), b"logStatusWarning"));
+/// The bit of [`WARNING`], and those of the model's own categories.
+const WARNINGS: u32 = 1 << 1;
+const OWNS: u32 = !0 << CATEGORIES.len();
+const _: () = assert!(matches!(CATEGORIES[1].0.as_bytes(), b"logStatusWarning") && OWN + CATEGORIES.len() == 32);
+
+/// The model's own categories: names and descriptions.
+pub type Categories = &'static [(&'static str, &'static str)];
 
 /// The importer's logger.
 pub trait Sink {
@@ -34,14 +38,14 @@ pub trait Sink {
 /// The logger and the enabled categories.
 pub struct Log {
     sink: Box<dyn Sink>,
-    /// One flag per category of [`CATEGORIES`].
-    enabled: [bool; CATEGORIES.len()],
+    /// A bit for each category of [`CATEGORIES`], then of the model's own.
+    enabled: u32,
 }
 
 impl Log {
     /// A log with all categories on or off.
     pub fn new(sink: Box<dyn Sink>, on: bool) -> Self {
-        Self { sink, enabled: [on; CATEGORIES.len()] }
+        Self { sink, enabled: if on { !0 } else { 0 } }
     }
 
     /// Logs why a call failed, even with logging off: the status alone does not help.
@@ -58,16 +62,29 @@ impl Log {
         }
     }
 
-    /// Whether anyone hears warnings.
+    /// Whether anyone hears what the model says: warnings, and messages of its own categories.
     #[inline]
-    pub fn hears_warnings(&self) -> bool {
-        self.enabled[WARNINGS] && self.sink.hears()
+    pub fn hears_model(&self, own: Categories) -> bool {
+        let heard = if own.is_empty() { WARNINGS } else { WARNINGS | OWNS };
+        self.enabled & heard != 0 && self.sink.hears()
     }
 
-    /// Logs a warning that comes from a call that succeeded.
+    /// Whether anyone hears this category. One that does not exist counts as that of warnings.
+    pub(crate) fn hears(&self, category: &str, own: Categories) -> bool {
+        self.enabled & position(category, own).map_or(WARNINGS, |i| 1 << i) != 0
+    }
+
+    /// Logs what the model says in a call that succeeded: a warning, or a message of one of its own categories.
     #[cold]
-    pub fn warning(&self, message: &str) {
-        self.sink.write(Status::Warning, WARNING, message);
+    pub(crate) fn said(&self, category: &str, own: Categories, message: &str) {
+        match position(category, own) {
+            Some(i) if i >= CATEGORIES.len() => self.sink.write(Status::Ok, category, message),
+            Some(_) => self.sink.write(Status::Warning, WARNING, message),
+            None => {
+                let message = format!("{message} (the model names no log category {category:?})");
+                self.sink.write(Status::Warning, WARNING, &message);
+            }
+        }
     }
 
     /// Logs an event; the message is built only if its category is enabled.
@@ -78,7 +95,7 @@ impl Log {
     }
 
     fn is_on(&self, category: &str) -> bool {
-        position(category).is_some_and(|i| self.enabled[i]) && self.sink.hears()
+        position(category, &[]).is_some_and(|i| self.enabled & (1 << i) != 0) && self.sink.hears()
     }
 
     /// `SetDebugLogging`. No category means all. In FMI 2.0 the listed categories become the only ones (2.0.5, 2.1.5),
@@ -86,32 +103,30 @@ impl Log {
     ///
     /// # Errors
     /// Names a category that does not exist; then nothing changes.
-    pub fn switch(&mut self, standard: Standard, on: bool, categories: &[&str]) -> Result<(), Fault> {
-        let mut listed = [categories.is_empty(); CATEGORIES.len()];
+    pub fn switch(&mut self, standard: Standard, on: bool, categories: &[&str], own: Categories) -> Result<(), Fault> {
+        let mut listed = if categories.is_empty() { !0 } else { 0 };
         for &category in categories {
-            match position(category) {
-                Some(i) => listed[i] = true,
-                None if category == ALL && standard == Standard::Fmi2 => listed = [true; CATEGORIES.len()],
-                None => return Err(unknown(category, standard)),
+            match position(category, own) {
+                Some(i) => listed |= 1 << i,
+                None if category == ALL && standard == Standard::Fmi2 => listed = !0,
+                None => return Err(unknown(category, standard, own)),
             }
         }
-        for (enabled, listed) in self.enabled.iter_mut().zip(listed) {
-            match (listed, standard) {
-                (true, _) => *enabled = on,
-                (false, Standard::Fmi2) => *enabled = *enabled && !on,
-                (false, Standard::Fmi3) => {}
-            }
-        }
+        self.enabled = match (on, standard) {
+            (true, Standard::Fmi2) => listed,
+            (true, Standard::Fmi3) => self.enabled | listed,
+            (false, _) => self.enabled & !listed,
+        };
         Ok(())
     }
 }
 
-fn position(category: &str) -> Option<usize> {
-    CATEGORIES.iter().position(|(name, _)| *name == category)
+fn position(category: &str, own: Categories) -> Option<usize> {
+    CATEGORIES.iter().chain(own).position(|(name, _)| *name == category)
 }
 
-fn unknown(category: &str, standard: Standard) -> Fault {
-    let mut names: Vec<&str> = CATEGORIES.iter().map(|(name, _)| *name).collect();
+fn unknown(category: &str, standard: Standard, own: Categories) -> Fault {
+    let mut names: Vec<&str> = CATEGORIES.iter().chain(own).map(|(name, _)| *name).collect();
     if standard == Standard::Fmi2 {
         names.push(ALL);
     }

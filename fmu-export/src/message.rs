@@ -89,6 +89,10 @@ pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State
         (Causality::Parameter | Causality::Input, _) => {
             format!("{name} changes at events only: it can be set in Event Mode, and this is {state}")
         }
+        _ if meta.exact => {
+            format!("{name} has a start value, which can be set before and in Initialization Mode, and this is {state}")
+        }
+        (_, Variability::Constant) => format!("{name} is a constant and cannot be set"),
         (Causality::CalculatedParameter, _) => format!("{name} is a calculated parameter and cannot be set"),
         (Causality::Output, _) => format!("{name} is an output and cannot be set"),
         _ => format!("{name} cannot be set"),
@@ -111,6 +115,7 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
 /// with others.
 pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
     let mut fresh = made.cloned().unwrap_or_default();
+    fresh.initialize();
     let mut changes = Vec::new();
     for index in 0..M::TABLE.len() {
         let (Some((meta, new)), Some((_, old))) =
@@ -118,7 +123,7 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: O
         else {
             continue;
         };
-        if matches!(meta.causality, Causality::Input | Causality::Parameter) && new.to_string() != old.to_string() {
+        if meta.takes_start() && new.to_string() != old.to_string() {
             changes.push(format!("{} = {new}", name::<M>(index)));
         }
     }

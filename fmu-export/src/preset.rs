@@ -4,7 +4,7 @@
 use crate::lifecycle::State;
 use crate::message;
 use fmu_core::preset::{self, Entry, FILE, MOST};
-use fmu_core::{Block, Bytes, Causality, Fault, Kind, Meta, Model, Slot};
+use fmu_core::{Block, Bytes, Capabilities, Fault, Kind, Meta, Model, Slot};
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, Read};
@@ -26,7 +26,7 @@ impl<M: Model> Made<M> {
     ///
     /// # Errors
     /// The token asks for a preset, which is not in the folder, is another one, or has a name or a value that is not allowed.
-    pub(crate) fn asked(resources: Option<&Path>, suffix: &str) -> Result<Self, Fault> {
+    pub(crate) fn asked(can: &Capabilities<M>, resources: Option<&Path>, suffix: &str) -> Result<Self, Fault> {
         if suffix.is_empty() {
             return Ok(Self { block: Block::default(), suffix: String::new() });
         }
@@ -63,24 +63,24 @@ impl<M: Model> Made<M> {
                 ),
             ));
         }
-        Self::of(&path, &bytes, found)
+        Self::of(can, &path, &bytes, found)
     }
 
     /// The model for its description, with the preset in the folder, if there is one.
     ///
     /// # Errors
     /// The preset cannot be read, or has a name or a value that is not allowed.
-    pub(crate) fn described(resources: Option<&Path>) -> Result<Self, Fault> {
+    pub(crate) fn described(can: &Capabilities<M>, resources: Option<&Path>) -> Result<Self, Fault> {
         let path: Option<PathBuf> = resources.filter(|_| READS_FILES).map(|folder| folder.join(FILE));
-        let Some(path) = path.filter(|path| path.exists()) else { return Self::asked(None, "") };
+        let Some(path) = path.filter(|path| path.exists()) else { return Self::asked(can, None, "") };
         let bytes = content(&path).map_err(|e| of(&path, e))?;
         let suffix = preset::suffix(&bytes);
-        Self::of(&path, &bytes, suffix)
+        Self::of(can, &path, &bytes, suffix)
     }
 
-    fn of(path: &Path, bytes: &[u8], suffix: String) -> Result<Self, Fault> {
+    fn of(can: &Capabilities<M>, path: &Path, bytes: &[u8], suffix: String) -> Result<Self, Fault> {
         let mut block = Block::default();
-        preset::read(bytes).and_then(|entries| apply(&mut block, &entries)).map_err(|fault| of(path, fault))?;
+        preset::read(bytes).and_then(|entries| apply(can, &mut block, &entries)).map_err(|fault| of(path, fault))?;
         Ok(Self { block, suffix })
     }
 }
@@ -101,7 +101,8 @@ fn content(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Sets the start values as an importer would after instantiation.
-fn apply<M: Model>(block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault> {
+fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault> {
+    let rows = can.rows()?;
     let len = M::TABLE.len();
     let (mut set, mut next) = (vec![false; len], 0);
     for Entry { line, name, value } in entries {
@@ -112,8 +113,8 @@ fn apply<M: Model>(block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault>
         if std::mem::replace(&mut set[index], true) {
             return Err(wrong(Fault::new(format!("{name} has a value already"))));
         }
-        let Some((meta, slot)) = M::TABLE.entry(block, index) else { continue };
-        if !matches!(meta.causality, Causality::Input | Causality::Parameter) {
+        let Some((meta, slot)) = can.place(block, &rows, index) else { continue };
+        if !meta.takes_start() {
             return Err(wrong(message::fixed::<M>(index, meta, State::Instantiated)));
         }
         write(meta, slot, value).map_err(|allowed| wrong(Fault::value(name, value, allowed)))?;
@@ -145,7 +146,7 @@ fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
             }
         }
         Slot::Text(x) => text.clone_into(x),
-        Slot::Said(_) => return Err("a text that the model computes".into()),
+        Slot::Said(_) | Slot::Constant(_) => return Err("a value that the model gives".into()),
         Slot::Clock(_) => return Err("a clock".into()),
         Slot::Binary(x) => x.set(&Bytes::from_hex(text).ok_or("pairs of hexadecimal digits")?),
     }

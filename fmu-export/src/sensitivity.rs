@@ -150,7 +150,7 @@ impl<E: Exported> Instance<E> {
         let current = &mut self.current;
         let slopes = std::mem::take(&mut current.slopes);
         let mut block = current.block.clone();
-        let (mut now, part) = (current.elapsed, h / f64::from(PARTS));
+        let (mut now, part, mut done) = (current.elapsed, h / f64::from(PARTS), Ok(()));
         for k in 0..PARTS {
             let middle = part * (f64::from(k) + 0.5);
             for &(row, slope) in &slopes {
@@ -164,7 +164,12 @@ impl<E: Exported> Instance<E> {
                     }
                 }
             }
-            block.step(&Step { start: now, h: part })?;
+            done = block.step(&Step { start: now, h: part });
+            match &done {
+                Err(fault) if fault.ends().is_some() => break,
+                Err(_) => return done,
+                Ok(()) => {}
+            }
             for (index, mean) in &mut means {
                 *mean += real(&mut block, *index) / f64::from(PARTS);
             }
@@ -179,7 +184,7 @@ impl<E: Exported> Instance<E> {
             put(&mut block, index, mean);
         }
         current.block = block;
-        Ok(())
+        done
     }
 
     /// Works with the references of all elements, where those of FMI 3.0 stand for arrays.
@@ -359,7 +364,11 @@ impl<E: Exported> Instance<E> {
         self.meta(unknown).is_some_and(|meta| {
             meta.causality == Causality::Output
                 && matches!(meta.kind, Kind::Real(_))
-                && (discrete || E::Model::CONTINUOUS || meta.variability == Variability::Continuous)
+                && match meta.variability {
+                    Variability::Continuous => true,
+                    Variability::Constant => false,
+                    _ => discrete || E::Model::CONTINUOUS,
+                }
         })
     }
 
@@ -372,8 +381,9 @@ impl<E: Exported> Instance<E> {
                 meta.causality == Causality::CalculatedParameter && matches!(meta.kind, Kind::Real(_))
             });
             let of_start = initial && (calculated || self.states.contains(&index(unknown)));
-            if !(Self::is_derivative(unknown) || of_start || self.is_output(unknown, state == State::Event || initial))
-            {
+            let set = initial && self.meta(unknown).is_some_and(|meta| meta.exact);
+            let output = self.is_output(unknown, state == State::Event || initial);
+            if set || !(Self::is_derivative(unknown) || of_start || output) {
                 return Err(Self::no_side(unknown, "an unknown of derivatives in this state"));
             }
             if unknowns[..i].contains(&unknown) {
@@ -387,7 +397,7 @@ impl<E: Exported> Instance<E> {
                 let fits = match meta.causality {
                     Causality::Input => meta.variability == Variability::Continuous || state == State::Event || initial,
                     Causality::Parameter => initial || (parameters && meta.variability == Variability::Tunable),
-                    _ => false,
+                    _ => initial && meta.exact,
                 };
                 fits && matches!(meta.kind, Kind::Real(_))
             });

@@ -164,7 +164,9 @@ impl<M: Model> Snapshot<M> {
     /// Whether an instance that was made for this interface can be in this state.
     pub(crate) fn fits_its_interface(&self) -> bool {
         match (self.life.state(), self.life.interface()) {
-            (State::Step, interface) => matches!(interface, Interface::CoSimulation | Interface::EventMode),
+            (State::Step | State::Ended, interface) => {
+                matches!(interface, Interface::CoSimulation | Interface::EventMode)
+            }
             (State::Event, interface) => matches!(interface, Interface::EventMode | Interface::ModelExchange),
             (State::Activation, interface) => interface == Interface::ScheduledExecution,
             (State::Continuous, interface) => interface == Interface::ModelExchange,
@@ -187,7 +189,15 @@ impl<M: Model> Snapshot<M> {
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
                 (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
-                (State::Step | State::Event | State::Continuous | State::Activation | State::Terminated, Some(_)) => {
+                (
+                    State::Step
+                    | State::Event
+                    | State::Continuous
+                    | State::Ended
+                    | State::Activation
+                    | State::Terminated,
+                    Some(_),
+                ) => {
                     self.end.is_finite()
                         && (start..=self.end + rounding).contains(&self.settled)
                         && elapsed >= 0.0

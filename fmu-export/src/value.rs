@@ -2,7 +2,7 @@
 
 use crate::access::index;
 use crate::lifecycle::Standard;
-use fmu_core::{Block, Inputs, IntegerType, Kind, Meta, Model, Slot};
+use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Meta, Model, Slot};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::mem::MaybeUninit;
@@ -71,7 +71,10 @@ impl Value for f64 {
     fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self> {
         match slot {
             Slot::Real(x) => Some(**x),
-            Slot::Float32(_) if standard == Standard::Fmi2 => f32::read(meta, slot, standard).map(Self::from),
+            Slot::Constant(Constant::Real(x)) => Some(*x),
+            Slot::Float32(_) | Slot::Constant(Constant::Float32(_)) if standard == Standard::Fmi2 => {
+                f32::read(meta, slot, standard).map(Self::from)
+            }
             _ => None,
         }
     }
@@ -139,7 +142,11 @@ impl Value for f32 {
     const CARRIES: &'static str = "a Float32";
 
     fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
-        if let Slot::Float32(x) = slot { Some(**x) } else { None }
+        match slot {
+            Slot::Float32(x) => Some(**x),
+            Slot::Constant(Constant::Float32(x)) => Some(*x),
+            _ => None,
+        }
     }
 
     fn write(self, slot: Slot<'_>) {
@@ -162,8 +169,14 @@ macro_rules! integers {
             fn read(meta: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
                 match (meta.kind, slot) {
                     (Kind::Integer(IntegerType::$name), Slot::Integer(x)) => x.get().try_into().ok(),
+                    (Kind::Integer(IntegerType::$name), Slot::Constant(Constant::Integer(x))) => (*x).try_into().ok(),
                     (Kind::Enumeration(_), Slot::Enumeration(x)) if IntegerType::$name == ENUMERATIONS => {
                         x.get().try_into().ok()
+                    }
+                    (Kind::Enumeration(_), Slot::Constant(Constant::Enumeration(x)))
+                        if IntegerType::$name == ENUMERATIONS =>
+                    {
+                        (*x).try_into().ok()
                     }
                     _ => None,
                 }
@@ -217,6 +230,8 @@ impl Value for Fmi2Integer {
         match slot {
             Slot::Integer(x) => x.get().try_into().ok().map(Self),
             Slot::Enumeration(x) => Some(Self(x.get())),
+            Slot::Constant(Constant::Integer(x)) => (*x).try_into().ok().map(Self),
+            Slot::Constant(Constant::Enumeration(x)) => Some(Self(*x)),
             _ => None,
         }
     }
@@ -257,7 +272,11 @@ macro_rules! truth_values {
             const CARRIES: &'static str = "a truth value";
 
             fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
-                if let Slot::Boolean(x) = slot { Some((**x).into()) } else { None }
+                match slot {
+                    Slot::Boolean(x) => Some((**x).into()),
+                    Slot::Constant(Constant::Boolean(x)) => Some((*x).into()),
+                    _ => None,
+                }
             }
 
             fn write(self, slot: Slot<'_>) {

@@ -46,7 +46,7 @@ impl Model for Sampler {
     const INFO: Info = Info {
         name: "Sampler",
         version: "1",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        experiment: Experiment { stop: 1.0, step: 1e-4, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![

@@ -26,11 +26,12 @@ pub struct Generation {
 pub fn write(description: &Description, version: FmiVersion, generation: &Generation) -> String {
     let units = types::units(description, version);
     let definitions = types::definitions(description, version);
+    let only = description.model_exchange.as_ref().is_some_and(|exchange| exchange.only);
     let root = header(description, version, generation).children(
         // The order of the schemas.
         [
             description.model_exchange.as_ref().map(|exchange| model_exchange(description, exchange, version)),
-            Some(co_simulation(description, version)),
+            (!only).then(|| co_simulation(description, version)),
             description
                 .model_exchange
                 .as_ref()
@@ -38,7 +39,7 @@ pub fn write(description: &Description, version: FmiVersion, generation: &Genera
                 .map(|_| scheduled_execution(description, version)),
             units,
             definitions,
-            Some(log_categories(version)),
+            Some(log_categories(description, version)),
             Some(experiment(description)),
             Some(variables::variables(description, version)),
             Some(structure::structure(description, version)),
@@ -158,7 +159,9 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
         .with("canBeInstantiatedOnlyOncePerProcess", "false")
         .with_some("canInterpolateInputs", (version == FmiVersion::V2).then_some(interpolates))
         .with_some("maxOutputDerivativeOrder", continuous.then_some("1"));
+    let fixed_step = description.experiment.fixed_step.filter(|_| version == FmiVersion::V3);
     let element = states_and_memory(element, version)
+        .with_some("fixedInternalStepSize", fixed_step.map(number::format))
         .with_some("hasEventMode", event_mode.then_some("true"))
         .with_some("mightReturnEarlyFromDoStep", (event_mode && !clocked(description)).then_some("true"))
         .with_some("providesIntermediateUpdate", intermediate.then_some("true"))
@@ -184,13 +187,15 @@ fn clocked(description: &Description) -> bool {
 }
 
 /// FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5.
-fn log_categories(version: FmiVersion) -> Element {
-    let category = |&(name, description): &(&str, &str)| {
+fn log_categories(description: &Description, version: FmiVersion) -> Element {
+    let category = |(name, description): (&str, &str)| {
         Element::new("Category").with("name", name).with_text("description", description)
     };
     // FMI 3.0 dropped the category; an empty list of categories means all of them in both standards.
     let all = (version == FmiVersion::V2).then_some((fmu_core::log::ALL, "All messages"));
-    Element::new("LogCategories").children(fmu_core::log::CATEGORIES.iter().chain(&all).map(category))
+    let own = description.categories.iter().map(|(name, about)| (name.as_str(), about.as_str()));
+    let standard = fmu_core::log::CATEGORIES.iter().chain(&all).copied();
+    Element::new("LogCategories").children(standard.chain(own).map(category))
 }
 
 /// FMI 2.0.5, 2.2.5; FMI 3.0.2, 2.4.6.
@@ -199,5 +204,6 @@ fn experiment(description: &Description) -> Element {
     Element::new("DefaultExperiment")
         .with("startTime", number::format(experiment.start))
         .with("stopTime", number::format(experiment.stop))
+        .with_some("tolerance", experiment.tolerance.map(number::format))
         .with("stepSize", number::format(experiment.step))
 }

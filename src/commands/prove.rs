@@ -100,7 +100,7 @@ fn example(archive: &Path, folder: &Path) -> Result<(Example, ModelDescription)>
     let times =
         of.start.zip(of.stop).zip(of.step).with_context(|| format!("{}: DefaultExperiment", archive.display()))?;
     let ((start, stop), step) = times;
-    let experiment = Experiment { start, stop, step };
+    let experiment = Experiment { start, stop, step, ..Experiment::DEFAULT };
     #[expect(clippy::cast_precision_loss, reason = "a small count")]
     let interval = step * reference::every(&experiment) as f64;
     let options = format!(
@@ -144,7 +144,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
     if !good {
         message::warning(&format!("{}: {}; {}", archive.display(), replays.join(", "), validations.join(", ")));
     }
-    let Experiment { start, stop, step } = experiment;
+    let Experiment { start, stop, step, .. } = experiment;
     let fed = if file("_in.csv").is_file() {
         format!("fed with {name}_in.csv")
     } else {

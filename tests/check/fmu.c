@@ -13,6 +13,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+/* The fifth step ends the simulation. */
+#if defined FAULT_ENDS || defined FAULT_T12t || defined FAULT_T12e || defined FAULT_T12s
+#define ENDS
+#endif
+
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8, FAILED = 16, ANY = 31 };
 #ifdef FMI3
@@ -255,12 +260,18 @@ EXPORT int fmi2EnterInitializationMode(void *c) {
 #endif
     if (!f->data.ready) return fail(f, "fmi2SetupExperiment was not called");
     f->data.state = INITIALIZATION;
+#ifdef FAULT_G09e
+    f->data.y = 0;
+#endif
     return OK;
 }
 
 EXPORT int fmi2ExitInitializationMode(void *c) {
     ENTER(INITIALIZATION);
     f->data.state = STEP;
+#ifdef FAULT_G09x
+    f->data.y *= 0.5;
+#endif
     return OK;
 }
 
@@ -272,6 +283,9 @@ EXPORT int fmi2Terminate(void *c) {
     ENTER(ANY);
 #else
     ENTER(STEP);
+#endif
+#ifdef FAULT_T12e
+    if (f->data.steps >= 5) return fail(f, "the simulation has ended");
 #endif
 #ifdef FAULT_L10
     f->data.y = 1234;
@@ -286,7 +300,7 @@ EXPORT int fmi2Terminate(void *c) {
 
 EXPORT int fmi2Reset(void *c) {
     ENTER(ANY);
-#ifdef FAULT_L06
+#if defined FAULT_L06 || defined FAULT_G09r
     double y = f->data.y;
     fresh(&f->data);
     f->data.y = y;
@@ -398,6 +412,15 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
             case 2:
                 if (write) f->data.u = values[i];
                 break;
+#ifdef STARTS
+            case 3:
+#ifdef FAULT_G09i
+                if (f->data.state == INSTANTIATED) return fail(f, "y is an output");
+#endif
+                if (f->data.state == STEP) return fail(f, "y starts only");
+                if (write) f->data.y = values[i];
+                break;
+#endif
             case 4:
 #ifdef FAULT_G06
                 if (f->data.state == STEP) return fail(f, "bias is fixed");
@@ -586,8 +609,15 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (d->steps > 400) return fail(f, "no more");
 #endif
     if (!isfinite(d->u)) return fail(f, "u is not finite");
-#if defined FAULT_ENDS && !defined FMI3
-    if (d->steps >= 5) return DISCARD;
+#if defined ENDS && !defined FAULT_T12s
+    if (d->steps >= 5) return fail(f, "the simulation has ended");
+#endif
+#if defined ENDS && !defined FMI3
+    if (d->steps == 4) {
+        d->steps++;
+        d->time = t + h / 2;
+        return DISCARD;
+    }
 #endif
 #ifdef FAULT_WAIT
     if (!isfinite(d->u) || d->steps == 3) pause();
@@ -672,12 +702,15 @@ static int status(void *c, int kind) {
 }
 EXPORT int fmi2GetStatus(void *c, int kind, int *value) { (void)value; return status(c, kind); }
 EXPORT int fmi2GetRealStatus(void *c, int kind, double *value) {
+#ifdef FAULT_T12t
+    if (c && kind == 2 && value && ((Fmu *)c)->data.steps >= 5) { *value = ((Fmu *)c)->data.time + 1; return OK; }
+#endif
     if (c && kind == 2 && value) { *value = ((Fmu *)c)->data.time; return OK; }
     return status(c, kind);
 }
 EXPORT int fmi2GetIntegerStatus(void *c, int kind, int *value) { (void)value; return status(c, kind); }
 EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) {
-#ifdef FAULT_ENDS
+#ifdef ENDS
     if (c && kind == 3 && value) { *value = ((Fmu *)c)->data.steps >= 5; return OK; }
 #endif
     (void)value;

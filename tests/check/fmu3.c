@@ -123,7 +123,7 @@ EXPORT int fmi3DoStep(void *c, double t, double h, bool no_prior, bool *event, b
 #ifdef FAULT_STANDS
     *last = t;
 #endif
-#ifdef FAULT_ENDS
+#ifdef ENDS
     *terminate = ((Fmu *)c)->data.steps >= 5;
 #endif
     return OK;

@@ -11,6 +11,7 @@ mod ci;
 mod description;
 mod exchange;
 mod foreign;
+mod starts;
 mod survives;
 mod terminals;
 mod zip;

@@ -1,8 +1,9 @@
 //! Feedthrough: an input and an output of every type.
 
-use super::{archive, fmpy, open};
+use super::{archive, open, script};
 use fmu_import::Values;
 use fmu_import::cosimulation::{Recording, Sequence, Settings, System};
+use model_description::FmiVersion::V3;
 use model_description::{BaseType, Causality};
 use std::fs;
 use std::ops::ControlFlow;
@@ -16,7 +17,7 @@ const ENDS: &str = "time,Int8_input,UInt8_input,Int16_input,UInt16_input,Int32_i
 fn run(name: &str, inputs: &str) -> Recording {
     let mut system = System::default();
     system.add("it", &open("feedthrough"), false).unwrap();
-    let file = super::folder().join(format!("feedthrough-{name}.csv"));
+    let file = super::archives().join(format!("feedthrough-{name}.csv"));
     fs::write(&file, inputs).unwrap();
     for (input, texts) in Sequence::read_csv(&file).unwrap() {
         system.sequence(&format!("it.{input}"), &texts).unwrap();
@@ -140,7 +141,7 @@ fn the_checker_finds_nothing() {
 
 #[test]
 fn fmpy_gives_the_same() {
-    let inputs = super::folder().join("feedthrough-fmpy.csv");
+    let inputs = super::archives().join("feedthrough-fmpy.csv");
     fs::write(&inputs, ENDS).unwrap();
-    fmpy(include_str!("feedthrough.py"), &[archive("feedthrough"), &inputs]);
+    script(include_str!("feedthrough.py"), &[&archive("feedthrough", V3), &inputs]);
 }

@@ -30,6 +30,6 @@ pub const PROJECT: fmu_core::Info = fmu_core::Info {
     author: "The sensorless-drive developers",
     license: "MIT OR Apache-2.0",
     copyright: "Copyright (c) 2026 The sensorless-drive developers",
-    experiment: fmu_core::Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+    experiment: fmu_core::Experiment { stop: 1.0, step: 1e-4, ..fmu_core::Experiment::DEFAULT },
     ..fmu_core::Info::DEFAULT
 };

@@ -26,7 +26,7 @@ impl Model for SensorlessControllerClocked {
     const INFO: Info = Info {
         name: "SensorlessControllerClocked",
         description: "SensorlessController on a clock: the importer calls it once in each sample period",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        experiment: Experiment { step: 1e-4, ..Experiment::DEFAULT },
         documentation: crate::documentation::CLOCKED,
         ..drive_base::PROJECT
     };

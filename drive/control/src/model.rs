@@ -228,7 +228,7 @@ impl Model for SensorlessController {
     const INFO: Info = Info {
         name: "SensorlessController",
         description: "Sensorless speed control of a permanent-magnet synchronous machine, zero speed included",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        experiment: Experiment { stop: 1.0, step: 1e-4, ..Experiment::DEFAULT },
         documentation: crate::documentation::CONTROLLER,
         ..drive_base::PROJECT
     };

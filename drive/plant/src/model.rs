@@ -171,7 +171,7 @@ impl Model for PmsmPlant {
     const INFO: Info = Info {
         name: "PmsmPlant",
         description: "Permanent-magnet synchronous machine with average inverter and mechanics",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-4 },
+        experiment: Experiment { stop: 1.0, step: 1e-4, ..Experiment::DEFAULT },
         documentation: crate::documentation::PLANT,
         ..drive_base::PROJECT
     };

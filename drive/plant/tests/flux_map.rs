@@ -119,7 +119,7 @@ fn a_state_beyond_the_map_is_told() {
     let warned = |map: FluxMap| {
         let block = run(false, |par| par.flux_map = map.clone());
         let mut said = Vec::new();
-        block.model.warn(&mut Warnings::to(&mut |key, text| said.push(format!("{key}: {}", text()))));
+        block.model.warn(&mut Warnings::to(&mut |(_, key, text)| said.push(format!("{key}: {}", text()))));
         said
     };
     assert!(warned(saturating()).is_empty());

@@ -198,7 +198,7 @@ impl Model for PmsmDriveMean {
     const INFO: Info = Info {
         name: "PmsmDriveMean",
         description: "PmsmDrive for system models: its steady state at every instant, with steps of 10 ms and more",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 1e-2 },
+        experiment: Experiment { stop: 1.0, step: 1e-2, ..Experiment::DEFAULT },
         documentation: crate::documentation::MEAN,
         ..drive_base::PROJECT
     };

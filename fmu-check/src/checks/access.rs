@@ -1,5 +1,6 @@
 //! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7): refused calls and start values.
 
+use super::starts::stand;
 use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
@@ -58,6 +59,11 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Initialization can be iterated: values set and read in between leave no trace.",
         tried: "Sets values once in one instance, twice with reading in between in another, and compares.",
         fix: "Compute outputs from values when they are read, without leaving anything in the state." },
+    Check { id: "G09", clause: "2.0.5, 4.2.4; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Probe(stand),
+        requirement: "The start value of an output or a local variable with initial=exact can be set, stands in the initialization, and is back \
+            after Reset.",
+        tried: "Sets each after the instantiation, reads it in Initialization Mode and at its end, and after Reset.",
+        fix: "Leave the variable alone when the initialization computes others, and restore all start values in Reset." },
     Check { id: "G07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number),
         requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.",
         tried: "Sets NaN, infinities and huge numbers at each input and makes 3 steps.", fix: "Check inputs for finiteness, and bound every loop." },

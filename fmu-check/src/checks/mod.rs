@@ -22,6 +22,7 @@ mod names;
 mod schema;
 mod schema_rules;
 mod sensitivity;
+mod starts;
 mod state;
 mod structure;
 mod terminals;

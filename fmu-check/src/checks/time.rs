@@ -1,6 +1,7 @@
 //! Steps and time (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
 
 use super::derivatives::{input_derivatives, output_derivatives, slopes};
+use super::starts::{ended, no_step_after};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
@@ -64,6 +65,14 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "T11", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(input_derivatives),
         requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.",
         tried: "Sets a derivative of an input of order 1.", fix: "Implement the function, or set canInterpolateInputs to false." },
+    Check { id: "T12", clause: "2.0.5, 4.2.3; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(ended),
+        requirement: "After a step in which the FMU ends the simulation, outputs can be read, fmi2LastSuccessfulTime lies in the step, and Terminate \
+            succeeds.",
+        tried: "Steps through the default experiment; if the FMU ends the simulation, asks for time and outputs, and terminates.",
+        fix: "Keep the state of the end, and return its time." },
+    Check { id: "T12s", clause: "hardening", levels: Levels::HARD, run: Run::Probe(no_step_after),
+        requirement: "No step succeeds after the FMU has ended the simulation.",
+        tried: "Steps on after the end.", fix: "Return Error until the FMU is reset." },
     Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism),
         requirement: "Two consecutive runs with the same inputs are equal bit for bit.",
         tried: "Runs twice in one process and compares bits.", fix: "Initialize all memory." },

@@ -4,7 +4,8 @@
 use crate::bytes::Bytes;
 use crate::enumeration::{Enumerated, Field};
 use crate::list::{Element, Items};
-use crate::row::{Access, Row};
+use crate::row::{Access, Constant, Row};
+use crate::rules::demand;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Variability};
 
@@ -159,6 +160,66 @@ impl<W: 'static> Row<W> {
 
     /// A text that never changes, for inspection: a revision, a source.
     pub const fn text_constant(name: &'static str, description: &'static str, text: &'static str) -> Self {
-        Self::new(name, description, Kind::Text, Access::Constant(text)).with(Causality::Local, Variability::Constant)
+        Self::new(name, description, Kind::Text, Access::ConstantText(text)).constant_local()
+    }
+
+    /// A real number that never changes, for inspection; [`as_output`](Self::as_output) makes it an output.
+    pub const fn constant(
+        name: &'static str,
+        quantity: &'static Quantity,
+        description: &'static str,
+        value: f64,
+    ) -> Self {
+        Self::new(name, description, Kind::Real(quantity), Access::Constant(Constant::Real(value))).constant_local()
+    }
+
+    /// A real number in single precision that never changes.
+    pub const fn float32_constant(
+        name: &'static str,
+        quantity: &'static Quantity,
+        description: &'static str,
+        value: f32,
+    ) -> Self {
+        let access = Access::Constant(Constant::Float32(value));
+        Self::new(name, description, Kind::Float32(quantity), access).constant_local()
+    }
+
+    /// A truth value that never changes.
+    pub const fn boolean_constant(name: &'static str, description: &'static str, value: bool) -> Self {
+        Self::new(name, description, Kind::Boolean, Access::Constant(Constant::Boolean(value))).constant_local()
+    }
+
+    /// An item of an enumeration that never changes: `Fan::On as i32`.
+    ///
+    /// # Panics
+    /// At compile time, if the enumeration has no item of this value.
+    #[track_caller]
+    pub const fn enumeration_constant<E: Enumerated>(
+        name: &'static str,
+        description: &'static str,
+        value: i32,
+    ) -> Self {
+        let (items, mut i) = (E::ENUMERATION.items, 0);
+        while i < items.len() && items[i].value != value {
+            i += 1;
+        }
+        demand(i < items.len(), name, "the enumeration has no item of this value");
+        let access = Access::Constant(Constant::Enumeration(value));
+        Self::new(name, description, Kind::Enumeration(E::ENUMERATION), access).constant_local()
+    }
+
+    /// An array of real numbers that never changes.
+    pub const fn array_constant(
+        name: &'static str,
+        quantity: &'static Quantity,
+        description: &'static str,
+        values: &'static [f64],
+    ) -> Self {
+        let row = Self::new(name, description, Kind::Real(quantity), Access::Constants(values));
+        row.of_dimension(values.len()).constant_local()
+    }
+
+    pub(crate) const fn constant_local(self) -> Self {
+        self.with(Causality::Local, Variability::Constant)
     }
 }

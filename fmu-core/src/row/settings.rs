@@ -32,6 +32,37 @@ impl<W: 'static> Row<W> {
         self
     }
 
+    /// The importer may set the start value of this output or local variable, before the initialization and in it. The start
+    /// value is that of the model's `Default`; [`initialize`](crate::Model::initialize) leaves it alone. The row of a state sets
+    /// the state itself; the closure of another row leads to a field of the model, which its outputs do not have.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not an output or a local variable, or is a text, bytes, a mean or a constant. Describing the
+    /// model checks that the value survives the initialization.
+    #[track_caller]
+    pub const fn exact(mut self) -> Self {
+        let calculated = matches!(self.meta.causality, Causality::Output | Causality::Local)
+            && !matches!(self.meta.variability, Variability::Constant)
+            && !matches!(self.meta.kind, Kind::Text | Kind::Binary { .. })
+            && !self.meta.mean;
+        let rule = "only an output or a local variable can be exact, and neither a text, bytes, a mean nor a constant";
+        demand(calculated, self.meta.name, rule);
+        self.meta.exact = true;
+        self
+    }
+
+    /// Makes a constant an output.
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not a constant.
+    #[track_caller]
+    pub const fn as_output(mut self) -> Self {
+        let constant = matches!(self.meta.variability, Variability::Constant);
+        demand(constant, self.meta.name, "only a constant can be made an output");
+        self.meta.causality = Causality::Output;
+        self
+    }
+
     /// Makes an input, output or local variable in single precision continuous.
     ///
     /// # Panics
@@ -149,7 +180,10 @@ impl<W: 'static> Row<W> {
     /// At compile time, if the variable is not a real output.
     #[track_caller]
     pub const fn mean(mut self) -> Self {
-        let output = matches!(self.meta.causality, Causality::Output) && matches!(self.meta.kind, Kind::Real(_));
+        let output = matches!(self.meta.causality, Causality::Output)
+            && matches!(self.meta.kind, Kind::Real(_))
+            && !self.meta.exact
+            && !matches!(self.meta.variability, Variability::Constant);
         demand(output, self.meta.name, "only a real output can be a mean");
         self.meta.mean = true;
         self

@@ -6,6 +6,21 @@ use crate::integer::Whole;
 use crate::variable::{Kind, Meta};
 use std::hash::{DefaultHasher, Hasher as _};
 
+/// The value of a constant that is not a text.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Constant {
+    /// A real number.
+    Real(f64),
+    /// A real number in single precision.
+    Float32(f32),
+    /// An integer.
+    Integer(i128),
+    /// A truth value.
+    Boolean(bool),
+    /// An item of an enumeration.
+    Enumeration(i32),
+}
+
 /// A value found by a table, ready to read or to write.
 #[derive(Debug)]
 pub enum Slot<'a> {
@@ -21,10 +36,12 @@ pub enum Slot<'a> {
     Enumeration(&'a mut dyn Choice),
     /// A text that can be set.
     Text(&'a mut String),
-    /// A text computed by the model.
+    /// A text computed by the model, or a constant one.
     Said(&'a str),
     /// A clock, and its interval in s if the importer may set it.
     Clock(Option<&'a mut f64>),
+    /// A constant.
+    Constant(Constant),
     /// Bytes.
     Binary(&'a mut Bytes),
 }
@@ -37,6 +54,9 @@ impl Slot<'_> {
             (Self::Float32(x), _) => meta.range.contains_single(**x),
             (Self::Clock(Some(x)), _) => x.is_finite() && **x > 0.0,
             (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
+            (Self::Constant(Constant::Real(x)), _) => meta.range.contains(*x),
+            (Self::Constant(Constant::Float32(x)), _) => meta.range.contains_single(*x),
+            (Self::Constant(Constant::Integer(x)), Kind::Integer(of)) => of.allows(*x, &meta.range),
             (Self::Binary(x), Kind::Binary { most, .. }) => x.len() <= most,
             _ => true,
         }
@@ -59,6 +79,7 @@ impl Slot<'_> {
             Self::Said(x) => hash(*x),
             Self::Binary(x) => hash::<[u8]>(x),
             Self::Clock(x) => x.as_ref().map_or(0, |x| x.to_bits()),
+            Self::Constant(_) => 0,
         }
     }
 }
@@ -76,6 +97,11 @@ impl std::fmt::Display for Slot<'_> {
             Self::Said(x) => write!(f, "{x:?}"),
             Self::Clock(Some(x)) => write!(f, "{x} s"),
             Self::Clock(None) => f.write_str("a clock"),
+            Self::Constant(Constant::Real(x)) => x.fmt(f),
+            Self::Constant(Constant::Float32(x)) => x.fmt(f),
+            Self::Constant(Constant::Integer(x)) => x.fmt(f),
+            Self::Constant(Constant::Boolean(x)) => x.fmt(f),
+            Self::Constant(Constant::Enumeration(x)) => x.fmt(f),
             Self::Binary(x) => x.fmt(f),
         }
     }

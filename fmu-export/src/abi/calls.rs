@@ -7,7 +7,7 @@ use super::{Abi, Answer};
 use crate::lifecycle::State;
 use crate::value::Value;
 use crate::{blob, registry};
-use fmu_core::{Exported, Fault};
+use fmu_core::{Exported, Fault, Model};
 use std::ffi::c_char;
 
 /// # Errors
@@ -132,7 +132,7 @@ impl<E: Exported> Abi<'_, E> {
             let category = unsafe { text(category) }.ok_or_else(|| Fault::new("a log category is NULL"))?;
             names.push(category.to_str().map_err(|_| Fault::new("a log category is not UTF-8"))?);
         }
-        Ok(self.0.log.switch(self.0.standard, on, &names)?)
+        Ok(self.0.log.switch(self.0.standard, on, &names, E::Model::INFO.categories)?)
     }
 
     pub fn terminate(&mut self) -> Answer {

@@ -6,6 +6,7 @@ use super::pointer::{place, text};
 use super::types::{Fmi2Boolean, Fmi2Callbacks, Fmi2EventInfo, InstancePointer, Text};
 use super::{Abi, Answer, credentials};
 use crate::instance::Refusal;
+use crate::lifecycle::State;
 use crate::log::Log;
 use fmu_core::{Exported, Fault, Interface};
 use std::ffi::c_int;
@@ -43,9 +44,14 @@ impl<E: Exported> Abi<'_, E> {
         };
         let judged = credentials::<E>(name, token).and_then(|wanted| {
             let exchange = E::CAN.model_exchange();
-            let fits = fmu_type == CO_SIMULATION || (exchange && fmu_type == MODEL_EXCHANGE);
-            let or = if exchange { " or fmi2ModelExchange (0)" } else { ": the FMU has no Model Exchange" };
-            let allowed = || Fault::value("fmuType", fmu_type, format_args!("fmi2CoSimulation (1){or}"));
+            let steps = !E::CAN.exchange_only;
+            let fits = (steps && fmu_type == CO_SIMULATION) || (exchange && fmu_type == MODEL_EXCHANGE);
+            let types = match (steps, exchange) {
+                (true, true) => "fmi2CoSimulation (1) or fmi2ModelExchange (0)",
+                (true, false) => "fmi2CoSimulation (1): the FMU has no Model Exchange",
+                (false, _) => "fmi2ModelExchange (0): the FMU has no Co-Simulation",
+            };
+            let allowed = || Fault::value("fmuType", fmu_type, types);
             if fits { Ok(wanted) } else { Err(allowed()) }
         });
         let interface = if fmu_type == MODEL_EXCHANGE { Interface::ModelExchange } else { Interface::CoSimulation };
@@ -78,14 +84,24 @@ impl<E: Exported> Abi<'_, E> {
         Ok(())
     }
 
-    /// `fmi2Terminated`: this FMU never asks to end the simulation.
+    /// FMI 2.0.5, 4.2.2: Discard, if the model has ended the simulation.
+    #[inline(always)]
+    #[expect(clippy::inline_always, reason = "the way of every communication point")]
+    pub fn fmi2_do_step(&mut self, t: f64, h: f64) -> Answer {
+        if self.0.do_step(t, h)?.terminate {
+            return Err(Refusal::Discard(Fault::new("the model has ended the simulation: see fmi2Terminated")));
+        }
+        Ok(())
+    }
+
+    /// `fmi2Terminated`: whether the model has ended the simulation in a step.
     pub unsafe fn fmi2_boolean_status(&mut self, kind: c_int, value: *mut Fmi2Boolean) -> Answer {
         // SAFETY: the importer's variable.
         let value = unsafe { place(value, "value")? };
         if kind != TERMINATED {
             return self.fmi2_no_status(kind);
         }
-        value.write(Fmi2Boolean(0));
+        value.write((self.0.current.life.state() == State::Ended).into());
         Ok(())
     }
 
@@ -166,7 +182,7 @@ macro_rules! export_fmi2 {
             fmi2DeSerializeFMUstate(bytes: *const u8, size: usize, state: *mut FmuState)
                 => UseState: deserialize(bytes, size, state);
 
-            fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: do_step(t, h);
+            fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: fmi2_do_step(t, h);
             fmi2CancelStep() => Unsupported: unsupported("no step is ever in progress");
             fmi2GetStatus(kind: c_int, _value: *mut c_int) => Status: fmi2_no_status(kind);
             fmi2GetRealStatus(kind: c_int, value: *mut f64) => Status: fmi2_real_status(kind, value);

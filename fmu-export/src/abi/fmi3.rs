@@ -50,6 +50,9 @@ impl<E: Exported> Abi<'_, E> {
             Interface::CoSimulation if E::CAN.clocked.is_some() => {
                 Some("eventModeUsed = false is not allowed: the model has clocks")
             }
+            Interface::CoSimulation | Interface::EventMode if E::CAN.exchange_only => {
+                Some("not supported: Co-Simulation; this FMU is for Model Exchange")
+            }
             Interface::EventMode if !E::CAN.event_mode() => {
                 Some("eventModeUsed = true is not allowed: hasEventMode = false")
             }
@@ -134,6 +137,7 @@ impl<E: Exported> Abi<'_, E> {
         };
         event.write(stepped.event.into());
         early.write(stepped.early.into());
+        terminate.write(stepped.terminate.into());
         time.write(self.0.current.end);
         Ok(None)
     }

@@ -250,7 +250,7 @@ pub(crate) fn open<E: Exported>(
     let make = |suffix: &str| {
         let made = catch_unwind(|| {
             let resources = folder(resources);
-            let mut block = Made::<E::Model>::asked(resources.as_deref(), suffix)?.block;
+            let mut block = Made::<E::Model>::asked(&E::CAN, resources.as_deref(), suffix)?.block;
             block.model.load(resources.as_deref())?;
             let shelf = blob::shelf(&block.model);
             Ok((block, shelf))

@@ -1,7 +1,7 @@
 //! The C interface: the only place with `unsafe`. It turns pointers into Rust values and decides nothing.
 //!
-//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` holds the calls that both standards
-//! share, [`fmi2`] and [`fmi3`] the tables of their functions, from which [`export!`](crate::export) makes C functions.
+//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` holds the calls that both
+//! standards share, [`fmi2`] and [`fmi3`] the tables of their functions, from which [`export!`](crate::export) makes C functions.
 
 pub mod callbacks;
 mod calls;
@@ -79,7 +79,7 @@ impl<E: Exported> Abi<'_, E> {
         // SAFETY: the caller's promise.
         let resources = crate::resources::folder(unsafe { pointer::text(resources) });
         let json = catch_unwind(|| {
-            let mut made = Made::<E::Model>::described(resources.as_deref())?;
+            let mut made = Made::<E::Model>::described(&E::CAN, resources.as_deref())?;
             if changes_on_loading(&made, resources.as_deref())? {
                 return Err(Fault::new("load changes what a state saves: store what it reads in a Resource"));
             }

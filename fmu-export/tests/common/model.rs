@@ -86,7 +86,7 @@ impl Model for Probe {
         name: "Probe",
         description: "A model for tests",
         version: "1.0",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
+        experiment: Experiment { stop: 1.0, step: 0.1, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![

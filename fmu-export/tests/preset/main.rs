@@ -161,7 +161,7 @@ fn names_and_values_that_are_not_allowed_are_refused_when_they_are_read() {
         ("weights[3,1]", "1", "line 2: All has no variable weights[3,1]"),
         ("y", "1", "line 2: y is an output and cannot be set"),
         ("doubled", "1", "line 2: doubled is a calculated parameter and cannot be set"),
-        ("made", "x", "line 2: made cannot be set"),
+        ("made", "x", "line 2: made is a constant and cannot be set"),
         ("real", "0", "line 2: real = 0 is not allowed: greater than 0"),
         ("real", "NaN", "line 2: real = NaN is not allowed: greater than 0"),
         ("real", "inf", "line 2: real = inf is not allowed: greater than 0"),

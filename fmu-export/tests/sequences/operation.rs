@@ -39,13 +39,6 @@ pub(crate) enum Kind {
     Foreign(u8),
 }
 
-impl Kind {
-    /// Bytes, which no variable of any model has: their getter and setter look at references alone.
-    pub(crate) fn is_binary(self, version: u8) -> bool {
-        version == 3 && matches!(self, Self::Foreign(8..))
-    }
-}
-
 /// What is wrong with the arrays of a getter or setter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Arrays {

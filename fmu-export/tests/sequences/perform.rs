@@ -97,8 +97,8 @@ struct Memory {
 }
 
 impl Memory {
-    fn new(version: u8, kind: Kind, references: &[u32], arrays: Arrays) -> Self {
-        let of = |&r: &u32| if kind.is_binary(version) { 1 } else { elements(version, r).unwrap_or(1) };
+    fn new(version: u8, references: &[u32], arrays: Arrays) -> Self {
+        let of = |&r: &u32| elements(version, r).unwrap_or(1);
         let m: usize = references.iter().map(of).sum();
         let m = match arrays {
             Arrays::More if version == 3 => m + 1,
@@ -150,7 +150,7 @@ pub(crate) fn get(
     references: &[u32],
     arrays: Arrays,
 ) -> (Done, Vec<u64>) {
-    let mut memory = Memory::new(version, kind, references, arrays);
+    let mut memory = Memory::new(version, references, arrays);
     let m = memory.m;
     let mut sizes = [0_usize; 64];
     let (status, name, width) = match (version, kind) {
@@ -193,7 +193,7 @@ pub(crate) fn set(
     values: &[Mixed],
     arrays: Arrays,
 ) -> Done {
-    let mut memory = Memory::new(version, kind, references, arrays);
+    let mut memory = Memory::new(version, references, arrays);
     let m = memory.m;
     let width = match (version, kind) {
         (_, Kind::Real) | (3, Kind::Enumeration) => 8,

@@ -247,9 +247,6 @@ impl Reference {
         let mut bits = Vec::new();
         let status = self.call(GET, |it| {
             it.arrays(kind, references, arrays)?;
-            if kind.is_binary(it.version) {
-                return if references.is_empty() { Ok(OK) } else { Err(()) };
-            }
             it.now.refresh()?;
             for &reference in references {
                 for offset in 0..elements(it.version, reference).ok_or(())? {
@@ -265,10 +262,8 @@ impl Reference {
     /// Whether the arrays can be used at all.
     fn arrays(&self, kind: Kind, references: &[u32], arrays: Arrays) -> Result<(), ()> {
         let empty = references.is_empty();
-        let foreign = kind.is_binary(self.version);
-        // Bytes are always aligned, and Binary is refused before its values are looked at.
         let byte = matches!(kind, Kind::Boolean | Kind::Foreign(1 | 2));
-        let aligned = foreign || (byte && self.version == 3);
+        let aligned = byte && self.version == 3;
         let usable = match arrays {
             Arrays::Good => true,
             Arrays::NullReferences | Arrays::NullValues => empty,
@@ -279,7 +274,7 @@ impl Reference {
         if !usable {
             return Err(());
         }
-        if !foreign && references.iter().any(|&r| elements(self.version, r).is_none()) {
+        if references.iter().any(|&r| elements(self.version, r).is_none()) {
             return Err(());
         }
         Ok(())

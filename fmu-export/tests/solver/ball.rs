@@ -127,7 +127,7 @@ impl Model for Ball {
         name: "Ball",
         description: "A ball that bounces",
         version: "1.0",
-        experiment: Experiment { start: 0.0, stop: 3.0, step: 0.1 },
+        experiment: Experiment { stop: 3.0, step: 0.1, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![

@@ -245,7 +245,8 @@ impl Live {
         let answer = self.calls.do_step(self.given(), (t, h), false, [true; 4], before);
         if self.is_v2() {
             let terminate = answer.was(Status::DISCARD) && self.terminated();
-            let stepped = Stepped { terminate, event: false, early: false, last: t + h };
+            let last = if terminate { self.last_successful_time().unwrap_or(t + h) } else { t + h };
+            let stepped = Stepped { terminate, event: false, early: false, last };
             return if terminate { Ok(stepped) } else { answer.outcome().map(|_| stepped) };
         }
         let StepResults { event, terminate, early, last } = answer.outcome()?;

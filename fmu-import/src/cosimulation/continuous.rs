@@ -8,7 +8,7 @@ use super::exchange::{Exchange, Inputs};
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
 use super::method::Integration;
-use super::run::{Ended, Point};
+use super::run::{Ended, Point, end};
 use crate::integration::{Driver, Hybrid, Trial};
 use crate::{CompletedStep, Error, Instance, Update};
 use std::ops::{ControlFlow, Range};
@@ -233,6 +233,8 @@ pub(super) fn run(
         }
         if flow.is_break() {
             ended.by = fmus.ended_by.map(|i| fmus.instances[i].name().to_owned());
+            let last = driver.point().0;
+            end(fmus.instances, fmus.exchange, row, hook, (index, last), &mut ended)?;
             break;
         }
         ended.time = time;

@@ -10,7 +10,7 @@
 use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
-use super::run::{Ended, Point};
+use super::run::{Ended, Point, end};
 use crate::{Error, FmuState, Instance, Kind, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
@@ -192,14 +192,16 @@ pub(super) fn run(
         if flow.is_break() || index == grid.steps() {
             break;
         }
-        let end = grid.time(index + 1);
+        let point = grid.time(index + 1);
         let mut t = time;
-        while t < end {
+        while t < point {
             let next = fmus.with_events.iter().filter_map(|&i| fmus.outcomes[i].next).fold(f64::INFINITY, f64::min);
-            let to = if next < end - near { next.max(t) } else { end };
-            let h = if (t, to) == (time, end) { grid.size(index) } else { to - t };
+            let to = if next < point - near { next.max(t) } else { point };
+            let h = if (t, to) == (time, point) { grid.size(index) } else { to - t };
             let reached = if h > 0.0 { fmus.step(t, to, h)? } else { t };
-            if fmus.ended_by.is_some() {
+            if let Some(by) = fmus.ended_by {
+                let last = fmus.stepped[by].last.min(to);
+                end(fmus.instances, fmus.exchange, row, hook, (index + 1, last), &mut ended)?;
                 break 'run;
             }
             stops = if reached > t + near { 0 } else { stops + 1 };
@@ -210,9 +212,10 @@ pub(super) fn run(
             if fmus.event_is_due(t) {
                 fmus.event(t, false)?;
                 if fmus.ended_by.is_some() {
+                    end(fmus.instances, fmus.exchange, row, hook, (index + 1, t), &mut ended)?;
                     break 'run;
                 }
-            } else if t < end {
+            } else if t < point {
                 fmus.exchange.pass_on_once(fmus.instances, t, &[])?;
             }
         }

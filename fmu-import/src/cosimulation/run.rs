@@ -81,6 +81,25 @@ pub(super) fn simulate(
     Ok(ended)
 }
 
+/// The last point of a run that an instance has ended after the point `ended`: outputs are read, nothing is set.
+pub(super) fn end(
+    instances: &mut [Instance],
+    exchange: &mut Exchange,
+    row: &mut Vec<f64>,
+    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    (index, time): (u32, f64),
+    ended: &mut Ended,
+) -> Result<(), Error> {
+    if time > ended.time {
+        ended.time = time;
+        exchange.read_all(instances)?;
+        exchange.row(time, row);
+        // The run is over, whatever the hook says.
+        hook(&mut Point { index, time, values: row, instances, touched: false }).map(drop)?;
+    }
+    Ok(())
+}
+
 /// Steps instances that are initialized.
 fn step(
     instances: &mut [Instance],
@@ -90,7 +109,7 @@ fn step(
     hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
-    let mut ended = Ended { time: settings.start, by: None };
+    let (mut ended, mut last) = (Ended { time: settings.start, by: None }, f64::INFINITY);
     for index in 0..=grid.steps() {
         let time = grid.time(index);
         ended.time = time;
@@ -108,6 +127,8 @@ fn step(
                 exchange.write(i, instance, time)?;
             }
             if instance.do_step(time, grid.size(index))?.is_break() {
+                let of_step = || grid.time(index + 1);
+                last = instance.last_successful_time().unwrap_or_else(|_| of_step()).min(of_step()).min(last);
                 ended.by = Some(instance.name().into());
             }
             if settings.sequential {
@@ -115,6 +136,7 @@ fn step(
             }
         }
         if ended.by.is_some() {
+            end(instances, exchange, row, hook, (index + 1, last), &mut ended)?;
             break;
         }
     }

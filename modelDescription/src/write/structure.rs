@@ -91,7 +91,7 @@ impl<'a> Numbering<'a> {
                 index += 1;
                 let number = if version == FmiVersion::V2 { index } else { v.value_reference };
                 numbers.push(number);
-                if v.causality.is_settable() || states.contains(&reference) {
+                if v.takes_start() || states.contains(&reference) {
                     known.insert(reference, number);
                 }
             }

@@ -145,8 +145,10 @@ fn clock(v: &Variable, timing: &Timing) -> Element {
 
 /// The properties of the variable that do not depend on its base type.
 fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> Element {
+    let exact = v.exact || v.variability == Variability::Constant;
     let (causality, initial) = match v.causality {
-        Causality::Local if v.variability == Variability::Constant => ("local", Some("exact")),
+        Causality::Local if exact => ("local", Some("exact")),
+        Causality::Output if exact => ("output", Some("exact")),
         Causality::Parameter => ("parameter", Some("exact")),
         Causality::CalculatedParameter => ("calculatedParameter", Some("calculated")),
         // FMI 2.0 forbids `initial` on an input, FMI 3.0 allows only the default.

@@ -56,6 +56,7 @@ pub(crate) fn variable(
         nominal: None,
         unbounded: false,
         shape: Vec::new(),
+        exact: false,
         start: None,
         initial_dependencies: None,
         dependencies: None,
@@ -139,7 +140,8 @@ pub(crate) fn sample() -> Description {
         license: "MIT OR Apache-2.0".into(),
         copyright: "\u{a9} 2026".into(),
         token: "{01234567-89ab-cdef-0123-456789abcdef}".into(),
-        experiment: Experiment { start: 0.0, stop: 2.0, step: 1e-4 },
+        experiment: Experiment { stop: 2.0, step: 1e-4, ..Experiment::DEFAULT },
+        categories: Vec::new(),
         documentation: String::new(),
         variables,
         terminals: terminals(),
@@ -181,6 +183,7 @@ pub(crate) fn exchange_sample() -> Description {
         event_mode: false,
         completed_steps: true,
         scheduled: false,
+        only: false,
     };
     Description { name: "Exchange".into(), model_exchange: Some(exchange), ..description }
 }
@@ -194,6 +197,7 @@ pub(crate) fn sampled_sample() -> Description {
         event_mode: true,
         completed_steps: false,
         scheduled: false,
+        only: false,
     };
     let mut description = sample();
     for v in description.variables.iter_mut().filter(|v| v.causality == Causality::Output) {

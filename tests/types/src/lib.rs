@@ -126,7 +126,7 @@ impl Model for EveryType {
         author: "The tests",
         license: "MIT OR Apache-2.0",
         copyright: "None",
-        experiment: Experiment { start: 0.0, stop: 1.0, step: 0.1 },
+        experiment: Experiment { stop: 1.0, step: 0.1, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
 

@@ -29,7 +29,7 @@ impl Model for Clocks {
     const INFO: Info = Info {
         name: "Clocks",
         description: "This model demonstrates clocks and Scheduled Execution",
-        experiment: Experiment { start: 0.0, stop: 10.0, step: 1.0 },
+        experiment: Experiment { stop: 10.0, step: 1.0, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![

@@ -68,7 +68,7 @@ impl Model for Feedthrough {
         author: env!("CARGO_PKG_AUTHORS"),
         license: env!("CARGO_PKG_LICENSE"),
         copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
-        experiment: Experiment { start: 0.0, stop: 2.0, step: 0.1 },
+        experiment: Experiment { stop: 2.0, step: 0.1, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
 

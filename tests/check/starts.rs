@@ -1,0 +1,56 @@
+//! Start values that the importer sets, and the end of the simulation: faults of a small C FMU.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+use crate::binary::{compile, pack, pack_with};
+use crate::{check, told, violated};
+use fmu_check::Verdict;
+
+/// The descriptions with an output that starts exactly.
+fn exact(version: u8) -> String {
+    if version == 2 {
+        let xml = include_str!("fmu.xml").replace(
+            "name=\"y\" valueReference=\"3\" causality=\"output\" variability=\"continuous\" initial=\"calculated\"><Real/>",
+            "name=\"y\" valueReference=\"3\" causality=\"output\" variability=\"continuous\" initial=\"exact\"><Real start=\"0\"/>",
+        );
+        xml.replace("      <Unknown index=\"4\" dependencies=\"\"/>\n", "")
+    } else {
+        let xml = include_str!("fmu3.xml")
+            .replace("initial=\"calculated\" unit=\"m\"", "initial=\"exact\" unit=\"m\" start=\"0\"");
+        xml.replace("    <InitialUnknown valueReference=\"3\" dependencies=\"\"/>\n", "")
+    }
+}
+
+#[test]
+fn starts_stand() {
+    let dir = tempfile::tempdir().unwrap();
+    for version in [2, 3] {
+        let xml = exact(version);
+        assert!(xml.matches("exact").count() == 5, "{xml}");
+        for (fault, ids) in
+            [("NONE", &[][..]), ("G09i", &["G09"]), ("G09e", &["G09"]), ("G09x", &["G09"]), ("G09r", &["L06", "G09"])]
+        {
+            let Some(binary) = compile(dir.path(), version, fault, &["-DSTARTS"]) else { return };
+            let report = check(&pack_with(dir.path(), fault, &xml, &binary), &[]);
+            assert_eq!(violated(&report), ids, "FMI {version}, {fault}: {}", told(&report));
+        }
+        let report =
+            check(&pack(dir.path(), version, "NONE", &compile(dir.path(), version, "NONE", &[]).unwrap()), &["G09"]);
+        assert!(matches!(report.finding("G09").unwrap().verdict, Verdict::NotApplicable(_)));
+    }
+}
+
+#[test]
+fn the_end_is_told_and_no_step_follows() {
+    let dir = tempfile::tempdir().unwrap();
+    for version in [2, 3] {
+        for (fault, ids) in [("ENDS", &[][..]), ("T12t", &["T12"]), ("T12e", &["L00"]), ("T12s", &["T12s"])] {
+            // FMI 3.0 has the time in the step itself: T06a looks at it.
+            if (version, fault) == (3, "T12t") {
+                continue;
+            }
+            let Some(binary) = compile(dir.path(), version, fault, &[]) else { return };
+            let report = check(&pack(dir.path(), version, fault, &binary), &["time", "lifecycle"]);
+            assert_eq!(violated(&report), ids, "FMI {version}, {fault}: {}", told(&report));
+        }
+    }
+}
