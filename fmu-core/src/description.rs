@@ -57,6 +57,7 @@ pub struct Description {
 
 /// The interface for Model Exchange, and what goes with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 pub struct ModelExchange {
     /// Value references of the states.
     pub states: Vec<u32>,
