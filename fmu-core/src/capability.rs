@@ -11,6 +11,7 @@ use crate::log::Warnings;
 use crate::model::Block;
 use crate::row::Slot;
 use crate::rules::can_be_state;
+use crate::table::WIDE;
 use crate::variable::Meta;
 use crate::{Elapsed, Fault, Hash, Model, Step};
 use std::marker::PhantomData;
@@ -285,9 +286,27 @@ impl<M: Model> Capabilities<M> {
             let named = |index: &usize| M::TABLE.locate(*index).is_some_and(|(name, meta, _)| fits(&name, meta));
             let none =
                 || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
-            (0..M::TABLE.len()).find(named).ok_or_else(none)
+            M::TABLE.indices().find(named).ok_or_else(none)
         };
         self.states().iter().map(row).collect()
+    }
+
+    /// Value reference of an index of the table: one more for those below its length, after which derivatives and event indicators
+    /// follow; the elements of wide arrays come after them.
+    pub fn reference(&self, index: usize) -> u32 {
+        let beside = if index < WIDE { 0 } else { M::TABLE.len() + self.states().len() + self.indicators().len() };
+        u32::try_from(index % WIDE + beside + 1).unwrap_or(u32::MAX)
+    }
+
+    /// The index that has this value reference, where [`reference`](Self::reference) is known to belong to a variable.
+    #[inline]
+    pub const fn index(&self, reference: u32) -> usize {
+        let index = (reference as usize).wrapping_sub(1);
+        if M::TABLE.wide() == 0 {
+            return index;
+        }
+        let beside = M::TABLE.len() + self.states().len() + self.indicators().len();
+        if index >= beside && index < beside + M::TABLE.wide() { index - beside + WIDE } else { index }
     }
 
     /// What variable `index` is, and where the importer's start value of it goes: to the state itself for the row of a state.

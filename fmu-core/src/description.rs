@@ -13,8 +13,9 @@ use crate::need::Need;
 use crate::probe;
 use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
-use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
+use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
@@ -104,6 +105,9 @@ pub struct Variable {
     pub nominal: Option<f64>,
     /// The value is unbounded.
     pub unbounded: bool,
+    /// Other names (FMI 3.0).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub aliases: Vec<AliasDescription>,
     /// Extents of an array, whose elements are row by row; empty for a scalar.
     pub shape: Vec<usize>,
     /// The importer may set the start value of this output or local variable.
@@ -123,6 +127,17 @@ pub struct Variable {
     pub clocks: Vec<u32>,
     /// It can be read or set inside a communication step (FMI 3.0).
     pub intermediate: bool,
+}
+
+/// Another name of a variable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AliasDescription {
+    /// Full name.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// Display unit: name, factor and offset.
+    pub display: Option<(String, f64, f64)>,
 }
 
 /// A base type with its type definition.
@@ -220,8 +235,9 @@ impl Description {
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
         block.initialize();
+        let reference = |index: usize| if index == probe::NOW { TIME } else { can.reference(index) };
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
-        let table = M::TABLE;
+        let (table, wide) = (M::TABLE, probe::wide::<M>().arrays);
         let mut variables: Vec<Variable> = Vec::new();
         let mut needs: Vec<(usize, Need<'static>)> = Vec::new();
         for index in 0..table.len() {
@@ -252,13 +268,13 @@ impl Description {
             });
         }
         for (i, state) in can.states().iter().enumerate() {
-            let index = table.len() + i;
+            let (index, place) = (table.len() + i, table.len() + wide.len() + i);
             let (name, of) = (format!("der({})", state.name), format!("Derivative of {}", state.name));
             let meta = *V::state("", state.rate, "", |m| m).meta();
             variables.push(Variable {
                 description: of,
-                initial_dependencies: references(&initial[index]),
-                dependencies: references(&between[index]),
+                initial_dependencies: references(&initial[place]),
+                dependencies: references(&between[place]),
                 derivative: Some(reference(states[i])),
                 ..variable(name, &meta, reference(index), None)
             });
@@ -268,11 +284,16 @@ impl Description {
             let index = table.len() + can.states().len() + i;
             variables.push(variable(indicator.name.into(), &meta, reference(index), None));
         }
-        for (i, v) in variables.iter().enumerate() {
-            if variables[..i].iter().any(|other| other.name == v.name) {
-                return Err(Fault::new(format!("two variables of {} have the name {}", M::INFO.name, v.name)));
-            }
+        // In the order of the value references.
+        for (place, &extent) in (table.len()..).zip(&wide) {
+            let array = wide_array::<M>(can, &mut block, extent)?;
+            variables.push(Variable {
+                initial_dependencies: references(&initial[place]),
+                dependencies: references(&between[place]),
+                ..array
+            });
         }
+        check_names(M::INFO.name, &variables)?;
         check_types(&variables)?;
         put_on_clocks::<M>(&mut variables, can.clocked.as_ref().is_some_and(|clocked| clocked.feedthrough))?;
         for (i, need) in needs {
@@ -427,6 +448,13 @@ fn join(all: &mut Option<Vec<u32>>, more: Option<Vec<u32>>) {
 }
 
 fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value>) -> Variable {
+    let prefix = name.strip_suffix(meta.name).unwrap_or_default();
+    let alias = |a: &Alias| AliasDescription {
+        name: format!("{prefix}{}", a.name),
+        description: a.description.into(),
+        display: a.display.map(|d| (d.name.into(), d.factor, d.offset)),
+    };
+    let aliases = meta.aliases.iter().map(alias).collect();
     Variable {
         name,
         description: meta.description.into(),
@@ -440,6 +468,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         below: meta.range.below,
         nominal: meta.nominal,
         unbounded: meta.unbounded,
+        aliases,
         shape: match (meta.shape, meta.dimension) {
             ([], n) => n.into_iter().collect(),
             (shape, _) => shape.to_vec(),
@@ -476,11 +505,6 @@ fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, 
         return Err(Fault::new(format!("{input} is read with {} = {value}, a value that it never has", found.name)));
     }
     Ok(Need::With { parameter: &found.name, value }.to_string())
-}
-
-/// Value reference of the table's variable `index`; of `time` for [`probe::NOW`].
-fn reference(index: usize) -> u32 {
-    if index == probe::NOW { TIME } else { u32::try_from(index + 1).unwrap_or(u32::MAX) }
 }
 
 /// Rows of variables that no model holds: derivatives and indicators.
@@ -547,6 +571,35 @@ fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
         return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
     }
     Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+}
+
+/// A wide array, by its first index and its number of elements.
+fn wide_array<M: Model>(
+    can: &Capabilities<M>,
+    block: &mut Block<M>,
+    (first, n): (usize, usize),
+) -> Result<Variable, Fault> {
+    let located = M::TABLE.locate(first);
+    let (name, meta, _) = located.ok_or_else(|| Fault::new(format!("no array at {first}")))?;
+    let mut array = variable(name.clone(), meta, can.reference(first), None);
+    if meta.has_start() {
+        for index in first..first + n {
+            let Some((_, slot)) = M::TABLE.entry(block, index) else { continue };
+            check_start(&name, meta, &slot)?;
+            array.start.get_or_insert_default().push(value(&slot));
+        }
+    }
+    Ok(array)
+}
+
+/// No two variables or aliases have one name.
+fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fault> {
+    let mut names = BTreeSet::new();
+    let all = variables.iter().flat_map(|v| v.aliases.iter().map(|a| &a.name).chain([&v.name]));
+    match all.into_iter().find(|name| !names.insert(name.as_str())) {
+        Some(name) => Err(Fault::new(format!("two variables of {model} have the name {name}"))),
+        None => Ok(()),
+    }
 }
 
 fn check_types(variables: &[Variable]) -> Result<(), Fault> {

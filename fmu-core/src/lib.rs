@@ -133,4 +133,4 @@ pub use table::{Part, Table};
 pub use terminal::{Icon, Member, Terminal};
 pub use time::{Elapsed, SampleGrid, Step};
 pub use token::{Hash, Token};
-pub use variable::{Causality, Enumeration, Item, Kind, Meta, Range, Variability};
+pub use variable::{Alias, Causality, Enumeration, Item, Kind, Meta, Range, Variability};

@@ -47,6 +47,7 @@ pub(crate) enum Access<W: 'static> {
     Clock(Option<fn(&mut W) -> &mut f64>),
     Part {
         len: usize,
+        wide: usize,
         hash: Hash,
         binary: bool,
         node: &'static dyn Node<W>,
@@ -146,6 +147,20 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
 /// ```
 ///
+/// Other names of a variable, of which FMI 2.0 has none:
+///
+/// ```
+/// # use fmu_core::unit::{DisplayUnit, METER};
+/// # use fmu_core::{Alias, Row, Table, table};
+/// # struct Model { h: f64 }
+/// const FOOT: DisplayUnit = DisplayUnit { name: "ft", factor: 1.0 / 0.3048, offset: 0.0 };
+/// const TABLE: &Table<Model> = table![
+///     Row::output("h", &METER, "Height", |m: &mut Model| &mut m.h)
+///         .aliases(&[Alias { name: "h_ft", description: "Height in feet", display: Some(FOOT) }]),
+/// ];
+/// # assert_eq!(TABLE.len(), 1);
+/// ```
+///
 /// Start values that the importer may set ([`exact`](Row::exact)), and constants of every type:
 ///
 /// ```
@@ -218,6 +233,7 @@ impl<W: 'static> Row<W> {
             intermediate: false,
             dimension: None,
             shape: &[],
+            aliases: &[],
         };
         Self { settable: Interval::of(&meta), meta, access }
     }

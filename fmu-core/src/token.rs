@@ -82,6 +82,14 @@ impl Hash {
         if meta.intermediate {
             hash = hash.text("intermediate");
         }
+        i = 0;
+        while i < meta.aliases.len() {
+            hash = hash.text("alias").text(meta.aliases[i].name);
+            if let Some(display) = meta.aliases[i].display {
+                hash = hash.text(display.name);
+            }
+            i += 1;
+        }
         match meta.kind {
             Kind::Real(quantity) => hash.quantity(quantity),
             Kind::Float32(quantity) => hash.text("Float32").quantity(quantity),

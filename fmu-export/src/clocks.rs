@@ -108,7 +108,7 @@ struct Found {
 impl<E: Exported> Instance<E> {
     /// The clock with this reference.
     fn clock(&self, reference: u32) -> Result<Found, Fault> {
-        let wanted = index(reference);
+        let wanted = index::<E>(reference);
         let list = self.clocks.as_ref().map_or(&[][..], |clocks| &clocks.list);
         if let Some(number) = list.iter().position(|(index, ..)| *index == wanted) {
             let (index, timing, ticked_by_importer) = list[number];
@@ -139,7 +139,7 @@ impl<E: Exported> Instance<E> {
             return Ok(());
         }
         let on = |instance: &Self, reference: &u32| {
-            instance.clocks.as_ref().and_then(|clocks| clocks.on.get(index(*reference)).copied()).unwrap_or(0)
+            instance.clocks.as_ref().and_then(|clocks| clocks.on.get(index::<E>(*reference)).copied()).unwrap_or(0)
         };
         if references.iter().all(|reference| on(self, reference) == 0) {
             return Ok(());
@@ -154,7 +154,7 @@ impl<E: Exported> Instance<E> {
             None => Ok(()),
             Some(&closed) => {
                 let (name, clocks) =
-                    (message::name::<E::Model>(index(closed)), E::Model::TABLE.clocks_of(index(closed)));
+                    (message::name::<E::Model>(index::<E>(closed)), E::Model::TABLE.clocks_of(index::<E>(closed)));
                 let which = clocks.replace(' ', " or ");
                 let doing = if sets { "set" } else { "read" };
                 Err(Fault::new(format!(

@@ -57,7 +57,8 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// A variable does not exist.
     pub(crate) fn look_inside(&mut self, required: &[u32]) -> Result<(), Fault> {
-        let last = E::Model::TABLE.len() + E::CAN.states().len() + E::CAN.indicators().len();
+        let table = E::Model::TABLE;
+        let last = table.len() + E::CAN.states().len() + E::CAN.indicators().len() + table.wide();
         if let Some(&reference) = required.iter().find(|&&reference| reference as usize > last) {
             return Err(message::unknown::<E>(reference, self.standard));
         }
@@ -147,7 +148,7 @@ impl<E: Exported> Instance<E> {
             if *reference == TIME && !sets {
                 continue;
             }
-            let name = || message::name::<E::Model>(index(*reference));
+            let name = || message::name::<E::Model>(index::<E>(*reference));
             if !inside.required.contains(reference) {
                 let name = name();
                 return Err(Fault::new(format!(
@@ -178,7 +179,7 @@ impl<E: Exported> Instance<E> {
         for reference in references {
             let (place, rest) = out.split_at_mut(self.elements(*reference)?);
             out = rest;
-            let kept = E::Model::TABLE.locate(index(*reference)).is_some()
+            let kept = E::Model::TABLE.locate(index::<E>(*reference)).is_some()
                 && !is_intermediate::<E>(*reference, Causality::Output);
             self.exchange_outputs(kept);
             let read = self.get(std::slice::from_ref(reference), place);
@@ -197,6 +198,6 @@ impl<E: Exported> Instance<E> {
 
 /// Whether a variable is marked so.
 fn is_intermediate<E: Exported>(reference: u32, causality: Causality) -> bool {
-    let found = E::Model::TABLE.locate(index(reference));
+    let found = E::Model::TABLE.locate(index::<E>(reference));
     found.is_some_and(|(_, meta, _)| meta.intermediate && meta.causality == causality)
 }

@@ -84,7 +84,7 @@ impl<E: Exported> Instance<E> {
     pub fn new(standard: Standard, name: String, log: Log, current: Snapshot<E::Model>) -> Self {
         let table = E::Model::TABLE;
         let arrays = standard == Standard::Fmi3
-            && (0..table.len()).any(|i| table.locate(i).is_some_and(|(_, meta, _)| meta.dimension.is_some()));
+            && table.indices().any(|i| table.locate(i).is_some_and(|(_, meta, _)| meta.dimension.is_some()));
         let info = E::Model::INFO;
         log.event(|| format!("{name}: instance of {} {}", info.name, info.version));
         // A state without a row has no reference; `fmu build` refuses such a model.

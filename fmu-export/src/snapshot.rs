@@ -121,7 +121,7 @@ impl<M: Model> Snapshot<M> {
     /// # Errors
     /// Names the first variable that is not, its value and what is allowed.
     pub fn check(&mut self) -> Result<(), Fault> {
-        for index in 0..M::TABLE.len() {
+        for index in M::TABLE.indices() {
             let Some((meta, slot)) = M::TABLE.entry(&mut self.block, index) else { continue };
             let set = matches!(meta.causality, Causality::Input | Causality::Parameter);
             let refused = match &slot {

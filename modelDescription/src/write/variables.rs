@@ -95,13 +95,19 @@ fn variable(v: &Variable) -> Element {
     let starts: Option<Vec<String>> =
         v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
     let dimensions = v.shape.iter().map(|n| Element::new("Dimension").with("start", n.to_string()));
+    let aliases = v.aliases.iter().map(|alias| {
+        Element::new("Alias")
+            .with("name", &alias.name)
+            .with_text("description", &alias.description)
+            .with_some("displayUnit", alias.display.as_ref().map(|(name, ..)| name.as_str()))
+    });
     if matches!(v.kind, VariableKind::Text | VariableKind::Binary { .. }) {
         let starts = starts.into_iter().flatten().map(|value| Element::new("Start").with("value", value));
-        return element.children(dimensions).children(starts);
+        return element.children(dimensions).children(starts).children(aliases);
     }
     let state = v.derivative.map(|reference| reference.to_string());
     let start = starts.map(|all| all.join(" "));
-    element.with_some("derivative", state).with_some("start", start).children(dimensions)
+    element.with_some("derivative", state).with_some("start", start).children(dimensions).children(aliases)
 }
 
 /// The value references of the clocks that a variable is on.

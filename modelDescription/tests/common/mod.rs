@@ -43,6 +43,7 @@ pub(crate) fn variable(
     kind: VariableKind,
 ) -> Variable {
     Variable {
+        aliases: Vec::new(),
         name: name.into(),
         description: format!("The variable {name}"),
         value_reference,
