@@ -181,9 +181,50 @@ fn models() -> Vec<Wrong> {
     ]
 }
 
+/// Clocks.
+fn clocks() -> Vec<Wrong> {
+    const EXPORT: usize = 26;
+    vec![
+        row(
+            "still",
+            r#"V::clock("c", "", fmu_core::Clock::constant(0.0))"#,
+            "c: the interval of a clock is greater than 0",
+            5,
+        ),
+        row(
+            "moved",
+            r#"V::clock("c", "", fmu_core::Clock::triggered()).shift(1.0)"#,
+            "c: only a clock with a period",
+            5,
+        ),
+        row(
+            "unmoved",
+            r#"V::parameter("x", &VOLT, "", |m| &mut m.u).on("c")"#,
+            "x: only a variable that changes can be on a clock",
+            5,
+        ),
+        model("tickless", ("Ball: ContinuousTime", "Ball: ContinuousTime + Clocked"), "`Ball` has no clocks", EXPORT),
+        model(
+            "unticked",
+            (r#"V::state("h","#, "V::clock(\"c\", \"\", Clock::triggered()),\n        V::state(\"h\","),
+            "Ball: a row V::clock needs the capability Clocked",
+            EXPORT + 1,
+        ),
+        model(
+            "adrift",
+            (
+                r#"V::state("h","#,
+                "V::output(\"y\", &METER, \"\", |m| &mut m.model.v).on(\"c\"),\n        V::state(\"h\",",
+            ),
+            "y: the table has no clock of the name that it is on",
+            EXPORT + 1,
+        ),
+    ]
+}
+
 #[test]
 fn a_wrong_row_or_model_is_an_error_at_its_place() {
-    let cases: Vec<Wrong> = rows().into_iter().chain(models()).collect();
+    let cases: Vec<Wrong> = rows().into_iter().chain(models()).chain(clocks()).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compile_errors");
     let sources = folder.join("src/bin");

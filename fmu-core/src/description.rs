@@ -6,6 +6,7 @@ pub use terminals::{MemberDescription, TerminalDescription, TerminalPicture};
 
 use crate::Fault;
 use crate::capability::{Capabilities, Exported};
+use crate::clock::Timing;
 use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
 use crate::need::Need;
@@ -57,6 +58,7 @@ pub struct Description {
 
 /// The interface for Model Exchange, and what goes with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 pub struct ModelExchange {
     /// Value references of the states.
     pub states: Vec<u32>,
@@ -68,6 +70,8 @@ pub struct ModelExchange {
     pub event_mode: bool,
     /// The importer must call `CompletedIntegratorStep`.
     pub completed_steps: bool,
+    /// Scheduled Execution (FMI 3.0).
+    pub scheduled: bool,
     /// There is no Co-Simulation.
     #[serde(default)]
     pub only: bool,
@@ -119,6 +123,8 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// A state that an event may change.
     pub reinit: bool,
+    /// Value references of the clocks that it is on.
+    pub clocks: Vec<u32>,
     /// It can be read or set inside a communication step (FMI 3.0).
     pub intermediate: bool,
 }
@@ -170,6 +176,8 @@ pub enum VariableKind {
     },
     /// A text.
     Text,
+    /// A clock; its start value is the interval in s, if the importer may set it.
+    Clock(Timing),
     /// Bytes.
     Binary {
         /// MIME type of the content.
@@ -235,7 +243,7 @@ impl Description {
         for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
-            let start = meta.has_start().then(|| value(&slot));
+            let start = (meta.has_start() && !matches!(slot, Slot::Clock(None))).then(|| value(&slot));
             if start.is_some() {
                 check_start(&name, meta, &slot)?;
             }
@@ -287,6 +295,7 @@ impl Description {
         }
         check_names(M::INFO.name, &variables)?;
         check_types(&variables)?;
+        put_on_clocks::<M>(&mut variables, can.clocked.as_ref().is_some_and(|clocked| clocked.feedthrough))?;
         for (i, need) in needs {
             let words = words(&variables[i].name, need, &variables)?;
             variables[i].description += &words;
@@ -300,6 +309,7 @@ impl Description {
             indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
             event_mode: can.event_mode(),
             completed_steps: can.complete.is_some(),
+            scheduled: can.scheduled,
             only: can.exchange_only,
         });
         let info = M::INFO;
@@ -330,13 +340,61 @@ impl Description {
     /// Why there can be no archive of FMI 2.0, if there cannot.
     pub fn needs_fmi3(&self) -> Option<String> {
         let binary = |v: &&Variable| matches!(v.kind, VariableKind::Binary { .. });
-        self.variables.iter().find(binary).map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name))
+        let of_bytes = self.variables.iter().find(binary);
+        let clock = self.variables.iter().find(|v| matches!(v.kind, VariableKind::Clock(_)));
+        let bytes = of_bytes.map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name));
+        bytes.or_else(|| clock.map(|v| format!("{} is a clock, and FMI 2.0 has no clocks", v.name)))
     }
 
     /// The variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
     }
+}
+
+/// The clocks of every variable. What is on a clock has no value before its first tick, and between events depends on the ticks.
+fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Result<(), Fault> {
+    let clocks: Vec<(String, u32, Causality)> = variables
+        .iter()
+        .filter(|v| matches!(v.kind, VariableKind::Clock(_)))
+        .map(|v| (v.name.clone(), v.value_reference, v.causality))
+        .collect();
+    if clocks.is_empty() {
+        return Ok(());
+    }
+    for v in variables.iter_mut() {
+        let Some(index) = v.value_reference.checked_sub(1) else { continue };
+        for name in M::TABLE.clocks_of(index as usize).split_whitespace() {
+            let found = clocks.iter().find(|(clock, ..)| clock == name);
+            let none = || Fault::new(format!("{} is on the clock {name}, which does not exist", v.name));
+            v.clocks.push(found.ok_or_else(none)?.1);
+        }
+        if !v.clocks.is_empty() && v.variability == Variability::Continuous {
+            v.variability = Variability::Discrete;
+        }
+    }
+    let inputs: Vec<(u32, Vec<u32>)> = variables
+        .iter()
+        .filter(|v| v.causality == Causality::Input && !v.clocks.is_empty() && feedthrough)
+        .filter(|v| !matches!(v.kind, VariableKind::Clock(_)))
+        .map(|v| (v.value_reference, v.clocks.clone()))
+        .collect();
+    let ticked = || clocks.iter().filter(|(.., causality)| *causality == Causality::Input).map(|(_, of, _)| *of);
+    for v in variables.iter_mut() {
+        let clock = matches!(v.kind, VariableKind::Clock(_));
+        if !clock && v.clocks.is_empty() {
+            continue;
+        }
+        v.initial_dependencies = None;
+        if v.causality == Causality::Output {
+            let mut on = if v.clocks.is_empty() { ticked().collect() } else { v.clocks.clone() };
+            let read = inputs.iter().filter(|(_, clocks)| clocks.iter().any(|clock| on.contains(clock)));
+            let read: Vec<u32> = read.map(|(input, _)| *input).collect();
+            on.extend(read);
+            v.dependencies = Some(on);
+        }
+    }
+    Ok(())
 }
 
 /// A variable of a table that the model shares with another one, as this model has it.
@@ -421,6 +479,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         dependencies: None,
         derivative: None,
         reinit: false,
+        clocks: Vec::new(),
         intermediate: meta.intermediate,
     }
 }
@@ -460,6 +519,7 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Enumeration(x) => Value::Integer(x.get().into()),
         Slot::Text(x) => Value::Text((*x).clone()),
         Slot::Said(x) => Value::Text((*x).into()),
+        Slot::Clock(x) => Value::Real(x.as_ref().map_or(f64::NAN, |x| **x)),
         Slot::Constant(Constant::Real(x)) => Value::Real(*x),
         Slot::Constant(Constant::Float32(x)) => Value::Real((*x).into()),
         Slot::Constant(Constant::Integer(x)) => Value::Integer(*x),
@@ -484,6 +544,7 @@ fn kind(kind: &Kind) -> VariableKind {
         Kind::Integer(of) => VariableKind::Integer(*of),
         Kind::Boolean => VariableKind::Boolean,
         Kind::Text => VariableKind::Text,
+        Kind::Clock(timing) => VariableKind::Clock(*timing),
         Kind::Binary { mime_type, most } => VariableKind::Binary { mime_type: (*mime_type).into(), most: *most },
         Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
             name: (*name).into(),

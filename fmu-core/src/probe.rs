@@ -306,7 +306,7 @@ fn change_one<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[u
                 x.set(other);
             }
         }
-        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Constant(_) => {}
+        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Constant(_) | Slot::Clock(_) => {}
     }
 }
 

@@ -25,6 +25,7 @@ pub(crate) trait Node<W>: Sync {
     fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
+    fn clocks_of(&self, index: usize) -> &'static str;
 }
 
 /// Where the value lives.
@@ -42,7 +43,15 @@ pub(crate) enum Access<W: 'static> {
     ConstantText(&'static str),
     Constant(Constant),
     Constants(&'static [f64]),
-    Part { len: usize, wide: usize, hash: Hash, binary: bool, node: &'static dyn Node<W> },
+    /// A clock, and where its interval is.
+    Clock(Option<fn(&mut W) -> &mut f64>),
+    Part {
+        len: usize,
+        wide: usize,
+        hash: Hash,
+        binary: bool,
+        node: &'static dyn Node<W>,
+    },
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
@@ -220,6 +229,7 @@ impl<W: 'static> Row<W> {
             mean: false,
             exact: false,
             need: Need::Always,
+            clocks: "",
             intermediate: false,
             dimension: None,
             shape: &[],

@@ -4,12 +4,13 @@
 //! array, of more than [`DENSE`] elements, has indices of its own, from [`WIDE`] on, and is found by a scan.
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
+use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::reals::Inputs;
 use crate::row::{Access, Constant, Node, Row, Slot};
 use crate::rules::{demand, same_text};
 use crate::token::Hash;
-use crate::variable::{Kind, Meta};
+use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::ptr;
@@ -53,6 +54,10 @@ impl<W, P> Node<W> for Part<W, P> {
 
     fn element(&self, index: usize) -> Option<usize> {
         self.table.element(index)
+    }
+
+    fn clocks_of(&self, index: usize) -> &'static str {
+        self.table.clocks_of(index)
     }
 }
 
@@ -131,6 +136,9 @@ impl<W: 'static> Table<W> {
                 (Access::Part { len, wide, hash: of_part, binary: of_bytes, .. }, _) => {
                     binary |= *of_bytes;
                     hash = hash.text(meta.name).join(of_part);
+                    if !meta.clocks.is_empty() {
+                        hash = hash.text("on").text(meta.clocks);
+                    }
                     (*len, *wide)
                 }
                 (_, dimension) => {
@@ -160,6 +168,21 @@ impl<W: 'static> Table<W> {
             row += 1;
         }
         Self { rows, places, len, wide_places, wide, hash, binary, intermediate }
+    }
+
+    /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
+    pub const fn announces(&self) -> bool {
+        let mut row = 0;
+        while row < self.rows.len() {
+            if let Kind::Clock(timing) = self.rows[row].meta.kind
+                && (matches!(self.rows[row].meta.causality, Causality::Output)
+                    || matches!(timing.ticks, Ticks::Countdown))
+            {
+                return true;
+            }
+            row += 1;
+        }
+        false
     }
 
     /// Every index: those below [`len`](Self::len), then those of wide arrays from [`WIDE`] on.
@@ -210,6 +233,7 @@ impl<W: 'static> Table<W> {
             Access::List(items) => items.find(whole, usize::from(place.inner))?,
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
+            Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
             Access::Binary(get) => Slot::Binary(get(whole)),
             Access::ConstantText(text) => Slot::Said(text),
             Access::Constant(x) => Slot::Constant(*x),
@@ -252,6 +276,28 @@ impl<W: 'static> Table<W> {
         }
     }
 
+    /// Names of the clocks that variable `index` is on, with spaces between them; empty for none. A part that is on a clock has its
+    /// variables on it, but for parameters.
+    pub fn clocks_of(&self, index: usize) -> &'static str {
+        let Some(place) = self.places[..self.len].get(index) else { return "" };
+        let row = &self.rows[usize::from(place.row)];
+        match &row.access {
+            Access::Part { node, .. } => {
+                let inner = node.clocks_of(usize::from(place.inner));
+                let changes = || {
+                    let found = node.locate(usize::from(place.inner), &mut String::new());
+                    found.is_some_and(|(meta, _)| {
+                        matches!(meta.causality, Causality::Input | Causality::Output | Causality::Local)
+                            && !matches!(meta.kind, Kind::Clock(_))
+                            && meta.variability != Variability::Constant
+                    })
+                };
+                if inner.is_empty() && !row.meta.clocks.is_empty() && changes() { row.meta.clocks } else { inner }
+            }
+            _ => row.meta.clocks,
+        }
+    }
+
     /// Full name and description of variable `index`, and which element of an array it is (0 for a scalar).
     pub fn locate(&self, index: usize) -> Option<(String, &'static Meta, usize)> {
         let mut name = String::new();
@@ -282,6 +328,7 @@ impl<W: 'static> Table<W> {
                 Slot::Boolean(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Enumeration(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Text(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Clock(x) => x.map(|x| ptr::from_ref(x).addr()),
                 Slot::Binary(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Said(_) | Slot::Constant(_) => None,
             });

@@ -1,5 +1,6 @@
 //! The properties of a variable except the location of its value: causality, variability, type, range.
 
+use crate::clock::Timing;
 use crate::integer::IntegerType;
 use crate::need::Need;
 use crate::unit::{DisplayUnit, Quantity};
@@ -81,6 +82,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
     /// A text.
     Text,
+    /// A clock (FMI 3.0).
+    Clock(Timing),
     /// Bytes (FMI 3.0).
     Binary {
         /// MIME type of the content.
@@ -172,6 +175,8 @@ pub struct Meta {
     pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
+    /// Names of the clocks that it is on, with spaces between them; empty for none.
+    pub clocks: &'static str,
     /// It can be read or set inside a communication step; of a part, that one of its variables can.
     pub intermediate: bool,
     /// Number of elements of an array, `None` for a scalar.

@@ -30,8 +30,8 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
             _ => true,
         },
         Causality::Parameter => match state {
-            State::Step | State::Event | State::Ended => meta.variability == Variability::Tunable,
-            State::Continuous | State::Intermediate => false,
+            State::Step | State::Event | State::Activation | State::Ended => meta.variability == Variability::Tunable,
+            State::Continuous | State::Intermediate | State::ClockUpdate => false,
             _ => true,
         },
         _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),
@@ -143,7 +143,8 @@ impl<E: Exported> Instance<E> {
         // In Step Mode, the model reads inputs directly.
         if state != State::Step && !references.is_empty() {
             self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
-            self.stale |= self.exchanges() && matches!(state, State::Event | State::Continuous);
+            self.stale |= (self.exchanges() || const { E::CAN.clocked.is_some() })
+                && matches!(state, State::Event | State::Continuous);
         }
         Ok(())
     }

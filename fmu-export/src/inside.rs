@@ -33,7 +33,7 @@ pub(crate) struct Parts {
 
 /// The importer is to be called.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Update {
+pub struct Pause {
     /// Time in s.
     pub time: f64,
     /// It may end the step.
@@ -46,7 +46,7 @@ pub type Reply = Option<f64>;
 /// What follows a part of a step.
 pub(crate) enum Then {
     /// The importer is called, and the step goes on.
-    Call(Update),
+    Call(Pause),
     /// The step is done.
     Done(Stepped),
 }
@@ -135,7 +135,7 @@ impl<E: Exported> Instance<E> {
         self.current.elapsed = next;
         self.current.end = if last { parts.end } else { (parts.t + parts.done * h).min(parts.end) };
         parts.stepped.early = early;
-        Ok(Then::Call(Update { time: self.current.end, can_return: self.early_return }))
+        Ok(Then::Call(Pause { time: self.current.end, can_return: self.early_return }))
     }
 
     /// Refuses variables that the importer did not ask for at instantiation, and to set those that are not intermediate.

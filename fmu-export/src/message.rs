@@ -40,6 +40,7 @@ fn kind(kind: &Kind) -> String {
         Kind::Boolean => "a truth value".into(),
         Kind::Enumeration(_) => "an enumeration".into(),
         Kind::Text => "a text".into(),
+        Kind::Clock(_) => "a clock".into(),
         Kind::Binary { .. } => "bytes".into(),
     }
 }
@@ -173,5 +174,6 @@ pub(crate) fn made_for(interface: Interface) -> &'static str {
         Interface::CoSimulation => "for Co-Simulation without Event Mode",
         Interface::EventMode => "for Co-Simulation with Event Mode",
         Interface::ModelExchange => "for Model Exchange",
+        Interface::ScheduledExecution => "for Scheduled Execution",
     }
 }

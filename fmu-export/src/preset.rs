@@ -149,6 +149,7 @@ fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
         }
         Slot::Text(x) => text.clone_into(x),
         Slot::Said(_) | Slot::Constant(_) => return Err("a value that the model gives".into()),
+        Slot::Clock(_) => return Err("a clock".into()),
         Slot::Binary(x) => x.set(&Bytes::from_hex(text).ok_or("pairs of hexadecimal digits")?),
     }
     if slot.is_allowed(meta) { Ok(()) } else { Err(allowed()) }
