@@ -223,6 +223,7 @@ fn unit(v: &Variable) -> String {
         VariableKind::Integer(of) if *of == IntegerType::Int32 => "<small>integer</small>".into(),
         VariableKind::Integer(of) => format!("<small>integer, {}</small>", of.name()),
         VariableKind::Text => "<small>text</small>".into(),
+        VariableKind::Clock(_) => "<small>clock, s</small>".into(),
         VariableKind::Binary { mime_type, most } => {
             format!("<small>bytes, at most {most}: {}</small>", escape(mime_type))
         }

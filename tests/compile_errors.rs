@@ -65,11 +65,9 @@ fn enumeration(name: &'static str, derive: &str, rest: &str, why: &'static str, 
     Wrong { name, source, why, line }
 }
 
-#[test]
-fn a_wrong_row_or_model_is_an_error_at_its_place() {
-    const EXPORT: usize = 26;
-    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
-    let cases = [
+/// Tables with a wrong row.
+fn rows() -> Vec<Wrong> {
+    vec![
         row(
             "bound",
             r#"V::boolean_input("on", "", |m| &mut m.on).at_least(0.0)"#,
@@ -117,6 +115,14 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
         // These two show in the table, whose start is in line 3.
         row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
         row("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
+    ]
+}
+
+/// Wrong models and enumerations.
+fn models() -> Vec<Wrong> {
+    const EXPORT: usize = 26;
+    let state = |wrong: &'static str| ("State::new(\"h\"", wrong);
+    vec![
         model("hyphen", (r#"name: "Ball""#, r#"name: "My-Ball""#), "My-Ball: INFO.name must be a C identifier", EXPORT),
         model("digit", (r#"name: "Ball""#, r#"name: "2Balls""#), "2Balls: INFO.name must be a C identifier", EXPORT),
         model("nameless", (r#"name: "Ball", "#, ""), ": INFO.name must be a C identifier", EXPORT),
@@ -172,7 +178,53 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
         model("events", ("Ball: ContinuousTime", "Ball: ContinuousTime + Events"), "`Ball` has no events", EXPORT),
         enumeration("unmarked", "#[derive(Default)]", "fn main() {}", "no `#[default]`", 2),
         enumeration("start", "", "#[derive(Default)]\nstruct M { fan: Fan }", "`Fan: Default` is not satisfied", 9),
-    ];
+    ]
+}
+
+/// Clocks.
+fn clocks() -> Vec<Wrong> {
+    const EXPORT: usize = 26;
+    vec![
+        row(
+            "still",
+            r#"V::clock("c", "", fmu_core::Clock::constant(0.0))"#,
+            "c: the interval of a clock is greater than 0",
+            5,
+        ),
+        row(
+            "moved",
+            r#"V::clock("c", "", fmu_core::Clock::triggered()).shift(1.0)"#,
+            "c: only a clock with a period",
+            5,
+        ),
+        row(
+            "unmoved",
+            r#"V::parameter("x", &VOLT, "", |m| &mut m.u).on("c")"#,
+            "x: only a variable that changes can be on a clock",
+            5,
+        ),
+        model("tickless", ("Ball: ContinuousTime", "Ball: ContinuousTime + Clocked"), "`Ball` has no clocks", EXPORT),
+        model(
+            "unticked",
+            (r#"V::state("h","#, "V::clock(\"c\", \"\", Clock::triggered()),\n        V::state(\"h\","),
+            "Ball: a row V::clock needs the capability Clocked",
+            EXPORT + 1,
+        ),
+        model(
+            "adrift",
+            (
+                r#"V::state("h","#,
+                "V::output(\"y\", &METER, \"\", |m| &mut m.model.v).on(\"c\"),\n        V::state(\"h\",",
+            ),
+            "y: the table has no clock of the name that it is on",
+            EXPORT + 1,
+        ),
+    ]
+}
+
+#[test]
+fn a_wrong_row_or_model_is_an_error_at_its_place() {
+    let cases: Vec<Wrong> = rows().into_iter().chain(models()).chain(clocks()).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compile_errors");
     let sources = folder.join("src/bin");

@@ -19,7 +19,11 @@ fn lasting(xml: &str) -> String {
 }
 
 fn check(model: &str) {
-    for (folder, version) in [("fmi2", "2.0"), ("fmi3", "3.0")] {
+    check_of(model, &[("fmi2", "2.0"), ("fmi3", "3.0")]);
+}
+
+fn check_of(model: &str, standards: &[(&str, &str)]) {
+    for (folder, version) in standards {
         let archive = common::archives().join(folder).join(format!("{model}.fmu"));
         let (_, files) = fmu_import::contents(&archive).unwrap();
         let xml = lasting(std::str::from_utf8(&files["modelDescription.xml"]).unwrap());
@@ -43,6 +47,12 @@ fn plant() {
 #[test]
 fn controller() {
     check("SensorlessController");
+}
+
+/// Clocks exist in FMI 3.0 only.
+#[test]
+fn clocked_controller() {
+    check_of("SensorlessControllerClocked", &[("fmi3", "3.0")]);
 }
 
 #[test]

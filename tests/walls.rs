@@ -21,6 +21,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("drive-study", &["drive", "fmu-core", "fmu-import", "fmu-plot"]),
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
+    ("sensorless-controller-clocked", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("pmsm-drive-mean", &["drive", "fmu-export"]),
     ("fmurun", &["fmu-import", "fmu-sweep", "model-description"]),

@@ -20,6 +20,7 @@ pub mod steady;
 mod terminals;
 
 pub use drive_base::{frame, integrate, math, modulation, motor};
+pub use drive_control::clocked::SensorlessControllerClocked;
 pub use drive_control::model::SensorlessController;
 pub use drive_control::{self as control, estimator};
 pub use drive_plant::{self as plant, PmsmPlant};

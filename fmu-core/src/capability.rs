@@ -3,6 +3,7 @@
 //! A capability is a trait of its own, named in the line that exports the model. What a model does not name costs it
 //! nothing: its entry is `None`, known to the compiler.
 
+use crate::clock::Clocked;
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 use crate::events::{EventMode, Events, Indicator, Next, Outcome, Sampled, Stop};
 use crate::intermediate::Intermediate;
@@ -10,6 +11,7 @@ use crate::log::Warnings;
 use crate::model::Block;
 use crate::row::Slot;
 use crate::rules::can_be_state;
+use crate::table::WIDE;
 use crate::variable::Meta;
 use crate::{Elapsed, Fault, Hash, Model, Step};
 use std::marker::PhantomData;
@@ -63,6 +65,20 @@ pub struct Samples<M: Model> {
     pub bounded: fn(&M, Elapsed) -> Result<(), Fault>,
 }
 
+/// The functions of [`Clocked`].
+pub struct ClockFunctions<M: Model> {
+    /// [`Clocked::FEEDTHROUGH`].
+    pub feedthrough: bool,
+    /// [`Clocked::activate`].
+    pub activate: fn(&mut M, usize, Elapsed),
+    /// [`Clocked::tick`].
+    pub tick: fn(&mut M, usize, Elapsed) -> Result<(), Fault>,
+    /// [`Clocked::interval`].
+    pub interval: fn(&M, usize, Elapsed) -> Option<f64>,
+    /// [`Clocked::ticked`].
+    pub ticked: fn(&mut M, usize) -> bool,
+}
+
 /// [`Differentiable::tangent`].
 pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs) -> Result<(), Fault>;
 
@@ -87,6 +103,10 @@ pub struct Capabilities<M: Model> {
     pub tangent: Option<Tangent<M>>,
     /// Function of a model that follows [`CompletedSteps`].
     pub complete: Option<Complete<M>>,
+    /// Functions of a [`Clocked`] model.
+    pub clocked: Option<ClockFunctions<M>>,
+    /// The partitions of a [`Clocked`] model can be scheduled one by one (Scheduled Execution).
+    pub scheduled: bool,
     /// The model is not for Co-Simulation.
     pub exchange_only: bool,
     /// [`Intermediate::longest`].
@@ -105,6 +125,8 @@ impl<M: Model> Capabilities<M> {
         to_event: None,
         tangent: None,
         complete: None,
+        clocked: None,
+        scheduled: false,
         exchange_only: false,
         intermediate: None,
         warn: None,
@@ -179,6 +201,30 @@ impl<M: Model> Capabilities<M> {
         Self { complete: Some(M::complete), ..self }
     }
 
+    /// Adds [`Clocked`].
+    pub const fn Clocked(self) -> Self
+    where
+        M: Clocked,
+    {
+        let clocked = ClockFunctions {
+            feedthrough: M::FEEDTHROUGH,
+            activate: M::activate,
+            tick: M::tick,
+            interval: M::interval,
+            ticked: M::ticked,
+        };
+        Self { clocked: Some(clocked), ..self }
+    }
+
+    /// Adds Scheduled Execution to a [`Clocked`] model: an importer activates each of its clocks when its scheduler likes. Every
+    /// clock that the importer ticks needs a priority.
+    pub const fn ScheduledExecution(self) -> Self
+    where
+        M: Clocked,
+    {
+        Self { scheduled: true, ..self }
+    }
+
     /// Leaves out Co-Simulation: for equations that need the importer's solver. Nobody calls [`Model::advance`].
     pub const fn ModelExchangeOnly(self) -> Self {
         Self { exchange_only: true, ..self }
@@ -204,13 +250,14 @@ impl<M: Model> Capabilities<M> {
 impl<M: Model> Capabilities<M> {
     /// The model can be exported for Model Exchange.
     pub const fn model_exchange(&self) -> bool {
-        self.continuous.is_some() || self.events.is_some()
+        self.continuous.is_some() || self.events.is_some() || self.clocked.is_some()
     }
 
-    /// Co-simulation with Event Mode and early return (FMI 3.0): for a sampled model without states of its own, and for one with
-    /// [`EventMode`].
+    /// Co-simulation with Event Mode (FMI 3.0): for a model with clocks, and with early return for a sampled model without states
+    /// of its own and for one with [`EventMode`].
     pub const fn event_mode(&self) -> bool {
-        self.to_event.is_some() || (self.samples.is_some() && self.continuous.is_none())
+        let sampled = self.samples.is_some() && self.continuous.is_none();
+        self.to_event.is_some() || sampled || self.clocked.is_some()
     }
 
     /// The states; none for a model without [`ContinuousTime`].
@@ -239,9 +286,27 @@ impl<M: Model> Capabilities<M> {
             let named = |index: &usize| M::TABLE.locate(*index).is_some_and(|(name, meta, _)| fits(&name, meta));
             let none =
                 || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
-            (0..M::TABLE.len()).find(named).ok_or_else(none)
+            M::TABLE.indices().find(named).ok_or_else(none)
         };
         self.states().iter().map(row).collect()
+    }
+
+    /// Value reference of an index of the table: one more for those below its length, after which derivatives and event indicators
+    /// follow; the elements of wide arrays come after them.
+    pub fn reference(&self, index: usize) -> u32 {
+        let beside = if index < WIDE { 0 } else { M::TABLE.len() + self.states().len() + self.indicators().len() };
+        u32::try_from(index % WIDE + beside + 1).unwrap_or(u32::MAX)
+    }
+
+    /// The index that has this value reference, where [`reference`](Self::reference) is known to belong to a variable.
+    #[inline]
+    pub const fn index(&self, reference: u32) -> usize {
+        let index = (reference as usize).wrapping_sub(1);
+        if M::TABLE.wide() == 0 {
+            return index;
+        }
+        let beside = M::TABLE.len() + self.states().len() + self.indicators().len();
+        if index >= beside && index < beside + M::TABLE.wide() { index - beside + WIDE } else { index }
     }
 
     /// What variable `index` is, and where the importer's start value of it goes: to the state itself for the row of a state.
@@ -282,7 +347,13 @@ impl<M: Model> Capabilities<M> {
         if self.exchange_only {
             hash = hash.text("ModelExchangeOnly");
         }
-        if self.complete.is_some() { hash.text("CompletedSteps") } else { hash }
+        if self.complete.is_some() {
+            hash = hash.text("CompletedSteps");
+        }
+        if self.clocked.is_some() {
+            hash = hash.text("Clocked").bytes(&[self.scheduled as u8]);
+        }
+        hash
     }
 }
 

@@ -6,14 +6,16 @@ pub use terminals::{MemberDescription, TerminalDescription, TerminalPicture};
 
 use crate::Fault;
 use crate::capability::{Capabilities, Exported};
+use crate::clock::Timing;
 use crate::integer::IntegerType;
 use crate::model::{Block, Experiment, Model};
 use crate::need::Need;
 use crate::probe;
 use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
-use crate::variable::{Causality, Enumeration, Kind, Meta, Range, Variability};
+use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
@@ -56,6 +58,7 @@ pub struct Description {
 
 /// The interface for Model Exchange, and what goes with it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 pub struct ModelExchange {
     /// Value references of the states.
     pub states: Vec<u32>,
@@ -67,6 +70,8 @@ pub struct ModelExchange {
     pub event_mode: bool,
     /// The importer must call `CompletedIntegratorStep`.
     pub completed_steps: bool,
+    /// Scheduled Execution (FMI 3.0).
+    pub scheduled: bool,
     /// There is no Co-Simulation.
     #[serde(default)]
     pub only: bool,
@@ -100,6 +105,9 @@ pub struct Variable {
     pub nominal: Option<f64>,
     /// The value is unbounded.
     pub unbounded: bool,
+    /// Other names (FMI 3.0).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub aliases: Vec<AliasDescription>,
     /// Extents of an array, whose elements are row by row; empty for a scalar.
     pub shape: Vec<usize>,
     /// The importer may set the start value of this output or local variable.
@@ -115,8 +123,21 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// A state that an event may change.
     pub reinit: bool,
+    /// Value references of the clocks that it is on.
+    pub clocks: Vec<u32>,
     /// It can be read or set inside a communication step (FMI 3.0).
     pub intermediate: bool,
+}
+
+/// Another name of a variable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AliasDescription {
+    /// Full name.
+    pub name: String,
+    /// One sentence.
+    pub description: String,
+    /// Display unit: name, factor and offset.
+    pub display: Option<(String, f64, f64)>,
 }
 
 /// A base type with its type definition.
@@ -155,6 +176,8 @@ pub enum VariableKind {
     },
     /// A text.
     Text,
+    /// A clock; its start value is the interval in s, if the importer may set it.
+    Clock(Timing),
     /// Bytes.
     Binary {
         /// MIME type of the content.
@@ -212,14 +235,15 @@ impl Description {
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
         block.initialize();
+        let reference = |index: usize| if index == probe::NOW { TIME } else { can.reference(index) };
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
-        let table = M::TABLE;
+        let (table, wide) = (M::TABLE, probe::wide::<M>().arrays);
         let mut variables: Vec<Variable> = Vec::new();
         let mut needs: Vec<(usize, Need<'static>)> = Vec::new();
         for index in 0..table.len() {
             let Some((name, meta, element)) = table.locate(index) else { continue };
             let Some((_, slot)) = table.entry(&mut block, index) else { continue };
-            let start = meta.has_start().then(|| value(&slot));
+            let start = (meta.has_start() && !matches!(slot, Slot::Clock(None))).then(|| value(&slot));
             if start.is_some() {
                 check_start(&name, meta, &slot)?;
             }
@@ -244,13 +268,13 @@ impl Description {
             });
         }
         for (i, state) in can.states().iter().enumerate() {
-            let index = table.len() + i;
+            let (index, place) = (table.len() + i, table.len() + wide.len() + i);
             let (name, of) = (format!("der({})", state.name), format!("Derivative of {}", state.name));
             let meta = *V::state("", state.rate, "", |m| m).meta();
             variables.push(Variable {
                 description: of,
-                initial_dependencies: references(&initial[index]),
-                dependencies: references(&between[index]),
+                initial_dependencies: references(&initial[place]),
+                dependencies: references(&between[place]),
                 derivative: Some(reference(states[i])),
                 ..variable(name, &meta, reference(index), None)
             });
@@ -260,12 +284,18 @@ impl Description {
             let index = table.len() + can.states().len() + i;
             variables.push(variable(indicator.name.into(), &meta, reference(index), None));
         }
-        for (i, v) in variables.iter().enumerate() {
-            if variables[..i].iter().any(|other| other.name == v.name) {
-                return Err(Fault::new(format!("two variables of {} have the name {}", M::INFO.name, v.name)));
-            }
+        // In the order of the value references.
+        for (place, &extent) in (table.len()..).zip(&wide) {
+            let array = wide_array::<M>(can, &mut block, extent)?;
+            variables.push(Variable {
+                initial_dependencies: references(&initial[place]),
+                dependencies: references(&between[place]),
+                ..array
+            });
         }
+        check_names(M::INFO.name, &variables)?;
         check_types(&variables)?;
+        put_on_clocks::<M>(&mut variables, can.clocked.as_ref().is_some_and(|clocked| clocked.feedthrough))?;
         for (i, need) in needs {
             let words = words(&variables[i].name, need, &variables)?;
             variables[i].description += &words;
@@ -279,6 +309,7 @@ impl Description {
             indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
             event_mode: can.event_mode(),
             completed_steps: can.complete.is_some(),
+            scheduled: can.scheduled,
             only: can.exchange_only,
         });
         let info = M::INFO;
@@ -309,13 +340,61 @@ impl Description {
     /// Why there can be no archive of FMI 2.0, if there cannot.
     pub fn needs_fmi3(&self) -> Option<String> {
         let binary = |v: &&Variable| matches!(v.kind, VariableKind::Binary { .. });
-        self.variables.iter().find(binary).map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name))
+        let of_bytes = self.variables.iter().find(binary);
+        let clock = self.variables.iter().find(|v| matches!(v.kind, VariableKind::Clock(_)));
+        let bytes = of_bytes.map(|v| format!("{} is binary, and FMI 2.0 has no bytes", v.name));
+        bytes.or_else(|| clock.map(|v| format!("{} is a clock, and FMI 2.0 has no clocks", v.name)))
     }
 
     /// The variable of this name.
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
     }
+}
+
+/// The clocks of every variable. What is on a clock has no value before its first tick, and between events depends on the ticks.
+fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Result<(), Fault> {
+    let clocks: Vec<(String, u32, Causality)> = variables
+        .iter()
+        .filter(|v| matches!(v.kind, VariableKind::Clock(_)))
+        .map(|v| (v.name.clone(), v.value_reference, v.causality))
+        .collect();
+    if clocks.is_empty() {
+        return Ok(());
+    }
+    for v in variables.iter_mut() {
+        let Some(index) = v.value_reference.checked_sub(1) else { continue };
+        for name in M::TABLE.clocks_of(index as usize).split_whitespace() {
+            let found = clocks.iter().find(|(clock, ..)| clock == name);
+            let none = || Fault::new(format!("{} is on the clock {name}, which does not exist", v.name));
+            v.clocks.push(found.ok_or_else(none)?.1);
+        }
+        if !v.clocks.is_empty() && v.variability == Variability::Continuous {
+            v.variability = Variability::Discrete;
+        }
+    }
+    let inputs: Vec<(u32, Vec<u32>)> = variables
+        .iter()
+        .filter(|v| v.causality == Causality::Input && !v.clocks.is_empty() && feedthrough)
+        .filter(|v| !matches!(v.kind, VariableKind::Clock(_)))
+        .map(|v| (v.value_reference, v.clocks.clone()))
+        .collect();
+    let ticked = || clocks.iter().filter(|(.., causality)| *causality == Causality::Input).map(|(_, of, _)| *of);
+    for v in variables.iter_mut() {
+        let clock = matches!(v.kind, VariableKind::Clock(_));
+        if !clock && v.clocks.is_empty() {
+            continue;
+        }
+        v.initial_dependencies = None;
+        if v.causality == Causality::Output {
+            let mut on = if v.clocks.is_empty() { ticked().collect() } else { v.clocks.clone() };
+            let read = inputs.iter().filter(|(_, clocks)| clocks.iter().any(|clock| on.contains(clock)));
+            let read: Vec<u32> = read.map(|(input, _)| *input).collect();
+            on.extend(read);
+            v.dependencies = Some(on);
+        }
+    }
+    Ok(())
 }
 
 /// A variable of a table that the model shares with another one, as this model has it.
@@ -369,6 +448,13 @@ fn join(all: &mut Option<Vec<u32>>, more: Option<Vec<u32>>) {
 }
 
 fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value>) -> Variable {
+    let prefix = name.strip_suffix(meta.name).unwrap_or_default();
+    let alias = |a: &Alias| AliasDescription {
+        name: format!("{prefix}{}", a.name),
+        description: a.description.into(),
+        display: a.display.map(|d| (d.name.into(), d.factor, d.offset)),
+    };
+    let aliases = meta.aliases.iter().map(alias).collect();
     Variable {
         name,
         description: meta.description.into(),
@@ -382,6 +468,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         below: meta.range.below,
         nominal: meta.nominal,
         unbounded: meta.unbounded,
+        aliases,
         shape: match (meta.shape, meta.dimension) {
             ([], n) => n.into_iter().collect(),
             (shape, _) => shape.to_vec(),
@@ -392,6 +479,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
         dependencies: None,
         derivative: None,
         reinit: false,
+        clocks: Vec::new(),
         intermediate: meta.intermediate,
     }
 }
@@ -419,11 +507,6 @@ fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, 
     Ok(Need::With { parameter: &found.name, value }.to_string())
 }
 
-/// Value reference of the table's variable `index`; of `time` for [`probe::NOW`].
-fn reference(index: usize) -> u32 {
-    if index == probe::NOW { TIME } else { u32::try_from(index + 1).unwrap_or(u32::MAX) }
-}
-
 /// Rows of variables that no model holds: derivatives and indicators.
 type V = Row<f64>;
 
@@ -436,6 +519,7 @@ fn value(slot: &Slot<'_>) -> Value {
         Slot::Enumeration(x) => Value::Integer(x.get().into()),
         Slot::Text(x) => Value::Text((*x).clone()),
         Slot::Said(x) => Value::Text((*x).into()),
+        Slot::Clock(x) => Value::Real(x.as_ref().map_or(f64::NAN, |x| **x)),
         Slot::Constant(Constant::Real(x)) => Value::Real(*x),
         Slot::Constant(Constant::Float32(x)) => Value::Real((*x).into()),
         Slot::Constant(Constant::Integer(x)) => Value::Integer(*x),
@@ -460,6 +544,7 @@ fn kind(kind: &Kind) -> VariableKind {
         Kind::Integer(of) => VariableKind::Integer(*of),
         Kind::Boolean => VariableKind::Boolean,
         Kind::Text => VariableKind::Text,
+        Kind::Clock(timing) => VariableKind::Clock(*timing),
         Kind::Binary { mime_type, most } => VariableKind::Binary { mime_type: (*mime_type).into(), most: *most },
         Kind::Enumeration(Enumeration { name, description, items }) => VariableKind::Enumeration {
             name: (*name).into(),
@@ -486,6 +571,35 @@ fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
         return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
     }
     Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+}
+
+/// A wide array, by its first index and its number of elements.
+fn wide_array<M: Model>(
+    can: &Capabilities<M>,
+    block: &mut Block<M>,
+    (first, n): (usize, usize),
+) -> Result<Variable, Fault> {
+    let located = M::TABLE.locate(first);
+    let (name, meta, _) = located.ok_or_else(|| Fault::new(format!("no array at {first}")))?;
+    let mut array = variable(name.clone(), meta, can.reference(first), None);
+    if meta.has_start() {
+        for index in first..first + n {
+            let Some((_, slot)) = M::TABLE.entry(block, index) else { continue };
+            check_start(&name, meta, &slot)?;
+            array.start.get_or_insert_default().push(value(&slot));
+        }
+    }
+    Ok(array)
+}
+
+/// No two variables or aliases have one name.
+fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fault> {
+    let mut names = BTreeSet::new();
+    let all = variables.iter().flat_map(|v| v.aliases.iter().map(|a| &a.name).chain([&v.name]));
+    match all.into_iter().find(|name| !names.insert(name.as_str())) {
+        Some(name) => Err(Fault::new(format!("two variables of {model} have the name {name}"))),
+        None => Ok(()),
+    }
 }
 
 fn check_types(variables: &[Variable]) -> Result<(), Fault> {

@@ -75,7 +75,7 @@
 //! ```
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
-//! [`CompletedSteps`], [`Intermediate`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
+//! [`CompletedSteps`], [`Intermediate`], [`Clocked`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
 //! and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
@@ -85,6 +85,7 @@
 
 pub mod bytes;
 pub mod capability;
+pub mod clock;
 pub mod continuous;
 pub mod description;
 pub mod dual;
@@ -113,6 +114,7 @@ pub mod variable;
 
 pub use bytes::Bytes;
 pub use capability::{Capabilities, Exported, Plain, Warns};
+pub use clock::{Clock, Clocked, Ticks, Timing};
 pub use continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
 pub use description::Description;
 pub use dual::{Dual, Scalar};
@@ -131,4 +133,4 @@ pub use table::{Part, Table};
 pub use terminal::{Icon, Member, Terminal};
 pub use time::{Elapsed, SampleGrid, Step};
 pub use token::{Hash, Token};
-pub use variable::{Causality, Enumeration, Item, Kind, Meta, Range, Variability};
+pub use variable::{Alias, Causality, Enumeration, Item, Kind, Meta, Range, Variability};

@@ -74,6 +74,8 @@ pub enum Interface {
     EventMode,
     /// Model Exchange: the importer integrates.
     ModelExchange,
+    /// Scheduled Execution: the importer activates clocks one by one (FMI 3.0).
+    ScheduledExecution,
 }
 
 /// A model of one block in a block diagram, sampled or continuous.

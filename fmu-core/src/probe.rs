@@ -13,13 +13,15 @@ const POINTS: u32 = 64;
 /// The index that stands for `time`.
 pub(crate) const NOW: usize = usize::MAX;
 
-/// For each variable, the indices that it depends on; derivatives follow the table. `None` for a variable that is not an unknown.
+/// For each variable, the indices that it depends on; wide arrays, each as a whole under its first index, and then derivatives
+/// follow the table. `None` for a variable that is not an unknown.
 type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// Checks that the start value of an exact variable stays what the importer has set.
 pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Result<(), Fault> {
     let mut draw = Draw(3);
-    for (index, meta) in metas(fresh).into_iter().enumerate().filter(|(_, meta)| meta.exact) {
+    for (index, meta) in metas::<M>().into_iter().enumerate().filter(|(_, meta)| meta.exact) {
+        let index = wide::<M>().index(index);
         let mut block = fresh.clone();
         change(can, &mut block, states, index, &mut draw);
         let set = can.place(&mut block, states, index).map(|(_, slot)| slot.bits());
@@ -42,7 +44,7 @@ pub(crate) fn initial_dependencies<M: Model>(
     fresh: &Block<M>,
     states: &[usize],
 ) -> Dependencies {
-    let metas = metas(fresh);
+    let metas = metas::<M>();
     let knowns: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
     let mut found = Found::new(metas.len() + states.len());
     let mut draw = Draw(1);
@@ -66,13 +68,13 @@ pub(crate) fn initial_dependencies<M: Model>(
         let calculated = |c| matches!(c, Causality::Output | Causality::CalculatedParameter);
         metas.get(i).is_none_or(|meta| !meta.has_start() && (states.contains(&i) || calculated(meta.causality)))
     };
-    found.list(unknown)
+    found.list(unknown, &wide::<M>())
 }
 
 /// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
 /// for any values of the parameters.
 pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
-    let metas = metas(fresh);
+    let metas = metas::<M>();
     let known = |meta: &Meta| meta.causality == Causality::Input || meta.variability == Variability::Tunable;
     let mut found = Found::new(metas.len() + states.len());
     let mut draw = Draw(2);
@@ -114,13 +116,15 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
             found.suspect(input);
         }
     }
-    found.list(|i| metas.get(i).is_none_or(|meta| meta.causality == Causality::Output))
+    found.list(|i| metas.get(i).is_none_or(|meta| meta.causality == Causality::Output), &wide::<M>())
 }
 
 /// Whether a variable is a text or bytes: which of them mean something is not known, so none is tried.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "a filter")]
-fn is_opaque<M: Model>(&index: &usize) -> bool {
-    M::TABLE.locate(index).is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
+fn is_opaque<M: Model>(&known: &usize) -> bool {
+    M::TABLE
+        .locate(wide::<M>().index(known))
+        .is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
 }
 
 /// The start values first; then other values for about half of the inputs and parameters.
@@ -174,8 +178,11 @@ impl Found {
         self.0.iter_mut().for_each(|list| list.push(known));
     }
 
-    fn list(self, unknown: impl Fn(usize) -> bool) -> Dependencies {
+    fn list(self, unknown: impl Fn(usize) -> bool, wide: &Wide) -> Dependencies {
         let sorted = |mut list: Vec<usize>| {
+            for known in &mut list {
+                *known = wide.index(*known);
+            }
             list.sort_unstable();
             list
         };
@@ -183,10 +190,36 @@ impl Found {
     }
 }
 
-fn metas<M: Model>(fresh: &Block<M>) -> Vec<&'static Meta> {
-    let mut block = fresh.clone();
-    let one = |i| M::TABLE.entry(&mut block, i).map(|(meta, _)| meta);
-    (0..M::TABLE.len()).map_while(one).collect()
+fn metas<M: Model>() -> Vec<&'static Meta> {
+    let one = |i| M::TABLE.locate(i).map(|(_, meta, _)| meta);
+    (0..M::TABLE.len()).chain(wide::<M>().arrays.into_iter().map(|(first, _)| first)).filter_map(one).collect()
+}
+
+/// The wide arrays of a table, whose places follow those of its other variables.
+pub(crate) struct Wide {
+    /// Number of the other variables.
+    len: usize,
+    /// First index and number of elements of each.
+    pub(crate) arrays: Vec<(usize, usize)>,
+}
+
+impl Wide {
+    /// The table's index of a place; [`NOW`] stays.
+    fn index(&self, place: usize) -> usize {
+        place.checked_sub(self.len).and_then(|i| self.arrays.get(i)).map_or(place, |(first, _)| *first)
+    }
+}
+
+/// The wide arrays of a model's table.
+pub(crate) fn wide<M: Model>() -> Wide {
+    let mut arrays: Vec<(usize, usize)> = Vec::new();
+    for index in M::TABLE.indices().skip(M::TABLE.len()) {
+        match M::TABLE.element(index) {
+            Some(0) => arrays.push((index, 1)),
+            _ => arrays.iter_mut().rev().take(1).for_each(|(_, n)| *n += 1),
+        }
+    }
+    Wide { len: M::TABLE.len(), arrays }
 }
 
 /// Bits of all values after the outputs at `now` were computed.
@@ -206,6 +239,13 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
     }
     let mut value = |i| M::TABLE.entry(&mut block, i).map_or(0, |(_, slot)| slot.bits());
     let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
+    for (first, n) in wide::<M>().arrays {
+        // Elements that differ by rounding alone make another hash: dependencies of a wide array may be too many.
+        let of_all = (first..first + n)
+            .map(&mut value)
+            .fold(0, |hash: u64, bits| (hash.rotate_left(5) ^ bits).wrapping_mul(0x0100_0000_01b3));
+        all.push(of_all >> 12);
+    }
     all.extend(dx.iter().map(|x| x.to_bits()));
     all
 }
@@ -220,8 +260,16 @@ fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize]
     }
 }
 
-/// Sets variable `index` to another value that is allowed.
-fn change<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], index: usize, draw: &mut Draw) {
+/// Sets the variable of a place to another value that is allowed, each element of a wide array.
+fn change<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], known: usize, draw: &mut Draw) {
+    if let Some((first, n)) = known.checked_sub(M::TABLE.len()).and_then(|i| wide::<M>().arrays.get(i).copied()) {
+        (first..first + n).for_each(|index| change_one(can, block, states, index, draw));
+    } else {
+        change_one(can, block, states, known, draw);
+    }
+}
+
+fn change_one<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], index: usize, draw: &mut Draw) {
     let Some((meta, slot)) = can.place(block, states, index) else { return };
     match slot {
         Slot::Real(x) => {
@@ -258,7 +306,7 @@ fn change<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize
                 x.set(other);
             }
         }
-        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Constant(_) => {}
+        Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Constant(_) | Slot::Clock(_) => {}
     }
 }
 

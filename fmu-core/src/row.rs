@@ -25,6 +25,7 @@ pub(crate) trait Node<W>: Sync {
     fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
+    fn clocks_of(&self, index: usize) -> &'static str;
 }
 
 /// Where the value lives.
@@ -42,7 +43,15 @@ pub(crate) enum Access<W: 'static> {
     ConstantText(&'static str),
     Constant(Constant),
     Constants(&'static [f64]),
-    Part { len: usize, hash: Hash, binary: bool, node: &'static dyn Node<W> },
+    /// A clock, and where its interval is.
+    Clock(Option<fn(&mut W) -> &mut f64>),
+    Part {
+        len: usize,
+        wide: usize,
+        hash: Hash,
+        binary: bool,
+        node: &'static dyn Node<W>,
+    },
 }
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
@@ -138,6 +147,20 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
 /// ```
 ///
+/// Other names of a variable, of which FMI 2.0 has none:
+///
+/// ```
+/// # use fmu_core::unit::{DisplayUnit, METER};
+/// # use fmu_core::{Alias, Row, Table, table};
+/// # struct Model { h: f64 }
+/// const FOOT: DisplayUnit = DisplayUnit { name: "ft", factor: 1.0 / 0.3048, offset: 0.0 };
+/// const TABLE: &Table<Model> = table![
+///     Row::output("h", &METER, "Height", |m: &mut Model| &mut m.h)
+///         .aliases(&[Alias { name: "h_ft", description: "Height in feet", display: Some(FOOT) }]),
+/// ];
+/// # assert_eq!(TABLE.len(), 1);
+/// ```
+///
 /// Start values that the importer may set ([`exact`](Row::exact)), and constants of every type:
 ///
 /// ```
@@ -206,9 +229,11 @@ impl<W: 'static> Row<W> {
             mean: false,
             exact: false,
             need: Need::Always,
+            clocks: "",
             intermediate: false,
             dimension: None,
             shape: &[],
+            aliases: &[],
         };
         Self { settable: Interval::of(&meta), meta, access }
     }

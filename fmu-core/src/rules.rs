@@ -1,6 +1,7 @@
 //! What the compiler checks of a model. A panic while compiling is an error whose text names the row, the state or the model.
 
 use crate::capability::Exported;
+use crate::clock::word;
 use crate::log;
 use crate::model::{Experiment, Info, Model};
 use crate::row::{Access, Row};
@@ -25,6 +26,7 @@ pub const fn check<E: Exported>() {
     let (rows, states, can) = (E::Model::TABLE.rows, E::CAN.states().len(), E::CAN);
     let mut i = 0;
     check_intermediate::<E>(model);
+    check_clocks::<E>(model);
     while i < states {
         let name = can.states()[i].name;
         let mut other = 0;
@@ -73,6 +75,48 @@ const fn check_intermediate<E: Exported>(model: &str) {
     demand(rows || !capability, model, "the capability Intermediate needs a row of the table with .intermediate()");
     demand(capability || !rows, model, "a row of the table with .intermediate() needs the capability Intermediate");
     demand(!capability || E::CAN.continuous.is_some(), model, "the capability Intermediate needs ContinuousTime");
+}
+
+/// Clocks come with the capability, and what is on a clock names one.
+#[track_caller]
+const fn check_clocks<E: Exported>(model: &str) {
+    let (rows, can) = (E::Model::TABLE.rows, E::CAN);
+    let (mut row, mut clocks) = (0, 0);
+    while row < rows.len() {
+        if let Kind::Clock(timing) = rows[row].meta.kind {
+            clocks += 1;
+            let ticked = matches!(rows[row].meta.causality, Causality::Input);
+            let urgent = timing.priority.is_some() || !ticked || !can.scheduled;
+            demand(urgent, rows[row].meta.name, "a clock of Scheduled Execution needs a priority");
+        }
+        let mut number = 0;
+        while !word(rows[row].meta.clocks, number).is_empty() {
+            let name = word(rows[row].meta.clocks, number);
+            demand(is_clock(rows, name), rows[row].meta.name, "the table has no clock of the name that it is on");
+            number += 1;
+        }
+        row += 1;
+    }
+    demand(clocks <= MAX_CLOCKS, model, "more than 64 clocks");
+    demand(clocks > 0 || can.clocked.is_none(), model, "the capability Clocked needs a row V::clock");
+    demand(clocks == 0 || can.clocked.is_some(), model, "a row V::clock needs the capability Clocked");
+    demand(can.clocked.is_some() || !can.scheduled, model, "the capability ScheduledExecution needs Clocked");
+    let alone = can.samples.is_none() && can.intermediate.is_none();
+    demand(alone || can.clocked.is_none(), model, "Clocked excludes Sampled, which ticks by itself, and Intermediate");
+}
+
+/// Number of clocks for which there is room.
+const MAX_CLOCKS: usize = 64;
+
+const fn is_clock<W>(rows: &[Row<W>], name: &str) -> bool {
+    let mut row = 0;
+    while row < rows.len() {
+        if same_text(rows[row].meta.name, name) {
+            return matches!(rows[row].meta.kind, Kind::Clock(_));
+        }
+        row += 1;
+    }
+    false
 }
 
 #[track_caller]

@@ -1,20 +1,31 @@
 //! The variable table of a type, composed of variables and of other types' tables.
 //!
-//! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table.
+//! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table. A wide
+//! array, of more than [`DENSE`] elements, has indices of its own, from [`WIDE`] on, and is found by a scan.
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
+use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::reals::Inputs;
 use crate::row::{Access, Constant, Node, Row, Slot};
 use crate::rules::{demand, same_text};
 use crate::token::Hash;
-use crate::variable::{Kind, Meta};
+use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::ptr;
 
-/// Maximum number of variables in a table, including those of its parts.
+/// Maximum number of variables in a table, including those of its parts, without wide arrays.
 pub const CAPACITY: usize = 512;
+
+/// Greatest number of elements of an array that is not wide.
+pub const DENSE: usize = 128;
+
+/// Index of the first element of the first wide array.
+pub const WIDE: usize = 1 << 30;
+
+/// Maximum number of wide arrays in a table, and of parts that have some.
+const WIDE_ROWS: usize = 16;
 
 /// The table of `P` seen through `W`, of which `P` is a part.
 pub struct Part<W: 'static, P: 'static> {
@@ -44,13 +55,17 @@ impl<W, P> Node<W> for Part<W, P> {
     fn element(&self, index: usize) -> Option<usize> {
         self.table.element(index)
     }
+
+    fn clocks_of(&self, index: usize) -> &'static str {
+        self.table.clocks_of(index)
+    }
 }
 
 impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
-        let Table { len, hash, binary, intermediate, .. } = *part.table;
-        let access = Access::Part { len, hash, binary, node: part };
+        let Table { len, wide, hash, binary, intermediate, .. } = *part.table;
+        let access = Access::Part { len, wide, hash, binary, node: part };
         let mut row = Self::new(prefix, "", Kind::Boolean, access);
         row.meta.intermediate = intermediate;
         row
@@ -79,11 +94,22 @@ pub(crate) struct RowPlace {
     pub(crate) inner: u16,
 }
 
+/// A wide array, or a part that has some: its row, and the elements before it.
+#[derive(Clone, Copy)]
+struct WidePlace {
+    row: u16,
+    first: usize,
+    len: usize,
+}
+
 /// All variables of `W`; [`table!`](crate::table!) makes one from its rows.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
     pub(crate) places: [RowPlace; CAPACITY],
     len: usize,
+    wide_places: [WidePlace; WIDE_ROWS],
+    /// Number of elements of wide arrays.
+    wide: usize,
     hash: Hash,
     /// A variable is binary.
     binary: bool,
@@ -95,27 +121,35 @@ impl<W: 'static> Table<W> {
     /// Builds the table.
     ///
     /// # Panics
-    /// At compile time, on a duplicate name, an array without an element or more than [`CAPACITY`] variables.
+    /// At compile time, on a duplicate name, an array without an element, more than [`CAPACITY`] variables, or too many wide arrays.
     #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
     pub const fn new(rows: &'static [Row<W>]) -> Self {
         assert!(CAPACITY <= u16::MAX as usize);
         // No row past the end.
         let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
         let (mut len, mut row, mut hash, mut binary, mut intermediate) = (0, 0, Hash::START, false, false);
+        let (mut wide_places, mut wide, mut wide_rows) = ([WidePlace { row: 0, first: 0, len: 0 }; WIDE_ROWS], 0, 0);
         while row < rows.len() {
             let meta = &rows[row].meta;
             intermediate |= meta.intermediate;
-            let count = match (&rows[row].access, meta.dimension) {
-                (Access::Part { len, hash: of_part, binary: of_bytes, .. }, _) => {
+            let (count, beyond) = match (&rows[row].access, meta.dimension) {
+                (Access::Part { len, wide, hash: of_part, binary: of_bytes, .. }, _) => {
                     binary |= *of_bytes;
                     hash = hash.text(meta.name).join(of_part);
-                    *len
+                    if !meta.clocks.is_empty() {
+                        hash = hash.text("on").text(meta.clocks);
+                    }
+                    (*len, *wide)
                 }
                 (_, dimension) => {
                     check(meta);
                     binary |= matches!(meta.kind, Kind::Binary { .. });
                     hash = hash.meta(meta);
-                    if let Some(n) = dimension { n } else { 1 }
+                    match dimension {
+                        Some(n) if n > DENSE => (0, n),
+                        Some(n) => (n, 0),
+                        None => (1, 0),
+                    }
                 }
             };
             let mut inner = 0;
@@ -125,13 +159,43 @@ impl<W: 'static> Table<W> {
                 len += 1;
                 inner += 1;
             }
+            if beyond > 0 {
+                demand(wide_rows < WIDE_ROWS, meta.name, "the table has too many arrays of more than 128 elements");
+                wide_places[wide_rows] = WidePlace { row: row as u16, first: wide, len: beyond };
+                (wide, wide_rows) = (wide + beyond, wide_rows + 1);
+            }
             check_unique(rows, row);
             row += 1;
         }
-        Self { rows, places, len, hash, binary, intermediate }
+        Self { rows, places, len, wide_places, wide, hash, binary, intermediate }
     }
 
-    /// Number of indices: variables, array elements counted singly.
+    /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
+    pub const fn announces(&self) -> bool {
+        let mut row = 0;
+        while row < self.rows.len() {
+            if let Kind::Clock(timing) = self.rows[row].meta.kind
+                && (matches!(self.rows[row].meta.causality, Causality::Output)
+                    || matches!(timing.ticks, Ticks::Countdown))
+            {
+                return true;
+            }
+            row += 1;
+        }
+        false
+    }
+
+    /// Every index: those below [`len`](Self::len), then those of wide arrays from [`WIDE`] on.
+    pub fn indices(&self) -> impl Iterator<Item = usize> + use<W> {
+        (0..self.len).chain(WIDE..WIDE + self.wide)
+    }
+
+    /// Number of elements of wide arrays.
+    pub const fn wide(&self) -> usize {
+        self.wide
+    }
+
+    /// Number of indices without those of wide arrays: variables, array elements counted singly.
     pub const fn len(&self) -> usize {
         self.len
     }
@@ -155,7 +219,7 @@ impl<W: 'static> Table<W> {
     #[inline]
     pub fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)> {
         if index >= self.len {
-            return None;
+            return self.wide_entry(whole, index);
         }
         let place = self.places[index];
         let row = &self.rows[usize::from(place.row)];
@@ -169,6 +233,7 @@ impl<W: 'static> Table<W> {
             Access::List(items) => items.find(whole, usize::from(place.inner))?,
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
+            Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
             Access::Binary(get) => Slot::Binary(get(whole)),
             Access::ConstantText(text) => Slot::Said(text),
             Access::Constant(x) => Slot::Constant(*x),
@@ -178,12 +243,58 @@ impl<W: 'static> Table<W> {
         Some((&row.meta, slot))
     }
 
+    /// [`entry`](Self::entry) of an element of a wide array.
+    #[cold]
+    fn wide_entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)> {
+        let (row, inner) = self.wide_place(index)?;
+        let slot = match &row.access {
+            Access::Reals(get) => Slot::Real(get(whole).get_mut(inner)?),
+            Access::List(items) => items.find(whole, inner)?,
+            Access::Constants(all) => Slot::Constant(Constant::Real(*all.get(inner)?)),
+            Access::Part { node, .. } => return node.entry(whole, WIDE + inner),
+            _ => return None,
+        };
+        Some((&row.meta, slot))
+    }
+
+    /// The row of an element of a wide array, and its place there.
+    fn wide_place(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
+        let at = index.checked_sub(WIDE).filter(|at| *at < self.wide)?;
+        let place = self.wide_places.iter().find(|place| (place.first..place.first + place.len).contains(&at))?;
+        Some((&self.rows[usize::from(place.row)], at - place.first))
+    }
+
     /// Which element of an array variable `index` is, 0 for a scalar; `None` past the end. Does not allocate.
     pub fn element(&self, index: usize) -> Option<usize> {
-        let place = self.places[..self.len].get(index)?;
+        let Some(place) = self.places[..self.len].get(index) else {
+            let (row, inner) = self.wide_place(index)?;
+            return if let Access::Part { node, .. } = &row.access { node.element(WIDE + inner) } else { Some(inner) };
+        };
         match &self.rows[usize::from(place.row)].access {
             Access::Part { node, .. } => node.element(usize::from(place.inner)),
             _ => Some(usize::from(place.inner)),
+        }
+    }
+
+    /// Names of the clocks that variable `index` is on, with spaces between them; empty for none. A part that is on a clock has its
+    /// variables on it, but for parameters.
+    pub fn clocks_of(&self, index: usize) -> &'static str {
+        let Some(place) = self.places[..self.len].get(index) else { return "" };
+        let row = &self.rows[usize::from(place.row)];
+        match &row.access {
+            Access::Part { node, .. } => {
+                let inner = node.clocks_of(usize::from(place.inner));
+                let changes = || {
+                    let found = node.locate(usize::from(place.inner), &mut String::new());
+                    found.is_some_and(|(meta, _)| {
+                        matches!(meta.causality, Causality::Input | Causality::Output | Causality::Local)
+                            && !matches!(meta.kind, Kind::Clock(_))
+                            && meta.variability != Variability::Constant
+                    })
+                };
+                if inner.is_empty() && !row.meta.clocks.is_empty() && changes() { row.meta.clocks } else { inner }
+            }
+            _ => row.meta.clocks,
         }
     }
 
@@ -209,7 +320,7 @@ impl<W: 'static> Table<W> {
     {
         let mut whole = whole.clone();
         let wanted = ptr::from_mut(get(&mut whole)).addr();
-        let found = (0..self.len).find(|&index| {
+        let found = self.indices().find(|&index| {
             let address = self.entry(&mut whole, index).and_then(|(_, slot)| match slot {
                 Slot::Real(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Float32(x) => Some(ptr::from_ref(x).addr()),
@@ -217,6 +328,7 @@ impl<W: 'static> Table<W> {
                 Slot::Boolean(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Enumeration(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Text(x) => Some(ptr::from_ref(x).addr()),
+                Slot::Clock(x) => x.map(|x| ptr::from_ref(x).addr()),
                 Slot::Binary(x) => Some(ptr::from_ref(x).addr()),
                 Slot::Said(_) | Slot::Constant(_) => None,
             });
@@ -232,7 +344,7 @@ impl<W: 'static> Table<W> {
     where
         W: Clone,
     {
-        let index = (0..self.len).find(|&index| self.locate(index).is_some_and(|(found, ..)| found == name))?;
+        let index = self.indices().find(|&index| self.locate(index).is_some_and(|(found, ..)| found == name))?;
         self.tell_index(&mut whole.clone(), index)
     }
 
@@ -249,15 +361,14 @@ impl<W: 'static> Table<W> {
     }
 
     fn locate_into(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
-        if index >= self.len {
-            return None;
-        }
-        let place = self.places[index];
-        let row = &self.rows[usize::from(place.row)];
+        let (row, inner, base) = match self.places[..self.len].get(index) {
+            Some(place) => (&self.rows[usize::from(place.row)], usize::from(place.inner), 0),
+            None => self.wide_place(index).map(|(row, inner)| (row, inner, WIDE))?,
+        };
         name.push_str(row.meta.name);
         match &row.access {
-            Access::Part { node, .. } => node.locate(usize::from(place.inner), name),
-            _ => Some((&row.meta, usize::from(place.inner))),
+            Access::Part { node, .. } => node.locate(base + inner, name),
+            _ => Some((&row.meta, inner)),
         }
     }
 }

@@ -4,6 +4,7 @@
 //! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID. Every number enters it with a fixed width, so that
 //! 32-bit and 64-bit compilers compute one token.
 
+use crate::clock::Timing;
 use crate::integer::IntegerType;
 use crate::unit::Quantity;
 use crate::variable::{Kind, Meta};
@@ -72,11 +73,22 @@ impl Hash {
             hash = hash.count(meta.shape[i]);
             i += 1;
         }
+        if !meta.clocks.is_empty() {
+            hash = hash.text("on").text(meta.clocks);
+        }
         if meta.exact {
             hash = hash.text("exact");
         }
         if meta.intermediate {
             hash = hash.text("intermediate");
+        }
+        i = 0;
+        while i < meta.aliases.len() {
+            hash = hash.text("alias").text(meta.aliases[i].name);
+            if let Some(display) = meta.aliases[i].display {
+                hash = hash.text(display.name);
+            }
+            i += 1;
         }
         match meta.kind {
             Kind::Real(quantity) => hash.quantity(quantity),
@@ -86,6 +98,7 @@ impl Hash {
             Kind::Text => hash.text("text"),
             Kind::Binary { mime_type, most } => hash.text("binary").text(mime_type).count(most),
             Kind::Boolean => hash.text("boolean"),
+            Kind::Clock(timing) => hash.timing(&timing),
             Kind::Enumeration(enumeration) => {
                 let (mut hash, mut i) = (hash.text(enumeration.name), 0);
                 while i < enumeration.items.len() {
@@ -95,6 +108,21 @@ impl Hash {
                 hash
             }
         }
+    }
+
+    const fn timing(self, timing: &Timing) -> Self {
+        let Timing { ticks, interval, fraction, shift, priority } = timing;
+        let mut hash = self.text("clock").bytes(&[*ticks as u8]).number(*shift);
+        if let Some(interval) = interval {
+            hash = hash.number(*interval);
+        }
+        if let Some((counter, resolution)) = fraction {
+            hash = hash.bytes(&counter.to_le_bytes()).bytes(&resolution.to_le_bytes());
+        }
+        if let Some(priority) = priority {
+            hash = hash.bytes(&priority.to_le_bytes());
+        }
+        hash
     }
 
     pub(crate) const fn quantity(self, quantity: &Quantity) -> Self {

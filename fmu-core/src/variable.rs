@@ -1,8 +1,9 @@
 //! The properties of a variable except the location of its value: causality, variability, type, range.
 
+use crate::clock::Timing;
 use crate::integer::IntegerType;
 use crate::need::Need;
-use crate::unit::Quantity;
+use crate::unit::{DisplayUnit, Quantity};
 use serde::{Deserialize, Serialize};
 
 /// Who sets a variable.
@@ -81,6 +82,8 @@ pub enum Kind {
     Enumeration(&'static Enumeration),
     /// A text.
     Text,
+    /// A clock (FMI 3.0).
+    Clock(Timing),
     /// Bytes (FMI 3.0).
     Binary {
         /// MIME type of the content.
@@ -135,6 +138,17 @@ impl std::fmt::Display for Range {
     }
 }
 
+/// Another name of a variable (FMI 3.0; FMI 2.0 does not show it).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alias {
+    /// Name, relative to the part that the variable belongs to; no other variable has it.
+    pub name: &'static str,
+    /// One sentence.
+    pub description: &'static str,
+    /// Display unit, of the variable's own unit.
+    pub display: Option<DisplayUnit>,
+}
+
 /// All properties of a variable except the location of its value.
 #[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -161,12 +175,16 @@ pub struct Meta {
     pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
+    /// Names of the clocks that it is on, with spaces between them; empty for none.
+    pub clocks: &'static str,
     /// It can be read or set inside a communication step; of a part, that one of its variables can.
     pub intermediate: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.
     pub shape: &'static [usize],
+    /// Other names.
+    pub aliases: &'static [Alias],
 }
 
 impl Meta {

@@ -11,8 +11,8 @@ use std::mem::MaybeUninit;
 
 /// The table's index of a value reference; [`TIME`] becomes an index past every table.
 #[inline]
-pub(crate) const fn index(reference: u32) -> usize {
-    (reference as usize).wrapping_sub(1)
+pub(crate) fn index<E: Exported>(reference: u32) -> usize {
+    E::CAN.index(reference)
 }
 
 /// Whether the reference is that of `time`, which archives of FMI 2.0 do not have.
@@ -30,8 +30,8 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
             _ => true,
         },
         Causality::Parameter => match state {
-            State::Step | State::Event | State::Ended => meta.variability == Variability::Tunable,
-            State::Continuous | State::Intermediate => false,
+            State::Step | State::Event | State::Activation | State::Ended => meta.variability == Variability::Tunable,
+            State::Continuous | State::Intermediate | State::ClockUpdate => false,
             _ => true,
         },
         _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),
@@ -75,7 +75,7 @@ impl<E: Exported> Instance<E> {
             let count = if self.arrays { self.elements(reference)? } else { 1 };
             let (places, rest) = out.split_at_mut(count);
             for (offset, place) in places.iter_mut().enumerate() {
-                let index = index(reference).wrapping_add(offset);
+                let index = index::<E>(reference).wrapping_add(offset);
                 let found = table::<E>().entry(&mut self.current.block, index);
                 match found.and_then(|(meta, slot)| T::read(meta, &slot, self.standard)) {
                     Some(value) => place.write(value),
@@ -143,7 +143,8 @@ impl<E: Exported> Instance<E> {
         // In Step Mode, the model reads inputs directly.
         if state != State::Step && !references.is_empty() {
             self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
-            self.stale |= self.exchanges() && matches!(state, State::Event | State::Continuous);
+            self.stale |= (self.exchanges() || const { E::CAN.clocked.is_some() })
+                && matches!(state, State::Event | State::Continuous);
         }
         Ok(())
     }
@@ -159,7 +160,7 @@ impl<E: Exported> Instance<E> {
             for &reference in references {
                 let count = if self.arrays { self.elements(reference)? } else { 1 };
                 for (offset, &value) in (0..count).zip(&mut next) {
-                    let index = index(reference).wrapping_add(offset);
+                    let index = index::<E>(reference).wrapping_add(offset);
                     if write { self.write(index, value) } else { self.try_value(state, reference, index, value)? }
                 }
             }
@@ -222,7 +223,7 @@ impl<E: Exported> Instance<E> {
     /// Why a reference past the table cannot be set, or read as another type.
     #[cold]
     pub(crate) fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
-        match self.after_table(index(reference)) {
+        match self.after_table(index::<E>(reference)) {
             Some(after) if set => {
                 Fault::new(format!("{} is calculated and cannot be set", message::calculated::<E>(after)))
             }
@@ -245,7 +246,7 @@ impl<E: Exported> Instance<E> {
 
     /// How many values a reference of FMI 3.0 stands for: one, or all elements of an array.
     pub(crate) fn elements(&mut self, reference: u32) -> Result<usize, Fault> {
-        let index = index(reference);
+        let index = index::<E>(reference);
         match table::<E>().element(index) {
             Some(element) if element > 0 => Err(message::element::<E::Model>(reference, index, element)),
             _ => {

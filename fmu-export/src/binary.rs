@@ -14,7 +14,7 @@ pub(crate) fn make_room<M: Model>(block: &mut Block<M>) {
     if const { !M::TABLE.has_binary() } {
         return;
     }
-    for index in 0..M::TABLE.len() {
+    for index in M::TABLE.indices() {
         if let Some((meta, Slot::Binary(bytes))) = M::TABLE.entry(block, index)
             && let Kind::Binary { most, .. } = meta.kind
         {
@@ -69,7 +69,9 @@ impl<E: Exported> Instance<E> {
             read(i)?;
         }
         for (i, &reference) in references.iter().enumerate() {
-            if let Some((_, Slot::Binary(bytes))) = E::Model::TABLE.entry(&mut self.current.block, index(reference)) {
+            if let Some((_, Slot::Binary(bytes))) =
+                E::Model::TABLE.entry(&mut self.current.block, index::<E>(reference))
+            {
                 bytes.set(read(i)?);
             }
         }

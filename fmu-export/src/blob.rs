@@ -19,7 +19,7 @@ use fmu_core::{Fault, Model};
 
 const MAGIC: &[u8; 8] = b"FMUstate";
 /// Version of this layout.
-const FORMAT: u16 = 2;
+const FORMAT: u16 = 3;
 const HEADER: usize = 8 + 2 + 2 + 16 + 4;
 const CHECKSUM: usize = 4;
 

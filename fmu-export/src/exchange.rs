@@ -1,6 +1,7 @@
 //! Model Exchange and Event Mode: the importer integrates the states and handles the events (FMI 2.0.5, 3.1 and 3.2;
 //! FMI 3.0.2, 2.3.5, 3.1 and 3.2).
 
+use crate::clocks::Tick;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
 use crate::message;
@@ -28,6 +29,9 @@ impl<E: Exported> Instance<E> {
         let current = &mut self.current;
         current.settled = current.settled.max(current.end);
         current.pending = true;
+        if const { E::CAN.clocked.is_some() } {
+            current.ticks.iter_mut().flatten().for_each(Tick::begin);
+        }
         if let Some(events) = &E::CAN.events {
             (events.begin)(&mut current.block.model, current.elapsed);
         }
@@ -55,6 +59,10 @@ impl<E: Exported> Instance<E> {
             current.dirty = false;
         }
         let mut update = Updated::default();
+        if const { E::CAN.clocked.is_some() } {
+            self.tick_all()?;
+        }
+        let current = &mut self.current;
         if let Some(events) = &E::CAN.events {
             let (model, now) = (&mut current.block.model, current.elapsed);
             update.outcome = (events.event)(model, now)?;

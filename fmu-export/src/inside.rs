@@ -33,7 +33,7 @@ pub(crate) struct Parts {
 
 /// The importer is to be called.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Update {
+pub struct Pause {
     /// Time in s.
     pub time: f64,
     /// It may end the step.
@@ -46,7 +46,7 @@ pub type Reply = Option<f64>;
 /// What follows a part of a step.
 pub(crate) enum Then {
     /// The importer is called, and the step goes on.
-    Call(Update),
+    Call(Pause),
     /// The step is done.
     Done(Stepped),
 }
@@ -57,7 +57,8 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// A variable does not exist.
     pub(crate) fn look_inside(&mut self, required: &[u32]) -> Result<(), Fault> {
-        let last = E::Model::TABLE.len() + E::CAN.states().len() + E::CAN.indicators().len();
+        let table = E::Model::TABLE;
+        let last = table.len() + E::CAN.states().len() + E::CAN.indicators().len() + table.wide();
         if let Some(&reference) = required.iter().find(|&&reference| reference as usize > last) {
             return Err(message::unknown::<E>(reference, self.standard));
         }
@@ -134,7 +135,7 @@ impl<E: Exported> Instance<E> {
         self.current.elapsed = next;
         self.current.end = if last { parts.end } else { (parts.t + parts.done * h).min(parts.end) };
         parts.stepped.early = early;
-        Ok(Then::Call(Update { time: self.current.end, can_return: self.early_return }))
+        Ok(Then::Call(Pause { time: self.current.end, can_return: self.early_return }))
     }
 
     /// Refuses variables that the importer did not ask for at instantiation, and to set those that are not intermediate.
@@ -147,7 +148,7 @@ impl<E: Exported> Instance<E> {
             if *reference == TIME && !sets {
                 continue;
             }
-            let name = || message::name::<E::Model>(index(*reference));
+            let name = || message::name::<E::Model>(index::<E>(*reference));
             if !inside.required.contains(reference) {
                 let name = name();
                 return Err(Fault::new(format!(
@@ -178,7 +179,7 @@ impl<E: Exported> Instance<E> {
         for reference in references {
             let (place, rest) = out.split_at_mut(self.elements(*reference)?);
             out = rest;
-            let kept = E::Model::TABLE.locate(index(*reference)).is_some()
+            let kept = E::Model::TABLE.locate(index::<E>(*reference)).is_some()
                 && !is_intermediate::<E>(*reference, Causality::Output);
             self.exchange_outputs(kept);
             let read = self.get(std::slice::from_ref(reference), place);
@@ -197,6 +198,6 @@ impl<E: Exported> Instance<E> {
 
 /// Whether a variable is marked so.
 fn is_intermediate<E: Exported>(reference: u32, causality: Causality) -> bool {
-    let found = E::Model::TABLE.locate(index(reference));
+    let found = E::Model::TABLE.locate(index::<E>(reference));
     found.is_some_and(|(_, meta, _)| meta.intermediate && meta.causality == causality)
 }

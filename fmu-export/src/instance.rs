@@ -1,5 +1,6 @@
 //! An instance of a model as an importer sees it, without C: names, times, saved states, messages.
 
+use crate::clocks::Clocks;
 use crate::exchange::MAX_ITERATIONS;
 use crate::inside::Inside;
 use crate::lifecycle::{Standard, State};
@@ -8,6 +9,7 @@ use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::capability::{Eventful, ToEvent};
+use fmu_core::log::WARNING;
 use fmu_core::log::{Said, Warnings};
 use fmu_core::resource::Shelf;
 use fmu_core::{Block, Elapsed, Exported, Fault, Interface, Model, Outcome, Range, SampleGrid, Step};
@@ -54,11 +56,11 @@ pub struct Instance<E: Exported> {
     /// A reference can stand for several values: only in FMI 3.0, and only if the model has an array.
     pub(crate) arrays: bool,
     /// Indices of the states' rows.
-    pub(crate) states: Vec<usize>,
+    pub(crate) states: Box<[usize]>,
     /// Ranges of the states.
     pub(crate) ranges: Box<[Range]>,
     /// Room for the derivatives and the indicators.
-    pub(crate) values: Vec<f64>,
+    pub(crate) values: Box<[f64]>,
     /// The outputs are old: they belong to another instant (Model Exchange only).
     pub(crate) stale: bool,
     /// Memory for derivatives of the equations.
@@ -69,6 +71,8 @@ pub struct Instance<E: Exported> {
     pub(crate) shelf: Shelf,
     /// The model as it was instantiated, for a reset, if that is not its `Default`.
     pub(crate) made: Option<Box<Block<E::Model>>>,
+    /// What the clocks are, of a model that has some.
+    pub(crate) clocks: Option<Box<Clocks>>,
     /// What the importer does inside communication steps.
     pub(crate) inside: Option<Box<Inside<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
@@ -80,11 +84,11 @@ impl<E: Exported> Instance<E> {
     pub fn new(standard: Standard, name: String, log: Log, current: Snapshot<E::Model>) -> Self {
         let table = E::Model::TABLE;
         let arrays = standard == Standard::Fmi3
-            && (0..table.len()).any(|i| table.locate(i).is_some_and(|(_, meta, _)| meta.dimension.is_some()));
+            && table.indices().any(|i| table.locate(i).is_some_and(|(_, meta, _)| meta.dimension.is_some()));
         let info = E::Model::INFO;
         log.event(|| format!("{name}: instance of {} {}", info.name, info.version));
         // A state without a row has no reference; `fmu build` refuses such a model.
-        let states = E::CAN.rows().unwrap_or_default();
+        let states = E::CAN.rows().unwrap_or_default().into_boxed_slice();
         let range = |&row: &usize| table.locate(row).map_or(Range::ALL, |(_, meta, _)| meta.range);
         Self {
             standard,
@@ -95,13 +99,14 @@ impl<E: Exported> Instance<E> {
             arrays,
             ranges: states.iter().map(range).collect(),
             states,
-            values: vec![0.0; E::CAN.states().len() + E::CAN.indicators().len()],
+            values: vec![0.0; E::CAN.states().len() + E::CAN.indicators().len()].into(),
             stale: false,
             scratch: None,
             texts: Vec::new(),
             shelf: Shelf::default(),
             made: None,
             inside: None,
+            clocks: Clocks::of::<E>(),
             warned: Vec::new(),
         }
     }
@@ -135,6 +140,9 @@ impl<E: Exported> Instance<E> {
         self.current.block.initialize();
         self.current.dirty = false;
         self.log.event(|| message::start(&self.name, &mut self.current, self.made.as_deref()));
+        if const { E::CAN.clocked.is_some() } {
+            self.plan_ticks(true)?;
+        }
         if self.current.life.handles_events() { self.enter_event() } else { Ok(()) }
     }
 
@@ -184,7 +192,7 @@ impl<E: Exported> Instance<E> {
     pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<Stepped, Fault> {
         let current = &mut self.current;
         let handles_events = current.life.handles_events();
-        if E::CAN.event_mode() && (handles_events || self.early_return) {
+        if E::CAN.event_mode() && E::CAN.clocked.is_none() && (handles_events || self.early_return) {
             return match E::CAN.to_event {
                 Some(to_event) => self.step_to_stop(to_event, t, h),
                 None => self.step_to_event(t, h),
@@ -262,6 +270,17 @@ impl<E: Exported> Instance<E> {
         current.block.model.output(current.elapsed, &mut current.block.out);
         self.warn();
         Ok(stepped)
+    }
+
+    /// Warns, if anyone listens and this key was not heard in the last second.
+    pub(crate) fn warn_of(&mut self, key: &'static str, message: impl FnOnce() -> String) {
+        let now = self.current.elapsed.seconds();
+        self.warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
+        let heard = self.log.hears_model(&[]);
+        if heard && !self.warned.iter().any(|&(other, _)| other == key) {
+            self.warned.push((key, now));
+            self.log.said(WARNING, &[], &format!("{}: at {} s: {}", self.name, self.current.end, message()));
+        }
     }
 
     /// A step of a model with states for an importer that handles its events, or takes steps that end early. What the importer

@@ -74,7 +74,8 @@
 //!
 //! Layers, from the bottom: [`lifecycle`] (which call is allowed in which state), [`value`] (C types and base types), [`snapshot`]
 //! (everything that changes), [`blob`] and [`registry`] (states as bytes and as handles), [`log`], [`instance`], [`exchange`],
-//! [`inside`] and [`sensitivity`] (the calls without C), and [`abi`] (pointers). The crate knows neither motors nor XML; only [`abi`] contains `unsafe`.
+//! [`clocks`], [`inside`] and [`sensitivity`] (the calls without C), and [`abi`] (pointers). The crate knows neither motors nor
+//! XML; only [`abi`] contains `unsafe`.
 
 #![deny(unsafe_code)]
 
@@ -83,6 +84,7 @@ pub mod abi;
 mod access;
 mod binary;
 pub mod blob;
+pub mod clocks;
 pub mod exchange;
 pub mod inside;
 pub mod instance;

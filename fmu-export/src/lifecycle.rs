@@ -42,10 +42,14 @@ pub enum State {
     Ended,
     /// Intermediate Update Mode of co-simulation in FMI 3.0: while the importer's callback runs.
     Intermediate,
+    /// Clock Activation Mode of Scheduled Execution.
+    Activation,
+    /// Clock Update Mode of Scheduled Execution: while the importer's callback runs.
+    ClockUpdate,
 }
 
 impl State {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 11] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,
@@ -55,17 +59,19 @@ impl State {
         Self::Terminated,
         Self::Error,
         Self::Intermediate,
+        Self::Activation,
+        Self::ClockUpdate,
     ];
 
-    /// Those in which no call is under way.
+    /// Those in which no call is under way; Clock Activation Mode takes the place of Step Mode in Scheduled Execution.
     const REST: [Self; 8] = {
-        let [rest @ .., _] = Self::ALL;
+        let [rest @ .., _, _, _] = Self::ALL;
         rest
     };
 
     /// Whether the instance waits for a callback of the importer.
     pub const fn calls_back(self) -> bool {
-        matches!(self, Self::Intermediate)
+        matches!(self, Self::Intermediate | Self::ClockUpdate)
     }
 }
 
@@ -81,6 +87,8 @@ impl fmt::Display for State {
             Self::Continuous => "Continuous-Time Mode",
             Self::Ended => "Ended by the model",
             Self::Intermediate => "Intermediate Update Mode",
+            Self::Activation => "Clock Activation Mode",
+            Self::ClockUpdate => "Clock Update Mode",
         })
     }
 }
@@ -97,6 +105,13 @@ impl States {
             i += 1;
         }
         Self(bits)
+    }
+
+    /// The states of Scheduled Execution, where Clock Activation Mode is what Step Mode is elsewhere.
+    const fn scheduled(self) -> Self {
+        use State::{Activation, Error, Initialization, Instantiated, Step, Terminated};
+        let common = Self::of(&[Instantiated, Initialization, Terminated, Error]).0 & self.0;
+        Self(if self.contains(Step) { common | Self::of(&[Activation]).0 } else { common })
     }
 
     /// Whether the set is empty.
@@ -180,6 +195,18 @@ pub enum Call {
     UseState,
     /// `fmi2Get...Status`.
     Status,
+    /// `fmi3GetClock`.
+    GetClock,
+    /// `fmi3SetClock`.
+    SetClock,
+    /// `fmi3GetInterval...`.
+    GetInterval,
+    /// `fmi3SetInterval...`.
+    SetInterval,
+    /// `fmi3GetShift...`, `fmi3SetShift...`.
+    Shift,
+    /// `fmi3ActivateModelPartition`.
+    Activate,
     /// A capability that this FMU does not have: refused in every state, with that reason.
     Unsupported,
 }
@@ -204,6 +231,8 @@ struct Row {
     event: States,
     /// In Model Exchange.
     exchange: [States; 2],
+    /// In Scheduled Execution.
+    scheduled: States,
     next: Next,
 }
 
@@ -219,23 +248,31 @@ const fn each(fmi2: &[State], fmi3: &[State]) -> [States; 2] {
 
 /// A call of every interface.
 const fn any(states: [States; 2], next: Next) -> Row {
-    Row { step: states, event: states[1], exchange: states, next }
+    Row { step: states, event: states[1], exchange: states, scheduled: states[1].scheduled(), next }
 }
 
 /// A call of co-simulation only; Event Mode does not allow it.
 const fn stepping(states: [States; 2], next: Next) -> Row {
-    Row { step: states, event: states[1], exchange: NONE, next }
+    Row { step: states, event: states[1], exchange: NONE, scheduled: States(0), next }
 }
 
 /// A call of Model Exchange only.
 const fn exchange(states: [States; 2], next: Next) -> Row {
-    Row { step: NONE, event: States(0), exchange: states, next }
+    Row { step: NONE, event: States(0), exchange: states, scheduled: States(0), next }
+}
+
+/// A call about clocks: where the importer handles events, and in Scheduled Execution.
+const fn clocks(events: &[State], scheduled: &[State]) -> Row {
+    Row { event: States::of(events), scheduled: States::of(scheduled), ..exchange(each(&[], events), Next::Stay) }
 }
 
 impl Call {
     const fn row(self) -> Row {
         use Next::{Start, Stay, To};
-        use State::{Continuous, Ended, Error, Event, Initialization, Instantiated, Intermediate, Step, Terminated};
+        use State::{
+            Activation, ClockUpdate, Continuous, Ended, Error, Event, Initialization, Instantiated, Intermediate, Step,
+            Terminated,
+        };
         match self {
             Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => {
                 any(both(&State::REST), Stay)
@@ -300,7 +337,23 @@ impl Call {
                 stepping(each(&[Step, Ended, Terminated, Error], &[Step, Ended, Terminated, Intermediate]), Stay)
             }
             Self::InputDerivatives => stepping(each(&[Instantiated, Initialization, Step], &[]), Stay),
+            Self::GetClock => clocks(&[Event], &[Activation, ClockUpdate]),
+            Self::SetClock => clocks(&[Event], &[]),
+            Self::GetInterval => clocks(&[Initialization, Event], &[Initialization, Activation, ClockUpdate]),
+            Self::SetInterval => clocks(&[Initialization, Event], &[Initialization, Activation]),
+            Self::Shift => clocks(&[Initialization], &[Initialization]),
+            Self::Activate => clocks(&[], &[Activation]),
         }
+    }
+
+    /// This call for an FMU that `has` its capability.
+    pub const fn of(self, has: bool) -> Self {
+        if has { self } else { Self::Unsupported }
+    }
+
+    /// A scheduler may interrupt it in Scheduled Execution (FMI 3.0.2, 5.1.2).
+    pub(crate) const fn is_preempted(self) -> bool {
+        matches!(self, Self::Get | Self::Set | Self::GetClock | Self::GetInterval | Self::SetInterval | Self::Activate)
     }
 
     /// The state that it leads to.
@@ -315,13 +368,14 @@ impl Call {
             Interface::CoSimulation => row.step[standard as usize],
             Interface::EventMode => row.event,
             Interface::ModelExchange => row.exchange[standard as usize],
+            Interface::ScheduledExecution => row.scheduled,
         }
     }
 }
 
 /// The states that allow a call: for each interface.
 #[derive(Clone, Copy, Debug)]
-pub struct Allowed([States; 3]);
+pub struct Allowed([States; 4]);
 
 impl Allowed {
     /// The states that allow `call`.
@@ -330,6 +384,7 @@ impl Allowed {
             call.states(standard, Interface::CoSimulation),
             call.states(standard, Interface::EventMode),
             call.states(standard, Interface::ModelExchange),
+            call.states(standard, Interface::ScheduledExecution),
         ])
     }
 
@@ -374,7 +429,7 @@ impl Life {
 
     /// Whether the importer handles events.
     pub const fn handles_events(self) -> bool {
-        !matches!(self.interface, Interface::CoSimulation)
+        matches!(self.interface, Interface::EventMode | Interface::ModelExchange)
     }
 
     /// Records that the model has ended the simulation in a step.
@@ -393,21 +448,26 @@ impl Life {
             Next::Stay => {}
             Next::To(state) => self.state = state,
             Next::Start if self.handles_events() => self.state = State::Event,
+            Next::Start if matches!(self.interface, Interface::ScheduledExecution) => self.state = State::Activation,
             Next::Start => self.state = State::Step,
         }
     }
 
-    /// Records that a step waits for a callback of the importer.
+    /// Records that a step, or a partition, waits for a callback of the importer.
     pub(crate) const fn call_back(&mut self) {
-        self.state = State::Intermediate;
+        self.state = match self.state {
+            State::Activation => State::ClockUpdate,
+            _ => State::Intermediate,
+        };
     }
 
     /// Records that the callback has returned; false if a call in it has failed.
     pub(crate) const fn called_back(&mut self) -> bool {
-        let waits = self.state.calls_back();
-        if waits {
-            self.state = State::Step;
+        match self.state {
+            State::Intermediate => self.state = State::Step,
+            State::ClockUpdate => self.state = State::Activation,
+            _ => return false,
         }
-        waits
+        true
     }
 }

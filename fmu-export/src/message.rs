@@ -40,6 +40,7 @@ fn kind(kind: &Kind) -> String {
         Kind::Boolean => "a truth value".into(),
         Kind::Enumeration(_) => "an enumeration".into(),
         Kind::Text => "a text".into(),
+        Kind::Clock(_) => "a clock".into(),
         Kind::Binary { .. } => "bytes".into(),
     }
 }
@@ -57,14 +58,14 @@ pub(crate) fn unknown<E: Exported>(reference: u32, standard: Standard) -> Fault 
     // Time and the event indicators are variables in FMI 3.0 only.
     let (first, indicators) =
         if standard == Standard::Fmi3 { (TIME, E::CAN.indicators().len()) } else { (TIME + 1, 0) };
-    let last = E::Model::TABLE.len() + E::CAN.states().len() + indicators;
+    let last = E::Model::TABLE.len() + E::CAN.states().len() + indicators + E::Model::TABLE.wide();
     Fault::new(format!("value reference {reference} does not exist; {first} to {last} do"))
 }
 
 /// The reference belongs to an element that has no reference of its own in FMI 3.0.
 #[cold]
 pub(crate) fn element<M: Model>(reference: u32, index: usize, element: usize) -> Fault {
-    let first = index - element + 1;
+    let first = reference as usize - element;
     let name = name::<M>(index);
     Fault::new(format!(
         "value reference {reference} does not exist; {name} belongs to the array with reference {first}"
@@ -116,7 +117,7 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: O
     let mut fresh = made.cloned().unwrap_or_default();
     fresh.initialize();
     let mut changes = Vec::new();
-    for index in 0..M::TABLE.len() {
+    for index in M::TABLE.indices() {
         let (Some((meta, new)), Some((_, old))) =
             (M::TABLE.entry(&mut current.block, index), M::TABLE.entry(&mut fresh, index))
         else {
@@ -173,5 +174,6 @@ pub(crate) fn made_for(interface: Interface) -> &'static str {
         Interface::CoSimulation => "for Co-Simulation without Event Mode",
         Interface::EventMode => "for Co-Simulation with Event Mode",
         Interface::ModelExchange => "for Model Exchange",
+        Interface::ScheduledExecution => "for Scheduled Execution",
     }
 }

@@ -103,14 +103,16 @@ fn content(path: &Path) -> io::Result<Vec<u8>> {
 /// Sets the start values as an importer would after instantiation.
 fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault> {
     let rows = can.rows()?;
-    let len = M::TABLE.len();
-    let (mut set, mut next) = (vec![false; len], 0);
+    let indices: Vec<usize> = M::TABLE.indices().collect();
+    let (mut set, mut next) = (vec![false; indices.len()], 0);
     for Entry { line, name, value } in entries {
         let wrong = |fault: Fault| Fault::new(format!("line {line}: {fault}"));
         // `fmu preset` writes the variables in the order of the table.
-        let found = (next..len).chain(0..next).find(|&index| message::name::<M>(index) == *name);
-        let index = found.ok_or_else(|| wrong(Fault::new(format!("{} has no variable {name}", M::INFO.name))))?;
-        if std::mem::replace(&mut set[index], true) {
+        let mut places = (next..indices.len()).chain(0..next);
+        let found = places.find(|&place| message::name::<M>(indices[place]) == *name);
+        let place = found.ok_or_else(|| wrong(Fault::new(format!("{} has no variable {name}", M::INFO.name))))?;
+        let index = indices[place];
+        if std::mem::replace(&mut set[place], true) {
             return Err(wrong(Fault::new(format!("{name} has a value already"))));
         }
         let Some((meta, slot)) = can.place(block, &rows, index) else { continue };
@@ -118,7 +120,7 @@ fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry
             return Err(wrong(message::fixed::<M>(index, meta, State::Instantiated)));
         }
         write(meta, slot, value).map_err(|allowed| wrong(Fault::value(name, value, allowed)))?;
-        next = index + 1;
+        next = place + 1;
     }
     Ok(())
 }
@@ -147,6 +149,7 @@ fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
         }
         Slot::Text(x) => text.clone_into(x),
         Slot::Said(_) | Slot::Constant(_) => return Err("a value that the model gives".into()),
+        Slot::Clock(_) => return Err("a clock".into()),
         Slot::Binary(x) => x.set(&Bytes::from_hex(text).ok_or("pairs of hexadecimal digits")?),
     }
     if slot.is_allowed(meta) { Ok(()) } else { Err(allowed()) }

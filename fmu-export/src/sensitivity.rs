@@ -111,7 +111,7 @@ impl<E: Exported> Instance<E> {
                 (continuous.integrands)(&current.block.model, current.elapsed, &mut scratch.block.out);
             }
             for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-                *out += sign * real(&mut scratch.block, index(unknown));
+                *out += sign * real(&mut scratch.block, index::<E>(unknown));
             }
         }
     }
@@ -130,12 +130,12 @@ impl<E: Exported> Instance<E> {
                 return Err(Fault::value("order", order, "1"));
             }
             if !value.is_finite() {
-                let name = format!("the derivative of {}", message::name::<E::Model>(index(known)));
+                let name = format!("the derivative of {}", message::name::<E::Model>(index::<E>(known)));
                 return Err(Fault::value(&name, value, "a finite number"));
             }
         }
         for (&known, &value) in knowns.iter().zip(values) {
-            let row = known - 1;
+            let row = u32::try_from(index::<E>(known)).unwrap_or(u32::MAX);
             self.current.slopes.retain(|(other, _)| *other != row);
             self.current.slopes.push((row, value));
         }
@@ -146,7 +146,7 @@ impl<E: Exported> Instance<E> {
     pub(crate) fn step_on_slopes(&mut self, h: f64) -> Result<(), Fault> {
         let table = E::Model::TABLE;
         let is_mean = |&index: &usize| table.locate(index).is_some_and(|(_, meta, _)| meta.mean);
-        let mut means: Vec<(usize, f64)> = (0..table.len()).filter(is_mean).map(|index| (index, 0.0)).collect();
+        let mut means: Vec<(usize, f64)> = table.indices().filter(is_mean).map(|index| (index, 0.0)).collect();
         let current = &mut self.current;
         let slopes = std::mem::take(&mut current.slopes);
         let mut block = current.block.clone();
@@ -235,7 +235,7 @@ impl<E: Exported> Instance<E> {
         let mut others = std::mem::take(&mut scratch.others);
         others.clear();
         for (&known, &seed) in knowns.iter().zip(seed) {
-            match self.states.iter().position(|&row| row == index(known)) {
+            match self.states.iter().position(|&row| row == index::<E>(known)) {
                 Some(i) => rates[i] = seed,
                 None => others.push((known, seed)),
             }
@@ -271,7 +271,7 @@ impl<E: Exported> Instance<E> {
         let direction = &mut scratch.block;
         clear::<E>(direction);
         for &(known, seed) in others {
-            put(direction, index(known), seed);
+            put(direction, index::<E>(known), seed);
         }
         for (state, rate) in E::CAN.states().iter().zip(rates) {
             *(state.at)(&mut direction.model) = *rate;
@@ -279,7 +279,7 @@ impl<E: Exported> Instance<E> {
         let (along, change) = (&direction.model, &mut direction.out);
         tangent(&current.block.model, current.elapsed, along, &mut scratch.dx, change).map_err(Refusal::Discard)?;
         for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-            *out += pick::<E>(&mut scratch.block, &scratch.dx, index(unknown));
+            *out += pick::<E>(&mut scratch.block, &scratch.dx, index::<E>(unknown));
         }
         Self::finite(unknowns, out)
     }
@@ -298,8 +298,8 @@ impl<E: Exported> Instance<E> {
         let mut largest = 0.0_f64;
         for &(known, seed) in others {
             let block = &mut self.current.block;
-            let x = real(block, index(known));
-            largest = largest.max(seed.abs() / message::nominal::<E::Model>(block, index(known)).max(x.abs()));
+            let x = real(block, index::<E>(known));
+            largest = largest.max(seed.abs() / message::nominal::<E::Model>(block, index::<E>(known)).max(x.abs()));
         }
         for ((rate, state), &row) in rates.iter().zip(E::CAN.states()).zip(&self.states) {
             let block = &mut self.current.block;
@@ -318,8 +318,8 @@ impl<E: Exported> Instance<E> {
             let block = &mut scratch.block;
             block.model.clone_from(&current.block.model);
             for &(known, seed) in others {
-                let x = real(block, index(known)) + side * eps * seed;
-                put(block, index(known), x);
+                let x = real(block, index::<E>(known)) + side * eps * seed;
+                put(block, index::<E>(known), x);
             }
             for (state, rate) in E::CAN.states().iter().zip(rates) {
                 *(state.at)(&mut block.model) += side * eps * rate;
@@ -333,7 +333,7 @@ impl<E: Exported> Instance<E> {
             let dx = &mut scratch.dx;
             evaluate::<E>(block, now, initial, dx).map_err(Refusal::Discard)?;
             for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-                *out += side * pick::<E>(block, dx, index(unknown)) / (2.0 * eps);
+                *out += side * pick::<E>(block, dx, index::<E>(unknown)) / (2.0 * eps);
             }
         }
         Self::finite(unknowns, out)
@@ -347,12 +347,12 @@ impl<E: Exported> Instance<E> {
     }
 
     fn is_derivative(unknown: u32) -> bool {
-        index(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.states().len()
+        index::<E>(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.states().len()
     }
 
     /// What the table says of a variable.
     fn meta(&mut self, reference: u32) -> Option<&'static Meta> {
-        E::Model::TABLE.entry(&mut self.current.block, index(reference)).map(|(meta, _)| meta)
+        E::Model::TABLE.entry(&mut self.current.block, index::<E>(reference)).map(|(meta, _)| meta)
     }
 
     fn is_continuous_input(&mut self, known: u32) -> bool {
@@ -380,7 +380,7 @@ impl<E: Exported> Instance<E> {
             let calculated = self.meta(unknown).is_some_and(|meta| {
                 meta.causality == Causality::CalculatedParameter && matches!(meta.kind, Kind::Real(_))
             });
-            let of_start = initial && (calculated || self.states.contains(&index(unknown)));
+            let of_start = initial && (calculated || self.states.contains(&index::<E>(unknown)));
             let set = initial && self.meta(unknown).is_some_and(|meta| meta.exact);
             let output = self.is_output(unknown, state == State::Event || initial);
             if set || !(Self::is_derivative(unknown) || of_start || output) {
@@ -391,7 +391,7 @@ impl<E: Exported> Instance<E> {
             }
         }
         for (i, &known) in knowns.iter().enumerate() {
-            let state_row = self.states.contains(&index(known)) && !initial;
+            let state_row = self.states.contains(&index::<E>(known)) && !initial;
             let parameters = self.standard == Standard::Fmi3;
             let input = self.meta(known).is_some_and(|meta| {
                 let fits = match meta.causality {
@@ -418,7 +418,7 @@ impl<E: Exported> Instance<E> {
 
     #[cold]
     fn name_of(reference: u32) -> String {
-        let index = index(reference);
+        let index = index::<E>(reference);
         if E::Model::TABLE.locate(index).is_some() {
             return message::name::<E::Model>(index);
         }
@@ -482,7 +482,7 @@ fn pick<E: Exported>(block: &mut Block<E::Model>, dx: &[f64], index: usize) -> f
 
 /// Makes a direction: no continuous input and no state changes, and so far no output.
 fn clear<E: Exported>(direction: &mut Block<E::Model>) {
-    for index in 0..E::Model::TABLE.len() {
+    for index in E::Model::TABLE.indices() {
         if let Some((meta, Slot::Real(x))) = E::Model::TABLE.entry(direction, index)
             && (ramps(meta) || meta.causality == Causality::Output)
         {

@@ -1,6 +1,7 @@
 //! Everything that changes in an instance, as one plain value that an FMU state saves.
 
 use crate::binary::make_room;
+use crate::clocks::{Tick, ticks};
 use crate::lifecycle::{Life, State};
 use crate::message;
 use fmu_core::{Block, Causality, Elapsed, Fault, Interface, Kind, Meta, Model, Slot, Variability};
@@ -61,6 +62,8 @@ pub struct Snapshot<M: Model> {
     pub slopes: Vec<(u32, f64)>,
     /// A set call awaits processing by the model: before the start for any variable, afterwards for a tunable parameter.
     pub dirty: bool,
+    /// The clocks of a model that has some, in the order of the table.
+    pub ticks: Option<Box<[Tick]>>,
     /// The model and its outputs.
     pub block: Block<M>,
 }
@@ -89,6 +92,7 @@ impl<M: Model> Snapshot<M> {
             pending: false,
             slopes: Vec::new(),
             dirty: true,
+            ticks: ticks::<M>(),
             block,
         }
     }
@@ -96,15 +100,16 @@ impl<M: Model> Snapshot<M> {
 
 impl<M: Model> Clone for Snapshot<M> {
     fn clone(&self) -> Self {
-        Self { block: self.block.clone(), slopes: self.slopes.clone(), ..*self }
+        Self { block: self.block.clone(), slopes: self.slopes.clone(), ticks: self.ticks.clone(), ..*self }
     }
 
     /// Reuses what `self` holds: for a plain model, and one with a `clone_from` of its own, nothing is allocated.
     fn clone_from(&mut self, source: &Self) {
-        let Self { life, experiment, elapsed, end, settled, pending, slopes, dirty, block } = source;
+        let Self { life, experiment, elapsed, end, settled, pending, slopes, dirty, ticks, block } = source;
         (self.life, self.experiment, self.elapsed) = (*life, *experiment, *elapsed);
         (self.end, self.settled, self.pending, self.dirty) = (*end, *settled, *pending, *dirty);
         self.slopes.clone_from(slopes);
+        self.ticks.clone_from(ticks);
         self.block.model.clone_from(&block.model);
         self.block.out.clone_from(&block.out);
     }
@@ -116,7 +121,7 @@ impl<M: Model> Snapshot<M> {
     /// # Errors
     /// Names the first variable that is not, its value and what is allowed.
     pub fn check(&mut self) -> Result<(), Fault> {
-        for index in 0..M::TABLE.len() {
+        for index in M::TABLE.indices() {
             let Some((meta, slot)) = M::TABLE.entry(&mut self.block, index) else { continue };
             let set = matches!(meta.causality, Causality::Input | Causality::Parameter);
             let refused = match &slot {
@@ -129,6 +134,13 @@ impl<M: Model> Snapshot<M> {
                 let allowed = if set { message::allowed(meta) } else { "a number".into() };
                 return Err(Fault::value(&message::name::<M>(index), slot, allowed));
             }
+        }
+        let sane = match (&self.ticks, ticks::<M>()) {
+            (Some(ticks), Some(fresh)) => ticks.len() == fresh.len() && ticks.iter().all(Tick::is_sane),
+            (ticks, fresh) => ticks.is_none() && fresh.is_none(),
+        };
+        if !sane {
+            return Err(Fault::new("clocks"));
         }
         let ramps = |&(index, slope): &(u32, f64)| {
             let entry = M::TABLE.entry(&mut self.block, index as usize);
@@ -152,11 +164,14 @@ impl<M: Model> Snapshot<M> {
     /// Whether an instance that was made for this interface can be in this state.
     pub(crate) fn fits_its_interface(&self) -> bool {
         match (self.life.state(), self.life.interface()) {
-            (State::Step | State::Ended, interface) => interface != Interface::ModelExchange,
-            (State::Event, interface) => interface != Interface::CoSimulation,
+            (State::Step | State::Ended, interface) => {
+                matches!(interface, Interface::CoSimulation | Interface::EventMode)
+            }
+            (State::Event, interface) => matches!(interface, Interface::EventMode | Interface::ModelExchange),
+            (State::Activation, interface) => interface == Interface::ScheduledExecution,
             (State::Continuous, interface) => interface == Interface::ModelExchange,
             // A step that is under way cannot be saved.
-            (State::Intermediate, _) => false,
+            (State::Intermediate | State::ClockUpdate, _) => false,
             _ => true,
         }
     }
@@ -174,7 +189,15 @@ impl<M: Model> Snapshot<M> {
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
                 (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
-                (State::Step | State::Event | State::Continuous | State::Ended | State::Terminated, Some(_)) => {
+                (
+                    State::Step
+                    | State::Event
+                    | State::Continuous
+                    | State::Ended
+                    | State::Activation
+                    | State::Terminated,
+                    Some(_),
+                ) => {
                     self.end.is_finite()
                         && (start..=self.end + rounding).contains(&self.settled)
                         && elapsed >= 0.0

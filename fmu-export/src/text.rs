@@ -90,7 +90,7 @@ impl<E: Exported> Instance<E> {
         carries: &str,
         fits: impl Fn(&Kind) -> bool,
     ) -> Result<usize, Fault> {
-        let index = index(reference);
+        let index = index::<E>(reference);
         match E::Model::TABLE.entry(&mut self.current.block, index) {
             Some((meta, _)) if fits(&meta.kind) => Ok(index),
             Some((meta, _)) => Err(message::type_of::<E::Model>(index, meta, carries)),

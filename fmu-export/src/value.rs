@@ -1,6 +1,5 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
-use crate::access::index;
 use crate::lifecycle::Standard;
 use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Meta, Model, Slot};
 use std::ffi::c_int;
@@ -132,7 +131,7 @@ impl Value for f64 {
 #[cold]
 fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
     for (&reference, &value) in list.iter().zip(before).rev() {
-        if let Some((_, Slot::Real(x))) = M::TABLE.entry(block, index(reference)) {
+        if let Some((_, Slot::Real(x))) = M::TABLE.entry(block, (reference - FIRST) as usize) {
             *x = value;
         }
     }

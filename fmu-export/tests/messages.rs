@@ -217,9 +217,8 @@ fn wishes_of_fmi3_that_are_refused() {
     unsafe {
         assert!(fmi3InstantiateModelExchange(name, token, null(), no, no, environment, Some(log3)).is_null());
         assert!(drain(&journal)[0].text.contains("Model Exchange"));
-        let none = null();
         let it =
-            fmi3InstantiateScheduledExecution(name, token, null(), no, no, environment, Some(log3), none, none, none);
+            fmi3InstantiateScheduledExecution(name, token, null(), no, no, environment, Some(log3), None, None, None);
         assert!(it.is_null() && drain(&journal)[0].text.contains("Scheduled Execution"));
         assert!(fmi3InstantiateModelExchange(null(), null(), null(), no, no, null_mut(), None).is_null());
     }

@@ -1,5 +1,6 @@
 //! One instance of an FMU of either standard.
 
+mod clocks;
 mod equations;
 
 pub use equations::{CompletedStep, Stepped, Update};
@@ -10,6 +11,7 @@ use crate::abi::journal::{self, Call};
 use crate::abi::live::{Live, Pointer};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::raw::Simple;
+use clocks::Clocks;
 use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -28,6 +30,8 @@ pub struct Instance {
     kind: Kind,
     states: Vec<Option<Pointer>>,
     dead: bool,
+    /// Of an FMU that has some, unless events are not used.
+    clocks: Option<Box<Clocks>>,
     // After the instance, which may log while it is freed.
     log: Arc<Log>,
 }
@@ -41,7 +45,9 @@ impl Instance {
         kind: Kind,
         log: Arc<Log>,
     ) -> Self {
-        Self { name: name.into(), id, description, live, kind, states: Vec::new(), dead: false, log }
+        let events = !matches!(kind, Kind::CoSimulation { event_mode: false, .. });
+        let clocks = if events { Clocks::of(&description) } else { None };
+        Self { name: name.into(), id, description, live, kind, states: Vec::new(), dead: false, clocks, log }
     }
 
     /// The name that the instance was given.
@@ -117,6 +123,12 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Error> {
+        if self.clocks.is_some() {
+            for (&reference, value) in references.iter().zip(values) {
+                *value = self.get_clocked(BaseType::Float64, reference, 1)?.number().unwrap_or(f64::NAN);
+            }
+            return Ok(());
+        }
         self.call(Call::Get, |s| s.get_reals(references, values))
     }
 
@@ -126,6 +138,12 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Error> {
+        if self.clocks.is_some() {
+            let mut all = references.iter().zip(values);
+            return all.try_for_each(|(&reference, &x)| {
+                self.set_clocked(BaseType::Float64, reference, &Values::Reals(vec![x]))
+            });
+        }
         self.call(Call::Set, |s| s.set_reals(references, values))
     }
 
@@ -134,6 +152,9 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn get_at(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
+        if self.clocks.is_some() {
+            return self.get_clocked(base, reference, count);
+        }
         self.call(Call::Get, |s| s.get(base, reference, count))
     }
 
@@ -142,6 +163,9 @@ impl Instance {
     /// # Errors
     /// The values do not fit, or the FMU refuses.
     pub fn set_at(&mut self, base: BaseType, reference: u32, values: &Values) -> Result<(), Error> {
+        if self.clocks.is_some() {
+            return self.set_clocked(base, reference, values);
+        }
         self.call(Call::Set, |s| s.set(base, reference, values))
     }
 
@@ -166,6 +190,9 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn setup_with(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result<(), Error> {
+        if let Some(clocks) = &mut self.clocks {
+            clocks.begin(start);
+        }
         self.call(Call::Setup, |s| s.setup(Experiment { start, stop, tolerance }))
     }
 
@@ -182,7 +209,9 @@ impl Instance {
     /// # Errors
     /// The FMU refuses, for example parameters that do not fit together.
     pub fn exit_initialization(&mut self) -> Result<(), Error> {
-        self.call(Call::ExitInitialization, |s| s.simple(Simple::ExitInitializationMode))
+        self.plan_clocks()?;
+        self.call(Call::ExitInitialization, |s| s.simple(Simple::ExitInitializationMode))?;
+        self.tick()
     }
 
     /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.

@@ -29,7 +29,9 @@ pub use number::{format as format_number, parse as parse_number};
 pub use read::{decode, read, read_element, read_terminals};
 pub use terminals::{Area, CoordinateSystem, Member, StreamMember, Terminal, TerminalPicture, TerminalsAndIcons};
 pub use units::{BaseUnit, DisplayUnit, Item, TypeDefinition, Unit};
-pub use variable::{Alias, BaseType, Causality, Dimension, Initial, ModelVariable, Variability};
+pub use variable::{
+    Alias, BaseType, Causality, ClockTiming, Dimension, Initial, IntervalVariability, ModelVariable, Variability,
+};
 pub use version::{FmiVersion, UnknownVersion};
 pub use write::{Generation, fits, write, write_terminals};
 pub use xml::Element;

@@ -127,6 +127,35 @@ impl BaseType {
     }
 }
 
+words! {
+    /// Who knows when a clock ticks (FMI 3.0 only).
+    IntervalVariability {
+        /// Always with one interval.
+        Constant = "constant",
+        /// With an interval that is set before the start.
+        Fixed = "fixed",
+        /// With an interval that may change at events.
+        Tunable = "tunable",
+        /// With an interval that the FMU gives at each tick.
+        Changing = "changing",
+        /// After a time that the FMU gives at an event.
+        Countdown = "countdown",
+        /// At any time.
+        Triggered = "triggered",
+    }
+}
+
+/// When a clock ticks, as the file says it (FMI 3.0 only).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ClockTiming {
+    /// Who knows when it ticks.
+    pub ticks: IntervalVariability,
+    /// Interval between two ticks in the unit of the independent variable, usually s.
+    pub interval: Option<f64>,
+    /// Time from the start to the first tick.
+    pub shift: f64,
+}
+
 /// One extent of an array (FMI 3.0 only).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dimension {
@@ -194,6 +223,8 @@ pub struct ModelVariable {
     pub reinit: bool,
     /// Value references of the clocks that this belongs to (FMI 3.0 only).
     pub clocks: Vec<u32>,
+    /// Of a clock: when it ticks; `None` where the file does not say it as the standard does.
+    pub timing: Option<ClockTiming>,
     /// Line of the element.
     pub line: usize,
 }

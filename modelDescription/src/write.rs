@@ -32,6 +32,11 @@ pub fn write(description: &Description, version: FmiVersion, generation: &Genera
         [
             description.model_exchange.as_ref().map(|exchange| model_exchange(description, exchange, version)),
             (!only).then(|| co_simulation(description, version)),
+            description
+                .model_exchange
+                .as_ref()
+                .filter(|of| of.scheduled)
+                .map(|_| scheduled_execution(description, version)),
             units,
             definitions,
             Some(log_categories(description, version)),
@@ -158,13 +163,27 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     let element = states_and_memory(element, version)
         .with_some("fixedInternalStepSize", fixed_step.map(number::format))
         .with_some("hasEventMode", event_mode.then_some("true"))
-        .with_some("mightReturnEarlyFromDoStep", event_mode.then_some("true"))
+        .with_some("mightReturnEarlyFromDoStep", (event_mode && !clocked(description)).then_some("true"))
         .with_some("providesIntermediateUpdate", intermediate.then_some("true"))
         .with_some("canReturnEarlyAfterIntermediateUpdate", intermediate.then_some("true"));
     match exchange {
         Some(exchange) => derivatives(element, exchange, version),
         None => element,
     }
+}
+
+/// FMI 3.0.2, 2.4.2 and 5.4.
+fn scheduled_execution(description: &Description, version: FmiVersion) -> Element {
+    let element = Element::new("ScheduledExecution")
+        .with("modelIdentifier", &*description.name)
+        .with("needsExecutionTool", "false")
+        .with("canBeInstantiatedOnlyOncePerProcess", "false");
+    states_and_memory(element, version)
+}
+
+/// Whether the model has clocks, which FMI 3.0 has.
+fn clocked(description: &Description) -> bool {
+    description.variables.iter().any(|v| matches!(v.kind, VariableKind::Clock(_)))
 }
 
 /// FMI 2.0.5, 2.2.4; FMI 3.0.2, 2.4.5.

@@ -166,11 +166,16 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     for model in &models {
         let name = &model.description.name;
         let mut versions = versions.clone();
+        // Whoever names no FMU gets those that the standard has room for.
+        let all = args.fmus.is_empty() && args.package.is_empty() && args.library.is_empty();
         if let Some(why) = model.description.needs_fmi3()
-            && versions.len() > 1
+            && (versions.len() > 1 || all)
         {
             message::note(&printable(&format!("{name}: only for FMI 3.0: {why}")));
             versions.retain(|version| *version == FmiVersion::V3);
+        }
+        if versions.is_empty() {
+            continue;
         }
         let reference = reference(model, versions[0], moment)?;
         for &version in &versions {

@@ -137,8 +137,8 @@ fn described(of: &Description, plain: &Description, mut members: Map<String, Val
             enumerations.insert(name.clone(), json!(items));
         }
     }
-    // Bytes stay out.
-    let has_text = |v: &Variable| !matches!(v.kind, VariableKind::Binary { .. });
+    // Bytes and clocks stay out.
+    let has_text = |v: &Variable| !matches!(v.kind, VariableKind::Binary { .. } | VariableKind::Clock(_));
     let shown = |v: &&Variable| (v.causality.is_settable() || is_curve(v)) && has_text(v);
     let variables: Vec<Value> = of.variables.iter().filter(shown).map(|v| variable(v, &ranges)).collect();
     // What a preset archive starts with, and the module does not.
@@ -191,6 +191,7 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
         VariableKind::Enumeration { name, .. } => ("Enumeration".into(), None, None, Some(name)),
         VariableKind::Text => (String::from("String"), None, None, None),
         VariableKind::Binary { .. } => (String::from("Binary"), None, None, None),
+        VariableKind::Clock(_) => (String::from("Clock"), None, None, None),
     };
     let mut json = json!({
         "name": v.name,

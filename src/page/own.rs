@@ -243,7 +243,7 @@ impl Own {
 pub fn is_curve(v: &Variable) -> bool {
     matches!(v.causality, Causality::Output | Causality::Input)
         && !v.is_array()
-        && !matches!(v.kind, VariableKind::Text | VariableKind::Binary { .. })
+        && !matches!(v.kind, VariableKind::Text | VariableKind::Binary { .. } | VariableKind::Clock(_))
 }
 
 fn distinct<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(), String> {

@@ -19,6 +19,10 @@ pub const ENVELOPE: &str = joined!(include_str!("../docs/envelope.html"), includ
 /// The limits of every estimator, and the tuning.
 pub const LIMITS_AND_TUNING: &str = joined!(include_str!("../docs/limits.html"), include_str!("../docs/tuning.html"));
 
+/// Documentation of [`SensorlessControllerClocked`](crate::clocked::SensorlessControllerClocked).
+pub const CLOCKED: &str =
+    joined!(include_str!("../docs/sensorless_controller_clocked.html"), DIAGRAM, EQUATIONS, LIMITS_AND_TUNING);
+
 /// Documentation of [`SensorlessController`](crate::model::SensorlessController).
 pub const CONTROLLER: &str = joined!(
     DIAGRAM,

@@ -9,6 +9,7 @@
 #![allow(non_snake_case)]
 
 pub mod battery;
+pub mod clocked;
 pub mod current;
 mod cycle;
 pub mod documentation;
@@ -32,4 +33,5 @@ pub mod trip;
 pub mod weakening;
 pub mod zero_speed;
 
+pub use clocked::SensorlessControllerClocked;
 pub use model::SensorlessController;

@@ -18,7 +18,7 @@ use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
-    integrate, table,
+    integrate,
 };
 use serde::{Deserialize, Serialize};
 
@@ -367,7 +367,11 @@ impl Warns for SensorlessController {
 
 type V = Row<Block<SensorlessController>>;
 
-const TABLE: &Table<Block<SensorlessController>> = table![
+const TABLE: &Table<Block<SensorlessController>> = &Table::new(ROWS);
+
+/// The inputs, the outputs, and last the parameters.
+pub(crate) const ROWS: &[V] = const {
+    &[
     V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
     V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
         .read_with("speed_loop.torque_mode", "true"),
@@ -395,4 +399,5 @@ const TABLE: &Table<Block<SensorlessController>> = table![
     .optional(),
     V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
     V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-];
+]
+};

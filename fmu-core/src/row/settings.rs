@@ -3,8 +3,8 @@
 use crate::need::Need;
 use crate::reals::Interval;
 use crate::row::Row;
-use crate::rules::demand;
-use crate::variable::{Causality, Kind, Range, Variability};
+use crate::rules::{demand, same_text};
+use crate::variable::{Alias, Causality, Kind, Range, Variability};
 
 impl<W: 'static> Row<W> {
     /// Makes a parameter tunable: it may change at communication points.
@@ -213,6 +213,25 @@ impl<W: 'static> Row<W> {
         let input = matches!(self.meta.causality, Causality::Input);
         demand(input, self.meta.name, "only an input can be left alone");
         self.meta.need = need;
+        self
+    }
+
+    /// Other names of the variable (FMI 3.0).
+    ///
+    /// # Panics
+    /// At compile time, if a name is missing or is that of the row, or a display unit belongs to a variable without a unit.
+    #[track_caller]
+    pub const fn aliases(mut self, aliases: &'static [Alias]) -> Self {
+        let mut i = 0;
+        while i < aliases.len() {
+            let named = !aliases[i].name.is_empty() && !same_text(aliases[i].name, self.meta.name);
+            demand(named, self.meta.name, "an alias needs a name of its own");
+            let with_unit = matches!(self.meta.kind, Kind::Real(of) | Kind::Float32(of) if !of.unit.name.is_empty());
+            let fits = with_unit || aliases[i].display.is_none();
+            demand(fits, aliases[i].name, "only a real variable with a unit can be shown in another one");
+            i += 1;
+        }
+        self.meta.aliases = aliases;
         self
     }
 

@@ -38,6 +38,8 @@ pub enum Slot<'a> {
     Text(&'a mut String),
     /// A text computed by the model, or a constant one.
     Said(&'a str),
+    /// A clock, and its interval in s if the importer may set it.
+    Clock(Option<&'a mut f64>),
     /// A constant.
     Constant(Constant),
     /// Bytes.
@@ -50,6 +52,7 @@ impl Slot<'_> {
         match (self, meta.kind) {
             (Self::Real(x), _) => meta.range.contains(**x),
             (Self::Float32(x), _) => meta.range.contains_single(**x),
+            (Self::Clock(Some(x)), _) => x.is_finite() && **x > 0.0,
             (Self::Integer(x), Kind::Integer(of)) => of.allows(x.get(), &meta.range),
             (Self::Constant(Constant::Real(x)), _) => meta.range.contains(*x),
             (Self::Constant(Constant::Float32(x)), _) => meta.range.contains_single(*x),
@@ -75,6 +78,7 @@ impl Slot<'_> {
             Self::Text(x) => hash(x.as_str()),
             Self::Said(x) => hash(*x),
             Self::Binary(x) => hash::<[u8]>(x),
+            Self::Clock(x) => x.as_ref().map_or(0, |x| x.to_bits()),
             Self::Constant(_) => 0,
         }
     }
@@ -91,6 +95,8 @@ impl std::fmt::Display for Slot<'_> {
             Self::Enumeration(x) => x.get().fmt(f),
             Self::Text(x) => write!(f, "{x:?}"),
             Self::Said(x) => write!(f, "{x:?}"),
+            Self::Clock(Some(x)) => write!(f, "{x} s"),
+            Self::Clock(None) => f.write_str("a clock"),
             Self::Constant(Constant::Real(x)) => x.fmt(f),
             Self::Constant(Constant::Float32(x)) => x.fmt(f),
             Self::Constant(Constant::Integer(x)) => x.fmt(f),

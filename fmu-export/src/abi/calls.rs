@@ -25,6 +25,9 @@ impl<E: Exported> Abi<'_, E> {
         if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
             return self.0.get_inside(vr, out);
         }
+        if const { E::CAN.clocked.is_some() } {
+            self.0.check_clocked(vr, false)?;
+        }
         self.0.get(vr, out)
     }
 
@@ -35,9 +38,12 @@ impl<E: Exported> Abi<'_, E> {
         self.0.set(vr, values)
     }
 
-    /// Judges the variables that the importer uses inside a step.
+    /// Judges the variables that the importer uses inside a step, or that are on clocks.
     #[inline]
-    fn inside(&self, vr: &[u32], sets: bool) -> Answer {
+    fn inside(&mut self, vr: &[u32], sets: bool) -> Answer {
+        if const { E::CAN.clocked.is_some() } {
+            self.0.check_clocked(vr, sets)?;
+        }
         if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
             self.0.check_inside(vr, sets)?;
         }
@@ -90,6 +96,7 @@ impl<E: Exported> Abi<'_, E> {
         let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
         // SAFETY: the importer's array, of this length.
         let sizes = unsafe { room(sizes, room_for, "valueSizes")? };
+        self.inside(vr, false)?;
         let mut places = out.iter_mut().zip(sizes);
         self.0.get_bytes(vr, room_for, |bytes| {
             if let Some((pointer, size)) = places.next() {
@@ -112,6 +119,7 @@ impl<E: Exported> Abi<'_, E> {
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
         // SAFETY: the importer's array, of this length.
         let sizes = unsafe { array(sizes, n_values, "valueSizes")? };
+        self.inside(vr, true)?;
         // SAFETY: NULL or as many bytes as the size says, if the variables are bytes; others are refused before one is read.
         self.0.set_bytes(vr, sizes, |i| unsafe { array(values[i], sizes[i], "a binary value") })
     }

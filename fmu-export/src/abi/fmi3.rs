@@ -1,15 +1,15 @@
 //! FMI 3.0.2: its own calls, and the table of its functions.
 
-use super::callbacks::Callbacks;
+use super::callbacks::{Callbacks, Request};
 use super::gate::{Entry, Function, Steps, enter, enter_parts, open};
 use super::logger::{Fmi3Logger, Fmi3Sink};
-use super::pointer::{array, place, text};
+use super::pointer::{array, place, room, text};
 use super::types::{Fmi3Boolean, InstancePointer, References, Text};
 use super::{Abi, Answer, credentials};
-use crate::inside::{Then, Update};
-use crate::instance::Instance;
+use crate::inside::{Pause, Then};
+use crate::instance::{Instance, Refusal};
 use crate::log::Log;
-use fmu_core::{Exported, Fault, Interface};
+use fmu_core::{Exported, Fault, Interface, Model};
 use std::ffi::c_int;
 
 /// Errors and safety as in `calls.rs`.
@@ -36,11 +36,19 @@ impl<E: Exported> Abi<'_, E> {
             unsafe { (text(name), text(token), text(resources), array(required, n_required, "variables")) };
         let unused = const { E::CAN.intermediate.is_none() } && n_required > 0;
         let environment = callbacks.environment;
-        let callbacks = if const { E::CAN.intermediate.is_some() } { callbacks } else { Callbacks::NONE };
+        let used = const { E::CAN.intermediate.is_some() || E::CAN.scheduled };
+        let callbacks = if used { callbacks } else { Callbacks::NONE };
         let refused = refused.or(match interface {
             _ if unused => Some("nRequiredIntermediateVariables must be 0: providesIntermediateUpdate = false"),
             Interface::ModelExchange if !E::CAN.model_exchange() => {
                 Some("not supported: Model Exchange; this FMU is for Co-Simulation")
+            }
+            Interface::ScheduledExecution if !E::CAN.scheduled => Some("not supported: Scheduled Execution"),
+            Interface::ScheduledExecution if callbacks.clock_update.is_none() && announces::<E>() => {
+                Some("clockUpdate is NULL, and the model has output or countdown clocks")
+            }
+            Interface::CoSimulation if E::CAN.clocked.is_some() => {
+                Some("eventModeUsed = false is not allowed: the model has clocks")
             }
             Interface::CoSimulation | Interface::EventMode if E::CAN.exchange_only => {
                 Some("not supported: Co-Simulation; this FMU is for Model Exchange")
@@ -89,12 +97,13 @@ impl<E: Exported> Abi<'_, E> {
         // SAFETY: the caller's promise.
         unsafe {
             enter_parts::<E, F>(instance, |mut abi, reply| {
-                Ok(abi.report_step(event, terminate, early, time, |instance| {
+                let update = abi.report_step(event, terminate, early, time, |instance| {
                     if instance.inside.is_none() {
                         return instance.do_step(t, h).map(Then::Done);
                     }
                     instance.step_part((t, h), &mut under_way, reply)
-                })?)
+                })?;
+                Ok(update.map(Request::Intermediate))
             })
         }
     }
@@ -108,7 +117,7 @@ impl<E: Exported> Abi<'_, E> {
         early_return: *mut Fmi3Boolean,
         last_successful_time: *mut f64,
         step: impl FnOnce(&mut Instance<E>) -> Result<Then, Fault>,
-    ) -> Result<Option<Update>, Fault> {
+    ) -> Result<Option<Pause>, Fault> {
         // SAFETY: the importer's variables.
         let (time, event, early, terminate) = unsafe {
             (
@@ -131,6 +140,110 @@ impl<E: Exported> Abi<'_, E> {
         terminate.write(stepped.terminate.into());
         time.write(self.0.current.end);
         Ok(None)
+    }
+
+    /// FMI 3.0.2, 5.2.2. The importer is told of clocks that ticked, and of ticks to come, before the call returns.
+    ///
+    /// # Safety
+    /// As [`enter`](Self::enter).
+    pub unsafe fn fmi3_activate<F: Function>(instance: InstancePointer, clock: u32, t: f64) -> c_int {
+        let mut done = false;
+        // SAFETY: the caller's promise.
+        unsafe {
+            enter_parts::<E, F>(instance, |mut abi, _| {
+                if const { !E::CAN.scheduled } {
+                    abi.unsupported("Scheduled Execution")?;
+                }
+                if std::mem::replace(&mut done, true) {
+                    return Ok(None);
+                }
+                Ok(abi.activate_partition(clock, t).map_err(as_error)?.then_some(Request::Clocks))
+            })
+        }
+    }
+
+    pub unsafe fn fmi3_get_clock(&mut self, vr: References, n: usize, values: *mut Fmi3Boolean) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (out, vr) = unsafe { (room(values, n, "values")?, array(vr, n, "value references")?) };
+        Ok(self.0.get_clocks(vr, out)?)
+    }
+
+    pub unsafe fn fmi3_set_clock(&mut self, vr: References, n: usize, values: *const Fmi3Boolean) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (values, vr) = unsafe { (array(values, n, "values")?, array(vr, n, "value references")?) };
+        Ok(self.0.set_clocks(vr, values)?)
+    }
+
+    pub unsafe fn fmi3_get_interval(
+        &mut self,
+        vr: References,
+        n: usize,
+        intervals: *mut f64,
+        qualifiers: *mut c_int,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (vr, intervals, qualifiers) = unsafe {
+            (array(vr, n, "value references")?, room(intervals, n, "intervals")?, room(qualifiers, n, "qualifiers")?)
+        };
+        Ok(self.0.get_intervals(vr, intervals, qualifiers)?)
+    }
+
+    pub unsafe fn fmi3_get_fraction(
+        &mut self,
+        vr: References,
+        n: usize,
+        counters: *mut u64,
+        resolutions: *mut u64,
+        qualifiers: *mut c_int,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (vr, counters, resolutions, qualifiers) = unsafe {
+            (
+                array(vr, n, "value references")?,
+                room(counters, n, "counters")?,
+                room(resolutions, n, "resolutions")?,
+                room(qualifiers, n, "qualifiers")?,
+            )
+        };
+        Ok(self.0.get_fractions(vr, counters, resolutions, qualifiers)?)
+    }
+
+    pub unsafe fn fmi3_get_shift(&mut self, vr: References, n: usize, shifts: *mut f64) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (out, vr) = unsafe { (room(shifts, n, "shifts")?, array(vr, n, "value references")?) };
+        Ok(self.0.get_shifts(vr, out)?)
+    }
+
+    pub unsafe fn fmi3_get_shift_fraction(
+        &mut self,
+        vr: References,
+        n: usize,
+        counters: *mut u64,
+        resolutions: *mut u64,
+    ) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (vr, counters, resolutions) = unsafe {
+            (array(vr, n, "value references")?, room(counters, n, "counters")?, room(resolutions, n, "resolutions")?)
+        };
+        Ok(self.0.get_shift_fractions(vr, counters, resolutions)?)
+    }
+
+    pub unsafe fn fmi3_set_interval(&mut self, vr: References, n: usize, intervals: *const f64) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (values, vr) = unsafe { (array(intervals, n, "intervals")?, array(vr, n, "value references")?) };
+        Ok(self.0.set_intervals(vr, values)?)
+    }
+
+    pub unsafe fn fmi3_set_shift(&mut self, vr: References, n: usize, shifts: *const f64) -> Answer {
+        // SAFETY: the importer's arrays, of this length.
+        let (values, vr) = unsafe { (array(shifts, n, "shifts")?, array(vr, n, "value references")?) };
+        Ok(self.0.set_shifts(vr, values)?)
+    }
+
+    /// No clock lets its importer choose a fraction.
+    pub unsafe fn fmi3_no_fraction(&mut self, vr: References, n: usize) -> Answer {
+        // SAFETY: the importer's array, of this length.
+        Ok(self.0.refuse_fractions(unsafe { array(vr, n, "value references")? })?)
     }
 
     pub unsafe fn fmi3_update_discrete_states(
@@ -181,6 +294,18 @@ impl<E: Exported> Abi<'_, E> {
     }
 }
 
+/// Whether the model tells the importer of clocks.
+const fn announces<E: Exported>() -> bool {
+    E::Model::TABLE.announces()
+}
+
+/// Scheduled Execution knows no Discard (FMI 3.0.2, 5.2).
+fn as_error(refusal: Refusal) -> Refusal {
+    match refusal {
+        Refusal::Discard(fault) | Refusal::Error(fault) => Refusal::Error(fault),
+    }
+}
+
 /// The functions of `fmi3Functions.h`, in the form of the table of FMI 2.0.
 #[doc(hidden)]
 #[macro_export]
@@ -210,7 +335,7 @@ macro_rules! export_fmi3 {
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateCoSimulation");
             let interface =
                 if event_mode_used.0 != 0 { Interface::EventMode } else { Interface::CoSimulation };
-            let (early, callbacks) = (early_return_allowed.0 != 0, Callbacks { environment, intermediate });
+            let (early, callbacks) = (early_return_allowed.0 != 0, Callbacks { environment, intermediate, ..Callbacks::NONE });
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
@@ -250,18 +375,19 @@ macro_rules! export_fmi3 {
             logging_on: Fmi3Boolean,
             environment: *mut c_void,
             logger: Option<Fmi3Logger>,
-            _clock_update: *const c_void,
-            _lock_preemption: *const c_void,
-            _unlock_preemption: *const c_void,
+            clock_update: Option<Fmi3ClockUpdate>,
+            lock: Option<Fmi3Preemption>,
+            unlock: Option<Fmi3Preemption>,
         ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi3, Call::Instantiate, "fmi3InstantiateScheduledExecution");
-            let refused = Some("not supported: Scheduled Execution");
-            let (interface, callbacks) = (Interface::CoSimulation, Callbacks { environment, ..Callbacks::NONE });
+            let interface = Interface::ScheduledExecution;
+            let preemption = lock.zip(unlock).map(|(lock, unlock)| [lock, unlock]);
+            let callbacks = Callbacks { environment, clock_update, preemption, ..Callbacks::NONE };
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), refused,
+                    ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), None,
                 )
             }
         }
@@ -295,6 +421,20 @@ macro_rules! export_fmi3 {
             }
         }
 
+        #[unsafe(no_mangle)]
+        pub(crate) unsafe extern "C" fn fmi3ActivateModelPartition(instance: InstancePointer, clock: u32, t: f64) -> c_int {
+            struct Here;
+            impl Function for Here {
+                const ENTRY: Entry = Entry::new(
+                    Standard::Fmi3,
+                    Call::Activate.of(<$exported as Exported>::CAN.scheduled),
+                    "fmi3ActivateModelPartition",
+                );
+            }
+            // SAFETY: what the standard demands of the importer.
+            unsafe { $crate::abi::Abi::<$exported>::fmi3_activate::<Here>(instance, clock, t) }
+        }
+
         $crate::functions! { Fmi3 $exported;
             fmi3SetDebugLogging(on: Fmi3Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
@@ -318,7 +458,8 @@ macro_rules! export_fmi3 {
             fmi3GetString(vr: References, n: usize, values: *mut Text, m: usize) => Get: get_texts(vr, n, values, m);
             fmi3GetBinary(vr: References, n: usize, sizes: *mut usize, values: *mut *const u8, m: usize)
                 => Get: get_bytes(vr, n, sizes, values, m);
-            fmi3GetClock(_vr: References, _n: usize, _v: *mut Fmi3Boolean) => Unsupported: unsupported("clocks");
+            fmi3GetClock(vr: References, n: usize, values: *mut Fmi3Boolean)
+                => GetClock if clocked: fmi3_get_clock(vr, n, values);
 
             fmi3SetFloat64(vr: References, n: usize, values: *const f64, m: usize) => Set: set(vr, n, values, m);
             fmi3SetInt32(vr: References, n: usize, values: *const i32, m: usize) => Set: set(vr, n, values, m);
@@ -334,7 +475,8 @@ macro_rules! export_fmi3 {
             fmi3SetString(vr: References, n: usize, values: *const Text, m: usize) => Set: set_texts(vr, n, values, m);
             fmi3SetBinary(vr: References, n: usize, sizes: *const usize, values: *const *const u8, m: usize)
                 => Set: set_bytes(vr, n, sizes, values, m);
-            fmi3SetClock(_vr: References, _n: usize, _v: *const Fmi3Boolean) => Unsupported: unsupported("clocks");
+            fmi3SetClock(vr: References, n: usize, values: *const Fmi3Boolean)
+                => SetClock if clocked: fmi3_set_clock(vr, n, values);
 
             fmi3GetFMUState(state: *mut FmuState) => SaveState: save_state(state);
             fmi3SetFMUState(state: FmuState) => RestoreState: restore_state(state);
@@ -374,21 +516,23 @@ macro_rules! export_fmi3 {
             fmi3EnterConfigurationMode() => Unsupported: unsupported("there are no structural parameters");
             fmi3ExitConfigurationMode() => Unsupported: unsupported("there are no structural parameters");
 
-            fmi3GetIntervalDecimal(_vr: References, _n: usize, _intervals: *mut f64, _qualifiers: *mut c_int)
-                => Unsupported: unsupported("clocks");
+            fmi3GetIntervalDecimal(vr: References, n: usize, intervals: *mut f64, qualifiers: *mut c_int)
+                => GetInterval if clocked: fmi3_get_interval(vr, n, intervals, qualifiers);
             fmi3GetIntervalFraction(
-                _vr: References, _n: usize, _counters: *mut u64, _resolutions: *mut u64, _qualifiers: *mut c_int
-            ) => Unsupported: unsupported("clocks");
-            fmi3GetShiftDecimal(_vr: References, _n: usize, _shifts: *mut f64) => Unsupported: unsupported("clocks");
-            fmi3GetShiftFraction(_vr: References, _n: usize, _counters: *mut u64, _resolutions: *mut u64)
-                => Unsupported: unsupported("clocks");
-            fmi3SetIntervalDecimal(_vr: References, _n: usize, _intervals: *const f64) => Unsupported: unsupported("clocks");
-            fmi3SetIntervalFraction(_vr: References, _n: usize, _counters: *const u64, _resolutions: *const u64)
-                => Unsupported: unsupported("clocks");
-            fmi3SetShiftDecimal(_vr: References, _n: usize, _shifts: *const f64) => Unsupported: unsupported("clocks");
-            fmi3SetShiftFraction(_vr: References, _n: usize, _counters: *const u64, _resolutions: *const u64)
-                => Unsupported: unsupported("clocks");
-            fmi3ActivateModelPartition(_clock: u32, _time: f64) => Unsupported: unsupported("Scheduled Execution");
+                vr: References, n: usize, counters: *mut u64, resolutions: *mut u64, qualifiers: *mut c_int
+            ) => GetInterval if clocked: fmi3_get_fraction(vr, n, counters, resolutions, qualifiers);
+            fmi3GetShiftDecimal(vr: References, n: usize, shifts: *mut f64)
+                => Shift if clocked: fmi3_get_shift(vr, n, shifts);
+            fmi3GetShiftFraction(vr: References, n: usize, counters: *mut u64, resolutions: *mut u64)
+                => Shift if clocked: fmi3_get_shift_fraction(vr, n, counters, resolutions);
+            fmi3SetIntervalDecimal(vr: References, n: usize, intervals: *const f64)
+                => SetInterval if clocked: fmi3_set_interval(vr, n, intervals);
+            fmi3SetIntervalFraction(vr: References, n: usize, _counters: *const u64, _resolutions: *const u64)
+                => SetInterval if clocked: fmi3_no_fraction(vr, n);
+            fmi3SetShiftDecimal(vr: References, n: usize, shifts: *const f64)
+                => Shift if clocked: fmi3_set_shift(vr, n, shifts);
+            fmi3SetShiftFraction(vr: References, n: usize, _counters: *const u64, _resolutions: *const u64)
+                => Shift if clocked: fmi3_no_fraction(vr, n);
 
             fmi3EnterContinuousTimeMode() => EnterContinuous: leave_event();
             fmi3CompletedIntegratorStep(_no_set_state_prior: Fmi3Boolean, event: *mut Fmi3Boolean, end: *mut Fmi3Boolean)

@@ -1,10 +1,10 @@
 //! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
 //! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
 
-use super::callbacks::Callbacks;
+use super::callbacks::{Callbacks, Lock, Request};
 use super::{Abi, Answer, Wanted};
 use crate::blob;
-use crate::inside::{Reply, Update};
+use crate::inside::Reply;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
@@ -14,9 +14,13 @@ use crate::resources::folder;
 use crate::snapshot::Snapshot;
 use fmu_core::{Exported, Fault, Interface, Model};
 use std::any::Any;
-use std::cell::{Cell, UnsafeCell};
+use std::cell::UnsafeCell;
 use std::ffi::{CStr, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{
+    AtomicBool,
+    Ordering::{Acquire, Relaxed, Release},
+};
 
 /// Which function was called: its name in C and its row of the lifecycle table.
 #[derive(Clone, Copy, Debug)]
@@ -25,12 +29,13 @@ pub struct Entry {
     pub(crate) standard: Standard,
     allowed: Allowed,
     next: Next,
+    preempted: bool,
 }
 
 impl Entry {
     /// Looks up the row at compile time.
     pub const fn new(standard: Standard, call: Call, name: &'static str) -> Self {
-        Self { name, standard, allowed: Allowed::of(call, standard), next: call.next() }
+        Self { name, standard, allowed: Allowed::of(call, standard), next: call.next(), preempted: call.is_preempted() }
     }
 }
 
@@ -43,10 +48,35 @@ pub trait Function {
 /// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused. `calling` while a callback
 /// runs for a call that is under way: the lifecycle says what it may call.
 struct Handle<E: Exported> {
-    busy: Cell<bool>,
-    calling: Cell<bool>,
+    busy: AtomicBool,
+    calling: AtomicBool,
     callbacks: Callbacks,
     instance: UnsafeCell<Instance<E>>,
+}
+
+impl<E: Exported> Handle<E> {
+    /// Whether this call has the instance for itself. In Scheduled Execution, threads come between each other.
+    #[inline]
+    fn take(&self) -> bool {
+        if const { E::CAN.scheduled } {
+            return !self.busy.swap(true, Acquire);
+        }
+        let busy = self.busy.load(Relaxed);
+        self.busy.store(true, Relaxed);
+        !busy
+    }
+
+    #[inline]
+    fn give(&self) {
+        self.busy.store(false, if const { E::CAN.scheduled } { Release } else { Relaxed });
+    }
+
+    /// Locks the importer's scheduler for a call that it may interrupt, unless the call comes from a callback.
+    #[inline]
+    fn lock<F: Function>(&self) -> Option<Lock> {
+        let locks = const { E::CAN.scheduled && F::ENTRY.preempted };
+        if locks && !self.calling.load(Relaxed) { self.callbacks.lock() } else { None }
+    }
 }
 
 /// Passes a call to the instance.
@@ -63,24 +93,31 @@ pub(crate) unsafe fn enter<E: Exported, F: Function>(
     }
     // SAFETY: the caller's promise.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
-    if handle.busy.replace(true) {
+    let _lock = handle.lock::<F>();
+    pass_one::<E, F>(handle, body)
+}
+
+#[inline]
+fn pass_one<E: Exported, F: Function>(handle: &Handle<E>, body: impl FnOnce(Abi<'_, E>) -> Answer) -> c_int {
+    if !handle.take() {
         return Status::Error as c_int;
     }
     // SAFETY: `busy` was false, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
-    let status = if const { calls_back::<E>() } && handle.calling.get() && !instance.current.life.state().calls_back() {
-        instance.log.error(&format!("{}: not allowed: an earlier call of this callback failed", F::ENTRY.name));
-        Status::Error
-    } else {
-        pass(const { &F::ENTRY }, instance, body)
-    };
-    handle.busy.set(false);
+    let status =
+        if const { calls_back::<E>() } && handle.calling.load(Relaxed) && !instance.current.life.state().calls_back() {
+            instance.log.error(&format!("{}: not allowed: an earlier call of this callback failed", F::ENTRY.name));
+            Status::Error
+        } else {
+            pass(const { &F::ENTRY }, instance, body)
+        };
+    handle.give();
     status as c_int
 }
 
 /// Whether a call of the model can call the importer, which may call the instance again.
 const fn calls_back<E: Exported>() -> bool {
-    E::CAN.intermediate.is_some()
+    E::CAN.intermediate.is_some() || E::CAN.scheduled
 }
 
 /// Passes a call to the instance in parts. After each that wants it, the importer is called, while nothing of the instance is
@@ -91,31 +128,40 @@ const fn calls_back<E: Exported>() -> bool {
 /// As [`enter`].
 pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
     pointer: *mut c_void,
-    mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Update>, Refusal>,
+    mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Request>, Refusal>,
 ) -> c_int {
+    if pointer.is_null() {
+        return Status::Error as c_int;
+    }
+    // SAFETY: the caller's promise; the instance lives on, because `close` leaves one alone that is calling.
+    let handle = unsafe { &*pointer.cast::<Handle<E>>() };
+    let _lock = handle.lock::<F>();
     let mut reply = None;
     loop {
-        let mut update = None;
-        // SAFETY: the caller's promise.
-        let status = unsafe {
-            enter::<E, F>(pointer, |mut abi| {
-                update = part(Abi(&mut *abi.0), reply)?;
-                if update.is_some() {
-                    abi.current.life.call_back();
-                }
-                Ok(())
-            })
-        };
-        let Some(update) = update else { return status };
-        // SAFETY: the caller's promise; the instance lives, because `close` leaves one alone that is calling.
-        let handle = unsafe { &*pointer.cast::<Handle<E>>() };
-        handle.calling.set(true);
-        reply = handle.callbacks.intermediate(update);
-        handle.calling.set(false);
-        // SAFETY: nothing else borrows the instance: every call of the callback has returned.
+        let mut request = None;
+        let status = pass_one::<E, F>(handle, |mut abi| {
+            request = part(Abi(&mut *abi.0), reply)?;
+            if request.is_some() {
+                abi.current.life.call_back();
+            }
+            Ok(())
+        });
+        let Some(request) = request else { return status };
+        handle.calling.store(true, Relaxed);
+        reply = handle.callbacks.call(request);
+        handle.calling.store(false, Relaxed);
+        // Another thread may be in a call, if the importer gave no lock.
+        while !handle.take() {
+            std::thread::yield_now();
+        }
+        // SAFETY: `busy` was false, as in `pass_one`.
         let instance = unsafe { &mut *handle.instance.get() };
-        if !instance.current.life.called_back() {
+        let waited = instance.current.life.called_back();
+        if !waited {
             instance.log.error(&format!("{}: a call of the callback failed", F::ENTRY.name));
+        }
+        handle.give();
+        if !waited {
             return Status::Error as c_int;
         }
     }
@@ -222,7 +268,7 @@ pub(crate) fn open<E: Exported>(
                 instance.log.error(&format!("{}: {fault}", entry.name));
                 return std::ptr::null_mut();
             }
-            let (busy, calling) = (Cell::new(false), Cell::new(false));
+            let (busy, calling) = (AtomicBool::new(false), AtomicBool::new(false));
             let instance = UnsafeCell::new(instance);
             Box::into_raw(Box::new(Handle { busy, calling, callbacks: steps.callbacks, instance })).cast()
         }
@@ -243,7 +289,7 @@ pub(crate) unsafe fn close<E: Exported>(pointer: *mut c_void) {
     }
     // SAFETY: the caller's promise.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
-    if !handle.busy.get() && !handle.calling.get() {
+    if !handle.busy.load(Acquire) && !handle.calling.load(Relaxed) {
         // SAFETY: from `open`, closed once by the caller's promise, not in use. A panic in a model's drop stops here.
         let _ = catch_unwind(AssertUnwindSafe(|| drop(unsafe { Box::from_raw(pointer.cast::<Handle<E>>()) })));
     }

@@ -145,22 +145,29 @@ fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result
 }
 
 /// C functions from a table of them. One line of the table reads: name in C, arguments after the instance, row of the
-/// lifecycle table, function of [`Abi`] or of the instance with the arguments it gets.
+/// lifecycle table (and the capability without which the call is unsupported), function of [`Abi`] or of the instance with the arguments it gets.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! functions {
     ($standard:ident $exported:ty; $(
-        $name:ident($($argument:ident: $type:ty),*) => $call:ident: $function:ident($($passed:expr),*);
+        $name:ident($($argument:ident: $type:ty),*) => $call:ident $(if $capability:ident)?: $function:ident($($passed:expr),*);
     )*) => { $(
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn $name(instance: InstancePointer $(, $argument: $type)*) -> c_int {
             struct Here;
             impl Function for Here {
-                const ENTRY: Entry = Entry::new(Standard::$standard, Call::$call, stringify!($name));
+                const ENTRY: Entry = Entry::new(
+                    Standard::$standard,
+                    Call::$call$(.of(<$exported as Exported>::CAN.$capability.is_some()))?,
+                    stringify!($name),
+                );
             }
             // SAFETY: what the standard demands of the importer.
             unsafe {
                 $crate::abi::Abi::<$exported>::enter::<Here>(instance, |mut abi| {
+                    $(if const { <$exported as Exported>::CAN.$capability.is_none() } {
+                        abi.unsupported("clocks")?;
+                    })?
                     abi.$function($($passed),*)?;
                     Ok(())
                 })

@@ -1,10 +1,11 @@
 //! The C types of both standards, as far as the signatures need them.
 
-pub use super::callbacks::{Callbacks, Fmi3IntermediateUpdate};
+pub use super::callbacks::{Callbacks, Fmi3ClockUpdate, Fmi3IntermediateUpdate, Fmi3Preemption};
 pub use super::gate::{Entry, Function};
 pub use super::logger::{Fmi2Logger, Fmi3Logger};
 pub use crate::lifecycle::{Call, Standard};
 pub use crate::value::{Fmi2Boolean, Fmi2Integer, Fmi3Boolean};
+pub use fmu_core::Exported;
 pub use fmu_core::Interface;
 pub use std::ffi::{c_char, c_int, c_void};
 #[doc(hidden)]

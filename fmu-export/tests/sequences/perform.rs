@@ -302,7 +302,7 @@ pub(crate) fn miscarry(version: u8, wrong: u8, environment: *mut c_void) -> &'st
         4 => c" \t".as_ptr(),
         _ => c"probe".as_ptr(),
     };
-    let (no, none) = (Fmi3Boolean(0), null());
+    let no = Fmi3Boolean(0);
     let (it, function) = match (version, wrong) {
         (2, _) => {
             let callbacks = Fmi2Callbacks {
@@ -330,9 +330,9 @@ pub(crate) fn miscarry(version: u8, wrong: u8, environment: *mut c_void) -> &'st
                     no,
                     environment,
                     Some(log3),
-                    none,
-                    none,
-                    none,
+                    None,
+                    None,
+                    None,
                 )
             },
             "fmi3InstantiateScheduledExecution",

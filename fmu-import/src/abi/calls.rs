@@ -29,6 +29,9 @@ pub(super) struct Request<'a> {
     pub(super) environment: *mut c_void,
 }
 
+/// `fmi3ClockActive`.
+static ACTIVE: u8 = 1;
+
 impl Calls {
     /// The library, to be unloaded.
     pub(super) fn into_library(self) -> Library {
@@ -239,6 +242,31 @@ impl Calls {
     pub(super) fn deserialize(&self, i: Given<'_>, bytes: Array<'_, u8>) -> Answer<StatePointer> {
         // SAFETY: the standards' type; the array is NULL or as long as said; the place is ours.
         self.deserialize.write(ptr::null_mut(), |f, state| unsafe { f(i.0, bytes.pointer(), bytes.1, state) })
+    }
+
+    /// `fmi3GetClock` of one clock.
+    pub(super) fn clock(&self, i: Given<'_>, clock: u32) -> Answer<u8> {
+        // SAFETY: the standard's type; one reference, one place of ours.
+        self.get_clock.write(0, |f, active| unsafe { f(i.0, &raw const clock, 1, active) })
+    }
+
+    /// `fmi3SetClock` of one clock.
+    pub(super) fn activate(&self, i: Given<'_>, clock: u32) -> Answer {
+        // SAFETY: the standard's type; one reference, one value.
+        self.set_clock.call(|f| unsafe { f(i.0, &raw const clock, 1, &raw const ACTIVE) })
+    }
+
+    /// `fmi3GetIntervalDecimal` of one clock: interval and qualifier.
+    pub(super) fn interval(&self, i: Given<'_>, clock: u32) -> Answer<(f64, c_int)> {
+        // SAFETY: the standard's type; one reference, places of ours.
+        self.get_interval
+            .write((0.0, 0), |f, (interval, qualifier)| unsafe { f(i.0, &raw const clock, 1, interval, qualifier) })
+    }
+
+    /// `fmi3GetShiftDecimal` of one clock.
+    pub(super) fn shift(&self, i: Given<'_>, clock: u32) -> Answer<f64> {
+        // SAFETY: the standard's type; one reference, one place of ours.
+        self.get_shift.write(0.0, |f, shift| unsafe { f(i.0, &raw const clock, 1, shift) })
     }
 
     /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`. `before` is what the places hold before the call; with `null`, all

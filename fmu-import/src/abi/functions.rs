@@ -154,5 +154,9 @@ functions! {
     adjoint_3: v3::Sensitivity = "" "fmi3GetAdjointDerivative",
     output_derivatives_2: v2::OutputDerivatives = "fmi2GetRealOutputDerivatives" "",
     output_derivatives_3: v3::OutputDerivatives = "" "fmi3GetOutputDerivatives",
+    get_clock: v3::GetClock = "" "fmi3GetClock",
+    set_clock: v3::SetClock = "" "fmi3SetClock",
+    get_interval: v3::GetInterval = "" "fmi3GetIntervalDecimal",
+    get_shift: v3::GetShift = "" "fmi3GetShiftDecimal",
     input_derivatives_2: v2::InputDerivatives = "fmi2SetRealInputDerivatives" "",
 }

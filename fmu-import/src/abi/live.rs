@@ -303,6 +303,26 @@ impl Live {
         })
     }
 
+    pub(crate) fn clock(&mut self, clock: u32) -> Outcome<bool> {
+        self.calls.clock(self.given(), clock).outcome().map(|active| active != 0)
+    }
+
+    pub(crate) fn activate(&mut self, clock: u32) -> Outcome {
+        self.calls.activate(self.given(), clock).outcome()
+    }
+
+    /// The interval of a clock, if it has changed or was not told before.
+    pub(crate) fn interval(&mut self, clock: u32) -> Outcome<Option<f64>> {
+        /// `fmi3IntervalChanged`.
+        const CHANGED: i32 = 2;
+        let (interval, qualifier) = self.calls.interval(self.given(), clock).outcome()?;
+        Ok((qualifier == CHANGED).then_some(interval))
+    }
+
+    pub(crate) fn shift(&mut self, clock: u32) -> Outcome<f64> {
+        self.calls.shift(self.given(), clock).outcome()
+    }
+
     /// "No set state before this point" is false: a state may be set at any time.
     pub(crate) fn completed_integrator_step(&mut self) -> Outcome<CompletedStep> {
         let [event, terminate] = self.calls.completed(self.given(), false, false, 0).outcome()?;

@@ -155,6 +155,11 @@ pub(super) mod v3 {
         unsafe extern "C" fn(InstancePointer, *const u32, usize, *const c_int, *mut f64, usize) -> Status;
     pub(in crate::abi) type CompletedIntegratorStep =
         unsafe extern "C" fn(InstancePointer, bool, *mut u8, *mut u8) -> Status;
+    pub(in crate::abi) type GetClock = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut u8) -> Status;
+    pub(in crate::abi) type SetClock = unsafe extern "C" fn(InstancePointer, *const u32, usize, *const u8) -> Status;
+    pub(in crate::abi) type GetInterval =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut f64, *mut c_int) -> Status;
+    pub(in crate::abi) type GetShift = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut f64) -> Status;
     /// Number of states, of event indicators.
     pub(in crate::abi) type Count = unsafe extern "C" fn(InstancePointer, *mut usize) -> Status;
     /// `fmi3GetDirectionalDerivative`, `fmi3GetAdjointDerivative`: unknowns, knowns, seed, sensitivity.

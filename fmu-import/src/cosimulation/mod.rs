@@ -86,6 +86,11 @@ impl System {
         if self.instances.iter().any(|i| i.name() == name) {
             return Err(Error::usage(name, "two instances have this name; NAME=FILE gives another"));
         }
+        // An FMU with clocks needs event mode.
+        let clocked = fmu.description().variables.iter().any(|v| v.base == BaseType::Clock);
+        if let Method::CoSimulation { event_mode, .. } = &mut self.method {
+            *event_mode |= clocked;
+        }
         let kind = self.method.kind(fmu);
         self.instances.push(fmu.instantiate_as(kind, name, logging)?);
         self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind });
@@ -334,7 +339,7 @@ impl System {
 
     fn outputs_of(&self, of: impl Fn(&ModelVariable) -> bool) -> Vec<String> {
         let outputs = |i: &Instance| {
-            let is_one = |v: &&ModelVariable| v.causality == Causality::Output && of(v);
+            let is_one = |v: &&ModelVariable| v.causality == Causality::Output && v.base != BaseType::Clock && of(v);
             let name = |v: &ModelVariable| format!("{}.{}", i.name(), v.name);
             i.description().variables.iter().filter(is_one).map(name).collect::<Vec<_>>()
         };

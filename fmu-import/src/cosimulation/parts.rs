@@ -141,7 +141,8 @@ pub(super) fn kind(base: BaseType) -> Option<char> {
     match base {
         BaseType::Float32 | BaseType::Float64 => Some('r'),
         BaseType::Boolean => Some('b'),
-        BaseType::String | BaseType::Binary | BaseType::Clock => None,
+        BaseType::Clock => Some('c'),
+        BaseType::String | BaseType::Binary => None,
         _ => Some('i'),
     }
 }

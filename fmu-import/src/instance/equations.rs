@@ -51,7 +51,11 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn advance(&mut self, t: f64, h: f64) -> Result<Stepped, Error> {
-        self.call(Call::Step, |s| s.do_step(t, h))
+        let stepped = self.call(Call::Step, |s| s.do_step(t, h))?;
+        if let Some(clocks) = &mut self.clocks {
+            clocks.time = stepped.last;
+        }
+        Ok(stepped)
     }
 
     /// Enters event mode: from continuous-time mode, or from step mode of an instance that uses event mode.
@@ -59,7 +63,8 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_event_mode(&mut self) -> Result<(), Error> {
-        self.call(Call::Events, |s| s.simple(Simple::EnterEventMode))
+        self.call(Call::Events, |s| s.simple(Simple::EnterEventMode))?;
+        self.tick()
     }
 
     /// Updates the discrete states once, in event mode (`fmi2NewDiscreteStates`, `fmi3UpdateDiscreteStates`).
@@ -67,7 +72,8 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn update_discrete_states(&mut self) -> Result<Update, Error> {
-        self.call(Call::Events, Live::update_discrete_states)
+        let update = self.call(Call::Events, Live::update_discrete_states)?;
+        self.tock(update)
     }
 
     /// Leaves event mode for continuous-time mode (Model Exchange).
@@ -75,6 +81,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_continuous_time_mode(&mut self) -> Result<(), Error> {
+        self.leave_events();
         self.call(Call::Events, |s| s.simple(Simple::EnterContinuousTimeMode))
     }
 
@@ -83,7 +90,14 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn enter_step_mode(&mut self) -> Result<(), Error> {
+        self.leave_events();
         self.call(Call::Events, |s| s.simple(Simple::EnterStepMode))
+    }
+
+    fn leave_events(&mut self) {
+        if let Some(clocks) = &mut self.clocks {
+            clocks.leave_event();
+        }
     }
 
     /// Numbers of continuous states and of event indicators. FMI 3.0 asks the FMU, FMI 2.0 the description.
@@ -102,6 +116,9 @@ impl Instance {
     /// The FMU refuses.
     #[inline]
     pub fn set_time(&mut self, t: f64) -> Result<(), Error> {
+        if let Some(clocks) = &mut self.clocks {
+            clocks.time = t;
+        }
         self.call(Call::Evaluation, |s| s.set_time(t))
     }
 

@@ -5,7 +5,9 @@ use super::types::base_type_2;
 use crate::error::Error;
 use crate::limits;
 use crate::units::TypeDefinition;
-use crate::variable::{Alias, BaseType, Causality, Dimension, Initial, ModelVariable, Variability};
+use crate::variable::{
+    Alias, BaseType, Causality, ClockTiming, Dimension, Initial, IntervalVariability, ModelVariable, Variability,
+};
 use crate::version::FmiVersion;
 use crate::xml::Element;
 use std::collections::BTreeMap;
@@ -102,7 +104,22 @@ fn variable(
         derivative: integer(typed, "derivative")?,
         reinit: boolean(typed, "reinit")?.unwrap_or(false),
         clocks: integers(element, "clocks")?.unwrap_or_default(),
+        timing: timing(element).filter(|_| base == BaseType::Clock),
         line: element.line,
+    })
+}
+
+/// FMI 3.0.2, 2.4.4. The fraction says what the decimal says; what is not as the standard has it is for a checker.
+fn timing(element: &Element) -> Option<ClockTiming> {
+    let number = |name: &str| element.get(name)?.trim().parse::<f64>().ok();
+    let of = |counter: &str, decimal: &str| {
+        let counted = number(counter).zip(number("resolution")).map(|(counter, resolution)| counter / resolution);
+        number(decimal).or(counted)
+    };
+    Some(ClockTiming {
+        ticks: IntervalVariability::from_word(element.get("intervalVariability")?)?,
+        interval: of("intervalCounter", "intervalDecimal"),
+        shift: of("shiftCounter", "shiftDecimal").unwrap_or(0.0),
     })
 }
 

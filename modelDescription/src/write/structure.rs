@@ -5,6 +5,7 @@
 use crate::version::FmiVersion;
 use crate::xml::Element;
 use fmu_core::description::{TIME, Variable};
+use fmu_core::table::DENSE;
 use fmu_core::{Causality, Description};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -104,13 +105,24 @@ impl<'a> Numbering<'a> {
 
     /// Numbers of the variables that the initial value depends on.
     fn at_start(&self, v: &Variable) -> Option<Vec<u32>> {
-        Some(self.numbers(v.initial_dependencies.as_ref()?.iter().copied()))
+        let of = v.initial_dependencies.as_ref()?;
+        (!self.has_wide(of)).then(|| self.numbers(of.iter().copied()))
+    }
+
+    /// Whether a wide array is among these: FMI 2.0 would have to name each of its elements, so nothing is said, which means that
+    /// all count.
+    fn has_wide(&self, references: &[u32]) -> bool {
+        let wide = |r: &u32| self.variables.iter().any(|(v, n)| v.value_reference == *r && n.len() > DENSE);
+        references.iter().any(wide)
     }
 
     /// Numbers of the variables that the value depends on between events. FMI 2.0 knows no parameters there.
     fn between(&self, v: &Variable) -> Option<Vec<u32>> {
         if self.steps_only {
             return Some(Vec::new());
+        }
+        if v.dependencies.as_ref().is_some_and(|of| self.has_wide(of)) {
+            return None;
         }
         let parameter = |reference: &u32| {
             self.variables.iter().any(|(v, _)| v.value_reference == *reference && v.causality == Causality::Parameter)

@@ -23,10 +23,12 @@ pub(super) fn units(description: &Description, version: FmiVersion) -> Option<El
             units.push(unit(name, *exponents, *factor));
             units.len() - 1
         });
-        let Some((display, factor, offset)) = display else { continue };
-        // Two quantities may share a unit but differ in display unit: rad/s is used for speeds and bandwidths.
-        if !units[at].all("DisplayUnit").any(|d| d.get("name") == Some(display)) {
-            units[at].children.push(display_unit(display, *factor, *offset));
+        let aliases = variable.aliases.iter().filter_map(|alias| alias.display.as_ref());
+        for (display, factor, offset) in display.iter().chain(aliases.filter(|_| version == FmiVersion::V3)) {
+            // Two quantities may share a unit but differ in display unit: rad/s is used for speeds and bandwidths.
+            if !units[at].all("DisplayUnit").any(|d| d.get("name") == Some(display)) {
+                units[at].children.push(display_unit(display, *factor, *offset));
+            }
         }
     }
     (!units.is_empty()).then(|| Element::new("UnitDefinitions").children(units))

@@ -15,7 +15,7 @@ use fmu_core::Description;
 use fmu_core::description::{TIME, Value, Variable, VariableKind};
 use fmu_core::unit::SECOND;
 use fmu_core::variable::position;
-use fmu_core::{Bytes, Causality, IntegerType, Range, Variability};
+use fmu_core::{Bytes, Causality, IntegerType, Range, Ticks, Timing, Variability};
 
 /// All variables.
 pub(super) fn variables(description: &Description, version: FmiVersion) -> Element {
@@ -53,8 +53,8 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
             VariableKind::Integer(_) => "Integer",
             VariableKind::Boolean => "Boolean",
             VariableKind::Enumeration { .. } => "Enumeration",
-            // No archive of FMI 2.0 has bytes.
-            VariableKind::Text | VariableKind::Binary { .. } => "String",
+            // No archive of FMI 2.0 has them.
+            VariableKind::Text | VariableKind::Binary { .. } | VariableKind::Clock(_) => "String",
         });
         typed.attributes = type_attributes(v, FmiVersion::V2);
         typed = typed
@@ -85,21 +85,68 @@ fn variable(v: &Variable) -> Element {
         VariableKind::Boolean => "Boolean",
         VariableKind::Enumeration { .. } => "Enumeration",
         VariableKind::Text => "String",
+        VariableKind::Clock(timing) => return clock(v, &timing),
         VariableKind::Binary { .. } => "Binary",
     };
-    let mut element =
-        identity(base, v, &v.name, v.value_reference).with_some("intermediateUpdate", v.intermediate.then_some("true"));
+    let mut element = identity(base, v, &v.name, v.value_reference)
+        .with_some("clocks", on_clocks(v))
+        .with_some("intermediateUpdate", v.intermediate.then_some("true"));
     element.attributes.extend(type_attributes(v, FmiVersion::V3));
     let starts: Option<Vec<String>> =
         v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
     let dimensions = v.shape.iter().map(|n| Element::new("Dimension").with("start", n.to_string()));
+    let aliases = v.aliases.iter().map(|alias| {
+        Element::new("Alias")
+            .with("name", &alias.name)
+            .with_text("description", &alias.description)
+            .with_some("displayUnit", alias.display.as_ref().map(|(name, ..)| name.as_str()))
+    });
     if matches!(v.kind, VariableKind::Text | VariableKind::Binary { .. }) {
         let starts = starts.into_iter().flatten().map(|value| Element::new("Start").with("value", value));
-        return element.children(dimensions).children(starts);
+        return element.children(dimensions).children(starts).children(aliases);
     }
     let state = v.derivative.map(|reference| reference.to_string());
     let start = starts.map(|all| all.join(" "));
-    element.with_some("derivative", state).with_some("start", start).children(dimensions)
+    element.with_some("derivative", state).with_some("start", start).children(dimensions).children(aliases)
+}
+
+/// The value references of the clocks that a variable is on.
+fn on_clocks(v: &Variable) -> Option<String> {
+    let list: Vec<String> = v.clocks.iter().map(u32::to_string).collect();
+    (!list.is_empty()).then(|| list.join(" "))
+}
+
+/// FMI 3.0.2, 2.4.4.
+fn clock(v: &Variable, timing: &Timing) -> Element {
+    let interval = timing.interval.or(match v.start.as_deref() {
+        Some([Value::Real(interval)]) => Some(*interval),
+        _ => None,
+    });
+    let ticks = match timing.ticks {
+        Ticks::Constant => "constant",
+        Ticks::Fixed => "fixed",
+        Ticks::Tunable => "tunable",
+        Ticks::Changing => "changing",
+        Ticks::Countdown => "countdown",
+        Ticks::Triggered => "triggered",
+    };
+    let shift = (timing.shift > 0.0).then(|| number::format(timing.shift));
+    let fraction = timing.fraction.map(|(counter, resolution)| (counter.to_string(), resolution.to_string()));
+    let shifted = timing.shift_counter().filter(|counter| *counter > 0).map(|counter| counter.to_string());
+    Element::new("Clock")
+        .with("name", &*v.name)
+        .with("valueReference", v.value_reference.to_string())
+        .with_text("description", &v.description)
+        .with("causality", if v.causality == Causality::Output { "output" } else { "input" })
+        .with_some("clocks", on_clocks(v))
+        .with("intervalVariability", ticks)
+        .with_some("intervalDecimal", interval.map(number::format))
+        .with_some("shiftDecimal", shift)
+        .with_some("supportsFraction", fraction.is_some().then_some("true"))
+        .with_some("resolution", fraction.as_ref().map(|(_, resolution)| resolution.clone()))
+        .with_some("intervalCounter", fraction.map(|(counter, _)| counter))
+        .with_some("shiftCounter", shifted)
+        .with_some("priority", timing.priority.map(|priority| priority.to_string()))
 }
 
 /// The properties of the variable that do not depend on its base type.
@@ -161,7 +208,7 @@ fn type_attributes(v: &Variable, version: FmiVersion) -> Vec<(String, String)> {
                 .with_some("min", (low > least && low <= greatest).then(|| low.to_string()))
                 .with_some("max", (high < greatest && high >= least).then(|| high.to_string()))
         }
-        VariableKind::Boolean | VariableKind::Text => element,
+        VariableKind::Boolean | VariableKind::Text | VariableKind::Clock(_) => element,
         VariableKind::Binary { mime_type, most } => {
             element.with("mimeType", mime_type).with("maxSize", most.to_string())
         }

@@ -43,6 +43,7 @@ pub(crate) fn variable(
     kind: VariableKind,
 ) -> Variable {
     Variable {
+        aliases: Vec::new(),
         name: name.into(),
         description: format!("The variable {name}"),
         value_reference,
@@ -62,6 +63,7 @@ pub(crate) fn variable(
         dependencies: None,
         derivative: None,
         reinit: false,
+        clocks: Vec::new(),
         intermediate: false,
     }
 }
@@ -181,6 +183,7 @@ pub(crate) fn exchange_sample() -> Description {
         indicators: vec![17],
         event_mode: false,
         completed_steps: true,
+        scheduled: false,
         only: false,
     };
     Description { name: "Exchange".into(), model_exchange: Some(exchange), ..description }
@@ -194,6 +197,7 @@ pub(crate) fn sampled_sample() -> Description {
         indicators: Vec::new(),
         event_mode: true,
         completed_steps: false,
+        scheduled: false,
         only: false,
     };
     let mut description = sample();

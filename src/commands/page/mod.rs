@@ -10,10 +10,11 @@ use crate::preset::PresetFmu;
 use crate::reference::STIMULI;
 use crate::target::{Tools, has_modules};
 use crate::workspace::{Package, Workspace};
-use crate::{Failed, pack};
+use crate::{Failed, message, pack};
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use fmu_core::Description;
+use fmu_core::description::VariableKind;
 use fmu_import::describe;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -164,6 +165,14 @@ fn models(workspace: &Workspace, args: &Page) -> Result<Vec<Model>> {
     for (package, library) in compile(workspace, &names, &Tools::find()?.host())? {
         let folder = workspace.package(&package).map_or(Path::new("."), Package::folder).to_owned();
         let description = describe(&library, None).map_err(|e| reads_files(&folder, e))?;
+        if let Some(clock) = description.variables.iter().find(|v| matches!(v.kind, VariableKind::Clock(_))) {
+            let why = format!("{}: a page does not tick the clock {}", description.name, clock.name);
+            if args.fmus.is_empty() && args.package.is_empty() {
+                message::note(&why);
+                continue;
+            }
+            return Err(Failed(why).into());
+        }
         models.push(Model { plain: description.clone(), description, package, folder, stimuli: None });
     }
     Ok(models)

@@ -43,6 +43,9 @@ impl Model for BouncingBall {
     const INFO: Info = Info {
         name: "BouncingBall",
         description: "This model calculates the trajectory, over time, of a ball dropped from a height of 1 m",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { stop: 3.0, step: 1e-2, fixed_step: Some(STEP), ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };

@@ -29,6 +29,9 @@ impl Model for Dahlquist {
     const INFO: Info = Info {
         name: "Dahlquist",
         description: "This model implements the Dahlquist test equation",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { stop: 10.0, step: STEP, fixed_step: Some(STEP), ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };

@@ -18,6 +18,9 @@ impl Model for Character {
     const INFO: Info = Info {
         name: "Resource",
         description: "This model loads data from a resource file",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { step: 1.0, fixed_step: Some(1.0), ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };

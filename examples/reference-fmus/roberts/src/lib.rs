@@ -28,6 +28,9 @@ impl Model for Roberts {
     const INFO: Info = Info {
         name: "Roberts",
         description: "The reaction of three substances due to Robertson",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { start: 1e-5, stop: 1e8, step: 1e4, tolerance: Some(1e-4), fixed_step: None },
         ..Info::DEFAULT
     };

@@ -29,6 +29,9 @@ impl Model for Stair {
     const INFO: Info = Info {
         name: "Stair",
         description: "This model generates a stair signal using time events",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { stop: 10.0, step: STEP, fixed_step: Some(STEP), ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
@@ -39,7 +42,7 @@ impl Model for Stair {
         self.second = 1;
     }
 
-    fn output(&self, _now: Elapsed, _: &mut ()) {}
+    fn output(&self, _now: Elapsed, (): &mut ()) {}
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         integrate::euler_hybrid::<Self, 0>(self, step, STEP)

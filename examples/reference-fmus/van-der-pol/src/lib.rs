@@ -30,6 +30,9 @@ impl Model for VanDerPol {
     const INFO: Info = Info {
         name: "VanDerPol",
         description: "This model implements the van der Pol oscillator",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { stop: 20.0, step: STEP, fixed_step: Some(STEP), ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };

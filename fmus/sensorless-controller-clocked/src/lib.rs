@@ -1,0 +1,3 @@
+//! The FMU SensorlessControllerClocked.
+
+fmu_export::export!(drive::SensorlessControllerClocked: Clocked + ScheduledExecution + Warns);

@@ -1,0 +1,206 @@
+//! `SensorlessControllerClocked` through its C functions: with the plant it gives the bits of the native pair that exchanges its
+//! values at every T_s, in Co-Simulation with Event Mode, Model Exchange and Scheduled Execution.
+#![allow(missing_docs, non_snake_case, clippy::float_cmp, clippy::borrow_as_ptr)]
+#![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions")]
+
+use drive::{Pair, PmsmPlant, SensorlessControllerClocked};
+use fmu_core::{Block, Elapsed, Exported, Model, Step};
+use fmu_export::abi::types::*;
+use std::ffi::CString;
+use std::ptr::{null, null_mut};
+
+fmu_export::export!(SensorlessControllerClocked: Clocked + ScheduledExecution + Warns);
+
+use fmi::*;
+
+const OK: c_int = 0;
+const ERROR: c_int = 3;
+const SAMPLE: u32 = 1;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Kind {
+    Cs,
+    Me,
+    Se,
+}
+
+/// The value reference of a variable.
+fn reference(name: &str) -> u32 {
+    let table = SensorlessControllerClocked::TABLE;
+    let index = (0..table.len()).position(|i| table.locate(i).is_some_and(|(other, ..)| other == name));
+    u32::try_from(index.unwrap_or_else(|| panic!("{name}"))).unwrap() + 1
+}
+
+struct Controller {
+    kind: Kind,
+    it: InstancePointer,
+}
+
+impl Controller {
+    /// In Initialization Mode.
+    fn new(kind: Kind) -> Self {
+        let token = CString::new(fmi::This::TOKEN.as_str()).unwrap();
+        let (name, token, no, yes) = (c"c".as_ptr(), token.as_ptr(), Fmi3Boolean(0), Fmi3Boolean(1));
+        let it = unsafe {
+            match kind {
+                Kind::Cs => {
+                    fmi3InstantiateCoSimulation(name, token, null(), no, no, yes, no, null(), 0, null_mut(), None, None)
+                }
+                Kind::Me => fmi3InstantiateModelExchange(name, token, null(), no, no, null_mut(), None),
+                Kind::Se => {
+                    fmi3InstantiateScheduledExecution(name, token, null(), no, no, null_mut(), None, None, None, None)
+                }
+            }
+        };
+        assert!(!it.is_null());
+        assert_eq!(unsafe { fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0) }, OK);
+        Self { kind, it }
+    }
+
+    fn exit(&self) -> c_int {
+        unsafe { fmi3ExitInitializationMode(self.it) }
+    }
+
+    fn update(&self) {
+        let ([mut a, mut b, mut c, mut d, mut e], mut next) = ([Fmi3Boolean(9); 5], 0.0);
+        let status = unsafe { fmi3UpdateDiscreteStates(self.it, &mut a, &mut b, &mut c, &mut d, &mut e, &mut next) };
+        assert_eq!((status, a.0, e.0), (OK, 0, 0));
+    }
+
+    /// From Event Mode at `t` to Event Mode at `end`.
+    fn proceed(&self, t: f64, h: f64, end: f64) {
+        let ([mut a, mut b, mut c], mut last) = ([Fmi3Boolean(9); 3], 0.0);
+        unsafe {
+            if self.kind == Kind::Cs {
+                assert_eq!(fmi3EnterStepMode(self.it), OK);
+                assert_eq!(fmi3DoStep(self.it, t, h, Fmi3Boolean(1), &mut a, &mut b, &mut c, &mut last), OK);
+            } else {
+                assert_eq!((fmi3EnterContinuousTimeMode(self.it), fmi3SetTime(self.it, end)), (OK, OK));
+            }
+            assert_eq!(fmi3EnterEventMode(self.it), OK);
+        }
+    }
+
+    fn set(&self, vr: &[u32], values: &[f64]) {
+        assert_eq!(unsafe { fmi3SetFloat64(self.it, vr.as_ptr(), vr.len(), values.as_ptr(), values.len()) }, OK);
+    }
+
+    fn get(&self, vr: &[u32]) -> Vec<f64> {
+        let mut values = vec![f64::NAN; vr.len()];
+        assert_eq!(unsafe { fmi3GetFloat64(self.it, vr.as_ptr(), vr.len(), values.as_mut_ptr(), vr.len()) }, OK);
+        values
+    }
+
+    fn get_booleans<const N: usize>(&self, vr: [u32; N]) -> [bool; N] {
+        let mut values = [Fmi3Boolean(9); N];
+        assert_eq!(unsafe { fmi3GetBoolean(self.it, vr.as_ptr(), N, values.as_mut_ptr(), N) }, OK);
+        values.map(|value| value.0 != 0)
+    }
+}
+
+impl Drop for Controller {
+    fn drop(&mut self) {
+        unsafe { fmi3FreeInstance(self.it) }
+    }
+}
+
+/// What the importer sets at sample k: a start, a reversal, load steps.
+fn inputs(k: u32) -> (f64, f64) {
+    let speed = [0.0, 50.0, 150.0, -100.0, 30.0][(k as usize / 20_000).min(4)];
+    (speed, if k % 30_000 > 15_000 { 1.5 } else { 0.0 })
+}
+
+const SAMPLES: u32 = 100_000;
+
+/// The pair as its importer steps it today: commands and measurements, as bits.
+fn jacobi(T_s: f64) -> Vec<[u64; 6]> {
+    let mut pair = Pair::default();
+    pair.controller.model.parameters.T_s = T_s;
+    pair.start().unwrap();
+    (0..SAMPLES)
+        .map(|k| {
+            let (speed, load) = inputs(k);
+            pair.set_inputs(speed, load, 325.0);
+            pair.step(T_s).unwrap();
+            let (u, i) = (pair.controller.out.u, pair.plant.out.i);
+            [u.a, u.b, i.a, i.b, pair.plant.out.speed, pair.controller.out.speed_est].map(f64::to_bits)
+        })
+        .collect()
+}
+
+fn clocked(kind: Kind, T_s: f64) -> Vec<[u64; 6]> {
+    let controller = Controller::new(kind);
+    if T_s != 1e-4 {
+        assert_eq!(unsafe { fmi3SetIntervalDecimal(controller.it, &SAMPLE, 1, &T_s) }, OK);
+        assert_eq!(controller.get(&[reference("T_s")]), [T_s]);
+    }
+    assert_eq!(controller.exit(), OK);
+    let mut plant = Block::<PmsmPlant>::default();
+    plant.initialize();
+    plant.model.inputs.u_dc = 325.0;
+    let commands = ["u_a", "u_b", "u_c", "speed_est"].map(reference);
+    let gates = ["enabled", "short_circuit"].map(reference);
+    let measured = ["i_a", "i_b", "i_c", "theta_meas", "speed_meas", "speed_ref", "u_dc"].map(reference);
+    let mut bits = Vec::new();
+    let mut now = Elapsed::ZERO;
+    let mut t = 0.0;
+    for k in 0..=SAMPLES {
+        let (speed, load) = inputs(k);
+        let (m, it) = (plant.out.measured(), controller.it);
+        let set = || {
+            controller.set(&measured, &[m.i.a, m.i.b, m.i.c, m.theta_e, m.speed, speed, 325.0]);
+        };
+        // The command of the last sample is read at the tick, before the currents of this one count.
+        match kind {
+            Kind::Se => {
+                set();
+                assert_eq!(unsafe { fmi3ActivateModelPartition(it, SAMPLE, t) }, OK);
+            }
+            _ => assert_eq!(unsafe { fmi3SetClock(it, &SAMPLE, 1, &Fmi3Boolean(1)) }, OK),
+        }
+        let (command, [enable, asc]) = (controller.get(&commands), controller.get_booleans(gates));
+        if kind != Kind::Se {
+            set();
+            controller.update();
+        }
+        if k > 0 {
+            let [u_a, u_b, speed_est] = [command[0], command[1], command[3]];
+            bits.push([u_a, u_b, plant.out.i.a, plant.out.i.b, plant.out.speed, speed_est].map(f64::to_bits));
+        }
+        let u = drive::frame::Phases { a: command[0], b: command[1], c: command[2] };
+        let inputs = &mut plant.model.inputs;
+        (inputs.u, inputs.enable, inputs.asc, inputs.tau_load) = (u, enable, asc, load);
+        plant.step(&Step { start: now, h: T_s }).unwrap();
+        now = now.plus(T_s);
+        if kind != Kind::Se {
+            controller.proceed(t, T_s, now.seconds());
+        }
+        t = if kind == Kind::Cs { t + T_s } else { now.seconds() };
+    }
+    bits
+}
+
+#[test]
+fn the_clocked_controller_gives_the_bits_of_the_pair() {
+    for T_s in [1e-4, 8e-5] {
+        let pair = jacobi(T_s);
+        assert!(pair.iter().any(|row| f64::from_bits(row[4]) > 100.0), "it runs");
+        for kind in [Kind::Cs, Kind::Me, Kind::Se] {
+            let ours = clocked(kind, T_s);
+            assert_eq!(ours.len(), pair.len());
+            if let Some(k) = ours.iter().zip(&pair).position(|(a, b)| a != b) {
+                panic!("{kind:?}, T_s = {T_s}: sample {k}: {:?} and {:?}", ours[k], pair[k]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_delay_of_0_is_refused() {
+    for kind in [Kind::Cs, Kind::Me, Kind::Se] {
+        let controller = Controller::new(kind);
+        let (vr, zero) = (reference("timing.delay"), 0);
+        assert_eq!(unsafe { fmi3SetInt32(controller.it, &vr, 1, &zero, 1) }, OK);
+        assert_eq!(controller.exit(), ERROR);
+    }
+}
