@@ -224,7 +224,7 @@ fn another_module_is_refused() {
 
 /// The serialized state of the packed FMU at the end of a run, in hexadecimal digits.
 fn state(run: &Run) -> String {
-    let fmu = fmu_import::Fmu::open(&common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();
+    let fmu = fmu_import::Fmu::open(common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();
     let mut instance = fmu.instantiate("instance", false).unwrap();
     let set = |instance: &mut fmu_import::Instance, (name, value): &(String, Value)| {
         instance.set_text(name, value.to_string().trim_matches('"')).unwrap();
