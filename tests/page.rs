@@ -6,7 +6,7 @@ mod common;
 use drive::PmsmDrive;
 use fmu::page::own::{Own, Run};
 use fmu::page::{Source, judged, page};
-use fmu_core::{Block, Description, Elapsed, Model, Slot, Step};
+use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -191,6 +191,23 @@ fn a_page_stands_alone_and_knows_the_model() {
 }
 
 #[test]
+fn a_model_without_co_simulation_has_no_page() {
+    let mut of = drive();
+    fmu::page::is_possible(&of).unwrap();
+    of.model_exchange = Description::exported::<Alone>().unwrap().model_exchange;
+    let said = fmu::page::is_possible(&of).unwrap_err().to_string();
+    assert!(said.contains("for Model Exchange alone"), "{said}");
+}
+
+/// The drive for Model Exchange alone.
+struct Alone;
+
+impl Exported for Alone {
+    type Model = PmsmDrive;
+    const CAN: Capabilities<PmsmDrive> = Capabilities::NONE.ContinuousTime().Events().ModelExchangeOnly();
+}
+
+#[test]
 fn another_module_is_refused() {
     let of = drive();
     let good = module(&of);
@@ -203,6 +220,29 @@ fn another_module_is_refused() {
         let said = page(&source(&of, &of, &module)).unwrap_err().to_string();
         assert!(said.contains(why), "{said}");
     }
+}
+
+/// The serialized state of the packed FMU at the end of a run, in hexadecimal digits.
+fn state(run: &Run) -> String {
+    let fmu = fmu_import::Fmu::open(common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();
+    let mut instance = fmu.instantiate("instance", false).unwrap();
+    let set = |instance: &mut fmu_import::Instance, (name, value): &(String, Value)| {
+        instance.set_text(name, value.to_string().trim_matches('"')).unwrap();
+    };
+    run.set.iter().for_each(|pair| set(&mut instance, pair));
+    let experiment = PmsmDrive::INFO.experiment;
+    instance.setup(experiment.start, None).unwrap();
+    instance.enter_initialization().unwrap();
+    instance.exit_initialization().unwrap();
+    for k in 0..1000_u32 {
+        for (_, name, value) in run.events.iter().filter(|event| event.0 == u64::from(k)) {
+            set(&mut instance, &(name.clone(), value.clone()));
+        }
+        let _ = instance.do_step(f64::from(k) * experiment.step, experiment.step).unwrap();
+    }
+    let state = instance.get_state().unwrap();
+    let bytes = instance.serialize_state(state).unwrap();
+    bytes.iter().fold(String::new(), |text, byte| text + &format!("{byte:02x}"))
 }
 
 /// Pages in a Chromium: the bits of native runs in every column, states, live changes, addresses, faults, widths, keys.
@@ -239,7 +279,7 @@ fn pages_in_a_browser() {
     let rows = run::<PmsmDrive>(&experiment, &names);
     let bits: Vec<Vec<String>> =
         rows.iter().map(|row| row.iter().map(|x| format!("{:016x}", x.to_bits())).collect()).collect();
-    let expected = json!({ "run": experiment.json(), "names": names, "rows": bits });
+    let expected = json!({ "run": experiment.json(), "names": names, "rows": bits, "state": state(&experiment) });
     let path: PathBuf = folder.join("expected.json");
     std::fs::write(&path, expected.to_string()).unwrap();
     common::python::pytest("pages", "run-pages", &["test_run_page.py"], &[("FMU_PAGES", &folder)]);

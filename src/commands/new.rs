@@ -26,11 +26,12 @@ pub struct New {
 }
 
 /// The files of a project; names in braces are filled in.
-const TEMPLATE: [(&str, &str); 6] = [
+const TEMPLATE: [(&str, &str); 7] = [
     ("Cargo.toml", include_str!("../../template/manifest.toml")),
     ("src/lib.rs", include_str!("../../template/lib.rs")),
     ("src/tests.rs", include_str!("../../template/tests.rs")),
     ("stimuli.csv", include_str!("../../template/stimuli.csv")),
+    ("page.toml", include_str!("../../template/page.toml")),
     (".github/workflows/fmu.yml", include_str!("../../template/ci.yml")),
     ("README.md", include_str!("../../template/README.md")),
 ];

@@ -52,6 +52,16 @@ pub struct Source<'a> {
     pub licenses: &'a str,
 }
 
+/// Requires a model that a page can run.
+///
+/// # Errors
+/// The model has no Co-Simulation.
+pub fn is_possible(of: &Description) -> Result<()> {
+    let alone = of.model_exchange.as_ref().is_some_and(|exchange| exchange.only);
+    ensure!(!alone, "{}: a page runs Co-Simulation, and this FMU is for Model Exchange alone", of.model_name());
+    Ok(())
+}
+
 /// The page as HTML.
 ///
 /// # Errors

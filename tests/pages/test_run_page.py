@@ -81,6 +81,10 @@ def test_the_bits_are_those_of_a_native_run(browser):
     for k, (row, wanted) in enumerate(zip(got, expected["rows"])):
         wrong = [name for name, a, b in zip(expected["names"], row, wanted) if a != b]
         assert not wrong, f"row {k}: {wrong}"
+    page.click("#save")
+    page.wait_for_function("() => saved !== null")
+    state = page.evaluate("Array.from(saved.state, byte => byte.toString(16).padStart(2, '0')).join('')")
+    assert state == expected["state"], "the state as bytes"
     print(page.text_content("#speed"))
     assert page.evaluate("speed") > 5
     page.close()
@@ -211,6 +215,19 @@ def test_a_model_that_fails(browser, what, told):
     page.click("#run")
     finished(page)
     assert page.evaluate("rec.n") == 11
+    page.close()
+
+
+def test_a_model_that_hangs(browser):
+    page = opened(browser, FOLDER / "RcCircuit.html")
+    page.workers[0].evaluate("void (DOES.hang = () => { for (;;); })")
+    page.evaluate("send({ does: 'hang' })")
+    page.wait_for_function("() => document.getElementById('message').textContent.startsWith('The model does not answer')", timeout=5000)
+    page.click("#reset")
+    page.wait_for_function("() => ready && rec.n === 1")
+    page.evaluate("choose(0)")
+    page.click("#run")
+    finished(page)
     page.close()
 
 

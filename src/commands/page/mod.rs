@@ -90,7 +90,10 @@ pub fn run(args: &Page) -> Result<Vec<PathBuf>> {
         models.len()
     );
     // What is wrong with a page.toml is told before anything is compiled for it.
-    models.iter().try_for_each(|model| own(model).map(drop))?;
+    for model in &models {
+        page::is_possible(&model.description)?;
+        own(model)?;
+    }
     let mut written = Vec::new();
     for model in &models {
         let file = match &args.module {
