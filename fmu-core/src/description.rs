@@ -108,8 +108,11 @@ pub struct Variable {
     /// Other names (FMI 3.0).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<AliasDescription>,
-    /// Extents of an array, whose elements are row by row; empty for a scalar.
+    /// Extents of an array at the start, whose elements are row by row; empty for a scalar.
     pub shape: Vec<usize>,
+    /// Value references of the structural parameters that are its extents; empty for an array of one size.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sized: Vec<u32>,
     /// The importer may set the start value of this output or local variable.
     #[serde(default)]
     pub exact: bool,
@@ -231,6 +234,11 @@ impl Description {
 
     fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
         let states = can.rows()?;
+        if M::TABLE.has_sizes() {
+            let mut started = block.clone();
+            started.initialize();
+            M::TABLE.check_sizes(&mut started)?;
+        }
         probe::keeps_starts(can, &block, &states)?;
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
@@ -259,40 +267,51 @@ impl Description {
             if meta.need != Need::Always {
                 needs.push((variables.len(), meta.need));
             }
-            let state = states.iter().position(|&row| row == index);
+            let state = states.iter().position(|&row| row == index).and_then(|number| can.state_of(number));
             variables.push(Variable {
                 initial_dependencies: references(&initial[index]),
                 dependencies: references(&between[index]),
-                reinit: state.is_some_and(|i| can.states()[i].reinit),
+                reinit: state.is_some_and(|(state, _)| state.reinit),
                 ..variable(name, meta, reference(index), start)
             });
         }
-        for (i, state) in can.states().iter().enumerate() {
-            let (index, place) = (table.len() + i, table.len() + wide.len() + i);
+        let (mut numbers, mut number) = (Vec::new(), 0);
+        for state in can.states() {
+            numbers.push(number);
+            let (index, place) = (table.len() + number, table.len() + wide.len() + number);
             let (name, of) = (format!("der({})", state.name), format!("Derivative of {}", state.name));
             let meta = *V::state("", state.rate, "", |m| m).meta();
-            variables.push(Variable {
+            let mut derivative = Variable {
                 description: of,
                 initial_dependencies: references(&initial[place]),
                 dependencies: references(&between[place]),
-                derivative: Some(reference(states[i])),
+                derivative: Some(reference(states[number])),
                 ..variable(name, &meta, reference(index), None)
-            });
+            };
+            for place in place + 1..place + state.most() {
+                join(&mut derivative.initial_dependencies, references(&initial[place]));
+                join(&mut derivative.dependencies, references(&between[place]));
+            }
+            variables.push(derivative);
+            number += state.most();
         }
         for (i, indicator) in can.indicators().iter().enumerate() {
             let meta = *V::state("", &ONE, indicator.description, |m| m).meta();
-            let index = table.len() + can.states().len() + i;
+            let index = table.len() + number + i;
             variables.push(variable(indicator.name.into(), &meta, reference(index), None));
         }
         // In the order of the value references.
         for (place, &extent) in (table.len()..).zip(&wide) {
             let array = wide_array::<M>(can, &mut block, extent)?;
+            let state = states.iter().position(|&row| row == extent.0).and_then(|number| can.state_of(number));
             variables.push(Variable {
                 initial_dependencies: references(&initial[place]),
                 dependencies: references(&between[place]),
+                reinit: state.is_some_and(|(state, _)| state.reinit),
                 ..array
             });
         }
+        size(can, &mut variables)?;
         check_names(M::INFO.name, &variables)?;
         check_types(&variables)?;
         put_on_clocks::<M>(&mut variables, can.clocked.as_ref().is_some_and(|clocked| clocked.feedthrough))?;
@@ -304,9 +323,9 @@ impl Description {
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
         let after = |i: usize| reference(table.len() + i);
         let model_exchange = can.model_exchange().then(|| ModelExchange {
-            states: states.iter().map(|&row| reference(row)).collect(),
-            derivatives: (0..states.len()).map(after).collect(),
-            indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
+            states: numbers.iter().map(|&first| reference(states[first])).collect(),
+            derivatives: numbers.iter().map(|&first| after(first)).collect(),
+            indicators: (0..can.indicators().len()).map(|i| after(number + i)).collect(),
             event_mode: can.event_mode(),
             completed_steps: can.complete.is_some(),
             scheduled: can.scheduled,
@@ -350,6 +369,39 @@ impl Description {
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
     }
+}
+
+/// Gives every array that structural parameters size its extents at the start, and every derivative those of its state.
+fn size<M: Model>(can: &Capabilities<M>, variables: &mut [Variable]) -> Result<(), Fault> {
+    if !M::TABLE.has_sizes() && !can.has_arrays() {
+        return Ok(());
+    }
+    let mut sizes: Vec<(String, u32, usize)> = Vec::new();
+    for v in variables.iter().filter(|v| v.causality == Causality::StructuralParameter) {
+        match v.start.as_deref() {
+            Some([Value::Integer(n @ 1..)]) => {
+                sizes.push((v.name.clone(), v.value_reference, usize::try_from(*n).unwrap_or(usize::MAX)));
+            }
+            _ => return Err(Fault::new(format!("{} must be greater than 0 at the start", v.name))),
+        }
+    }
+    for v in variables.iter_mut().filter(|v| v.derivative.is_none()) {
+        let Some((_, meta, _)) = M::TABLE.locate(can.index(v.value_reference)) else { continue };
+        let prefix = v.name.strip_suffix(meta.name).unwrap_or_default();
+        let named = |name: &&str| sizes.iter().find(|(full, ..)| full.strip_prefix(prefix) == Some(name));
+        let found: Vec<_> = meta.sized.iter().filter_map(named).collect();
+        if !found.is_empty() {
+            v.sized = found.iter().map(|(_, reference, _)| *reference).collect();
+            v.shape = found.iter().map(|(.., n)| *n).collect();
+        }
+    }
+    for i in 0..variables.len() {
+        let state = variables[i].derivative.and_then(|of| variables.iter().find(|v| v.value_reference == of));
+        if let Some((shape, sized)) = state.map(|state| (state.shape.clone(), state.sized.clone())) {
+            (variables[i].shape, variables[i].sized) = (shape, sized);
+        }
+    }
+    Ok(())
 }
 
 /// The clocks of every variable. What is on a clock has no value before its first tick, and between events depends on the ticks.
@@ -473,6 +525,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
             ([], n) => n.into_iter().collect(),
             (shape, _) => shape.to_vec(),
         },
+        sized: Vec::new(),
         exact: meta.exact,
         start: start.map(|x| vec![x]),
         initial_dependencies: None,

@@ -69,12 +69,17 @@ impl ModelDescription {
 
     /// Extents of a variable, none of a scalar; a structural parameter counts with its start value. `None` if a size is not known.
     pub fn shape(&self, variable: &ModelVariable) -> Option<Vec<usize>> {
+        self.shape_with(variable, |_| None)
+    }
+
+    /// [`shape`](Self::shape), where `size` has the structural parameters, by value reference, that do not have their start values.
+    pub fn shape_with(&self, variable: &ModelVariable, size: impl Fn(u32) -> Option<usize>) -> Option<Vec<usize>> {
         let extent = |dimension: &Dimension| match dimension {
             Dimension::Fixed(n) => usize::try_from(*n).ok(),
-            Dimension::Variable(reference) => {
+            Dimension::Variable(reference) => size(*reference).or_else(|| {
                 let size = self.variables.iter().find(|v| v.value_reference == *reference)?;
                 size.start.as_ref()?.trim().parse().ok()
-            }
+            }),
         };
         variable.dimensions.iter().map(extent).collect()
     }
