@@ -86,6 +86,9 @@ pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs
 /// [`CompletedSteps::complete`].
 pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
 
+/// [`Resizable::resize`].
+pub type Resize<M> = fn(&mut M) -> Result<(), Fault>;
+
 /// [`EventMode::to_event`].
 pub type ToEvent<M> = fn(&mut M, &Step) -> Result<Stop, Fault>;
 
@@ -111,7 +114,7 @@ pub struct Capabilities<M: Model> {
     /// The model is not for Co-Simulation.
     pub exchange_only: bool,
     /// [`Resizable::resize`].
-    pub resizable: Option<fn(&mut M) -> Result<(), Fault>>,
+    pub resizable: Option<Resize<M>>,
     /// [`Intermediate::longest`].
     pub intermediate: Option<fn(&M) -> f64>,
     /// Function of a model that [`Warns`].

@@ -1,5 +1,6 @@
 //! The neutral description of a model, from which the XML, documentation and tools are generated.
 
+mod sizes;
 mod terminals;
 
 pub use terminals::{MemberDescription, TerminalDescription, TerminalPicture};
@@ -15,6 +16,7 @@ use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
+use sizes::{check_sizes, exchange, size};
 use std::collections::BTreeSet;
 
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
@@ -234,11 +236,7 @@ impl Description {
 
     fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
         let states = can.rows()?;
-        if M::TABLE.has_sizes() {
-            let mut started = block.clone();
-            started.initialize();
-            M::TABLE.check_sizes(&mut started)?;
-        }
+        check_sizes(&block)?;
         probe::keeps_starts(can, &block, &states)?;
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
@@ -275,9 +273,8 @@ impl Description {
                 ..variable(name, meta, reference(index), start)
             });
         }
-        let (mut numbers, mut number) = (Vec::new(), 0);
+        let mut number = 0;
         for state in can.states() {
-            numbers.push(number);
             let (index, place) = (table.len() + number, table.len() + wide.len() + number);
             let (name, of) = (format!("der({})", state.name), format!("Derivative of {}", state.name));
             let meta = *V::state("", state.rate, "", |m| m).meta();
@@ -321,16 +318,6 @@ impl Description {
         }
         variables.iter_mut().for_each(in_place_of_another::<M>);
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
-        let after = |i: usize| reference(table.len() + i);
-        let model_exchange = can.model_exchange().then(|| ModelExchange {
-            states: numbers.iter().map(|&first| reference(states[first])).collect(),
-            derivatives: numbers.iter().map(|&first| after(first)).collect(),
-            indicators: (0..can.indicators().len()).map(|i| after(number + i)).collect(),
-            event_mode: can.event_mode(),
-            completed_steps: can.complete.is_some(),
-            scheduled: can.scheduled,
-            only: can.exchange_only,
-        });
         let info = M::INFO;
         Ok(Self {
             name: info.name.into(),
@@ -347,7 +334,7 @@ impl Description {
             variables,
             terminals,
             icon: M::ICON.map(Into::into),
-            model_exchange,
+            model_exchange: exchange(can, &states),
         })
     }
 
@@ -369,39 +356,6 @@ impl Description {
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
     }
-}
-
-/// Gives every array that structural parameters size its extents at the start, and every derivative those of its state.
-fn size<M: Model>(can: &Capabilities<M>, variables: &mut [Variable]) -> Result<(), Fault> {
-    if !M::TABLE.has_sizes() && !can.has_arrays() {
-        return Ok(());
-    }
-    let mut sizes: Vec<(String, u32, usize)> = Vec::new();
-    for v in variables.iter().filter(|v| v.causality == Causality::StructuralParameter) {
-        match v.start.as_deref() {
-            Some([Value::Integer(n @ 1..)]) => {
-                sizes.push((v.name.clone(), v.value_reference, usize::try_from(*n).unwrap_or(usize::MAX)));
-            }
-            _ => return Err(Fault::new(format!("{} must be greater than 0 at the start", v.name))),
-        }
-    }
-    for v in variables.iter_mut().filter(|v| v.derivative.is_none()) {
-        let Some((_, meta, _)) = M::TABLE.locate(can.index(v.value_reference)) else { continue };
-        let prefix = v.name.strip_suffix(meta.name).unwrap_or_default();
-        let named = |name: &&str| sizes.iter().find(|(full, ..)| full.strip_prefix(prefix) == Some(name));
-        let found: Vec<_> = meta.sized.iter().filter_map(named).collect();
-        if !found.is_empty() {
-            v.sized = found.iter().map(|(_, reference, _)| *reference).collect();
-            v.shape = found.iter().map(|(.., n)| *n).collect();
-        }
-    }
-    for i in 0..variables.len() {
-        let state = variables[i].derivative.and_then(|of| variables.iter().find(|v| v.value_reference == of));
-        if let Some((shape, sized)) = state.map(|state| (state.shape.clone(), state.sized.clone())) {
-            (variables[i].shape, variables[i].sized) = (shape, sized);
-        }
-    }
-    Ok(())
 }
 
 /// The clocks of every variable. What is on a clock has no value before its first tick, and between events depends on the ticks.

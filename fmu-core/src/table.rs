@@ -281,13 +281,11 @@ impl<W: 'static> Table<W> {
 
     /// The row of a variable, and the index in it, which of a part's wide arrays counts from [`WIDE`].
     pub(crate) fn row_of(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
-        match self.places[..self.len].get(index) {
-            Some(place) => Some((&self.rows[usize::from(place.row)], usize::from(place.inner))),
-            None => {
-                let (row, inner) = self.wide_place(index)?;
-                Some((row, if matches!(row.access, Access::Part { .. }) { WIDE + inner } else { inner }))
-            }
+        if let Some(place) = self.places[..self.len].get(index) {
+            return Some((&self.rows[usize::from(place.row)], usize::from(place.inner)));
         }
+        let (row, inner) = self.wide_place(index)?;
+        Some((row, if matches!(row.access, Access::Part { .. }) { WIDE + inner } else { inner }))
     }
 
     /// Which element of an array variable `index` is, 0 for a scalar; `None` past the end. Does not allocate.

@@ -291,7 +291,7 @@ impl<E: Exported> Instance<E> {
         let number = self.after_table(index).filter(|number| *number < E::CAN.scalars());
         match number.and_then(|number| Some((number, E::CAN.state_of(number)?))) {
             Some((number, (state, first))) if number > first => {
-                Err(message::inner_derivative(self.reference_of(number), state.name, self.reference_of(first)))
+                Err(message::inner_derivative(Self::reference_of(number), state.name, Self::reference_of(first)))
             }
             Some((_, (state, _))) => Ok(state.all(&mut self.current.block.model).len().min(state.most())),
             None => Ok(1),
@@ -299,7 +299,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// The reference of a derivative.
-    fn reference_of(&self, number: usize) -> u32 {
+    fn reference_of(number: usize) -> u32 {
         E::CAN.reference(table::<E>().len() + number)
     }
 }
