@@ -30,7 +30,7 @@ pub struct Instance {
     kind: Kind,
     states: Vec<Option<Pointer>>,
     dead: bool,
-    /// Of an FMU that has some, unless events are not used.
+    /// The clocks of an FMU that has some, unless events are not used.
     clocks: Option<Box<Clocks>>,
     // After the instance, which may log while it is freed.
     log: Arc<Log>,
