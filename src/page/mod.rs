@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::{Compression, GzBuilder};
 use fmu_core::Description;
 use fmu_core::description::{Value as Start, Variable, VariableKind};
-use fmu_core::variable::Causality;
+use fmu_core::variable::{Causality, Variability};
 use fmu_import::cosimulation::Schedule;
 use fmu_plot::ink::CURVES;
 use fmu_plot::page::{AXIS, document, escape};
@@ -198,15 +198,20 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
         "reference": v.value_reference,
         "kind": kind,
         "causality": v.causality,
-        "variability": v.variability,
         "description": v.description,
-        "elements": v.elements(),
     });
     let mut put = |key: &str, value: Value| {
         if !value.is_null() {
             json[key] = value;
         }
     };
+    // What most variables have is left out.
+    if v.variability == Variability::Tunable {
+        put("variability", json!(v.variability));
+    }
+    if v.elements() != 1 {
+        put("elements", json!(v.elements()));
+    }
     put("unit", json!(unit));
     put("display", json!(display));
     put("type", json!(enumeration));

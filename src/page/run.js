@@ -3,6 +3,7 @@
 
 const $ = (id) => document.getElementById(id);
 const model = JSON.parse($("fmu").textContent);
+for (const v of model.variables) v.elements ??= 1;
 const byName = new Map(model.variables.map((v) => [v.name, v]));
 const NUMBERS = /^(Float|Int|UInt|Enumeration|Boolean)/;
 const recorded = model.variables.filter((v) => (v.causality === "output" || v.causality === "input") && v.elements === 1 && NUMBERS.test(v.kind));
