@@ -69,12 +69,16 @@ pub fn is_possible(of: &Description) -> Result<()> {
 pub fn page(source: &Source<'_>) -> Result<String> {
     let Source { description: of, plain, module, licenses, .. } = source;
     fits(module, plain)?;
-    let Judged { members, presets } = judged(plain, source.own)?;
+    let Judged { mut members, presets } = judged(plain, source.own)?;
     // The author's presets are for the author's start values.
     let is_plain = of.variables.iter().zip(&plain.variables).all(|(a, b)| a.start == b.start);
     let mut presets: Vec<Value> = presets.iter().filter(|_| is_plain).map(Run::json).collect();
     if presets.is_empty() {
-        presets.push(default_experiment(of, source.stimuli)?.json());
+        let run = default_experiment(of, source.stimuli)?;
+        if !is_plain {
+            members.insert("ranges".into(), ranges_of(&run));
+        }
+        presets.push(run.json());
     }
     let json = described(of, plain, members, &presets).to_string().replace('<', "\\u003c");
     let body = BODY
@@ -92,6 +96,19 @@ pub fn page(source: &Source<'_>) -> Result<String> {
          <script type=\"text/plain\" id=\"worker\">{WORKER}</script>\n<script>\n{AXIS}{RUN}</script>\n"
     );
     Ok(document(of.model_name(), POLICY, STYLE, &body))
+}
+
+/// The ranges of the inputs of a run, twice what it needs, for a machine that the author's ranges are not for.
+fn ranges_of(run: &Run) -> Value {
+    let mut ranges = Map::new();
+    for (_, name, value) in &run.events {
+        let most = ranges.get(name).map_or(0.0, |range: &Value| range[1].as_f64().unwrap_or(0.0));
+        let x = 2.0 * value.as_f64().unwrap_or(0.0).abs();
+        if x > most {
+            ranges.insert(name.clone(), json!([-x, x]));
+        }
+    }
+    Value::Object(ranges)
 }
 
 /// Requires a module that a page can run, of the model with this token.
