@@ -229,7 +229,7 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
     if v.elements() != 1 {
         put("elements", json!(v.elements()));
     }
-    put("unit", json!(unit));
+    put("unit", json!(unit.filter(|unit| display.is_none() && !unit.is_empty())));
     put("display", json!(display));
     put("type", json!(enumeration));
     put("min", json!(v.min));
