@@ -146,8 +146,10 @@ fn texts_are_set_and_said() {
         assert_eq!(instance.get("status").unwrap(), text("off"));
         let error = instance.set("label", &text("late")).unwrap_err().to_string();
         assert!(error.contains("label is a fixed parameter"), "{error}");
-        for (name, why) in [("status", "status is an output and cannot be set"), ("revision", "revision cannot be set")]
-        {
+        for (name, why) in [
+            ("status", "status is an output and cannot be set"),
+            ("revision", "revision is a constant and cannot be set"),
+        ] {
             let error = fresh(version).set(name, &text("x")).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }

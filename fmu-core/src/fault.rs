@@ -1,5 +1,5 @@
-//! Error messages of a model: one sentence with the variable, its value and the allowed values. And the one that is no error: the
-//! end of the simulation.
+//! Error messages of a model: one sentence with the variable, its value and the allowed values; and the message that ends the
+//! simulation without an error.
 
 use crate::Elapsed;
 use std::fmt::{self, Display};

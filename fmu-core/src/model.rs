@@ -185,8 +185,8 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Advances the state by one step with the inputs held.
     ///
     /// # Errors
-    /// Gives the reason why the step is impossible, for example a state that is no longer finite. [`Fault::end`] is no
-    /// failure: the simulation ends inside the step, and the state is that of its end.
+    /// Gives the reason why the step is impossible, for example a state that is no longer finite. With
+    /// [`Fault::end`] the simulation ends inside the step without an error, and the state is that of its end.
     fn advance(&mut self, step: &Step) -> Result<(), Fault>;
 }
 

@@ -32,7 +32,7 @@ pub struct Instance {
     kind: Kind,
     states: Vec<Option<Pointer>>,
     dead: bool,
-    /// Of an FMU that has some, unless events are not used.
+    /// The clocks of an FMU that has some, unless events are not used.
     clocks: Option<Box<Clocks>>,
     /// Structural parameters that do not have their start values, by value reference.
     sizes: BTreeMap<u32, usize>,

@@ -223,7 +223,7 @@ pub struct ModelVariable {
     pub reinit: bool,
     /// Value references of the clocks that this belongs to (FMI 3.0 only).
     pub clocks: Vec<u32>,
-    /// Of a clock: when it ticks; `None` where the file does not say it as the standard does.
+    /// When a clock ticks; `None` where the file does not say it as the standard does.
     pub timing: Option<ClockTiming>,
     /// Line of the element.
     pub line: usize,

@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::{Compression, GzBuilder};
 use fmu_core::Description;
 use fmu_core::description::{Value as Start, Variable, VariableKind};
-use fmu_core::variable::Causality;
+use fmu_core::variable::{Causality, Variability};
 use fmu_import::cosimulation::Schedule;
 use fmu_plot::ink::CURVES;
 use fmu_plot::page::{AXIS, document, escape};
@@ -69,12 +69,16 @@ pub fn is_possible(of: &Description) -> Result<()> {
 pub fn page(source: &Source<'_>) -> Result<String> {
     let Source { description: of, plain, module, licenses, .. } = source;
     fits(module, plain)?;
-    let Judged { members, presets } = judged(plain, source.own)?;
+    let Judged { mut members, presets } = judged(plain, source.own)?;
     // The author's presets are for the author's start values.
     let is_plain = of.variables.iter().zip(&plain.variables).all(|(a, b)| a.start == b.start);
     let mut presets: Vec<Value> = presets.iter().filter(|_| is_plain).map(Run::json).collect();
     if presets.is_empty() {
-        presets.push(default_experiment(of, source.stimuli)?.json());
+        let run = default_experiment(of, source.stimuli)?;
+        if !is_plain {
+            members.insert("ranges".into(), ranges_of(&run));
+        }
+        presets.push(run.json());
     }
     let json = described(of, plain, members, &presets).to_string().replace('<', "\\u003c");
     let body = BODY
@@ -92,6 +96,19 @@ pub fn page(source: &Source<'_>) -> Result<String> {
          <script type=\"text/plain\" id=\"worker\">{WORKER}</script>\n<script>\n{AXIS}{RUN}</script>\n"
     );
     Ok(document(of.model_name(), POLICY, STYLE, &body))
+}
+
+/// The ranges of the inputs of a run, twice what it needs, for a machine that the author's ranges are not for.
+fn ranges_of(run: &Run) -> Value {
+    let mut ranges = Map::new();
+    for (_, name, value) in &run.events {
+        let most = ranges.get(name).map_or(0.0, |range: &Value| range[1].as_f64().unwrap_or(0.0));
+        let x = 2.0 * value.as_f64().unwrap_or(0.0).abs();
+        if x > most {
+            ranges.insert(name.clone(), json!([-x, x]));
+        }
+    }
+    Value::Object(ranges)
 }
 
 /// Requires a module that a page can run, of the model with this token.
@@ -198,16 +215,21 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
         "reference": v.value_reference,
         "kind": kind,
         "causality": v.causality,
-        "variability": v.variability,
         "description": v.description,
-        "elements": v.elements(),
     });
     let mut put = |key: &str, value: Value| {
         if !value.is_null() {
             json[key] = value;
         }
     };
-    put("unit", json!(unit));
+    // What most variables have is left out.
+    if v.variability == Variability::Tunable {
+        put("variability", json!(v.variability));
+    }
+    if v.elements() != 1 {
+        put("elements", json!(v.elements()));
+    }
+    put("unit", json!(unit.filter(|unit| display.is_none() && !unit.is_empty())));
     put("display", json!(display));
     put("type", json!(enumeration));
     put("min", json!(v.min));

@@ -3,6 +3,7 @@
 
 const $ = (id) => document.getElementById(id);
 const model = JSON.parse($("fmu").textContent);
+for (const v of model.variables) v.elements ??= 1;
 const byName = new Map(model.variables.map((v) => [v.name, v]));
 const NUMBERS = /^(Float|Int|UInt|Enumeration|Boolean)/;
 const recorded = model.variables.filter((v) => (v.causality === "output" || v.causality === "input") && v.elements === 1 && NUMBERS.test(v.kind));
@@ -511,8 +512,12 @@ class Plane {
     pen.moveTo(middle - radius, middle); pen.lineTo(middle + radius, middle);
     pen.moveTo(middle, middle - radius); pen.lineTo(middle, middle + radius);
     pen.stroke();
-    this.arrows.forEach(({ angle, d, q, full, thin }, i) => {
-      const turn = angle ? this.sum([angle], row) : 0, [x, y] = [this.sum(d, row) / full, this.sum(q, row) / full];
+    const sums = this.arrows.map(({ d, q }) => [this.sum(d, row), this.sum(q, row)]);
+    // A longer vector reaches the circle too, and with it those of its scale.
+    if (this.of !== rec) [this.of, this.reach] = [rec, new Map(this.arrows.map(({ full }) => [full, full]))];
+    this.arrows.forEach(({ full }, i) => { const length = Math.hypot(...sums[i]); if (length > this.reach.get(full)) this.reach.set(full, length); });
+    this.arrows.forEach(({ angle, full, thin }, i) => {
+      const turn = angle ? this.sum([angle], row) : 0, [x, y] = sums[i].map((sum) => sum / this.reach.get(full));
       const [a, b] = [x * Math.cos(turn) - y * Math.sin(turn), x * Math.sin(turn) + y * Math.cos(turn)];
       if (!Number.isFinite(a + b)) return;
       const [tipX, tipY] = [middle + radius * a, middle - radius * b], length = Math.hypot(a, b) * radius, along = Math.atan2(-b, a);

@@ -233,7 +233,7 @@ impl Loaded {
     /// As [`input`](Self::input), or the text has another form.
     pub fn points(&mut self, name: &str, text: &str) -> Result<()> {
         for port in self.connectors.ports(name)? {
-            let wrong = |cause: String| anyhow!("{text}: {cause}");
+            let wrong = anyhow::Error::msg::<String>;
             if self.system.is_text(&port)? {
                 self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
             } else {
