@@ -28,6 +28,7 @@ pub(crate) trait Node<W>: Sync {
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
     fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)>;
+    fn extents(&self, whole: &mut W, index: usize) -> Vec<usize>;
     fn check_sizes(&self, whole: &mut W) -> Result<(), Fault>;
     fn clocks_of(&self, index: usize) -> &'static str;
 }

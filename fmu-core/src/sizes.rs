@@ -137,6 +137,16 @@ impl<W: 'static> Table<W> {
         })
     }
 
+    /// Extents now of the array that has variable `index`; empty for a scalar, and for an array with one extent that is the same always.
+    pub fn extents(&self, whole: &mut W, index: usize) -> Vec<usize> {
+        match self.row_of(index) {
+            Some((Row { access: Access::Part { node, .. }, .. }, inner)) => node.extents(whole, inner),
+            Some((row, _)) if row.meta.sized.is_empty() => row.meta.shape.to_vec(),
+            Some((row, _)) => row.meta.sized.iter().map(|name| self.size(whole, name)).collect(),
+            None => Vec::new(),
+        }
+    }
+
     /// Checks that every array has the length that its sizes say.
     ///
     /// # Errors

@@ -61,6 +61,10 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.extent((self.lens)(whole), index)
     }
 
+    fn extents(&self, whole: &mut W, index: usize) -> Vec<usize> {
+        self.table.extents((self.lens)(whole), index)
+    }
+
     fn check_sizes(&self, whole: &mut W) -> Result<(), Fault> {
         self.table.check_sizes((self.lens)(whole))
     }

@@ -210,7 +210,7 @@ impl Meta {
 pub fn position(shape: &[usize], element: usize) -> String {
     let mut rest = element;
     let mut indices: Vec<String> = Vec::new();
-    for &extent in shape.iter().skip(1).rev() {
+    for extent in shape.iter().skip(1).rev().map(|n| (*n).max(1)) {
         indices.push((rest % extent + 1).to_string());
         rest /= extent;
     }

@@ -156,9 +156,10 @@ impl<E: Exported> Instance<E> {
         if references.len() != values.len()
             || !T::write_inputs(&mut self.current.block, references, values, state == State::Continuous)
         {
-            self.set_each(references, values)?;
             if const { E::CAN.resizable.is_some() } && state == State::Instantiated {
-                self.configure_at_once(references)?;
+                self.set_and_configure(references, values)?;
+            } else {
+                self.set_each(references, values)?;
             }
         }
         // In Step Mode, the model reads inputs directly.
@@ -173,7 +174,7 @@ impl<E: Exported> Instance<E> {
     /// Judges all values, then writes them. In Continuous-Time Mode, a solver tries values: one that is out of range is
     /// discarded, the states can be set too, and a discrete input to the value that it has.
     #[inline(never)]
-    fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub(crate) fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         self.check_count(references, values.len())?;
         let state = self.current.life.state();
         for write in [false, true] {
@@ -239,7 +240,7 @@ impl<E: Exported> Instance<E> {
                 Some(_) if !self.opens(meta, self.current.life.state()) && !self.sets_state(index) => {
                     message::fixed::<E::Model>(index, meta, self.current.life.state())
                 }
-                Some(_) => message::range::<E::Model>(index, meta, value),
+                Some(_) => message::range(&mut self.current.block, index, meta, value),
             },
             None if is_time(reference, self.standard) => message::real(true, T::CARRIES),
             None => self.beside_table(reference, T::CARRIES, true),

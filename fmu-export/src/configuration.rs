@@ -3,9 +3,11 @@
 //! Until the mode is left, every array has the size that it had. Then the model resizes a copy, which takes the place of the
 //! model if it is right: no old value is kept.
 
-use crate::instance::Instance;
+use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
+use crate::value::Value;
 use fmu_core::{Block, Causality, Exported, Fault, Model};
+use std::mem;
 
 impl<E: Exported> Instance<E> {
     /// Enters Configuration Mode, or Reconfiguration Mode once the simulation runs.
@@ -26,10 +28,14 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The model refuses the sizes, or an array does not have the length that they say: nothing has changed.
     pub fn exit_configuration(&mut self) -> Result<(), Fault> {
+        self.resize(self.current.block.clone())
+    }
+
+    /// Gives the arrays of this model the sizes that it has, and takes it.
+    fn resize(&mut self, mut block: Block<E::Model>) -> Result<(), Fault> {
         let Some(resize) = E::CAN.resizable else { return Ok(()) };
         let exchanges = self.exchanges();
         let current = &mut self.current;
-        let mut block: Block<E::Model> = current.block.clone();
         resize(&mut block.model)?;
         if matches!(current.life.state(), State::Configuration | State::Instantiated) {
             block.initialize();
@@ -42,24 +48,31 @@ impl<E: Exported> Instance<E> {
         // What hangs on values that are gone.
         current.slopes.clear();
         current.dirty = true;
-        current.pending |= current.life.state() == State::Reconfiguration && exchanges;
-        self.stale = exchanges;
+        let event = exchanges && current.life.state() == State::Reconfiguration;
+        current.pending |= event;
+        self.stale = event;
         self.scratch = None;
         Ok(())
     }
 
-    /// After a set call before the initialization: structural parameters take effect at once, as in a Configuration Mode of
-    /// their own.
+    /// Sets variables before the initialization: structural parameters take effect at once, as in a Configuration Mode of their
+    /// own.
     ///
     /// # Errors
-    /// As [`exit_configuration`](Self::exit_configuration).
+    /// As [`set`](Self::set) and [`exit_configuration`](Self::exit_configuration): nothing has changed.
     #[cold]
-    pub(crate) fn configure_at_once(&mut self, references: &[u32]) -> Result<(), Fault> {
+    pub(crate) fn set_and_configure<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let structural = |reference: &u32| {
             let found = E::Model::TABLE.locate(E::CAN.index(*reference));
             found.is_some_and(|(_, meta, _)| meta.causality == Causality::StructuralParameter)
         };
-        if references.iter().any(structural) { self.exit_configuration() } else { Ok(()) }
+        if !references.iter().any(structural) {
+            return self.set_each(references, values);
+        }
+        let before = self.current.block.clone();
+        self.set_each(references, values)?;
+        let changed = mem::replace(&mut self.current.block, before);
+        Ok(self.resize(changed)?)
     }
 
     /// Number of scalar states that the model has now.

@@ -16,6 +16,16 @@ pub(crate) fn name<M: Model>(index: usize) -> String {
     }
 }
 
+/// [`name`] with the sizes that arrays have now, by which a description counts the elements of a matrix.
+pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String {
+    match M::TABLE.locate(index) {
+        Some((name, meta, element)) if !meta.sized.is_empty() => {
+            name + &position(&M::TABLE.extents(block, index), element)
+        }
+        _ => name::<M>(index),
+    }
+}
+
 /// What a variable may be set to.
 pub(crate) fn allowed(meta: &Meta) -> String {
     let enumeration = match meta.kind {
@@ -120,8 +130,8 @@ pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State
 
 /// The value is of the right type, and out of range.
 #[cold]
-pub(crate) fn range<M: Model>(index: usize, meta: &Meta, value: impl Display) -> Fault {
-    Fault::value(&name::<M>(index), value, allowed(meta))
+pub(crate) fn range<M: Model>(block: &mut Block<M>, index: usize, meta: &Meta, value: impl Display) -> Fault {
+    Fault::value(&sized_name(block, index), value, allowed(meta))
 }
 
 /// The number of values is not what the references need.
@@ -143,7 +153,8 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: O
             continue;
         };
         if meta.takes_start() && new.to_string() != old.to_string() {
-            changes.push(format!("{} = {new}", name::<M>(index)));
+            let value = new.to_string();
+            changes.push(format!("{} = {value}", sized_name(&mut current.block, index)));
         }
     }
     let changes = if changes.is_empty() { "all start values unchanged".into() } else { changes.join(", ") };

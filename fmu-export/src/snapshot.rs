@@ -133,11 +133,12 @@ impl<M: Model> Snapshot<M> {
             };
             if refused {
                 let allowed = if set { message::allowed(meta) } else { "a number".into() };
-                return Err(Fault::value(&message::name::<M>(index), slot, allowed));
+                let value = slot.to_string();
+                return Err(Fault::value(&message::sized_name(&mut self.block, index), value, allowed));
             }
         }
-        // Where sizes are set, arrays have those of before.
-        if !matches!(self.life.state(), State::Configuration | State::Reconfiguration) {
+        // Where sizes are set, arrays have those of before, also if the simulation ends there.
+        if !matches!(self.life.state(), State::Configuration | State::Reconfiguration | State::Terminated) {
             M::TABLE.check_sizes(&mut self.block)?;
         }
         let sane = match (&self.ticks, ticks::<M>()) {

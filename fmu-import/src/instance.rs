@@ -323,7 +323,7 @@ impl Instance {
     /// # Errors
     /// A size is not known.
     pub fn elements(&self, variable: &ModelVariable) -> Result<usize, Error> {
-        let shape = self.description.shape_with(variable, |reference| self.sizes.get(&reference).copied());
+        let shape = self.description.shape_with(variable, |reference| self.size(reference));
         let count = shape.and_then(|shape| shape.iter().try_fold(1_usize, |n, d| n.checked_mul(*d)));
         count.ok_or_else(|| Error::usage(&self.name, format!("the size of {} is not known", variable.name)))
     }

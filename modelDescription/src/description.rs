@@ -86,9 +86,14 @@ impl ModelDescription {
 
     /// The array of FMI 3.0 and the index of its element that this name means: `x[2]`, `m[1,2]`.
     pub fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
+        self.element_with(name, |_| None)
+    }
+
+    /// [`element`](Self::element) with sizes as for [`shape_with`](Self::shape_with).
+    pub fn element_with(&self, name: &str, size: impl Fn(u32) -> Option<usize>) -> Option<(&ModelVariable, usize)> {
         let (array, _) = name.rsplit_once('[')?;
         let variable = self.variable(array).filter(|v| v.is_array())?;
-        Some((variable, element(&self.shape(variable)?, &name[array.len()..])?))
+        Some((variable, element(&self.shape_with(variable, size)?, &name[array.len()..])?))
     }
 
     /// The variable of this name, or the array of which it names an element.

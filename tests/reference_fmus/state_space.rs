@@ -1,10 +1,12 @@
 //! A linear system whose sizes the importer chooses.
 
 use super::{BOTH, archive, checks, exchange, open, run, script};
-use fmu_import::cosimulation::{Method, Recording};
-use fmu_import::{Kind, Values};
+use fmu_import::cosimulation::{Method, Recording, Schedule, Settings, System};
+use fmu_import::{Instance, Kind, Values};
 use model_description::FmiVersion::{V2, V3};
 use model_description::{Causality, Dimension};
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// The output at every 1000th of the 10000 points: x += s (x + u), y = x + u.
 fn expected() -> Vec<[f64; 3]> {
@@ -94,6 +96,99 @@ fn sizes_change_while_it_runs() {
         it.set("u", &reals(&u)).unwrap();
         assert!(it.do_step(time, 0.1).unwrap().is_continue());
         assert_eq!(it.get("y").unwrap(), reals(&u), "step {step}");
+    }
+}
+
+/// Values that differ from place to place.
+fn drawn(n: usize, seed: usize) -> Vec<f64> {
+    (0..n).map(|i| f64::from(u8::try_from((7 * i + 3 * seed) % 11).unwrap()) - 5.0).collect()
+}
+
+/// The product of a matrix, row by row, and a vector, added up from `start`.
+fn product(matrix: &[f64], vector: &[f64], start: &[f64]) -> Vec<f64> {
+    let row = |i: usize| &matrix[i * vector.len()..(i + 1) * vector.len()];
+    start.iter().enumerate().map(|(i, y)| row(i).iter().zip(vector).fold(*y, |y, (a, x)| y + a * x)).collect()
+}
+
+/// Sets matrices and inputs, makes three steps of the solver, and compares with the matrices' own products.
+fn compare(it: &mut Instance, time: f64, [m, n, r]: [usize; 3]) {
+    let matrices = [("A", n * n), ("B", n * m), ("C", r * n), ("D", r * m), ("u", m)];
+    let [a, b, c, d, u] = std::array::from_fn(|seed| {
+        let (name, count) = matrices[seed];
+        let values = drawn(count, seed);
+        it.set(name, &reals(&values)).unwrap();
+        values
+    });
+    let Values::Reals(mut x) = it.get("x").unwrap() else { unreachable!() };
+    assert!(it.do_step(time, 3e-3).unwrap().is_continue());
+    for _ in 0..3 {
+        let dx = product(&b, &u, &product(&a, &x, &vec![0.0; n]));
+        x.iter_mut().zip(dx).for_each(|(x, dx)| *x += 1e-3 * dx);
+    }
+    let y = product(&d, &u, &product(&c, &x, &vec![0.0; r]));
+    assert_eq!((it.get("x").unwrap(), it.get("y").unwrap()), (reals(&x), reals(&y)), "{m} {n} {r}");
+}
+
+/// Every number of inputs, states and outputs, before the start and while it runs.
+#[test]
+fn every_size_gives_the_products_of_its_matrices() {
+    let fmu = open("state-space");
+    let begin = |it: &mut Instance| {
+        it.setup(0.0, None).unwrap();
+        it.enter_initialization().unwrap();
+        it.exit_initialization().unwrap();
+    };
+    let mut running = fmu.instantiate("running", false).unwrap();
+    begin(&mut running);
+    let mut time = 0.0;
+    let all = (0..6_u32).flat_map(|m| (0..6).flat_map(move |n| (0..6).map(move |r| [m, n, r])));
+    for [m, n, r] in all {
+        let (given, counts) = ([("m", &size(m)), ("n", &size(n)), ("r", &size(r))], [m, n, r].map(|n| n as usize));
+        let mut it = fmu.instantiate("it", false).unwrap();
+        it.configure(&given).unwrap();
+        it.set("x0", &reals(&drawn(counts[1], 9))).unwrap();
+        begin(&mut it);
+        compare(&mut it, 0.0, counts);
+        running.configure(&given).unwrap();
+        compare(&mut running, time, counts);
+        time += 3e-3;
+    }
+}
+
+/// Sizes are set together, first; elements count with them.
+#[test]
+fn elements_of_a_resized_array_are_found() {
+    let fmu = open("state-space");
+    let system = || {
+        let mut system = System::default();
+        system.add("it", &fmu, false).unwrap();
+        system.configure([("it.n", "5"), ("m", "4"), ("r", "5")]).unwrap();
+        system
+    };
+    let mut it = system();
+    it.set("x0[5]", "3").unwrap();
+    it.set("x0[2]", "7").unwrap();
+    it.set("A[4,5]", "0.5").unwrap();
+    it.input("u[4]", Schedule::parse("2").unwrap()).unwrap();
+    for port in ["x[2]", "x[5]", "y[4]", "D[2,4]"] {
+        it.record(port).unwrap();
+    }
+    for none in ["x0[6]", "B[5,5]", "u[5]"] {
+        assert!(it.set(none, "1").is_err() && it.record(none).is_err(), "{none}");
+    }
+    assert!(it.configure([("x0", "1")]).unwrap_err().to_string().contains("is not a structural parameter"));
+    let settings = Settings { start: 0.0, stop: 1e-3, step: 1e-3, sequential: false };
+    let recording = it.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let last: Vec<f64> = recording.columns.iter().map(|column| column.values[1]).collect();
+    assert_eq!(last, [7.0 + 1e-3 * (7.0 + 2.0), 3.0 + 1e-3 * 3.0, 1e-3 * (0.5 * 3.0 + 2.0) + 2.0, 0.0]);
+    // The sizes of a plan are those of each of its runs.
+    let mut it = system();
+    it.record("y[5]").unwrap();
+    let plan = Arc::new(it.into_plan(&settings).unwrap());
+    assert!(plan.target("n").unwrap_err().to_string().contains("has one value in all runs"));
+    let mut worker = plan.worker().unwrap();
+    for _ in 0..2 {
+        assert_eq!(worker.record([]).unwrap().columns[0].values, [0.0, 0.0]);
     }
 }
 

@@ -25,6 +25,11 @@ impl Instance {
         self.read_sizes()
     }
 
+    /// The value of a structural parameter that was set, by value reference.
+    pub(crate) fn size(&self, reference: u32) -> Option<usize> {
+        self.sizes.get(&reference).copied()
+    }
+
     /// Reads all structural parameters.
     pub(super) fn read_sizes(&mut self) -> Result<(), Error> {
         let structural = self.description.variables.iter().filter(|v| v.causality == Causality::StructuralParameter);

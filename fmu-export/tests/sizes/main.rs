@@ -6,6 +6,8 @@
     reason = "an importer calls C functions, rightly or not"
 )]
 
+mod random;
+
 use fmi::*;
 use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::{
@@ -24,6 +26,9 @@ struct Map {
     rows: u64,
     values: Vec<f64>,
 }
+
+/// A number of rows at which the model panics.
+const UNLUCKY: u64 = 13;
 
 /// A chain of `n` decays.
 #[derive(Clone, Serialize, Deserialize)]
@@ -108,6 +113,7 @@ impl Resizable for Chain {
         if n == 5 && k == 4 {
             return Err(Fault::new("five states have at most three outputs"));
         }
+        assert!(self.map.rows != UNLUCKY, "a model with a mistake");
         (self.gains, self.marks) = (vec![1.0; n * k], vec![7; k]);
         self.map.values = vec![0.5; usize::try_from(self.map.rows).unwrap()];
         self.x = (1_u8..).take(n).map(f64::from).collect();
@@ -210,6 +216,18 @@ impl It {
         unsafe { fmi3DoStep(self.0, t, h, NO, &mut no, &mut end, &mut early, &mut time) }
     }
 
+    /// A saved state, written to bytes and read from them.
+    fn through_bytes(&self, state: *mut c_void) -> *mut c_void {
+        let (mut size, mut again) = (0, null_mut());
+        unsafe {
+            assert_eq!(fmi3SerializedFMUStateSize(self.0, state, &mut size), OK);
+            let mut bytes = vec![0; size];
+            assert_eq!(fmi3SerializeFMUState(self.0, state, bytes.as_mut_ptr(), size), OK);
+            assert_eq!(fmi3DeserializeFMUState(self.0, bytes.as_ptr(), size, &mut again), OK);
+        }
+        again
+    }
+
     fn count(&self) -> usize {
         let mut n = usize::MAX;
         assert_eq!(unsafe { fmi3GetNumberOfContinuousStates(self.0, &mut n) }, OK);
@@ -308,6 +326,28 @@ fn sizes_are_judged() {
     assert_eq!((unsafe { fmi3Reset(it.0) }, it.size(N), it.begin()), (OK, 2, OK));
 }
 
+/// A model that panics while it resizes: Error, in both modes. Nothing has changed, a reset makes the instance usable, and others do
+/// not notice.
+#[test]
+fn a_panic_while_sizes_change_is_an_error() {
+    let other = It::begun(false);
+    let y = other.values(Y, 2);
+    for at_once in [false, true] {
+        let it = It::new(false);
+        if at_once {
+            assert_eq!(it.set_sizes(&[N, ROWS], &[3, UNLUCKY]), ERROR);
+            assert_eq!((it.size(N), it.size(ROWS)), (2, 2));
+        } else {
+            assert_eq!((it.enter(), it.set_sizes(&[N, ROWS], &[3, UNLUCKY]), it.exit()), (OK, OK, ERROR));
+        }
+        assert_eq!((it.values(GAINS, 4), it.values(VALUES, 2)), (vec![1.0; 4], vec![0.5; 2]));
+        assert_eq!((it.enter(), unsafe { fmi3EnterInitializationMode(it.0, NO, 0.0, 0.0, NO, 0.0) }), (ERROR, ERROR));
+        assert_eq!((unsafe { fmi3Reset(it.0) }, it.size(ROWS), it.begin()), (OK, 2, OK));
+        assert_eq!((it.step(0.0, 0.1), it.values(X, 2).len()), (OK, 2));
+    }
+    assert_eq!((other.values(Y, 2), other.step(0.0, 0.1)), (y, OK));
+}
+
 #[test]
 fn each_mode_takes_its_own_parameters() {
     let refused = |begun: bool, work: &dyn Fn(&It) -> c_int| {
@@ -355,12 +395,7 @@ fn saved_states_have_their_sizes() {
     assert_eq!((it.exit(), it.begin(), it.step(0.0, 0.1)), (OK, OK, OK));
     let (large, x) = (save(&it), it.values(X, 4));
     assert_eq!((it.enter(), it.set_sizes(&[N], &[1]), it.exit(), it.step(0.1, 0.1)), (OK, OK, OK, OK));
-    let mut size = 0;
-    assert_eq!(unsafe { fmi3SerializedFMUStateSize(it.0, large, &mut size) }, OK);
-    let mut bytes = vec![0; size];
-    assert_eq!(unsafe { fmi3SerializeFMUState(it.0, large, bytes.as_mut_ptr(), size) }, OK);
-    let mut again = null_mut();
-    assert_eq!(unsafe { fmi3DeserializeFMUState(it.0, bytes.as_ptr(), size, &mut again) }, OK);
+    let again = it.through_bytes(large);
     for state in [large, again] {
         assert_eq!((unsafe { fmi3SetFMUState(it.0, state) }, it.size(N)), (OK, 4));
         assert_eq!((it.values(X, 4), it.step(0.1, 0.1), it.values(Y, 2).len()), (x.clone(), OK, 2));
