@@ -194,7 +194,9 @@ impl<E: Exported> Instance<E> {
     fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         if let Some((meta, slot)) = found {
-            let held = meta.causality == Causality::Input && T::read(meta, &slot, self.standard) == Some(value);
+            let held = meta.causality == Causality::Input
+                && !matches!(state, State::Configuration | State::Reconfiguration)
+                && T::read(meta, &slot, self.standard) == Some(value);
             let (possible, settable) =
                 (value.judge(meta, self.standard), self.opens(meta, state) || held || self.sets_state(index));
             if possible == Some(true) && settable {

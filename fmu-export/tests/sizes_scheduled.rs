@@ -9,6 +9,7 @@ use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use std::ffi::CString;
 use std::ptr::{null, null_mut};
+use std::sync::Once;
 
 /// Adds up its inputs, at each tick.
 #[derive(Clone, Serialize, Deserialize)]
@@ -81,7 +82,12 @@ struct It(InstancePointer);
 
 impl It {
     fn new() -> Self {
-        fmu_export::abi::quiet();
+        // The library silences panics; a test wants to see its own.
+        static LOUD: Once = Once::new();
+        LOUD.call_once(|| {
+            fmu_export::abi::quiet();
+            drop(std::panic::take_hook());
+        });
         let token = CString::new(This::TOKEN.as_str()).unwrap();
         let (name, token) = (c"it".as_ptr(), token.as_ptr());
         Self(unsafe {
@@ -156,9 +162,9 @@ fn each_mode_takes_its_own_parameters() {
         [&|it| it.set_size(K, 2), &|it| it.set_size(N, 5), &|it| it.tick(0.0), &|it| it.set(U, &[0.0; 3]), &|it| {
             it.enter()
         }];
-    for call in refused {
+    for (number, call) in refused.into_iter().enumerate() {
         let it = It::begun();
-        assert_eq!((it.enter(), call(&it)), (OK, ERROR));
+        assert_eq!((it.enter(), call(&it)), (OK, ERROR), "{number}");
     }
     // Outside of the mode, and where values of the old sizes are given.
     assert_eq!(It::begun().set_size(N, 1), ERROR);
