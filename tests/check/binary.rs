@@ -95,6 +95,8 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("G01c", &["G01c"]),
     // References count over all types.
     ("G02", &["G02", "V12"]),
+    ("G05b", &["G05b"]),
+    ("G05m", &["G05m"]),
     ("G06", &["G06"]),
     ("G08", &["G08"]),
     ("L01b", &["L01b"]),

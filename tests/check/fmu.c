@@ -39,6 +39,10 @@ typedef struct {
     int32_t n, flag, state, has_stop, ready, steps;
     char label[64];
     uint64_t extra;
+#ifdef FMI3
+    uint64_t frame_size;
+    uint8_t frame[64];
+#endif
 } Data;
 
 typedef struct {
@@ -113,6 +117,10 @@ static void fresh(Data *d) {
     d->n = 1;
     d->state = INSTANTIATED;
     strcpy(d->label, "a");
+#ifdef FMI3
+    d->frame_size = 3;
+    memcpy(d->frame, "foo", 3);
+#endif
 #ifdef FAULT_V07
     d->gain = 3;
 #endif

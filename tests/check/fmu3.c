@@ -92,12 +92,45 @@ EXPORT int fmi3SetBoolean(void *c, Refs vr, size_t n, const uint8_t v[], size_t 
     return fmi2SetBoolean(c, at, n, v ? wide : NULL);
 }
 
+/* The bytes of frame, 6 at most. */
+#define FRAME 6
+EXPORT int fmi3GetBinary(void *c, Refs vr, size_t n, size_t sizes[], const uint8_t *v[], size_t m) {
+    FITS(8);
+    ENTER(READABLE);
+    if (n && (!vr || !v || !sizes)) return fail(f, "NULL");
+    for (size_t i = 0; i < n; i++) {
+        if (own[i] != 0) return fail(f, "no such Binary");
+        sizes[i] = f->data.frame_size;
+        v[i] = f->data.frame;
+#ifdef FAULT_G05b
+        sizes[i] = f->data.frame_size < 4 ? f->data.frame_size : 4;
+#endif
+    }
+    return OK;
+}
+EXPORT int fmi3SetBinary(void *c, Refs vr, size_t n, const size_t sizes[], const uint8_t *const v[], size_t m) {
+    FITS(8);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP);
+    if (n && (!vr || !v || !sizes)) return fail(f, "NULL");
+    for (size_t i = 0; i < n; i++) {
+        if (own[i] != 0) return fail(f, "no such Binary");
+        if (f->data.state == STEP) return fail(f, "frame is fixed");
+#ifndef FAULT_G05m
+        if (sizes[i] > FRAME) return fail(f, "too many bytes");
+#endif
+        if (sizes[i] > sizeof f->data.frame || (sizes[i] && !v[i])) return fail(f, "too many bytes, or NULL");
+        f->data.frame_size = sizes[i];
+        if (sizes[i]) memcpy(f->data.frame, v[i], sizes[i]);
+    }
+    return OK;
+}
+
 /* Types that no variable has. */
 #define ABSENT(type) \
     EXPORT int fmi3Get##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(READABLE); return n ? fail(f, "no such variable") : OK; } \
     EXPORT int fmi3Set##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(INSTANTIATED | INITIALIZATION | STEP); return n ? fail(f, "no such variable") : OK; }
 ABSENT(Float32) ABSENT(Int8) ABSENT(UInt8) ABSENT(Int16) ABSENT(UInt16)
-ABSENT(UInt32) ABSENT(Int64) ABSENT(UInt64) ABSENT(Binary)
+ABSENT(UInt32) ABSENT(Int64) ABSENT(UInt64)
 
 EXPORT int fmi3GetFMUState(void *c, void **state) { return fmi2GetFMUstate(c, state); }
 EXPORT int fmi3SetFMUState(void *c, void *state) { return fmi2SetFMUstate(c, state); }
