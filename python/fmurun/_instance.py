@@ -144,7 +144,8 @@ def _typed(type_):
 
 for _class, _types in (
     (FMU2Slave, ("Integer", "Boolean", "String")),
-    (FMU3Slave, ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")),
+    (FMU3Slave, ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String",
+                 "Binary")),
 ):
     for _type in _types:
         _get, _set = _typed(_type)

@@ -4,7 +4,7 @@
 
 `read_model_description` returns objects with FMPy's attributes; `instantiate_fmu` returns an `FMU2Slave` or an `FMU3Slave`
 with FMPy's methods for co-simulation. An `FmuError` (also `FMICallException` here) says which call failed and why.
-Model exchange, scheduled execution, event mode, directional derivatives, binary variables and clocks are not there.
+Model exchange, scheduled execution, event mode, directional derivatives and clocks are not there.
 """
 
 from ._description import (
