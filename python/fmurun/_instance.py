@@ -268,7 +268,8 @@ def _typed(type_):
 
 for _class, _types in (
     (_FMU2, ("Integer", "Boolean", "String")),
-    (_FMU3, ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String")),
+    (_FMU3, ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String",
+             "Binary")),
 ):
     for _type in _types:
         _get, _set = _typed(_type)

@@ -4,7 +4,7 @@
 
 `read_model_description` returns objects with FMPy's attributes; `instantiate_fmu` returns an `FMU2Slave`, `FMU3Slave`,
 `FMU2Model` or `FMU3Model` with FMPy's methods. An `FmuError` (also `FMICallException` here) says which call failed and why.
-Scheduled Execution, intermediate update, setters of binary variables and functions of clocks are not there.
+Scheduled Execution, intermediate update and functions of clocks are not there.
 """
 
 from ._description import (

@@ -43,7 +43,11 @@ impl Euler {
 
     /// The event that ends the initialization.
     pub(crate) fn begin(&mut self, instance: &mut Instance) -> Result<(), Error> {
-        self.next_event = update(instance, self.regular)?.ok_or_else(|| ends(instance))?;
+        let updated = update(instance, self.regular)?;
+        if updated.terminate {
+            return Err(ends(instance));
+        }
+        self.next_event = updated.next_event_time;
         instance.enter_continuous_time_mode()?;
         let (states, indicators) = instance.state_and_indicator_counts()?;
         (self.x, self.dx) = (vec![0.0; states], vec![0.0; states]);
@@ -95,11 +99,12 @@ impl Euler {
             if at_input {
                 course.input.apply(instance, next, true)?;
             }
-            let Some(next_event) = update(instance, next)? else {
+            let updated = update(instance, next)?;
+            if updated.terminate {
                 course.ended = true;
                 return Ok(false);
-            };
-            self.next_event = next_event;
+            }
+            self.next_event = updated.next_event_time;
             instance.enter_continuous_time_mode()?;
         }
         Ok(true)
@@ -188,7 +193,6 @@ impl Integrating {
         let mut fmus = equations.of(slice::from_mut(instance), &mut signals);
         let (t, x) = driver.point();
         fmus.place(t, x).map_err(Trial::into_error)?;
-        drop(fmus);
         if sampled {
             signals.record.sample(instance, course.time)?;
         }

@@ -5,7 +5,7 @@ use crate::error::{gate, raise, usage};
 use fmu_import::trace::traced;
 use fmu_import::{Error, Kind, Values};
 use model_description::BaseType;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyList, PyTuple};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -141,7 +141,10 @@ fn values(base: BaseType, items: &Bound<'_, PyAny>) -> PyResult<Values> {
             Values::Booleans(items.try_iter()?.map(|x| x?.is_truthy()).collect::<PyResult<_>>()?)
         }
         BaseType::String => Values::Strings(items.extract()?),
-        BaseType::Binary => return Err(PyTypeError::new_err("values of the type Binary are not supported")),
+        BaseType::Binary => {
+            let bytes = |x: PyResult<Bound<'_, PyAny>>| x?.extract::<Vec<u8>>();
+            Values::Binaries(items.try_iter()?.map(bytes).collect::<PyResult<_>>()?)
+        }
         _ => Values::Integers(items.extract()?),
     })
 }

@@ -2,12 +2,13 @@
 
 use crate::course::{Course, cut};
 use crate::input::is_close;
-use fmu_import::{Error, Instance};
+use fmu_import::{Error, Instance, Update};
 
 /// Most updates of discrete states of one event.
 const UPDATES: usize = 1000;
 
 /// The FMU steps itself.
+#[expect(clippy::struct_excessive_bools, reason = "capabilities, and what was done")]
 pub(crate) struct Stepping {
     /// Steps may have any size: they end at input events and at the stop time.
     pub(crate) variable_step: bool,
@@ -22,7 +23,7 @@ impl Stepping {
     /// The first row, after the event that ends the initialization.
     pub(crate) fn begin(&mut self, course: &mut Course, instance: &mut Instance) -> Result<(), Error> {
         if self.event_mode {
-            course.ended = update(instance, course.time)?.is_none();
+            course.ended = update(instance, course.time)?.terminate;
             instance.enter_step_mode()?;
         }
         course.record.sample(instance, course.time)
@@ -57,7 +58,7 @@ impl Stepping {
         if self.applied {
             instance.enter_event_mode()?;
             course.input.apply(instance, course.time, true)?;
-            course.ended = update(instance, course.time)?.is_none();
+            course.ended = update(instance, course.time)?.terminate;
             if course.ended {
                 return Ok(false);
             }
@@ -71,15 +72,12 @@ impl Stepping {
     }
 }
 
-/// Updates the discrete states in event mode; the next event time, or `None` if the FMU asks to end the simulation.
-pub(crate) fn update(instance: &mut Instance, time: f64) -> Result<Option<Option<f64>>, Error> {
+/// Updates the discrete states in event mode until they need no other update, or the FMU asks to end the simulation.
+pub(crate) fn update(instance: &mut Instance, time: f64) -> Result<Update, Error> {
     for _ in 0..UPDATES {
         let update = instance.update_discrete_states()?;
-        if update.terminate {
-            return Ok(None);
-        }
-        if !update.again {
-            return Ok(Some(update.next_event_time));
+        if update.terminate || !update.again {
+            return Ok(update);
         }
     }
     let cause = format!("needs more than {UPDATES} updates of its discrete states at t = {time} s");

@@ -15,6 +15,7 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr;
 
 /// The arguments of an instantiation in both standards.
+#[expect(clippy::struct_excessive_bools, reason = "the arguments of the standards")]
 pub(super) struct Request<'a> {
     /// Name, token, resources.
     pub(super) texts: [Option<&'a CStr>; 3],

@@ -247,8 +247,8 @@ impl Exchange {
     }
 
     fn read_feeding(&mut self, instances: &mut [Instance]) -> Result<(), Error> {
-        let exchanging = self.traffic.iter_mut().zip(instances).filter(|(_, i)| i.kind() == Kind::ModelExchange);
-        exchanging.map(|(traffic, instance)| traffic.read(traffic.feeding, instance)).collect()
+        let mut exchanging = self.traffic.iter_mut().zip(instances).filter(|(_, i)| i.kind() == Kind::ModelExchange);
+        exchanging.try_for_each(|(traffic, instance)| traffic.read(traffic.feeding, instance))
     }
 
     /// The inputs that another pass would change.
