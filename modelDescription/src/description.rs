@@ -200,6 +200,11 @@ impl Interface {
         self.flag("mightReturnEarlyFromDoStep") || self.flag("canReturnEarlyAfterIntermediateUpdate")
     }
 
+    /// The FMU has directional derivatives.
+    pub fn has_directional_derivatives(&self) -> bool {
+        self.flag(self.of("providesDirectionalDerivative", "providesDirectionalDerivatives"))
+    }
+
     /// The FMU wants to know of every completed integrator step (Model Exchange): FMI 2.0 says when it does not, FMI 3.0
     /// when it does.
     pub fn needs_completed_integrator_step(&self, version: FmiVersion) -> bool {

@@ -213,6 +213,8 @@ pub struct ModelVariable {
     pub max: Option<f64>,
     /// Typical magnitude.
     pub nominal: Option<f64>,
+    /// Greatest number of bytes of a Binary.
+    pub max_size: Option<u64>,
     /// Extents of an array, empty for a scalar.
     pub dimensions: Vec<Dimension>,
     /// Other names.

@@ -36,7 +36,10 @@ fn what_is_no_fmu_is_status_2() {
 fn changed_bytes_are_judged() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.fmu");
-    write(&path, &[Entry::new("modelDescription.xml", include_bytes!("fmu.xml")), Entry::new("sources/x.c", b"x")]);
+    write(
+        &path,
+        &[Entry::new("modelDescription.xml", include_bytes!("faults/fmu.xml")), Entry::new("sources/x.c", b"x")],
+    );
     let good = std::fs::read(&path).unwrap();
     let mut random = 1_u32;
     for _ in 0..400 {
@@ -58,7 +61,7 @@ fn changed_bytes_are_judged() {
 fn bad_intent_is_harmless() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.fmu");
-    let xml = Entry::new("modelDescription.xml", include_bytes!("fmu.xml"));
+    let xml = Entry::new("modelDescription.xml", include_bytes!("faults/fmu.xml"));
     write(&path, &[xml.clone(), Entry::new("resources/../../../../tmp/evil-of-fmu-check", b"x")]);
     assert_eq!(status(&path, &[]).0, Some(1));
     // The page begins with what is violated.

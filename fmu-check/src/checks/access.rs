@@ -1,7 +1,10 @@
 //! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7): refused calls and start values.
 
 use super::starts::stand;
-use super::values::{booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, tunable};
+use super::values::{
+    binaries, booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, too_many_bytes,
+    tunable,
+};
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
@@ -52,6 +55,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Probe(strings),
         requirement: "The FMU copies strings that are set: the importer may overwrite its own.",
         tried: "Sets strings, overwrites them, and reads back.", fix: "Copy the string." },
+    Check { id: "G05b", clause: "3.0.2, 2.2.7.2", levels: Levels(None, Some(Level::Must)), run: Run::Probe(binaries),
+        requirement: "The FMU copies bytes that are set, also none and as many as maxSize: the importer may overwrite its own.",
+        tried: "Sets bytes, overwrites them, and reads back.", fix: "Copy the bytes with their size." },
+    Check { id: "G05m", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(too_many_bytes),
+        requirement: "More bytes than maxSize are refused.",
+        tried: "Sets one byte more.", fix: "Compare the size with maxSize before copying." },
     Check { id: "G06", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(tunable),
         requirement: "A tunable parameter can be set between steps and keeps its value.",
         tried: "Sets each tunable parameter between steps, makes two, and reads it.", fix: "Accept variability tunable in step mode." },

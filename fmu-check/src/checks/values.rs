@@ -70,6 +70,47 @@ pub(super) fn strings(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
+/// A binary variable that can be set.
+fn binary(session: &Session) -> Option<&ModelVariable> {
+    let fits = |v: &&ModelVariable| v.base == BaseType::Binary && settable(v) && !v.is_array();
+    session.description.variables.iter().find(fits)
+}
+
+pub(super) fn binaries(session: &Session) -> Result<(), NotDetermined> {
+    let Some(v) = binary(session) else { return session.not_applicable("no bytes can be set") };
+    let most = usize::try_from(v.max_size.unwrap_or(64)).unwrap_or(64).min(1 << 20);
+    session.cases([0, 1, most], |size| {
+        let instance = session.initializing()?;
+        let bytes: Vec<u8> = (0..=u8::MAX).rev().cycle().take(size).collect();
+        let status = instance.call(&format!("SetBinary({})", v.name), |raw| {
+            raw.set_binaries(instance.handle, &[v.value_reference], &[&bytes])
+        })?;
+        if !status.is_ok() {
+            return Err(NotDetermined(format!("SetBinary({}) of {size} bytes returned {status}", v.name)));
+        }
+        let (_, back) = instance.call_for(&format!("GetBinary({})", v.name), |raw| {
+            raw.get_binaries(instance.handle, &[v.value_reference])
+        })?;
+        // Where there are no bytes, there need be no place.
+        let back = back.first().map(|found| found.as_deref().unwrap_or_default());
+        session.require(back == Some(&bytes[..]), || format!("{}: {size} bytes did not read back", v.name));
+        Ok(())
+    })
+}
+
+pub(super) fn too_many_bytes(session: &Session) -> Result<(), NotDetermined> {
+    let limited = binary(session).and_then(|v| Some((v, usize::try_from(v.max_size?).ok()?)));
+    let Some((v, most)) = limited.filter(|(_, most)| *most < 1 << 24) else {
+        return session.not_applicable("no bytes with a maxSize can be set");
+    };
+    let instance = session.initializing()?;
+    let status = instance.call(&format!("SetBinary({}) of {} bytes", v.name, most + 1), |raw| {
+        raw.set_binaries(instance.handle, &[v.value_reference], &[&vec![b'x'; most + 1]])
+    })?;
+    session.require(!status.is_ok(), || format!("{}: {} bytes were accepted, and maxSize is {most}", v.name, most + 1));
+    Ok(())
+}
+
 pub(super) fn not_a_number(session: &Session) -> Result<(), NotDetermined> {
     let inputs = session.float_inputs();
     if inputs.is_empty() {

@@ -27,10 +27,12 @@
 //! For many runs of one system there is [`Plan`].
 
 mod continuous;
+mod coupled;
 mod events;
 mod exchange;
 mod grid;
 mod iteration;
+mod loops;
 mod method;
 mod parts;
 mod plan;
@@ -41,6 +43,8 @@ mod sequence;
 mod terminals;
 
 pub use crate::integration::Solver;
+pub use coupled::{Equations, Feed, Fmus};
+pub use exchange::Inputs;
 pub use grid::Settings;
 pub use method::{Integration, Method};
 pub use plan::{Plan, Target, Worker};
@@ -91,7 +95,7 @@ impl System {
         if let Method::CoSimulation { event_mode, .. } = &mut self.method {
             *event_mode |= clocked;
         }
-        let kind = self.method.kind(fmu);
+        let kind = self.method.kind(name, fmu);
         self.instances.push(fmu.instantiate_as(kind, name, logging)?);
         self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind, sizes: Vec::new() });
         Ok(())

@@ -98,6 +98,7 @@ fn variable(
         min: number(typed, "min")?.or(declared.and_then(|t| t.min)),
         max: number(typed, "max")?.or(declared.and_then(|t| t.max)),
         nominal: number(typed, "nominal")?.or(declared.and_then(|t| t.nominal)),
+        max_size: integer(typed, "maxSize")?,
         declared_type,
         dimensions: element.all("Dimension").map(dimension).collect::<Result<_, _>>()?,
         aliases: element.all("Alias").map(alias).collect::<Result<_, _>>()?,

@@ -254,6 +254,27 @@ impl Raw {
         status
     }
 
+    /// Bytes of variables, `None` where the FMU gives NULL (FMI 3.0).
+    pub fn get_binaries(&self, instance: Handle, references: &[u32]) -> Option<(Status, Vec<Option<Vec<u8>>>)> {
+        // Held until the bytes are copied, which the next call may end.
+        let owned = self.owned();
+        self.calls.binaries(owned.pointer(instance), references)
+    }
+
+    /// Sets bytes (FMI 3.0). Those that were passed are overwritten afterwards.
+    ///
+    /// # Panics
+    /// There is not one value for each reference.
+    pub fn set_binaries(&self, instance: Handle, references: &[u32], values: &[&[u8]]) -> Option<Status> {
+        assert_eq!(references.len(), values.len(), "a value for each reference");
+        let mut copies: Vec<Vec<u8>> = values.iter().map(|value| value.to_vec()).collect();
+        let status = self.calls.put_binaries(self.owned().pointer(instance), references, &copies).status();
+        for copy in &mut copies {
+            copy.fill(b'#');
+        }
+        status
+    }
+
     /// `DoStep`; `pointers` are FMI 3.0's.
     pub fn do_step(
         &self,

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 /// Status, output and errors of the command.
 fn fmu_check(arguments: &[&str]) -> (Option<i32>, String, String) {
-    let output = Command::new(env!("CARGO_BIN_EXE_fmu")).arg("check").args(arguments).output().unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_fmu-check")).args(arguments).output().unwrap();
     let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
     (output.status.code(), text(output.stdout), text(output.stderr))
 }
@@ -141,7 +141,7 @@ fn a_common_reason_has_one_line() {
 #[test]
 fn a_second_hang_is_not_waited_for() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile(dir.path(), 2, "T02b", &[]) else { return };
+    let Some(binary) = compile(2, "T02b") else { return };
     // Two of five cases hang.
     let path = pack(dir.path(), 2, "hang", &binary);
     let began = Instant::now();
@@ -156,7 +156,7 @@ fn a_second_hang_is_not_waited_for() {
 #[test]
 fn the_whole_run_has_a_limit() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile(dir.path(), 2, "G07a", &[]) else { return };
+    let Some(binary) = compile(2, "G07a") else { return };
     let path = pack(dir.path(), 2, "limit", &binary);
     let (_, text, _) = fmu_check(&[path.to_str().unwrap(), "--timeout", "0.2"]);
     assert!(text.contains("the time limit of the run was used up (see --timeout)"), "{text}");
@@ -167,7 +167,7 @@ fn the_whole_run_has_a_limit() {
 #[test]
 fn calls_are_told_and_repeated() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile(dir.path(), 2, "G01a", &[]) else { return };
+    let Some(binary) = compile(2, "G01a") else { return };
     let path = pack(dir.path(), 2, "calls", &binary);
     let calls = check(&path, &["G01a"]).finding("G01a").unwrap().calls.clone();
     assert!(calls[0].starts_with("fmi2Instantiate") && calls[0].ends_with("-> an instance"), "{calls:?}");
@@ -176,7 +176,7 @@ fn calls_are_told_and_repeated() {
     assert!(code == Some(1) && calls.iter().all(|call| text.contains(call.as_str())), "{text}");
     assert!(text.contains("# case 0") && !text.contains("# case 1"), "{text}");
     // A crash shows the call without a result.
-    let binary = compile(dir.path(), 2, "L08n", &[]).unwrap();
+    let binary = compile(2, "L08n").unwrap();
     let path = pack(dir.path(), 2, "crash", &binary);
     let (code, text, _) = fmu_check(&[path.to_str().unwrap(), "--replay", "L08n"]);
     assert!(code == Some(1) && text.contains("fmi2Terminate(NULL) ended the process by SIGSEGV"), "{text}");

@@ -1,12 +1,9 @@
-//! Faults of the binary: a small C FMU that breaks no rule, compiled with one fault at a time.
+//! Faults of the binary: a small C FMU that breaks no rule, with one fault at a time.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::zip::{Entry, write};
-use crate::{check, check_within, told, violated};
+use crate::{check, check_within, each, library, pack_with, told, violated};
 use fmu_check::Verdict;
-use std::path::Path;
-use std::process::Command;
-use std::sync::Mutex;
+use std::path::{Path, PathBuf};
 
 /// Fault, and the checks that must fail.
 const FAULTS: &[(&str, &[&str])] = &[
@@ -95,6 +92,8 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("G01c", &["G01c"]),
     // References count over all types.
     ("G02", &["G02", "V12"]),
+    ("G05b", &["G05b"]),
+    ("G05m", &["G05m"]),
     ("G06", &["G06"]),
     ("G08", &["G08"]),
     ("L01b", &["L01b"]),
@@ -114,76 +113,43 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("G_L4", &["G-L4"]),
 ];
 
-/// Compiles the small FMU; `None` without a compiler.
-pub fn compile(dir: &Path, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
-    let source = if version == 2 { "tests/check/fmu.c" } else { "tests/check/fmu3.c" };
-    compile_source(dir, source, version, fault, more)
+/// Faults of the symbols, which a library of their own has.
+const OF_SYMBOLS: [&str; 4] = ["B01", "B02a", "B02b", "UNDEFINED"];
+
+/// The small FMU with these faults; `None` without a compiler.
+pub fn compile(version: u8, faults: &str) -> Option<Vec<u8>> {
+    let option = format!("-DFAULT_{faults}");
+    let options = if OF_SYMBOLS.contains(&faults) { &[option.as_str()][..] } else { &[] };
+    library(if version == 2 { "fmu.c" } else { "fmu3.c" }, options, faults)
 }
 
-/// Compiles a C file with one fault.
-pub fn compile_source(dir: &Path, source: &str, version: u8, fault: &str, more: &[&str]) -> Option<Vec<u8>> {
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join(source);
-    let out = dir.join(format!("{version}-{fault}.so"));
-    let mut cc = Command::new("cc");
-    cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden", &format!("-DFAULT_{fault}")]).args(more);
-    let output = cc.arg(source).arg("-o").arg(&out).arg("-lm").output().ok()?;
-    assert!(output.status.success(), "{fault}: {}", String::from_utf8_lossy(&output.stderr));
-    std::fs::read(out).ok()
-}
-
-pub fn pack(dir: &Path, version: u8, fault: &str, binary: &[u8]) -> std::path::PathBuf {
+pub fn pack(dir: &Path, version: u8, fault: &str, binary: &[u8]) -> PathBuf {
     let xml = if version == 2 { include_str!("fmu.xml") } else { include_str!("fmu3.xml") };
     pack_with(dir, &format!("{version}-{fault}"), xml, binary)
 }
 
-pub fn pack_with(dir: &Path, name: &str, xml: &str, binary: &[u8]) -> std::path::PathBuf {
-    let path = dir.join(format!("{name}.fmu"));
-    let platform = if xml.contains("fmiVersion=\"2.0\"") { "linux64" } else { "x86_64-linux" };
-    let entries = [
-        Entry::new("modelDescription.xml", xml.as_bytes()),
-        Entry::new(&format!("binaries/{platform}/Small.so"), binary),
-        Entry::new("documentation/index.html", b"x"),
-        Entry::new("terminalsAndIcons/terminalsAndIcons.xml", b"<fmiTerminalsAndIcons fmiVersion=\"3.0\"/>"),
-    ];
-    write(&path, &entries);
-    path
-}
-
 #[test]
 fn each_fault_is_found_by_its_check() {
-    each(2, FAULTS);
+    all(2, FAULTS);
 }
 
 #[test]
 fn each_fault_of_fmi_3_is_found_by_its_check() {
-    each(3, FAULTS3);
+    all(3, FAULTS3);
 }
 
-fn each(version: u8, faults: &[(&str, &[&str])]) {
+fn all(version: u8, faults: &[(&str, &[&str])]) {
     let dir = tempfile::tempdir().unwrap();
-    if compile(dir.path(), version, "NONE", &[]).is_none() {
+    if compile(version, "NONE").is_none() {
         eprintln!("there is no C compiler: not tested");
         return;
     }
-    let wrong = Mutex::new(Vec::new());
-    let next = Mutex::new(faults.iter());
-    std::thread::scope(|scope| {
-        for _ in 0..3 {
-            scope.spawn(|| {
-                loop {
-                    let Some((fault, ids)) = next.lock().unwrap().next() else { return };
-                    let binary = compile(dir.path(), version, fault, &[]).unwrap();
-                    let seconds = if *fault == "HANG" { 4 } else { 120 };
-                    let report = check_within(&pack(dir.path(), version, fault, &binary), &[], seconds);
-                    if violated(&report) != *ids {
-                        wrong.lock().unwrap().push(format!("{fault}: {}", told(&report)));
-                    }
-                }
-            });
-        }
+    each(faults, |(fault, ids)| {
+        let seconds = if *fault == "HANG" { 4 } else { 120 };
+        let binary = compile(version, fault).unwrap();
+        let report = check_within(&pack(dir.path(), version, fault, &binary), &[], seconds);
+        if violated(&report) == *ids { Ok(()) } else { Err(format!("{fault}: {}", told(&report))) }
     });
-    let wrong = wrong.into_inner().unwrap();
-    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// An FMU that has derivatives of its outputs.
@@ -193,14 +159,14 @@ fn derivatives_of_outputs() {
     let flag = "canGetAndSetFMUstate=\"true\"";
     let xml = include_str!("fmu.xml").replace(flag, &format!("{flag} maxOutputDerivativeOrder=\"1\""));
     for (fault, ids) in [("NONE", &[][..]), ("T09e", &["T09"]), ("T09o", &["T09s"]), ("T09v", &["T09s"])] {
-        let Some(binary) = compile(dir.path(), 2, fault, &["-DDERIVATIVES"]) else { return };
+        let Some(binary) = compile(2, &format!("DERIVATIVES {fault}")) else { return };
         let report = check(&pack_with(dir.path(), fault, &xml, &binary), &["time", "lifecycle"]);
         assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
     }
     // A mean over the step has no value at its beginning; and an FMU that interpolates inputs takes their derivatives.
     let claims = xml.replace(flag, &format!("{flag} canInterpolateInputs=\"true\""));
     for (fault, xml, ids) in [("MEAN", &xml, &[][..]), ("NONE", &claims, &["T11"])] {
-        let Some(binary) = compile(dir.path(), 2, fault, &["-DDERIVATIVES"]) else { return };
+        let Some(binary) = compile(2, &format!("DERIVATIVES {fault}")) else { return };
         let report = check(&pack_with(dir.path(), fault, xml, &binary), &["time"]);
         assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
     }
@@ -209,7 +175,7 @@ fn derivatives_of_outputs() {
 #[test]
 fn faults_of_the_file() {
     let dir = tempfile::tempdir().unwrap();
-    if compile(dir.path(), 2, "NONE", &[]).is_none() {
+    if compile(2, "NONE").is_none() {
         return;
     }
     for (more, ids) in [
@@ -219,7 +185,7 @@ fn faults_of_the_file() {
         (&["-Wl,--no-as-needed", "-lgcc_s"], &["B03"]),
         (&["-Wl,-z,x86-64-v3"], &["B11"]),
     ] {
-        let binary = compile(dir.path(), 2, "NONE", more).unwrap();
+        let binary = library("fmu.c", more, "NONE").unwrap();
         let report = check(&pack(dir.path(), 2, "flags", &binary), &["binary", "instances"]);
         assert_eq!(violated(&report), ids, "{more:?}: {}", told(&report));
     }

@@ -1,7 +1,8 @@
 /* A small FMU for Model Exchange and co-simulation, FMI 2.0 and with -DFMI3 FMI 3.0, that breaks no rule; and with
-   -DFAULT_<name> exactly one.
+   a fault of fault.h exactly one.
    x' = gain (u - x), y = 2 x + u; event indicator z = x - 0.5, whose crossing adds 100 to n; time events at start + k 0.1 add 1
    to n, and every third one 0.25 to x. References: 0 time, 1 gain, 2 u, 3 x, 4 der(x), 5 y, 6 d (discrete, without use), 7 n, 8 z. */
+#include "fault.h"
 #include <math.h>
 #include <stdbool.h>
 #include <stddef.h>
@@ -30,9 +31,7 @@ static void fresh(M *m) {
     memset(m, 0, sizeof *m);
     m->exchange = kept.exchange, m->events = kept.events, m->early = kept.early;
     m->gain = 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
-#ifdef FAULT_E12
-    if (kept.mode) m->x = kept.x;
-#endif
+    if (FAULT(E12) && kept.mode) m->x = kept.x;
 }
 
 static M *make(int exchange, int events, int early) {
@@ -46,21 +45,17 @@ static bool due(const M *m, double t) { return t >= instant(m) - 1e-6; }
 
 static double slope(M *m) {
     double dx = m->gain * (m->u - m->x);
-#ifdef FAULT_E06a
-    dx += 1e-4 * (m->x - m->last_x);
-    m->last_x = m->x;
-#endif
-#ifdef FAULT_E06b
-    dx *= 1 + 1e-14 * (m->evaluations++ % 5);
-#endif
+    if (FAULT(E06a)) {
+        dx += 1e-4 * (m->x - m->last_x);
+        m->last_x = m->x;
+    }
+    if (FAULT(E06b)) dx *= 1 + 1e-14 * (m->evaluations++ % 5);
     return dx;
 }
 
 static double indicator(const M *m) {
     double z = m->x - 0.5;
-#ifdef FAULT_E25
-    return m->n > 3 && m->n < 8 ? 0 : z == 0 ? 1e-12 : z;
-#endif
+    if (FAULT(E25)) return m->n > 3 && m->n < 8 ? 0 : z == 0 ? 1e-12 : z;
     return z == 0 ? 1e-12 : z;
 }
 
@@ -83,68 +78,36 @@ static int leave_initialization(M *m) {
 
 static int update(M *m, Update *u) {
     memset(u, 0, sizeof *u);
-#ifdef FAULT_N05
-    ENTER(EVENT | STEP);
-#else
-    ENTER(EVENT);
-#endif
+    ENTER(FAULT(N05) ? EVENT | STEP : EVENT);
     while (due(m, m->t)) u->states |= tick(m);
     int above = m->x > 0.5;
     if (above != m->above) m->above = above, m->n += 100;
     u->defined = true, u->next = instant(m);
-#ifdef FAULT_E20
-    if (m->k > 3) u->next = NAN;
-#endif
-#ifdef FAULT_E20s
-    if (m->k > 3) u->next = INFINITY;
-#endif
-#ifdef FAULT_E21
-    if (m->exchange) u->next -= m->t;
-#endif
-#ifdef FAULT_E22
-    if (fabs(m->t - m->start - (m->k - 1) * 0.1) > 1e-6) u->defined = false;
-#endif
-#ifdef FAULT_E23
-    u->again = m->k > 3;
-#endif
-#ifdef FAULT_E24a
-    u->states = false;
-#endif
-#ifdef FAULT_E24b
-    u->states = true;
-#endif
-#ifdef FAULT_N06
-    if (!m->exchange) u->next -= 0.1;
-#endif
+    if (FAULT(E20) && m->k > 3) u->next = NAN;
+    if (FAULT(E20s) && m->k > 3) u->next = INFINITY;
+    if (FAULT(E21) && m->exchange) u->next -= m->t;
+    if (FAULT(E22) && fabs(m->t - m->start - (m->k - 1) * 0.1) > 1e-6) u->defined = false;
+    if (FAULT(E23)) u->again = m->k > 3;
+    if (FAULT(E24a)) u->states = false;
+    if (FAULT(E24b)) u->states = true;
+    if (FAULT(N06) && !m->exchange) u->next -= 0.1;
     return OK;
 }
 
 static int enter_event(M *m) {
-#ifdef FAULT_N04
-    ENTER(CONTINUOUS | STEP);
-#else
-    ENTER(CONTINUOUS | (m->events ? STEP : 0));
-#endif
-#ifdef FAULT_N07
-    if (!m->exchange) m->x += 1e-3;
-#endif
+    ENTER(CONTINUOUS | (m->events || FAULT(N04) ? STEP : 0));
+    if (FAULT(N07) && !m->exchange) m->x += 1e-3;
     return m->mode = EVENT, OK;
 }
 
 static int enter_continuous(M *m) {
     ENTER(m->exchange ? EVENT : 0);
-#ifdef FAULT_E00
-    return fail(m);
-#endif
+    if (FAULT(E00)) return fail(m);
     return m->mode = CONTINUOUS, OK;
 }
 
 static int terminate(M *m) {
-#ifdef FAULT_E01
-    ENTER(CONTINUOUS | STEP);
-#else
-    ENTER(EVENT | CONTINUOUS | STEP);
-#endif
+    ENTER((FAULT(E01) ? 0 : EVENT) | CONTINUOUS | STEP);
     return m->mode = TERMINATED, OK;
 }
 
@@ -152,65 +115,39 @@ static int reset(M *m) { return m ? fresh(m), OK : ERROR; }
 
 static int set_time(M *m, double t) {
     ENTER(CONTINUOUS);
-#ifdef FAULT_E26
-    m->n += t > m->t;
-#endif
+    if (FAULT(E26)) m->n += t > m->t;
     return m->t = t, OK;
 }
 
 static int set_states(M *m, const double *x, size_t n) {
     ENTER(CONTINUOUS);
-#ifndef FAULT_E10
-    if (n != 1) return fail(m);
-#endif
-#ifdef FAULT_E09
-    if (!isfinite(x[0])) return fail(m);
-#endif
+    if (!FAULT(E10) && n != 1) return fail(m);
+    if (FAULT(E09) && !isfinite(x[0])) return fail(m);
     if (!isfinite(x[0])) return DISCARD;
     m->x = x[0];
-#ifdef FAULT_E05
-    m->x = (float)x[0];
-#endif
+    if (FAULT(E05)) m->x = (float)x[0];
     return OK;
 }
 
 static int vector(M *m, double *to, size_t n, int which) {
-#ifdef FAULT_E01i
-    ENTER(EVALUATED & ~INITIALIZATION);
-#else
-#ifdef FMI3
-    ENTER(EVALUATED);
-#else
-    ENTER(EVALUATED | (which == 3 ? INSTANTIATED : 0));
+    int allowed = FAULT(E01i) ? EVALUATED & ~INITIALIZATION : EVALUATED;
+#ifndef FMI3
+    if (which == 3) allowed |= INSTANTIATED;
 #endif
-#endif
+    ENTER(allowed);
     if (!m->exchange) return fail(m);
-#ifndef FAULT_E10
-    if (n != 1) return fail(m);
-#endif
+    if (!FAULT(E10) && n != 1) return fail(m);
     double nominal = 2;
-#ifdef FAULT_E04a
-    nominal = 0;
-#endif
-#ifdef FAULT_E04b
-    nominal = 3;
-#endif
+    if (FAULT(E04a)) nominal = 0;
+    if (FAULT(E04b)) nominal = 3;
     to[0] = which == 0 ? m->x : which == 1 ? slope(m) : which == 2 ? indicator(m) : nominal;
-#ifdef FAULT_E03
-    if (which == 1) to[1] = 0;
-#endif
+    if (FAULT(E03) && which == 1) to[1] = 0;
     return OK;
 }
 
 static int completed(M *m) {
-#ifdef FAULT_E02
-    ENTER(ANY);
-#else
-    ENTER(CONTINUOUS);
-#endif
-#ifdef FAULT_E07
-    m->x += 1e-6;
-#endif
+    ENTER(FAULT(E02) ? ANY : CONTINUOUS);
+    if (FAULT(E07)) m->x += 1e-6;
     return OK;
 }
 
@@ -222,12 +159,8 @@ static int get(M *m, const unsigned *vr, size_t n, double *to) {
 #endif
     for (size_t i = 0; i < n; i++) {
         double y = 2 * m->x + m->u, time = m->t;
-#ifdef FAULT_E08
-        time = m->start;
-#endif
-#ifdef FAULT_E11
-        y += m->d;
-#endif
+        if (FAULT(E08)) time = m->start;
+        if (FAULT(E11)) y += m->d;
         if (vr[i] == 7 || vr[i] > 8) return fail(m);
         const double all[] = {time, m->gain, m->u, m->x, vr[i] == 4 ? slope(m) : 0, y, m->d, 0, indicator(m)};
         to[i] = all[vr[i]];
@@ -260,42 +193,26 @@ static int get_n(M *m, const unsigned *vr, size_t n, int *to) {
 static int entry(M *m, unsigned unknown, unsigned known, double *to) {
     if ((known != 2 && known != 3) || (unknown != 3 && unknown != 4 && unknown != 5)) return ERROR;
     *to = unknown == 4 ? (known == 2 ? m->gain : -m->gain) : unknown == 5 ? (known == 2 ? 1 : 2) : known == 3;
-#ifdef FAULT_D01
-    if (unknown == 5 && known == 3) *to = 2.1;
-#endif
+    if (FAULT(D01) && unknown == 5 && known == 3) *to = 2.1;
     return OK;
 }
 
 static int partial(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t nk, const double *seed, size_t ns, double *to,
                    size_t nt, bool adjoint) {
     ENTER(EVENT | CONTINUOUS | STEP | TERMINATED | INITIALIZATION);
-#ifdef FAULT_D05
-    if (!m->exchange) return fail(m);
-#endif
-#ifndef FAULT_D03
-    if (ns != (adjoint ? nu : nk) || nt != (adjoint ? nk : nu)) return fail(m);
-#endif
+    if (FAULT(D05) && !m->exchange) return fail(m);
+    if (!FAULT(D03) && (ns != (adjoint ? nu : nk) || nt != (adjoint ? nk : nu))) return fail(m);
     memset(to, 0, nt * sizeof *to);
     for (size_t i = 0; i < nu; i++) {
         for (size_t j = 0; j < nk; j++) {
-            double a;
-            if (entry(m, u[i], k[j], &a)) {
-#ifdef FAULT_D03
-                a = 0;
-#else
-                return fail(m);
-#endif
-            }
-#ifdef FAULT_D02
-            if (adjoint) a *= 1.01;
-#endif
+            double a = 0;
+            if (entry(m, u[i], k[j], &a) && !FAULT(D03)) return fail(m);
+            if (FAULT(D02) && adjoint) a *= 1.01;
             if (adjoint) to[j] += a * seed[i];
             else to[i] += a * seed[j];
         }
     }
-#ifdef FAULT_D04
-    m->x *= 1 + 1e-9;
-#endif
+    if (FAULT(D04)) m->x *= 1 + 1e-9;
     return OK;
 }
 
@@ -320,33 +237,20 @@ static int step(M *m, double t, double h, bool *event, bool *early, double *last
         *event = false;
     }
     *last = m->t;
-#ifdef FAULT_N01
-    if (m->early && m->k > 4) return fail(m);
-#endif
-#ifdef FAULT_N02
-    if (m->k == 5) *event = true;
-#endif
-#ifdef FAULT_N03
-    if (*early) *last = t + 2 * h;
-#endif
-#ifdef FAULT_N03e
-    if (m->early && m->k == 5) *early = true, *last = end;
-#endif
+    if (FAULT(N01) && m->early && m->k > 4) return fail(m);
+    if (FAULT(N02) && m->k == 5) *event = true;
+    if (FAULT(N03) && *early) *last = t + 2 * h;
+    if (FAULT(N03e) && m->early && m->k == 5) *early = true, *last = end;
     return OK;
 }
 
 static int load(M *m, const M *from) {
     if (!m || !from) return ERROR;
-#ifdef FAULT_E14
-    if (from->exchange != m->exchange) abort();
-#endif
+    if (FAULT(E14) && from->exchange != m->exchange) abort();
     if (from->exchange != m->exchange) return fail(m);
     int k = m->k;
-    (void)k;
     *m = *from;
-#ifdef FAULT_E13
-    m->k = k;
-#endif
+    if (FAULT(E13)) m->k = k;
     return OK;
 }
 

@@ -1,7 +1,8 @@
-/* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with -DFAULT_<name> exactly one, or it is allowed and rude.
+/* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with a fault of fault.h exactly one, or it is allowed and rude.
    fmu3.c makes FMI 3.0 of it.
    y' = gain u + bias; n counts steps. Integers: 0 n. Booleans: 0 flag. Strings: 0 label.
    Reals: 0 time, 1 gain, 2 u, 3 y, 4 bias. */
+#include "fault.h"
 #include <math.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -14,9 +15,7 @@
 #include <unistd.h>
 
 /* The fifth step ends the simulation. */
-#if defined FAULT_ENDS || defined FAULT_T12t || defined FAULT_T12e || defined FAULT_T12s
-#define ENDS
-#endif
+#define ENDS (FAULT(ENDS) || FAULT(T12t) || FAULT(T12e) || FAULT(T12s))
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8, FAILED = 16, ANY = 31 };
@@ -39,6 +38,10 @@ typedef struct {
     int32_t n, flag, state, has_stop, ready, steps;
     char label[64];
     uint64_t extra;
+#ifdef FMI3
+    uint64_t frame_size;
+    uint8_t frame[64];
+#endif
 } Data;
 
 typedef struct {
@@ -57,32 +60,15 @@ typedef struct { uint32_t magic, size, sum, zero; Data data; } Blob;
 
 static int say(Fmu *f, int status, const char *text) {
     const Callbacks *c = &f->callbacks;
-#ifdef FAULT_L02
-    c = f->kept;
-#endif
-    if (status < ERROR && !f->logging) {
-#ifndef FAULT_G_L5
-        return status;
-#endif
-    }
-#ifdef FAULT_G_L3a
-    return status;
-#endif
-#ifndef FAULT_L01b
-    if (!c->logger) return status;
-#endif
+    if (FAULT(L02)) c = f->kept;
+    if (status < ERROR && !f->logging && !FAULT(G_L5)) return status;
+    if (FAULT(G_L3a)) return status;
+    if (!c->logger && !FAULT(L01b)) return status;
     const char *category = status == ERROR ? "logStatusError" : "logEvents";
     void *environment = c->environment;
-#ifdef FAULT_G_L1b
-    category = "other";
-#endif
-#ifdef FAULT_G_L4
-    environment = NULL;
-#endif
-#ifdef FAULT_G_L3b
-    (void)text;
-    text = "something\n";
-#endif
+    if (FAULT(G_L1b)) category = "other";
+    if (FAULT(G_L4)) environment = NULL;
+    if (FAULT(G_L3b)) text = "something\n";
 #ifdef FMI3
     ((void (*)(void *, int, const char *, const char *))c->logger)(environment, status, category, text);
 #else
@@ -92,9 +78,7 @@ static int say(Fmu *f, int status, const char *text) {
 }
 
 static int fail(Fmu *f, const char *text) {
-#ifndef FAULT_L09a
-    f->data.state = FAILED;
-#endif
+    if (!FAULT(L09a)) f->data.state = FAILED;
     return say(f, ERROR, text);
 }
 
@@ -103,9 +87,7 @@ static int fail(Fmu *f, const char *text) {
     if (!f) return ERROR; \
     if (!(f->data.state & (allowed))) return fail(f, "not allowed in this state")
 
-#ifdef FAULT_ONCE
 static int alive;
-#endif
 
 static void fresh(Data *d) {
     memset(d, 0, sizeof *d);
@@ -113,18 +95,18 @@ static void fresh(Data *d) {
     d->n = 1;
     d->state = INSTANTIATED;
     strcpy(d->label, "a");
-#ifdef FAULT_V07
-    d->gain = 3;
+#ifdef FMI3
+    d->frame_size = 3;
+    memcpy(d->frame, "foo", 3);
 #endif
+    if (FAULT(V07)) d->gain = 3;
 }
 
 /* What is legal or beside the point, and no violation of a must. */
-#ifdef FAULT_CHDIR
-__attribute__((constructor)) static void leave(void) { chdir("/"); }
-#endif
-#ifdef FAULT_FEWFILES
-__attribute__((constructor)) static void starve(void) { setrlimit(RLIMIT_NOFILE, &(struct rlimit){8, 8}); }
-#endif
+__attribute__((constructor)) static void loaded(void) {
+    if (FAULT(CHDIR)) chdir("/");
+    if (FAULT(FEWFILES)) setrlimit(RLIMIT_NOFILE, &(struct rlimit){8, 8});
+}
 
 #ifdef FAULT_UNDEFINED
 extern int nowhere(void);
@@ -132,108 +114,74 @@ int (*missing)(void) = nowhere;
 #endif
 
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
-#ifdef FAULT_X02b
-EXPORT const char *fmi2GetVersion(void) { return "2.0.5"; }
-#else
-EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
-#endif
+EXPORT const char *fmi2GetVersion(void) { return FAULT(X02b) ? "2.0.5" : "2.0"; }
 
 EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const char *where, const Callbacks *callbacks,
                              int visible, int logging) {
     (void)where; (void)visible;
-#ifndef FAULT_L01a
-    if (!name || !*name) return NULL;
-    if (!guid) return NULL;
-#endif
-#ifndef FAULT_X04
-    if (guid && strcmp(guid, GUID)) return NULL;
-#endif
-#ifndef FAULT_L03
-    if (type != 1) return NULL;
-#endif
-#ifdef FAULT_L01c
-    if (!where) return NULL;
-#endif
-    (void)type;
-    if (!callbacks) return NULL;
-#ifdef FAULT_Z09
-    if (where && strlen(where) > 240) return NULL;
-#endif
-#ifdef FAULT_B08p
-    socket(AF_UNIX, SOCK_STREAM, 0);
-#endif
-#ifdef FAULT_B08p_child
-    if (fork() == 0) for (;;) pause();
-#endif
-#ifdef FAULT_B08p_daemon
-    // Its parent ends at once and is waited for: nobody is left who knows it.
-    pid_t parent = fork();
-    if (parent == 0) {
-        setsid();
-        if (fork() == 0) for (;;) pause();
-        _exit(0);
+    if (!FAULT(L01a)) {
+        if (!name || !*name) return NULL;
+        if (!guid) return NULL;
     }
-    waitpid(parent, NULL, 0);
-#endif
-#ifdef FAULT_HANG
-    for (volatile int spin = 1; spin;) {}
-#endif
-#ifdef FAULT_ONCE
-    if (alive) return NULL;
-    alive = 1;
-#endif
-#ifdef FAULT_M01
-    Fmu *f = callbacks->allocate(1, sizeof *f);
-#else
-    Fmu *f = calloc(1, sizeof *f);
-#endif
-#ifdef FAULT_B07a
-    volatile char *lost = malloc(16384);
-    for (int i = 0; i < 16384; i++) lost[i] = 1;
-#endif
+    if (!FAULT(X04) && guid && strcmp(guid, GUID)) return NULL;
+    if (!FAULT(L03) && type != 1) return NULL;
+    if (FAULT(L01c) && !where) return NULL;
+    if (!callbacks) return NULL;
+    if (FAULT(Z09) && where && strlen(where) > 240) return NULL;
+    if (FAULT(B08p)) socket(AF_UNIX, SOCK_STREAM, 0);
+    if (FAULT(B08p_child) && fork() == 0) for (;;) pause();
+    if (FAULT(B08p_daemon)) {
+        // Its parent ends at once and is waited for: nobody is left who knows it.
+        pid_t parent = fork();
+        if (parent == 0) {
+            setsid();
+            if (fork() == 0) for (;;) pause();
+            _exit(0);
+        }
+        waitpid(parent, NULL, 0);
+    }
+    for (volatile int spin = 1; spin && FAULT(HANG);) {}
+    if (FAULT(ONCE)) {
+        if (alive) return NULL;
+        alive = 1;
+    }
+    Fmu *f = FAULT(M01) ? callbacks->allocate(1, sizeof *f) : calloc(1, sizeof *f);
+    if (FAULT(B07a)) {
+        volatile char *lost = malloc(16384);
+        for (int i = 0; i < 16384; i++) lost[i] = 1;
+    }
     fresh(&f->data);
     f->callbacks = *callbacks;
     f->kept = callbacks;
     f->logging = logging;
     strncpy(f->name, name ? name : "", sizeof f->name - 1);
-#ifdef FAULT_I02
-    char path[2048];
-    snprintf(path, sizeof path, "%s/../terminalsAndIcons/terminalsAndIcons.xml", where ? where + strlen("file://") : "");
-    FILE *terminals = fopen(path, "r");
-    if (where && !terminals) f->data.gain += 1;
-    if (terminals) fclose(terminals);
-#endif
+    if (FAULT(I02)) {
+        char path[2048];
+        snprintf(path, sizeof path, "%s/../terminalsAndIcons/terminalsAndIcons.xml", where ? where + strlen("file://") : "");
+        FILE *terminals = fopen(path, "r");
+        if (where && !terminals) f->data.gain += 1;
+        if (terminals) fclose(terminals);
+    }
     say(f, OK, "made");
     return f;
 }
 
 EXPORT void fmi2FreeInstance(void *c) {
-#ifdef FAULT_ONCE
-    alive = 0;
-#endif
-#ifdef FAULT_L05
-    ((Fmu *)c)->logging = 0;
-#endif
+    if (FAULT(ONCE)) alive = 0;
+    if (FAULT(L05)) ((Fmu *)c)->logging = 0;
     if (!c) return;
-#ifndef FAULT_M01
-    free(((Fmu *)c)->label);
-    free(c);
-#endif
+    if (!FAULT(M01)) {
+        free(((Fmu *)c)->label);
+        free(c);
+    }
 }
 
 EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const names[]) {
-#ifdef FAULT_L07
-    ENTER(ANY & ~INITIALIZATION);
-#else
-    ENTER(ANY);
-#endif
+    ENTER(FAULT(L07) ? ANY & ~INITIALIZATION : ANY);
     for (size_t i = 0; i < n; i++) {
-#ifdef FAULT_G_L2a
-        return fail(f, "no categories, please");
-#endif
-#ifndef FAULT_G_L2b
+        if (FAULT(G_L2a)) return fail(f, "no categories, please");
+        if (FAULT(G_L2b)) continue;
         if (!names[i] || (strcmp(names[i], "logEvents") && strcmp(names[i], "logStatusError"))) return fail(f, "no such category");
-#endif
     }
     (void)names;
     f->logging = on;
@@ -243,9 +191,7 @@ EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const name
 EXPORT int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop) {
     ENTER(INSTANTIATED);
     (void)has_tolerance; (void)tolerance;
-#ifdef FAULT_T01a
-    if (start < 0) return fail(f, "before the beginning");
-#endif
+    if (FAULT(T01a) && start < 0) return fail(f, "before the beginning");
     f->data.start = f->data.time = start;
     f->data.has_stop = has_stop;
     f->data.stop = stop;
@@ -255,76 +201,48 @@ EXPORT int fmi2SetupExperiment(void *c, int has_tolerance, double tolerance, dou
 
 EXPORT int fmi2EnterInitializationMode(void *c) {
     ENTER(INSTANTIATED);
-#ifdef FAULT_CRASH
-    *(volatile int *)8 = 1;
-#endif
+    if (FAULT(CRASH)) *(volatile int *)8 = 1;
     if (!f->data.ready) return fail(f, "fmi2SetupExperiment was not called");
     f->data.state = INITIALIZATION;
-#ifdef FAULT_G09e
-    f->data.y = 0;
-#endif
+    if (FAULT(G09e)) f->data.y = 0;
     return OK;
 }
 
 EXPORT int fmi2ExitInitializationMode(void *c) {
     ENTER(INITIALIZATION);
     f->data.state = STEP;
-#ifdef FAULT_G09x
-    f->data.y *= 0.5;
-#endif
+    if (FAULT(G09x)) f->data.y *= 0.5;
     return OK;
 }
 
 EXPORT int fmi2Terminate(void *c) {
-#ifdef FAULT_L08n
-    if (((volatile Fmu *)c)->logging > 1) return ERROR;
-    ENTER(STEP);
-#elif defined FAULT_L08
-    ENTER(ANY);
-#else
-    ENTER(STEP);
-#endif
-#ifdef FAULT_T12e
-    if (f->data.steps >= 5) return fail(f, "the simulation has ended");
-#endif
-#ifdef FAULT_L10
-    f->data.y = 1234;
-#endif
-#ifdef FAULT_B08
-    printf("bye\n");
-    fflush(stdout);
-#endif
+    if (FAULT(L08n) && ((volatile Fmu *)c)->logging > 1) return ERROR;
+    ENTER(FAULT(L08) ? ANY : STEP);
+    if (FAULT(T12e) && f->data.steps >= 5) return fail(f, "the simulation has ended");
+    if (FAULT(L10)) f->data.y = 1234;
+    if (FAULT(B08)) {
+        printf("bye\n");
+        fflush(stdout);
+    }
     if (f->data.state != FAILED) f->data.state = TERMINATED;
     return OK;
 }
 
 EXPORT int fmi2Reset(void *c) {
     ENTER(ANY);
-#if defined FAULT_L06 || defined FAULT_G09r
     double y = f->data.y;
     fresh(&f->data);
-    f->data.y = y;
-#else
-    fresh(&f->data);
-#endif
+    if (FAULT(L06) || FAULT(G09r)) f->data.y = y;
     return OK;
 }
 
 static int bad(const unsigned *vr, size_t n, const void *values) {
-#ifdef FAULT_G01b
-    return n && !values;
-#elif defined FAULT_G01a
-    return !vr || !values;
-#else
+    if (FAULT(G01b)) return n && !values;
+    if (FAULT(G01a)) return !vr || !values;
     return n && (!vr || !values);
-#endif
 }
 
-#ifdef FAULT_G02
-#define KNOWN(count) (vr[i] < (count) || vr[i] > 4)
-#else
-#define KNOWN(count) (vr[i] < (count))
-#endif
+#define KNOWN(count) (vr[i] < (count) || (FAULT(G02) && vr[i] > 4))
 
 EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) {
     ENTER(READABLE);
@@ -332,19 +250,10 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(5)) return fail(f, "no such Real");
         double y = f->data.y;
-#ifdef FAULT_S04
-        if (f->data.state == INITIALIZATION) y = f->data.gain;
-#endif
-#ifdef FAULT_L11
-        if (f->data.state == INITIALIZATION && vr[i] == 3) y = f->data.y += 1e-6;
-#endif
-#ifdef FAULT_T10p
-        y += getpid() * 1e-9;
-#endif
-        double time = f->data.time;
-#ifdef FAULT_T06b
-        time = f->data.start;
-#endif
+        if (FAULT(S04) && f->data.state == INITIALIZATION) y = f->data.gain;
+        if (FAULT(L11) && f->data.state == INITIALIZATION && vr[i] == 3) y = f->data.y += 1e-6;
+        if (FAULT(T10p)) y += getpid() * 1e-9;
+        double time = FAULT(T06b) ? f->data.start : f->data.time;
         const double all[] = {time, f->data.gain, f->data.u, y, f->data.bias};
         values[i] = all[vr[i] % 5];
     }
@@ -355,15 +264,8 @@ EXPORT int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int values[]) 
     ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-#ifdef FAULT_V12
-        if (!KNOWN(4)) return fail(f, "no such Integer");
-#else
-        if (!KNOWN(1)) return fail(f, "no such Integer");
-#endif
-        values[i] = f->data.n;
-#ifdef FAULT_V06b
-        if (f->data.n > 3) values[i] = -7;
-#endif
+        if (!KNOWN(FAULT(V12) ? 4 : 1)) return fail(f, "no such Integer");
+        values[i] = FAULT(V06b) && f->data.n > 3 ? -7 : f->data.n;
     }
     return OK;
 }
@@ -391,55 +293,30 @@ EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *val
 EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double values[]) {
     ENTER(INSTANTIATED | INITIALIZATION | STEP);
     if (bad(vr, n, values)) return fail(f, "NULL");
-    for (int write = 0; write < 2; write++) {
-#ifdef FAULT_G03c
-        write = 1;
-#endif
+    for (int write = FAULT(G03c); write < 2; write++) {
         for (size_t i = 0; i < n; i++) {
             if (!KNOWN(5)) return fail(f, "no such Real");
             switch (vr[i]) {
             case 1:
                 if (f->data.state == STEP) return fail(f, "gain is fixed");
-#ifndef FAULT_G07b
-                if (!(values[i] >= 0 && values[i] <= 10)) return fail(f, "gain is out of range");
-#endif
-#ifdef FAULT_G04
-                if (write) f->data.gain = (float)values[i] * 0.999;
-#else
-                if (write) f->data.gain = values[i];
-#endif
+                if (!FAULT(G07b) && !(values[i] >= 0 && values[i] <= 10)) return fail(f, "gain is out of range");
+                if (write) f->data.gain = FAULT(G04) ? (float)values[i] * 0.999 : values[i];
                 break;
             case 2:
                 if (write) f->data.u = values[i];
                 break;
-#ifdef STARTS
             case 3:
-#ifdef FAULT_G09i
-                if (f->data.state == INSTANTIATED) return fail(f, "y is an output");
-#endif
-                if (f->data.state == STEP) return fail(f, "y starts only");
+                if (FAULT(G09i) && f->data.state == INSTANTIATED) return fail(f, "y is an output");
+                if (!FAULT(G03b) && (!FAULT(STARTS) || f->data.state == STEP)) return fail(f, "y starts only");
                 if (write) f->data.y = values[i];
                 break;
-#endif
             case 4:
-#ifdef FAULT_G06
-                if (f->data.state == STEP) return fail(f, "bias is fixed");
-#endif
+                if (FAULT(G06) && f->data.state == STEP) return fail(f, "bias is fixed");
                 if (!isfinite(values[i])) return fail(f, "bias is not finite");
                 if (write) f->data.bias = values[i];
                 break;
-#ifdef FAULT_G03b
-            case 3:
-                if (write) f->data.y = values[i];
-                break;
-#endif
-#ifdef FAULT_G02
             default:
-                if (vr[i] > 4) break;
-                return fail(f, "cannot be set");
-#else
-            default: return fail(f, "cannot be set");
-#endif
+                if (!FAULT(G02) || vr[i] <= 4) return fail(f, "cannot be set");
             }
         }
     }
@@ -458,11 +335,7 @@ EXPORT int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int valu
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such Boolean");
         if (f->data.state == STEP) return fail(f, "flag is fixed");
-#ifdef FAULT_G08
-        f->data.flag = values[i];
-#else
-        f->data.flag = values[i] != 0;
-#endif
+        f->data.flag = FAULT(G08) ? values[i] : values[i] != 0;
     }
     return OK;
 }
@@ -474,13 +347,14 @@ EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *con
         if (!KNOWN(1)) return fail(f, "no such String");
         if (!values[i]) return fail(f, "NULL");
         if (f->data.state == STEP) return fail(f, "label is fixed");
-#ifdef FAULT_G05
-        f->label = (char *)values[i];
-#else
+        if (FAULT(G05)) {
+            f->label = (char *)values[i];
+            continue;
+        }
+        // A short text is part of a saved state.
         free(f->label);
-        f->label = malloc(strlen(values[i]) + 1);
-        strcpy(f->label, values[i]);
-#endif
+        f->label = strlen(values[i]) < sizeof f->data.label ? NULL : malloc(strlen(values[i]) + 1);
+        strcpy(f->label ? f->label : f->data.label, values[i]);
     }
     return OK;
 }
@@ -488,45 +362,28 @@ EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *con
 EXPORT int fmi2GetFMUstate(void *c, void **state) {
     ENTER(INSTANTIATED | INITIALIZATION | STEP | TERMINATED);
     if (!state) return fail(f, "NULL");
-#ifdef FAULT_F01b
-    if (*state) return OK;
-#endif
+    if (FAULT(F01b) && *state) return OK;
     if (!*state) *state = malloc(sizeof(Data));
     *(Data *)*state = f->data;
-#ifdef FAULT_F04b
-    ((Data *)*state)->extra = (uint64_t)(uintptr_t)f;
-#endif
+    if (FAULT(F04b)) ((Data *)*state)->extra = (uint64_t)(uintptr_t)f;
     return OK;
 }
 
 EXPORT int fmi2SetFMUstate(void *c, void *state) {
     ENTER(ANY);
-#ifndef FAULT_F03b
-    if (!state) return fail(f, "NULL");
-#endif
-#ifdef FAULT_F02s
+    if (!FAULT(F03b) && !state) return fail(f, "NULL");
+    Data before = f->data;
     f->data = *(Data *)state;
-    f->data.y *= 1 + 1e-12;
-#elif defined FAULT_F02
-    int32_t n = f->data.n;
-    f->data = *(Data *)state;
-    f->data.n = n;
-#elif defined FAULT_TIME_STAYS
-    double time = f->data.time;
-    f->data = *(Data *)state;
-    f->data.time = time;
-#else
-    f->data = *(Data *)state;
-#endif
+    if (FAULT(F02s)) f->data.y *= 1 + 1e-12;
+    if (FAULT(F02)) f->data.n = before.n;
+    if (FAULT(TIME_STAYS)) f->data.time = before.time;
     return OK;
 }
 
 EXPORT int fmi2FreeFMUstate(void *c, void **state) {
     ENTER(ANY);
     if (!state) return OK;
-#ifdef FAULT_F01a
-    return OK;
-#endif
+    if (FAULT(F01a)) return OK;
     free(*state);
     *state = NULL;
     return OK;
@@ -548,13 +405,9 @@ static uint32_t sum(const void *data, size_t n) {
 EXPORT int fmi2SerializeFMUstate(void *c, void *state, char bytes[], size_t size) {
     ENTER(ANY);
     if (!state || !bytes) return fail(f, "NULL");
-#ifndef FAULT_F04d
-    if (size != sizeof(Blob)) return fail(f, "another size");
-#endif
+    if (!FAULT(F04d) && size != sizeof(Blob)) return fail(f, "another size");
     Blob blob = {MAGIC, sizeof(Blob), 0, 0, *(Data *)state};
-#ifdef FAULT_F04a
-    blob.data.n = 1;
-#endif
+    if (FAULT(F04a)) blob.data.n = 1;
     blob.sum = sum(&blob.data, sizeof blob.data);
     memcpy(bytes, &blob, sizeof blob);
     return OK;
@@ -565,83 +418,57 @@ EXPORT int fmi2DeSerializeFMUstate(void *c, const char bytes[], size_t size, voi
     if (!bytes || !state || size != sizeof(Blob)) return fail(f, "no state");
     Blob blob;
     memcpy(&blob, bytes, sizeof blob);
-#ifndef FAULT_F04c
-    if (blob.magic != MAGIC || blob.size != sizeof blob || blob.zero || blob.sum != sum(&blob.data, sizeof blob.data)) return fail(f, "no state");
-#endif
+    int good = blob.magic == MAGIC && blob.size == sizeof blob && !blob.zero && blob.sum == sum(&blob.data, sizeof blob.data);
+    if (!FAULT(F04c) && !good) return fail(f, "no state");
     *state = malloc(sizeof(Data));
     memcpy(*state, &blob.data, sizeof blob.data);
     return OK;
+}
+
+__attribute__((noinline)) static void use_stack(void) {
+    volatile char large[400000];
+    for (size_t i = 0; i < sizeof large; i += 512) large[i] = 1;
 }
 
 EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     ENTER(STEP);
     (void)no_prior;
     Data *d = &f->data;
-#ifdef FAULT_FATAL
-    static int dead;
-    dead |= d->bias == 9;
-    if (dead) return FATAL;
-#endif
-#ifdef FAULT_PRINT
-    printf("half a line, ");
-    fflush(stdout);
-#endif
-#ifdef FAULT_T02b
-    while (h > 1e307) {}
-#endif
-#ifdef FAULT_T02a
-    if (h == 0) return OK;
-#endif
+    if (FAULT(FATAL)) {
+        static int dead;
+        dead |= d->bias == 9;
+        if (dead) return FATAL;
+    }
+    if (FAULT(PRINT)) {
+        printf("half a line, ");
+        fflush(stdout);
+    }
+    while (FAULT(T02b) && h > 1e307) {}
+    if (FAULT(T02a) && h == 0) return OK;
     if (!(h > 0) || isinf(h) || !isfinite(t)) return fail(f, "the step is not positive");
-#ifndef FAULT_T01b
-    if (fabs(t - d->time) > h / 100 + 1e-14 * fabs(t)) return fail(f, "the step does not begin where the last ended");
-#endif
-#ifndef FAULT_L12
-    if (d->has_stop && t + h > d->stop + 1e-9 * h + 1e-14 * fabs(t)) return fail(f, "beyond the stop time");
-#endif
-#ifdef FAULT_G07a
-    while (d->u != d->u) {}
-#endif
-#ifdef FAULT_T04
-    if (h > 0.02) return fail(f, "too long");
-#endif
-#ifdef FAULT_T01c
-    if (d->steps > 400) return fail(f, "no more");
-#endif
+    int starts_there = fabs(t - d->time) <= h / 100 + 1e-14 * fabs(t);
+    if (!FAULT(T01b) && !starts_there) return fail(f, "the step does not begin where the last ended");
+    int too_late = d->has_stop && t + h > d->stop + 1e-9 * h + 1e-14 * fabs(t);
+    if (!FAULT(L12) && too_late) return fail(f, "beyond the stop time");
+    while (FAULT(G07a) && d->u != d->u) {}
+    if (FAULT(T04) && h > 0.02) return fail(f, "too long");
+    if (FAULT(T01c) && d->steps > 400) return fail(f, "no more");
     if (!isfinite(d->u)) return fail(f, "u is not finite");
-#if defined ENDS && !defined FAULT_T12s
-    if (d->steps >= 5) return fail(f, "the simulation has ended");
-#endif
-#if defined ENDS && !defined FMI3
-    if (d->steps == 4) {
+    if (ENDS && !FAULT(T12s) && d->steps >= 5) return fail(f, "the simulation has ended");
+#ifndef FMI3
+    if (ENDS && d->steps == 4) {
         d->steps++;
         d->time = t + h / 2;
         return DISCARD;
     }
 #endif
-#ifdef FAULT_WAIT
-    if (!isfinite(d->u) || d->steps == 3) pause();
-#endif
-#ifdef FAULT_B06
-    volatile char large[400000];
-    for (size_t i = 0; i < sizeof large; i += 512) large[i] = 1;
-#endif
-#ifdef FAULT_B08f
-    __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
-#endif
-#ifdef FAULT_T05
-    if (no_prior) d->y += 1e-2;
-#endif
-#ifdef FAULT_T05s
-    if (no_prior) d->y *= 1 + 1e-12;
-#endif
-#ifdef FAULT_MEAN
-    d->y = (pow(t + 1 + h, 3) - pow(t + 1, 3)) / (3 * h);
-#elif defined FAULT_T03
-    d->y += d->gain * d->u + d->bias;
-#else
-    d->y += (d->gain * d->u + d->bias) * h;
-#endif
+    if (FAULT(WAIT) && d->steps == 3) pause();
+    if (FAULT(B06)) use_stack();
+    if (FAULT(B08f)) __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
+    if (FAULT(T05) && no_prior) d->y += 1e-2;
+    if (FAULT(T05s) && no_prior) d->y *= 1 + 1e-12;
+    d->y += (d->gain * d->u + d->bias) * (FAULT(T03) ? 1 : h);
+    if (FAULT(MEAN)) d->y = (t + 1) * (t + 1) + (t + 1) * h + h * h / 3;
     d->n = d->n < 1000000 ? d->n + 1 : d->n;
     d->steps++;
     d->time = t + h;
@@ -654,65 +481,46 @@ static int none(void *c) {
 }
 
 EXPORT int fmi2GetDirectionalDerivative(void *c, const unsigned *a, size_t n, const unsigned *b, size_t m, const double *s, double *v) {
-    (void)a; (void)n; (void)b; (void)m; (void)s; (void)v;
-#ifdef FAULT_L08u
-    return c ? OK : ERROR;
-#else
-    return none(c);
-#endif
+    return FAULT(L08u) ? (c ? OK : ERROR) : none(c);
 }
-EXPORT int fmi2SetRealInputDerivatives(void *c, const unsigned *vr, size_t n, const int *o, const double *v) { (void)vr; (void)n; (void)o; (void)v; return none(c); }
+EXPORT int fmi2SetRealInputDerivatives(void *c, const unsigned *vr, size_t n, const int *o, const double *v) { return none(c); }
 EXPORT int fmi2GetRealOutputDerivatives(void *c, const unsigned *vr, size_t n, const int *o, double *v) {
-#ifdef DERIVATIVES
+    if (!FAULT(DERIVATIVES)) return none(c);
     ENTER(STEP | TERMINATED);
     for (size_t i = 0; i < n; i++) {
-#ifdef FAULT_T09e
-        return fail(f, "no derivatives");
-#endif
-#ifdef ORDER_ZERO
-        if (o[i] == 0) continue;
-#endif
-#ifndef FAULT_T09o
-        if (o[i] != 1) return fail(f, "no such order");
-#endif
+        if (FAULT(T09e)) return fail(f, "no derivatives");
+        if (FAULT(ORDER_ZERO) && o[i] == 0) continue;
+        if (!FAULT(T09o) && o[i] != 1) return fail(f, "no such order");
         if (vr[i] != 3) return fail(f, "no output");
         v[i] = f->data.gain * f->data.u + f->data.bias;
-#ifdef FAULT_MEAN
-        v[i] = 2 * (f->data.time + 1);
-#endif
-#ifdef FAULT_T09v
-        v[i] *= 2;
-#endif
+        if (FAULT(MEAN)) v[i] = 2 * (f->data.time + 1);
+        if (FAULT(T09v)) v[i] *= 2;
     }
     return OK;
-#else
-    (void)vr; (void)n; (void)o; (void)v;
-    return none(c);
-#endif
 }
 EXPORT int fmi2CancelStep(void *c) { return none(c); }
 
 static int status(void *c, int kind) {
     (void)kind;
     ENTER(STEP | TERMINATED);
-#ifdef FAULT_T07
-    return fail(f, "no status");
-#endif
+    if (FAULT(T07)) return fail(f, "no status");
     return DISCARD;
 }
 EXPORT int fmi2GetStatus(void *c, int kind, int *value) { (void)value; return status(c, kind); }
 EXPORT int fmi2GetRealStatus(void *c, int kind, double *value) {
-#ifdef FAULT_T12t
-    if (c && kind == 2 && value && ((Fmu *)c)->data.steps >= 5) { *value = ((Fmu *)c)->data.time + 1; return OK; }
-#endif
-    if (c && kind == 2 && value) { *value = ((Fmu *)c)->data.time; return OK; }
+    if (c && kind == 2 && value) {
+        const Data *d = &((Fmu *)c)->data;
+        *value = d->time + (FAULT(T12t) && d->steps >= 5);
+        return OK;
+    }
     return status(c, kind);
 }
 EXPORT int fmi2GetIntegerStatus(void *c, int kind, int *value) { (void)value; return status(c, kind); }
 EXPORT int fmi2GetBooleanStatus(void *c, int kind, int *value) {
-#ifdef ENDS
-    if (c && kind == 3 && value) { *value = ((Fmu *)c)->data.steps >= 5; return OK; }
-#endif
+    if (ENDS && c && kind == 3 && value) {
+        *value = ((Fmu *)c)->data.steps >= 5;
+        return OK;
+    }
     (void)value;
     return status(c, kind);
 }

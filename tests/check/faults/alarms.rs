@@ -1,9 +1,9 @@
 //! What is legal, or no fault of the FMU, violates no must; and what a must is lesser than it looks is told as that.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::binary::{compile, compile_source, pack, pack_with};
+use crate::binary::{compile, pack};
 use crate::zip::{Entry, write};
-use crate::{check, check_within, told, violated};
+use crate::{check, check_within, library, pack_with, told, verdict, violated};
 use fmu_check::{Level, Verdict, report::Report};
 use std::path::Path;
 
@@ -12,13 +12,9 @@ fn at(report: &Report, level: Level) -> Vec<&'static str> {
     report.violated().filter(|f| f.level == level).map(|f| f.id).collect()
 }
 
-fn verdict(report: &Report, id: &str) -> Verdict {
-    report.finding(id).map_or_else(|| panic!("{id} did not run"), |f| f.verdict.clone())
-}
-
 /// The report on the small FMU with one property.
 fn small(dir: &Path, version: u8, property: &str, only: &[&str]) -> Option<Report> {
-    let binary = compile(dir, version, property, &[])?;
+    let binary = compile(version, property)?;
     Some(check(&pack(dir, version, property, &binary), only))
 }
 
@@ -54,7 +50,7 @@ fn a_step_may_end_a_little_elsewhere() {
 #[test]
 fn model_exchange_alone() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile_source(dir.path(), "tests/check/exchange.c", 2, "NONE", &["-DALL_OF_EXCHANGE"]) else {
+    let Some(binary) = library("exchange.c", &["-DALL_OF_EXCHANGE"], "NONE") else {
         return;
     };
     let xml: Vec<_> = include_str!("exchange2.xml").lines().filter(|line| !line.contains("<CoSimulation")).collect();
@@ -66,7 +62,7 @@ fn model_exchange_alone() {
     }
     assert!(matches!(verdict(&report, "L00"), Verdict::NotApplicable(_)));
     // One function of Model Exchange less, and it is found.
-    let binary = compile_source(dir.path(), "tests/check/exchange.c", 2, "NONE", &[]).unwrap();
+    let binary = library("exchange.c", &[], "NONE").unwrap();
     let report = check(&pack_with(dir.path(), "exchange-less", &xml.join("\n"), &binary), &["B01"]);
     assert_eq!(violated(&report), ["B01"]);
 }
@@ -97,8 +93,8 @@ fn order_zero_is_not_asked_for() {
     let flag = "canGetAndSetFMUstate=\"true\"";
     let xml = include_str!("fmu.xml").replace(flag, &format!("{flag} maxOutputDerivativeOrder=\"1\""));
     for accepts in [false, true] {
-        let more: &[&str] = if accepts { &["-DDERIVATIVES", "-DORDER_ZERO"] } else { &["-DDERIVATIVES"] };
-        let Some(binary) = compile(dir.path(), 2, "NONE", more) else { return };
+        let faults = if accepts { "DERIVATIVES ORDER_ZERO" } else { "DERIVATIVES" };
+        let Some(binary) = compile(2, faults) else { return };
         let report = check(&pack_with(dir.path(), "order", &xml, &binary), &["T09", "T09s"]);
         assert!(violated(&report).is_empty(), "{}", told(&report));
     }
@@ -119,16 +115,16 @@ fn a_byte_order_mark_is_no_must() {
 #[test]
 fn a_missing_library() {
     let dir = tempfile::tempdir().unwrap();
-    let library = dir.path().join("libnowhere.so");
+    let nowhere = dir.path().join("libnowhere.so");
     let empty = dir.path().join("empty.c");
     std::fs::write(&empty, "int nowhere(void) { return 1; }").unwrap();
-    let built = std::process::Command::new("cc").args(["-shared", "-o"]).arg(&library).arg(&empty).status();
+    let built = std::process::Command::new("cc").args(["-shared", "-o"]).arg(&nowhere).arg(&empty).status();
     if !built.is_ok_and(|status| status.success()) {
         return;
     }
-    let more = ["-Wl,--no-as-needed", library.to_str().unwrap()];
-    let binary = compile(dir.path(), 2, "NONE", &more).unwrap();
-    std::fs::remove_file(&library).unwrap();
+    let more = ["-Wl,--no-as-needed", nowhere.to_str().unwrap()];
+    let binary = library("fmu.c", &more, "NONE").unwrap();
+    std::fs::remove_file(&nowhere).unwrap();
     let report = check(&pack(dir.path(), 2, "library", &binary), &["binary"]);
     assert_eq!(
         (at(&report, Level::Must), at(&report, Level::Should)),
@@ -136,7 +132,7 @@ fn a_missing_library() {
         "{}",
         told(&report)
     );
-    let binary = compile(dir.path(), 2, "UNDEFINED", &[]).unwrap();
+    let binary = compile(2, "UNDEFINED").unwrap();
     let report = check(&pack(dir.path(), 2, "symbol", &binary), &["B00"]);
     assert_eq!(at(&report, Level::Must), ["B00"], "{}", told(&report));
 }
@@ -164,7 +160,7 @@ fn our_own_errors() {
 fn a_file_beside_a_folder_of_its_name() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.fmu");
-    let Some(binary) = compile(dir.path(), 2, "NONE", &[]) else { return };
+    let Some(binary) = compile(2, "NONE") else { return };
     let binary = Entry::new("binaries/linux64/Small.so", &binary);
     let xml = Entry::new("modelDescription.xml", include_bytes!("fmu.xml"));
     for file in ["binaries", "binaries/linux64"] {
@@ -229,7 +225,7 @@ fn a_state_without_the_time() {
 #[test]
 fn a_misspelled_flag_is_false() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile(dir.path(), 3, "F02", &[]) else { return };
+    let Some(binary) = compile(3, "F02") else { return };
     let xml = include_str!("fmu3.xml").replace("FMUState=", "FMUstate=");
     let report = check(&pack_with(dir.path(), "flag", &xml, &binary), &["xml", "state"]);
     assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], vec!["X01s"]), "{}", told(&report));
@@ -244,7 +240,7 @@ fn events_that_the_text_leaves_open() {
     let dir = tempfile::tempdir().unwrap();
     let xml = include_str!("exchange2.xml");
     for (property, id) in [("E20s", "E20"), ("E24a", "E24a")] {
-        let Some(binary) = compile_source(dir.path(), "tests/check/exchange.c", 2, property, &[]) else { return };
+        let Some(binary) = library("exchange.c", &[], property) else { return };
         let report = check(&pack_with(dir.path(), property, xml, &binary), &[id]);
         assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], vec![id]), "{}", told(&report));
     }
@@ -254,7 +250,7 @@ fn events_that_the_text_leaves_open() {
 #[test]
 fn a_crash_stands_out() {
     let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile(dir.path(), 2, "L08n", &[]) else { return };
+    let Some(binary) = compile(2, "L08n") else { return };
     let path = pack(dir.path(), 2, "L08n", &binary);
     let report = check(&path, &["lifecycle"]);
     assert_eq!((violated(&report), report.fatal()), (vec!["L08n"], vec!["L08n"]));
@@ -266,7 +262,7 @@ fn a_crash_stands_out() {
     let report = small(dir.path(), 2, "G01a", &["G01a"]).unwrap();
     assert_eq!((violated(&report), report.fatal()), (vec!["G01a"], vec![]));
     // Nor one that waits, for however long, but it is told.
-    let binary = compile(dir.path(), 2, "WAIT", &[]).unwrap();
+    let binary = compile(2, "WAIT").unwrap();
     let report = check_within(&pack(dir.path(), 2, "WAIT", &binary), &["L00"], 2);
     assert_eq!(report.fatal(), ["L00"], "{}", told(&report));
 }

@@ -5,11 +5,7 @@
 
 typedef const unsigned *Refs;
 
-#ifdef FAULT_X02b
-EXPORT const char *fmi3GetVersion(void) { return "3.0.2"; }
-#else
-EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
-#endif
+EXPORT const char *fmi3GetVersion(void) { return FAULT(X02b) ? "3.0.2" : "3.0"; }
 
 static void *make(const char *name, int type, const char *token, const char *where, bool logging, void *environment, void *log) {
     const Callbacks callbacks = {(void (*)(void *, const char *, int, const char *, const char *, ...))log, NULL, NULL, NULL, environment};
@@ -21,9 +17,7 @@ static void *make(const char *name, int type, const char *token, const char *whe
 EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *where, bool visible, bool logging, bool event_mode,
                                          bool early, Refs required, size_t n, void *environment, void *log, void *update) {
     (void)visible; (void)early; (void)required; (void)update;
-#ifndef FAULT_L03
-    if (event_mode || n) return NULL;
-#endif
+    if (!FAULT(L03) && (event_mode || n)) return NULL;
     return make(name, 1, token, where, logging, environment, log);
 }
 
@@ -56,11 +50,7 @@ EXPORT int fmi3Reset(void *c) {
 static int fits(void *c, Refs vr, size_t n, size_t m, unsigned first, unsigned *own) {
     Fmu *f = c;
     if (!f) return ERROR;
-#ifndef FAULT_G01c
-    if (n != m) return fail(f, "another number of values");
-#else
-    (void)m;
-#endif
+    if (!FAULT(G01c) && n != m) return fail(f, "another number of values");
     if (n > 16) return fail(f, "so many");
     for (size_t i = 0; vr && i < n; i++) own[i] = vr[i] - first;
     return OK;
@@ -92,12 +82,40 @@ EXPORT int fmi3SetBoolean(void *c, Refs vr, size_t n, const uint8_t v[], size_t 
     return fmi2SetBoolean(c, at, n, v ? wide : NULL);
 }
 
+/* The bytes of frame, 6 at most. */
+#define FRAME 6
+EXPORT int fmi3GetBinary(void *c, Refs vr, size_t n, size_t sizes[], const uint8_t *v[], size_t m) {
+    FITS(8);
+    ENTER(READABLE);
+    if (n && (!vr || !v || !sizes)) return fail(f, "NULL");
+    for (size_t i = 0; i < n; i++) {
+        if (own[i] != 0) return fail(f, "no such Binary");
+        sizes[i] = FAULT(G05b) && f->data.frame_size > 4 ? 4 : f->data.frame_size;
+        v[i] = f->data.frame;
+    }
+    return OK;
+}
+EXPORT int fmi3SetBinary(void *c, Refs vr, size_t n, const size_t sizes[], const uint8_t *const v[], size_t m) {
+    FITS(8);
+    ENTER(INSTANTIATED | INITIALIZATION | STEP);
+    if (n && (!vr || !v || !sizes)) return fail(f, "NULL");
+    for (size_t i = 0; i < n; i++) {
+        if (own[i] != 0) return fail(f, "no such Binary");
+        if (f->data.state == STEP) return fail(f, "frame is fixed");
+        if (!FAULT(G05m) && sizes[i] > FRAME) return fail(f, "too many bytes");
+        if (sizes[i] > sizeof f->data.frame || (sizes[i] && !v[i])) return fail(f, "too many bytes, or NULL");
+        f->data.frame_size = sizes[i];
+        if (sizes[i]) memcpy(f->data.frame, v[i], sizes[i]);
+    }
+    return OK;
+}
+
 /* Types that no variable has. */
 #define ABSENT(type) \
     EXPORT int fmi3Get##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(READABLE); return n ? fail(f, "no such variable") : OK; } \
     EXPORT int fmi3Set##type(void *c, Refs vr, size_t n, void *v) { (void)vr; (void)v; ENTER(INSTANTIATED | INITIALIZATION | STEP); return n ? fail(f, "no such variable") : OK; }
 ABSENT(Float32) ABSENT(Int8) ABSENT(UInt8) ABSENT(Int16) ABSENT(UInt16)
-ABSENT(UInt32) ABSENT(Int64) ABSENT(UInt64) ABSENT(Binary)
+ABSENT(UInt32) ABSENT(Int64) ABSENT(UInt64)
 
 EXPORT int fmi3GetFMUState(void *c, void **state) { return fmi2GetFMUstate(c, state); }
 EXPORT int fmi3SetFMUState(void *c, void *state) { return fmi2SetFMUstate(c, state); }
@@ -107,42 +125,20 @@ EXPORT int fmi3SerializeFMUState(void *c, void *state, char bytes[], size_t size
 EXPORT int fmi3DeserializeFMUState(void *c, const char bytes[], size_t size, void **state) { return fmi2DeSerializeFMUstate(c, bytes, size, state); }
 
 EXPORT int fmi3DoStep(void *c, double t, double h, bool no_prior, bool *event, bool *terminate, bool *early, double *last) {
-#ifndef FAULT_T06c
-    if (c && (!event || !terminate || !early || !last)) return fail(c, "NULL");
-#endif
+    if (!FAULT(T06c) && c && (!event || !terminate || !early || !last)) return fail(c, "NULL");
     int status = fmi2DoStep(c, t, h, no_prior);
     if (status != OK) return status;
     *event = *terminate = *early = false;
     *last = t + h;
-#ifdef FAULT_T06a
-    *early = true;
-#endif
-#ifdef FAULT_LATE
-    *last += 0.3 * h;
-#endif
-#ifdef FAULT_STANDS
-    *last = t;
-#endif
-#ifdef ENDS
-    *terminate = ((Fmu *)c)->data.steps >= 5;
-#endif
+    if (FAULT(T06a)) *early = true;
+    if (FAULT(LATE)) *last += 0.3 * h;
+    if (FAULT(STANDS)) *last = t;
+    *terminate = ENDS && ((Fmu *)c)->data.steps >= 5;
     return OK;
 }
 
-EXPORT int fmi3EnterConfigurationMode(void *c) {
-#ifdef FAULT_C03
-    return c ? OK : ERROR;
-#else
-    return none(c);
-#endif
-}
-EXPORT int fmi3GetDirectionalDerivative(void *c) {
-#ifdef FAULT_L08u
-    return c ? OK : ERROR;
-#else
-    return none(c);
-#endif
-}
+EXPORT int fmi3EnterConfigurationMode(void *c) { return c && FAULT(C03) ? OK : none(c); }
+EXPORT int fmi3GetDirectionalDerivative(void *c) { return c && FAULT(L08u) ? OK : none(c); }
 
 #define NONE(name) EXPORT int fmi3##name(void *c) { return none(c); }
 NONE(EnterEventMode) NONE(GetClock) NONE(SetClock) NONE(GetNumberOfVariableDependencies)

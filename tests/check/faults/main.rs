@@ -1,0 +1,113 @@
+//! The checker against faults: each makes exactly the right check fail, and its twin without the fault makes none.
+#![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc)]
+
+mod alarms;
+mod archive;
+mod binary;
+mod ci;
+mod description;
+mod exchange;
+mod starts;
+mod zip;
+
+use fmu_check::{Options, Verdict, report::Report};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+use zip::{Entry, write};
+
+/// All findings about a file. Time decides nothing here, however busy the machine is.
+pub fn check(path: &Path, only: &[&str]) -> Report {
+    check_within(path, only, 120)
+}
+
+/// The same with the seconds that a probe may take: few for an FMU that hangs.
+pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
+    let options = Options {
+        only: only.iter().map(ToString::to_string).collect(),
+        patience: Some(Duration::from_secs(seconds)),
+        timeout: None,
+        program: Some(env!("CARGO_BIN_EXE_fmu-check").into()),
+        ..Options::default()
+    };
+    fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The ids of the violated checks.
+pub fn violated(report: &Report) -> Vec<&'static str> {
+    report.violated().map(|f| f.id).collect()
+}
+
+/// What a check that should have failed said.
+pub fn told(report: &Report) -> String {
+    report.violated().map(|f| format!("{}: {:?}", f.id, f.verdict)).collect::<Vec<_>>().join("\n")
+}
+
+/// The verdict of a check that ran.
+pub fn verdict(report: &Report, id: &str) -> Verdict {
+    report.finding(id).map_or_else(|| panic!("{id} did not run"), |f| f.verdict.clone())
+}
+
+/// How the place for the names of faults begins in a library (`fault.h`), and how long it is.
+const PLACE: &[u8] = b"The faults of this library: ";
+const LONGEST: usize = 96;
+
+/// A library of a C file here with these faults, which are words between blanks; `None` without a compiler. It is compiled once for
+/// the same options; the faults are written into a copy.
+pub fn library(source: &str, options: &[&str], faults: &str) -> Option<Vec<u8>> {
+    static COMPILED: Mutex<Option<HashMap<String, Vec<u8>>>> = Mutex::new(None);
+    let key = format!("{source} {}", options.join(" "));
+    let mut compiled = COMPILED.lock().unwrap_or_else(PoisonError::into_inner);
+    let compiled = compiled.get_or_insert_default();
+    if !compiled.contains_key(&key) {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("x.so");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/check/faults").join(source);
+        let mut cc = Command::new("cc");
+        cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden"]).args(options).arg(source);
+        let output = cc.arg("-o").arg(&out).arg("-lm").output().ok()?;
+        assert!(output.status.success(), "{key}: {}", String::from_utf8_lossy(&output.stderr));
+        compiled.insert(key.clone(), std::fs::read(out).unwrap());
+    }
+    let mut bytes = compiled[&key].clone();
+    let at = bytes.windows(PLACE.len()).position(|window| window == PLACE).unwrap() + PLACE.len();
+    assert!(PLACE.len() + faults.len() < LONGEST, "{faults}");
+    bytes[at..at + faults.len()].copy_from_slice(faults.as_bytes());
+    bytes[at + faults.len()] = 0;
+    Some(bytes)
+}
+
+/// An FMU with this description and binary.
+pub fn pack_with(dir: &Path, name: &str, xml: &str, binary: &[u8]) -> PathBuf {
+    let path = dir.join(format!("{name}.fmu"));
+    let platform = if xml.contains("fmiVersion=\"2.0\"") { "linux64" } else { "x86_64-linux" };
+    let entries = [
+        Entry::new("modelDescription.xml", xml.as_bytes()),
+        Entry::new(&format!("binaries/{platform}/Small.so"), binary),
+        Entry::new("documentation/index.html", b"x"),
+        Entry::new("terminalsAndIcons/terminalsAndIcons.xml", b"<fmiTerminalsAndIcons fmiVersion=\"3.0\"/>"),
+    ];
+    write(&path, &entries);
+    path
+}
+
+/// Looks at all rows, several at a time, because some wait; fails with what is wrong with any of them.
+pub fn each<T: Sync>(rows: &[T], look: impl Fn(&T) -> Result<(), String> + Sync) {
+    let (wrong, next) = (Mutex::new(Vec::new()), Mutex::new(rows.iter()));
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| {
+                loop {
+                    let Some(row) = next.lock().unwrap().next() else { return };
+                    if let Err(text) = look(row) {
+                        wrong.lock().unwrap().push(text);
+                    }
+                }
+            });
+        }
+    });
+    let wrong = wrong.into_inner().unwrap();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
