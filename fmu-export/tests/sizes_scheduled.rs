@@ -13,7 +13,7 @@ use std::sync::Once;
 
 /// Adds up its inputs, at each tick.
 #[derive(Clone, Serialize, Deserialize)]
-struct Sums {
+struct Adder {
     n: u64,
     k: u64,
     u: Vec<f64>,
@@ -21,17 +21,17 @@ struct Sums {
     gains: Vec<f64>,
 }
 
-impl Default for Sums {
+impl Default for Adder {
     fn default() -> Self {
         Self { n: 3, k: 1, u: vec![0.0; 3], sums: vec![0.0; 3], gains: vec![1.0] }
     }
 }
 
-type V = Row<Block<Sums>>;
+type V = Row<Block<Adder>>;
 
-impl Model for Sums {
+impl Model for Adder {
     type Outputs = ();
-    const INFO: Info = Info { name: "Sums", ..Info::DEFAULT };
+    const INFO: Info = Info { name: "Adder", ..Info::DEFAULT };
     const TABLE: &'static Table<Block<Self>> = table![
         V::clock("tick", "Adds up", Clock::triggered()).priority(0),
         V::structural("n", "Number of inputs", |m| &mut m.model.n).at_most(4.0).tunable(),
@@ -49,14 +49,14 @@ impl Model for Sums {
     }
 }
 
-impl Clocked for Sums {
+impl Clocked for Adder {
     fn tick(&mut self, _: usize, _: Elapsed) -> Result<(), Fault> {
         self.sums.iter_mut().zip(&self.u).for_each(|(sum, u)| *sum += self.gains[0] * u);
         Ok(())
     }
 }
 
-impl Resizable for Sums {
+impl Resizable for Adder {
     fn resize(&mut self) -> Result<(), Fault> {
         let (n, k) = (usize::try_from(self.n).unwrap(), usize::try_from(self.k).unwrap());
         (self.u, self.sums) = (vec![0.0; n], vec![0.0; n]);
@@ -65,7 +65,7 @@ impl Resizable for Sums {
     }
 }
 
-fmu_export::export!(Sums: Clocked + ScheduledExecution + Resizable);
+fmu_export::export!(Adder: Clocked + ScheduledExecution + Resizable);
 
 const TICK: u32 = 1;
 const N: u32 = 2;

@@ -1,6 +1,7 @@
 //! Structural parameters, arrays whose sizes they are, and arrays of states.
 #![allow(missing_docs)]
 #![allow(
+    clippy::float_cmp,
     clippy::undocumented_unsafe_blocks,
     clippy::borrow_as_ptr,
     reason = "an importer calls C functions, rightly or not"

@@ -93,7 +93,8 @@ impl Twin {
                 N => (&mut model.n, 0..=5, true),
                 K => (&mut model.k, 0..=4, false),
                 ROWS => (&mut model.map.rows, 1..=200, false),
-                _ => (&mut model.n, 1..=0, true),
+                // Not a size.
+                _ => (&mut model.n, 7..=7, true),
             };
             let open = "ic".contains(self.state) || self.state == 'r' && tunable;
             if !open || !range.contains(size) {
@@ -190,6 +191,7 @@ impl World {
     }
 
     /// Status, and the status that the call must have.
+    #[expect(clippy::too_many_lines, reason = "a row for each call")]
     fn call(&mut self, draw: &mut Draw) -> [c_int; 2] {
         let who = draw.below(2);
         let (it, twin) = (&self.its[who], &mut self.twins[who]);
@@ -238,7 +240,7 @@ impl World {
             "sizes" => {
                 let references = [N, K, ROWS, if draw.rarely() { GAINS } else { N }];
                 let first = draw.below(3);
-                let references = &references[first..][..1 + draw.below(2)];
+                let references = &references[first..][..=draw.below(2)];
                 let sizes: Vec<u64> = references.iter().map(|_| draw.of(&[0, 1, 2, 3, 4, 5, 3, 2])).collect();
                 let _ = write!(self.trace, " {references:?} {sizes:?}");
                 let may = twin.is("icr");
@@ -256,7 +258,8 @@ impl World {
                 wanted = verdict(open && fits || n == 0 && twin.values(reference).is_empty() && twin.is("icnsvxr"));
                 if wanted == OK {
                     let model = &mut twin.block.model;
-                    *(if name == "map" { &mut model.map.values } else { &mut model.gains }) = values.clone();
+                    let place = if name == "map" { &mut model.map.values } else { &mut model.gains };
+                    place.clone_from(&values);
                     twin.set |= twin.is("in");
                 }
                 it.set(reference, &values)
