@@ -10,6 +10,7 @@ mod python;
 mod resource;
 mod roberts;
 mod stair;
+mod state_space;
 mod van_der_pol;
 
 use fmu::commands::build::{self, Build};
