@@ -2,6 +2,7 @@
 #![allow(missing_docs, clippy::float_cmp)]
 
 mod bouncing_ball;
+mod clocks;
 mod dahlquist;
 mod feedthrough;
 #[path = "../common/python.rs"]
