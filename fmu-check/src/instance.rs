@@ -1,5 +1,6 @@
 //! An instance under test.
 
+use crate::check::Level;
 use crate::encoding::show;
 use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
@@ -230,6 +231,22 @@ impl Instance<'_> {
             return Err(NotDetermined(format!("getting {} wrote past its {n} values", v.name)));
         }
         Ok((status, buffer.bits()))
+    }
+
+    /// A variable's values after it was set; `None` where they cannot be read. FMI 2.0 lets an importer read few variables in
+    /// Initialization Mode, so that only FMI 3.0 is at fault then.
+    pub(super) fn get_back(&self, v: &ModelVariable) -> Result<Option<Vec<u64>>, NotDetermined> {
+        let (status, back) = self.get(v)?;
+        if status.is_ok() {
+            return Ok(Some(back));
+        }
+        let text = format!("{} was set, and Get({}) returned {status}", v.name, v.name);
+        if self.session.is_v2() {
+            self.session.note(text);
+        } else {
+            self.session.lesser(Level::Should, text);
+        }
+        Ok(None)
     }
 
     /// Sets a variable's values.

@@ -47,6 +47,8 @@ pub(super) enum Line {
     NotApplicable(String),
     /// The check could not decide.
     NotDetermined(String),
+    /// Euler's method needs steps of this size, in s.
+    Integrator(f64),
     /// The probe is complete.
     Done,
 }
@@ -75,6 +77,9 @@ pub struct ProbeArguments {
     /// Print every call with what it returned.
     #[arg(long)]
     pub trace: bool,
+    /// Step of the integrator in s, where that of a twentieth of the communication step is too long.
+    #[arg(long)]
+    pub integrator: Option<f64>,
     /// Time that it may take, in seconds.
     #[arg(long, default_value_t = 10.0)]
     pub seconds: f64,
@@ -94,6 +99,8 @@ pub(super) struct Session {
     /// The level of a crash, if it is lower than that of the check.
     lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
+    /// The step of the integrator in s, if it is not the usual one.
+    pub(super) integrator: Cell<Option<f64>>,
     log: RefCell<File>,
     trace: bool,
     from: usize,
@@ -143,6 +150,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(false),
+            integrator: Cell::new(args.integrator),
             log: RefCell::new(log),
             trace: args.trace,
             from: args.from,
@@ -184,6 +192,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(true),
+            integrator: self.integrator.clone(),
             log: RefCell::new(tempfile::tempfile().map_err(lost)?),
             trace: false,
             from: 0,

@@ -1,5 +1,6 @@
 //! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). Checks the file; `dependencies` checks the binary against it.
 
+use super::clock_rules::lists;
 use super::clocked::clocked_states;
 use super::dependencies::dependencies_hold;
 use super::xml::with_description;
@@ -24,6 +25,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "S02b", clause: "2.0.5, 2.2.8", levels: Levels(Some(Level::Must), None), run: Run::File(sorted),
         requirement: "InitialUnknowns are sorted by index.",
         tried: "Compares the indices of neighbors.", fix: "Sort the list by index before writing it." },
+    Check { id: "S07", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::File(lists),
+        requirement: "A list of the model structure has each entry once, and event indicators are continuous variables of the FMU's own.",
+        tried: "Compares the entries of each list, and looks the event indicators up.", fix: "List each once, and indicators as local continuous variables." },
     Check { id: "S03a", clause: CLAUSE, levels: Levels::MUST, run: Run::File(dependencies_exist),
         requirement: "Every dependency exists.",
         tried: "Looks every dependency up among the variables.", fix: "Refer to indices from 1 in FMI 2.0, to value references in FMI 3.0." },
