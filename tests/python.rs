@@ -4,6 +4,7 @@
 mod common;
 
 use common::python::{environment, pytest_with, run, scratch};
+use fmu::commands::build::{self, Build};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, iter, process};
@@ -24,6 +25,15 @@ fn installed() -> PathBuf {
     folder
 }
 
+/// Archives of the Reference-FMUs that the tests integrate.
+fn reference() -> PathBuf {
+    let folder = scratch().join("python-reference");
+    let package = ["bouncing-ball", "van-der-pol", "stair"].map(String::from).to_vec();
+    let build = Build { package, out: Some(folder.clone()), ..Build::default() };
+    build::run(&build).expect("Reference-FMUs that build");
+    folder
+}
+
 fn package() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("python")
 }
@@ -39,14 +49,22 @@ fn tests_with(requirements: &str, name: &str, files: &[&str], variables: &[(&str
         TESTS,
         name,
         files,
-        &[&[("FMURUN", folder.as_path()), ("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu")))], variables].concat(),
+        &[
+            &[
+                ("FMURUN", folder.as_path()),
+                ("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu"))),
+                ("FMU_REFERENCE", &reference()),
+            ],
+            variables,
+        ]
+        .concat(),
     );
     let _ = fs::remove_dir_all(&folder);
 }
 
 #[test]
 fn the_package() {
-    let files = ["simulate", "fmpy", "batch", "plan", "dask", "gym", "examples", "cli", "types", "figures"];
+    let files = ["simulate", "exchange", "fmpy", "batch", "plan", "dask", "gym", "examples", "cli", "types", "figures"];
     let files = files.map(|name| format!("test_{name}.py"));
     tests("fmurun", &files.each_ref().map(String::as_str), &[]);
 }
@@ -55,7 +73,11 @@ fn the_package() {
 #[test]
 #[ignore = "opt-in: cargo test --test python figures -- --ignored --nocapture"]
 fn figures() {
-    tests("figures", &["test_figures.py", "-s"], &[("FMU_FIGURES", Path::new("1"))]);
+    tests(
+        "figures",
+        &["test_figures.py", "test_exchange.py::test_the_drive_in_model_exchange_is_fast", "-s"],
+        &[("FMU_FIGURES", Path::new("1"))],
+    );
 }
 
 /// The examples for Ray and OpenTURNS, and a step of gym-electric-motor against one of ours.

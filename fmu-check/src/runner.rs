@@ -59,13 +59,13 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
             let found = match (&runner, why) {
                 (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
                 (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
-                (Ok(runner), _) if matches!(check.run, Run::Twice(_)) => match runner.once_more(check) {
-                    Some(found) => found,
-                    None => {
+                (Ok(runner), _) if matches!(check.run, Run::Twice(_)) => {
+                    let Some(found) = runner.once_more(check) else {
                         put_back(&queue, (check, verdict));
                         continue;
-                    }
-                },
+                    };
+                    found
+                }
                 (Ok(runner), _) => runner.run(check),
             };
             store(verdict, found);
@@ -218,7 +218,11 @@ impl Runner {
         };
         let (simulation, exchange) = (binary(&description.co_simulation)?, binary(&description.model_exchange)?);
         if simulation.is_none() && exchange.is_none() {
-            return Err("the description has no interface for co-simulation or Model Exchange".into());
+            return Err(if description.scheduled_execution.is_some() {
+                "the FMU is for Scheduled Execution only, and the checker does not run that".into()
+            } else {
+                "the description has no interface for co-simulation or Model Exchange".into()
+            });
         }
         let program = options.program.clone().map_or_else(std::env::current_exe, Ok).map_err(|e| e.to_string())?;
         Ok(Self {

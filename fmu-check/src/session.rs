@@ -8,9 +8,7 @@ use crate::encoding::bits;
 use clap::Args;
 use fmu_import::raw::{Arguments, Interface, Raw};
 use fmu_import::{file_uri, printable_lines};
-use model_description::{
-    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability,
-};
+use model_description::{BaseType, Causality, FmiVersion, Initial, ModelDescription, ModelVariable, Variability};
 use serde::{Deserialize, Serialize};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
@@ -108,6 +106,8 @@ pub(super) struct Session {
     next: Cell<usize>,
     violations: Cell<usize>,
     instances_made: Cell<usize>,
+    /// Instances of this case.
+    of_case: Cell<usize>,
     began: Instant,
     /// When `show_progress` last wrote.
     shown: Cell<Instant>,
@@ -158,6 +158,7 @@ impl Session {
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(0),
+            of_case: Cell::new(0),
             began: Instant::now(),
             shown: Cell::new(Instant::now()),
             home,
@@ -200,6 +201,7 @@ impl Session {
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(1000 * (number + 1)),
+            of_case: Cell::new(0),
             began: self.began,
             shown: Cell::new(Instant::now()),
             home: self.home.clone(),
@@ -270,6 +272,7 @@ impl Session {
         if number < self.from || (self.one && number > self.from) {
             return;
         }
+        self.of_case.set(0);
         self.write(&Line::Case(number));
         self.note_call(&format!("\n# case {number}\n"));
         if let Err(NotDetermined(why)) = case() {
@@ -329,6 +332,17 @@ impl Session {
     /// Adds what the last call returned.
     pub(super) fn record_result(&self, result: &dyn std::fmt::Display) {
         self.note_call(&format!(" -> {result}"));
+    }
+
+    /// Adds a value that the last call returned.
+    pub(super) fn record_value(&self, value: &str) {
+        self.note_call(&format!(", {value}"));
+    }
+
+    /// The number of one more instance of this case.
+    pub(super) fn another(&self) -> usize {
+        self.of_case.set(self.of_case.get() + 1);
+        self.of_case.get()
     }
 
     /// Tells the parent, from time to time, that calls without entries of their own return.
@@ -454,14 +468,13 @@ impl Session {
 
     /// Number of elements of a variable.
     pub(super) fn elements(&self, v: &ModelVariable) -> usize {
-        let extent = |d: &Dimension| match d {
-            Dimension::Fixed(n) => usize::try_from(*n).unwrap_or(1),
-            Dimension::Variable(r) => {
-                let size = self.description.variables.iter().find(|s| s.value_reference == *r);
-                size.and_then(|s| s.start.as_deref()?.trim().parse().ok()).unwrap_or(1)
-            }
-        };
-        v.dimensions.iter().map(extent).product()
+        self.description.shape(v).unwrap_or_default().iter().product()
+    }
+
+    /// Number of values that references stand for; one that does not exist counts as one value.
+    pub(super) fn values_of(&self, references: &[u32]) -> usize {
+        let of = |r: &u32| self.description.variables.iter().find(|v| v.value_reference == *r);
+        references.iter().map(|r| of(r).map_or(1, |v| self.elements(v))).sum()
     }
 
     /// A value near the start value, within the range, that differs from it.

@@ -3,6 +3,7 @@
 //!
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
 //! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs from files.
+//! - [`integration`]: integrators with events, for Model Exchange.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
 //! - [`guard`]: processes of their own for FMUs of unknown origin.
 //!
@@ -32,13 +33,14 @@ mod error;
 mod folder;
 pub mod guard;
 mod instance;
-mod integration;
+pub mod integration;
 pub mod machine;
 pub mod platform;
 mod quantity;
 pub mod ssp;
 mod standard;
 mod text;
+pub mod trace;
 mod value;
 
 pub use abi::journal;
@@ -205,6 +207,14 @@ impl Fmu {
     /// # Errors
     /// The FMU refuses or has no such interface, or a name has a null byte.
     pub fn instantiate_as(&self, kind: Kind, name: &str, logging: bool) -> Result<Instance, Error> {
+        self.instantiate_with(kind, name, logging, false)
+    }
+
+    /// Creates an instance of this kind; `visible` lets an FMU with a window of its own show it.
+    ///
+    /// # Errors
+    /// As [`instantiate_as`](Self::instantiate_as).
+    pub fn instantiate_with(&self, kind: Kind, name: &str, logging: bool, visible: bool) -> Result<Instance, Error> {
         let functions = self.functions(kind, name)?;
         let c_name = text(name, name)?;
         let token = text(name, &self.description.token)?;
@@ -217,7 +227,7 @@ impl Fmu {
         let resources = text(name, &resources)?;
         let id = journal::name(name);
         journal::note(id, Call::Instantiate);
-        match functions.instantiate(&c_name, &token, &resources, &log, logging, kind) {
+        match functions.instantiate([&c_name, &token, &resources], &log, [logging, visible], kind) {
             Ok(live) => Ok(Instance::new(name, id, self.description.clone(), live, kind, log)),
             Err(refusal) => Err(explain(name, refusal, log.reason())),
         }

@@ -127,15 +127,23 @@ impl Values {
     /// # Errors
     /// A text is not a number.
     pub fn from_number(x: f64, base: BaseType) -> Result<Self, String> {
+        Self::from_numbers(&[x], base)
+    }
+
+    /// Numbers as the elements of an array, each as in [`from_number`](Self::from_number).
+    ///
+    /// # Errors
+    /// A text is not a number.
+    pub fn from_numbers(numbers: &[f64], base: BaseType) -> Result<Self, String> {
         match base {
-            BaseType::Float32 | BaseType::Float64 => Ok(Self::Reals(vec![x])),
-            BaseType::Boolean | BaseType::Clock => Ok(Self::Booleans(vec![x != 0.0])),
+            BaseType::Float32 | BaseType::Float64 => Ok(Self::Reals(numbers.to_vec())),
+            BaseType::Boolean | BaseType::Clock => Ok(Self::Booleans(numbers.iter().map(|x| *x != 0.0).collect())),
             BaseType::String | BaseType::Binary => Err(format!("a {base} takes no number")),
             _ => {
                 // Beyond the range of the variable's type the setter refuses; a NaN becomes 0.
                 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
-                let rounded = x.round() as i128;
-                Ok(Self::Integers(vec![rounded]))
+                let rounded = numbers.iter().map(|x| x.round() as i128).collect();
+                Ok(Self::Integers(rounded))
             }
         }
     }

@@ -69,21 +69,31 @@ impl ModelDescription {
 
     /// Extents of a variable, none of a scalar; a structural parameter counts with its start value. `None` if a size is not known.
     pub fn shape(&self, variable: &ModelVariable) -> Option<Vec<usize>> {
+        self.shape_with(variable, |_| None)
+    }
+
+    /// [`shape`](Self::shape), where `size` has the structural parameters, by value reference, that do not have their start values.
+    pub fn shape_with(&self, variable: &ModelVariable, size: impl Fn(u32) -> Option<usize>) -> Option<Vec<usize>> {
         let extent = |dimension: &Dimension| match dimension {
             Dimension::Fixed(n) => usize::try_from(*n).ok(),
-            Dimension::Variable(reference) => {
+            Dimension::Variable(reference) => size(*reference).or_else(|| {
                 let size = self.variables.iter().find(|v| v.value_reference == *reference)?;
                 size.start.as_ref()?.trim().parse().ok()
-            }
+            }),
         };
         variable.dimensions.iter().map(extent).collect()
     }
 
     /// The array of FMI 3.0 and the index of its element that this name means: `x[2]`, `m[1,2]`.
     pub fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
+        self.element_with(name, |_| None)
+    }
+
+    /// [`element`](Self::element) with sizes as for [`shape_with`](Self::shape_with).
+    pub fn element_with(&self, name: &str, size: impl Fn(u32) -> Option<usize>) -> Option<(&ModelVariable, usize)> {
         let (array, _) = name.rsplit_once('[')?;
         let variable = self.variable(array).filter(|v| v.is_array())?;
-        Some((variable, element(&self.shape(variable)?, &name[array.len()..])?))
+        Some((variable, element(&self.shape_with(variable, size)?, &name[array.len()..])?))
     }
 
     /// The variable of this name, or the array of which it names an element.
@@ -96,7 +106,11 @@ impl ModelDescription {
     pub fn referenced(&self, reference: u32) -> Option<&ModelVariable> {
         match self.version {
             FmiVersion::V2 => self.variables.get(usize::try_from(reference).ok()?.checked_sub(1)?),
-            FmiVersion::V3 => self.variables.iter().find(|v| v.value_reference == reference),
+            // They mostly ascend.
+            FmiVersion::V3 => match self.variables.binary_search_by_key(&reference, |v| v.value_reference) {
+                Ok(place) => self.variables.get(place),
+                Err(_) => self.variables.iter().find(|v| v.value_reference == reference),
+            },
         }
     }
 
@@ -188,6 +202,11 @@ impl Interface {
     /// `DoStep` may return before the end of the step, for its own reasons or after an intermediate update (FMI 3.0 only).
     pub fn may_return_early(&self) -> bool {
         self.flag("mightReturnEarlyFromDoStep") || self.flag("canReturnEarlyAfterIntermediateUpdate")
+    }
+
+    /// The FMU has directional derivatives.
+    pub fn has_directional_derivatives(&self) -> bool {
+        self.flag(self.of("providesDirectionalDerivative", "providesDirectionalDerivatives"))
     }
 
     /// The FMU wants to know of every completed integrator step (Model Exchange): FMI 2.0 says when it does not, FMI 3.0

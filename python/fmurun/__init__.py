@@ -1,6 +1,6 @@
 """Runs FMUs of FMI 2.0 and FMI 3.0: FMPy's `simulate_fmu`, millions of runs, batches.
 
-- `simulate_fmu`: one run, as FMPy does it: same arguments, same result, same bits.
+- `simulate_fmu`: one run, as FMPy does it: same arguments, same result, Co-Simulation or Model Exchange.
 - `Plan`: a system of FMUs for many runs on all processors, and on clusters by `fmurun.dask.sweep`.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
 - `fmurun.fmpy`: FMPy's classes for loops written by hand.

@@ -25,7 +25,7 @@ class InterfaceType:
 
 
 class ModelExchange(InterfaceType):
-    """Model exchange; this package does not run it."""
+    """Model Exchange."""
 
 
 class ScheduledExecution(InterfaceType):

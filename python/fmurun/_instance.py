@@ -7,6 +7,8 @@ import tempfile
 import zipfile
 from functools import lru_cache
 
+import numpy as np
+
 from . import _core
 from ._description import _build
 from ._error import FmuError
@@ -64,43 +66,127 @@ def extract(filename, unzipdir=None, include=None):
     return unzipdir
 
 
-def _refuse(**arguments):
-    """Refuse values of arguments that this package does not support."""
-    for name, value in arguments.items():
-        if value not in (None, False):
-            raise NotImplementedError(f"{name} = {value!r}: fmurun does not do this; FMPy does")
+def _array(values, n):
+    """The memory of `n` numbers, given as a NumPy array or as an array or a pointer of ctypes."""
+    if isinstance(values, np.ndarray):
+        return values.reshape(-1)[:n]
+    return np.ctypeslib.as_array(values, (n,)) if n else np.empty(0)
 
 
-class _Slave(_core.Instance):
-    """The methods that both standards share."""
+class _Instance(_core.Instance):
+    """The methods that both standards and both interfaces share."""
 
-    def __new__(cls, guid, unzipDirectory, modelIdentifier=None, instanceName=None, fmiCallLogger=None, requireFunctions=True,
-                libraryPath=None, *, loggingOn=False, fmu=None):  # fmt: skip
-        _refuse(fmiCallLogger=fmiCallLogger, libraryPath=libraryPath)
+    def __new__(cls, guid, unzipDirectory, modelIdentifier=None, instanceName=None, libraryPath=None, fmiCallLogger=None,
+                requireFunctions=True, *, kind=None, loggingOn=False, visible=False, logger=None, fmu=None):  # fmt: skip
+        if libraryPath is not None:
+            raise ValueError(f"libraryPath = {libraryPath!r}: the library of the archive is used; pack another one into it")
         fmu = fmu or _open(unzipDirectory)
-        made = super().__new__(cls, fmu, instanceName or _described(fmu).modelName, loggingOn)
-        made.fmu, made.unzipDirectory, made.modelDescription = fmu, unzipDirectory, _described(fmu)
+        description = _described(fmu)
+        kind = kind or (issubclass(cls, (FMU2Model, FMU3Model)), False, False)
+        talks = logger is not None or fmiCallLogger is not None
+        made = super().__new__(_talking(cls) if talks else cls, fmu, instanceName or description.modelName, kind,
+                               bool(loggingOn), bool(visible), fmiCallLogger is not None)  # fmt: skip
+        made.fmu, made.unzipDirectory, made.modelDescription = fmu, unzipDirectory, description
+        made._loggers, made._freed = (logger, fmiCallLogger), False
         return made
 
+    def __init__(self, *_, **__):
+        pass
+
     def instantiate(self, visible=False, callbacks=None, loggingOn=False, **more):
-        """Switch logging on; the instance exists already."""
-        _refuse(visible=visible, callbacks=callbacks, **more)
+        """Switch logging on; the instance exists already, with the arguments of `instantiate_fmu`."""
+        late = [name for name, value in {"visible": visible, "callbacks": callbacks, **more}.items() if value]
+        if late:
+            raise ValueError(f"{', '.join(late)}: give this to instantiate_fmu, which creates the instance")
         if loggingOn:
             self._set_debug_logging(True)
 
     def setDebugLogging(self, loggingOn, categories=()):
-        """Switch logging of all categories on or off."""
-        _refuse(categories=list(categories) or None)
+        """Switch logging of all categories on or off, whatever `categories` says."""
         self._set_debug_logging(bool(loggingOn))
 
     def messages(self):
         """Take the FMU's messages since the last call: (status, category, text)."""
         return self._take_messages()
 
+    def _talk(self):
+        """Give messages and calls since the last time to the loggers."""
+        logger, call_logger = self._loggers
+        if call_logger is not None:
+            for line in self._take_calls():
+                call_logger(line)
+        if logger is not None and not self._freed:
+            for status, category, text in self._take_messages():
+                name = self.instanceName.encode()
+                before = (None, name) if self.modelDescription.fmiVersion == "2.0" else (None,)
+                logger(*before, _STATUS.get(status, 5), category.encode(), text.encode())
 
-class FMU2Slave(_Slave):
-    """A co-simulation instance of FMI 2.0 with FMPy's methods."""
+    def getDirectionalDerivative(self, unknowns, knowns, seed, nSensitivity=None):
+        """Partial derivatives of the unknowns in the direction of the seed of the knowns, by value references."""
+        return self._sensitivity(list(unknowns), list(knowns), list(seed), nSensitivity or len(unknowns), False)
 
+
+_STATUS = {"OK": 0, "Warning": 1, "Discard": 2, "Error": 3, "Fatal": 4, "Pending": 5}
+
+
+@lru_cache
+def _talking(cls):
+    """The class with methods that call the loggers when they end."""
+
+    def __getattribute__(self, name):
+        value = cls.__getattribute__(self, name)
+        if name.startswith("_") or not callable(value):
+            return value
+
+        def method(*arguments, **named):
+            try:
+                return value(*arguments, **named)
+            finally:
+                self._talk()
+
+        def free():
+            self._talk()
+            value()
+            self._freed = True
+            self._talk()
+
+        return free if name == "freeInstance" else method
+
+    return type(cls.__name__, (cls,), {"__getattribute__": __getattribute__})
+
+
+class _Model:
+    """Methods of Model Exchange. Vectors are NumPy arrays, or arrays or pointers of ctypes as in FMPy, with their length."""
+
+    enterContinuousTimeMode = _core.Instance._enter_continuous
+    setTime = _core.Instance._set_time
+
+    def completedIntegratorStep(self, noSetFMUStatePriorToCurrentPoint=True):
+        """Report a completed step: (enter event mode, terminate)."""
+        return self._completed()
+
+    def setContinuousStates(self, x, nx):
+        """Set all continuous states."""
+        self._set_states(_array(x, nx).tolist())
+
+    def getContinuousStates(self, x, nx):
+        """Read all continuous states."""
+        _array(x, nx)[:] = self._vector("states", nx)
+
+    def getDerivatives(self, dx, nx):
+        """Compute the derivatives of all states."""
+        _array(dx, nx)[:] = self._vector("derivatives", nx)
+
+    def getEventIndicators(self, z, nz):
+        """Compute all event indicators."""
+        _array(z, nz)[:] = self._vector("indicators", nz)
+
+    def getNominalsOfContinuousStates(self, nominals, nx):
+        """Read the nominal values of all states."""
+        _array(nominals, nx)[:] = self._vector("nominals", nx)
+
+
+class _FMU2(_Instance):
     getReal = _core.Instance._get_reals
     setReal = _core.Instance._set_reals
 
@@ -119,16 +205,54 @@ class FMU2Slave(_Slave):
     deSerializeFMUstate = _core.Instance.deserializeFMUState
 
 
-class FMU3Slave(_Slave):
-    """A co-simulation instance of FMI 3.0 with FMPy's methods. Getters return all elements of arrays."""
+class _FMU3(_Instance):
+    """Getters return all elements of arrays."""
 
     getFloat64 = _core.Instance._get_reals
     setFloat64 = _core.Instance._set_reals
+    updateDiscreteStates = _core.Instance._update
 
     def enterInitializationMode(self, tolerance=None, startTime=0.0, stopTime=None):
         """Begin the initialization; times (s) and relative tolerance of the experiment."""
         self._setup(tolerance, startTime, stopTime)
         self._enter()
+
+    def getAdjointDerivative(self, unknowns, knowns, seed, nSensitivity=None):
+        """The seed of the unknowns times their partial derivatives, by value references."""
+        return self._sensitivity(list(unknowns), list(knowns), list(seed), nSensitivity or len(knowns), True)
+
+
+class FMU2Slave(_FMU2):
+    """A Co-Simulation instance of FMI 2.0 with FMPy's methods."""
+
+    getRealOutputDerivatives = _core.Instance._output_derivatives
+
+
+class FMU3Slave(_FMU3):
+    """A Co-Simulation instance of FMI 3.0 with FMPy's methods."""
+
+    getOutputDerivatives = _core.Instance._output_derivatives
+    enterStepMode = _core.Instance._enter_steps
+
+
+class FMU2Model(_Model, _FMU2):
+    """A Model Exchange instance of FMI 2.0 with FMPy's methods."""
+
+    newDiscreteStates = _core.Instance._update
+
+
+class FMU3Model(_Model, _FMU3):
+    """A Model Exchange instance of FMI 3.0 with FMPy's methods."""
+
+    getContinuousStateDerivatives = _Model.getDerivatives
+
+    def getNumberOfContinuousStates(self):
+        """Number of continuous states."""
+        return self._counts()[0]
+
+    def getNumberOfEventIndicators(self):
+        """Number of event indicators."""
+        return self._counts()[1]
 
 
 def _typed(type_):
@@ -143,9 +267,9 @@ def _typed(type_):
 
 
 for _class, _types in (
-    (FMU2Slave, ("Integer", "Boolean", "String")),
-    (FMU3Slave, ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String",
-                 "Binary")),
+    (_FMU2, ("Integer", "Boolean", "String")),
+    (_FMU3, ("Float32", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64", "Boolean", "String",
+             "Binary")),
 ):
     for _type in _types:
         _get, _set = _typed(_type)
@@ -157,24 +281,46 @@ for _class, _types in (
 def instantiate_fmu(unzipdir, model_description, fmi_type=None, visible=False, debug_logging=False, logger=None,
                     fmi_call_logger=None, library_path=None, early_return_allowed=False, event_mode_used=False,
                     intermediate_update=None, require_functions=True, required_intermediate_variables=None):  # fmt: skip
-    """Create a co-simulation instance from an extracted FMU, or from the archive itself.
+    """Create an instance from an extracted FMU, or from the archive itself, for Co-Simulation or Model Exchange.
 
-    Arguments as FMPy's. NotImplementedError names one that this package does not know.
+    Arguments as FMPy's. `logger` gets the FMU's messages as FMPy's does, when the call that caused them ends; `fmi_call_logger`
+    gets a line "fmi3DoStep -> OK" for each call. Calls during a step, `intermediate_update`, are not made.
     """
-    _refuse(visible=visible, logger=logger, fmi_call_logger=fmi_call_logger, library_path=library_path,
-            early_return_allowed=early_return_allowed, event_mode_used=event_mode_used,
-            intermediate_update=intermediate_update,
-            required_intermediate_variables=required_intermediate_variables)  # fmt: skip
-    if fmi_type not in (None, "CoSimulation") or model_description.coSimulation is None:
-        fmi_type = fmi_type if model_description.coSimulation else "of an FMU without co-simulation"
-        raise NotImplementedError(f"fmi_type = {fmi_type!r}: fmurun runs co-simulation only; FMPy does the rest")
-    return _instance(_open(unzipdir), debug_logging, unzipdir)
+    unsupported = {"library_path": library_path, "intermediate_update": intermediate_update,
+                   "required_intermediate_variables": required_intermediate_variables}  # fmt: skip
+    for name, value in unsupported.items():
+        if value is not None:
+            raise ValueError(f"{name} = {value!r}: fmurun has no such instances; FMPy has")
+    fmu = _open(unzipdir)
+    kind = _kind(_described(fmu), _interface(model_description, fmi_type), event_mode_used, early_return_allowed)
+    return _instance(fmu, kind, unzipdir, debug_logging, visible, logger, fmi_call_logger)
 
 
-def _instance(fmu, debug_logging, unzipdir=None):
+def _interface(description, fmi_type):
+    """ "CoSimulation" or "ModelExchange": what is asked for, or what the FMU has."""
+    has = {"CoSimulation": description.coSimulation, "ModelExchange": description.modelExchange}
+    if fmi_type is None:
+        fmi_type = next((name for name, interface in has.items() if interface), "CoSimulation")
+    if fmi_type not in has:
+        raise ValueError(f"fmi_type must be CoSimulation or ModelExchange, not {fmi_type!r}")
+    if not has[fmi_type]:
+        raise FmuError(None, None, description.modelName, f"has no {fmi_type}")
+    return fmi_type
+
+
+def _kind(description, fmi_type, event_mode, early_return):
+    """(Model Exchange, event mode, early return) as far as the FMU has them."""
+    exchange, stepping = fmi_type == "ModelExchange", description.coSimulation
+    three = description.fmiVersion != "2.0" and not exchange
+    return exchange, three and event_mode and stepping.hasEventMode, three and early_return and stepping.mightReturnEarlyFromDoStep
+
+
+def _instance(fmu, kind, unzipdir=None, debug_logging=False, visible=False, logger=None, fmi_call_logger=None):
     """An instance of an open FMU."""
-    slave = FMU2Slave if _described(fmu).fmiVersion == "2.0" else FMU3Slave
-    return slave(None, unzipdir, loggingOn=bool(debug_logging), fmu=fmu)
+    classes = ((FMU3Slave, FMU3Model), (FMU2Slave, FMU2Model))
+    cls = classes[_described(fmu).fmiVersion == "2.0"][kind[0]]
+    return cls(None, unzipdir, kind=kind, loggingOn=debug_logging, visible=visible, logger=logger,
+               fmiCallLogger=fmi_call_logger, fmu=fmu)  # fmt: skip
 
 
 def dump(filename):

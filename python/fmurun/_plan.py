@@ -334,4 +334,4 @@ def _values(name, column, core, full):
     bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
     if bad:
         raise TypeError(f"the column {name} must have numbers, not {bad[0]!r}")
-    return np.ascontiguousarray(array, dtype=np.float64)
+    return np.require(array, np.float64, ["C", "A"])

@@ -1,11 +1,12 @@
-"""FMPy's `simulate_fmu` for co-simulation: its arguments, its result, its bits."""
+"""FMPy's `simulate_fmu`: its arguments, its result, its bits."""
 
+import warnings
 from math import prod
 
 import numpy as np
 
 from . import _core
-from ._instance import _described, _instance, _open, _refuse
+from ._instance import _described, _instance, _interface, _kind, _Model, _open
 
 # Columns are grouped by type, in this order.
 _COLUMNS = {
@@ -56,13 +57,13 @@ class Recorder:
         return result
 
 
-def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solver="CVode", step_size=None,
+def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solver=None, step_size=None,
                  relative_tolerance=None, output_interval=None, record_events=True, fmi_type=None, start_values={},
                  apply_default_start_values=False, input=None, output=None, timeout=None, debug_logging=False, visible=False,
                  logger=None, fmi_call_logger=None, step_finished=None, model_description=None, fmu_instance=None,
                  set_input_derivatives=False, remote_platform="auto", early_return_allowed=False, use_event_mode=False,
                  initialize=True, terminate=True, fmu_state=None, set_stop_time=True):  # fmt: skip
-    """Simulate an FMU by co-simulation, like FMPy 0.3.32: same arguments, same communication points, same bits.
+    """Simulate an FMU like FMPy 0.3.32: same arguments, same points; for Co-Simulation and with Euler same bits.
 
     FMUs stay open: another simulation of the same file reads it, compares its bytes and does not unpack it again.
 
@@ -70,22 +71,30 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         filename: an .fmu file, or the folder that it was extracted to
         validate: refuse start values that could not be set
         start_time, stop_time: of the simulation (s); by default the FMU's default experiment, else 0 and one second more
-        relative_tolerance: of a solver inside the FMU
+        solver: for Model Exchange: "Dopri" (the default: Dormand-Prince, its step follows `relative_tolerance`, events are
+            located), "RK4" (fixed steps of `step_size`), "Euler" (FMPy's); "CVode" is "Dopri" with a warning
+        step_size: of "RK4" (s); by default a thousandth of the time, rounded to a power of ten
+        relative_tolerance: of "Dopri", or of a solver inside the FMU
         output_interval: communication step (s); by default the FMU's, doubled until there are at most 1000 steps
-        fmi_type: None or "CoSimulation"
+        record_events: Model Exchange: two rows for each event, before and after it
+        fmi_type: "CoSimulation" or "ModelExchange"; by default the first of them that the FMU has
         start_values: name -> value, or (value, unit); inputs that `input` does not have keep theirs
         input: structured array, its first column is time (s), the others are inputs and tunable parameters
         output: names to record; by default the outputs
         timeout: end after this much time of the clock (s)
-        debug_logging: the FMU logs; its messages are printed at the end
+        debug_logging: the FMU logs; `logger` gets its messages, without one they are printed
+        logger: called like FMPy's for each message, after the step that caused it
+        fmi_call_logger: called with a line for each call to the FMU, "fmi3DoStep -> OK"
         step_finished: called with (time, recorder) after each step; False ends the simulation
         model_description, fmu_instance: read and instantiated before; a given instance is not freed
+        set_input_derivatives: also set derivatives of continuous inputs (Co-Simulation of FMI 2.0)
+        remote_platform: None or "auto"; the FMU needs a binary for this platform
+        early_return_allowed, use_event_mode: of Co-Simulation of FMI 3.0, where the FMU has them
         initialize, terminate: False leaves the given instance as it is before and after
         fmu_state: state of `fmu_instance`, or bytes of a serialized one: begin there instead of with an initialization
         set_stop_time: tell the FMU the stop time
 
-    An unknown name raises an error; FMPy ignores it. `solver`, `step_size` and `record_events` belong to model exchange and have
-    no effect, as in FMPy. Model exchange and the other arguments of FMPy raise NotImplementedError.
+    An unknown name raises an error; FMPy ignores it.
 
     Returns:
         a structured array, one row per communication point, `time` (s) first, then the variables by type
@@ -100,34 +109,46 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
     >>> result.dtype.names, len(result), bool(result["speed"][-1] < 0)
     (('time', 'speed'), 101, True)
     """
-    _refuse(visible=visible, logger=logger, fmi_call_logger=fmi_call_logger, set_input_derivatives=set_input_derivatives,
-            use_event_mode=use_event_mode)  # fmt: skip
     if remote_platform not in ("auto", None):
-        raise NotImplementedError(f"remote_platform = {remote_platform!r}: fmurun runs binaries of this platform only")
-    if fmi_type not in (None, "CoSimulation"):
-        raise NotImplementedError(f"fmi_type = {fmi_type!r}: fmurun runs co-simulation only; FMPy does the rest")
+        raise ValueError(f"remote_platform = {remote_platform!r}: fmurun runs binaries of this platform")
     fmu = fmu_instance.fmu if fmu_instance is not None else _open(filename)
     description = model_description or _described(fmu)
-    if early_return_allowed and description.coSimulation.mightReturnEarlyFromDoStep:
-        raise NotImplementedError("early_return_allowed = True: this FMU may return early, which fmurun never lets it; FMPy does")
+    if fmi_type is None and fmu_instance is not None:
+        fmi_type = "ModelExchange" if isinstance(fmu_instance, _Model) else "CoSimulation"
+    exchange = _interface(description, fmi_type) == "ModelExchange"
+    if exchange and not (initialize and fmu_state is None):
+        raise ValueError("a simulation for ModelExchange begins with an initialization: leave initialize and fmu_state")
     if not initialize and fmu_instance is None and fmu_state is None:
         raise ValueError("initialize = False needs fmu_instance or fmu_state")
+    kind = _kind(description, "ModelExchange" if exchange else "CoSimulation", use_event_mode, early_return_allowed)
 
-    times, tolerance = _times(description, start_time, stop_time, output_interval, relative_tolerance)
+    times, tolerance = _times(description, start_time, stop_time, output_interval, relative_tolerance, exchange, step_size)
     variables = {v.name: v for v in description.modelVariables}
     before, during = _start_values(variables, description, start_values, validate)
     dtype, columns = _columns(description, variables, output)
     samples = None if input is None else _samples(description, variables, input)
+    if exchange:
+        way = _solver(solver, times, step_size, tolerance) | {"record_events": record_events}
+        tolerance = None
+    else:
+        way = {"variable_step": description.coSimulation.canHandleVariableCommunicationStepSize, "event_mode": kind[1]}
+    if set_input_derivatives:
+        if exchange or description.fmiVersion != "2.0" or not description.coSimulation.canInterpolateInputs:
+            raise ValueError(f"set_input_derivatives = True: {description.modelName} does not interpolate inputs")
+        way["input_derivatives"] = True
 
-    instance = fmu_instance if fmu_instance is not None else _instance(fmu, debug_logging, filename)
+    instance = fmu_instance
+    if instance is None:
+        talk = logger or (_print_message(description) if debug_logging else None)
+        instance = _instance(fmu, kind, filename, debug_logging, visible, talk, fmi_call_logger)
+    talks = instance._loggers != (None, None)
     try:
         if fmu_state is not None:
             state = instance.deserializeFMUState(fmu_state) if isinstance(fmu_state, bytes) else fmu_state
             instance.setFMUState(state)
             if isinstance(fmu_state, bytes):
                 instance.freeFMUState(state)
-        variable_step = description.coSimulation.canHandleVariableCommunicationStepSize
-        simulation = _core.Simulation(instance, times, variable_step, columns, samples)
+        simulation = _core.Simulation(instance, times, way, columns, samples)
         if initialize and fmu_state is None:
             start, stop, _ = times
             instance._setup(tolerance, start, stop if set_stop_time else None)
@@ -136,34 +157,72 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
             _apply(instance, during)
             simulation.apply()
             instance.exitInitializationMode()
-        simulation.sample(times[0])
+            simulation.begin()
+        else:
+            simulation.sample(times[0])
         recorder = Recorder(instance, description, simulation, dtype)
-        if step_finished is None:
+        if step_finished is None and not talks:
             simulation.finish(None if timeout is None else float(timeout))
         else:
             _follow(simulation, recorder, step_finished, timeout)
-        if terminate:
+        if terminate or exchange:
             instance.terminate()
         return recorder._result(True)
     finally:
-        if debug_logging:
-            for status, category, text in instance.messages():
-                print(f"[{status}] [{instance.instanceName}] {category}: {text}")
+        if talks:
+            instance._talk()
         if fmu_instance is None:
             instance.freeInstance()
 
 
+def _print_message(description):
+    """A logger that prints."""
+    if description.fmiVersion == "2.0":
+        return lambda _, name, status, category, text: print(f"[{name.decode()}] {category.decode()}: {text.decode()}")
+    return lambda _, status, category, text: print(f"[{description.modelName}] {category.decode()}: {text.decode()}")
+
+
 def _follow(simulation, recorder, step_finished, timeout):
-    """Step by step with a callback."""
+    """Step by step with callbacks."""
     from time import time as clock
 
-    begin = clock()
+    begin, talk = clock(), recorder.fmu._talk
     while (timeout is None or clock() - begin <= float(timeout)) and simulation.step():
-        if not step_finished(simulation.time, recorder):
+        talk()
+        if step_finished is not None and not step_finished(simulation.time, recorder):
             break
 
 
-def _times(description, start, stop, interval, tolerance):
+_SOLVERS = ("Dopri", "RK4", "Euler", "CVode")
+_told = set()
+
+
+def _solver(name, times, step_size, tolerance):
+    """How to integrate."""
+    if name not in (None, *_SOLVERS):
+        raise ValueError(f"solver = {name!r}: there is no such solver; expected one of {', '.join(_SOLVERS)}")
+    if name == "CVode" and name not in _told:
+        _told.add(name)
+        warnings.warn("solver='CVode': fmurun has no CVode and integrates with Dopri, which is explicit; "
+                      "give solver='Dopri', or FMPy for a stiff FMU", stacklevel=3)  # fmt: skip
+    start, stop, interval = times
+    rtol = 1e-5 if tolerance is None else tolerance
+    if not 1e-14 <= rtol <= 0.1:
+        raise ValueError(f"relative_tolerance must be between 1e-14 and 0.1, not {rtol}")
+    step = _default_step(stop - start) or interval if step_size is None else float(step_size)
+    if not (step > 0.0 and np.isfinite(step)):
+        raise ValueError(f"step_size must be positive and finite, not {step}")
+    if name in ("Euler", "RK4") and not np.isclose(round(interval / step) * step, interval):
+        raise ValueError(f"output_interval {interval} must be a multiple of step_size {step} for the solver {name}")
+    return {"solver": "Dopri" if name in (None, "CVode") else name, "step": step, "rtol": rtol}
+
+
+def _default_step(time):
+    """FMPy's step of fixed-step solvers."""
+    return 10 ** (np.round(np.log10(time)) - 3) if time > 0.0 else None
+
+
+def _times(description, start, stop, interval, tolerance, exchange, step_size):
     """(start, stop, interval) in s, and the tolerance, where not given from the default experiment."""
     experiment = description.defaultExperiment
     of = lambda name: None if experiment is None else getattr(experiment, name)
@@ -172,6 +231,10 @@ def _times(description, start, stop, interval, tolerance):
     stop = first(stop, of("stopTime"), start + 1.0)
     if not (np.isfinite(start) and np.isfinite(stop)):
         raise ValueError(f"start_time {start} and stop_time {stop} must be finite")
+    if interval is None and exchange:
+        interval = float(_default_step(stop - start) or 1.0) if step_size is None else float(step_size)
+        while interval > 0.0 and (stop - start) / interval > 1000:
+            interval *= 2
     if interval is None:
         interval = first(description.coSimulation.fixedInternalStepSize, of("stepSize"))
         if interval is not None and not interval > 0.0:
@@ -332,9 +395,9 @@ def _samples(description, variables, signals):
     for v in variables.values() if len(names) > 1 else map(variables.get, names):
         if v.name not in names:
             continue
-        if v.shape or signals[v.name].ndim > 1:
-            raise NotImplementedError(f"input: {v.name} is an array; fmurun feeds scalars only")
-        table = signals[v.name].astype(np.float64)
+        if signals[v.name].shape[1:] != v.shape:
+            raise ValueError(f"input: {v.name} has the shape {v.shape}, and its column {signals[v.name].shape[1:]}")
+        table = signals[v.name].astype(np.float64).reshape(t.size, -1).T
         if v.type == "Float32":
             table = table.astype(np.float32).astype(np.float64)
         elif v.type not in _FLOATS and not (np.isfinite(table).all() and (np.abs(table) <= 2.0**53).all()):
@@ -342,10 +405,12 @@ def _samples(description, variables, signals):
         elif v.type not in _FLOATS:
             table = np.trunc(table)
         if v.variability in ("discrete", "tunable") and t.size > 1:
-            events |= set(t[1:][np.diff(table) != 0])
+            events |= set(t[1:][(np.diff(table) != 0).any(axis=0)])
         continuous = v.type in _FLOATS and v.variability not in ("discrete", "tunable")
-        groups.setdefault((not continuous, _base(v, description)), []).append((v.valueReference, table))
+        # An array is a group of its own.
+        key = (not continuous, _base(v, description), v.valueReference if v.shape else None)
+        groups.setdefault(key, []).append((v.valueReference, table))
     # A stable order: continuous variables before discrete ones, types in the order of the description.
     ordered = sorted(groups.items(), key=lambda item: item[0][0])
-    tables = [(base, not discrete, [r for r, _ in g], np.stack([x for _, x in g])) for (discrete, base), g in ordered]
+    tables = [(base, not discrete, [r for r, _ in g], np.concatenate([x for _, x in g])) for (discrete, base, _), g in ordered]
     return t, np.array(sorted(events)), tables

@@ -2,9 +2,9 @@
 
     from fmurun.fmpy import extract, instantiate_fmu, read_model_description
 
-`read_model_description` returns objects with FMPy's attributes; `instantiate_fmu` returns an `FMU2Slave` or an `FMU3Slave`
-with FMPy's methods for co-simulation. An `FmuError` (also `FMICallException` here) says which call failed and why.
-Model exchange, scheduled execution, event mode, directional derivatives and clocks are not there.
+`read_model_description` returns objects with FMPy's attributes; `instantiate_fmu` returns an `FMU2Slave`, `FMU3Slave`,
+`FMU2Model` or `FMU3Model` with FMPy's methods. An `FmuError` (also `FMICallException` here) says which call failed and why.
+Scheduled Execution, intermediate update and functions of clocks are not there.
 """
 
 from ._description import (
@@ -15,13 +15,22 @@ from ._description import (
     ScalarVariable,
 )
 from ._error import FmuError
-from ._instance import FMU2Slave, FMU3Slave, dump, extract, instantiate_fmu, read_model_description
+from ._instance import (
+    FMU2Model,
+    FMU2Slave,
+    FMU3Model,
+    FMU3Slave,
+    dump,
+    extract,
+    instantiate_fmu,
+    read_model_description,
+)
 from ._simulate import SimulationResult, simulate_fmu
 
 FMICallException = FmuError
 
 __all__ = [
-    "CoSimulation", "DefaultExperiment", "FMICallException", "FMU2Slave", "FMU3Slave", "FmuError", "ModelDescription",
-    "ModelVariable", "ScalarVariable", "SimulationResult", "dump", "extract", "instantiate_fmu", "read_model_description",
+    "CoSimulation", "DefaultExperiment", "FMICallException", "FMU2Model", "FMU2Slave", "FMU3Model", "FMU3Slave", "FmuError",
+    "ModelDescription", "ModelVariable", "ScalarVariable", "SimulationResult", "dump", "extract", "instantiate_fmu", "read_model_description",
     "simulate_fmu",
 ]  # fmt: skip

@@ -2,7 +2,6 @@
 
 use crate::describe;
 use crate::error::{gate, plain, raise};
-use crate::instance::Instance;
 use fmu_import::Error;
 use model_description::{FmiVersion, ModelDescription};
 use pyo3::prelude::*;
@@ -91,11 +90,6 @@ impl Fmu {
     /// The model description as plain values; see `describe` in Rust.
     fn describe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         gate(|| describe::dictionary(py, self.0.fmu.description()))
-    }
-
-    /// An instance that is not yet initialized.
-    fn instantiate(&self, py: Python<'_>, name: &str, logging: bool) -> PyResult<Instance> {
-        gate(|| Instance::new(py, &self.0, name, logging))
     }
 }
 

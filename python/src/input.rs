@@ -11,7 +11,7 @@ pub(crate) struct Group {
     pub(crate) base: BaseType,
     pub(crate) continuous: bool,
     pub(crate) references: Vec<u32>,
-    /// The samples of each variable.
+    /// The samples of each variable, or of each element of an array, which is alone in its group.
     pub(crate) tables: Vec<Vec<f64>>,
 }
 
@@ -22,6 +22,8 @@ pub(crate) struct Input {
     /// Instants at which a step ends, ascending.
     pub(crate) events: Vec<f64>,
     pub(crate) groups: Vec<Group>,
+    /// Their derivatives are set, too (Co-Simulation of FMI 2.0).
+    pub(crate) derivatives: bool,
 }
 
 /// Python's `math.isclose` with its default tolerances.
@@ -46,18 +48,38 @@ impl Input {
 
     /// Sets the inputs at `time`; `after_event` takes the right-hand values of an event.
     pub(crate) fn apply(&self, instance: &mut Instance, time: f64, after_event: bool) -> Result<(), Error> {
-        if self.groups.is_empty() {
-            return Ok(());
-        }
-        for group in &self.groups {
+        self.apply_to(instance, time, after_event, |_| true)
+    }
+
+    /// Sets the inputs of some groups.
+    pub(crate) fn apply_to(
+        &self,
+        instance: &mut Instance,
+        time: f64,
+        after_event: bool,
+        which: impl Fn(&Group) -> bool,
+    ) -> Result<(), Error> {
+        for group in self.groups.iter().filter(|group| which(group)) {
             let at = self.at(time, group.continuous, after_event);
             let value = |table: &Vec<f64>| match at {
                 At::Sample(i) => table[i],
                 At::Between(i, w0) => w0 * table[i] + (1.0 - w0) * table[i + 1],
             };
+            if group.tables.len() != group.references.len() {
+                let numbers: Vec<f64> = group.tables.iter().map(value).collect();
+                let wrong = |cause| Error::Usage { instance: instance.name().into(), cause };
+                let values = Values::from_numbers(&numbers, group.base).map_err(wrong)?;
+                instance.set_at(group.base, group.references[0], &values)?;
+                continue;
+            }
             if group.base == BaseType::Float64 {
                 let values: Vec<f64> = group.tables.iter().map(value).collect();
                 instance.set_reals(&group.references, &values)?;
+                if self.derivatives && group.continuous {
+                    let slopes: Vec<f64> =
+                        group.tables.iter().map(|table| self.slope(table, time, after_event)).collect();
+                    instance.set_input_derivatives(&group.references, &vec![1; slopes.len()], &slopes)?;
+                }
                 continue;
             }
             for (reference, table) in group.references.iter().zip(&group.tables) {
@@ -67,6 +89,21 @@ impl Input {
             }
         }
         Ok(())
+    }
+
+    /// The derivative of a continuous input: 0 where the first or the last sample holds.
+    fn slope(&self, table: &[f64], time: f64, after_event: bool) -> f64 {
+        let (t, i) = (&self.times, self.times.partition_point(|&x| x < time));
+        if i == 0 || i == t.len() {
+            return 0.0;
+        }
+        let left = match self.at(time, true, after_event) {
+            At::Between(left, _) => left,
+            At::Sample(at) if !after_event => at - 1,
+            At::Sample(at) if at + 1 < t.len() => at,
+            At::Sample(_) => return 0.0,
+        };
+        (table[left + 1] - table[left]) / (t[left + 1] - t[left])
     }
 
     fn at(&self, time: f64, continuous: bool, after_event: bool) -> At {

@@ -2,7 +2,8 @@
 
 use crate::cache::{self, Opened};
 use crate::error::{gate, raise, usage};
-use fmu_import::{Error, Values};
+use fmu_import::trace::traced;
+use fmu_import::{Error, Kind, Values};
 use model_description::BaseType;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,6 +20,8 @@ pub(crate) struct Instance {
     fmi2: bool,
     /// `None` after it was freed.
     inner: Mutex<Option<fmu_import::Instance>>,
+    /// A line for each call to the FMU, if somebody wants them.
+    calls: Option<Mutex<Vec<String>>>,
 }
 
 /// A saved state of one instance.
@@ -29,11 +32,19 @@ pub(crate) struct FmuState {
 }
 
 impl Instance {
-    pub(crate) fn new(py: Python<'_>, opened: &Arc<Opened>, name: &str, logging: bool) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        opened: &Arc<Opened>,
+        name: &str,
+        kind: Kind,
+        [logging, visible, traces]: [bool; 3],
+    ) -> PyResult<Self> {
         static IDS: AtomicU64 = AtomicU64::new(0);
-        let inner = py.detach(|| opened.fmu.instantiate(name, logging)).map_err(raise)?;
-        let (id, fmi2) = (IDS.fetch_add(1, Ordering::Relaxed), opened.is_fmi2());
-        Ok(Self { opened: opened.clone(), name: name.into(), id, fmi2, inner: Mutex::new(Some(inner)) })
+        let make = || opened.fmu.instantiate_with(kind, name, logging, visible);
+        let (inner, lines) = py.detach(|| if traces { traced(make) } else { (make(), Vec::new()) });
+        let (inner, id, fmi2) = (inner.map_err(raise)?, IDS.fetch_add(1, Ordering::Relaxed), opened.is_fmi2());
+        let calls = traces.then(|| Mutex::new(lines));
+        Ok(Self { opened: opened.clone(), name: name.into(), id, fmi2, inner: Mutex::new(Some(inner)), calls })
     }
 
     /// One call on the instance, with Python's lock held: for calls of less than a microsecond.
@@ -65,7 +76,15 @@ impl Instance {
         call: impl FnOnce(&mut fmu_import::Instance) -> Result<T, Error>,
     ) -> PyResult<T> {
         let instance = instance.ok_or_else(|| usage(&self.name, "was freed"))?;
-        call(instance).map_err(|error| {
+        let result = match &self.calls {
+            None => call(instance),
+            Some(calls) => {
+                let (result, lines) = traced(|| call(instance));
+                calls.lock().unwrap_or_else(PoisonError::into_inner).extend(lines);
+                result
+            }
+        };
+        result.map_err(|error| {
             if matches!(&error, Error::Call { status, .. } if status == "Fatal") {
                 cache::forget(&self.opened);
             }
@@ -133,8 +152,19 @@ fn values(base: BaseType, items: &Bound<'_, PyAny>) -> PyResult<Values> {
 #[pymethods]
 impl Instance {
     #[new]
-    fn create(py: Python<'_>, fmu: &Bound<'_, crate::cache::Fmu>, name: &str, logging: bool) -> PyResult<Self> {
-        gate(|| Self::new(py, &fmu.get().0, name, logging))
+    #[pyo3(signature = (fmu, name, kind, logging = false, visible = false, traces = false))]
+    fn create(
+        py: Python<'_>,
+        fmu: &Bound<'_, crate::cache::Fmu>,
+        name: &str,
+        kind: (bool, bool, bool),
+        logging: bool,
+        visible: bool,
+        traces: bool,
+    ) -> PyResult<Self> {
+        let (exchange, event_mode, early_return) = kind;
+        let kind = if exchange { Kind::ModelExchange } else { Kind::CoSimulation { event_mode, early_return } };
+        gate(|| Self::new(py, &fmu.get().0, name, kind, [logging, visible, traces]))
     }
 
     /// Name that errors and messages give it.
@@ -247,13 +277,9 @@ impl Instance {
     ) -> PyResult<Option<Bound<'py, PyTuple>>> {
         let (t, h) = (currentCommunicationPoint, communicationStepSize);
         // A step may take long: other threads run meanwhile.
-        let step = |i: &mut fmu_import::Instance| {
-            let ended = i.do_step(t, h)?.is_break();
-            Ok((ended, if self.fmi2 { t } else { i.last_successful_time()? }))
-        };
-        let (ended, last) = gate(|| py.detach(|| self.with(step)))?;
+        let stepped = gate(|| py.detach(|| self.with(|i| i.advance(t, h))))?;
         if self.fmi2 {
-            return if ended {
+            return if stepped.terminate {
                 Err(raise(Error::Call {
                     instance: self.name.clone(),
                     function: "fmi2DoStep",
@@ -264,7 +290,7 @@ impl Instance {
                 Ok(None)
             };
         }
-        (false, ended, false, last).into_pyobject(py).map(Some)
+        (stepped.event, stepped.terminate, stepped.early, stepped.last).into_pyobject(py).map(Some)
     }
 
     /// End the simulation; variables can still be read.
@@ -281,7 +307,11 @@ impl Instance {
     #[pyo3(name = "freeInstance")]
     fn free(&self, py: Python<'_>) -> PyResult<()> {
         gate(|| {
-            py.detach(|| drop(self.inner.lock().unwrap_or_else(PoisonError::into_inner).take()));
+            let free = || drop(self.inner.lock().unwrap_or_else(PoisonError::into_inner).take());
+            let ((), lines) = py.detach(|| traced(free));
+            if let Some(calls) = &self.calls {
+                calls.lock().unwrap_or_else(PoisonError::into_inner).extend(lines);
+            }
             Ok(())
         })
     }
@@ -297,6 +327,118 @@ impl Instance {
     fn take_messages(&self, py: Python<'_>) -> PyResult<Vec<(String, String, String)>> {
         let all = self.call(py, |i| Ok(i.take_messages()))?;
         Ok(all.into_iter().map(|m| (m.status.to_string(), m.category, m.text)).collect())
+    }
+
+    /// Take the lines of the calls since the last call.
+    #[pyo3(name = "_take_calls")]
+    fn take_calls(&self) -> Vec<String> {
+        self.calls
+            .as_ref()
+            .map(|calls| std::mem::take(&mut *calls.lock().unwrap_or_else(PoisonError::into_inner)))
+            .unwrap_or_default()
+    }
+
+    /// Enter event mode.
+    #[pyo3(name = "enterEventMode")]
+    fn enter_event_mode(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::enter_event_mode)
+    }
+
+    /// Update the discrete states once: (needs another, terminates, nominals changed, states changed, next is defined, next time).
+    #[pyo3(name = "_update")]
+    fn update(&self, py: Python<'_>) -> PyResult<(bool, bool, bool, bool, bool, f64)> {
+        let u = self.call(py, fmu_import::Instance::update_discrete_states)?;
+        let next = u.next_event_time;
+        Ok((u.again, u.terminate, u.nominals_changed, u.states_changed, next.is_some(), next.unwrap_or(0.0)))
+    }
+
+    /// Leave event mode for continuous-time mode.
+    #[pyo3(name = "_enter_continuous")]
+    fn enter_continuous(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::enter_continuous_time_mode)
+    }
+
+    /// Leave event mode for step mode.
+    #[pyo3(name = "_enter_steps")]
+    fn enter_steps(&self, py: Python<'_>) -> PyResult<()> {
+        self.call(py, fmu_import::Instance::enter_step_mode)
+    }
+
+    /// Numbers of continuous states and of event indicators.
+    #[pyo3(name = "_counts")]
+    fn counts(&self, py: Python<'_>) -> PyResult<(usize, usize)> {
+        self.call(py, fmu_import::Instance::state_and_indicator_counts)
+    }
+
+    /// Set the time in continuous-time mode.
+    #[pyo3(name = "_set_time")]
+    fn set_time(&self, py: Python<'_>, time: f64) -> PyResult<()> {
+        self.call(py, |i| i.set_time(time))
+    }
+
+    /// Set all continuous states.
+    #[pyo3(name = "_set_states")]
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+    fn set_states(&self, py: Python<'_>, x: Vec<f64>) -> PyResult<()> {
+        self.call(py, |i| i.set_continuous_states(&x))
+    }
+
+    /// Read `n` states, derivatives, indicators or nominals.
+    #[pyo3(name = "_vector")]
+    fn vector(&self, py: Python<'_>, which: &str, n: usize) -> PyResult<Vec<f64>> {
+        let mut values = vec![0.0; n];
+        self.call(py, |i| match which {
+            "states" => i.get_continuous_states(&mut values),
+            "derivatives" => i.get_derivatives(&mut values),
+            "indicators" => i.get_event_indicators(&mut values),
+            _ => i.get_nominals(&mut values),
+        })?;
+        Ok(values)
+    }
+
+    /// Report a completed integrator step: (enters event mode, terminates).
+    #[pyo3(name = "_completed")]
+    fn completed(&self, py: Python<'_>) -> PyResult<(bool, bool)> {
+        let completed = self.call(py, fmu_import::Instance::completed_integrator_step)?;
+        Ok((completed.enter_event_mode, completed.terminate))
+    }
+
+    /// Partial derivatives in the direction of a seed, or with `adjoint` the seed of the unknowns times them.
+    #[pyo3(name = "_sensitivity")]
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+    fn sensitivity(
+        &self,
+        py: Python<'_>,
+        unknowns: Vec<u32>,
+        knowns: Vec<u32>,
+        seed: Vec<f64>,
+        results: usize,
+        adjoint: bool,
+    ) -> PyResult<Vec<f64>> {
+        let mut values = vec![0.0; results];
+        self.call(py, |i| {
+            if adjoint {
+                i.adjoint_derivative(&unknowns, &knowns, &seed, &mut values)
+            } else {
+                i.directional_derivative(&unknowns, &knowns, &seed, &mut values)
+            }
+        })?;
+        Ok(values)
+    }
+
+    /// Derivatives of outputs with respect to time.
+    #[pyo3(name = "_output_derivatives")]
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+    fn output_derivatives(&self, py: Python<'_>, vr: Vec<u32>, order: Vec<i32>) -> PyResult<Vec<f64>> {
+        let mut values = vec![0.0; vr.len()];
+        self.call(py, |i| i.output_derivatives(&vr, &order, &mut values)).map(|()| values)
+    }
+
+    /// Derivatives of inputs with respect to time (FMI 2.0).
+    #[pyo3(name = "setRealInputDerivatives")]
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+    fn set_input_derivatives(&self, py: Python<'_>, vr: Vec<u32>, order: Vec<i32>, value: Vec<f64>) -> PyResult<()> {
+        self.call(py, |i| i.set_input_derivatives(&vr, &order, &value))
     }
 
     /// Save the state.

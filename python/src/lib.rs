@@ -6,14 +6,17 @@
 
 mod batch;
 mod cache;
+mod course;
 mod describe;
 mod error;
+mod exchange;
 mod input;
 mod instance;
 mod lane;
 mod plan;
 mod record;
 mod simulation;
+mod stepping;
 
 use pyo3::prelude::*;
 

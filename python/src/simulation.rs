@@ -1,65 +1,54 @@
-//! The loop of FMPy's `simulate_fmu` for co-simulation, with its communication points: `start + (n + 1) interval`, steps that
-//! are differences of two points, and steps that end at events of the input.
+//! The loops of FMPy's `simulate_fmu` behind one class.
 
+use crate::course::Course;
 use crate::error::gate;
-use crate::input::{Group, Input, is_close};
+use crate::exchange::{Euler, Integrating};
+use crate::input::{Group, Input};
 use crate::instance::Instance;
 use crate::record::{self, Record};
+use crate::stepping::Stepping;
 use fmu_import::Error;
+use fmu_import::cosimulation::Solver;
 use model_description::BaseType;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Steps between two checks of the clock and of Python's signals.
 const CHUNK: u32 = 1024;
 
+/// How the instance gets from point to point.
+enum Way {
+    Steps(Stepping),
+    Euler(Euler),
+    Integrates(Box<Integrating>),
+}
+
 struct Run {
-    start: f64,
-    stop: f64,
-    interval: f64,
-    /// Steps may have any size: they end at input events and at the stop time.
-    variable_step: bool,
-    fmi2: bool,
-    input: Input,
-    record: Record,
-    time: f64,
-    /// Regular points reached so far.
-    reached: u32,
-    ended: bool,
+    course: Course,
+    way: Way,
 }
 
 impl Run {
-    /// One step with its sample; false at the end.
+    /// One step with its samples; false at the end.
     fn step(&mut self, instance: &mut fmu_import::Instance) -> Result<bool, Error> {
-        let time = self.time;
-        if self.ended || time > self.stop || is_close(time, self.stop) {
-            return Ok(false);
+        match &mut self.way {
+            Way::Steps(way) => way.step(&mut self.course, instance),
+            Way::Euler(way) => way.step(&mut self.course, instance),
+            Way::Integrates(way) => way.step(&mut self.course, instance),
         }
-        let regular = self.start + f64::from(self.reached + 1) * self.interval;
-        let mut next = regular;
-        if self.variable_step {
-            let event = self.input.next_event(time);
-            if next > event && !is_close(next, event) {
-                next = event;
-            }
+    }
+
+    /// What follows the initialization.
+    fn begin(&mut self, instance: &mut fmu_import::Instance) -> Result<(), Error> {
+        match &mut self.way {
+            Way::Steps(way) => way.begin(&mut self.course, instance),
+            Way::Euler(way) => way.begin(instance),
+            Way::Integrates(way) => way.begin(&mut self.course, instance),
         }
-        if next > self.stop && !is_close(next, self.stop) {
-            if !self.variable_step {
-                return Ok(false);
-            }
-            next = self.stop;
-        }
-        self.input.apply(instance, time, true)?;
-        self.ended = instance.do_step(time, next - time)?.is_break();
-        self.time = if self.ended && self.fmi2 { instance.last_successful_time()? } else { next };
-        self.record.sample(instance, self.time)?;
-        if is_close(self.time, regular) {
-            self.reached += 1;
-        }
-        Ok(!self.ended)
     }
 }
 
@@ -82,11 +71,11 @@ fn base(name: &str) -> PyResult<BaseType> {
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (instance, times, variable_step, columns, samples = None))]
+    #[pyo3(signature = (instance, times, way, columns, samples = None))]
     fn new(
         instance: Bound<'_, Instance>,
         times: (f64, f64, f64),
-        variable_step: bool,
+        way: &Bound<'_, PyDict>,
         columns: Vec<Columns>,
         samples: Option<(PyReadonlyArray1<'_, f64>, PyReadonlyArray1<'_, f64>, Vec<Samples<'_>>)>,
     ) -> PyResult<Self> {
@@ -117,31 +106,44 @@ impl Simulation {
             };
             let groups = columns.into_iter().map(group).collect::<PyResult<_>>()?;
             let fmi2 = instance.get().opened().is_fmi2();
-            let record = Record::new(groups, fmi2);
-            let run = Run {
-                start,
-                stop,
-                interval,
-                variable_step,
-                fmi2,
-                input,
-                record,
-                time: start,
-                reached: 0,
-                ended: false,
+            let is = |name: &str| Ok::<_, PyErr>(way.get_item(name)?.is_some_and(|x| x.is_truthy().unwrap_or(false)));
+            let number = |name: &str| way.get_item(name)?.map_or(Ok(f64::NAN), |x| x.extract());
+            input.derivatives = is("input_derivatives")?;
+            let solver: Option<String> = way.get_item("solver")?.map(|x| x.extract()).transpose()?;
+            let record_events = is("record_events")?;
+            let integrates = |solver| {
+                Ok::<_, PyErr>(Way::Integrates(Box::new(Integrating::new(solver, number("step")?, record_events))))
             };
-            Ok(Self { instance: instance.unbind(), run: Mutex::new(run) })
+            let way = match solver.as_deref() {
+                None => Way::Steps(Stepping {
+                    variable_step: is("variable_step")?,
+                    fmi2,
+                    event_mode: is("event_mode")?,
+                    applied: false,
+                }),
+                Some("Euler") => Way::Euler(Euler::new(record_events, start)),
+                Some("RK4") => integrates(Solver::Rk4)?,
+                Some(_) => integrates(Solver::Dopri { rtol: number("rtol")? })?,
+            };
+            let record = Record::new(groups, fmi2);
+            let course = Course { start, stop, interval, input, record, time: start, reached: 0, ended: false };
+            Ok(Self { instance: instance.unbind(), run: Mutex::new(Run { course, way }) })
         })
     }
 
     /// Set the inputs at the start.
     fn apply(&self, py: Python<'_>) -> PyResult<()> {
-        self.with(py, |run, i| run.input.apply(i, run.time, false))
+        self.with(py, |run, i| run.course.input.apply(i, run.course.time, false))
+    }
+
+    /// Begin, when the initialization has ended: the event that follows it, and the first row.
+    fn begin(&self, py: Python<'_>) -> PyResult<()> {
+        self.with(py, Run::begin)
     }
 
     /// Read the variables and append a row.
     fn sample(&self, py: Python<'_>, time: f64) -> PyResult<()> {
-        self.with(py, |run, i| run.record.sample(i, time))
+        self.with(py, |run, i| run.course.record.sample(i, time))
     }
 
     /// Take one step; false when there was none, or when it was the last because the FMU asked to end.
@@ -172,18 +174,18 @@ impl Simulation {
     /// Time (s) reached.
     #[getter]
     fn time(&self) -> f64 {
-        self.run().time
+        self.run().course.time
     }
 
     /// Number of rows.
     #[getter]
     fn rows(&self) -> usize {
-        self.run().record.rows
+        self.run().course.record.rows
     }
 
     /// The rows as bytes; those of the simulation are then empty with `take`.
     fn bytes<'py>(&self, py: Python<'py>, take: bool) -> Bound<'py, PyArray1<u8>> {
-        let bytes = &mut self.run().record.bytes;
+        let bytes = &mut self.run().course.record.bytes;
         if take { std::mem::take(bytes) } else { bytes.clone() }.into_pyarray(py)
     }
 }

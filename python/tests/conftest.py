@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-for variable in ("FMU_ARCHIVES", "FMURUN"):
+for variable in ("FMU_ARCHIVES", "FMURUN", "FMU_REFERENCE"):
     if variable not in os.environ:
         pytest.exit(f"{variable} is not set: run `cargo test --test python`", 2)
 FOLDER = Path(os.environ["FMU_ARCHIVES"]).absolute()
@@ -34,6 +34,12 @@ def standard(request):
 def plant():
     """Path of the plant's archive."""
     return FOLDER / "fmi3" / "PmsmPlant.fmu"
+
+
+@pytest.fixture(scope="session")
+def reference():
+    """The folder of the Reference-FMUs."""
+    return Path(os.environ["FMU_REFERENCE"]).absolute()
 
 
 @pytest.fixture

@@ -106,16 +106,6 @@ def test_a_timeout_ends_it(plant):
     assert len(simulate_fmu(plant, stop_time=1e4, output_interval=1e-4, timeout=0.2)) > 1
 
 
-@pytest.mark.parametrize(
-    "arguments", [{"fmi_type": "ModelExchange"}, {"logger": print}, {"fmi_call_logger": print}, {"visible": True},
-                  {"set_input_derivatives": True}, {"use_event_mode": True}, {"remote_platform": "win64"}],
-    ids=lambda a: next(iter(a)),
-)  # fmt: skip
-def test_what_it_cannot_is_named(plant, arguments):
-    with pytest.raises(NotImplementedError, match=next(iter(arguments))):
-        simulate_fmu(plant, **arguments)
-
-
 WRONG = {
     "a variable of start_values": ({"start_values": {"motor.R": 3.0}}, "has no variable motor.R; see start_values"),
     "a variable of output": ({"output": ["speed", "sped"]}, "has no variable sped; see output"),

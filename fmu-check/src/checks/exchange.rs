@@ -380,7 +380,7 @@ fn both_ways(session: &Session) -> Result<(), NotDetermined> {
             if !status.is_ok() || v.base != BaseType::Float64 {
                 continue;
             }
-            if let Some((_, largest)) = deviation(&[of_vector.to_vec()], &[found.clone()]) {
+            if let Some((_, largest)) = deviation(&[of_vector.to_vec()], std::slice::from_ref(&found)) {
                 session.deviates(
                     largest,
                     &format!("line {}: {} is {found:?}, and {of_vector:?} in the vector", v.line, v.name),

@@ -61,11 +61,9 @@ fn list(d: &ModelDescription, unknowns: &[Unknown]) -> BTreeSet<String> {
 }
 
 fn twice(d: &ModelDescription, unknowns: &[Unknown]) -> Vec<String> {
-    let again = |(i, u): (usize, &Unknown)| {
-        let bad = unknowns[..i].iter().any(|o| o.reference == u.reference);
-        bad.then(|| format!("line {}: {} occurs twice", u.line, name(d, u.reference)))
-    };
-    unknowns.iter().enumerate().filter_map(again).collect()
+    let mut seen = BTreeSet::new();
+    let again = unknowns.iter().filter(|u| !seen.insert(u.reference));
+    again.map(|u| format!("line {}: {} occurs twice", u.line, name(d, u.reference))).collect()
 }
 
 fn outputs(fmu: &FmuFile) -> Verdict {
@@ -138,7 +136,7 @@ fn dependencies_exist(fmu: &FmuFile) -> Verdict {
 
 fn knowns(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
-        let states: Vec<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
+        let states: BTreeSet<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
         let mut findings = Vec::new();
         for (kind, unknown, at) in entries(d) {
             let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
@@ -156,7 +154,7 @@ fn knowns(fmu: &FmuFile) -> Verdict {
     })
 }
 
-fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&str]) -> bool {
+fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &BTreeSet<&str>) -> bool {
     let exact = v.initial_or_default() == Some(Initial::Exact) && v.variability != Variability::Constant;
     match v.causality {
         Causality::Input | Causality::Independent => true,
@@ -165,7 +163,7 @@ fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&s
         Causality::Parameter | Causality::StructuralParameter => {
             d.version == FmiVersion::V3 || v.variability == Variability::Tunable
         }
-        _ => states.contains(&v.name.as_str()) || !v.clocks.is_empty() || v.base == BaseType::Clock,
+        _ => states.contains(v.name.as_str()) || !v.clocks.is_empty() || v.base == BaseType::Clock,
     }
 }
 

@@ -256,7 +256,12 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
         } else if step_results.early == 0 && step_results.terminate == 0 && (last - (t + h)).abs() >= h {
             session.lesser(Level::Should, text);
         }
-        if step_results.terminate == 1 {
+        // One finding is enough.
+        if step_results.terminate == 1
+            || step_results.early != 0
+            || step_results.event != 0
+            || step_results.terminate > 1
+        {
             break;
         }
         instance.time.set(t + h);

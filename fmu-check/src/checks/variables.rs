@@ -214,10 +214,7 @@ fn independent(fmu: &FmuFile) -> Verdict {
 /// Whether the file omits the variability. The default of FMI 2.0 is continuous for every type; except for Real this
 /// is illegal, which V05 says, and the other checks read it as discrete.
 fn by_default(fmu: &FmuFile, v: &ModelVariable) -> bool {
-    let element = fmu
-        .root()
-        .and_then(|r| r.child("ModelVariables"))
-        .and_then(|list| list.children.iter().find(|e| e.line == v.line && e.get("name") == Some(&v.name)));
+    let element = fmu.element_of(v);
     element.is_some_and(|e| e.get("variability").is_none())
 }
 
@@ -411,18 +408,11 @@ fn displays(fmu: &FmuFile) -> Verdict {
 }
 
 fn flags(fmu: &FmuFile) -> Verdict {
-    let Some(list) = fmu.root().and_then(|r| r.child("ModelVariables")) else {
-        return Verdict::NotDetermined("the XML cannot be read".into());
-    };
     with_description(fmu, |d| {
         let mut findings = Vec::new();
-        for element in &list.children {
+        for v in &d.variables {
+            let Some(element) = fmu.element_of(v) else { continue };
             let on = |a: &str| element.get(a).is_some_and(|v| matches!(v.trim(), "true" | "1"));
-            let Some(v) =
-                d.variables.iter().find(|v| v.line == element.line && Some(v.name.as_str()) == element.get("name"))
-            else {
-                continue;
-            };
             if on("intermediateUpdate") && (v.variability != Variability::Continuous || v.base == BaseType::Clock) {
                 findings.push(format!(
                     "line {}: variable {}: has intermediateUpdate but is {}",

@@ -2,6 +2,7 @@
 
 use super::log::Status;
 use crate::standard::{Outcome, Refusal, judge};
+use crate::trace;
 use std::ffi::c_void;
 use std::marker::PhantomData;
 use std::ptr;
@@ -19,6 +20,7 @@ impl<T> Answer<T> {
     #[inline]
     pub(super) fn outcome(self) -> Outcome<T> {
         let (status, value) = self.1.ok_or_else(|| missing(self.0))?;
+        trace::note(self.0, || status.to_string());
         judge(self.0, status).map(|()| value)
     }
 

@@ -15,11 +15,13 @@ use std::ffi::{CStr, c_char, c_int, c_void};
 use std::ptr;
 
 /// The arguments of an instantiation in both standards.
+#[expect(clippy::struct_excessive_bools, reason = "the arguments of the standards")]
 pub(super) struct Request<'a> {
     /// Name, token, resources.
     pub(super) texts: [Option<&'a CStr>; 3],
     pub(super) interface: Interface,
     pub(super) logging: bool,
+    pub(super) visible: bool,
     pub(super) event_mode: bool,
     pub(super) early_return: bool,
     /// FMI 2.0's.
@@ -67,22 +69,22 @@ impl Calls {
                 (FmiVersion::V2, interface) => {
                     let kind = c_int::from(interface == Interface::CoSimulation);
                     let (Function(full, f), logging) = (&self.instantiate, c_int::from(r.logging));
-                    (*full, f.map(|f| f(name, kind, token, resources, r.callbacks, 0, logging)))
+                    (*full, f.map(|f| f(name, kind, token, resources, r.callbacks, c_int::from(r.visible), logging)))
                 }
                 (FmiVersion::V3, Interface::CoSimulation) => {
                     let (Function(full, f), event_mode, early) = (&self.co_simulation, r.event_mode, r.early_return);
                     let call = |f: v3::InstantiateCoSimulation| {
-                        f(name, token, resources, false, r.logging, event_mode, early, ptr::null(), 0, e, log, none)
+                        f(name, token, resources, r.visible, r.logging, event_mode, early, ptr::null(), 0, e, log, none)
                     };
                     (*full, f.map(call))
                 }
                 (FmiVersion::V3, Interface::ModelExchange) => {
                     let Function(full, f) = &self.model_exchange;
-                    (*full, f.map(|f| f(name, token, resources, false, r.logging, e, log)))
+                    (*full, f.map(|f| f(name, token, resources, r.visible, r.logging, e, log)))
                 }
                 (FmiVersion::V3, Interface::ScheduledExecution) => {
                     let Function(full, f) = &self.scheduled_execution;
-                    (*full, f.map(|f| f(name, token, resources, false, r.logging, e, log, none, none, none)))
+                    (*full, f.map(|f| f(name, token, resources, r.visible, r.logging, e, log, none, none, none)))
                 }
             }
         }

@@ -8,6 +8,7 @@ use super::raw::{Buffer, Count, Interface, Sensitivity, Simple, StepResults, Ste
 use super::signatures::v2::{Callbacks, calloc, free};
 use crate::instance::{CompletedStep, Stepped, Update};
 use crate::standard::{Directions, Experiment, Kind, Outcome, Refusal, misfit, same_length};
+use crate::trace;
 use crate::value::Values;
 use model_description::{BaseType, FmiVersion};
 use std::ffi::{CStr, CString, c_char, c_void};
@@ -77,7 +78,7 @@ impl Live {
         calls: &Arc<Calls>,
         texts: [&CStr; 3],
         log: &Arc<Log>,
-        logging: bool,
+        [logging, visible]: [bool; 2],
         kind: Kind,
     ) -> Outcome<Self> {
         let (interface, event_mode, early_return) = match kind {
@@ -96,6 +97,7 @@ impl Live {
             texts: texts.map(Some),
             interface,
             logging,
+            visible,
             event_mode,
             early_return,
             callbacks: Arc::as_ptr(&callbacks),
@@ -105,6 +107,7 @@ impl Live {
         // SAFETY: callbacks and log outlive the instance.
         let (name, pointer) = unsafe { calls.instantiate(&request) };
         let missing = || Refusal::Impossible(format!("the function {name} is missing"));
+        trace::note(name, || if pointer.is_some_and(|p| !p.is_null()) { "an instance" } else { "no instance" }.into());
         let pointer = pointer.ok_or_else(missing)?;
         if pointer.is_null() {
             return Err(Refusal::Null(name));
@@ -395,6 +398,7 @@ impl Live {
 impl Drop for Live {
     fn drop(&mut self) {
         if !self.instance.0.is_null() {
+            trace::note(self.calls.free.0, String::new);
             // SAFETY: the instance is alive, and nothing uses it after this.
             unsafe { self.calls.free(self.given()) };
         }

@@ -20,7 +20,7 @@ use functions::Calls;
 use live::Live;
 use log::Log;
 use model_description::FmiVersion;
-use std::ffi::CString;
+use std::ffi::CStr;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -48,17 +48,9 @@ impl Functions {
     }
 
     /// An instance; `resources` is a URI in FMI 2.0 and a path in FMI 3.0.
-    pub(crate) fn instantiate(
-        &self,
-        name: &CString,
-        token: &CString,
-        resources: &CString,
-        log: &Arc<Log>,
-        logging: bool,
-        kind: Kind,
-    ) -> Outcome<Live> {
+    pub(crate) fn instantiate(&self, texts: [&CStr; 3], log: &Arc<Log>, shows: [bool; 2], kind: Kind) -> Outcome<Live> {
         promised(&self.0, kind).map_err(Refusal::Impossible)?;
-        Live::new(&self.0, [name, token, resources], log, logging, kind)
+        Live::new(&self.0, texts, log, shows, kind)
     }
 }
 

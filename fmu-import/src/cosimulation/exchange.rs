@@ -1,9 +1,9 @@
 //! Moving values between FMUs: what is read from each, and where what is set comes from.
 
-use super::Schedule;
 use super::parts::Port;
 use super::sequence::Held;
-use crate::{Error, Instance, Values};
+use super::{Schedule, loops};
+use crate::{Error, Instance, Kind, Values};
 
 /// Source of an input.
 #[derive(Clone)]
@@ -93,10 +93,23 @@ pub(super) struct Exchange {
     pub(super) since: Option<f64>,
 }
 
+/// An input that a pass changes.
+pub(super) struct Unsettled {
+    /// Its instance.
+    pub(super) index: usize,
+    /// Where its value stands among those that are written in one call.
+    slot: usize,
+    pub(super) reference: u32,
+    /// Instance and reference of what feeds it, if both are continuous double-precision numbers.
+    pub(super) source: Option<(usize, u32)>,
+}
+
 /// Which inputs are set.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Inputs {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inputs {
+    /// In event mode.
     All,
+    /// In continuous-time mode.
     Continuous,
 }
 
@@ -205,30 +218,87 @@ impl Exchange {
         Ok(changed)
     }
 
-    /// Passes outputs on to inputs until nothing changes: an output may depend on an input, through several FMUs. Returns
+    /// Passes outputs on to inputs until nothing changes: an output may depend on an input, through several FMUs. A loop of
+    /// continuous inputs is solved. FMUs for Co-Simulation are left out: they read and set at communication points. Returns
     /// whether a discrete input changed.
     pub(super) fn settle(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<bool, Error> {
         let mut discrete = false;
-        let mut unsettled = 0;
         // Without a loop, each pass settles one more input at least.
         for _ in 0..self.fed + 2 {
-            for (traffic, instance) in self.traffic.iter_mut().zip(instances.iter_mut()) {
-                traffic.read(traffic.feeding, instance)?;
-            }
-            let mut settled = true;
-            for (index, instance) in instances.iter_mut().enumerate() {
-                let (some, some_discrete) = self.pass_on(index, instance, t, inputs)?;
-                discrete |= some_discrete;
-                if some {
-                    (settled, unsettled) = (false, index);
-                }
-            }
+            let (settled, some) = self.pass(instances, t, inputs)?;
+            discrete |= some;
             if settled {
                 return Ok(discrete);
             }
         }
-        let cause = format!("its inputs do not settle at t = {t} s: the connections form an algebraic loop");
-        Err(Error::usage(instances[unsettled].name(), cause))
+        loops::solve(self, instances, t).map(|()| discrete)
+    }
+
+    /// Reads what feeds inputs, and sets the inputs that have changed; returns whether none has, and whether a discrete one has.
+    fn pass(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<(bool, bool), Error> {
+        let (mut settled, mut discrete) = (true, false);
+        self.read_feeding(instances)?;
+        for (index, instance) in instances.iter_mut().enumerate().filter(|(_, i)| i.kind() == Kind::ModelExchange) {
+            let (some, some_discrete) = self.pass_on(index, instance, t, inputs)?;
+            settled &= !some;
+            discrete |= some_discrete;
+        }
+        Ok((settled, discrete))
+    }
+
+    fn read_feeding(&mut self, instances: &mut [Instance]) -> Result<(), Error> {
+        let mut exchanging = self.traffic.iter_mut().zip(instances).filter(|(_, i)| i.kind() == Kind::ModelExchange);
+        exchanging.try_for_each(|(traffic, instance)| traffic.read(traffic.feeding, instance))
+    }
+
+    /// The inputs that another pass would change.
+    pub(super) fn unsettled(&mut self, instances: &mut [Instance], t: f64) -> Result<Vec<Unsettled>, Error> {
+        self.read_feeding(instances)?;
+        let mut all = Vec::new();
+        for (index, traffic) in self.traffic.iter().enumerate() {
+            if instances[index].kind() != Kind::ModelExchange {
+                continue;
+            }
+            for (slot, (reference, place)) in traffic.write.iter().enumerate() {
+                if self.value(place, t).to_bits() != traffic.buffer[slot].to_bits() {
+                    let source = match place {
+                        Place::Read { instance, slot } => {
+                            self.traffic[*instance].read.get(*slot).map(|r| (*instance, *r))
+                        }
+                        Place::Schedule(_) => None,
+                    };
+                    let continuous = slot < traffic.continuous[0];
+                    all.push(Unsettled { index, slot, reference: *reference, source: source.filter(|_| continuous) });
+                }
+            }
+            for ((port, place), old) in traffic.write_singly.iter().zip(&traffic.singles) {
+                if self.value(place, t).to_bits() != old.to_bits() {
+                    all.push(Unsettled { index, slot: usize::MAX, reference: port.reference, source: None });
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// Sets inputs to these values, and returns what would be set next.
+    pub(super) fn try_values(
+        &mut self,
+        instances: &mut [Instance],
+        t: f64,
+        inputs: &[Unsettled],
+        values: &[f64],
+    ) -> Result<Vec<f64>, Error> {
+        for (input, value) in inputs.iter().zip(values) {
+            self.traffic[input.index].buffer[input.slot] = *value;
+            instances[input.index].set_reals(&[input.reference], &[*value])?;
+        }
+        self.read_feeding(instances)?;
+        Ok(inputs.iter().map(|input| self.value(&self.traffic[input.index].write[input.slot].1, t)).collect())
+    }
+
+    /// The values that these inputs have.
+    pub(super) fn values_of(&self, inputs: &[Unsettled]) -> Vec<f64> {
+        inputs.iter().map(|input| self.traffic[input.index].buffer[input.slot]).collect()
     }
 
     /// Passes outputs on to inputs once, as at a communication point. Returns whether a discrete input of one of these

@@ -31,6 +31,8 @@ impl Default for Method {
 pub struct Integration {
     /// How states are integrated.
     pub solver: Solver,
+    /// Names of the FMUs that step themselves all the same (Co-Simulation), from communication point to communication point.
+    pub stepping: Vec<String>,
     /// At an event, the FMUs are updated from the last one added to the first.
     pub reversed: bool,
     /// Event mode is entered this time (s) after the time event of an FMU.
@@ -41,12 +43,15 @@ pub struct Integration {
 
 impl Method {
     /// What an instance of this FMU is made for.
-    pub(super) fn kind(&self, fmu: &Fmu) -> Kind {
+    pub(super) fn kind(&self, name: &str, fmu: &Fmu) -> Kind {
         let description = fmu.description();
         let can = |flag: fn(&Interface) -> bool| {
             description.version == FmiVersion::V3 && description.co_simulation.as_ref().is_some_and(flag)
         };
         match self {
+            Self::ModelExchange(integration) if integration.stepping.iter().any(|other| other == name) => {
+                Kind::default()
+            }
             Self::ModelExchange(_) => Kind::ModelExchange,
             Self::CoSimulation { event_mode, early_return } => Kind::CoSimulation {
                 event_mode: *event_mode && can(Interface::has_event_mode),

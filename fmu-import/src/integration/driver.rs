@@ -11,8 +11,25 @@ const EVENTS: u32 = 100;
 /// Width of the interval that a state event is located in, relative to the step.
 const WIDTH: f64 = 1e-10;
 
+/// Why the driver stopped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Stop {
+    /// The target is reached.
+    Target,
+    /// An event was handled, at or before the target.
+    Event,
+    /// The system asks to end the simulation.
+    End,
+}
+
+impl Stop {
+    fn of(flow: ControlFlow<()>, otherwise: Self) -> Self {
+        if flow.is_break() { Self::End } else { otherwise }
+    }
+}
+
 /// The state of an integration.
-pub(crate) struct Driver {
+pub struct Driver {
     solver: Solver,
     /// Longest step of a fixed-step solver in s.
     longest: f64,
@@ -32,7 +49,10 @@ pub(crate) struct Driver {
 
 impl Driver {
     /// Begins with the event that ends the initialization; breaks if the system asks to end the simulation.
-    pub(crate) fn start(
+    ///
+    /// # Errors
+    /// The system cannot handle the event.
+    pub fn start(
         system: &mut impl Hybrid,
         solver: Solver,
         longest: f64,
@@ -57,41 +77,86 @@ impl Driver {
     }
 
     /// Time in s and states.
-    pub(crate) fn point(&self) -> (f64, &[f64]) {
+    pub fn point(&self) -> (f64, &[f64]) {
         (self.step.t, &self.step.x)
     }
 
     /// Inputs may have changed: the derivative is computed anew.
-    pub(crate) fn forget(&mut self) {
+    pub fn forget(&mut self) {
         self.known = false;
     }
 
     /// Integrates to the time `until`, and over an event that is at the same time but for rounding. Breaks if the system asks
     /// to end the simulation.
-    pub(crate) fn run_to(&mut self, system: &mut impl Hybrid, until: f64) -> Result<ControlFlow<()>, Error> {
+    ///
+    /// # Errors
+    /// The system cannot be integrated to that time.
+    pub fn run_to(&mut self, system: &mut impl Hybrid, until: f64) -> Result<ControlFlow<()>, Error> {
+        self.all_towards(system, until, true)
+    }
+
+    /// Integrates to the time `until`, or to the first event before it or there, which it handles.
+    ///
+    /// # Errors
+    /// As for [`run_to`](Self::run_to).
+    pub fn stop_at(&mut self, system: &mut impl Hybrid, until: f64) -> Result<Stop, Error> {
+        self.towards(system, until, true)
+    }
+
+    /// Integrates to the time `until` and leaves the events there to [`interrupt`](Self::interrupt).
+    ///
+    /// # Errors
+    /// As for [`run_to`](Self::run_to).
+    pub fn run_before(&mut self, system: &mut impl Hybrid, until: f64) -> Result<ControlFlow<()>, Error> {
+        self.all_towards(system, until, false)
+    }
+
+    fn all_towards(
+        &mut self,
+        system: &mut impl Hybrid,
+        until: f64,
+        events_there: bool,
+    ) -> Result<ControlFlow<()>, Error> {
         loop {
-            let near = near(self.step.t, until);
-            let (target, event) = match self.next_event {
-                Some(next) if next <= until + near => (next, true),
-                _ => (until, false),
-            };
-            if target - self.step.t > near {
-                if self.advance(system, target)?.is_break() {
-                    return Ok(ControlFlow::Break(()));
-                }
-            } else if event {
-                self.step.t = self.step.t.max(target);
-                if self.event(system)?.is_break() {
-                    return Ok(ControlFlow::Break(()));
-                }
-            } else {
-                return Ok(ControlFlow::Continue(()));
+            match self.towards(system, until, events_there)? {
+                Stop::Target => return Ok(ControlFlow::Continue(())),
+                Stop::Event => {}
+                Stop::End => return Ok(ControlFlow::Break(())),
             }
         }
     }
 
+    fn towards(&mut self, system: &mut impl Hybrid, until: f64, events_there: bool) -> Result<Stop, Error> {
+        loop {
+            let near = near(self.step.t, until);
+            let last = if events_there { until + near } else { until - near };
+            let (target, event) = match self.next_event {
+                Some(next) if next <= last => (next, true),
+                _ => (until, false),
+            };
+            if target - self.step.t > near {
+                if let Some(stop) = self.advance(system, target)? {
+                    return Ok(stop);
+                }
+            } else if event {
+                self.step.t = self.step.t.max(target);
+                return Ok(Stop::of(self.event(system)?, Stop::Event));
+            } else {
+                return Ok(Stop::Target);
+            }
+        }
+    }
+
+    /// Handles an event at the time reached, whether the system asked for it or something outside of it has changed.
+    ///
+    /// # Errors
+    /// The system cannot handle the event.
+    pub fn interrupt(&mut self, system: &mut impl Hybrid) -> Result<ControlFlow<()>, Error> {
+        self.event(system)
+    }
+
     /// One step towards `target`, to its end or to the first state event in it, with the event there.
-    fn advance(&mut self, system: &mut impl Hybrid, target: f64) -> Result<ControlFlow<()>, Error> {
+    fn advance(&mut self, system: &mut impl Hybrid, target: f64) -> Result<Option<Stop>, Error> {
         if !self.known {
             let Step { t, x, f, .. } = &mut self.step;
             system.derivatives(*t, x, f).map_err(Trial::into_error)?;
@@ -110,9 +175,10 @@ impl Driver {
         std::mem::swap(&mut self.z, &mut self.z_end);
         let completed = system.completed_step(self.step.t, &self.step.x)?;
         if completed.terminate {
-            return Ok(ControlFlow::Break(()));
+            return Ok(Some(Stop::End));
         }
-        if event || completed.enter_event_mode { self.event(system) } else { Ok(ControlFlow::Continue(())) }
+        let event = event || completed.enter_event_mode;
+        if event { Ok(Some(Stop::of(self.event(system)?, Stop::Event))) } else { Ok(None) }
     }
 
     /// A step that the system computes and whose error is small enough.

@@ -2,7 +2,7 @@
 //!
 //! [`Hybrid`] is what is integrated; [`Driver`] steps it and handles its events: it lands on time events exactly, locates state
 //! events, which are changes of sign of indicators, and begins anew after each event. [`Solver`] selects how it steps:
-//! [`rk4`](mod@rk4) with a fixed step, or [`dopri`](mod@dopri) with a step that its error estimate controls.
+//! `rk4` with a fixed step, or `dopri` with a step that its error estimate controls.
 //!
 //! The integrators are our own: event location needs their stages and interpolants, every trial step may be discarded by an FMU,
 //! and together they are shorter than the adapters that a crate of integrators would need. Both are explicit: a stiff FMU runs
@@ -16,7 +16,7 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use driver::Driver;
+pub use driver::{Driver, Stop};
 
 use crate::{CompletedStep, Error, Update};
 
@@ -41,7 +41,7 @@ impl Default for Solver {
 }
 
 /// Why a trial evaluation has no result.
-pub(crate) enum Trial {
+pub enum Trial {
     /// The point is outside of what the system can compute: a shorter step may succeed.
     Discard(Error),
     /// The run is over.
@@ -49,7 +49,8 @@ pub(crate) enum Trial {
 }
 
 impl Trial {
-    pub(crate) fn into_error(self) -> Error {
+    /// What it says.
+    pub fn into_error(self) -> Error {
         match self {
             Self::Discard(error) | Self::Stop(error) => error,
         }
@@ -57,7 +58,7 @@ impl Trial {
 }
 
 /// Ordinary differential equations with events.
-pub(crate) trait Hybrid {
+pub trait Hybrid {
     /// Nominal values of the states, one for each.
     fn nominals(&self) -> &[f64];
 
@@ -68,14 +69,26 @@ pub(crate) trait Hybrid {
     fn indicator_count(&self) -> usize;
 
     /// Derivatives at a time (s) and a state.
+    ///
+    /// # Errors
+    /// The system cannot compute it.
     fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Trial>;
 
     /// Event indicators: a change between positive and not positive is a state event.
+    ///
+    /// # Errors
+    /// The system cannot compute it.
     fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), Trial>;
 
     /// A step ended here: asks for a step event.
+    ///
+    /// # Errors
+    /// The system cannot compute it.
     fn completed_step(&mut self, t: f64, x: &[f64]) -> Result<CompletedStep, Error>;
 
     /// Handles an event; changes states that jump. The next event time in the result is absolute.
+    ///
+    /// # Errors
+    /// The system cannot compute it.
     fn event(&mut self, t: f64, x: &mut [f64]) -> Result<Update, Error>;
 }

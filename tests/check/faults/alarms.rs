@@ -338,3 +338,16 @@ fn what_can_be_disputed_is_a_should() {
         assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], ids.to_vec()), "{}", told(&report));
     }
 }
+
+/// Explicit steps of a stiff model must be short: that the checker's own integrator runs away is no fault of the FMU.
+#[test]
+fn a_stiff_model_is_integrated_in_short_steps() {
+    let dir = tempfile::tempdir().unwrap();
+    for (xml, options) in [(include_str!("exchange2.xml"), &[][..]), (include_str!("exchange3.xml"), &["-DFMI3"])] {
+        let Some(binary) = library("exchange.c", options, "STIFF") else { return };
+        let report = check(&pack_with(dir.path(), "stiff", xml, &binary), &["E00", "E01", "E05", "E12", "E15"]);
+        assert!(violated(&report).is_empty(), "{}", told(&report));
+        let Verdict::Pass(notes) = verdict(&report, "E00") else { panic!("{:?}", verdict(&report, "E00")) };
+        assert!(notes.iter().any(|note| note.contains("stiff")), "{notes:?}");
+    }
+}

@@ -95,7 +95,7 @@ const RUNNING: &[(&str, &[&str])] = &[
     ("G13", &["G13"]),
     ("G14", &["G14"]),
     // One parameter cannot be set, and another does not keep its value.
-    ("G04o", &["L07", "G04", "G06"]),
+    ("G04o", &["G04", "G06"]),
     // Reset keeps a tunable parameter, a counter after an event, a text.
     ("L06t", &["L06"]),
     ("L06e", &["L06"]),
@@ -111,7 +111,7 @@ const RUNNING: &[(&str, &[&str])] = &[
     ("B07m", &["B07a"]),
     ("B07u", &["B07a"]),
 ];
-const RUNNING_GROUPS: [&str; 9] = ["lifecycle", "access", "time", "state", "logging", "B07a", "S04", "B08r", "B08g"];
+const RUNNING_GROUPS: [&str; 9] = ["access", "time", "L06", "L13", "F01l", "F02b", "G-L3c", "B07a", "S04"];
 
 /// What stays altered or is left: each is found by this check.
 const AROUND: &[(&str, &[&str])] = &[

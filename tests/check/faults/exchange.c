@@ -30,7 +30,7 @@ static void fresh(M *m) {
     M kept = *m;
     memset(m, 0, sizeof *m);
     m->exchange = kept.exchange, m->events = kept.events, m->early = kept.early;
-    m->gain = 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
+    m->gain = FAULT(STIFF) ? 1e4 : 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
     if (FAULT(E12) && kept.mode) m->x = kept.x;
 }
 

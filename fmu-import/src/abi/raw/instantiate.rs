@@ -69,6 +69,7 @@ impl Raw {
             texts: [&a.name, &a.token, &a.resources].map(|text| text.as_deref()),
             interface: a.interface,
             logging: a.logging,
+            visible: false,
             event_mode: a.event_mode,
             early_return: a.early_return,
             callbacks: if a.callbacks { lasting } else { ptr::null() },

@@ -1,0 +1,33 @@
+//! The calls of one thread as lines, `fmi3DoStep -> OK`, for a user who asks what happens.
+
+use std::cell::{Cell, RefCell};
+
+thread_local! {
+    static ON: Cell<bool> = const { Cell::new(false) };
+    static LINES: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
+}
+
+/// Does the work; returns its result and a line for each call to an FMU of this thread meanwhile.
+pub fn traced<T>(work: impl FnOnce() -> T) -> (T, Vec<String>) {
+    /// Ends the trace, also when the work panics.
+    struct Off;
+    impl Drop for Off {
+        fn drop(&mut self) {
+            ON.set(false);
+        }
+    }
+    LINES.take();
+    ON.set(true);
+    let off = Off;
+    let result = work();
+    drop(off);
+    (result, LINES.take())
+}
+
+/// Notes a call and how it ended.
+#[inline]
+pub(crate) fn note(function: &str, ended: impl FnOnce() -> String) {
+    if ON.get() {
+        LINES.with_borrow_mut(|lines| lines.push(format!("{function} -> {}", ended())));
+    }
+}
