@@ -13,6 +13,7 @@ __all__ = ["Batch", "FmuError", "Plan", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
+_Interface = Literal["CoSimulation", "ModelExchange"]
 _Table = Any  # a dictionary of columns, a structured array, a DataFrame of pandas or polars, a Table of pyarrow
 
 class FmuError(Exception):
@@ -32,7 +33,7 @@ def simulate_fmu(
     relative_tolerance: float | str | None = None,
     output_interval: float | str | None = None,
     record_events: bool = True,
-    fmi_type: Literal["CoSimulation", "ModelExchange"] | None = None,
+    fmi_type: _Interface | None = None,
     start_values: Mapping[str, Any] = {},
     apply_default_start_values: bool = False,
     input: NDArray[Any] | None = None,
@@ -71,6 +72,9 @@ class Plan:
         measures: Mapping[str, str | tuple[str, str] | Mapping[str, Any]] | None = None,
         sequential: bool = False,
         embed: bool = False,
+        fmi_type: _Interface | Mapping[str, _Interface] | None = None,
+        solver: Literal["Dopri", "RK4"] | None = None,
+        relative_tolerance: float | None = None,
     ) -> None: ...
     @staticmethod
     def from_toml(path: _Path, *, output: Sequence[str] | None = None, embed: bool = False) -> Plan: ...

@@ -39,6 +39,10 @@ class Plan:
             (text, function): functions are final, min, max, max_abs, mean, rms, integral, at, rise, settling; see docs/sweeps.md
         sequential: step the FMUs one after another, each with the new outputs of those before it
         embed: pickle the files, too
+        fmi_type: "CoSimulation", "ModelExchange", or a dictionary with the one of each FMU; by default FMUs step themselves if they
+            can. FMUs for Model Exchange are integrated as one system: events of any of them are met at their time, and algebraic
+            loops are solved. Those for Co-Simulation among them step from one communication point to the next
+        solver, relative_tolerance: for Model Exchange: "Dopri" (the default, with a relative tolerance of 1e-6) or "RK4"
 
     >>> plan = Plan(PLANT, start_values={"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}, stop_time=0.01, step_size=1e-4,
     ...             output=["i_a"], measures={"last": "i_a", "peak": ("i_a", "max_abs")})
@@ -52,7 +56,8 @@ class Plan:
     """
 
     def __init__(self, fmus, *, connections="by_name", terminals=(), start_values=None, input=None, start_time=None,
-                 stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False):  # fmt: skip
+                 stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False,
+                 fmi_type=None, solver=None, relative_tolerance=None):  # fmt: skip
         files, self._prefix = _files(fmus)
         name = self._name if self._prefix else lambda name: name
         if isinstance(connections, str) and connections != "by_name":
@@ -64,6 +69,7 @@ class Plan:
             "connect": [] if connections == "by_name" else [list(pair) for pair in connections],
             "terminal": [list(pair) for pair in terminals],
             "sequential": bool(sequential),
+            **_integration(fmi_type, solver, relative_tolerance, [key for key, _ in files], _is_ssp(files)),
             "start": _number("start_time", start_time),
             "stop": _number("stop_time", stop_time),
             "step": _number("step_size", step_size),
@@ -176,6 +182,8 @@ class Plan:
         if len(set(lengths.values())) > 1:
             raise ValueError(f"the columns are not of one length: {', '.join(f'{k} {n}' for k, n in lengths.items())}")
         n = len(values[0])
+        if n == 0:
+            raise ValueError("the table has no row")
         runs = first_run + np.arange(n) if runs is None else np.asarray(runs, dtype=np.int64)
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
@@ -217,6 +225,22 @@ def _named(items, column):
         return column
     names = dict(items)
     return np.array([names.get(x, "" if x != x else f"{x:.17g}") for x in column.tolist()], dtype=object)
+
+
+def _integration(fmi_type, solver, tolerance, names, ssp):
+    """How the FMUs run, as a definition has it."""
+    one = fmi_type if isinstance(fmi_type, dict) else dict.fromkeys(names, fmi_type)
+    for name, kind in one.items():
+        if name not in names and not ssp:
+            raise ValueError(f"fmi_type: {name} is the name of no FMU; expected one of {', '.join(names)}")
+        if kind not in (None, "CoSimulation", "ModelExchange"):
+            raise ValueError(f"fmi_type of {name} must be CoSimulation or ModelExchange, not {kind!r}")
+    if solver not in (None, "Dopri", "RK4"):
+        raise ValueError(f"solver = {solver!r}: there is no such solver; expected Dopri or RK4")
+    exchange = "ModelExchange" in one.values()
+    stepping = [name for name, kind in one.items() if kind == "CoSimulation"] if exchange else []
+    interface = "ModelExchange" if exchange else next(iter(one.values()), None)
+    return {"interface": interface, "stepping": stepping, "solver": solver, "rtol": _number("relative_tolerance", tolerance)}
 
 
 def _files(fmus):
