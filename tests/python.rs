@@ -28,7 +28,7 @@ fn installed() -> PathBuf {
 /// Archives of the Reference-FMUs that the tests integrate.
 fn reference() -> PathBuf {
     let folder = scratch().join("python-reference");
-    let package = ["bouncing-ball", "van-der-pol", "stair"].map(String::from).to_vec();
+    let package = ["bouncing-ball", "van-der-pol", "stair", "dahlquist"].map(String::from).to_vec();
     let build = Build { package, out: Some(folder.clone()), ..Build::default() };
     build::run(&build).expect("Reference-FMUs that build");
     folder
@@ -64,7 +64,20 @@ fn tests_with(requirements: &str, name: &str, files: &[&str], variables: &[(&str
 
 #[test]
 fn the_package() {
-    let files = ["simulate", "exchange", "fmpy", "batch", "plan", "dask", "gym", "examples", "cli", "types", "figures"];
+    let files = [
+        "simulate",
+        "exchange",
+        "linearize",
+        "fmpy",
+        "batch",
+        "plan",
+        "dask",
+        "gym",
+        "examples",
+        "cli",
+        "types",
+        "figures",
+    ];
     let files = files.map(|name| format!("test_{name}.py"));
     tests("fmurun", &files.each_ref().map(String::as_str), &[]);
 }

@@ -2,6 +2,7 @@
 
 - `simulate_fmu`: one run, as FMPy does it: same arguments, same result, Co-Simulation or Model Exchange.
 - `Plan`: a system of FMUs for many runs on all processors, and on clusters by `fmurun.dask.sweep`.
+- `linearize`: matrices A, B, C and D of an FMU for Model Exchange.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
 - `fmurun.fmpy`: FMPy's classes for loops written by hand.
 
@@ -10,7 +11,8 @@ Every error of an FMU is an `FmuError`.
 
 from ._batch import Batch
 from ._error import FmuError
+from ._linearize import Linearization, linearize
 from ._plan import Plan
 from ._simulate import simulate_fmu
 
-__all__ = ["Batch", "FmuError", "Plan", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "linearize", "simulate_fmu"]

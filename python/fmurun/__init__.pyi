@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "Plan", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "linearize", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
@@ -80,11 +80,38 @@ class Plan:
     def from_toml(path: _Path, *, output: Sequence[str] | None = None, embed: bool = False) -> Plan: ...
     def simulate(self, start_values: Mapping[str, _Value] | None = None) -> fmpy.SimulationResult: ...
     def run_many(self, table: _Table, *, threads: int | None = None, first_run: int = 0) -> dict[str, NDArray[Any]]: ...
+    def gradient(
+        self, at: Mapping[str, float], *, step: float = 1e-4, threads: int | None = None
+    ) -> tuple[dict[str, float], dict[str, dict[str, float]]]: ...
     def rows(self, first: int, count: int) -> dict[str, NDArray[Any]]: ...
     def meta(self, columns: Iterable[str] | None = None) -> dict[str, NDArray[Any]]: ...
     @property
     def measures(self) -> list[str]: ...
     def __len__(self) -> int: ...
+
+class Linearization:
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
+    C: NDArray[np.float64]
+    D: NDArray[np.float64]
+    states: list[str]
+    inputs: list[str]
+    outputs: list[str]
+    x: NDArray[np.float64]
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    dx: NDArray[np.float64]
+    method: str
+
+def linearize(
+    fmu: _Path,
+    point: Mapping[str, _Value] | None = None,
+    *,
+    time: float = 0.0,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    method: Literal["derivatives", "differences"] | None = None,
+) -> Linearization: ...
 
 class Batch:
     n: int
