@@ -21,6 +21,7 @@ fn installed() -> PathBuf {
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation"]);
     // maturin is in the environment; it builds in this workspace's target folder.
     pip.arg("--target").arg(&folder).arg(package()).env("PATH", path.expect("a search path"));
+    pip.env("FMURUN_ARCHIVES", common::archives());
     run(&mut pip, "package fmurun").unwrap_or_else(|why| panic!("{why}"));
     folder
 }
@@ -68,6 +69,7 @@ fn the_package() {
         "simulate",
         "exchange",
         "linearize",
+        "drives",
         "fmpy",
         "batch",
         "plan",

@@ -7,9 +7,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import drives as drives
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "linearize", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str

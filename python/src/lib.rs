@@ -17,6 +17,7 @@ mod plan;
 mod record;
 mod simulation;
 mod stepping;
+mod tune;
 
 use pyo3::prelude::*;
 
@@ -35,4 +36,6 @@ mod _core {
     use super::plan::{Plan, paths, read_definition};
     #[pymodule_export]
     use super::simulation::Simulation;
+    #[pymodule_export]
+    use super::tune::tune;
 }
