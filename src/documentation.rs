@@ -124,7 +124,9 @@ fn timing(d: &Description) -> String {
 
 /// Parameters under a heading for each prefix, those without one first.
 fn parameters(d: &Description) -> String {
-    let of = |c: Causality| matches!(c, Causality::Parameter | Causality::CalculatedParameter);
+    let of = |c: Causality| {
+        matches!(c, Causality::Parameter | Causality::CalculatedParameter | Causality::StructuralParameter)
+    };
     let all: Vec<_> = d.variables.iter().filter(|v| of(v.causality)).collect();
     let mut prefixes: Vec<&str> = Vec::new();
     for variable in &all {
@@ -190,6 +192,8 @@ fn table(variables: &[&Variable]) -> String {
     );
     for v in variables {
         let kind = match (v.causality, v.variability) {
+            (Causality::StructuralParameter, Variability::Tunable) => " <small>a size, tunable</small>",
+            (Causality::StructuralParameter, _) => " <small>a size, set before the initialization</small>",
             (_, Variability::Tunable) => " <small>tunable</small>",
             (Causality::Output | Causality::Input | Causality::Local, Variability::Discrete) => {
                 " <small>sampled</small>"

@@ -137,6 +137,7 @@ impl PresetFmu {
             let what = match variable.causality {
                 Causality::Output => "an output",
                 Causality::CalculatedParameter => "a calculated parameter",
+                Causality::StructuralParameter => "a structural parameter, which sizes arrays",
                 _ => "a local variable",
             };
             bail!("{name} is {what}: a preset has start values of inputs and parameters, and of exact variables");

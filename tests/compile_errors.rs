@@ -128,7 +128,7 @@ fn models() -> Vec<Wrong> {
         model("nameless", (r#"name: "Ball", "#, ""), ": INFO.name must be a C identifier", EXPORT),
         model("typo", state("State::new(\"hight\""), "STATES of Ball: no row of the table has the name hight", EXPORT),
         model("sampled", state("State::new(\"v\""), "v: the row of a state is V::output or V::state", EXPORT),
-        model("array", state("State::new(\"a\""), "a: an array cannot be a state: write a row for each", EXPORT),
+        model("array", state("State::new(\"a\""), "a: the row is an array: its state is State::array", EXPORT),
         model(
             "double",
             (
@@ -181,6 +181,53 @@ fn models() -> Vec<Wrong> {
     ]
 }
 
+/// Structural parameters and arrays of states.
+fn sizes() -> Vec<Wrong> {
+    const EXPORT: usize = 26;
+    let array = |wrong: &'static str| ("State::new(\"h\", &METER_PER_S, |m| &mut m.h)", wrong);
+    let structural = |wrong: &'static str| ("V::state(\"h\",", wrong);
+    vec![
+        row(
+            "endless",
+            r#"V::structural("n", "", |_| unreachable!())"#,
+            "n: a structural parameter needs an upper bound: at_most",
+            3,
+        ),
+        row(
+            "unknown_size",
+            r#"V::array_input("a", &VOLT, "", 4, |m| &mut m.a).sized(&["n"])"#,
+            "a: the table has no structural parameter of the name that sizes it",
+            3,
+        ),
+        row(
+            "wrong_size",
+            r#"V::structural("n", "", |_| unreachable!()).at_most(3.0),
+               V::array_input("a", &VOLT, "", 4, |m| &mut m.a).sized(&["n"])"#,
+            "a: the product of the greatest sizes is not the number of elements",
+            3,
+        ),
+        row(
+            "sized_scalar",
+            r#"V::input("x", &VOLT, "", |m| &mut m.u).sized(&["n"])"#,
+            "x: only an array without a shape",
+            5,
+        ),
+        model(
+            "longer",
+            array("State::array(\"a\", &METER_PER_S, 3, |m| &mut m.a)"),
+            "a: State::array and its row have different numbers of elements",
+            EXPORT,
+        ),
+        model("sizeless", ("Ball: ContinuousTime", "Ball: ContinuousTime + Resizable"), "`Ball` has no sizes", EXPORT),
+        model(
+            "unsized",
+            structural("V::structural(\"n\", \"\", |_| unreachable!()).at_most(2.0),\n        V::state(\"h\","),
+            "Ball: a row V::structural needs the capability Resizable",
+            EXPORT + 1,
+        ),
+    ]
+}
+
 /// Clocks.
 fn clocks() -> Vec<Wrong> {
     const EXPORT: usize = 26;
@@ -224,7 +271,7 @@ fn clocks() -> Vec<Wrong> {
 
 #[test]
 fn a_wrong_row_or_model_is_an_error_at_its_place() {
-    let cases: Vec<Wrong> = rows().into_iter().chain(models()).chain(clocks()).collect();
+    let cases: Vec<Wrong> = rows().into_iter().chain(models()).chain(clocks()).chain(sizes()).collect();
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("compile_errors");
     let sources = folder.join("src/bin");

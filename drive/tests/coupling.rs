@@ -130,10 +130,10 @@ fn the_fastest_machines_run() {
 fn model_exchange_has_no_derivatives_there() {
     let mut plant = PmsmPlant::default();
     plant.initialize();
-    *(PmsmPlant::STATES[2].at)(&mut plant) = 1e6;
+    *PmsmPlant::STATES[2].at(&mut plant) = 1e6;
     let fault = plant.derivatives(Elapsed::ZERO, &mut [0.0; 4]).unwrap_err();
     assert!(fault.message().starts_with("the shaft turns at 1000000 rad/s, beyond the 333333"), "{fault}");
-    *(PmsmPlant::STATES[2].at)(&mut plant) = 1e5;
+    *PmsmPlant::STATES[2].at(&mut plant) = 1e5;
     plant.derivatives(Elapsed::ZERO, &mut [0.0; 4]).unwrap();
 }
 

@@ -329,7 +329,7 @@ fn the_derivatives_are_exact() {
     for k in 0..6 {
         let step = |model: &mut PmsmDrive, by: f64| {
             if k < 5 {
-                *(PmsmDrive::STATES[k].at)(model) += by;
+                *PmsmDrive::STATES[k].at(model) += by;
             } else {
                 model.inputs.u_dc += by;
             }

@@ -255,8 +255,8 @@ fn what_a_solver_tries_is_not_counted() {
     // Other states, inputs and times, and back: a step that is rejected, or an event that is searched for.
     let (before, inputs) = (tried.model.clone(), tried.model.inputs.clone());
     for k in 1..50 {
-        *(PmsmPlant::STATES[0].at)(&mut tried.model) = 0.01 * f64::from(k);
-        *(PmsmPlant::STATES[2].at)(&mut tried.model) = 7.0 * f64::from(k);
+        *PmsmPlant::STATES[0].at(&mut tried.model) = 0.01 * f64::from(k);
+        *PmsmPlant::STATES[2].at(&mut tried.model) = 7.0 * f64::from(k);
         tried.model.settle();
         (tried.model.inputs.u.a, tried.model.inputs.u_dc) = (300.0, 500.0);
         tried.model.derivatives(importer.now.plus(1e-5 * f64::from(k)), &mut [0.0; 4]).unwrap();
@@ -264,7 +264,7 @@ fn what_a_solver_tries_is_not_counted() {
         assert_eq!(tried.out.energy, importer.block.out.energy);
     }
     for (i, state) in PmsmPlant::STATES.iter().enumerate() {
-        *(state.at)(&mut tried.model) = *(PmsmPlant::STATES[i].at)(&mut before.clone());
+        *state.at(&mut tried.model) = *PmsmPlant::STATES[i].at(&mut before.clone());
     }
     tried.model.settle();
     tried.model.inputs = inputs;

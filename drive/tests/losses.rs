@@ -58,11 +58,11 @@ fn the_powers_are_balanced_at_every_instant() {
         block.initialize();
         let values = [0.545 + 0.4 * draw(&mut seed), 0.4 * draw(&mut seed), 300.0 * draw(&mut seed), draw(&mut seed)];
         for (state, value) in PmsmPlant::STATES.iter().zip(values) {
-            *(state.at)(&mut block.model) = value;
+            *state.at(&mut block.model) = value;
         }
         block.model.settle();
         block.model.event(Elapsed::ZERO).unwrap();
-        let values = [0, 1, 2].map(|k: usize| *(PmsmPlant::STATES[k].at)(&mut block.model));
+        let values = [0, 1, 2].map(|k: usize| *PmsmPlant::STATES[k].at(&mut block.model));
         let mut dx = [0.0; 4];
         block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();
         block.model.observe(Elapsed::ZERO, &mut block.out);
@@ -109,7 +109,7 @@ fn turning(h: f64, steps: u32, set: impl Fn(&mut PlantParameters)) -> Block<Pmsm
 #[test]
 fn the_energies_are_balanced_over_20_ms() {
     let stored = |block: &mut Block<PmsmPlant>| {
-        let [d, q, speed] = [0, 1, 2].map(|k: usize| *(PmsmPlant::STATES[k].at)(&mut block.model));
+        let [d, q, speed] = [0, 1, 2].map(|k: usize| *PmsmPlant::STATES[k].at(&mut block.model));
         let parameters = &block.model.parameters;
         let psi = drive::frame::Dq::new(d, q);
         machine::magnetic_energy(&machine_of(parameters), parameters.magnetics(), psi)

@@ -315,7 +315,7 @@ fn both_interfaces_agree() {
     set(&mut solved.model.inputs);
     solved.initialize();
     let states = PmsmDriveMean::STATES;
-    let read = |m: &mut PmsmDriveMean| states.iter().map(|s| *(s.at)(m)).collect::<Vec<f64>>();
+    let read = |m: &mut PmsmDriveMean| states.iter().map(|s| *s.at(m)).collect::<Vec<f64>>();
     let h = 1e-4;
     for _ in 0..5000 {
         let x = read(&mut solved.model);
@@ -323,7 +323,7 @@ fn both_interfaces_agree() {
         let mut slope = vec![0.0; x.len()];
         for (share, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
             for (k, state) in states.iter().enumerate() {
-                *(state.at)(&mut solved.model) = x[k] + share * h * slope[k];
+                *state.at(&mut solved.model) = x[k] + share * h * slope[k];
             }
             solved.model.derivatives(Elapsed::ZERO, &mut slope).unwrap();
             for (sum, slope) in sum.iter_mut().zip(&slope) {
@@ -331,7 +331,7 @@ fn both_interfaces_agree() {
             }
         }
         for (k, state) in states.iter().enumerate() {
-            *(state.at)(&mut solved.model) = x[k] + h * sum[k];
+            *state.at(&mut solved.model) = x[k] + h * sum[k];
         }
     }
     solved.model.observe(Elapsed::ZERO, &mut solved.out);

@@ -224,15 +224,15 @@ fn indicators_stand_on_the_side_of_the_decision() {
     // The EMF of exactly the link voltage opens the diodes, and the indicator is not 0.
     let legs = 3.0_f64.sqrt() * 0.15 * 3.0;
     plant.model.inputs.u_dc = legs * 400.0;
-    (PmsmPlant::STATES[2].at)(&mut plant.model);
-    *(PmsmPlant::STATES[2].at)(&mut plant.model) = 400.0;
+    PmsmPlant::STATES[2].at(&mut plant.model);
+    *PmsmPlant::STATES[2].at(&mut plant.model) = 400.0;
     plant.model.settle();
     let before = z(&plant.model);
     assert!(!plant.model.event(Elapsed::ZERO).unwrap().states_changed);
     assert!(before[1].abs() < 2e-9 && z(&plant.model)[1] != 0.0, "{before:?} {:?}", z(&plant.model));
     // A remaining current is thrown away once: a second event changes nothing.
-    *(PmsmPlant::STATES[2].at)(&mut plant.model) = 10.0;
-    *(PmsmPlant::STATES[1].at)(&mut plant.model) += 1e-4;
+    *PmsmPlant::STATES[2].at(&mut plant.model) = 10.0;
+    *PmsmPlant::STATES[1].at(&mut plant.model) += 1e-4;
     assert!(plant.model.event(Elapsed::ZERO).unwrap().states_changed);
     assert!(!plant.model.event(Elapsed::ZERO).unwrap().states_changed);
     // A link without voltage never blocks, and no indicator is NaN.
@@ -268,7 +268,7 @@ fn an_imposed_shaft_replaces_the_mechanical_states() {
         assert!(di < 1e-5 && dw == 0.0, "{k}: {di} A, {dw} rad/s");
         assert!((a.angle - b.angle).abs() < 1e-9 && (a.tau_e - b.tau_e).abs() < 1e-5, "{a:?} {b:?}");
         // The state goes with the angle of the shaft too.
-        let state = *(PmsmPlant::STATES[3].at)(&mut plant.integrated.model);
+        let state = *PmsmPlant::STATES[3].at(&mut plant.integrated.model);
         assert!((state - b.angle).abs() < 1e-9, "{state} {}", b.angle);
     }
     assert!(plant.stepped.out.tau_e.abs() > 0.5, "{:?}", plant.stepped.out);
@@ -279,10 +279,10 @@ fn heun(plant: &mut PmsmPlant, now: Elapsed, h: f64, mut input: impl FnMut(&mut 
     let (mut k_1, mut k_2) = ([0.0; 4], [0.0; 4]);
     input(plant, now);
     plant.derivatives(now, &mut k_1).unwrap();
-    let x: Vec<f64> = PmsmPlant::STATES.iter().map(|state| *(state.at)(plant)).collect();
+    let x: Vec<f64> = PmsmPlant::STATES.iter().map(|state| *state.at(plant)).collect();
     let write = |plant: &mut PmsmPlant, dx: &dyn Fn(usize) -> f64| {
         for (i, state) in PmsmPlant::STATES.iter().enumerate() {
-            *(state.at)(plant) = x[i] + dx(i);
+            *state.at(plant) = x[i] + dx(i);
         }
         plant.settle();
     };
@@ -461,9 +461,9 @@ fn the_states_are_rows_of_the_tables() {
     block.model.pair.plant.model.parameters.initial.speed = 20.0;
     block.initialize();
     for (state, index) in PmsmDrive::STATES.iter().zip(drive.rows().unwrap()) {
-        *(state.at)(&mut block.model) += 0.1;
+        *state.at(&mut block.model) += 0.1;
         block.model.settle();
-        let x = *(state.at)(&mut block.model);
+        let x = *state.at(&mut block.model);
         block.model.observe(Elapsed::ZERO, &mut block.out);
         let Some((_, Slot::Real(shown))) = PmsmDrive::TABLE.entry(&mut block, index) else {
             panic!("{} is a real number", state.name)

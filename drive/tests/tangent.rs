@@ -38,7 +38,7 @@ struct Known<M: Model> {
 fn knowns() -> Vec<Known<PmsmPlant>> {
     macro_rules! state {
         ($k:literal, $size:expr) => {
-            Known { name: PmsmPlant::STATES[$k].name, at: |b| (PmsmPlant::STATES[$k].at)(&mut b.model), size: $size }
+            Known { name: PmsmPlant::STATES[$k].name, at: |b| PmsmPlant::STATES[$k].at(&mut b.model), size: $size }
         };
     }
     vec![
@@ -307,7 +307,7 @@ fn the_tangent_of_the_drive_is_that_of_its_plant() {
         }
         change(&mut inputs.thermal.coolant, 5.0);
         for (state, by) in PmsmDrive::STATES.iter().zip([0.02, -0.03, 10.0, 0.3, 3.0]) {
-            change((state.at)(&mut block.model), by);
+            change(state.at(&mut block.model), by);
         }
     };
     let mut along = base.clone();

@@ -334,7 +334,7 @@ fn imposed_temperatures_act_in_the_machine() {
         coasting.initialize();
         impose(&mut coasting, 20.0, celsius);
         run(&mut coasting, &mut now, 1e-3);
-        let psi = *(PmsmPlant::STATES[0].at)(&mut coasting.model);
+        let psi = *PmsmPlant::STATES[0].at(&mut coasting.model);
         assert!((psi / 0.15 - magnet).abs() < 1e-9 && coasting.out.i_d == 0.0, "{psi} Wb, {} A", coasting.out.i_d);
         // Blocking diodes stay closed in Model Exchange too.
         let mut exchanged = imposed(20.0, 20.0);

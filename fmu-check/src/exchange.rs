@@ -177,7 +177,7 @@ impl Instance<'_> {
         seed: &[f64],
     ) -> Result<(Status, Vec<f64>), NotDetermined> {
         let adjoint = name == Sensitivity::GetAdjointDerivative;
-        let mut result = vec![f64::NAN; if adjoint { knowns.len() } else { unknowns.len() }];
+        let mut result = vec![f64::NAN; self.session.values_of(if adjoint { knowns } else { unknowns })];
         let n = result.len();
         let arguments = SensitivityArguments {
             unknowns: (Some(unknowns), unknowns.len()),

@@ -8,9 +8,7 @@ use crate::encoding::bits;
 use clap::Args;
 use fmu_import::raw::{Arguments, Interface, Raw};
 use fmu_import::{file_uri, printable_lines};
-use model_description::{
-    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability,
-};
+use model_description::{BaseType, Causality, FmiVersion, Initial, ModelDescription, ModelVariable, Variability};
 use serde::{Deserialize, Serialize};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
@@ -445,14 +443,13 @@ impl Session {
 
     /// Number of elements of a variable.
     pub(super) fn elements(&self, v: &ModelVariable) -> usize {
-        let extent = |d: &Dimension| match d {
-            Dimension::Fixed(n) => usize::try_from(*n).unwrap_or(1),
-            Dimension::Variable(r) => {
-                let size = self.description.variables.iter().find(|s| s.value_reference == *r);
-                size.and_then(|s| s.start.as_deref()?.trim().parse().ok()).unwrap_or(1)
-            }
-        };
-        v.dimensions.iter().map(extent).product()
+        self.description.shape(v).unwrap_or_default().iter().product()
+    }
+
+    /// Number of values that references stand for; one that does not exist counts as one value.
+    pub(super) fn values_of(&self, references: &[u32]) -> usize {
+        let of = |r: &u32| self.description.variables.iter().find(|v| v.value_reference == *r);
+        references.iter().map(|r| of(r).map_or(1, |v| self.elements(v))).sum()
     }
 
     /// A value near the start value, within the range, that differs from it.

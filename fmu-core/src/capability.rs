@@ -11,6 +11,7 @@ use crate::log::Warnings;
 use crate::model::Block;
 use crate::row::Slot;
 use crate::rules::can_be_state;
+use crate::sizes::Resizable;
 use crate::table::WIDE;
 use crate::variable::Meta;
 use crate::{Elapsed, Fault, Hash, Model, Step};
@@ -85,6 +86,9 @@ pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs
 /// [`CompletedSteps::complete`].
 pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
 
+/// [`Resizable::resize`].
+pub type Resize<M> = fn(&mut M) -> Result<(), Fault>;
+
 /// [`EventMode::to_event`].
 pub type ToEvent<M> = fn(&mut M, &Step) -> Result<Stop, Fault>;
 
@@ -109,6 +113,8 @@ pub struct Capabilities<M: Model> {
     pub scheduled: bool,
     /// The model is not for Co-Simulation.
     pub exchange_only: bool,
+    /// [`Resizable::resize`].
+    pub resizable: Option<Resize<M>>,
     /// [`Intermediate::longest`].
     pub intermediate: Option<fn(&M) -> f64>,
     /// Function of a model that [`Warns`].
@@ -128,6 +134,7 @@ impl<M: Model> Capabilities<M> {
         clocked: None,
         scheduled: false,
         exchange_only: false,
+        resizable: None,
         intermediate: None,
         warn: None,
     };
@@ -230,6 +237,14 @@ impl<M: Model> Capabilities<M> {
         Self { exchange_only: true, ..self }
     }
 
+    /// Adds [`Resizable`].
+    pub const fn Resizable(self) -> Self
+    where
+        M: Resizable,
+    {
+        Self { resizable: Some(M::resize), ..self }
+    }
+
     /// Adds [`Intermediate`].
     pub const fn Intermediate(self) -> Self
     where
@@ -276,25 +291,27 @@ impl<M: Model> Capabilities<M> {
         }
     }
 
-    /// The indices of the states' rows in the table.
+    /// The indices of the states' rows in the table: one for each scalar state.
     ///
     /// # Errors
     /// Names a state without a continuous real row that is an output or local.
     pub fn rows(&self) -> Result<Vec<usize>, Fault> {
         let row = |state: &State<M>| {
-            let fits = |name: &str, meta: &Meta| name == state.name && can_be_state(meta);
+            let fits = |name: &str, meta: &Meta| name == state.name && can_be_state(meta, state.dimension());
             let named = |index: &usize| M::TABLE.locate(*index).is_some_and(|(name, meta, _)| fits(&name, meta));
             let none =
                 || Fault::new(format!("the state {} has no continuous real output or state in the table", state.name));
-            M::TABLE.indices().find(named).ok_or_else(none)
+            let first = M::TABLE.indices().find(named).ok_or_else(none)?;
+            Ok(first..first + state.most())
         };
-        self.states().iter().map(row).collect()
+        let rows: Result<Vec<_>, Fault> = self.states().iter().map(row).collect();
+        Ok(rows?.into_iter().flatten().collect())
     }
 
     /// Value reference of an index of the table: one more for those below its length, after which derivatives and event indicators
     /// follow; the elements of wide arrays come after them.
     pub fn reference(&self, index: usize) -> u32 {
-        let beside = if index < WIDE { 0 } else { M::TABLE.len() + self.states().len() + self.indicators().len() };
+        let beside = if index < WIDE { 0 } else { M::TABLE.len() + self.scalars() + self.indicators().len() };
         u32::try_from(index % WIDE + beside + 1).unwrap_or(u32::MAX)
     }
 
@@ -305,7 +322,7 @@ impl<M: Model> Capabilities<M> {
         if M::TABLE.wide() == 0 {
             return index;
         }
-        let beside = M::TABLE.len() + self.states().len() + self.indicators().len();
+        let beside = M::TABLE.len() + self.scalars() + self.indicators().len();
         if index >= beside && index < beside + M::TABLE.wide() { index - beside + WIDE } else { index }
     }
 
@@ -317,9 +334,9 @@ impl<M: Model> Capabilities<M> {
         rows: &[usize],
         index: usize,
     ) -> Option<(&'static Meta, Slot<'a>)> {
-        let Some(state) = rows.iter().position(|&row| row == index) else { return M::TABLE.entry(block, index) };
+        let Some(number) = rows.iter().position(|&row| row == index) else { return M::TABLE.entry(block, index) };
         let (meta, _) = M::TABLE.entry(block, index)?;
-        Some((meta, Slot::Real((self.states()[state].at)(&mut block.model))))
+        Some((meta, Slot::Real(self.scalar(&mut block.model, number)?)))
     }
 
     /// Hash of the model's table and of all that the capabilities add to its interface.
@@ -334,6 +351,9 @@ impl<M: Model> Capabilities<M> {
         while i < self.states().len() {
             let state = &self.states()[i];
             hash = hash.text(state.name).quantity(state.rate).bytes(&[state.reinit as u8]);
+            if state.dimension().is_some() {
+                hash = hash.text("array");
+            }
             i += 1;
         }
         i = 0;

@@ -1,8 +1,16 @@
 //! Capabilities of a model with differential equations: its states and derivatives, and their tangent.
 
 use crate::{Elapsed, Fault, Model, unit::Quantity};
+use std::slice;
 
-/// A continuous state of the model `M`.
+/// Where the model `M` keeps a state.
+enum Place<M: 'static> {
+    One(fn(&mut M) -> &mut f64),
+    /// Greatest number of elements, and where they are.
+    Many(usize, fn(&mut M) -> &mut [f64]),
+}
+
+/// A continuous state of the model `M`, or an array of states.
 pub struct State<M: 'static> {
     /// Name of a continuous real row of the table: an output, or a row made by [`Row::state`](crate::Row::state). The
     /// row's nominal value scales the solver's error.
@@ -11,25 +19,72 @@ pub struct State<M: 'static> {
     pub rate: &'static Quantity,
     /// An event may change it.
     pub reinit: bool,
-    /// Where the model keeps it.
-    pub at: fn(&mut M) -> &mut f64,
+    place: Place<M>,
 }
 
 impl<M: 'static> State<M> {
     /// A state that no event changes.
     pub const fn new(name: &'static str, rate: &'static Quantity, at: fn(&mut M) -> &mut f64) -> Self {
-        Self { name, rate, reinit: false, at }
+        Self { name, rate, reinit: false, place: Place::One(at) }
+    }
+
+    /// An array of states that no event changes: `name` is a row of an array with `dimension` elements. The elements follow one
+    /// another in all calls, as many as the model holds: see [`Resizable`](crate::Resizable).
+    pub const fn array(
+        name: &'static str,
+        rate: &'static Quantity,
+        dimension: usize,
+        at: fn(&mut M) -> &mut [f64],
+    ) -> Self {
+        Self { name, rate, reinit: false, place: Place::Many(dimension, at) }
     }
 
     /// The state `of` a part of the model that has the rows of its table under the same names.
     pub const fn of_part<P>(of: &State<P>, at: fn(&mut M) -> &mut f64) -> Self {
-        Self { name: of.name, rate: of.rate, reinit: of.reinit, at }
+        Self { name: of.name, rate: of.rate, reinit: of.reinit, place: Place::One(at) }
     }
 
     /// Marks the state as one that an event may change.
     pub const fn reinit(mut self) -> Self {
         self.reinit = true;
         self
+    }
+
+    /// Greatest number of elements of an array; `None` of a state that is not one.
+    pub const fn dimension(&self) -> Option<usize> {
+        match self.place {
+            Place::One(_) => None,
+            Place::Many(dimension, _) => Some(dimension),
+        }
+    }
+
+    /// Greatest number of scalar states that it stands for.
+    pub const fn most(&self) -> usize {
+        match self.place {
+            Place::One(_) => 1,
+            Place::Many(dimension, _) => dimension,
+        }
+    }
+
+    /// The value in the model.
+    ///
+    /// # Panics
+    /// The state is an array.
+    #[inline]
+    pub fn at<'a>(&self, model: &'a mut M) -> &'a mut f64 {
+        match self.place {
+            Place::One(at) => at(model),
+            Place::Many(..) => panic!("the state {} is an array", self.name),
+        }
+    }
+
+    /// The values in the model: one, or those of an array.
+    #[inline]
+    pub fn all<'a>(&self, model: &'a mut M) -> &'a mut [f64] {
+        match self.place {
+            Place::One(at) => slice::from_mut(at(model)),
+            Place::Many(_, at) => at(model),
+        }
     }
 }
 
@@ -42,7 +97,8 @@ pub trait ContinuousTime: Model {
     /// The states, in the order of all calls.
     const STATES: &'static [State<Self>];
 
-    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES).
+    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an array
+    /// has as many as the model holds.
     /// It allocates nothing and depends on nothing that a step leaves behind.
     ///
     /// # Errors

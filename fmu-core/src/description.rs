@@ -1,5 +1,6 @@
 //! The neutral description of a model, from which the XML, documentation and tools are generated.
 
+mod sizes;
 mod terminals;
 
 pub use terminals::{MemberDescription, TerminalDescription, TerminalPicture};
@@ -15,6 +16,7 @@ use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
 use serde::{Deserialize, Serialize};
+use sizes::{check_sizes, exchange, size};
 use std::collections::BTreeSet;
 
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
@@ -108,8 +110,11 @@ pub struct Variable {
     /// Other names (FMI 3.0).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<AliasDescription>,
-    /// Extents of an array, whose elements are row by row; empty for a scalar.
+    /// Extents of an array at the start, whose elements are row by row; empty for a scalar.
     pub shape: Vec<usize>,
+    /// Value references of the structural parameters that are its extents; empty for an array of one size.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub sized: Vec<u32>,
     /// The importer may set the start value of this output or local variable.
     #[serde(default)]
     pub exact: bool,
@@ -231,6 +236,7 @@ impl Description {
 
     fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
         let states = can.rows()?;
+        check_sizes(&block)?;
         probe::keeps_starts(can, &block, &states)?;
         let initial = probe::initial_dependencies(can, &block, &states);
         let between = probe::dependencies(can, &block, &states);
@@ -259,40 +265,50 @@ impl Description {
             if meta.need != Need::Always {
                 needs.push((variables.len(), meta.need));
             }
-            let state = states.iter().position(|&row| row == index);
+            let state = states.iter().position(|&row| row == index).and_then(|number| can.state_of(number));
             variables.push(Variable {
                 initial_dependencies: references(&initial[index]),
                 dependencies: references(&between[index]),
-                reinit: state.is_some_and(|i| can.states()[i].reinit),
+                reinit: state.is_some_and(|(state, _)| state.reinit),
                 ..variable(name, meta, reference(index), start)
             });
         }
-        for (i, state) in can.states().iter().enumerate() {
-            let (index, place) = (table.len() + i, table.len() + wide.len() + i);
+        let mut number = 0;
+        for state in can.states() {
+            let (index, place) = (table.len() + number, table.len() + wide.len() + number);
             let (name, of) = (format!("der({})", state.name), format!("Derivative of {}", state.name));
             let meta = *V::state("", state.rate, "", |m| m).meta();
-            variables.push(Variable {
+            let mut derivative = Variable {
                 description: of,
                 initial_dependencies: references(&initial[place]),
                 dependencies: references(&between[place]),
-                derivative: Some(reference(states[i])),
+                derivative: Some(reference(states[number])),
                 ..variable(name, &meta, reference(index), None)
-            });
+            };
+            for place in place + 1..place + state.most() {
+                join(&mut derivative.initial_dependencies, references(&initial[place]));
+                join(&mut derivative.dependencies, references(&between[place]));
+            }
+            variables.push(derivative);
+            number += state.most();
         }
         for (i, indicator) in can.indicators().iter().enumerate() {
             let meta = *V::state("", &ONE, indicator.description, |m| m).meta();
-            let index = table.len() + can.states().len() + i;
+            let index = table.len() + number + i;
             variables.push(variable(indicator.name.into(), &meta, reference(index), None));
         }
         // In the order of the value references.
         for (place, &extent) in (table.len()..).zip(&wide) {
             let array = wide_array::<M>(can, &mut block, extent)?;
+            let state = states.iter().position(|&row| row == extent.0).and_then(|number| can.state_of(number));
             variables.push(Variable {
                 initial_dependencies: references(&initial[place]),
                 dependencies: references(&between[place]),
+                reinit: state.is_some_and(|(state, _)| state.reinit),
                 ..array
             });
         }
+        size(can, &mut variables)?;
         check_names(M::INFO.name, &variables)?;
         check_types(&variables)?;
         put_on_clocks::<M>(&mut variables, can.clocked.as_ref().is_some_and(|clocked| clocked.feedthrough))?;
@@ -302,16 +318,6 @@ impl Description {
         }
         variables.iter_mut().for_each(in_place_of_another::<M>);
         let terminals = terminals::describe(M::TERMINALS, &variables)?;
-        let after = |i: usize| reference(table.len() + i);
-        let model_exchange = can.model_exchange().then(|| ModelExchange {
-            states: states.iter().map(|&row| reference(row)).collect(),
-            derivatives: (0..states.len()).map(after).collect(),
-            indicators: (0..can.indicators().len()).map(|i| after(states.len() + i)).collect(),
-            event_mode: can.event_mode(),
-            completed_steps: can.complete.is_some(),
-            scheduled: can.scheduled,
-            only: can.exchange_only,
-        });
         let info = M::INFO;
         Ok(Self {
             name: info.name.into(),
@@ -328,7 +334,7 @@ impl Description {
             variables,
             terminals,
             icon: M::ICON.map(Into::into),
-            model_exchange,
+            model_exchange: exchange(can, &states),
         })
     }
 
@@ -473,6 +479,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
             ([], n) => n.into_iter().collect(),
             (shape, _) => shape.to_vec(),
         },
+        sized: Vec::new(),
         exact: meta.exact,
         start: start.map(|x| vec![x]),
         initial_dependencies: None,

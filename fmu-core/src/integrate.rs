@@ -42,7 +42,7 @@ const WIDTH: f64 = 1e-9;
 /// # Errors
 /// Those of [`ContinuousTime::derivatives`], a state that is not finite, or more substeps than anyone can wait for.
 pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, longest: f64) -> Result<(), Fault> {
-    const { check_number::<M>(M::STATES.len(), N) };
+    const { check_number::<M>(N) };
     let count = substeps(step.h, longest)?;
     let h = step.h / count;
     let (mut now, mut left) = (step.start, count);
@@ -90,7 +90,7 @@ fn run<M: ContinuousTime + Events, const N: usize>(
     longest: f64,
     stops: bool,
 ) -> Result<Stop, Fault> {
-    const { check_number::<M>(M::STATES.len(), N) };
+    const { check_number::<M>(N) };
     const { check_indicators::<M>() };
     let (mut now, end) = (step.start, step.end());
     let count = substeps(step.h, longest)?;
@@ -210,27 +210,67 @@ fn substep<M: ContinuousTime + Events, const N: usize>(
     Ok(Some(high))
 }
 
+/// The states, those that the model has now in front.
 fn states<M: ContinuousTime, const N: usize>(model: &mut M) -> [f64; N] {
-    std::array::from_fn(|i| *(M::STATES[i].at)(model))
+    let mut all = [0.0; N];
+    if const { !has_arrays::<M>() } {
+        all = std::array::from_fn(|i| *M::STATES[i].at(model));
+    } else {
+        let mut places = all.iter_mut();
+        for state in M::STATES {
+            for (x, place) in state.all(model).iter().zip(&mut places) {
+                *place = *x;
+            }
+        }
+    }
+    all
 }
 
 fn write<M: ContinuousTime, const N: usize>(model: &mut M, x: &[f64; N]) {
-    for (state, x) in M::STATES.iter().zip(x) {
-        *(state.at)(model) = *x;
+    if const { !has_arrays::<M>() } {
+        for (state, x) in M::STATES.iter().zip(x) {
+            *state.at(model) = *x;
+        }
+    } else {
+        let mut values = x.iter();
+        for state in M::STATES {
+            for (place, x) in state.all(model).iter_mut().zip(&mut values) {
+                *place = *x;
+            }
+        }
     }
     model.settle();
+}
+
+/// Number of states that the model has now: `N`, unless an array has become shorter.
+fn count<M: ContinuousTime, const N: usize>(model: &mut M) -> usize {
+    if const { !has_arrays::<M>() } {
+        return N;
+    }
+    M::STATES.iter().map(|state| state.all(model).len()).sum::<usize>().min(N)
+}
+
+const fn has_arrays<M: ContinuousTime>() -> bool {
+    let mut i = 0;
+    while i < M::STATES.len() {
+        if M::STATES[i].dimension().is_some() {
+            return true;
+        }
+        i += 1;
+    }
+    false
 }
 
 /// One step of `h` (s) of the classical Runge-Kutta method.
 fn rk4<M: ContinuousTime, const N: usize>(model: &mut M, now: Elapsed, h: f64) -> Result<(), Fault> {
     let start = states::<M, N>(model);
-    let (mut sum, mut k) = ([0.0; N], [0.0; N]);
+    let (mut sum, mut k, n) = ([0.0; N], [0.0; N], count::<M, N>(model));
     for (at, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
         if at > 0.0 {
             let x = std::array::from_fn(|i| start[i] + at * h * k[i]);
             write::<M, N>(model, &x);
         }
-        model.derivatives(if at > 0.0 { now.plus(at * h) } else { now }, &mut k)?;
+        model.derivatives(if at > 0.0 { now.plus(at * h) } else { now }, &mut k[..n])?;
         for i in 0..N {
             sum[i] += weight * k[i];
         }
@@ -249,10 +289,21 @@ fn arrive<M: ContinuousTime, const N: usize>(
     if let Some(i) = (0..N).find(|&i| !end[i].is_finite()) {
         write::<M, N>(model, start);
         let at = now.seconds();
-        return Err(Fault::value(M::STATES[i].name, end[i], format_args!("a finite number, {at} s after the start")));
+        return Err(Fault::value(name_of::<M>(i), end[i], format_args!("a finite number, {at} s after the start")));
     }
     write::<M, N>(model, end);
     Ok(())
+}
+
+/// The name of the state to which a scalar belongs.
+#[cold]
+fn name_of<M: ContinuousTime>(scalar: usize) -> &'static str {
+    let mut first = 0;
+    let named = M::STATES.iter().find(|state| {
+        first += state.most();
+        scalar < first
+    });
+    named.map_or("a state", |state| state.name)
 }
 
 /// Number of equal substeps into which a step of `h` (s) is divided.

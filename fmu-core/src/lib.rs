@@ -75,10 +75,10 @@
 //! ```
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
-//! [`CompletedSteps`], [`Intermediate`], [`Clocked`] and [`Warns`] are further capabilities of a model; [`Model::load`] reads files that the FMU brings along,
-//! and a [`preset`] is one of them.
+//! [`CompletedSteps`], [`Intermediate`], [`Clocked`], [`Resizable`] and [`Warns`] are further capabilities of a model;
+//! [`Model::load`] reads files that the FMU brings along, and a [`preset`] is one of them.
 //!
-//! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`terminal`], [`model`],
+//! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`sizes`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`rules`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]
@@ -105,6 +105,7 @@ pub mod reals;
 pub mod resource;
 pub mod row;
 pub mod rules;
+pub mod sizes;
 pub mod table;
 pub mod terminal;
 pub mod time;
@@ -129,6 +130,7 @@ pub use need::Need;
 pub use reals::Inputs;
 pub use resource::Resource;
 pub use row::{Constant, Row, Slot};
+pub use sizes::Resizable;
 pub use table::{Part, Table};
 pub use terminal::{Icon, Member, Terminal};
 pub use time::{Elapsed, SampleGrid, Step};

@@ -57,10 +57,15 @@ pub struct Items<W: 'static, T: 'static>(pub fn(&mut W) -> &mut [T]);
 /// The interface of [`Items`] for a table that does not know their type.
 pub(crate) trait List<W>: Sync {
     fn find<'a>(&self, whole: &'a mut W, index: usize) -> Option<Slot<'a>>;
+    fn count(&self, whole: &mut W) -> usize;
 }
 
 impl<W, T: Element> List<W> for Items<W, T> {
     fn find<'a>(&self, whole: &'a mut W, index: usize) -> Option<Slot<'a>> {
         (self.0)(whole).get_mut(index).map(T::slot)
+    }
+
+    fn count(&self, whole: &mut W) -> usize {
+        (self.0)(whole).len()
     }
 }

@@ -66,7 +66,8 @@ pub(crate) fn initial_dependencies<M: Model>(
     }
     let unknown = |i: usize| {
         let calculated = |c| matches!(c, Causality::Output | Causality::CalculatedParameter);
-        metas.get(i).is_none_or(|meta| !meta.has_start() && (states.contains(&i) || calculated(meta.causality)))
+        let state = states.contains(&wide::<M>().index(i));
+        metas.get(i).is_none_or(|meta| !meta.has_start() && (state || calculated(meta.causality)))
     };
     found.list(unknown, &wide::<M>())
 }
@@ -231,12 +232,14 @@ fn observed<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) 
 
 /// The bits of every variable, then of every derivative.
 fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) -> Vec<u64> {
-    let mut dx = vec![f64::NAN; can.states().len()];
+    let mut dx = vec![f64::NAN; can.scalars()];
+    let n = can.count_states(&mut block.model);
     if let Some(continuous) = &can.continuous
-        && (continuous.derivatives)(&block.model, now, &mut dx).is_err()
+        && (continuous.derivatives)(&block.model, now, &mut dx[..n]).is_err()
     {
         dx.fill(f64::NAN);
     }
+    can.spread(&mut block.model, &mut dx);
     let mut value = |i| M::TABLE.entry(&mut block, i).map_or(0, |(_, slot)| slot.bits());
     let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
     for (first, n) in wide::<M>().arrays {
@@ -253,8 +256,8 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
 /// Moves state `i` by about its nominal value.
 fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], i: usize, draw: &mut Draw) {
     let nominal = M::TABLE.entry(block, states[i]).and_then(|(meta, _)| meta.nominal).unwrap_or(1.0);
-    *(can.states()[i].at)(&mut block.model) +=
-        nominal * draw.between(0.3, 1.0) * if draw.below(2) == 0 { 1.0 } else { -1.0 };
+    let Some(x) = can.scalar(&mut block.model, i) else { return };
+    *x += nominal * draw.between(0.3, 1.0) * if draw.below(2) == 0 { 1.0 } else { -1.0 };
     if let Some(continuous) = &can.continuous {
         (continuous.settle)(&mut block.model);
     }

@@ -9,10 +9,12 @@ mod slot;
 
 use crate::bytes::Bytes;
 use crate::enumeration::Place;
+use crate::fault::Fault;
 use crate::integer::Getter;
 use crate::list::List;
 use crate::need::Need;
 use crate::reals::{Inputs, Interval};
+use crate::sizes::Sizes;
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 pub use slot::{Constant, Slot};
@@ -25,6 +27,9 @@ pub(crate) trait Node<W>: Sync {
     fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
+    fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)>;
+    fn extents(&self, whole: &mut W, index: usize) -> Vec<usize>;
+    fn check_sizes(&self, whole: &mut W) -> Result<(), Fault>;
     fn clocks_of(&self, index: usize) -> &'static str;
 }
 
@@ -50,6 +55,7 @@ pub(crate) enum Access<W: 'static> {
         wide: usize,
         hash: Hash,
         binary: bool,
+        sizes: Sizes,
         node: &'static dyn Node<W>,
     },
 }
@@ -233,6 +239,7 @@ impl<W: 'static> Row<W> {
             intermediate: false,
             dimension: None,
             shape: &[],
+            sized: &[],
             aliases: &[],
         };
         Self { settable: Interval::of(&meta), meta, access }

@@ -2,6 +2,7 @@
 
 use crate::capability::Exported;
 use crate::clock::word;
+use crate::continuous::ContinuousTime;
 use crate::log;
 use crate::model::{Experiment, Info, Model};
 use crate::row::{Access, Row};
@@ -27,6 +28,7 @@ pub const fn check<E: Exported>() {
     let mut i = 0;
     check_intermediate::<E>(model);
     check_clocks::<E>(model);
+    check_resizable::<E>(model);
     while i < states {
         let name = can.states()[i].name;
         let mut other = 0;
@@ -35,7 +37,7 @@ pub const fn check<E: Exported>() {
             demand(!twice, name, "two states have this name");
             other += 1;
         }
-        check_state(rows, model, name);
+        check_state(rows, model, name, can.states()[i].dimension());
         i += 1;
     }
 }
@@ -75,6 +77,14 @@ const fn check_intermediate<E: Exported>(model: &str) {
     demand(rows || !capability, model, "the capability Intermediate needs a row of the table with .intermediate()");
     demand(capability || !rows, model, "a row of the table with .intermediate() needs the capability Intermediate");
     demand(!capability || E::CAN.continuous.is_some(), model, "the capability Intermediate needs ContinuousTime");
+}
+
+/// The capability and its rows come together.
+#[track_caller]
+const fn check_resizable<E: Exported>(model: &str) {
+    let (capability, rows) = (E::CAN.resizable.is_some(), E::Model::TABLE.has_sizes());
+    demand(rows || !capability, model, "the capability Resizable needs a row V::structural");
+    demand(capability || !rows, model, "a row V::structural needs the capability Resizable");
 }
 
 /// Clocks come with the capability, and what is on a clock names one.
@@ -120,7 +130,7 @@ const fn is_clock<W>(rows: &[Row<W>], name: &str) -> bool {
 }
 
 #[track_caller]
-const fn check_state<W>(rows: &[Row<W>], model: &str, name: &str) {
+const fn check_state<W>(rows: &[Row<W>], model: &str, name: &str, dimension: Option<usize>) {
     let mut row = 0;
     while row < rows.len() {
         let meta = &rows[row].meta;
@@ -130,8 +140,13 @@ const fn check_state<W>(rows: &[Row<W>], model: &str, name: &str) {
                 return;
             }
         } else if same_text(meta.name, name) {
-            demand(meta.dimension.is_none(), name, "an array cannot be a state: write a row for each element");
-            demand(can_be_state(meta), name, "the row of a state is V::output or V::state");
+            let array = meta.dimension.is_none() || dimension.is_some();
+            demand(array, name, "the row is an array: its state is State::array");
+            let one = same_dimension(meta.dimension, dimension);
+            demand(one, name, "State::array and its row have different numbers of elements");
+            let rule =
+                "the row of a state is V::output or V::state, that of an array V::array_output or V::array_local";
+            demand(can_be_state(meta, dimension), name, rule);
             return;
         }
         row += 1;
@@ -139,10 +154,18 @@ const fn check_state<W>(rows: &[Row<W>], model: &str, name: &str) {
     fail(&["STATES of ", model, ": no row of the table has the name ", name]);
 }
 
-/// Whether a row can hold a continuous state.
-pub(crate) const fn can_be_state(meta: &Meta) -> bool {
+const fn same_dimension(a: Option<usize>, b: Option<usize>) -> bool {
+    match (a, b) {
+        (Some(a), Some(b)) => a == b,
+        (None, None) => true,
+        _ => false,
+    }
+}
+
+/// Whether a row can hold a continuous state, or an array of that many.
+pub(crate) const fn can_be_state(meta: &Meta, dimension: Option<usize>) -> bool {
     matches!(meta.variability, Variability::Continuous)
-        && meta.dimension.is_none()
+        && same_dimension(meta.dimension, dimension)
         && matches!(meta.kind, Kind::Real(_))
         && matches!(meta.causality, Causality::Output | Causality::Local)
 }
@@ -152,8 +175,13 @@ pub(crate) const fn can_be_state(meta: &Meta) -> bool {
 /// # Panics
 /// At compile time, if it is another.
 #[track_caller]
-pub(crate) const fn check_number<M: Model>(states: usize, given: usize) {
+pub(crate) const fn check_number<M: ContinuousTime>(given: usize) {
     let (mut of_model, mut of_call) = ([0; 20], [0; 20]);
+    let (mut states, mut i) = (0, 0);
+    while i < M::STATES.len() {
+        states += M::STATES[i].most();
+        i += 1;
+    }
     if states != given {
         let (states, given) = (digits(states, &mut of_model), digits(given, &mut of_call));
         fail(&["STATES of ", M::INFO.name, " has the length ", states, ", and its integrator is made for ", given]);

@@ -9,6 +9,7 @@ use crate::fault::Fault;
 use crate::reals::Inputs;
 use crate::row::{Access, Constant, Node, Row, Slot};
 use crate::rules::{demand, same_text};
+use crate::sizes::{Sizes, check_sized};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use std::fmt::Display;
@@ -56,6 +57,18 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.element(index)
     }
 
+    fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)> {
+        self.table.extent((self.lens)(whole), index)
+    }
+
+    fn extents(&self, whole: &mut W, index: usize) -> Vec<usize> {
+        self.table.extents((self.lens)(whole), index)
+    }
+
+    fn check_sizes(&self, whole: &mut W) -> Result<(), Fault> {
+        self.table.check_sizes((self.lens)(whole))
+    }
+
     fn clocks_of(&self, index: usize) -> &'static str {
         self.table.clocks_of(index)
     }
@@ -64,8 +77,8 @@ impl<W, P> Node<W> for Part<W, P> {
 impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
-        let Table { len, wide, hash, binary, intermediate, .. } = *part.table;
-        let access = Access::Part { len, wide, hash, binary, node: part };
+        let Table { len, wide, hash, binary, intermediate, sizes, .. } = *part.table;
+        let access = Access::Part { len, wide, hash, binary, sizes, node: part };
         let mut row = Self::new(prefix, "", Kind::Boolean, access);
         row.meta.intermediate = intermediate;
         row
@@ -115,6 +128,8 @@ pub struct Table<W: 'static> {
     binary: bool,
     /// A variable can be read or set inside a communication step.
     pub(crate) intermediate: bool,
+    /// What the structural parameters can do.
+    pub(crate) sizes: Sizes,
 }
 
 impl<W: 'static> Table<W> {
@@ -128,13 +143,15 @@ impl<W: 'static> Table<W> {
         // No row past the end.
         let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
         let (mut len, mut row, mut hash, mut binary, mut intermediate) = (0, 0, Hash::START, false, false);
+        let mut sizes = Sizes::NONE;
         let (mut wide_places, mut wide, mut wide_rows) = ([WidePlace { row: 0, first: 0, len: 0 }; WIDE_ROWS], 0, 0);
         while row < rows.len() {
             let meta = &rows[row].meta;
             intermediate |= meta.intermediate;
             let (count, beyond) = match (&rows[row].access, meta.dimension) {
-                (Access::Part { len, wide, hash: of_part, binary: of_bytes, .. }, _) => {
+                (Access::Part { len, wide, hash: of_part, binary: of_bytes, sizes: of_sizes, .. }, _) => {
                     binary |= *of_bytes;
+                    sizes = sizes.and(*of_sizes);
                     hash = hash.text(meta.name).join(of_part);
                     if !meta.clocks.is_empty() {
                         hash = hash.text("on").text(meta.clocks);
@@ -143,6 +160,8 @@ impl<W: 'static> Table<W> {
                 }
                 (_, dimension) => {
                     check(meta);
+                    check_sized(rows, row);
+                    sizes = sizes.and(Sizes::of(meta));
                     binary |= matches!(meta.kind, Kind::Binary { .. });
                     hash = hash.meta(meta);
                     match dimension {
@@ -167,7 +186,7 @@ impl<W: 'static> Table<W> {
             check_unique(rows, row);
             row += 1;
         }
-        Self { rows, places, len, wide_places, wide, hash, binary, intermediate }
+        Self { rows, places, len, wide_places, wide, hash, binary, intermediate, sizes }
     }
 
     /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
@@ -264,16 +283,19 @@ impl<W: 'static> Table<W> {
         Some((&self.rows[usize::from(place.row)], at - place.first))
     }
 
+    /// The row of a variable, and the index in it, which of a part's wide arrays counts from [`WIDE`].
+    pub(crate) fn row_of(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
+        if let Some(place) = self.places[..self.len].get(index) {
+            return Some((&self.rows[usize::from(place.row)], usize::from(place.inner)));
+        }
+        let (row, inner) = self.wide_place(index)?;
+        Some((row, if matches!(row.access, Access::Part { .. }) { WIDE + inner } else { inner }))
+    }
+
     /// Which element of an array variable `index` is, 0 for a scalar; `None` past the end. Does not allocate.
     pub fn element(&self, index: usize) -> Option<usize> {
-        let Some(place) = self.places[..self.len].get(index) else {
-            let (row, inner) = self.wide_place(index)?;
-            return if let Access::Part { node, .. } = &row.access { node.element(WIDE + inner) } else { Some(inner) };
-        };
-        match &self.rows[usize::from(place.row)].access {
-            Access::Part { node, .. } => node.element(usize::from(place.inner)),
-            _ => Some(usize::from(place.inner)),
-        }
+        let (row, inner) = self.row_of(index)?;
+        if let Access::Part { node, .. } = &row.access { node.element(inner) } else { Some(inner) }
     }
 
     /// Names of the clocks that variable `index` is on, with spaces between them; empty for none. A part that is on a clock has its
@@ -361,13 +383,10 @@ impl<W: 'static> Table<W> {
     }
 
     fn locate_into(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)> {
-        let (row, inner, base) = match self.places[..self.len].get(index) {
-            Some(place) => (&self.rows[usize::from(place.row)], usize::from(place.inner), 0),
-            None => self.wide_place(index).map(|(row, inner)| (row, inner, WIDE))?,
-        };
+        let (row, inner) = self.row_of(index)?;
         name.push_str(row.meta.name);
         match &row.access {
-            Access::Part { node, .. } => node.locate(base + inner, name),
+            Access::Part { node, .. } => node.locate(inner, name),
             _ => Some((&row.meta, inner)),
         }
     }

@@ -73,6 +73,11 @@ impl Hash {
             hash = hash.count(meta.shape[i]);
             i += 1;
         }
+        i = 0;
+        while i < meta.sized.len() {
+            hash = hash.text("sized").text(meta.sized[i]);
+            i += 1;
+        }
         if !meta.clocks.is_empty() {
             hash = hash.text("on").text(meta.clocks);
         }

@@ -20,6 +20,8 @@ pub enum Causality {
     Output,
     /// Computed by the model, for inspection only.
     Local,
+    /// The size of arrays, set by the importer in Configuration Mode (FMI 3.0).
+    StructuralParameter,
 }
 
 impl Causality {
@@ -183,6 +185,9 @@ pub struct Meta {
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.
     pub shape: &'static [usize],
+    /// Names of the structural parameters that are the extents of an array, relative to the same part; empty for an array of one
+    /// size. Its number of elements is then the greatest.
+    pub sized: &'static [&'static str],
     /// Other names.
     pub aliases: &'static [Alias],
 }
@@ -195,7 +200,9 @@ impl Meta {
 
     /// Whether the description has a start value.
     pub fn has_start(&self) -> bool {
-        self.takes_start() || self.variability == Variability::Constant
+        self.takes_start()
+            || self.variability == Variability::Constant
+            || self.causality == Causality::StructuralParameter
     }
 }
 
@@ -203,7 +210,7 @@ impl Meta {
 pub fn position(shape: &[usize], element: usize) -> String {
     let mut rest = element;
     let mut indices: Vec<String> = Vec::new();
-    for &extent in shape.iter().skip(1).rev() {
+    for extent in shape.iter().skip(1).rev().map(|n| (*n).max(1)) {
         indices.push((rest % extent + 1).to_string());
         rest /= extent;
     }

@@ -26,13 +26,24 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
     match meta.causality {
         Causality::Input => match state {
             State::Continuous => meta.variability == Variability::Continuous,
+            State::Configuration | State::Reconfiguration => false,
             State::Intermediate => meta.intermediate,
             _ => true,
         },
         Causality::Parameter => match state {
             State::Step | State::Event | State::Activation | State::Ended => meta.variability == Variability::Tunable,
-            State::Continuous | State::Intermediate | State::ClockUpdate => false,
+            State::Continuous
+            | State::Intermediate
+            | State::ClockUpdate
+            | State::Configuration
+            | State::Reconfiguration => false,
             _ => true,
+        },
+        // Before the initialization, it has the effect of a Configuration Mode of its own.
+        Causality::StructuralParameter => match state {
+            State::Instantiated | State::Configuration => true,
+            State::Reconfiguration => meta.variability == Variability::Tunable,
+            _ => false,
         },
         _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),
     }
@@ -109,16 +120,23 @@ impl<E: Exported> Instance<E> {
     /// The position after the table of a derivative or, in FMI 3.0, of an indicator.
     fn after_table(&self, index: usize) -> Option<usize> {
         let indicators = if self.standard == Standard::Fmi3 { E::CAN.indicators().len() } else { 0 };
-        index.checked_sub(table::<E>().len()).filter(|after| *after < E::CAN.states().len() + indicators)
+        index.checked_sub(table::<E>().len()).filter(|after| *after < E::CAN.scalars() + indicators)
     }
 
     /// A derivative or an indicator, by its index after the table.
     fn calculated(&mut self, index: usize) -> Result<Option<f64>, Refusal> {
         let Some(after) = self.after_table(index) else { return Ok(None) };
-        let states = E::CAN.states().len();
+        let state = self.current.life.state();
+        if const { E::CAN.resizable.is_some() } && matches!(state, State::Configuration | State::Reconfiguration) {
+            let name = message::calculated::<E>(after);
+            return Err(Fault::new(format!("{name} is not known in {state}")).into());
+        }
+        let (states, now) = (E::CAN.scalars(), self.state_count());
         let mut values = std::mem::take(&mut self.values);
         let read = if after < states {
-            self.derivatives(&mut values[..states])
+            let read = self.derivatives(&mut values[..now]);
+            E::CAN.spread(&mut self.current.block.model, &mut values[..states]);
+            read
         } else {
             self.indicators(&mut values[states..])
         };
@@ -138,7 +156,11 @@ impl<E: Exported> Instance<E> {
         if references.len() != values.len()
             || !T::write_inputs(&mut self.current.block, references, values, state == State::Continuous)
         {
-            self.set_each(references, values)?;
+            if const { E::CAN.resizable.is_some() } && state == State::Instantiated {
+                self.set_and_configure(references, values)?;
+            } else {
+                self.set_each(references, values)?;
+            }
         }
         // In Step Mode, the model reads inputs directly.
         if state != State::Step && !references.is_empty() {
@@ -152,7 +174,7 @@ impl<E: Exported> Instance<E> {
     /// Judges all values, then writes them. In Continuous-Time Mode, a solver tries values: one that is out of range is
     /// discarded, the states can be set too, and a discrete input to the value that it has.
     #[inline(never)]
-    fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub(crate) fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         self.check_count(references, values.len())?;
         let state = self.current.life.state();
         for write in [false, true] {
@@ -172,9 +194,11 @@ impl<E: Exported> Instance<E> {
     fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         if let Some((meta, slot)) = found {
-            let held = meta.causality == Causality::Input && T::read(meta, &slot, self.standard) == Some(value);
+            let held = meta.causality == Causality::Input
+                && !matches!(state, State::Configuration | State::Reconfiguration)
+                && T::read(meta, &slot, self.standard) == Some(value);
             let (possible, settable) =
-                (value.judge(meta, self.standard), open(meta, state) || held || self.sets_state(index));
+                (value.judge(meta, self.standard), self.opens(meta, state) || held || self.sets_state(index));
             if possible == Some(true) && settable {
                 return Ok(());
             }
@@ -185,6 +209,11 @@ impl<E: Exported> Instance<E> {
             }
         }
         Err(self.refusal(reference, index, value).into())
+    }
+
+    /// [`open`]; FMI 2.0 has no structural parameters.
+    fn opens(&self, meta: &Meta, state: State) -> bool {
+        open(meta, state) && !(self.standard == Standard::Fmi2 && meta.causality == Causality::StructuralParameter)
     }
 
     /// Whether the variable is a state that can be set: FMI 3.0.2, 3.2.1.
@@ -210,10 +239,10 @@ impl<E: Exported> Instance<E> {
         match table::<E>().entry(&mut self.current.block, index) {
             Some((meta, _)) => match value.judge(meta, self.standard) {
                 None => message::type_of::<E::Model>(index, meta, T::CARRIES),
-                Some(_) if !open(meta, self.current.life.state()) && !self.sets_state(index) => {
+                Some(_) if !self.opens(meta, self.current.life.state()) && !self.sets_state(index) => {
                     message::fixed::<E::Model>(index, meta, self.current.life.state())
                 }
-                Some(_) => message::range::<E::Model>(index, meta, value),
+                Some(_) => message::range(&mut self.current.block, index, meta, value),
             },
             None if is_time(reference, self.standard) => message::real(true, T::CARRIES),
             None => self.beside_table(reference, T::CARRIES, true),
@@ -249,9 +278,31 @@ impl<E: Exported> Instance<E> {
         let index = index::<E>(reference);
         match table::<E>().element(index) {
             Some(element) if element > 0 => Err(message::element::<E::Model>(reference, index, element)),
+            _ if const { E::CAN.has_arrays() || E::Model::TABLE.has_sizes() } => self.resizable_elements(index),
             _ => {
                 Ok(table::<E>().entry(&mut self.current.block, index).and_then(|(meta, _)| meta.dimension).unwrap_or(1))
             }
         }
+    }
+
+    /// [`elements`](Self::elements) of a model whose arrays change their sizes, or are states.
+    #[cold]
+    fn resizable_elements(&mut self, index: usize) -> Result<usize, Fault> {
+        if let Some((_, n)) = table::<E>().extent(&mut self.current.block, index) {
+            return Ok(n);
+        }
+        let number = self.after_table(index).filter(|number| *number < E::CAN.scalars());
+        match number.and_then(|number| Some((number, E::CAN.state_of(number)?))) {
+            Some((number, (state, first))) if number > first => {
+                Err(message::inner_derivative(Self::reference_of(number), state.name, Self::reference_of(first)))
+            }
+            Some((_, (state, _))) => Ok(state.all(&mut self.current.block.model).len().min(state.most())),
+            None => Ok(1),
+        }
+    }
+
+    /// The reference of a derivative.
+    fn reference_of(number: usize) -> u32 {
+        E::CAN.reference(table::<E>().len() + number)
     }
 }

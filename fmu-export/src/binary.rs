@@ -36,7 +36,8 @@ impl<E: Exported> Instance<E> {
             let Some((meta, slot)) = E::Model::TABLE.entry(&mut self.current.block, index) else { continue };
             let (allowed, Slot::Binary(bytes)) = (slot.is_allowed(meta), slot) else { continue };
             if !allowed {
-                return Err(message::range::<E::Model>(index, meta, format_args!("{} bytes", bytes.len())).into());
+                let found = format!("{} bytes", bytes.len());
+                return Err(message::range(&mut self.current.block, index, meta, found).into());
             }
             take(bytes);
         }
@@ -60,7 +61,9 @@ impl<E: Exported> Instance<E> {
             self.check_open(index)?;
             match E::Model::TABLE.entry(&mut self.current.block, index) {
                 Some((meta, _)) if !matches!(meta.kind, Kind::Binary { most, .. } if size <= most) => {
-                    return Err(message::range::<E::Model>(index, meta, format_args!("{size} bytes")).into());
+                    return Err(
+                        message::range(&mut self.current.block, index, meta, format_args!("{size} bytes")).into()
+                    );
                 }
                 _ => {}
             }

@@ -85,7 +85,11 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
     }
     state.check().and_then(|()| state.check_time()).map_err(|fault| refuse(fault.to_string()))?;
     // Tunable parameters that no step has seen are judged by the next one.
-    if !matches!(state.life.state(), State::Instantiated | State::Initialization | State::Error) && !state.dirty {
+    let unjudged = matches!(
+        state.life.state(),
+        State::Instantiated | State::Configuration | State::Initialization | State::Reconfiguration | State::Error
+    );
+    if !unjudged && !state.dirty {
         let model = &state.block.model;
         let judged = model.validate().and_then(|()| model.validate_for(state.life.interface()));
         judged.map_err(|fault| refuse(fault.to_string()))?;

@@ -146,22 +146,43 @@ impl<E: Exported> Instance<E> {
     /// has changed.
     #[inline]
     pub fn set_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
-        let states = E::CAN.states();
-        count("nContinuousStates", x.len(), states.len())?;
-        if let Some(i) = x.iter().zip(&self.ranges).position(|(x, range)| !range.contains(*x)) {
-            return Err(Refusal::Discard(Fault::value(states[i].name, x[i], self.ranges[i])));
+        count("nContinuousStates", x.len(), self.state_count())?;
+        if let Some((i, number)) = self.first_refused(x) {
+            let name = E::CAN.state_of(number).map_or("a state", |(state, _)| state.name);
+            return Err(Refusal::Discard(Fault::value(name, x[i], self.ranges[number])));
         }
-        for (state, x) in states.iter().zip(x) {
-            *(state.at)(&mut self.current.block.model) = *x;
-        }
+        let mut values = x.iter();
+        E::CAN.each_state(&mut self.current.block.model, |_, place| {
+            if let Some(x) = values.next() {
+                *place = *x;
+            }
+        });
         self.settle();
         self.stale = true;
         Ok(())
     }
 
-    /// Sets one state of a model with several: in Model Exchange, or its start value.
-    pub(crate) fn set_state(&mut self, i: usize, x: f64) {
-        *(E::CAN.states()[i].at)(&mut self.current.block.model) = x;
+    /// The first value that is not in the range of its state, with the number of that state.
+    #[inline]
+    fn first_refused(&mut self, x: &[f64]) -> Option<(usize, usize)> {
+        if const { !E::CAN.has_arrays() } {
+            let refused = x.iter().zip(&self.ranges).position(|(x, range)| !range.contains(*x));
+            return refused.map(|i| (i, i));
+        }
+        let (mut values, ranges, mut refused) = (x.iter().enumerate(), &self.ranges, None);
+        E::CAN.each_state(&mut self.current.block.model, |number, _| {
+            if let Some((i, _)) = values.next().filter(|(_, x)| !ranges[number].contains(**x)) {
+                refused = refused.or(Some((i, number)));
+            }
+        });
+        refused
+    }
+
+    /// Sets one state of a model with several, by its number: in Model Exchange, or its start value.
+    pub(crate) fn set_state(&mut self, number: usize, x: f64) {
+        if let Some(place) = E::CAN.scalar(&mut self.current.block.model, number) {
+            *place = x;
+        }
         self.settle();
     }
 
@@ -176,12 +197,14 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The array does not have one element for each state.
     pub fn get_states(&mut self, out: &mut [f64]) -> Result<(), Fault> {
-        let states = E::CAN.states();
-        count("nContinuousStates", out.len(), states.len())?;
+        count("nContinuousStates", out.len(), self.state_count())?;
         self.refresh();
-        for (x, state) in out.iter_mut().zip(states) {
-            *x = *(state.at)(&mut self.current.block.model);
-        }
+        let mut places = out.iter_mut();
+        E::CAN.each_state(&mut self.current.block.model, |_, x| {
+            if let Some(place) = places.next() {
+                *place = *x;
+            }
+        });
         Ok(())
     }
 
@@ -191,14 +214,16 @@ impl<E: Exported> Instance<E> {
     /// The array does not have one element for each state (Error); derivatives that do not exist or are not finite (Discard).
     #[inline]
     pub fn derivatives(&mut self, dx: &mut [f64]) -> Result<(), Refusal> {
-        let states = E::CAN.states();
-        count("nContinuousStates", dx.len(), states.len())?;
+        count("nContinuousStates", dx.len(), self.state_count())?;
         self.refresh_initial();
         let Some(continuous) = &E::CAN.continuous else { return Ok(()) };
         (continuous.derivatives)(&self.current.block.model, self.current.elapsed, dx).map_err(Refusal::Discard)?;
         match dx.iter().position(|x| !x.is_finite()) {
             None => Ok(()),
-            Some(i) => Err(Refusal::Discard(Fault::value(&message::derivative(&states[i]), dx[i], "a finite number"))),
+            Some(i) => {
+                let name = message::calculated::<E>(self.number_of_state(i));
+                Err(Refusal::Discard(Fault::value(&name, dx[i], "a finite number")))
+            }
         }
     }
 
@@ -233,9 +258,10 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The array does not have one element for each state.
     pub fn nominals(&mut self, out: &mut [f64]) -> Result<(), Fault> {
-        count("nContinuousStates", out.len(), E::CAN.states().len())?;
-        for (nominal, &row) in out.iter_mut().zip(&self.states) {
-            *nominal = message::nominal::<E::Model>(&mut self.current.block, row);
+        count("nContinuousStates", out.len(), self.state_count())?;
+        for (i, nominal) in out.iter_mut().enumerate() {
+            let number = if const { E::CAN.has_arrays() } { self.number_of_state(i) } else { i };
+            *nominal = message::nominal::<E::Model>(&mut self.current.block, self.states[number]);
         }
         Ok(())
     }

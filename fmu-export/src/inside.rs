@@ -58,7 +58,7 @@ impl<E: Exported> Instance<E> {
     /// A variable does not exist.
     pub(crate) fn look_inside(&mut self, required: &[u32]) -> Result<(), Fault> {
         let table = E::Model::TABLE;
-        let last = table.len() + E::CAN.states().len() + E::CAN.indicators().len() + table.wide();
+        let last = table.len() + E::CAN.scalars() + E::CAN.indicators().len() + table.wide();
         if let Some(&reference) = required.iter().find(|&&reference| reference as usize > last) {
             return Err(message::unknown::<E>(reference, self.standard));
         }

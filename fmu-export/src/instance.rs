@@ -55,7 +55,7 @@ pub struct Instance<E: Exported> {
     pub early_return: bool,
     /// A reference can stand for several values: only in FMI 3.0, and only if the model has an array.
     pub(crate) arrays: bool,
-    /// Indices of the states' rows.
+    /// Indices of the rows of the scalar states.
     pub(crate) states: Box<[usize]>,
     /// Ranges of the states.
     pub(crate) ranges: Box<[Range]>,
@@ -99,7 +99,7 @@ impl<E: Exported> Instance<E> {
             arrays,
             ranges: states.iter().map(range).collect(),
             states,
-            values: vec![0.0; E::CAN.states().len() + E::CAN.indicators().len()].into(),
+            values: vec![0.0; E::CAN.scalars() + E::CAN.indicators().len()].into(),
             stale: false,
             scratch: None,
             texts: Vec::new(),
@@ -156,6 +156,10 @@ impl<E: Exported> Instance<E> {
         let made = self.made.as_deref().cloned().unwrap_or_default();
         self.current = Snapshot::of(self.current.life.interface(), made);
         self.stale = false;
+        if const { E::CAN.resizable.is_some() } {
+            self.scratch = None;
+            self.refresh();
+        }
         self.warned.clear();
         self.log.event(|| format!("{}: reset", self.name));
     }
@@ -399,6 +403,10 @@ impl<E: Exported> Instance<E> {
             Ok(())
         })?;
         self.stale = false;
+        if const { E::CAN.resizable.is_some() } {
+            // Its arrays may have other sizes.
+            self.scratch = None;
+        }
         Ok(())
     }
 

@@ -85,6 +85,7 @@ mod access;
 mod binary;
 pub mod blob;
 pub mod clocks;
+mod configuration;
 pub mod exchange;
 pub mod inside;
 pub mod instance;

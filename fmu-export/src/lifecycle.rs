@@ -1,9 +1,8 @@
 //! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and where it
 //! leads.
 //!
-//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The states that are not here (configuration mode, step in
-//! progress) do not exist in an FMU without structural parameters and asynchronous steps: the calls that would lead to them
-//! are [`Call::Unsupported`].
+//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The state that is not here (step in progress) does not exist in an
+//! FMU without asynchronous steps: the calls that would lead to it are [`Call::Unsupported`].
 
 use fmu_core::Interface;
 use serde::{Deserialize, Serialize};
@@ -46,10 +45,14 @@ pub enum State {
     Activation,
     /// Clock Update Mode of Scheduled Execution: while the importer's callback runs.
     ClockUpdate,
+    /// Configuration Mode: structural parameters are set before the initialization.
+    Configuration,
+    /// Reconfiguration Mode: tunable structural parameters are set while the simulation runs.
+    Reconfiguration,
 }
 
 impl State {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 13] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,
@@ -58,13 +61,15 @@ impl State {
         Self::Ended,
         Self::Terminated,
         Self::Error,
+        Self::Configuration,
+        Self::Reconfiguration,
         Self::Intermediate,
         Self::Activation,
         Self::ClockUpdate,
     ];
 
     /// Those in which no call is under way; Clock Activation Mode takes the place of Step Mode in Scheduled Execution.
-    const REST: [Self; 8] = {
+    const REST: [Self; 10] = {
         let [rest @ .., _, _, _] = Self::ALL;
         rest
     };
@@ -89,6 +94,8 @@ impl fmt::Display for State {
             Self::Intermediate => "Intermediate Update Mode",
             Self::Activation => "Clock Activation Mode",
             Self::ClockUpdate => "Clock Update Mode",
+            Self::Configuration => "Configuration Mode",
+            Self::Reconfiguration => "Reconfiguration Mode",
         })
     }
 }
@@ -109,8 +116,11 @@ impl States {
 
     /// The states of Scheduled Execution, where Clock Activation Mode is what Step Mode is elsewhere.
     const fn scheduled(self) -> Self {
-        use State::{Activation, Error, Initialization, Instantiated, Step, Terminated};
-        let common = Self::of(&[Instantiated, Initialization, Terminated, Error]).0 & self.0;
+        use State::{
+            Activation, Configuration, Error, Initialization, Instantiated, Reconfiguration, Step, Terminated,
+        };
+        let both = &[Instantiated, Configuration, Initialization, Reconfiguration, Terminated, Error];
+        let common = Self::of(both).0 & self.0;
         Self(if self.contains(Step) { common | Self::of(&[Activation]).0 } else { common })
     }
 
@@ -151,6 +161,10 @@ pub enum Call {
     EnterInitialization,
     /// `ExitInitializationMode`.
     ExitInitialization,
+    /// `fmi3EnterConfigurationMode`.
+    EnterConfiguration,
+    /// `fmi3ExitConfigurationMode`.
+    ExitConfiguration,
     /// `Terminate`.
     Terminate,
     /// `Reset`.
@@ -220,6 +234,10 @@ pub enum Next {
     To(State),
     /// The state after initialization: Step Mode, or Event Mode where the importer handles events.
     Start,
+    /// Configuration Mode from Instantiated, Reconfiguration Mode from another state.
+    Configure,
+    /// Back to where one of these was entered.
+    Configured,
 }
 
 /// A row of the table: the states that allow a call, for FMI 2.0 and FMI 3.0.
@@ -267,11 +285,12 @@ const fn clocks(events: &[State], scheduled: &[State]) -> Row {
 }
 
 impl Call {
+    #[expect(clippy::too_many_lines, reason = "a table")]
     const fn row(self) -> Row {
-        use Next::{Start, Stay, To};
+        use Next::{Configure, Configured, Start, Stay, To};
         use State::{
-            Activation, ClockUpdate, Continuous, Ended, Error, Event, Initialization, Instantiated, Intermediate, Step,
-            Terminated,
+            Activation, ClockUpdate, Configuration, Continuous, Ended, Error, Event, Initialization, Instantiated,
+            Intermediate, Reconfiguration, Step, Terminated,
         };
         match self {
             Self::SetDebugLogging | Self::RestoreState | Self::UseState | Self::Unsupported => {
@@ -281,7 +300,14 @@ impl Call {
             Self::SetupExperiment => any(each(&[Instantiated], &[]), Stay),
             Self::EnterInitialization => any(both(&[Instantiated]), To(Initialization)),
             Self::ExitInitialization => any(both(&[Initialization]), Start),
-            Self::Terminate => any(both(&[Step, Event, Continuous, Ended]), To(Terminated)),
+            Self::EnterConfiguration => {
+                Row { exchange: each(&[], &[Instantiated, Event]), ..any(each(&[], &[Instantiated, Step]), Configure) }
+            }
+            Self::ExitConfiguration => any(each(&[], &[Configuration, Reconfiguration]), Configured),
+            Self::Terminate => any(
+                each(&[Step, Event, Continuous, Ended], &[Step, Event, Continuous, Ended, Reconfiguration]),
+                To(Terminated),
+            ),
             Self::Reset => any(both(&State::REST), To(Instantiated)),
             // FMI 3.0.2, 2.3.2 lets start values be read before initialization; FMI 2.0.5, 4.2.4 does not.
             // In Error: for debugging (2.0.5, 4.2.4).
@@ -291,14 +317,36 @@ impl Call {
             Self::Set => any(
                 each(
                     &[Instantiated, Initialization, Step, Event, Continuous],
-                    &[Instantiated, Initialization, Step, Event, Continuous, Ended, Intermediate],
+                    &[
+                        Instantiated,
+                        Configuration,
+                        Initialization,
+                        Step,
+                        Event,
+                        Continuous,
+                        Ended,
+                        Reconfiguration,
+                        Intermediate,
+                    ],
                 ),
                 Stay,
             ),
             Self::DoStep => stepping(both(&[Step]), Stay),
             // A state that an error left behind is of no use.
             Self::SaveState => {
-                any(both(&[Instantiated, Initialization, Step, Event, Continuous, Ended, Terminated]), Stay)
+                let saved = &[Instantiated, Initialization, Step, Event, Continuous, Ended, Terminated];
+                let also = &[
+                    Instantiated,
+                    Configuration,
+                    Initialization,
+                    Step,
+                    Event,
+                    Continuous,
+                    Ended,
+                    Reconfiguration,
+                    Terminated,
+                ];
+                any(each(saved, also), Stay)
             }
             Self::Status => stepping(each(&[Step, Ended, Terminated], &[]), Stay),
             // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3).
@@ -450,6 +498,16 @@ impl Life {
             Next::Start if self.handles_events() => self.state = State::Event,
             Next::Start if matches!(self.interface, Interface::ScheduledExecution) => self.state = State::Activation,
             Next::Start => self.state = State::Step,
+            Next::Configure if matches!(self.state, State::Instantiated) => self.state = State::Configuration,
+            Next::Configure => self.state = State::Reconfiguration,
+            Next::Configured if matches!(self.state, State::Configuration) => self.state = State::Instantiated,
+            Next::Configured => {
+                self.state = match self.interface {
+                    Interface::ModelExchange => State::Event,
+                    Interface::ScheduledExecution => State::Activation,
+                    Interface::CoSimulation | Interface::EventMode => State::Step,
+                }
+            }
         }
     }
 

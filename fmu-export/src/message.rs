@@ -16,6 +16,16 @@ pub(crate) fn name<M: Model>(index: usize) -> String {
     }
 }
 
+/// [`name`] with the sizes that arrays have now, by which a description counts the elements of a matrix.
+pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String {
+    match M::TABLE.locate(index) {
+        Some((name, meta, element)) if !meta.sized.is_empty() => {
+            name + &position(&M::TABLE.extents(block, index), element)
+        }
+        _ => name::<M>(index),
+    }
+}
+
 /// What a variable may be set to.
 pub(crate) fn allowed(meta: &Meta) -> String {
     let enumeration = match meta.kind {
@@ -58,7 +68,7 @@ pub(crate) fn unknown<E: Exported>(reference: u32, standard: Standard) -> Fault 
     // Time and the event indicators are variables in FMI 3.0 only.
     let (first, indicators) =
         if standard == Standard::Fmi3 { (TIME, E::CAN.indicators().len()) } else { (TIME + 1, 0) };
-    let last = E::Model::TABLE.len() + E::CAN.states().len() + indicators + E::Model::TABLE.wide();
+    let last = E::Model::TABLE.len() + E::CAN.scalars() + indicators + E::Model::TABLE.wide();
     Fault::new(format!("value reference {reference} does not exist; {first} to {last} do"))
 }
 
@@ -69,6 +79,14 @@ pub(crate) fn element<M: Model>(reference: u32, index: usize, element: usize) ->
     let name = name::<M>(index);
     Fault::new(format!(
         "value reference {reference} does not exist; {name} belongs to the array with reference {first}"
+    ))
+}
+
+/// The reference belongs to an element of the derivative of a state.
+#[cold]
+pub(crate) fn inner_derivative(reference: u32, state: &str, first: u32) -> Fault {
+    Fault::new(format!(
+        "value reference {reference} does not exist; it belongs to the array der({state}) with reference {first}"
     ))
 }
 
@@ -86,6 +104,17 @@ pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State
         (Causality::Parameter, Variability::Fixed) => {
             format!("{name} is a fixed parameter: it can be set before and in Initialization Mode, and this is {state}")
         }
+        (Causality::StructuralParameter, Variability::Tunable) => {
+            format!(
+                "{name} is a structural parameter: it can be set in Configuration Mode and in Reconfiguration Mode, and this is {state}"
+            )
+        }
+        (Causality::StructuralParameter, _) => {
+            format!("{name} is a fixed structural parameter: it can be set in Configuration Mode, and this is {state}")
+        }
+        _ if matches!(state, lifecycle::State::Configuration | lifecycle::State::Reconfiguration) => {
+            format!("{name} is not a structural parameter: it cannot be set in {state}")
+        }
         (Causality::Parameter | Causality::Input, _) => {
             format!("{name} changes at events only: it can be set in Event Mode, and this is {state}")
         }
@@ -101,8 +130,8 @@ pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State
 
 /// The value is of the right type, and out of range.
 #[cold]
-pub(crate) fn range<M: Model>(index: usize, meta: &Meta, value: impl Display) -> Fault {
-    Fault::value(&name::<M>(index), value, allowed(meta))
+pub(crate) fn range<M: Model>(block: &mut Block<M>, index: usize, meta: &Meta, value: impl Display) -> Fault {
+    Fault::value(&sized_name(block, index), value, allowed(meta))
 }
 
 /// The number of values is not what the references need.
@@ -124,7 +153,8 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: O
             continue;
         };
         if meta.takes_start() && new.to_string() != old.to_string() {
-            changes.push(format!("{} = {new}", name::<M>(index)));
+            let value = new.to_string();
+            changes.push(format!("{} = {value}", sized_name(&mut current.block, index)));
         }
     }
     let changes = if changes.is_empty() { "all start values unchanged".into() } else { changes.join(", ") };
@@ -150,10 +180,9 @@ pub(crate) fn derivative<M>(state: &State<M>) -> String {
 
 /// Name of the derivative or event indicator at a position after the table.
 pub(crate) fn calculated<E: Exported>(after: usize) -> String {
-    let states = E::CAN.states();
-    match states.get(after) {
-        Some(state) => derivative(state),
-        None => E::CAN.indicators().get(after - states.len()).map_or_else(String::new, |i| i.name.to_owned()),
+    match E::CAN.state_of(after) {
+        Some((state, _)) => derivative(state),
+        None => E::CAN.indicators().get(after - E::CAN.scalars()).map_or_else(String::new, |i| i.name.to_owned()),
     }
 }
 

@@ -109,7 +109,7 @@ fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry
         let wrong = |fault: Fault| Fault::new(format!("line {line}: {fault}"));
         // `fmu preset` writes the variables in the order of the table.
         let mut places = (next..indices.len()).chain(0..next);
-        let found = places.find(|&place| message::name::<M>(indices[place]) == *name);
+        let found = places.find(|&place| message::sized_name(block, indices[place]) == *name);
         let place = found.ok_or_else(|| wrong(Fault::new(format!("{} has no variable {name}", M::INFO.name))))?;
         let index = indices[place];
         if std::mem::replace(&mut set[place], true) {

@@ -93,8 +93,11 @@ impl<E: Exported> Instance<E> {
                 return Err(Self::no_side(unknown, "a continuous output").into());
             }
         }
-        let mut rates = zeros(&mut self.scratch().1.rates, E::CAN.states().len());
-        let done = self.derivatives(&mut rates).and_then(|()| self.along(unknowns, &[], &rates, 1.0, out));
+        let mut rates = zeros(&mut self.scratch().1.rates, E::CAN.scalars());
+        let now = self.state_count();
+        let found = self.derivatives(&mut rates[..now]);
+        E::CAN.spread(&mut self.current.block.model, &mut rates);
+        let done = found.and_then(|()| self.along(unknowns, &[], &rates, 1.0, out));
         self.scratch().1.rates = rates;
         done?;
         self.add_integrands(unknowns, out);
@@ -111,7 +114,10 @@ impl<E: Exported> Instance<E> {
                 (continuous.integrands)(&current.block.model, current.elapsed, &mut scratch.block.out);
             }
             for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-                *out += sign * real(&mut scratch.block, index::<E>(unknown));
+                // Fresh outputs lack the elements of arrays whose sizes are chosen.
+                if let Some((_, Slot::Real(x))) = E::Model::TABLE.entry(&mut scratch.block, index::<E>(unknown)) {
+                    *out += sign * *x;
+                }
             }
         }
     }
@@ -218,7 +224,7 @@ impl<E: Exported> Instance<E> {
         let Self { current, scratch, .. } = self;
         let new = || Scratch {
             block: current.block.clone(),
-            dx: vec![0.0; E::CAN.states().len()],
+            dx: vec![0.0; E::CAN.scalars()],
             rates: Vec::new(),
             others: Vec::new(),
             column: Vec::new(),
@@ -231,7 +237,7 @@ impl<E: Exported> Instance<E> {
     /// Divides the knowns into states and others, and takes the derivative.
     fn column(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         let (_, scratch) = self.scratch();
-        let mut rates = zeros(&mut scratch.rates, E::CAN.states().len());
+        let mut rates = zeros(&mut scratch.rates, E::CAN.scalars());
         let mut others = std::mem::take(&mut scratch.others);
         others.clear();
         for (&known, &seed) in knowns.iter().zip(seed) {
@@ -273,11 +279,14 @@ impl<E: Exported> Instance<E> {
         for &(known, seed) in others {
             put(direction, index::<E>(known), seed);
         }
-        for (state, rate) in E::CAN.states().iter().zip(rates) {
-            *(state.at)(&mut direction.model) = *rate;
+        if !rates.is_empty() {
+            E::CAN.each_state(&mut direction.model, |number, x| *x = rates[number]);
         }
+        let now = E::CAN.count_states(&mut direction.model);
         let (along, change) = (&direction.model, &mut direction.out);
-        tangent(&current.block.model, current.elapsed, along, &mut scratch.dx, change).map_err(Refusal::Discard)?;
+        let dx = &mut scratch.dx;
+        tangent(&current.block.model, current.elapsed, along, &mut dx[..now], change).map_err(Refusal::Discard)?;
+        E::CAN.spread(&mut direction.model, dx);
         for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
             *out += pick::<E>(&mut scratch.block, &scratch.dx, index::<E>(unknown));
         }
@@ -301,9 +310,9 @@ impl<E: Exported> Instance<E> {
             let x = real(block, index::<E>(known));
             largest = largest.max(seed.abs() / message::nominal::<E::Model>(block, index::<E>(known)).max(x.abs()));
         }
-        for ((rate, state), &row) in rates.iter().zip(E::CAN.states()).zip(&self.states) {
+        for (number, (rate, &row)) in rates.iter().zip(&self.states).enumerate() {
             let block = &mut self.current.block;
-            let x = *(state.at)(&mut block.model);
+            let Some(x) = E::CAN.scalar(&mut block.model, number).map(|x| *x) else { continue };
             largest = largest.max(rate.abs() / message::nominal::<E::Model>(block, row).max(x.abs()));
         }
         if largest == 0.0 && time == 0.0 {
@@ -321,8 +330,8 @@ impl<E: Exported> Instance<E> {
                 let x = real(block, index::<E>(known)) + side * eps * seed;
                 put(block, index::<E>(known), x);
             }
-            for (state, rate) in E::CAN.states().iter().zip(rates) {
-                *(state.at)(&mut block.model) += side * eps * rate;
+            if !rates.is_empty() {
+                E::CAN.each_state(&mut block.model, |number, x| *x += side * eps * rates[number]);
             }
             let now = if time == 0.0 { current.elapsed } else { current.elapsed.plus(side * eps * time) };
             if initial {
@@ -347,7 +356,7 @@ impl<E: Exported> Instance<E> {
     }
 
     fn is_derivative(unknown: u32) -> bool {
-        index::<E>(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.states().len()
+        index::<E>(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.scalars()
     }
 
     /// What the table says of a variable.
@@ -422,8 +431,8 @@ impl<E: Exported> Instance<E> {
         if E::Model::TABLE.locate(index).is_some() {
             return message::name::<E::Model>(index);
         }
-        match E::CAN.states().get(index.wrapping_sub(E::Model::TABLE.len())) {
-            Some(state) => message::derivative(state),
+        match E::CAN.state_of(index.wrapping_sub(E::Model::TABLE.len())) {
+            Some((state, _)) => message::derivative(state),
             None => format!("value reference {reference}"),
         }
     }
@@ -471,7 +480,10 @@ fn evaluate<E: Exported>(
         (continuous.settle)(&mut block.model);
         (continuous.observe)(&block.model, now, &mut block.out);
     }
-    (continuous.derivatives)(&block.model, now, dx)
+    let n = E::CAN.count_states(&mut block.model);
+    (continuous.derivatives)(&block.model, now, &mut dx[..n])?;
+    E::CAN.spread(&mut block.model, dx);
+    Ok(())
 }
 
 /// An unknown's value: a derivative, or a row of the table.
@@ -489,9 +501,7 @@ fn clear<E: Exported>(direction: &mut Block<E::Model>) {
             *x = 0.0;
         }
     }
-    for state in E::CAN.states() {
-        *(state.at)(&mut direction.model) = 0.0;
-    }
+    E::CAN.each_state(&mut direction.model, |_, x| *x = 0.0);
 }
 
 fn real<M: Model>(block: &mut Block<M>, index: usize) -> f64 {

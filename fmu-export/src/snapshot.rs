@@ -123,7 +123,8 @@ impl<M: Model> Snapshot<M> {
     pub fn check(&mut self) -> Result<(), Fault> {
         for index in M::TABLE.indices() {
             let Some((meta, slot)) = M::TABLE.entry(&mut self.block, index) else { continue };
-            let set = matches!(meta.causality, Causality::Input | Causality::Parameter);
+            let set =
+                matches!(meta.causality, Causality::Input | Causality::Parameter | Causality::StructuralParameter);
             let refused = match &slot {
                 _ if set => !slot.is_allowed(meta),
                 Slot::Real(x) => x.is_nan(),
@@ -132,8 +133,13 @@ impl<M: Model> Snapshot<M> {
             };
             if refused {
                 let allowed = if set { message::allowed(meta) } else { "a number".into() };
-                return Err(Fault::value(&message::name::<M>(index), slot, allowed));
+                let value = slot.to_string();
+                return Err(Fault::value(&message::sized_name(&mut self.block, index), value, allowed));
             }
+        }
+        // Where sizes are set, arrays have those of before, also if the simulation ends there.
+        if !matches!(self.life.state(), State::Configuration | State::Reconfiguration | State::Terminated) {
+            M::TABLE.check_sizes(&mut self.block)?;
         }
         let sane = match (&self.ticks, ticks::<M>()) {
             (Some(ticks), Some(fresh)) => ticks.len() == fresh.len() && ticks.iter().all(Tick::is_sane),
@@ -188,12 +194,15 @@ impl<M: Model> Snapshot<M> {
         // A sum that is not in its normal form hides numbers that cancel.
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
-                (State::Instantiated, _) | (State::Initialization, Some(_)) => since == 0.0 && elapsed == 0.0,
+                (State::Instantiated | State::Configuration, _) | (State::Initialization, Some(_)) => {
+                    since == 0.0 && elapsed == 0.0
+                }
                 (
                     State::Step
                     | State::Event
                     | State::Continuous
                     | State::Ended
+                    | State::Reconfiguration
                     | State::Activation
                     | State::Terminated,
                     Some(_),

@@ -1,6 +1,7 @@
 //! One instance of an FMU of either standard.
 
 mod clocks;
+mod configuration;
 mod equations;
 
 pub use equations::{CompletedStep, Stepped, Update};
@@ -12,7 +13,8 @@ use crate::abi::live::{Live, Pointer};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::raw::Simple;
 use clocks::Clocks;
-use model_description::{BaseType, ModelDescription, ModelVariable};
+use model_description::{BaseType, Causality, ModelDescription, ModelVariable};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -32,6 +34,8 @@ pub struct Instance {
     dead: bool,
     /// The clocks of an FMU that has some, unless events are not used.
     clocks: Option<Box<Clocks>>,
+    /// Structural parameters that do not have their start values, by value reference.
+    sizes: BTreeMap<u32, usize>,
     // After the instance, which may log while it is freed.
     log: Arc<Log>,
 }
@@ -47,7 +51,8 @@ impl Instance {
     ) -> Self {
         let events = !matches!(kind, Kind::CoSimulation { event_mode: false, .. });
         let clocks = if events { Clocks::of(&description) } else { None };
-        Self { name: name.into(), id, description, live, kind, states: Vec::new(), dead: false, clocks, log }
+        let (name, states, sizes) = (name.into(), Vec::new(), BTreeMap::new());
+        Self { name, id, description, live, kind, states, dead: false, clocks, sizes, log }
     }
 
     /// The name that the instance was given.
@@ -88,11 +93,14 @@ impl Instance {
         self.get_at(base, reference, count)
     }
 
-    /// Writes a variable.
+    /// Writes a variable; a structural parameter in a Configuration Mode of its own, as [`configure`](Self::configure).
     ///
     /// # Errors
     /// The variable does not exist, the values do not fit, or the FMU refuses.
     pub fn set(&mut self, name: &str, values: &Values) -> Result<(), Error> {
+        if self.variable(name)?.causality == Causality::StructuralParameter {
+            return self.configure(&[(name, values)]);
+        }
         let (base, reference, count) = self.place(name)?;
         if values.len() != count {
             return Err(Error::usage(&self.name, format!("{name} has {count} elements, not {}", values.len())));
@@ -245,6 +253,7 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn reset(&mut self) -> Result<(), Error> {
+        self.sizes.clear();
         self.call(Call::Reset, |s| s.simple(Simple::Reset))
     }
 
@@ -264,7 +273,8 @@ impl Instance {
     /// The FMU refuses, or the state was freed.
     pub fn set_state(&mut self, state: FmuState) -> Result<(), Error> {
         let state = self.state(state)?;
-        self.call(Call::State, |s| s.set_state(state))
+        self.call(Call::State, |s| s.set_state(state))?;
+        self.read_sizes()
     }
 
     /// Frees a saved state. Those that remain are freed with the instance.
@@ -308,12 +318,12 @@ impl Instance {
     }
 
     /// Number of elements of a variable: of an array, the product of its extents, where a structural parameter counts with its
-    /// start value.
+    /// present value.
     ///
     /// # Errors
     /// A size is not known.
     pub fn elements(&self, variable: &ModelVariable) -> Result<usize, Error> {
-        let shape = self.description.shape(variable);
+        let shape = self.description.shape_with(variable, |reference| self.size(reference));
         let count = shape.and_then(|shape| shape.iter().try_fold(1_usize, |n, d| n.checked_mul(*d)));
         count.ok_or_else(|| Error::usage(&self.name, format!("the size of {} is not known", variable.name)))
     }

@@ -69,21 +69,31 @@ impl ModelDescription {
 
     /// Extents of a variable, none of a scalar; a structural parameter counts with its start value. `None` if a size is not known.
     pub fn shape(&self, variable: &ModelVariable) -> Option<Vec<usize>> {
+        self.shape_with(variable, |_| None)
+    }
+
+    /// [`shape`](Self::shape), where `size` has the structural parameters, by value reference, that do not have their start values.
+    pub fn shape_with(&self, variable: &ModelVariable, size: impl Fn(u32) -> Option<usize>) -> Option<Vec<usize>> {
         let extent = |dimension: &Dimension| match dimension {
             Dimension::Fixed(n) => usize::try_from(*n).ok(),
-            Dimension::Variable(reference) => {
+            Dimension::Variable(reference) => size(*reference).or_else(|| {
                 let size = self.variables.iter().find(|v| v.value_reference == *reference)?;
                 size.start.as_ref()?.trim().parse().ok()
-            }
+            }),
         };
         variable.dimensions.iter().map(extent).collect()
     }
 
     /// The array of FMI 3.0 and the index of its element that this name means: `x[2]`, `m[1,2]`.
     pub fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
+        self.element_with(name, |_| None)
+    }
+
+    /// [`element`](Self::element) with sizes as for [`shape_with`](Self::shape_with).
+    pub fn element_with(&self, name: &str, size: impl Fn(u32) -> Option<usize>) -> Option<(&ModelVariable, usize)> {
         let (array, _) = name.rsplit_once('[')?;
         let variable = self.variable(array).filter(|v| v.is_array())?;
-        Some((variable, element(&self.shape(variable)?, &name[array.len()..])?))
+        Some((variable, element(&self.shape_with(variable, size)?, &name[array.len()..])?))
     }
 
     /// The variable of this name, or the array of which it names an element.

@@ -303,6 +303,11 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
 /// Prepares the run; also returns how many of the last columns are only for the plot.
 fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
     let Loaded { system, .. } = loaded;
+    let values = args.set.iter().map(|text| halves(text, "--set VARIABLE=VALUE")).collect::<Result<Vec<_>>>()?;
+    // What follows names elements of arrays, which these size.
+    let (sizes, values): (Vec<_>, Vec<_>) =
+        values.into_iter().partition(|(port, _)| system.is_size(port).unwrap_or(false));
+    system.configure(sizes)?;
     for text in &args.connect {
         let (from, to) = halves(text, "--connect OUTPUT=INPUT")?;
         system.connect(from, to)?;
@@ -339,8 +344,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
         let given = ssv::read(&content).map_err(|cause| anyhow!("{file}: {cause}"))?;
         values::set(&mut loaded.system, instance, file, &given)?;
     }
-    for text in &args.set {
-        let (port, value) = halves(text, "--set VARIABLE=VALUE")?;
+    for (port, value) in values {
         loaded.set(port, value)?;
     }
     if args.record.is_empty() {

@@ -2,6 +2,7 @@
 #![allow(missing_docs, clippy::float_cmp)]
 
 mod bouncing_ball;
+mod clocks;
 mod dahlquist;
 mod feedthrough;
 #[path = "../common/python.rs"]
@@ -10,6 +11,7 @@ mod python;
 mod resource;
 mod roberts;
 mod stair;
+mod state_space;
 mod van_der_pol;
 
 use fmu::commands::build::{self, Build};

@@ -92,7 +92,7 @@ fn the_energy_balance_closes() {
     let (model, energy) = (&block.model, block.out.energy);
     let [d, q, speed] = [0, 1, 2].map(|k: usize| {
         let mut model = model.clone();
-        *(PmsmPlant::STATES[k].at)(&mut model)
+        *PmsmPlant::STATES[k].at(&mut model)
     });
     let par = &model.parameters;
     let magnetic = machine::magnetic_energy(&par.motor, Magnetics::Map(&par.flux_map), Dq::new(d, q));

@@ -45,10 +45,10 @@ impl PmsmDrive {
 
 impl ContinuousTime for PmsmDrive {
     const STATES: &'static [State<Self>] = &[
-        State::of_part(&PmsmPlant::STATES[0], |m: &mut Self| (PmsmPlant::STATES[0].at)(&mut m.pair.plant.model)),
-        State::of_part(&PmsmPlant::STATES[1], |m: &mut Self| (PmsmPlant::STATES[1].at)(&mut m.pair.plant.model)),
-        State::of_part(&PmsmPlant::STATES[2], |m: &mut Self| (PmsmPlant::STATES[2].at)(&mut m.pair.plant.model)),
-        State::of_part(&PmsmPlant::STATES[3], |m: &mut Self| (PmsmPlant::STATES[3].at)(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[0], |m: &mut Self| PmsmPlant::STATES[0].at(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[1], |m: &mut Self| PmsmPlant::STATES[1].at(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[2], |m: &mut Self| PmsmPlant::STATES[2].at(&mut m.pair.plant.model)),
+        State::of_part(&PmsmPlant::STATES[3], |m: &mut Self| PmsmPlant::STATES[3].at(&mut m.pair.plant.model)),
         State::<Self>::new("u_cap", &VOLT_PER_S, |m| &mut m.link.u),
     ];
 

@@ -85,11 +85,11 @@ impl<M: CompletedSteps + Events + Clone> Importer<M> {
 
     fn rk4(&mut self, h: f64, set: &impl Fn(&mut M, f64)) {
         let (model, start) = (&mut self.block.model, self.now);
-        let x: [f64; MOST] = std::array::from_fn(|i| M::STATES.get(i).map_or(0.0, |state| *(state.at)(model)));
+        let x: [f64; MOST] = std::array::from_fn(|i| M::STATES.get(i).map_or(0.0, |state| *state.at(model)));
         let (mut sum, mut k) = ([0.0; MOST], [0.0; MOST]);
         let at = |model: &mut M, share: f64, k: &[f64; MOST]| {
             for (i, state) in M::STATES.iter().enumerate() {
-                *(state.at)(model) = x[i] + share * h * k[i];
+                *state.at(model) = x[i] + share * h * k[i];
             }
             model.settle();
             let now = start.plus(share * h);

@@ -154,7 +154,8 @@ fn direction(session: &Session) -> Option<[u32; 2]> {
 
 fn directional_derivative(instance: &Instance<'_>, _: State) -> Result<Status, NotDetermined> {
     let [unknown, known] = direction(instance.session).ok_or_else(nothing)?;
-    Ok(instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&[unknown], &[known]], &[1.0])?.0)
+    let seed = vec![1.0; instance.session.values_of(&[known])];
+    Ok(instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&[unknown], &[known]], &seed)?.0)
 }
 
 /// Variables that a row needs were looked for before.

@@ -4,7 +4,7 @@
 //! waits for the next one, and until then the states are those of the last point. So the states at a point of the grid have the
 //! same bits for any communication step. An event is handled at the point that follows its instant; nothing locates it.
 
-use super::{MAX_INDICATORS, MAX_SUBSTEPS, arrive, check_indicators, crossed, handle, states};
+use super::{MAX_INDICATORS, MAX_SUBSTEPS, arrive, check_indicators, count, crossed, handle, states};
 use crate::rules::check_number;
 use crate::{ContinuousTime, Elapsed, Events, Fault, SampleGrid, Step, Stop};
 use std::ops::Range;
@@ -20,7 +20,7 @@ use std::ops::Range;
 /// # Errors
 /// Those of [`ContinuousTime::derivatives`], a state that is not finite, or more points than anyone can wait for.
 pub fn euler<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, fixed: f64) -> Result<(), Fault> {
-    const { check_number::<M>(M::STATES.len(), N) };
+    const { check_number::<M>(N) };
     points(step, fixed)?.try_for_each(|k| forward::<M, N>(model, k, fixed))
 }
 
@@ -75,7 +75,7 @@ fn walk<M: ContinuousTime + Events, const N: usize>(
     left: &mut Range<u64>,
     fixed: f64,
 ) -> Result<Option<u64>, Fault> {
-    const { check_number::<M>(M::STATES.len(), N) };
+    const { check_number::<M>(N) };
     const { check_indicators::<M>() };
     let count = M::INDICATORS.len();
     let (mut before, mut after) = ([0.0; MAX_INDICATORS], [0.0; MAX_INDICATORS]);
@@ -95,7 +95,8 @@ fn walk<M: ContinuousTime + Events, const N: usize>(
 /// One step of the method, to the point `k`.
 fn forward<M: ContinuousTime, const N: usize>(model: &mut M, k: u64, fixed: f64) -> Result<(), Fault> {
     let (now, start, mut dx) = (Elapsed::periods(k.saturating_sub(1), fixed), states::<M, N>(model), [0.0; N]);
-    model.derivatives(now, &mut dx)?;
+    let n = count::<M, N>(model);
+    model.derivatives(now, &mut dx[..n])?;
     let end = std::array::from_fn(|i| start[i] + fixed * dx[i]);
     arrive(model, now, &start, &end)
 }

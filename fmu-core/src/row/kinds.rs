@@ -3,6 +3,7 @@
 
 use crate::bytes::Bytes;
 use crate::enumeration::{Enumerated, Field};
+use crate::integer::{Getter, IntegerType};
 use crate::list::{Element, Items};
 use crate::row::{Access, Constant, Row};
 use crate::rules::demand;
@@ -151,6 +152,14 @@ impl<W: 'static> Row<W> {
     const fn of_dimension(mut self, dimension: usize) -> Self {
         self.meta.dimension = Some(dimension);
         self
+    }
+
+    /// A structural parameter (FMI 3.0), the size of arrays that name it in [`sized`](Self::sized); an
+    /// [upper bound](Self::at_most) belongs to it. The importer sets it in Configuration Mode, before the simulation; also in
+    /// Reconfiguration Mode if it is [`tunable`](Self::tunable). In FMI 2.0 it is a constant.
+    pub const fn structural(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut u64) -> Self {
+        let (kind, access) = (Kind::Integer(IntegerType::UInt64), Access::Integer(Getter::UInt64(get)));
+        Self::new(name, description, kind, access).with(Causality::StructuralParameter, Variability::Fixed)
     }
 
     /// A text output. The model keeps it or chooses among constants: reading it in a step does not allocate.

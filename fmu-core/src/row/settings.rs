@@ -7,13 +7,13 @@ use crate::rules::{demand, same_text};
 use crate::variable::{Alias, Causality, Kind, Range, Variability};
 
 impl<W: 'static> Row<W> {
-    /// Makes a parameter tunable: it may change at communication points.
+    /// Makes a parameter tunable: it may change at communication points, and a structural parameter in Reconfiguration Mode.
     ///
     /// # Panics
     /// At compile time, if the variable is not a parameter, or is a text or bytes.
     #[track_caller]
     pub const fn tunable(mut self) -> Self {
-        let parameter = matches!(self.meta.causality, Causality::Parameter)
+        let parameter = matches!(self.meta.causality, Causality::Parameter | Causality::StructuralParameter)
             && !matches!(self.meta.kind, Kind::Text | Kind::Binary { .. });
         demand(parameter, self.meta.name, "only a parameter of a type other than text and bytes can be tunable");
         self.meta.variability = Variability::Tunable;
@@ -92,9 +92,30 @@ impl<W: 'static> Row<W> {
             product *= extents[i];
             i += 1;
         }
-        let fits = matches!(self.meta.dimension, Some(n) if n == product);
+        let fits = matches!(self.meta.dimension, Some(n) if n == product) && self.meta.sized.is_empty();
         demand(fits, self.meta.name, "the product of the extents is not the number of elements");
         self.meta.shape = extents;
+        self
+    }
+
+    /// Makes the extents of an array structural parameters of the same table, by their names: `&["n", "n"]`. Its number of
+    /// elements is the greatest, the product of their upper bounds; how many it has now is the length of what the model holds,
+    /// row by row. See [`Resizable`](crate::Resizable).
+    ///
+    /// # Panics
+    /// At compile time, if the variable is not an array, has a [`shape`](Self::shape) or is a constant; the table checks the names
+    /// and the number of elements.
+    #[track_caller]
+    pub const fn sized(mut self, extents: &'static [&'static str]) -> Self {
+        let array = self.meta.dimension.is_some()
+            && self.meta.shape.is_empty()
+            && !matches!(self.meta.variability, Variability::Constant);
+        demand(
+            array && !extents.is_empty(),
+            self.meta.name,
+            "only an array without a shape can be sized, and no constant",
+        );
+        self.meta.sized = extents;
         self
     }
 

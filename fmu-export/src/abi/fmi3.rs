@@ -287,7 +287,7 @@ impl<E: Exported> Abi<'_, E> {
     }
 
     pub unsafe fn fmi3_count(&mut self, count: *mut usize, of_indicators: bool) -> Answer {
-        let number = if of_indicators { E::CAN.indicators().len() } else { E::CAN.states().len() };
+        let number = if of_indicators { E::CAN.indicators().len() } else { self.0.state_count() };
         // SAFETY: the importer's variable.
         unsafe { place(count, "the number")? }.write(number);
         Ok(())
@@ -513,8 +513,8 @@ macro_rules! export_fmi3 {
                 _dependent: u32, _elements: *mut usize, _independents: *mut u32, _of_independents: *mut usize,
                 _kinds: *mut c_int, _n: usize
             ) => Unsupported: unsupported("providesPerElementDependencies = false");
-            fmi3EnterConfigurationMode() => Unsupported: unsupported("there are no structural parameters");
-            fmi3ExitConfigurationMode() => Unsupported: unsupported("there are no structural parameters");
+            fmi3EnterConfigurationMode() => EnterConfiguration if resizable: enter_configuration();
+            fmi3ExitConfigurationMode() => ExitConfiguration if resizable: exit_configuration();
 
             fmi3GetIntervalDecimal(vr: References, n: usize, intervals: *mut f64, qualifiers: *mut c_int)
                 => GetInterval if clocked: fmi3_get_interval(vr, n, intervals, qualifiers);

@@ -252,6 +252,10 @@ pub(crate) fn open<E: Exported>(
             let resources = folder(resources);
             let mut block = Made::<E::Model>::asked(&E::CAN, resources.as_deref(), suffix)?.block;
             block.model.load(resources.as_deref())?;
+            if const { E::Model::TABLE.has_sizes() } {
+                // The arrays of its outputs get their lengths.
+                block.initialize();
+            }
             let shelf = blob::shelf(&block.model);
             Ok((block, shelf))
         });

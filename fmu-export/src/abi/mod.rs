@@ -144,6 +144,15 @@ fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result
     }
 }
 
+/// What a model without a capability lacks.
+#[doc(hidden)]
+pub fn lacks(capability: &str) -> &'static str {
+    match capability {
+        "resizable" => "there are no structural parameters",
+        _ => "clocks",
+    }
+}
+
 /// C functions from a table of them. One line of the table reads: name in C, arguments after the instance, row of the
 /// lifecycle table (and the capability without which the call is unsupported), function of [`Abi`] or of the instance with the arguments it gets.
 #[doc(hidden)]
@@ -166,7 +175,7 @@ macro_rules! functions {
             unsafe {
                 $crate::abi::Abi::<$exported>::enter::<Here>(instance, |mut abi| {
                     $(if const { <$exported as Exported>::CAN.$capability.is_none() } {
-                        abi.unsupported("clocks")?;
+                        abi.unsupported($crate::abi::lacks(stringify!($capability)))?;
                     })?
                     abi.$function($($passed),*)?;
                     Ok(())

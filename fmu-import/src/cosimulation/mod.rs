@@ -97,7 +97,7 @@ impl System {
         }
         let kind = self.method.kind(name, fmu);
         self.instances.push(fmu.instantiate_as(kind, name, logging)?);
-        self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind });
+        self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind, sizes: Vec::new() });
         Ok(())
     }
 
@@ -111,13 +111,46 @@ impl System {
         take_messages(&self.instances)
     }
 
+    /// Whether a variable, written `instance.variable`, is a structural parameter.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_size(&self, port: &str) -> Result<bool, Error> {
+        Ok(self.parts.causality(&self.parts.port(port)?) == Causality::StructuralParameter)
+    }
+
+    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode. Arrays
+    /// have other sizes then, and have lost their values, so this comes before everything that names variables.
+    ///
+    /// # Errors
+    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, or the FMU refuses.
+    pub fn configure<'a>(&mut self, sizes: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<(), Error> {
+        let mut changed = vec![false; self.instances.len()];
+        for (written, text) in sizes {
+            if !self.is_size(written)? {
+                return Err(Error::usage(written, "is not a structural parameter"));
+            }
+            let port = self.parts.port(written)?;
+            let values = self.instances[port.instance].parse(&port.name, text)?;
+            changed[port.instance] = true;
+            self.parts.0[port.instance].sizes.retain(|(other, _)| *other != port);
+            self.parts.0[port.instance].sizes.push((port, values));
+        }
+        let all = self.parts.0.iter().zip(&mut self.instances).zip(changed);
+        all.filter(|(_, changed)| *changed).try_for_each(|((part, instance), _)| part.configure(instance))
+    }
+
     /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. An element of an array
-    /// leaves the others as they were set, or as they start.
+    /// leaves the others as they were set, or as they start. [`configure`](Self::configure) sets several structural parameters.
     ///
     /// # Errors
     /// The variable does not exist, the text is not a value of its type, or the FMU refuses.
     pub fn set(&mut self, port: &str, text: &str) -> Result<(), Error> {
+        if self.is_size(port)? {
+            return self.configure([(port, text)]);
+        }
         let port = self.parts.port(port)?;
+        let present = self.present(&port)?;
         let (index, description) = (port.instance, self.parts.0[port.instance].description());
         let variable = self.parts.variable(index, &port.name)?;
         let wrong = |cause: String| Error::usage(self.instances[index].name(), cause);
@@ -127,7 +160,7 @@ impl System {
         if let Some((element, count)) = whole.element.take() {
             let one = values;
             let name = std::mem::replace(&mut whole.name, variable.name.clone());
-            let before = self.value_set(index, &whole.name).cloned();
+            let before = self.value_set(index, &whole.name).cloned().or(present);
             values = before.map_or_else(|| Values::start(variable, description).map_err(wrong), Ok)?;
             if values.len() != count || !values.replace(element, &one) {
                 return Err(wrong(format!("{name} = {text} is not one value, or the start values are not known")));
@@ -300,6 +333,16 @@ impl System {
             Need::With { parameter, value } => self.has_value(instance, parameter, value),
         };
         self.instances[instance].description().variables.iter().filter(is_free).filter(needed).collect()
+    }
+
+    /// The elements of an array of which `port` is one, if sizes were set: its start values are gone.
+    fn present(&mut self, port: &Port) -> Result<Option<Values>, Error> {
+        let part = &self.parts.0[port.instance];
+        if part.sizes.is_empty() || port.element.is_none() {
+            return Ok(None);
+        }
+        let name = &self.parts.variable(port.instance, &port.name)?.name;
+        self.instances[port.instance].get(name).map(Some)
     }
 
     /// The value that was set last.

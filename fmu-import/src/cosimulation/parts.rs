@@ -2,7 +2,7 @@
 
 use super::Column;
 use crate::quantity::suggest;
-use crate::{Error, Fmu, Kind};
+use crate::{Error, Fmu, Instance, Kind, Values};
 use fmu_core::variable::position;
 use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
 
@@ -31,11 +31,39 @@ pub(super) struct Part {
     pub(super) fmu: Fmu,
     pub(super) logging: bool,
     pub(super) kind: Kind,
+    /// Structural parameters that were set, and their values.
+    pub(super) sizes: Vec<(Port, Values)>,
 }
 
 impl Part {
     pub(super) fn description(&self) -> &ModelDescription {
         self.fmu.description()
+    }
+
+    /// The value of a structural parameter that was set.
+    fn size(&self, reference: u32) -> Option<usize> {
+        let (_, values) = self.sizes.iter().rev().find(|(port, _)| port.reference == reference)?;
+        let Values::Integers(values) = values else { return None };
+        usize::try_from(*values.first()?).ok()
+    }
+
+    /// Extents of a variable with the sizes that were set; empty if one is not known.
+    fn shape(&self, variable: &ModelVariable) -> Vec<usize> {
+        self.description().shape_with(variable, |reference| self.size(reference)).unwrap_or_default()
+    }
+
+    /// The array and the index of its element that a name means, with the sizes that were set.
+    fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
+        self.description().element_with(name, |reference| self.size(reference))
+    }
+
+    /// Sets the structural parameters of an instance, if there are some, in one Configuration Mode.
+    pub(super) fn configure(&self, instance: &mut Instance) -> Result<(), Error> {
+        if self.sizes.is_empty() {
+            return Ok(());
+        }
+        let values: Vec<_> = self.sizes.iter().map(|(port, values)| (port.name.as_str(), values)).collect();
+        instance.configure(&values)
     }
 }
 
@@ -48,11 +76,10 @@ impl Parts {
     pub(super) fn port(&self, text: &str) -> Result<Port, Error> {
         let (instance, name) = self.instance_and_rest(text, "VARIABLE")?;
         let variable = self.variable(instance, name)?;
-        let description = self.0[instance].description();
-        let is_named = description.variable(name).is_some();
-        let element = if is_named { None } else { description.element(name) };
-        let count = || description.shape(variable).unwrap_or_default().iter().product();
-        let element = element.map(|(_, element)| (element, count()));
+        let part = &self.0[instance];
+        let is_named = part.description().variable(name).is_some();
+        let element = if is_named { None } else { part.element(name) };
+        let element = element.map(|(_, element)| (element, part.shape(variable).iter().product()));
         let (reference, base) = (variable.value_reference, variable.base);
         Ok(Port { instance, reference, base, name: name.to_owned(), element })
     }
@@ -62,7 +89,7 @@ impl Parts {
         let port = self.port(text)?;
         let variable = self.variable(port.instance, &port.name)?;
         if variable.is_array() && port.element.is_none() {
-            let shape = self.0[port.instance].description().shape(variable).unwrap_or_default();
+            let shape = self.0[port.instance].shape(variable);
             let cause = "is an array; only scalars can be connected, fed, varied and recorded";
             return Err(Error::usage(text, format!("{cause}: name an element, {text}{}", position(&shape, 0))));
         }
@@ -82,6 +109,12 @@ impl Parts {
             return Err(Error::usage(text, "is an element of an array; only scalars can be varied"));
         }
         let variable = self.variable(port.instance, &port.name)?;
+        if variable.causality == Causality::StructuralParameter {
+            return Err(Error::usage(
+                text,
+                "is a structural parameter, which sizes arrays: it has one value in all runs",
+            ));
+        }
         let starts = matches!(variable.initial_or_default(), Some(Initial::Exact | Initial::Approx));
         if variable.variability == Variability::Constant || !(starts || variable.causality == Causality::Input) {
             let cause = format!("is {} {} and takes no value", variable.variability, variable.causality);
@@ -92,10 +125,10 @@ impl Parts {
 
     /// The variable of this name, or the array of which it names an element.
     pub(super) fn variable(&self, instance: usize, name: &str) -> Result<&ModelVariable, Error> {
-        let Part { name: of, fmu, .. } = &self.0[instance];
-        let names = || fmu.description().variables.iter().map(|v| v.name.as_str());
-        let none = || Error::usage(of, format!("has no variable {name}{}", suggest(name, names())));
-        fmu.description().variable_or_array(name).ok_or_else(none)
+        let part = &self.0[instance];
+        let names = || part.description().variables.iter().map(|v| v.name.as_str());
+        let none = || Error::usage(&part.name, format!("has no variable {name}{}", suggest(name, names())));
+        part.description().variable(name).or_else(|| Some(part.element(name)?.0)).ok_or_else(none)
     }
 
     pub(super) fn causality(&self, port: &Port) -> Causality {

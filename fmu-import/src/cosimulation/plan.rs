@@ -281,6 +281,9 @@ impl Worker {
         if lost || (self.used && instances.iter_mut().any(|instance| instance.reset().is_err())) {
             self.renew()?;
         }
+        for (part, instance) in self.plan.parts.0.iter().zip(&mut self.instances) {
+            part.configure(instance)?;
+        }
         for (port, values) in &self.plan.set {
             self.instances[port.instance].set_at(port.base, port.reference, values)?;
         }

@@ -92,7 +92,7 @@ impl<'a> Numbering<'a> {
                 index += 1;
                 let number = if version == FmiVersion::V2 { index } else { v.value_reference };
                 numbers.push(number);
-                if v.takes_start() || states.contains(&reference) {
+                if v.takes_start() || states.contains(&v.value_reference) {
                     known.insert(reference, number);
                 }
             }

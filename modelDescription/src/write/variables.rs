@@ -46,8 +46,9 @@ fn time() -> Element {
 
 /// FMI 2.0 has no arrays: one scalar per element, `name[1]` the first (2.0.5, 2.2.9).
 fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
-    let state = v.derivative.map(|reference| index(description, reference).to_string());
+    let state = v.derivative.map(|reference| index(description, reference));
     let element = |name: &str, offset: u32, start: Option<&Value>| {
+        let state = state.map(|first| (first + offset as usize).to_string());
         let mut typed = Element::new(match v.kind {
             VariableKind::Real { .. } => "Real",
             VariableKind::Integer(_) => "Integer",
@@ -57,17 +58,25 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
             VariableKind::Text | VariableKind::Binary { .. } | VariableKind::Clock(_) => "String",
         });
         typed.attributes = type_attributes(v, FmiVersion::V2);
-        typed = typed
-            .with_some("derivative", state.clone())
-            .with_some("start", start.map(|value| text(v, value, FmiVersion::V2)));
-        identity("ScalarVariable", v, name, v.value_reference.saturating_add(offset)).children([typed])
+        typed =
+            typed.with_some("derivative", state).with_some("start", start.map(|value| text(v, value, FmiVersion::V2)));
+        identity("ScalarVariable", v, FmiVersion::V2, name, v.value_reference.saturating_add(offset)).children([typed])
     };
     let start = |i: usize| v.start.as_ref().and_then(|all| all.get(i));
     if !v.is_array() {
         return vec![element(&v.name, 0, start(0))];
     }
-    let of_array = |(i, k)| element(&format!("{}{}", v.name, position(&v.shape, i)), k, start(i));
+    let of_array = |(i, k)| element(&element_name(v, i), k, start(i));
     (0..v.elements()).zip(0..).map(of_array).collect()
+}
+
+/// Name of an element: `x[1]`, and `der(x[1])` of a derivative.
+fn element_name(v: &Variable, i: usize) -> String {
+    let at = position(&v.shape, i);
+    match v.name.strip_suffix(')').filter(|_| v.derivative.is_some()) {
+        Some(name) => format!("{name}{at})"),
+        None => format!("{}{at}", v.name),
+    }
 }
 
 /// Position in the list of FMI 2.0, from 1.
@@ -88,13 +97,15 @@ fn variable(v: &Variable) -> Element {
         VariableKind::Clock(timing) => return clock(v, &timing),
         VariableKind::Binary { .. } => "Binary",
     };
-    let mut element = identity(base, v, &v.name, v.value_reference)
+    let mut element = identity(base, v, FmiVersion::V3, &v.name, v.value_reference)
         .with_some("clocks", on_clocks(v))
         .with_some("intermediateUpdate", v.intermediate.then_some("true"));
     element.attributes.extend(type_attributes(v, FmiVersion::V3));
     let starts: Option<Vec<String>> =
         v.start.as_ref().map(|all| all.iter().map(|value| text(v, value, FmiVersion::V3)).collect());
-    let dimensions = v.shape.iter().map(|n| Element::new("Dimension").with("start", n.to_string()));
+    let dimension = |attribute: &str, n: String| Element::new("Dimension").with(attribute, n);
+    let fixed = v.shape.iter().filter(|_| v.sized.is_empty()).map(|n| dimension("start", n.to_string()));
+    let dimensions = fixed.chain(v.sized.iter().map(|n| dimension("valueReference", n.to_string())));
     let aliases = v.aliases.iter().map(|alias| {
         Element::new("Alias")
             .with("name", &alias.name)
@@ -149,10 +160,20 @@ fn clock(v: &Variable, timing: &Timing) -> Element {
         .with_some("priority", timing.priority.map(|priority| priority.to_string()))
 }
 
+/// Causality and variability. FMI 2.0 has no structural parameters: their values stay.
+fn who(v: &Variable, version: FmiVersion) -> (Causality, Variability) {
+    if version == FmiVersion::V2 && v.causality == Causality::StructuralParameter {
+        return (Causality::Local, Variability::Constant);
+    }
+    (v.causality, v.variability)
+}
+
 /// The properties of the variable that do not depend on its base type.
-fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> Element {
-    let exact = v.exact || v.variability == Variability::Constant;
-    let (causality, initial) = match v.causality {
+fn identity(element: &str, v: &Variable, version: FmiVersion, name: &str, value_reference: u32) -> Element {
+    let (causality, variability) = who(v, version);
+    let exact = v.exact || variability == Variability::Constant;
+    let (causality, initial) = match causality {
+        Causality::StructuralParameter => ("structuralParameter", Some("exact")),
         Causality::Local if exact => ("local", Some("exact")),
         Causality::Output if exact => ("output", Some("exact")),
         Causality::Parameter => ("parameter", Some("exact")),
@@ -162,7 +183,7 @@ fn identity(element: &str, v: &Variable, name: &str, value_reference: u32) -> El
         Causality::Output => ("output", Some("calculated")),
         Causality::Local => ("local", Some("calculated")),
     };
-    let variability = match v.variability {
+    let variability = match variability {
         Variability::Fixed => "fixed",
         Variability::Tunable => "tunable",
         Variability::Discrete => "discrete",

@@ -57,6 +57,7 @@ pub(crate) fn variable(
         nominal: None,
         unbounded: false,
         shape: Vec::new(),
+        sized: Vec::new(),
         exact: false,
         start: None,
         initial_dependencies: None,
@@ -108,6 +109,7 @@ pub(crate) fn sample() -> Description {
         Variable {
             start: Some(vec![Value::Real(0.1), Value::Real(-1e-7), Value::Real(1.0 / 3.0)]),
             shape: vec![3],
+            sized: Vec::new(),
             ..variable("filter.b", 4, parameter, real(&ONE))
         },
         Variable { start: Some(vec![Value::Integer(3)]), ..variable("observer", 7, parameter, observer) },

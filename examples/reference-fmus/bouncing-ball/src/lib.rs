@@ -1,15 +1,17 @@
 //! BouncingBall of the Reference-FMUs: a ball that bounces until it rests. The original then sets its parameter g to 0; here the
 //! ball has a discrete state for that.
 
-use fmu_core::unit::{METER, METER_PER_S, METER_PER_S2, ONE};
+use fmu_core::unit::{DisplayUnit, METER, METER_PER_S, METER_PER_S2, ONE};
 use fmu_core::{
-    Block, ContinuousTime, Elapsed, EventMode, Events, Experiment, Fault, Indicator, Info, Model, Next, Outcome, Row,
-    State, Step, Stop, Table, integrate, table,
+    Alias, Block, ContinuousTime, Elapsed, EventMode, Events, Experiment, Fault, Indicator, Info, Model, Next, Outcome,
+    Row, State, Step, Stop, Table, integrate, table,
 };
 use serde::{Deserialize, Serialize};
 
 /// The step of the solver in s.
 const STEP: f64 = 1e-3;
+/// The foot of 1959.
+const FOOT: DisplayUnit = DisplayUnit { name: "ft", factor: 1.0 / 0.3048, offset: 0.0 };
 /// Velocity in m/s below which the ball stops bouncing.
 const V_MIN: f64 = 0.1;
 /// Depth in m that a ball on its way up may have.
@@ -50,7 +52,11 @@ impl Model for BouncingBall {
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![
-        V::output("h", &METER, "Position of the ball", |m| &mut m.out.h).exact(),
+        V::output("h", &METER, "Position of the ball", |m| &mut m.out.h).exact().aliases(&[Alias {
+            name: "h_ft",
+            description: "Position of the ball",
+            display: Some(FOOT),
+        }]),
         V::output("v", &METER_PER_S, "Velocity of the ball", |m| &mut m.out.v).exact(),
         V::parameter("g", &METER_PER_S2, "Gravity acting on the ball", |m| &mut m.model.g),
         V::parameter("e", &ONE, "Coefficient of restitution", |m| &mut m.model.e).at_least(0.5).at_most(1.0).tunable(),

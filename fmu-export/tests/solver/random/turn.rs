@@ -156,7 +156,7 @@ impl<M: Twin> Turn<'_, M> {
         };
         if wanted == OK {
             for (state, x) in M::CAN.states().iter().zip(&x) {
-                *(state.at)(&mut self.now.block.model) = *x;
+                *state.at(&mut self.now.block.model) = *x;
             }
         }
         (self.fmu.set_states(&x), wanted)

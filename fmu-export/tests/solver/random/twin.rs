@@ -91,7 +91,7 @@ impl<M: Twin> Snapshot<M> {
     }
 
     pub fn states(&mut self) -> Vec<f64> {
-        M::CAN.states().iter().map(|state| *(state.at)(&mut self.block.model)).collect()
+        M::CAN.states().iter().map(|state| *state.at(&mut self.block.model)).collect()
     }
 
     /// The values of a real reference.
@@ -263,7 +263,7 @@ impl<M: Twin> Snapshot<M> {
         for (index, value) in places {
             self.fresh |= "in".contains(self.state);
             if let Some(i) = rows.iter().position(|row| *row == index) {
-                *(M::CAN.states()[i].at)(&mut self.block.model) = value;
+                *M::CAN.states()[i].at(&mut self.block.model) = value;
             } else if let Some((meta, Slot::Real(x))) = M::TABLE.entry(&mut self.block, index) {
                 *x = value;
                 self.fresh |= meta.causality == Causality::Parameter;

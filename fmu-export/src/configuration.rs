@@ -1,0 +1,95 @@
+//! Configuration Mode and Reconfiguration Mode (FMI 3.0.2, 2.3.6 and 2.3.7): structural parameters, and the sizes of arrays.
+//!
+//! Until the mode is left, every array has the size that it had. Then the model resizes a copy, which takes the place of the
+//! model if it is right: no old value is kept.
+
+use crate::instance::{Instance, Refusal};
+use crate::lifecycle::State;
+use crate::value::Value;
+use fmu_core::{Block, Causality, Exported, Fault, Model};
+use std::mem;
+
+impl<E: Exported> Instance<E> {
+    /// Enters Configuration Mode, or Reconfiguration Mode once the simulation runs.
+    ///
+    /// # Errors
+    /// No structural parameter can change once the simulation runs.
+    pub fn enter_configuration(&mut self) -> Result<(), Fault> {
+        if self.current.life.state() == State::Instantiated || E::Model::TABLE.has_tunable_sizes() {
+            // Nothing is computed while sizes and arrays differ.
+            self.refresh();
+            return Ok(());
+        }
+        Err(Fault::new("no structural parameter is tunable: sizes can be set before the initialization only"))
+    }
+
+    /// Leaves the mode: the arrays get their new sizes.
+    ///
+    /// # Errors
+    /// The model refuses the sizes, or an array does not have the length that they say: nothing has changed.
+    pub fn exit_configuration(&mut self) -> Result<(), Fault> {
+        self.resize(self.current.block.clone())
+    }
+
+    /// Gives the arrays of this model the sizes that it has, and takes it.
+    fn resize(&mut self, mut block: Block<E::Model>) -> Result<(), Fault> {
+        let Some(resize) = E::CAN.resizable else { return Ok(()) };
+        let exchanges = self.exchanges();
+        let current = &mut self.current;
+        resize(&mut block.model)?;
+        if matches!(current.life.state(), State::Configuration | State::Instantiated) {
+            block.initialize();
+        } else {
+            block.model.derive();
+            block.model.output(current.elapsed, &mut block.out);
+        }
+        E::Model::TABLE.check_sizes(&mut block)?;
+        current.block = block;
+        // What hangs on values that are gone.
+        current.slopes.clear();
+        current.dirty = true;
+        let event = exchanges && current.life.state() == State::Reconfiguration;
+        current.pending |= event;
+        self.stale = event;
+        self.scratch = None;
+        Ok(())
+    }
+
+    /// Sets variables before the initialization: structural parameters take effect at once, as in a Configuration Mode of their
+    /// own.
+    ///
+    /// # Errors
+    /// As [`set`](Self::set) and [`exit_configuration`](Self::exit_configuration): nothing has changed.
+    #[cold]
+    pub(crate) fn set_and_configure<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+        let structural = |reference: &u32| {
+            let found = E::Model::TABLE.locate(E::CAN.index(*reference));
+            found.is_some_and(|(_, meta, _)| meta.causality == Causality::StructuralParameter)
+        };
+        if !references.iter().any(structural) {
+            return self.set_each(references, values);
+        }
+        let before = self.current.block.clone();
+        self.set_each(references, values)?;
+        let changed = mem::replace(&mut self.current.block, before);
+        Ok(self.resize(changed)?)
+    }
+
+    /// Number of scalar states that the model has now.
+    #[inline]
+    pub(crate) fn state_count(&mut self) -> usize {
+        if const { E::CAN.has_arrays() } {
+            E::CAN.count_states(&mut self.current.block.model)
+        } else {
+            const { E::CAN.scalars() }
+        }
+    }
+
+    /// The number, counted with the greatest sizes, of a state that the model has now.
+    #[cold]
+    pub(crate) fn number_of_state(&mut self, place: usize) -> usize {
+        let mut numbers = Vec::new();
+        E::CAN.each_state(&mut self.current.block.model, |number, _| numbers.push(number));
+        numbers.get(place).copied().unwrap_or(place)
+    }
+}

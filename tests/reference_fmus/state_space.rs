@@ -1,0 +1,273 @@
+//! A linear system whose sizes the importer chooses.
+
+use super::{BOTH, archive, checks, exchange, open, run, script};
+use fmu_import::cosimulation::{Method, Recording, Schedule, Settings, System};
+use fmu_import::{Instance, Kind, Values};
+use model_description::FmiVersion::{V2, V3};
+use model_description::{Causality, Dimension};
+use std::ops::ControlFlow;
+use std::sync::Arc;
+
+/// The output at every 1000th of the 10000 points: x += s (x + u), y = x + u.
+fn expected() -> Vec<[f64; 3]> {
+    let (u, mut x, mut rows) = ([1.0, 2.0, 3.0], [0.0; 3], vec![[1.0, 2.0, 3.0]]);
+    for k in 1..=10_000 {
+        x = std::array::from_fn(|i| x[i] + 1e-3 * (x[i] + u[i]));
+        if k % 1000 == 0 {
+            rows.push(std::array::from_fn(|i| x[i] + u[i]));
+        }
+    }
+    rows
+}
+
+/// The output as columns of texts or of numbers have it.
+fn rows(recording: &Recording) -> Vec<Vec<f64>> {
+    if let Some(column) = recording.texts.first() {
+        return column.values.iter().map(|row| row.split(' ').map(|x| x.parse().unwrap()).collect()).collect();
+    }
+    let columns: Vec<_> = recording.columns.iter().map(|c| &c.values).collect();
+    (0..recording.time.len()).map(|k| columns.iter().map(|c| c[k]).collect()).collect()
+}
+
+fn reals(values: &[f64]) -> Values {
+    Values::Reals(values.to_vec())
+}
+
+fn size(n: u32) -> Values {
+    Values::Integers(vec![n.into()])
+}
+
+#[test]
+fn its_description_names_the_sizes() {
+    let fmu = open("state-space");
+    let md = fmu.description();
+    let named = |name: &str| md.variable(name).unwrap();
+    assert_eq!(named("n").causality, Causality::StructuralParameter);
+    let (m, n, r) = (named("m").value_reference, named("n").value_reference, named("r").value_reference);
+    for (name, sizes) in [("A", vec![n, n]), ("B", vec![n, m]), ("D", vec![r, m]), ("x", vec![n]), ("der(x)", vec![n])]
+    {
+        let dimensions: Vec<_> = sizes.into_iter().map(Dimension::Variable).collect();
+        assert_eq!(named(name).dimensions, dimensions, "{name}");
+    }
+    assert_eq!(named("A").start.as_deref(), Some("1 0 0 0 1 0 0 0 1"));
+    assert_eq!((md.derivatives.len(), md.states()[0].name.as_str()), (1, "x"));
+}
+
+#[test]
+fn has_the_bits_of_the_original() {
+    let expected = expected();
+    let last = [21_916.681_339_078_466, 43_833.362_678_156_93, 65_750.044_017_235_2];
+    assert_eq!((expected.len(), expected[10]), (11, last));
+    for version in BOTH {
+        let recording = run(Method::default(), &archive("state-space", version), &[], 10.0, 1.0);
+        assert_eq!(rows(&recording), expected, "{version:?}");
+    }
+}
+
+#[test]
+fn sizes_are_set_before_the_start() {
+    let zeros = ["0"; 25].join(" ");
+    let set = [("n", "5"), ("m", "1"), ("r", "2"), ("x0", "1 2 0 0 0"), ("u", "0"), ("A", &*zeros)];
+    for method in [Method::default(), exchange()] {
+        let recording = run(method, &archive("state-space", V3), &set, 1.0, 0.5);
+        assert_eq!(rows(&recording), [[1.0, 2.0]; 3]);
+    }
+}
+
+/// `examples/cs_reconfiguration.c` of the original: no states, and outputs that follow inputs whose number changes.
+#[test]
+fn sizes_change_while_it_runs() {
+    let mut it = open("state-space").instantiate("it", false).unwrap();
+    it.configure(&[("m", &size(2)), ("n", &size(0)), ("r", &size(2))]).unwrap();
+    assert_eq!(it.get("D").unwrap(), reals(&[1.0, 0.0, 0.0, 1.0]));
+    it.set("u", &reals(&[0.0, 1.0])).unwrap();
+    it.setup(0.0, Some(1.1)).unwrap();
+    it.enter_initialization().unwrap();
+    it.exit_initialization().unwrap();
+    assert_eq!((it.get("y").unwrap(), it.get("x").unwrap()), (reals(&[0.0, 1.0]), reals(&[])));
+    let mut inputs = 2;
+    for step in 0..=10 {
+        let time = f64::from(step) * 0.1;
+        if step == 5 {
+            it.configure(&[("m", &size(3)), ("r", &size(3))]).unwrap();
+            inputs = 3;
+        }
+        let u: Vec<f64> = (0..inputs).map(|i| time + 0.1 + f64::from(i)).collect();
+        it.set("u", &reals(&u)).unwrap();
+        assert!(it.do_step(time, 0.1).unwrap().is_continue());
+        assert_eq!(it.get("y").unwrap(), reals(&u), "step {step}");
+    }
+}
+
+/// Values that differ from place to place.
+fn drawn(n: usize, seed: usize) -> Vec<f64> {
+    (0..n).map(|i| f64::from(u8::try_from((7 * i + 3 * seed) % 11).unwrap()) - 5.0).collect()
+}
+
+/// The product of a matrix, row by row, and a vector, added up from `start`.
+fn product(matrix: &[f64], vector: &[f64], start: &[f64]) -> Vec<f64> {
+    let row = |i: usize| &matrix[i * vector.len()..(i + 1) * vector.len()];
+    start.iter().enumerate().map(|(i, y)| row(i).iter().zip(vector).fold(*y, |y, (a, x)| y + a * x)).collect()
+}
+
+/// Sets matrices and inputs, makes three steps of the solver, and compares with the matrices' own products.
+fn compare(it: &mut Instance, time: f64, [m, n, r]: [usize; 3]) {
+    let matrices = [("A", n * n), ("B", n * m), ("C", r * n), ("D", r * m), ("u", m)];
+    let [a, b, c, d, u] = std::array::from_fn(|seed| {
+        let (name, count) = matrices[seed];
+        let values = drawn(count, seed);
+        it.set(name, &reals(&values)).unwrap();
+        values
+    });
+    let Values::Reals(mut x) = it.get("x").unwrap() else { unreachable!() };
+    assert!(it.do_step(time, 3e-3).unwrap().is_continue());
+    for _ in 0..3 {
+        let dx = product(&b, &u, &product(&a, &x, &vec![0.0; n]));
+        x.iter_mut().zip(dx).for_each(|(x, dx)| *x += 1e-3 * dx);
+    }
+    let y = product(&d, &u, &product(&c, &x, &vec![0.0; r]));
+    assert_eq!((it.get("x").unwrap(), it.get("y").unwrap()), (reals(&x), reals(&y)), "{m} {n} {r}");
+}
+
+/// Every number of inputs, states and outputs, before the start and while it runs.
+#[test]
+fn every_size_gives_the_products_of_its_matrices() {
+    let fmu = open("state-space");
+    let begin = |it: &mut Instance| {
+        it.setup(0.0, None).unwrap();
+        it.enter_initialization().unwrap();
+        it.exit_initialization().unwrap();
+    };
+    let mut running = fmu.instantiate("running", false).unwrap();
+    begin(&mut running);
+    let mut time = 0.0;
+    let all = (0..6_u32).flat_map(|m| (0..6).flat_map(move |n| (0..6).map(move |r| [m, n, r])));
+    for [m, n, r] in all {
+        let (given, counts) = ([("m", &size(m)), ("n", &size(n)), ("r", &size(r))], [m, n, r].map(|n| n as usize));
+        let mut it = fmu.instantiate("it", false).unwrap();
+        it.configure(&given).unwrap();
+        it.set("x0", &reals(&drawn(counts[1], 9))).unwrap();
+        begin(&mut it);
+        compare(&mut it, 0.0, counts);
+        running.configure(&given).unwrap();
+        compare(&mut running, time, counts);
+        time += 3e-3;
+    }
+}
+
+/// Sizes are set together, first; elements count with them.
+#[test]
+fn elements_of_a_resized_array_are_found() {
+    let fmu = open("state-space");
+    let system = || {
+        let mut system = System::default();
+        system.add("it", &fmu, false).unwrap();
+        system.configure([("it.n", "5"), ("m", "4"), ("r", "5")]).unwrap();
+        system
+    };
+    let mut it = system();
+    it.set("x0[5]", "3").unwrap();
+    it.set("x0[2]", "7").unwrap();
+    it.set("A[4,5]", "0.5").unwrap();
+    it.input("u[4]", Schedule::parse("2").unwrap()).unwrap();
+    for port in ["x[2]", "x[5]", "y[4]", "D[2,4]"] {
+        it.record(port).unwrap();
+    }
+    for none in ["x0[6]", "B[5,5]", "u[5]"] {
+        assert!(it.set(none, "1").is_err() && it.record(none).is_err(), "{none}");
+    }
+    assert!(it.configure([("x0", "1")]).unwrap_err().to_string().contains("is not a structural parameter"));
+    let settings = Settings { start: 0.0, stop: 1e-3, step: 1e-3, sequential: false };
+    let recording = it.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let last: Vec<f64> = recording.columns.iter().map(|column| column.values[1]).collect();
+    assert_eq!(last, [7.0 + 1e-3 * (7.0 + 2.0), 3.0 + 1e-3 * 3.0, 1e-3 * (0.5 * 3.0 + 2.0) + 2.0, 0.0]);
+    // The sizes of a plan are those of each of its runs.
+    let mut it = system();
+    it.record("y[5]").unwrap();
+    let plan = Arc::new(it.into_plan(&settings).unwrap());
+    assert!(plan.target("n").unwrap_err().to_string().contains("has one value in all runs"));
+    let mut worker = plan.worker().unwrap();
+    for _ in 0..2 {
+        assert_eq!(worker.record([]).unwrap().columns[0].values, [0.0, 0.0]);
+    }
+}
+
+/// A state saved with other sizes brings them along.
+#[test]
+fn a_saved_state_has_its_sizes() {
+    let mut it = open("state-space").instantiate("it", false).unwrap();
+    it.configure(&[("m", &size(1)), ("n", &size(4)), ("r", &size(2))]).unwrap();
+    it.set("x0", &reals(&[1.0, 2.0, 3.0, 4.0])).unwrap();
+    it.setup(0.0, None).unwrap();
+    it.enter_initialization().unwrap();
+    it.exit_initialization().unwrap();
+    let (saved, x, y) = (it.get_state().unwrap(), it.get("x").unwrap(), it.get("y").unwrap());
+    assert_eq!(x, reals(&[1.0, 2.0, 3.0, 4.0]));
+    let bytes = it.serialize_state(saved).unwrap();
+    assert!(it.do_step(0.0, 0.5).unwrap().is_continue());
+    it.configure(&[("m", &size(5)), ("n", &size(1)), ("r", &size(5))]).unwrap();
+    assert_eq!(it.get("x").unwrap(), reals(&[0.0]));
+    let same = it.deserialize_state(&bytes).unwrap();
+    for state in [saved, same] {
+        it.set_state(state).unwrap();
+        assert_eq!((it.get("x").unwrap(), it.get("y").unwrap()), (x.clone(), y.clone()));
+        assert!(it.do_step(0.0, 0.5).unwrap().is_continue());
+    }
+}
+
+/// In Model Exchange, the number of states follows.
+#[test]
+fn model_exchange_has_as_many_states_as_the_importer_wants() {
+    let mut it = open("state-space").instantiate_as(Kind::ModelExchange, "it", false).unwrap();
+    it.setup(0.0, None).unwrap();
+    it.enter_initialization().unwrap();
+    it.exit_initialization().unwrap();
+    for n in [0_u32, 5, 2] {
+        it.configure(&[("n", &size(n)), ("m", &size(2))]).unwrap();
+        let n = n as usize;
+        assert_eq!(it.state_and_indicator_counts().unwrap().0, n);
+        let x: Vec<f64> = (0_u8..).take(n).map(f64::from).collect();
+        it.enter_continuous_time_mode().unwrap();
+        it.set_continuous_states(&x).unwrap();
+        let mut dx = vec![f64::NAN; n];
+        it.get_derivatives(&mut dx).unwrap();
+        let rates: Vec<f64> = (0..n).map(|i| x[i] + [1.0, 2.0].get(i).unwrap_or(&0.0)).collect();
+        assert_eq!((&dx, it.get("der(x)").unwrap()), (&rates, reals(&rates)));
+        let mut nominals = vec![f64::NAN; n];
+        it.get_nominals(&mut nominals).unwrap();
+        assert_eq!(nominals, vec![1.0; n]);
+        it.enter_event_mode().unwrap();
+    }
+}
+
+#[test]
+fn fmi2_has_the_sizes_of_the_start() {
+    let fmu = fmu_import::Fmu::open(archive("state-space", V2)).unwrap();
+    let md = fmu.description();
+    assert_eq!((md.derivatives.len(), md.states()[2].name.as_str()), (3, "x[3]"));
+    assert!(md.variable("A[3,3]").is_some() && md.variable("der(x[1])").is_some() && md.variable("A[4,1]").is_none());
+    let mut it = fmu.instantiate("it", false).unwrap();
+    it.setup(0.0, None).unwrap();
+    it.enter_initialization().unwrap();
+    assert_eq!(it.get("n").unwrap(), size(3));
+    assert!(it.set("n", &size(2)).is_err());
+}
+
+#[test]
+fn the_checker_finds_nothing() {
+    checks("state-space");
+}
+
+#[test]
+fn fmpy_gives_the_same() {
+    let last = script(
+        "import sys, fmpy\n\
+         from fmpy.validation import validate_fmu\n\
+         assert validate_fmu(sys.argv[1]) == []\n\
+         result = fmpy.simulate_fmu(sys.argv[1], stop_time=10, output_interval=1)\n\
+         print(*(float(x).hex() for row in result['y'] for x in row))\n",
+        &[&archive("state-space", V3)],
+    );
+    let found: Vec<f64> = last.split_whitespace().map(super::hexadecimal).collect();
+    assert_eq!(found, expected().concat());
+}
