@@ -70,6 +70,7 @@ fn the_package() {
         "exchange",
         "linearize",
         "drives",
+        "plot",
         "fmpy",
         "batch",
         "plan",

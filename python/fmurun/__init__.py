@@ -4,6 +4,7 @@
 - `Plan`: a system of FMUs for many runs on all processors, and on clusters by `fmurun.dask.sweep`.
 - `linearize`: matrices A, B, C and D of an FMU for Model Exchange.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
+- `plot`: a result, with matplotlib; notebooks show results by themselves.
 - `fmurun.drives`: the drives of this wheel, and start values for machines.
 - `fmurun.fmpy`: FMPy's classes for loops written by hand.
 
@@ -15,6 +16,7 @@ from ._batch import Batch
 from ._error import FmuError
 from ._linearize import Linearization, linearize
 from ._plan import Plan
+from ._plot import plot
 from ._simulate import simulate_fmu
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "plot", "simulate_fmu"]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import drives as drives
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "plot", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
@@ -80,7 +80,14 @@ class Plan:
     @staticmethod
     def from_toml(path: _Path, *, output: Sequence[str] | None = None, embed: bool = False) -> Plan: ...
     def simulate(self, start_values: Mapping[str, _Value] | None = None) -> fmpy.SimulationResult: ...
-    def run_many(self, table: _Table, *, threads: int | None = None, first_run: int = 0) -> dict[str, NDArray[Any]]: ...
+    def run_many(
+        self,
+        table: _Table,
+        *,
+        threads: int | None = None,
+        first_run: int = 0,
+        progress: bool | Callable[[int, int], object] | None = None,
+    ) -> dict[str, NDArray[Any]]: ...
     def gradient(
         self, at: Mapping[str, float], *, step: float = 1e-4, threads: int | None = None
     ) -> tuple[dict[str, float], dict[str, dict[str, float]]]: ...
@@ -89,6 +96,8 @@ class Plan:
     @property
     def measures(self) -> list[str]: ...
     def __len__(self) -> int: ...
+
+def plot(result: NDArray[Any], columns: str | Sequence[str] | None = None, *, figure: Any = None) -> Any: ...
 
 class Linearization:
     A: NDArray[np.float64]

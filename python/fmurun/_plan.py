@@ -7,6 +7,7 @@ import shutil
 import tempfile
 import threading
 from collections import OrderedDict
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -151,19 +152,23 @@ class Plan:
             values.append(str(_scalar(name, value)) if not isinstance(value, bool) else str(value).lower())
         output = None if self._output is None else [self._name(name) for name in self._output]
         time, columns = self._core.simulate(names, values, output)
-        result = np.empty(len(time), [("time", float)] + [(name.removeprefix(self._prefix), float) for name, _ in columns])
+        columns = [(name.removeprefix(self._prefix), *more) for name, *more in columns]
+        result = np.empty(len(time), [("time", float)] + [(name, float) for name, *_ in columns])
         result["time"] = time
-        for name, values in columns:
-            result[name.removeprefix(self._prefix)] = values
-        return result.view(SimulationResult)
+        for name, values, _ in columns:
+            result[name] = values
+        result = result.view(SimulationResult)
+        result.units = {name: unit for name, _, unit in columns}
+        return result
 
-    def run_many(self, table, *, threads=None, first_run=0):
+    def run_many(self, table, *, threads=None, first_run=0, progress=None):
         """Run every row of a table on `threads` threads (all processors by default) with Python's lock released.
 
         Args:
             table: the values of variables by their names: a dictionary of columns, a structured array, a DataFrame of pandas or
                 polars, a Table or RecordBatch of pyarrow; a column `run` numbers the rows
             first_run: number of the first row, if there is no column `run`
+            progress: True for a bar of tqdm, in a terminal or a notebook; or a function of (rows done, rows)
 
         Returns:
             a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
@@ -187,7 +192,8 @@ class Plan:
         runs = first_run + np.arange(n) if runs is None else np.asarray(runs, dtype=np.int64)
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
-        measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0)
+        with _bar(progress, n) as told:
+            measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, told)
         results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
         return dict(zip(["run", *columns, *self.measures, "end", "error"], [runs, *results, end, np.array(errors, dtype=object)]))
 
@@ -248,6 +254,22 @@ class Plan:
         measures = {name: _named(items, np.empty(0)) for name, items in zip(self.measures, self._core.measure_items)}
         last = {"end": np.empty(0), "error": np.empty(0, dtype=object)}
         return {"run": np.empty(0, dtype=np.int64), **varied, **measures, **last}
+
+
+@contextmanager
+def _bar(progress, total):
+    """A function that gets the number of rows done, or None."""
+    if progress is None or progress is False:
+        yield None
+    elif callable(progress):
+        yield lambda done: progress(done, total)
+    else:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            raise ImportError("progress=True needs tqdm: pip install tqdm; or give a function of (done, rows)") from None
+        with tqdm(total=total, unit="run") as bar:
+            yield lambda done: bar.update(done - bar.n)
 
 
 def _named(items, column):

@@ -13,6 +13,7 @@ mod exchange;
 mod input;
 mod instance;
 mod lane;
+mod page;
 mod plan;
 mod record;
 mod simulation;
@@ -32,6 +33,8 @@ mod _core {
     use super::error::panic;
     #[pymodule_export]
     use super::instance::{FmuState, Instance};
+    #[pymodule_export]
+    use super::page::run_page;
     #[pymodule_export]
     use super::plan::{Plan, paths, read_definition};
     #[pymodule_export]

@@ -36,8 +36,9 @@ def test_the_command_gives_the_same():
         command = [os.environ["FMU_COMMAND"], "tune", drives.machines[motor], "--json", *arguments]
         return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
+    values = told()
     for fmu in ("PmsmDrive", "PmsmPlant", "SensorlessController"):
-        assert told()[fmu] == drives.tune("ipmsm-2.2kw", fmu=fmu)
+        assert values[fmu] == drives.tune("ipmsm-2.2kw", fmu=fmu)
     other = drives.tune("servo-6.6kw", estimator="ExtendedEmf")
     assert told("--estimator", "ExtendedEmf", motor="servo-6.6kw")["PmsmDrive"] == other != drives.tune("servo-6.6kw")
     assert other["controller.estimator"] == 4

@@ -34,6 +34,7 @@ use std::path::{Path, PathBuf};
 ///     --input SensorlessController.speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Tune {
     /// Motor file
     #[arg(value_name = "MOTOR.toml", required_unless_present = "example")]
