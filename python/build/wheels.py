@@ -51,7 +51,7 @@ def main():
         command = [sys.executable, "-m", "maturin", "build", "--quiet", "--release", "--locked", "--target", target, *options, "--out", out]
         if subprocess.run(command, cwd=package, check=False).returncode:
             failed.append(name)
-    if subprocess.run([sys.executable, "-m", "maturin", "sdist", "--quiet", "--out", out], cwd=package, check=False).returncode:
+    if subprocess.run([sys.executable, "-m", "maturin", "sdist", "--out", out], cwd=package, check=False).returncode:
         failed.append("the source distribution")
     for path in sorted(set(out.iterdir()) - before):
         print(path)

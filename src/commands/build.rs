@@ -46,9 +46,10 @@ use std::process::{Command, Stdio};
 /// prints what they need. CARGO_TARGET_TRIPLE_LINKER (spelled as Cargo does) selects another linker.
 ///
 /// --release-dir DIR writes all files of a release: the archives, with a binary for each of Linux, Windows and macOS that can be
-/// built here; pages/NAME.html (fmu page); presets/MACHINE.PmsmDrive.fmu for each file of motors/; wheels/, the Python package fmurun with these
-/// archives, if python3 (or PYTHON) has maturin and ziglang; SHA256SUMS; sbom.cdx.json with the crates in them and their licenses (CycloneDX); and, in the workspace that has
-/// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library if cargo-zigbuild builds them.
+/// built here; pages/NAME.html (fmu page); presets/MACHINE.PmsmDrive.fmu for each file of motors/; wheels/, the Python package fmurun
+/// with these archives, if python3 (or PYTHON) has maturin and ziglang; SHA256SUMS; sbom.cdx.json with the crates in them and their
+/// licenses (CycloneDX); and, in the workspace that has them, the programs fmu, cargo-fmu and fmu-check for this computer, which need
+/// no other library if cargo-zigbuild builds them.
 ///   fmu build --release-dir release
 ///
 /// Archives of FMI 2.0 hold one universal library for both processors of macOS. Many importers look for Linux libraries of FMI 2.0
