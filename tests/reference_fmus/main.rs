@@ -3,6 +3,7 @@
 #![allow(missing_docs, clippy::float_cmp)]
 
 mod bouncing_ball;
+mod clocks;
 mod current_map;
 mod dahlquist;
 mod feedthrough;
