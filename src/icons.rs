@@ -1,6 +1,7 @@
 //! The folder `terminalsAndIcons/` of an FMU: its XML, and every picture as SVG and as PNG (FMI 3.0.2, 2.4.9).
 //!
-//! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here, in the size that the SVG gives itself.
+//! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here, in
+//! the size that the SVG gives itself.
 
 use crate::pack::Entry;
 use crate::picture;
