@@ -126,5 +126,6 @@ fn install() {
     let bytes = fs::metadata(&wheel).unwrap().len();
     println!("G8   {}: {bytes} bytes, {seconds} s of wall time", wheel.file_name().unwrap().display());
     let _ = fs::remove_dir_all(&folder);
-    assert!(bytes <= 2_000_000, "{bytes} bytes");
+    // The drives of both standards take two thirds of it.
+    assert!(bytes <= 12_000_000, "{bytes} bytes");
 }
