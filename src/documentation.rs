@@ -162,6 +162,9 @@ fn terminals(d: &Description) -> String {
                 MemberKind::Signal => "",
                 MemberKind::Inflow => " <small>flows in</small>",
                 MemberKind::Outflow => " <small>flows out</small>",
+                MemberKind::Domain => " <small>an axis</small>",
+                MemberKind::Codomain => " <small>a table</small>",
+                MemberKind::DomainInput | MemberKind::CodomainOutput => " <small>read now</small>",
             };
             let other = Some(&m.variable).filter(|v| **v != m.name).map(|v| format!(" = {}", escape(v)));
             format!("{}{}{kind}", escape(&m.name), other.unwrap_or_default())

@@ -1,15 +1,26 @@
 //! The folder `terminalsAndIcons/` of an FMU: its XML, and every picture as SVG and as PNG (FMI 3.0.2, 2.4.9).
 //!
-//! A picture is written once, as SVG; its PNG is drawn here, in the size that the SVG gives itself.
+//! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here, in
+//! the size that the SVG gives itself.
 
 use crate::pack::Entry;
 use crate::picture;
 use anyhow::{Context, Result};
 use fmu_core::Description;
+use fmu_core::terminal::MatchingRule;
 use model_description::{FmiVersion, write_terminals};
 use std::collections::BTreeMap;
 
 const FOLDER: &str = "terminalsAndIcons";
+
+/// Folder of the layered standard that says what terminals with maps mean.
+const STRUCT: &str = "extra/org.fmi-standard.fmi-ls-struct/";
+
+const MANIFEST: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
+<fmiLayeredStandardManifest xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls-manifest\" \
+ fmi-ls:fmi-ls-name=\"org.fmi-standard.fmi-ls-struct\" fmi-ls:fmi-ls-version=\"1.0.0-rc.1\" \
+ fmi-ls:fmi-ls-description=\"Layered standard for structuring of variables\"/>
+";
 
 /// The files; none for a model without terminals and icon.
 ///
@@ -18,8 +29,12 @@ const FOLDER: &str = "terminalsAndIcons";
 pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, Entry>> {
     let mut files = BTreeMap::new();
     let file = |bytes: Vec<u8>| Entry { bytes, executable: false };
-    if let Some(xml) = write_terminals(description) {
+    if let Some(xml) = write_terminals(description, version) {
         files.insert(format!("{FOLDER}/terminalsAndIcons.xml"), file(xml.into_bytes()));
+    }
+    let has_map = description.terminals.iter().any(|t| t.rule == MatchingRule::Map);
+    if has_map && version == FmiVersion::V3 {
+        files.insert(format!("{STRUCT}fmi-ls-manifest.xml"), file(MANIFEST.into()));
     }
     let of_terminals = description.terminals.iter().filter_map(|t| t.picture.as_ref());
     let mut pictures: BTreeMap<&str, &str> = of_terminals.map(|p| (p.icon.as_str(), p.svg.as_str())).collect();

@@ -24,7 +24,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sensorless-controller-clocked", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("pmsm-drive-mean", &["drive", "fmu-export"]),
-    ("fmurun", &["fmu-import", "fmu-sweep", "model-description"]),
+    ("fmurun", &["drive-study", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"]),
     (
         "fmu",
         &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"],

@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Checks a co-simulation FMU of FMI 2.0 or FMI 3.0, made by any tool: archive, description, and what its binary does.
+/// Checks an FMU for Co-Simulation or Model Exchange of FMI 2.0 or FMI 3.0, made by any tool: archive, description, and what its binary does.
 ///
 /// Every check has an id, a clause of the standard, and a level: must (the standard requires it), should (the standard
 /// recommends it) or hard (the standard leaves it open, but a robust FMU does it). Each probe of the binary runs in its own

@@ -10,6 +10,8 @@ use fmu_import::Status;
 use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, UpdateResults, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
 
+/// Why a run of the integrator cannot go on.
+pub(super) const UNSTABLE: &str = "Euler's method is not stable for this FMU";
 /// Largest number of updates of one event; an FMU that needs more never ends the event.
 const UPDATES: usize = 100;
 
@@ -50,7 +52,7 @@ impl Session {
 
     /// A step of the integrator in s.
     pub(super) fn integrator_step(&self) -> f64 {
-        self.h() / 20.0
+        self.integrator.get().unwrap_or(self.h() / 20.0)
     }
 }
 
@@ -298,7 +300,7 @@ impl<'a, 'b> Importer<'a, 'b> {
             *x += f * (end - t);
         }
         if x.iter().any(|x| !x.is_finite()) {
-            return Err(NotDetermined("Euler's method is not stable for this FMU".into()));
+            return Err(NotDetermined(UNSTABLE.into()));
         }
         i.must("SetTime", i.set_time(end)?)?;
         if !x.is_empty() {
@@ -352,6 +354,9 @@ impl<'a, 'b> Importer<'a, 'b> {
     }
 }
 
+/// The least scale of a deviation: what is small beside it is noise about 0.
+const LEAST_SCALE: f64 = 1e-6;
+
 /// Whether two vectors differ by more than rounding.
 pub(super) fn differ(a: &[f64], b: &[f64]) -> bool {
     deviation(&[a.to_vec()], &[b.to_vec()]).is_some()
@@ -369,7 +374,7 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
             if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
                 0.0
             } else {
-                (x - y).abs() / (scale + f64::MIN_POSITIVE)
+                (x - y).abs() / scale.max(LEAST_SCALE)
             }
         });
         let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
@@ -390,6 +395,7 @@ mod tests {
         assert!(step == 2 && (largest - 2e-9).abs() < 1e-12, "{step} {largest}");
         assert_eq!(deviation(&rows(5.0), &rows(f64::NAN)), Some((2, f64::INFINITY)));
         assert_eq!(deviation(&rows(f64::NAN), &rows(f64::NAN)), None);
+        assert_eq!(deviation(&rows(0.0), &rows(-8.7e-18)), None, "noise about 0");
         assert_eq!(deviation(&rows(5.0), &rows(5.0)[..1]), Some((2, f64::INFINITY)));
     }
 }

@@ -3,10 +3,12 @@
 use crate::zip_headers::{Archive, contents, copy, is_inside};
 use fmu_import::platform::Platform;
 use fmu_import::{Folder, machine};
-use model_description::{Element, Error, FmiVersion, Interface, ModelDescription, limits};
+use model_description::{Element, Error, FmiVersion, Interface, ModelDescription, ModelVariable, limits};
+use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 const DESCRIPTION: &str = "modelDescription.xml";
 
@@ -60,6 +62,8 @@ pub struct FmuFile {
     /// The description as an importer reads it, or why it cannot.
     pub(super) description: Result<ModelDescription, String>,
     pub(super) binaries: Vec<Binary>,
+    /// Where the element of a variable stands, by its line and name.
+    places: OnceLock<HashMap<(usize, String), usize>>,
     /// Entries that could not be unpacked.
     pub(super) unpack_errors: Vec<String>,
     /// Entries that this computer could not store, for example because of their long names.
@@ -102,6 +106,7 @@ impl FmuFile {
             tree,
             description,
             binaries: Vec::new(),
+            places: OnceLock::new(),
             unpack_errors: Vec::new(),
             own_errors: Vec::new(),
             dir,
@@ -166,6 +171,16 @@ impl FmuFile {
     /// The root element.
     pub(super) fn root(&self) -> Option<&Element> {
         self.tree.as_ref().ok()
+    }
+
+    /// The element of a variable.
+    pub(super) fn element_of(&self, v: &ModelVariable) -> Option<&Element> {
+        let list = &self.root()?.child("ModelVariables")?.children;
+        let places = self.places.get_or_init(|| {
+            let key = |e: &Element| (e.line, e.get("name").unwrap_or_default().to_owned());
+            list.iter().enumerate().rev().map(|(place, e)| (key(e), place)).collect()
+        });
+        list.get(*places.get(&(v.line, v.name.clone()))?)
     }
 
     /// The interface for co-simulation, or for Model Exchange where there is no other.

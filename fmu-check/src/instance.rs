@@ -1,5 +1,6 @@
 //! An instance under test.
 
+use crate::check::Level;
 use crate::encoding::show;
 use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
@@ -12,6 +13,8 @@ pub(super) struct Instance<'b> {
     pub(super) session: &'b Session,
     pub(super) handle: Handle,
     event_mode: bool,
+    /// Which instance of the case it is, from 1.
+    number: usize,
     start: Cell<f64>,
     stop: Cell<Option<f64>>,
     /// Start time of the next step in s.
@@ -26,8 +29,13 @@ impl Session {
         let function = self.function_for(arguments.interface);
         self.record_call(&format!("{function}({:?})", arguments.name.as_deref().unwrap_or_default()));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
-        self.record_result(&if handle.is_some() { "an instance" } else { "NULL" });
-        Ok(handle.map(|handle| Instance::new(self, handle, arguments.event_mode)))
+        let made = handle.map(|handle| Instance::new(self, handle, arguments.event_mode));
+        match &made {
+            Some(Instance { number: number @ 2.., .. }) => self.record_result(&format!("instance [{number}]")),
+            Some(_) => self.record_result(&"an instance"),
+            None => self.record_result(&"NULL"),
+        }
+        Ok(made)
     }
 
     /// Name of the function that makes instances for co-simulation.
@@ -75,7 +83,8 @@ impl Session {
 impl<'b> Instance<'b> {
     fn new(session: &'b Session, handle: Handle, event_mode: bool) -> Self {
         let (start, stop, time) = (Cell::new(session.start()), Cell::new(None), Cell::new(session.start()));
-        Self { session, handle, event_mode, start, stop, time, over: Cell::new(false) }
+        let number = session.another();
+        Self { session, handle, event_mode, number, start, stop, time, over: Cell::new(false) }
     }
 }
 
@@ -96,7 +105,9 @@ impl Instance<'_> {
         function: impl FnOnce(&Raw) -> Option<(Status, T)>,
     ) -> Result<(Status, T), NotDetermined> {
         let name = self.session.raw.name(call);
-        self.session.record_call(&name);
+        // The first instance of a case needs no number.
+        let mark = if self.number > 1 { format!("[{}] ", self.number) } else { String::new() };
+        self.session.record_call(&format!("{mark}{name}"));
         let missing =
             || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
         let (status, value) = function(&self.session.raw).ok_or_else(missing)?;
@@ -222,14 +233,37 @@ impl Instance<'_> {
     /// A variable's values.
     pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), NotDetermined> {
         let n = self.session.elements(v);
-        let mut buffer = Buffer::room(v.base, self.session.description.version, n);
+        let version = self.session.description.version;
+        let mut buffer = Buffer::room(v.base, version, n);
+        let untouched = buffer.clone();
         let status = self.call(&format!("Get({})", v.name), |raw| {
             raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
         })?;
+        if !self.session.silent.get() && status.is_ok() {
+            let not_written = n > 0 && buffer == untouched;
+            let value = if not_written { "not written".into() } else { show(v, version, &buffer.bits()) };
+            self.session.record_value(&value);
+        }
         if !buffer.intact() {
             return Err(NotDetermined(format!("getting {} wrote past its {n} values", v.name)));
         }
         Ok((status, buffer.bits()))
+    }
+
+    /// A variable's values after it was set; `None` where they cannot be read. FMI 2.0 lets an importer read few variables in
+    /// Initialization Mode, so that only FMI 3.0 is at fault then.
+    pub(super) fn get_back(&self, v: &ModelVariable) -> Result<Option<Vec<u64>>, NotDetermined> {
+        let (status, back) = self.get(v)?;
+        if status.is_ok() {
+            return Ok(Some(back));
+        }
+        let text = format!("{} was set, and Get({}) returned {status}", v.name, v.name);
+        if self.session.is_v2() {
+            self.session.note(text);
+        } else {
+            self.session.lesser(Level::Should, text);
+        }
+        Ok(None)
     }
 
     /// Sets a variable's values.

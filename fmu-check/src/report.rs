@@ -156,7 +156,13 @@ impl Report {
         if !self.fatal().is_empty() {
             let _ = writeln!(out, "An importer would have crashed or hung in: {}.", self.fatal().join(", "));
         }
+        let c = self.counts();
+        let applicable = self.findings.len() - c.not_applicable;
+        if c.not_determined > 0 {
+            let _ = writeln!(out, "{} of {applicable} requirements could be checked.", applicable - c.not_determined);
+        }
         let end = match (self.conforms(), self.unknown().count()) {
+            (true, _) if 2 * c.not_determined > applicable => "Most requirements could not be checked.",
             (true, 0) if self.counts().known > 0 => "All findings are known.",
             (true, 0) if self.counts().not_determined > 0 => "What could be determined holds.",
             (true, 0) => "All requirements hold.",

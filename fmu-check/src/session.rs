@@ -45,6 +45,8 @@ pub(super) enum Line {
     NotApplicable(String),
     /// The check could not decide.
     NotDetermined(String),
+    /// Euler's method needs steps of this size, in s.
+    Integrator(f64),
     /// The probe is complete.
     Done,
 }
@@ -73,6 +75,9 @@ pub struct ProbeArguments {
     /// Print every call with what it returned.
     #[arg(long)]
     pub trace: bool,
+    /// Step of the integrator in s, where that of a twentieth of the communication step is too long.
+    #[arg(long)]
+    pub integrator: Option<f64>,
     /// Time that it may take, in seconds.
     #[arg(long, default_value_t = 10.0)]
     pub seconds: f64,
@@ -92,6 +97,8 @@ pub(super) struct Session {
     /// The level of a crash, if it is lower than that of the check.
     lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
+    /// The step of the integrator in s, if it is not the usual one.
+    pub(super) integrator: Cell<Option<f64>>,
     log: RefCell<File>,
     trace: bool,
     from: usize,
@@ -99,6 +106,8 @@ pub(super) struct Session {
     next: Cell<usize>,
     violations: Cell<usize>,
     instances_made: Cell<usize>,
+    /// Instances of this case.
+    of_case: Cell<usize>,
     began: Instant,
     /// When `show_progress` last wrote.
     shown: Cell<Instant>,
@@ -141,6 +150,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(false),
+            integrator: Cell::new(args.integrator),
             log: RefCell::new(log),
             trace: args.trace,
             from: args.from,
@@ -148,6 +158,7 @@ impl Session {
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(0),
+            of_case: Cell::new(0),
             began: Instant::now(),
             shown: Cell::new(Instant::now()),
             home,
@@ -182,6 +193,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(true),
+            integrator: self.integrator.clone(),
             log: RefCell::new(tempfile::tempfile().map_err(lost)?),
             trace: false,
             from: 0,
@@ -189,6 +201,7 @@ impl Session {
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(1000 * (number + 1)),
+            of_case: Cell::new(0),
             began: self.began,
             shown: Cell::new(Instant::now()),
             home: self.home.clone(),
@@ -259,6 +272,7 @@ impl Session {
         if number < self.from || (self.one && number > self.from) {
             return;
         }
+        self.of_case.set(0);
         self.write(&Line::Case(number));
         self.note_call(&format!("\n# case {number}\n"));
         if let Err(NotDetermined(why)) = case() {
@@ -318,6 +332,17 @@ impl Session {
     /// Adds what the last call returned.
     pub(super) fn record_result(&self, result: &dyn std::fmt::Display) {
         self.note_call(&format!(" -> {result}"));
+    }
+
+    /// Adds a value that the last call returned.
+    pub(super) fn record_value(&self, value: &str) {
+        self.note_call(&format!(", {value}"));
+    }
+
+    /// The number of one more instance of this case.
+    pub(super) fn another(&self) -> usize {
+        self.of_case.set(self.of_case.get() + 1);
+        self.of_case.get()
     }
 
     /// Tells the parent, from time to time, that calls without entries of their own return.

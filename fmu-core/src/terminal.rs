@@ -3,7 +3,7 @@
 //! A terminal names variables of the table and adds nothing to them: an importer that knows no terminals loses nothing, and
 //! the instantiation token does not change.
 
-use crate::rules::same_text;
+use crate::rules::{demand, same_text};
 use serde::{Deserialize, Serialize};
 
 /// A group of variables that is connected as a whole.
@@ -29,6 +29,8 @@ pub enum MatchingRule {
     Plug,
     /// By name; only the members that both terminals have.
     Bus,
+    /// The tables of two maps over the same points: FMI-LS-STRUCT 1.0.0-rc.1, a map on a rectilinear grid (FMI 3.0).
+    Map,
 }
 
 /// A variable of a terminal.
@@ -52,6 +54,14 @@ pub enum MemberKind {
     Inflow,
     /// Flow out of the model through the terminal.
     Outflow,
+    /// The points on an axis of a map.
+    Domain,
+    /// Where on this axis the map is read.
+    DomainInput,
+    /// The values of a map, row by row: an extent for each axis.
+    Codomain,
+    /// The value that is read from the map.
+    CodomainOutput,
 }
 
 /// Where a terminal is drawn: its center, in a coordinate system from -100 to 100 with y upwards, and its icon.
@@ -98,6 +108,33 @@ impl Terminal {
         Self::new(name, description, MatchingRule::Bus, members)
     }
 
+    /// A map: arrays with the points on its axes, an array for each of its tables, and where it is read now.
+    /// Each [`Member::domain_input`] follows its domain, each [`Member::codomain_output`] its codomain.
+    ///
+    /// # Panics
+    /// At compile time, on two members with the same name, without a domain or a codomain, or on another order.
+    pub const fn map(name: &'static str, description: &'static str, members: &'static [Member]) -> Self {
+        let (mut domains, mut codomains, mut i) = (0, 0, 0);
+        while i < members.len() {
+            match members[i].kind {
+                MemberKind::Domain => domains += 1,
+                MemberKind::Codomain => codomains += 1,
+                MemberKind::DomainInput => {
+                    let follows = i > 0 && matches!(members[i - 1].kind, MemberKind::Domain);
+                    demand(follows, members[i].name, "a domain_input follows its domain");
+                }
+                MemberKind::CodomainOutput => {
+                    let follows = i > 0 && matches!(members[i - 1].kind, MemberKind::Codomain);
+                    demand(follows, members[i].name, "a codomain_output follows its codomain");
+                }
+                _ => demand(false, members[i].name, "a map has domains and codomains"),
+            }
+            i += 1;
+        }
+        demand(domains > 0 && codomains > 0, name, "a map has a domain and a codomain");
+        Self::new(name, description, MatchingRule::Map, members)
+    }
+
     const fn new(
         name: &'static str,
         description: &'static str,
@@ -138,6 +175,26 @@ impl Member {
     /// A member that flows out of the model.
     pub const fn outflow(name: &'static str) -> Self {
         Self { name, variable: name, kind: MemberKind::Outflow }
+    }
+
+    /// The points on an axis of a [map](Terminal::map): a parameter or a constant with one extent.
+    pub const fn domain(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::Domain }
+    }
+
+    /// Where on the axis before it a [map](Terminal::map) is read.
+    pub const fn domain_input(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::DomainInput }
+    }
+
+    /// The values of a [map](Terminal::map): an array with an extent for each axis.
+    pub const fn codomain(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::Codomain }
+    }
+
+    /// What is read from the values before it.
+    pub const fn codomain_output(name: &'static str) -> Self {
+        Self { name, variable: name, kind: MemberKind::CodomainOutput }
     }
 
     /// Names another variable for the member.

@@ -153,7 +153,10 @@ impl<E: Exported> Instance<E> {
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let state = self.current.life.state();
+        let configures =
+            const { E::CAN.resizable.is_some() } && matches!(state, State::Configuration | State::Reconfiguration);
         if references.len() != values.len()
+            || configures
             || !T::write_inputs(&mut self.current.block, references, values, state == State::Continuous)
         {
             if const { E::CAN.resizable.is_some() } && state == State::Instantiated {

@@ -19,11 +19,12 @@ struct Adder {
     u: Vec<f64>,
     sums: Vec<f64>,
     gains: Vec<f64>,
+    offset: f64,
 }
 
 impl Default for Adder {
     fn default() -> Self {
-        Self { n: 3, k: 1, u: vec![0.0; 3], sums: vec![0.0; 3], gains: vec![1.0] }
+        Self { n: 3, k: 1, u: vec![0.0; 3], sums: vec![0.0; 3], gains: vec![1.0], offset: 0.0 }
     }
 }
 
@@ -38,6 +39,7 @@ impl Model for Adder {
         V::structural("k", "Number of gains", |m| &mut m.model.k).at_most(2.0),
         V::array_input("u", &ONE, "Inputs", 4, |m| &mut m.model.u).sized(&["n"]).on("tick"),
         V::array_output("sums", &ONE, "Sums", 4, |m| &mut m.model.sums).sized(&["n"]).on("tick"),
+        V::input("offset", &ONE, "Added to each", |m| &mut m.model.offset),
         V::array_parameter("gains", &ONE, "Gains", 2, |m| &mut m.model.gains).sized(&["k"]),
     ];
     fn initialize(&mut self) {
@@ -51,7 +53,7 @@ impl Model for Adder {
 
 impl Clocked for Adder {
     fn tick(&mut self, _: usize, _: Elapsed) -> Result<(), Fault> {
-        self.sums.iter_mut().zip(&self.u).for_each(|(sum, u)| *sum += self.gains[0] * u);
+        self.sums.iter_mut().zip(&self.u).for_each(|(sum, u)| *sum += self.gains[0] * u + self.offset);
         Ok(())
     }
 }
@@ -72,7 +74,8 @@ const N: u32 = 2;
 const K: u32 = 3;
 const U: u32 = 4;
 const SUMS: u32 = 8;
-const GAINS: u32 = 12;
+const OFFSET: u32 = 12;
+const GAINS: u32 = 13;
 
 const OK: c_int = 0;
 const ERROR: c_int = 3;
@@ -158,10 +161,14 @@ fn each_mode_takes_its_own_parameters() {
     let it = It::new();
     assert_eq!((it.enter(), it.set_size(K, 2), it.set_size(N, 1), it.exit()), (OK, OK, OK, OK));
     assert_eq!((it.get(GAINS, 2), it.get(U, 1).0), ((OK, vec![1.0, 2.0]), OK));
-    let refused: [&dyn Fn(&It) -> c_int; 5] =
-        [&|it| it.set_size(K, 2), &|it| it.set_size(N, 5), &|it| it.tick(0.0), &|it| it.set(U, &[0.0; 3]), &|it| {
-            it.enter()
-        }];
+    let refused: [&dyn Fn(&It) -> c_int; 6] = [
+        &|it| it.set_size(K, 2),
+        &|it| it.set_size(N, 5),
+        &|it| it.tick(0.0),
+        &|it| it.set(U, &[0.0; 3]),
+        &|it| it.set(OFFSET, &[1.0]),
+        &|it| it.enter(),
+    ];
     for (number, call) in refused.into_iter().enumerate() {
         let it = It::begun();
         assert_eq!((it.enter(), call(&it)), (OK, ERROR), "{number}");

@@ -22,6 +22,14 @@ pub struct Definition {
     pub terminal: Vec<[String; 2]>,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
+    /// How all FMUs run; otherwise each steps itself if it can.
+    pub interface: Option<Interface>,
+    /// Names of the FMUs that step themselves all the same, in a system for Model Exchange.
+    pub stepping: Vec<String>,
+    /// How states are integrated (Model Exchange); otherwise with the adaptive solver.
+    pub solver: Option<SolverName>,
+    /// Relative tolerance of the adaptive solver; otherwise 1e-6.
+    pub rtol: Option<f64>,
     /// Start time in s; otherwise from the FMUs.
     pub start: Option<f64>,
     /// Stop time in s; otherwise from the FMUs.
@@ -42,6 +50,25 @@ pub struct Definition {
     pub measure: Ordered<MeasureDefinition>,
     /// Which runs are recorded.
     pub trace: Option<Trace>,
+}
+
+/// Who integrates the states of an FMU.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+pub enum Interface {
+    /// The FMU itself.
+    CoSimulation,
+    /// The importer.
+    ModelExchange,
+}
+
+/// An integrator of Model Exchange.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+pub enum SolverName {
+    /// Dormand and Prince, of order 5, with adaptive steps.
+    Dopri,
+    /// Runge-Kutta of order 4, with the communication step as its step.
+    #[serde(rename = "RK4")]
+    Rk4,
 }
 
 /// How rows are made.

@@ -1,13 +1,16 @@
 //! A system with its measures, ready for many runs.
 
 use crate::Error;
-use crate::definition::{Definition, MeasureDefinition};
+use crate::definition::{Definition, Interface, MeasureDefinition, SolverName};
 use crate::error::invalid;
 use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
-use fmu_import::cosimulation::{self, Recording, Schedule, Settings, Target, Worker, item};
+use fmu_import::cosimulation::{
+    self, Integration, Method, Recording, Schedule, Settings, Solver, Target, Worker, item,
+};
 use fmu_import::ssp::load::{Connectors, Loaded};
+use fmu_import::{Fmu, Kind};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -88,7 +91,28 @@ impl Plan {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");
         }
-        let mut loaded = Loaded::open_files(&definition.fmus, folder, false)?;
+        if let Some(rtol) = definition.rtol.filter(|rtol| !(1e-14..=0.1).contains(rtol)) {
+            return invalid(format!("rtol = {rtol}: expected a number between 1e-14 and 0.1"));
+        }
+        let mut unknown = None;
+        let method = |fmus: &[(String, Fmu)]| {
+            let known = |name: &&String| fmus.iter().any(|(other, _)| other == *name);
+            unknown = definition.stepping.iter().find(|name| !known(name)).cloned();
+            method(definition, fmus)
+        };
+        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, method)?;
+        if let Some(name) = unknown {
+            return invalid(format!("stepping: {name} is the name of no FMU"));
+        }
+        let integrates = loaded.system.instances().iter().any(|i| i.kind() == Kind::ModelExchange);
+        if !integrates && (definition.solver.is_some() || definition.rtol.is_some()) {
+            return invalid(
+                "solver and rtol are for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'",
+            );
+        }
+        if integrates && definition.sequential {
+            return invalid("sequential: FMUs step one after another in Co-Simulation alone");
+        }
         for [from, to] in &definition.connect {
             loaded.system.connect(from, to)?;
         }
@@ -329,6 +353,23 @@ impl Outcomes {
             Err(error) => self.errors[row] = Some(error),
         }
     }
+}
+
+/// How the FMUs run: as the definition says, otherwise those step themselves that can.
+fn method(definition: &Definition, fmus: &[(String, Fmu)]) -> Method {
+    let steps = |fmu: &Fmu| fmu.description().co_simulation.is_some();
+    let stepping = match definition.interface {
+        Some(Interface::CoSimulation) => return Method::default(),
+        None if fmus.iter().all(|(_, fmu)| steps(fmu)) => return Method::default(),
+        None => fmus.iter().filter(|(_, fmu)| steps(fmu)).map(|(name, _)| name.clone()).collect(),
+        Some(Interface::ModelExchange) => definition.stepping.clone(),
+    };
+    let solver = match (definition.solver, definition.rtol) {
+        (Some(SolverName::Rk4), _) => Solver::Rk4,
+        (_, Some(rtol)) => Solver::Dopri { rtol },
+        (_, None) => Solver::default(),
+    };
+    Method::ModelExchange(Integration { solver, stepping, ..Integration::default() })
 }
 
 /// The place of a name in a list, added if it is new.

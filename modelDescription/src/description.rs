@@ -106,7 +106,11 @@ impl ModelDescription {
     pub fn referenced(&self, reference: u32) -> Option<&ModelVariable> {
         match self.version {
             FmiVersion::V2 => self.variables.get(usize::try_from(reference).ok()?.checked_sub(1)?),
-            FmiVersion::V3 => self.variables.iter().find(|v| v.value_reference == reference),
+            // They mostly ascend.
+            FmiVersion::V3 => match self.variables.binary_search_by_key(&reference, |v| v.value_reference) {
+                Ok(place) => self.variables.get(place),
+                Err(_) => self.variables.iter().find(|v| v.value_reference == reference),
+            },
         }
     }
 

@@ -5,13 +5,14 @@ mod common;
 
 use common::{AWKWARD, sample};
 use fmu_core::Description;
+use model_description::FmiVersion::V3;
 use model_description::{Area, CoordinateSystem, read_terminals, write_terminals};
 
 /// The whole text. `UPDATE_GOLDEN=1 cargo test -p model-description` accepts a change.
 #[test]
 fn golden_file() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/sample-terminals.xml");
-    let written = write_terminals(&sample()).unwrap();
+    let written = write_terminals(&sample(), V3).unwrap();
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         std::fs::write(path, &written).unwrap();
     }
@@ -20,7 +21,7 @@ fn golden_file() {
 
 #[test]
 fn what_is_written_reads_back() {
-    let read = read_terminals(write_terminals(&sample()).unwrap()).unwrap();
+    let read = read_terminals(write_terminals(&sample(), V3).unwrap()).unwrap();
     assert_eq!((read.fmi_version.as_str(), read.coordinates), ("3.0", CoordinateSystem::default()));
     assert_eq!(read.icon, Some(CoordinateSystem::default().area));
     assert_eq!(read.terminals.len(), 2);
@@ -39,10 +40,10 @@ fn what_is_written_reads_back() {
 #[test]
 fn a_model_without_has_no_file() {
     let bare = Description { terminals: Vec::new(), icon: None, ..sample() };
-    assert_eq!(write_terminals(&bare), None);
-    let only_icon = write_terminals(&Description { terminals: Vec::new(), ..sample() }).unwrap();
+    assert_eq!(write_terminals(&bare, V3), None);
+    let only_icon = write_terminals(&Description { terminals: Vec::new(), ..sample() }, V3).unwrap();
     assert!(only_icon.contains("<Icon ") && !only_icon.contains("<Terminals"), "an empty list is no valid XML");
-    let no_icon = write_terminals(&Description { icon: None, ..sample() }).unwrap();
+    let no_icon = write_terminals(&Description { icon: None, ..sample() }, V3).unwrap();
     assert!(!no_icon.contains("<Icon ") && no_icon.contains("<Terminals>"));
 }
 

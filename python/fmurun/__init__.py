@@ -2,15 +2,21 @@
 
 - `simulate_fmu`: one run, as FMPy does it: same arguments, same result, Co-Simulation or Model Exchange.
 - `Plan`: a system of FMUs for many runs on all processors, and on clusters by `fmurun.dask.sweep`.
+- `linearize`: matrices A, B, C and D of an FMU for Model Exchange.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
+- `plot`: a result, with matplotlib; notebooks show results by themselves.
+- `fmurun.drives`: the drives of this wheel, and start values for machines.
 - `fmurun.fmpy`: FMPy's classes for loops written by hand.
 
 Every error of an FMU is an `FmuError`.
 """
 
+from . import drives
 from ._batch import Batch
 from ._error import FmuError
+from ._linearize import Linearization, linearize
 from ._plan import Plan
+from ._plot import plot
 from ._simulate import simulate_fmu
 
-__all__ = ["Batch", "FmuError", "Plan", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "plot", "simulate_fmu"]

@@ -7,12 +7,14 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import drives as drives
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "Plan", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "plot", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
+_Interface = Literal["CoSimulation", "ModelExchange"]
 _Table = Any  # a dictionary of columns, a structured array, a DataFrame of pandas or polars, a Table of pyarrow
 
 class FmuError(Exception):
@@ -32,7 +34,7 @@ def simulate_fmu(
     relative_tolerance: float | str | None = None,
     output_interval: float | str | None = None,
     record_events: bool = True,
-    fmi_type: Literal["CoSimulation", "ModelExchange"] | None = None,
+    fmi_type: _Interface | None = None,
     start_values: Mapping[str, Any] = {},
     apply_default_start_values: bool = False,
     input: NDArray[Any] | None = None,
@@ -71,16 +73,55 @@ class Plan:
         measures: Mapping[str, str | tuple[str, str] | Mapping[str, Any]] | None = None,
         sequential: bool = False,
         embed: bool = False,
+        fmi_type: _Interface | Mapping[str, _Interface] | None = None,
+        solver: Literal["Dopri", "RK4"] | None = None,
+        relative_tolerance: float | None = None,
     ) -> None: ...
     @staticmethod
     def from_toml(path: _Path, *, output: Sequence[str] | None = None, embed: bool = False) -> Plan: ...
     def simulate(self, start_values: Mapping[str, _Value] | None = None) -> fmpy.SimulationResult: ...
-    def run_many(self, table: _Table, *, threads: int | None = None, first_run: int = 0) -> dict[str, NDArray[Any]]: ...
+    def run_many(
+        self,
+        table: _Table,
+        *,
+        threads: int | None = None,
+        first_run: int = 0,
+        progress: bool | Callable[[int, int], object] | None = None,
+    ) -> dict[str, NDArray[Any]]: ...
+    def gradient(
+        self, at: Mapping[str, float], *, step: float = 1e-4, threads: int | None = None
+    ) -> tuple[dict[str, float], dict[str, dict[str, float]]]: ...
     def rows(self, first: int, count: int) -> dict[str, NDArray[Any]]: ...
     def meta(self, columns: Iterable[str] | None = None) -> dict[str, NDArray[Any]]: ...
     @property
     def measures(self) -> list[str]: ...
     def __len__(self) -> int: ...
+
+def plot(result: NDArray[Any], columns: str | Sequence[str] | None = None, *, figure: Any = None) -> Any: ...
+
+class Linearization:
+    A: NDArray[np.float64]
+    B: NDArray[np.float64]
+    C: NDArray[np.float64]
+    D: NDArray[np.float64]
+    states: list[str]
+    inputs: list[str]
+    outputs: list[str]
+    x: NDArray[np.float64]
+    u: NDArray[np.float64]
+    y: NDArray[np.float64]
+    dx: NDArray[np.float64]
+    method: str
+
+def linearize(
+    fmu: _Path,
+    point: Mapping[str, _Value] | None = None,
+    *,
+    time: float = 0.0,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+    method: Literal["derivatives", "differences"] | None = None,
+) -> Linearization: ...
 
 class Batch:
     n: int

@@ -24,8 +24,17 @@ class InterfaceType:
     canSerializeFMUstate: bool = False
 
 
+@dataclass(eq=False)
 class ModelExchange(InterfaceType):
-    """Model Exchange."""
+    """The Model Exchange interface and its capabilities."""
+
+    providesDirectionalDerivatives: bool = False
+    providesAdjointDerivatives: bool = False
+
+    @property
+    def providesDirectionalDerivative(self):
+        """The capability by its name of FMI 2.0."""
+        return self.providesDirectionalDerivatives
 
 
 class ScheduledExecution(InterfaceType):
@@ -189,6 +198,16 @@ def _co_simulation(identifier, attributes):
     return CoSimulation(identifier, fixedInternalStepSize=None if step is None else float(step), **flags)
 
 
+def _model_exchange(identifier, attributes):
+    """Capabilities of FMI 2.0 and FMI 3.0 under FMPy's names."""
+    attributes = {name.replace("FMUState", "FMUstate"): text.strip() in ("true", "1") for name, text in attributes}
+    attributes["providesDirectionalDerivatives"] = (
+        attributes.get("providesDirectionalDerivatives") or attributes.get("providesDirectionalDerivative") or False
+    )
+    known = ModelExchange.__dataclass_fields__
+    return ModelExchange(identifier, **{name: value for name, value in attributes.items() if name in known and name != "modelIdentifier"})
+
+
 def _build(d):
     """Objects from the dictionary of `Fmu.describe`."""
     types = {t["name"]: SimpleType(**t | {"items": [Item(*i) for i in t["items"]]}) for t in d["types"]}
@@ -222,7 +241,7 @@ def _build(d):
         variableNamingConvention="structured" if d["structured"] else "flat",
         defaultExperiment=DefaultExperiment(**d["defaultExperiment"]),
         coSimulation=d["coSimulation"] and _co_simulation(*d["coSimulation"]),
-        modelExchange=d["modelExchange"] and ModelExchange(d["modelExchange"]),
+        modelExchange=d["modelExchange"] and _model_exchange(*d["modelExchange"]),
         scheduledExecution=d["scheduledExecution"] and ScheduledExecution(d["scheduledExecution"]),
         unitDefinitions=units,
         typeDefinitions=list(types.values()),

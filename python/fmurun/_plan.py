@@ -7,6 +7,7 @@ import shutil
 import tempfile
 import threading
 from collections import OrderedDict
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -39,6 +40,10 @@ class Plan:
             (text, function): functions are final, min, max, max_abs, mean, rms, integral, at, rise, settling; see docs/sweeps.md
         sequential: step the FMUs one after another, each with the new outputs of those before it
         embed: pickle the files, too
+        fmi_type: "CoSimulation", "ModelExchange", or a dictionary with the one of each FMU; by default FMUs step themselves if they
+            can. FMUs for Model Exchange are integrated as one system: events of any of them are met at their time, and algebraic
+            loops are solved. Those for Co-Simulation among them step from one communication point to the next
+        solver, relative_tolerance: for Model Exchange: "Dopri" (the default, with a relative tolerance of 1e-6) or "RK4"
 
     >>> plan = Plan(PLANT, start_values={"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}, stop_time=0.01, step_size=1e-4,
     ...             output=["i_a"], measures={"last": "i_a", "peak": ("i_a", "max_abs")})
@@ -52,7 +57,8 @@ class Plan:
     """
 
     def __init__(self, fmus, *, connections="by_name", terminals=(), start_values=None, input=None, start_time=None,
-                 stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False):  # fmt: skip
+                 stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False,
+                 fmi_type=None, solver=None, relative_tolerance=None):  # fmt: skip
         files, self._prefix = _files(fmus)
         name = self._name if self._prefix else lambda name: name
         if isinstance(connections, str) and connections != "by_name":
@@ -64,6 +70,7 @@ class Plan:
             "connect": [] if connections == "by_name" else [list(pair) for pair in connections],
             "terminal": [list(pair) for pair in terminals],
             "sequential": bool(sequential),
+            **_integration(fmi_type, solver, relative_tolerance, [key for key, _ in files], _is_ssp(files)),
             "start": _number("start_time", start_time),
             "stop": _number("stop_time", stop_time),
             "step": _number("step_size", step_size),
@@ -145,19 +152,23 @@ class Plan:
             values.append(str(_scalar(name, value)) if not isinstance(value, bool) else str(value).lower())
         output = None if self._output is None else [self._name(name) for name in self._output]
         time, columns = self._core.simulate(names, values, output)
-        result = np.empty(len(time), [("time", float)] + [(name.removeprefix(self._prefix), float) for name, _ in columns])
+        columns = [(name.removeprefix(self._prefix), *more) for name, *more in columns]
+        result = np.empty(len(time), [("time", float)] + [(name, float) for name, *_ in columns])
         result["time"] = time
-        for name, values in columns:
-            result[name.removeprefix(self._prefix)] = values
-        return result.view(SimulationResult)
+        for name, values, _ in columns:
+            result[name] = values
+        result = result.view(SimulationResult)
+        result.units = {name: unit for name, _, unit in columns}
+        return result
 
-    def run_many(self, table, *, threads=None, first_run=0):
+    def run_many(self, table, *, threads=None, first_run=0, progress=None):
         """Run every row of a table on `threads` threads (all processors by default) with Python's lock released.
 
         Args:
             table: the values of variables by their names: a dictionary of columns, a structured array, a DataFrame of pandas or
                 polars, a Table or RecordBatch of pyarrow; a column `run` numbers the rows
             first_run: number of the first row, if there is no column `run`
+            progress: True for a bar of tqdm, in a terminal or a notebook; or a function of (rows done, rows)
 
         Returns:
             a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
@@ -176,12 +187,46 @@ class Plan:
         if len(set(lengths.values())) > 1:
             raise ValueError(f"the columns are not of one length: {', '.join(f'{k} {n}' for k, n in lengths.items())}")
         n = len(values[0])
+        if n == 0:
+            raise ValueError("the table has no row")
         runs = first_run + np.arange(n) if runs is None else np.asarray(runs, dtype=np.int64)
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
-        measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0)
+        with _bar(progress, n) as told:
+            measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, told)
         results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
         return dict(zip(["run", *columns, *self.measures, "end", "error"], [runs, *results, end, np.array(errors, dtype=object)]))
+
+    def gradient(self, at, *, step=1e-4, threads=None):
+        """The measures and their derivatives with respect to variables, by central differences of runs, all in parallel.
+
+        Args:
+            at: name -> value: the point
+            step: of the differences, relative to a value, absolute for 0; larger steps suit coarse tolerances of a solver
+
+        Returns:
+            measure -> value, and measure -> name -> derivative
+
+        >>> plan = Plan(PLANT, stop_time=0.01, step_size=1e-4, start_values={"u_b": -5.0, "u_c": -5.0}, measures={"i": "i_a"})
+        >>> value, gradient = plan.gradient({"u_a": 10.0})
+        >>> bool(abs(gradient["i"]["u_a"] * 10.0 - value["i"]) < 0.5 * value["i"])
+        True
+        """
+        if not at or not self.measures:
+            raise ValueError("gradient needs at least one variable and one measure")
+        if not (np.isfinite(step) and step > 0.0):
+            raise ValueError(f"step must be positive and finite, not {step}")
+        point = np.array([_number(name, value) for name, value in at.items()])
+        h = step * np.where(point == 0.0, 1.0, np.abs(point))
+        rows = np.concatenate([[point], point + np.diag(h), point - np.diag(h)])
+        runs = self.run_many(dict(zip(at, rows.T)), threads=threads)
+        failed = [error for error in runs["error"] if error]
+        if failed:
+            raise FmuError(None, None, None, f"gradient: {failed[0]}")
+        n = len(point)
+        values = {name: float(runs[name][0]) for name in self.measures}
+        slopes = {name: (runs[name][1 : n + 1] - runs[name][n + 1 :]) / (2.0 * h) for name in self.measures}
+        return values, {name: dict(zip(at, slope.tolist())) for name, slope in slopes.items()}
 
     def _named(self, columns):
         """Columns of varied variables, enumerations with their names."""
@@ -211,12 +256,44 @@ class Plan:
         return {"run": np.empty(0, dtype=np.int64), **varied, **measures, **last}
 
 
+@contextmanager
+def _bar(progress, total):
+    """A function that gets the number of rows done, or None."""
+    if progress is None or progress is False:
+        yield None
+    elif callable(progress):
+        yield lambda done: progress(done, total)
+    else:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            raise ImportError("progress=True needs tqdm: pip install tqdm; or give a function of (done, rows)") from None
+        with tqdm(total=total, unit="run") as bar:
+            yield lambda done: bar.update(done - bar.n)
+
+
 def _named(items, column):
     """Numbers with the names of an enumeration, if `items` has any: "" for NaN, the number as text where there is no name."""
     if not items:
         return column
     names = dict(items)
     return np.array([names.get(x, "" if x != x else f"{x:.17g}") for x in column.tolist()], dtype=object)
+
+
+def _integration(fmi_type, solver, tolerance, names, ssp):
+    """How the FMUs run, as a definition has it."""
+    one = fmi_type if isinstance(fmi_type, dict) else dict.fromkeys(names, fmi_type)
+    for name, kind in one.items():
+        if name not in names and not ssp:
+            raise ValueError(f"fmi_type: {name} is the name of no FMU; expected one of {', '.join(names)}")
+        if kind not in (None, "CoSimulation", "ModelExchange"):
+            raise ValueError(f"fmi_type of {name} must be CoSimulation or ModelExchange, not {kind!r}")
+    if solver not in (None, "Dopri", "RK4"):
+        raise ValueError(f"solver = {solver!r}: there is no such solver; expected Dopri or RK4")
+    exchange = "ModelExchange" in one.values()
+    stepping = [name for name, kind in one.items() if kind == "CoSimulation"] if exchange else []
+    interface = "ModelExchange" if exchange else next(iter(one.values()), None)
+    return {"interface": interface, "stepping": stepping, "solver": solver, "rtol": _number("relative_tolerance", tolerance)}
 
 
 def _files(fmus):

@@ -5,7 +5,7 @@ from math import prod
 
 import numpy as np
 
-from . import _core
+from . import _core, _plot
 from ._instance import _described, _instance, _interface, _kind, _Model, _open
 
 # Columns are grouped by type, in this order.
@@ -21,10 +21,21 @@ _INTEGERS |= {f"UInt{n}": (0, 2**n - 1) for n in (8, 16, 32, 64)} | {"Integer": 
 
 
 class SimulationResult(np.ndarray):
-    """A structured array with the column `time` first, and the attribute `modelDescription`."""
+    """A structured array with the column `time` first, and the attribute `modelDescription`.
+
+    A notebook shows it as a figure with zoom; `fmurun.plot` draws it with matplotlib.
+    """
 
     def __array_finalize__(self, made_from):
         self.modelDescription = getattr(made_from, "modelDescription", None)
+        self.units = getattr(made_from, "units", None)
+
+    def _repr_html_(self):
+        return None if self.dtype.names is None or self.ndim != 1 else _plot.frame(self)
+
+    def to_pandas(self):
+        """A DataFrame of pandas with `time` (s) as its index; enumerations have their names."""
+        return _plot.pandas_frame(self)
 
 
 class Recorder:

@@ -77,13 +77,13 @@ pub(crate) fn dictionary<'py>(py: Python<'py>, d: &ModelDescription) -> PyResult
             })
             .collect()
     };
-    let interface = d.co_simulation.as_ref().map(|c| (c.model_identifier.as_str(), c.attributes.clone()));
+    let whole = |i: &Option<Interface>| i.as_ref().map(|c| (c.model_identifier.clone(), c.attributes.clone()));
     let identifier = |interface: &Option<Interface>| interface.as_ref().map(|i| i.model_identifier.clone());
     Ok(dict!(py, "fmiVersion": &d.fmi_version, "modelName": &d.model_name, "instantiationToken": &d.token,
         "description": &d.description, "author": &d.author, "version": &d.model_version, "copyright": &d.copyright,
         "license": &d.license, "generationTool": &d.generation_tool,
         "generationDateAndTime": &d.generation_date_and_time, "structured": d.structured_names,
-        "coSimulation": interface, "modelExchange": identifier(&d.model_exchange),
+        "coSimulation": whole(&d.co_simulation), "modelExchange": whole(&d.model_exchange),
         "scheduledExecution": identifier(&d.scheduled_execution),
         "defaultExperiment": experiment, "units": units, "types": types, "variables": variables,
         "logCategories": d.log_categories.iter().map(|c| (&c.name, &c.description)).collect::<Vec<_>>(),

@@ -13,10 +13,12 @@ mod exchange;
 mod input;
 mod instance;
 mod lane;
+mod page;
 mod plan;
 mod record;
 mod simulation;
 mod stepping;
+mod tune;
 
 use pyo3::prelude::*;
 
@@ -32,7 +34,11 @@ mod _core {
     #[pymodule_export]
     use super::instance::{FmuState, Instance};
     #[pymodule_export]
+    use super::page::run_page;
+    #[pymodule_export]
     use super::plan::{Plan, paths, read_definition};
     #[pymodule_export]
     use super::simulation::Simulation;
+    #[pymodule_export]
+    use super::tune::tune;
 }

@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -75,7 +75,7 @@ impl Plan {
         names: Vec<String>,
         values: Vec<String>,
         outputs: Option<Vec<String>>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyArray1<f64>>)>)> {
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyArray1<f64>>, (String, f64, f64))>)> {
         gate(|| {
             let run = || {
                 let set = self.plan.bind(names.iter().map(String::as_str))?;
@@ -84,7 +84,13 @@ impl Plan {
                 self.plan.simulate(&set, outputs.as_deref())
             };
             let recording = py.detach(run).map_err(failed)?;
-            let columns = recording.columns.into_iter().map(|c| (c.name, c.values.into_pyarray(py)));
+            let columns = recording.columns.into_iter().map(|c| {
+                let shown = match &c.display {
+                    Some(display) => (c.shown_unit().to_owned(), display.factor, display.offset),
+                    None => (c.unit, 1.0, 0.0),
+                };
+                (c.name, c.values.into_pyarray(py), shown)
+            });
             Ok((recording.time.into_pyarray(py), columns.collect()))
         })
     }
@@ -97,13 +103,15 @@ impl Plan {
         names: Vec<String>,
         columns: Vec<PyReadonlyArray1<'py, f64>>,
         threads: usize,
+        progress: Option<Py<PyAny>>,
     ) -> PyResult<(Vec<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>, Vec<String>)> {
         gate(|| {
             // Copies: another thread may write the arrays once Python's lock is released.
             let columns: Vec<Vec<f64>> = columns.iter().map(|column| column.as_array().to_vec()).collect();
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
-            let Outcomes { measures, end, errors } = py.detach(|| self.run(&variables, &columns, threads))?;
+            let Outcomes { measures, end, errors } =
+                py.detach(|| self.run(&variables, &columns, threads, progress.as_ref()))?;
             let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
             Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
@@ -174,10 +182,24 @@ impl Plan {
     }
 
     /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
-    fn run(&self, variables: &[Variable], columns: &[Vec<f64>], threads: usize) -> PyResult<Outcomes> {
+    fn run(
+        &self,
+        variables: &[Variable],
+        columns: &[Vec<f64>],
+        threads: usize,
+        progress: Option<&Py<PyAny>>,
+    ) -> PyResult<Outcomes> {
         let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
         let stop = AtomicBool::new(false);
-        let go_on = |_| if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
+        let done_rows = AtomicU64::new(0);
+        let tell = |py: Python<'_>| match progress {
+            Some(progress) => progress.call1(py, (done_rows.load(Ordering::Relaxed),)).map(drop),
+            None => Ok(()),
+        };
+        let go_on = |done| {
+            done_rows.fetch_max(done, Ordering::Relaxed);
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        };
         let (done, result) = channel();
         std::thread::scope(|scope| {
             let (plan, columns, go_on) = (&self.plan, &columns, &go_on);
@@ -195,13 +217,13 @@ impl Plan {
             let mut signal = Ok(());
             loop {
                 match result.recv_timeout(SIGNALS) {
-                    Ok(outcomes) => return signal.and(outcomes.map_err(failed)),
+                    Ok(outcomes) => {
+                        let outcomes = signal.and(outcomes.map_err(failed))?;
+                        Python::attach(tell)?;
+                        return Ok(outcomes);
+                    }
                     Err(RecvTimeoutError::Timeout) if signal.is_ok() => {
-                        #[expect(
-                            clippy::redundant_closure_for_method_calls,
-                            reason = "the method has a lifetime, attach has all"
-                        )]
-                        let heard = Python::attach(|py| py.check_signals());
+                        let heard = Python::attach(|py| py.check_signals().and_then(|()| tell(py)));
                         signal = heard;
                         stop.store(signal.is_err(), Ordering::Relaxed);
                     }

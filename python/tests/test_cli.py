@@ -96,5 +96,8 @@ def test_an_ssp_file(standard, tmp_path):
     ours = plan.simulate()
     assert list(ours.dtype.names) == header
     assert [[float(x) for x in line] for line in lines] == [list(row) for row in ours.tolist()]
+    arguments = {"input": inputs, "stop_time": 0.05, "step_size": 1e-4, "output": header[1:]}
+    exchanged = Plan(ssp, fmi_type="ModelExchange", relative_tolerance=1e-9, **arguments).simulate()
+    assert all(np.allclose(exchanged[name], ours[name], rtol=1e-4, atol=1e-3) for name in header if "speed" in name)
     again = pickle.loads(pickle.dumps(Plan(ssp, input=inputs, stop_time=0.05, step_size=1e-4, embed=True)))
     assert again.simulate().tobytes() == ours.tobytes()

@@ -159,7 +159,36 @@ def test_embedded_archives(standard, tmp_path):
     assert float(said) == expected
 
 
+def test_the_pair_in_model_exchange_is_the_drive(standard):
+    """Coupled, with each sample at its instant, whatever the communication step: the FMU that has both inside."""
+    more = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-11, "step_size": 1e-3, "stop_time": 0.1}
+    apart = pair(standard, output=["p.speed", "p.i_a", "c.theta_est"], **more).simulate()
+    whole = Plan(standard / "PmsmDrive.fmu", input={"speed_ref": SPEED}, output=["speed", "i_a", "theta_est"], **more).simulate()
+    worst = max(np.max(np.abs(apart[a] - whole[b])) for a, b in zip(apart.dtype.names, whole.dtype.names))
+    print(f"ME   {standard.name} pair in a Plan and PmsmDrive: within {worst:.1e}")
+    assert worst <= 1e-9
+    assert whole["speed"].max() > 10.0
+
+
+def test_interfaces_may_be_mixed(standard, resistances):
+    """A controller that is integrated, with a plant that steps itself: the bits of Co-Simulation."""
+    mixed, plain = pair(standard, fmi_type={"c": "ModelExchange", "p": "CoSimulation"}), pair(standard)
+    same(mixed.run_many({"p.motor.R_s": resistances[:5]}), plain.run_many({"p.motor.R_s": resistances[:5]}))
+    other = pair(standard, fmi_type={"p": "ModelExchange", "c": "CoSimulation"}, relative_tolerance=1e-11)
+    results = [plan.run_many({"p.motor.R_s": resistances[:5]})["peak"] for plan in (other, plain)]
+    assert np.allclose(*results, rtol=1e-7)
+    again = pickle.loads(pickle.dumps(other))
+    same(again.run_many({"p.motor.R_s": resistances[:5]}), other.run_many({"p.motor.R_s": resistances[:5]}))
+
+
 WRONG = {
+    "an interface": (lambda p: pair_of(p, fmi_type="ME"), ValueError, "must be CoSimulation or ModelExchange, not 'ME'"),
+    "an FMU of an interface": (lambda p: pair_of(p, fmi_type={"q": "ModelExchange"}), ValueError, "q is the name of no FMU"),
+    "a solver": (lambda p: pair_of(p, solver="Rk45"), ValueError, "solver = 'Rk45': there is no such solver"),
+    "a solver of nobody": (lambda p: pair_of(p, solver="RK4"), FmuError, "are for Model Exchange, and no FMU runs so"),
+    "a tolerance": (lambda p: pair_of(p, fmi_type="ModelExchange", relative_tolerance=1.0), FmuError, "between 1e-14 and 0.1"),
+    "NaN in a column": (lambda p: raised(p.run_many({"p.motor.R_s": [float("nan")]})), FmuError, "motor.R_s"),
+    "no row": (lambda p: p.run_many({"p.motor.R_s": []}), ValueError, "the table has no row"),
     "a variable": (lambda p: p.run_many({"p.motor.R": [3.0]}), FmuError, "has no variable motor.R"),
     "an instance": (lambda p: p.run_many({"q.motor.R_s": [3.0]}), FmuError, "the instances are p, c"),
     "a fed input": (lambda p: p.run_many({"c.speed_ref": [3.0]}), FmuError, "is fed by"),
@@ -183,6 +212,10 @@ WRONG = {
     "no file": (lambda p: Plan("missing.fmu"), FmuError, r"missing\.fmu"),
     "no fmus": (lambda p: Plan({}), ValueError, "fmus is empty"),
 }
+
+
+def raised(runs):
+    raise FmuError(None, None, None, runs["error"][0])
 
 
 def pair_of(plan, **more):

@@ -1,7 +1,7 @@
 //! `fmu build`: compiles models and packs them.
 
 use super::page::{self, Page};
-use super::tune;
+use super::{preset, tune};
 use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
@@ -20,6 +20,7 @@ use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 /// Compiles FMUs and packs them for both standards.
 ///
@@ -45,8 +46,10 @@ use std::path::{Path, PathBuf};
 /// prints what they need. CARGO_TARGET_TRIPLE_LINKER (spelled as Cargo does) selects another linker.
 ///
 /// --release-dir DIR writes all files of a release: the archives, with a binary for each of Linux, Windows and macOS that can be
-/// built here; pages/NAME.html (fmu page); SHA256SUMS; sbom.cdx.json with the crates in them and their licenses (CycloneDX); and, in the workspace that has
-/// them, the programs fmu, cargo-fmu and fmu-check for this computer, which need no other library if cargo-zigbuild builds them.
+/// built here; pages/NAME.html (fmu page); presets/MACHINE.PmsmDrive.fmu for each file of motors/; wheels/, the Python package fmurun
+/// with these archives, if python3 (or PYTHON) has maturin and ziglang; SHA256SUMS; sbom.cdx.json with the crates in them and their
+/// licenses (CycloneDX); and, in the workspace that has them, the programs fmu, cargo-fmu and fmu-check for this computer, which need
+/// no other library if cargo-zigbuild builds them.
 ///   fmu build --release-dir release
 ///
 /// Archives of FMI 2.0 hold one universal library for both processors of macOS. Many importers look for Linux libraries of FMI 2.0
@@ -243,9 +246,58 @@ fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
         }
         Err(why) => message::note(&format!("left out: pages that run the FMUs: {why:#}")),
     }
+    written.extend(presets(&workspace, folder)?);
+    match wheels(&workspace, folder) {
+        Ok(files) => written.extend(files),
+        Err(why) => message::note(&format!("left out: wheels of fmurun: {why:#}")),
+    }
     packages.dedup();
     let others = release::finish(&workspace, &packages, folder, &written, moment)?;
     Ok(written.into_iter().chain(others).collect())
+}
+
+/// `PmsmDrive` with the start values of each machine of the workspace: presets/MACHINE.PmsmDrive.fmu.
+fn presets(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
+    let (motors, drive) = (workspace.root.join("motors"), folder.join("fmi3/PmsmDrive.fmu"));
+    if !motors.is_dir() || !drive.is_file() {
+        return Ok(Vec::new());
+    }
+    let entries = fs::read_dir(&motors).with_context(|| motors.display().to_string())?;
+    let mut files: Vec<PathBuf> = entries.filter_map(|entry| Some(entry.ok()?.path())).collect();
+    files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    let mut written = Vec::new();
+    for file in files {
+        let tuned = drive_study::tune::tune(&file)?;
+        let path = folder.join("presets").join(format!("{}.PmsmDrive.fmu", tuned.name));
+        fs::create_dir_all(folder.join("presets"))?;
+        preset::of_machine(&drive, &tuned, &path)?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+/// The wheels of the Python package of the workspace, with these archives; its script names what it cannot build.
+fn wheels(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
+    let script = workspace.root.join("python/build/wheels.py");
+    if !script.is_file() {
+        return Ok(Vec::new());
+    }
+    let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+    let has = Command::new(&python).args(["-c", "import maturin, ziglang"]).output();
+    if !has.is_ok_and(|output| output.status.success()) {
+        bail!(
+            "{python} has no maturin or ziglang: pip install maturin==1.16.0 ziglang==0.17.1 (PYTHON names another Python)"
+        );
+    }
+    let out = folder.join("wheels");
+    let mut command = Command::new(&python);
+    command.arg(&script).arg("--archives").arg(folder).arg("--out").arg(&out).stderr(Stdio::inherit());
+    let output = command.env("CARGO_TARGET_DIR", &workspace.target).output().context(python)?;
+    if !output.status.success() {
+        bail!("{}: {}", script.display(), output.status);
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).lines().map(PathBuf::from).collect())
 }
 
 /// The targets of a release that can be built here; notes say what is missing for the others.

@@ -34,6 +34,7 @@ use std::path::{Path, PathBuf};
 ///     --input SensorlessController.speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Tune {
     /// Motor file
     #[arg(value_name = "MOTOR.toml", required_unless_present = "example")]
@@ -50,6 +51,12 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
+    /// Print the values as JSON, a dictionary for each FMU, and nothing else; enumerations are integers, as FMPy takes them
+    #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
+    pub json: bool,
+    /// Estimator to tune for, instead of that of the motor file
+    #[arg(long, value_name = "NAME", requires = "json")]
+    pub estimator: Option<String>,
     /// Print the trial: starts from 24 angles at each speed, loads held, least speed, greatest angle error
     #[arg(long)]
     pub check: bool,
@@ -70,6 +77,10 @@ pub fn run(args: &Tune) -> Result<()> {
         print!("{EXAMPLE}");
         return Ok(());
     };
+    if args.json {
+        println!("{:#}", tune::values(motor, args.estimator.as_deref())?);
+        return Ok(());
+    }
     let motor = MotorFile::read(motor)?;
     let tuned = rules::tune(&motor)?;
     let out = args.out.clone().map_or_else(|| output_folder("tune"), Ok)?;

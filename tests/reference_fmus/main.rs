@@ -1,8 +1,10 @@
-//! The Reference-FMUs in Rust, `examples/reference-fmus/`: packed, in our importer and in FMPy, with the bits of the originals.
+//! The Reference-FMUs in Rust, `examples/reference-fmus/`: packed, in our importer and in FMPy, with the bits of the originals; and
+//! `examples/current-map`.
 #![allow(missing_docs, clippy::float_cmp)]
 
 mod bouncing_ball;
 mod clocks;
+mod current_map;
 mod dahlquist;
 mod feedthrough;
 #[path = "../common/python.rs"]
@@ -25,7 +27,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The archives of a package of `examples/reference-fmus/`, of FMI 2.0 and of FMI 3.0: a library as Cargo's tests are built.
+/// The archives of a package of `examples/`, of FMI 2.0 and of FMI 3.0: a library as Cargo's tests are built.
 fn packed(package: &str) -> Vec<PathBuf> {
     type Once = Arc<OnceLock<Vec<PathBuf>>>;
     static ALL: Mutex<BTreeMap<String, Once>> = Mutex::new(BTreeMap::new());

@@ -24,6 +24,7 @@ pub mod remedy;
 pub mod rules;
 pub mod saturation;
 pub mod trial;
+mod values;
 pub mod voltage;
 
 use anyhow::{Result, anyhow};
@@ -33,6 +34,8 @@ use fmu_core::{Description, Model};
 use motor::MotorFile;
 use rules::{Setting, Tuned, Value};
 use std::path::Path;
+
+pub use values::values;
 
 /// Reads a machine's file and derives the values of both FMUs.
 ///

@@ -1,5 +1,6 @@
 //! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7): refused calls and start values.
 
+use super::held::{booleans_read, finite, inputs_keep, parameters_keep, several};
 use super::starts::stand;
 use super::values::{
     binaries, booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, too_many_bytes,
@@ -20,7 +21,7 @@ const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "V07", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Probe(start_values),
         requirement: "A start value in the description equals the value in the binary.",
-        tried: "Reads every variable with a start value from a new instance and compares.", fix: "Generate both from one table." },
+        tried: "Reads every variable with a start value in Initialization Mode, and in FMI 3.0 from a new instance (should), and compares.", fix: "Generate both from one table." },
     Check { id: "V06b", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges),
         requirement: "Integer and enumeration outputs always lie between min and max.",
         tried: "Reads integer outputs with limits over 50 steps.", fix: "Saturate the output, or correct min and max." },
@@ -73,6 +74,22 @@ pub(super) const CHECKS: &[Check] = &[
             after Reset.",
         tried: "Sets each after the instantiation, reads it in Initialization Mode and at its end, and after Reset.",
         fix: "Leave the variable alone when the initialization computes others, and restore all start values in Reset." },
+    Check { id: "G10", clause: GET, levels: Levels::MUST, run: Run::Probe(several),
+        requirement: "Several variables in one call have the values that each of them has alone.",
+        tried: "Reads up to 12 variables of a type one by one, in one call, and in reverse order.", fix: "Return the values in the order of the references." },
+    Check { id: "G11", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.3", levels: Levels::SHOULD, run: Run::Probe(booleans_read),
+        requirement: "A Boolean that is read is 0 or 1.",
+        tried: "Reads all Booleans over 20 steps.", fix: "Return the result of a comparison, not a number." },
+    Check { id: "G12", clause: "2.0.5, 4.2.1; 3.0.2, 4.2.1", levels: Levels::SHOULD, run: Run::Probe(inputs_keep),
+        requirement: "An input keeps the value that was set, within its min and max, until it is set again.",
+        tried: "Sets each input near its start value and far from it, makes 3 steps, and reads it after each.",
+        fix: "Keep inputs between steps; saturate a copy, and state min and max." },
+    Check { id: "G13", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::Probe(parameters_keep),
+        requirement: "A parameter changes only if the importer sets it.",
+        tried: "Reads all parameters before and after 100 steps.", fix: "Compute with a copy, or make it a local variable." },
+    Check { id: "G14", clause: "hardening", levels: Levels::HARD, run: Run::Probe(finite),
+        requirement: "Outputs are finite numbers, or a message says why not.",
+        tried: "Reads floating-point outputs over 20 steps.", fix: "Return Error or log a message where a result is not a number." },
     Check { id: "G07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number),
         requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.",
         tried: "Sets NaN, infinities and huge numbers at each input and makes 3 steps.", fix: "Check inputs for finiteness, and bound every loop." },
@@ -101,20 +118,33 @@ fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
 }
 
 fn start_values(session: &Session) -> Result<(), NotDetermined> {
-    let v2 = session.is_v2();
-    let instance = if v2 { session.initializing()? } else { session.fresh()? };
+    compare_starts(session, &session.initializing()?, true)?;
+    // FMI 3.0.2, 2.3.2: start values can be read in Instantiated, by its table; the calls that it allows do not name it.
+    if session.is_v2() { Ok(()) } else { compare_starts(session, &session.fresh()?, false) }
+}
+
+/// Compares start values with those of an instance: in Initialization Mode, those that nothing changes there.
+fn compare_starts(session: &Session, instance: &Instance<'_>, initializing: bool) -> Result<(), NotDetermined> {
+    let tell = |text: String| if initializing { session.violated(text) } else { session.lesser(Level::Should, text) };
     let mut compared = 0;
     for v in session.numeric().filter(|v| v.start.is_some() && v.clocks.is_empty()) {
-        let fixed = !v2 || v.causality == Causality::Input || v.initial_or_default() == Some(Initial::Exact);
+        let fixed = !initializing || v.causality == Causality::Input || v.initial_or_default() == Some(Initial::Exact);
         let Some(expected) = expected(v, session.elements(v)).filter(|_| fixed) else { continue };
         let (status, found) = instance.get(v)?;
         compared += 1;
-        session.require(status.is_ok(), || format!("line {}: Get({}) returned {status}", v.line, v.name));
-        if status.is_ok() && !same(v, session.description.version, &expected, &found) {
+        if !status.is_ok() {
+            // FMI 2.0 names the variables that can be read here: L07 looks at them.
+            if !(session.is_v2() && initializing) {
+                tell(format!("line {}: Get({}) returned {status}", v.line, v.name));
+            }
+            return Ok(());
+        }
+        if !same(v, session.description.version, &expected, &found) {
             let (start, found_text) =
                 (v.start.as_deref().unwrap_or_default(), show(v, session.description.version, &found));
             let text = format!("line {}: {}: start={start:?}, but the binary has {found_text}", v.line, v.name);
-            session.value_deviates(v, &expected, found, &text);
+            let level = (!initializing).then_some(Level::Should);
+            session.value_deviates_at(level, v, &expected, found, &text);
         }
     }
     let fits = |v: &&ModelVariable| v.base == BaseType::String && !v.is_array() && v.start.is_some();
@@ -122,10 +152,12 @@ fn start_values(session: &Session) -> Result<(), NotDetermined> {
         session.record_call(&format!("GetString({})", v.name));
         let Some((status, found)) = session.raw.get_strings(instance.handle, &[v.value_reference], 1) else { continue };
         compared += 1;
-        let good = status.is_ok() && found.first().is_some_and(|f| f.as_deref() == v.start.as_deref());
-        session.require(good, || {
-            format!("line {}: {}: start={:?}, but the binary returned {status}, {found:?}", v.line, v.name, v.start)
-        });
+        if !status.is_ok() || found.first().is_none_or(|f| f.as_deref() != v.start.as_deref()) {
+            tell(format!(
+                "line {}: {}: start={:?}, but the binary returned {status}, {found:?}",
+                v.line, v.name, v.start
+            ));
+        }
     }
     session.note(format!("compared {compared} start values"));
     Ok(())
@@ -145,7 +177,10 @@ fn ranges(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.stepping()?;
     for k in 0..50 {
         for v in &limited {
-            let (_, found) = instance.get(v)?;
+            let (got, found) = instance.get(v)?;
+            if !got.is_ok() {
+                return Err(NotDetermined(format!("Get({}) returned {got}", v.name)));
+            }
             let text = show(v, session.description.version, &found);
             let outside = |x: f64| v.min.is_some_and(|min| x < min) || v.max.is_some_and(|max| x > max);
             if text.split(' ').filter_map(|t| t.parse().ok()).any(outside) {
@@ -327,7 +362,12 @@ fn not_settable(session: &Session) -> Result<(), NotDetermined> {
         session.case(|| {
             let instance = session.stepping()?;
             instance.steps(2, session.h())?;
-            let (before, Some(values)) = (instance.get(v)?.1, session.different_value(v, 7.0)) else { return Ok(()) };
+            let ((got, before), Some(values)) = (instance.get(v)?, session.different_value(v, 7.0)) else {
+                return Ok(());
+            };
+            if !got.is_ok() {
+                return Err(NotDetermined(format!("Get({}) returned {got}", v.name)));
+            }
             let status = instance.set(v, &values)?;
             session.require(status == Status::ERROR, || {
                 format!("Set({}), {} {}, in step mode returned {status}", v.name, v.variability, v.causality)
@@ -349,7 +389,10 @@ fn all_or_nothing(session: &Session) -> Result<(), NotDetermined> {
     };
     let Some(values) = session.different_value(v, 3.0) else { return Ok(()) };
     let instance = session.stepping()?;
-    let before = instance.get(v)?.1;
+    let (got, before) = instance.get(v)?;
+    if !got.is_ok() {
+        return Err(NotDetermined(format!("Get({}) returned {got}", v.name)));
+    }
     let mut buffer = Buffer::of(v.base, session.description.version, &[values[0], 0]);
     let list = [v.value_reference, free_reference(session)];
     let call = format!("Set({}, and a reference that does not exist)", v.name);

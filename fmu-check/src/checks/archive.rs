@@ -1,5 +1,6 @@
 //! The archive, by its raw headers (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
+use super::clock_rules::build_description;
 use super::layered::manifests;
 use crate::check::{Check, Level, Levels, Run, Verdict};
 use crate::fmu_file::FmuFile;
@@ -83,6 +84,9 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Sources include sources/buildDescription.xml and exclude the headers of the standard.",
         tried: "Reads the names of the entries below sources/.",
         fix: "Add buildDescription.xml, and leave out the headers of the standard, which the importer has." },
+    Check { id: "Z08", clause: "3.0.2, 2.4.10", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(build_description),
+        requirement: "sources/buildDescription.xml is well-formed, of the version of the FMU, and names files that exist, once for each model and platform.",
+        tried: "Reads it and looks its files up.", fix: "Generate it with the list of the sources." },
     Check { id: "I03", clause: "3.0.2, 2.6", levels: Levels(None, Some(Level::Should)), run: Run::File(manifests),
         requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its \
             namespace.",
@@ -264,6 +268,15 @@ fn base_names(fmu: &FmuFile) -> Verdict {
             .flatten()
             .map(|interface| interface.model_identifier.as_str())
             .collect();
+    let folders: Vec<String> = fmu.zip.names();
+    let folder = folders.iter().find(|n| {
+        let parts: Vec<_> = n.split('/').collect();
+        let extension = |name: &str| [".so", ".dll", ".dylib"].iter().any(|e| name.ends_with(e));
+        parts.len() > 3 && parts[0] == "binaries" && extension(parts[2])
+    });
+    if let Some(name) = folder {
+        return Verdict::Violated(vec![format!("{name}: a folder has the name of a library")]);
+    }
     if fmu.binaries.is_empty() {
         return Verdict::NotApplicable("there are no shared libraries".into());
     }

@@ -1,5 +1,6 @@
 //! Dependencies proved by perturbation (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8).
 
+use super::held::set_all;
 use crate::exchange::{Importer, differ};
 use crate::session::{NotDetermined, Session, settable};
 use fmu_import::raw::Simple;
@@ -26,29 +27,42 @@ pub(super) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
     if unknowns.is_empty() {
         return session.not_applicable("no dependencies of initial unknowns are given");
     }
-    let instance = session.initializing()?;
     let variables: Vec<_> = unknowns.iter().map(|(v, _)| *v).collect();
-    let before = instance.snapshot(&variables)?;
     let mut tried = 0;
-    for known in session.numeric().filter(|v| settable(v)) {
-        let Some(values) = session.different_value(known, 1.0) else { continue };
-        if session.half_time_used() {
+    // Also where all knowns differ from their start values: a factor may be 0 there.
+    for moved in [false, true] {
+        let instance = session.initializing()?;
+        if moved && set_all(&instance, 3.0).is_err() {
             break;
         }
-        let one = session.initializing()?;
-        if !one.set(known, &values)?.is_ok() {
-            continue;
-        }
-        tried += 1;
-        let after = one.snapshot(&variables)?;
-        for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
-            let named =
-                dependencies.iter().any(|d| session.description.referenced(*d).is_some_and(|v| v.name == known.name));
-            if !named && old != new {
-                undeclared(session, unknown, known, (old, new));
+        let before = instance.snapshot(&variables)?;
+        for known in session.numeric().filter(|v| settable(v)) {
+            let Some(values) = session.different_value(known, 1.0) else { continue };
+            if session.half_time_used() {
+                break;
             }
+            let one = session.initializing()?;
+            if moved {
+                set_all(&one, 3.0)?;
+            }
+            let start = one.get(known)?;
+            let values =
+                if moved && start.1 == values { session.different_value(known, 2.0).unwrap_or(values) } else { values };
+            if !one.set(known, &values)?.is_ok() {
+                continue;
+            }
+            tried += 1;
+            let after = one.snapshot(&variables)?;
+            for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
+                let named = dependencies
+                    .iter()
+                    .any(|d| session.description.referenced(*d).is_some_and(|v| v.name == known.name));
+                if !named && old != new {
+                    undeclared(session, unknown, known, (old, new));
+                }
+            }
+            let _ = one.free();
         }
-        let _ = one.free();
     }
     session.note(format!("{tried} knowns were changed"));
     Ok(())

@@ -3,6 +3,7 @@
 use crate::check::{Check, Level, Levels, Run};
 use crate::exchange::Importer;
 use crate::session::{NotDetermined, Session};
+use fmu_import::raw::Vector;
 use model_description::{Causality, ModelVariable, Variability};
 use std::cell::{Cell, RefCell};
 
@@ -28,6 +29,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "E24b", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), run: Run::Exchange(true_changes),
         requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.",
         tried: "Compares states before and after every update.", fix: "Clear the flag where no state is reinitialized." },
+    Check { id: "E24n", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(true_nominals),
+        requirement: "nominalsOfContinuousStatesChanged is true only if a nominal has changed.",
+        tried: "Reads the nominals after every update that says so.", fix: "Clear the flag where no nominal changes." },
     Check { id: "E25", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, run: Run::Exchange(indicators),
         requirement: "After Event Mode no event indicator is 0.",
         tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis." },
@@ -107,6 +111,36 @@ fn true_changes(session: &Session) -> Result<(), NotDetermined> {
         let idle = event.updates.iter().any(|(u, changed)| !changed && u.states_changed == 1);
         idle.then(|| "valuesOfContinuousStatesChanged is true, and no state changed".into())
     })
+}
+
+fn true_nominals(session: &Session) -> Result<(), NotDetermined> {
+    let n = session.states();
+    if n == 0 {
+        return session.not_applicable("there are no continuous states");
+    }
+    let instance = session.excited()?;
+    let nominals = |instance: &crate::instance::Instance<'_>| instance.vector(Vector::GetNominalsOfContinuousStates, n);
+    let last = RefCell::new(nominals(&instance)?.1);
+    let mut idle = 0;
+    Importer::survey(
+        &instance,
+        STEPS,
+        &mut |instance, event| {
+            let Ok((status, now, _)) = nominals(instance) else { return };
+            let told = event.updates.iter().any(|(u, _)| u.nominals_changed == 1);
+            if told && status.is_ok() && *last.borrow() == now {
+                idle += 1;
+                if idle == 3 {
+                    session.violated(format!(
+                        "t = {:?}: nominalsOfContinuousStatesChanged is true for the third time, and the nominals are still {now:?}",
+                        instance.time.get()
+                    ));
+                }
+            }
+            *last.borrow_mut() = now;
+        },
+        &mut |_, _| Ok(()),
+    )
 }
 
 fn indicators(session: &Session) -> Result<(), NotDetermined> {

@@ -3,13 +3,14 @@
 use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
 use crate::check::{Check, Level, Levels, Run};
-use crate::exchange::{Importer, deviation, differ};
+use crate::exchange::{Importer, UNSTABLE, deviation, differ};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session};
+use crate::session::{Line, NotDetermined, Session};
 use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
+use std::cell::Cell;
 
 const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
 
@@ -67,6 +68,12 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "An output or derivative changes only with the states and inputs among its dependencies.",
         tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.",
         fix: "Add them to dependencies, or leave dependencies out." },
+    Check { id: "E15", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(both_ways),
+        requirement: "The vector of derivatives has the values of the variables that are the derivatives.",
+        tried: "Reads both at several points.", fix: "Let both functions read one value." },
+    Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state.",
+        tried: "Reads the states before and after each change of the mode.", fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
         requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
         tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },
@@ -79,12 +86,50 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error." },
 ];
 
-fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
+/// Ten steps of the integrator; `None` where they run away from the start, as Euler's method does if they are too long.
+fn first_steps(session: &Session) -> Result<Option<(Instance<'_>, bool)>, NotDetermined> {
     let instance = session.exchange(State::Event)?;
     let mut importer = Importer::start(&instance)?;
-    importer.run(10, &mut |_| Ok(()))?;
+    let nominals =
+        session.description.states().into_iter().flat_map(|v| vec![v.nominal.unwrap_or(1.0); session.elements(v)]);
+    let limits: Vec<f64> =
+        instance.states()?.iter().zip(nominals).map(|(x, nominal)| 1e3 * x.abs().max(nominal.abs())).collect();
+    let away = Cell::new(false);
+    let result = importer.run(10, &mut |instance| {
+        away.set(away.get() || instance.states()?.iter().zip(&limits).any(|(x, limit)| x.abs() > *limit));
+        Ok(())
+    });
+    let over = importer.over;
+    match result {
+        // A model may refuse states that no trajectory has.
+        Err(_) | Ok(()) if away.get() => instance.free().map(|()| None),
+        Err(NotDetermined(why)) if why == UNSTABLE => instance.free().map(|()| None),
+        Err(why) => Err(why),
+        Ok(()) => Ok(Some((instance, over))),
+    }
+}
+
+fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
+    let usual = session.integrator_step();
+    let mut found = first_steps(session)?;
+    // Stiff equations need steps of the size of their shortest time constant.
+    for tenth in 1..=12 {
+        if found.is_some() {
+            break;
+        }
+        session.integrator.set(Some(usual / 10.0_f64.powi(tenth)));
+        found = first_steps(session)?;
+    }
+    let Some((instance, over)) = found else {
+        session.write(&Line::NotDetermined(UNSTABLE.into()));
+        return Ok(());
+    };
+    if let Some(step) = session.integrator.get() {
+        session.write(&Line::Integrator(step));
+        session.note(format!("the equations are stiff: steps of {step:e} s instead of {usual:e} s"));
+    }
     let _ = instance.snapshot(&session.watched())?;
-    if !importer.over {
+    if !over {
         let status = instance.simple(Simple::Terminate)?;
         session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
     }
@@ -314,6 +359,65 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
         session.require(status.is_ok() && (found - t).abs() <= 1e-9 * t.abs(), || {
             format!("after SetTime({t:?}), Get({}) returned {status}, {found:?}", time.name)
         });
+    }
+    Ok(())
+}
+
+fn both_ways(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let d = &session.description;
+    let variables: Vec<&ModelVariable> = d.derivatives.iter().filter_map(|u| d.referenced(u.reference)).collect();
+    let instance = session.excited()?;
+    let mut importer = Importer::start(&instance)?;
+    for _ in 0..5 {
+        let vector = instance.derivatives()?;
+        let mut rest = &vector[..];
+        for v in &variables {
+            let (of_vector, more) = rest.split_at(session.elements(v).min(rest.len()));
+            rest = more;
+            let (status, found) = instance.get(v)?;
+            let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
+            if !status.is_ok() || v.base != BaseType::Float64 {
+                continue;
+            }
+            if let Some((_, largest)) = deviation(&[of_vector.to_vec()], std::slice::from_ref(&found)) {
+                session.deviates(
+                    largest,
+                    &format!("line {}: {} is {found:?}, and {of_vector:?} in the vector", v.line, v.name),
+                );
+                return Ok(());
+            }
+        }
+        importer.run(20, &mut |_| Ok(()))?;
+        if importer.over {
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let instance = session.excited()?;
+    let compare = |what: &str, before: &[f64]| {
+        let after = instance.states()?;
+        session.require(!differ(before, &after), || format!("{what}: the states were {before:?}, and are {after:?}"));
+        Ok::<_, NotDetermined>(())
+    };
+    for _ in 0..3 {
+        let event = instance.iterate()?;
+        if event.terminates() || !event.ended() {
+            return Ok(());
+        }
+        let before = instance.states()?;
+        instance.perform(Simple::EnterContinuousTimeMode)?;
+        compare("EnterContinuousTimeMode", &before)?;
+        let t = instance.time.get() + session.integrator_step();
+        let next = event.next().unwrap_or(f64::INFINITY);
+        instance.must("SetTime", instance.set_time(t.min(next))?)?;
+        let before = instance.states()?;
+        instance.perform(Simple::EnterEventMode)?;
+        compare("EnterEventMode", &before)?;
     }
     Ok(())
 }

@@ -3,12 +3,13 @@
 
 use super::by_name::{configuration, null_instance, unsupported};
 use super::calls::attempt;
+use super::held::{set_all, texts};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{ENDED, NotDetermined, Session};
 use crate::states::{Life, State::Error, State::Step};
 use fmu_import::raw::{Arguments, Handle, Interface, Simple};
-use model_description::Causality;
+use model_description::{Causality, ModelVariable, Variability};
 use std::ffi::CString;
 
 const STATES: &str = "2.0.5, 4.2.4; 3.0.2, 4.2";
@@ -31,6 +32,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "L01c", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(without_resources),
         requirement: "An FMU without resources works without a resource path.",
         tried: "Runs without a resource path and with one that does not exist.", fix: "Read the path only if the FMU has resources." },
+    Check { id: "L13", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(long_names),
+        requirement: "An instance name may have any length.",
+        tried: "Runs with names of 300 and 5000 letters, and logging.", fix: "Copy the name to memory of its size." },
     Check { id: "L02", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Should), None), run: Run::Probe(callbacks),
         requirement: "The FMU does not read the struct of callbacks after fmi2Instantiate has returned.",
         tried: "Frees the struct of callbacks after fmi2Instantiate and makes the FMU log.", fix: "Copy the struct, not its pointer." },
@@ -142,6 +146,22 @@ fn short_run(session: &Session, arguments: &Arguments, what: &str, level: Level)
     instance.free()
 }
 
+fn long_names(session: &Session) -> Result<(), NotDetermined> {
+    let plain = session.stepping()?.run(5, session.h())?;
+    session.cases([300, 5000], |length| {
+        let name = CString::new("n".repeat(length)).ok();
+        let arguments = Arguments { name, logging: true, ..session.arguments("probe") };
+        let Some(instance) = session.instantiate(&arguments)? else {
+            session.violated(format!("{} with a name of {length} letters returned NULL", session.instantiation()));
+            return Ok(());
+        };
+        instance.initialize()?;
+        session.compare(&format!("with a name of {length} letters"), &plain, &instance.run(5, session.h())?);
+        let _ = instance.simple(Simple::Terminate)?;
+        instance.free()
+    })
+}
+
 fn without_logger(session: &Session) -> Result<(), NotDetermined> {
     let v2 = session.is_v2();
     session.case(|| {
@@ -251,21 +271,66 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             Ok(())
         });
     }
+    // What was set before and during the run, and what events have changed.
     session.case(|| {
-        let instance = session.fresh()?;
+        let (fresh, instance) = (session.initializing()?, session.fresh()?);
+        if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
+            session.note(why);
+        }
+        let begun = instance.initialize().and_then(|()| past_an_event(&instance));
+        if let Err(NotDetermined(why)) = begun {
+            session.note(why);
+        }
         for v in
-            session.description.variables.iter().filter(|v| v.causality == Causality::Parameter && v.base.is_float())
+            session.numeric().filter(|v| v.variability == Variability::Tunable && v.causality == Causality::Parameter)
         {
-            if let Some(values) = session.different_value(v, 1.0) {
+            if let Some(values) = session.different_value(v, 2.0) {
                 let _ = instance.set(v, &values)?;
             }
         }
-        let _ = instance.simple(Simple::Reset)?;
+        instance.perform(Simple::Reset)?;
+        instance.experiment(session.start(), None);
+        instance.enter()?;
+        let all: Vec<&ModelVariable> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+        for (v, (old, new)) in all.iter().zip(fresh.snapshot(&all)?.into_iter().zip(instance.snapshot(&all)?)) {
+            if !old.is_empty() && !new.is_empty() {
+                session.compare_variables(
+                    &[*v],
+                    "after Reset, compared with a new instance",
+                    &[vec![old]],
+                    &[vec![new]],
+                );
+            }
+        }
+        let [old, new] = [texts(&fresh)?, texts(&instance)?];
+        for (old, new) in old.iter().zip(&new).filter(|(old, new)| old != new) {
+            session.violated(format!("after Reset {} is {:?}, and {:?} in a new instance", old.0, new.1, old.1));
+        }
+        instance.perform(Simple::Reset)?;
         instance.experiment(session.start(), None);
         let second = run(&instance)?;
         session.compare("Reset after setting parameters, compared with a new instance", &first, &second);
         Ok(())
     });
+    Ok(())
+}
+
+/// Runs past the first change of a variable that is not a floating-point number, or 400 steps.
+fn past_an_event(instance: &Instance<'_>) -> Result<(), NotDetermined> {
+    let session = instance.session;
+    let discrete: Vec<&ModelVariable> = session.watched().into_iter().filter(|v| !v.base.is_float()).take(20).collect();
+    let before = instance.snapshot(&discrete)?;
+    let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
+    for k in 0..400 {
+        if session.half_time_used() || instance.time.get() + session.h() > stop {
+            break;
+        }
+        instance.change_inputs(k)?;
+        instance.steps(1, session.h())?;
+        if instance.snapshot(&discrete)? != before {
+            return instance.steps(2, session.h());
+        }
+    }
     Ok(())
 }
 
@@ -295,6 +360,9 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
 fn terminated(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.simulation(Step)?;
     let watched = session.watched();
+    // What cannot be read before cannot be read after.
+    let watched: Vec<_> =
+        watched.into_iter().filter(|v| instance.get(v).is_ok_and(|(status, _)| status.is_ok())).collect();
     let before = instance.snapshot(&watched)?;
     let status = instance.simple(Simple::Terminate)?;
     if !status.is_ok() {

@@ -19,9 +19,12 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "G-L2b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(unknown),
         requirement: "A category that does not exist or is NULL gives Error and does no harm.",
         tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error." },
-    Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(errors),
+    Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors),
         requirement: "With logging on, every Error is accompanied by a message of that status.",
         tried: "Provokes an Error with logging on.", fix: "Log in the one place that returns Error." },
+    Check { id: "G-L3c", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(refusals),
+        requirement: "With logging on, an instantiation that returns NULL is accompanied by a message.",
+        tried: "Instantiates with a wrong token.", fix: "Log the reason before returning NULL." },
     Check { id: "G-L3b", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts),
         requirement: "Messages are UTF-8, not empty, and have no trailing line break.",
         tried: "Reads the messages of a run with an Error.", fix: "Write UTF-8 without a line break at the end." },
@@ -110,6 +113,18 @@ fn errors(session: &Session) -> Result<(), NotDetermined> {
     session.require(reported, || {
         format!("{how} returned Error, but none of the {} messages has that status", events.len())
     });
+    Ok(())
+}
+
+fn refusals(session: &Session) -> Result<(), NotDetermined> {
+    let _ = take_events();
+    let token = CString::new("{00000000-wrong-token}").ok();
+    let arguments = Arguments { logging: true, token, ..session.arguments("probe") };
+    if session.instantiate(&arguments)?.is_some() {
+        return session.not_applicable("a wrong token is not refused");
+    }
+    session
+        .require(!take_events().is_empty(), || format!("{} returned NULL without a message", session.instantiation()));
     Ok(())
 }
 

@@ -7,12 +7,15 @@ mod archive;
 mod binary;
 mod by_name;
 mod calls;
+mod clock_rules;
 mod clocked;
+mod configuration;
 mod dependencies;
 mod derivatives;
 mod event_mode;
 mod events;
 mod exchange;
+mod held;
 mod host;
 mod instances;
 mod layered;
@@ -25,6 +28,7 @@ mod sensitivity;
 mod starts;
 mod state;
 mod structure;
+mod surroundings;
 mod terminals;
 mod time;
 mod units;
@@ -46,6 +50,7 @@ pub const GROUPS: &[Group] = &[
     Group { name: "access", title: "Getting and setting", checks: access::CHECKS },
     Group { name: "time", title: "Steps and time", checks: time::CHECKS },
     Group { name: "event-mode", title: "Event mode and early return", checks: event_mode::CHECKS },
+    Group { name: "configuration", title: "Structural parameters", checks: configuration::CHECKS },
     Group { name: "exchange", title: "Model Exchange", checks: exchange::CHECKS },
     Group { name: "events", title: "Events of Model Exchange", checks: events::CHECKS },
     Group { name: "derivatives", title: "Partial derivatives", checks: sensitivity::CHECKS },

@@ -1,5 +1,7 @@
 //! Saved states (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
 
+use super::held::{set_all, texts};
+use super::instances::leak;
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
@@ -21,6 +23,9 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.",
         tried: "Gets a state into an existing one, runs, restores, and compares; frees NULL.",
         fix: "Overwrite the memory that the pointer has; return OK for NULL." },
+    Check { id: "F01l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(state_leaks),
+        requirement: "Saving and freeing states leaks no memory.",
+        tried: "Saves and frees some thousand states and measures memory.", fix: "Free in FreeFMUState what GetFMUState allocated." },
     Check { id: "F02a", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state),
         requirement: "A run from a restored state equals the run from the time of saving.",
         tried: "Saves, runs 50 steps, restores twice, and compares.",
@@ -200,7 +205,37 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(&all)?)) {
         session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
     }
+    in_initialization(session, &all)
+}
+
+/// The same in Initialization Mode, where more can be set, texts too.
+fn in_initialization(session: &Session, all: &[&ModelVariable]) -> Result<(), NotDetermined> {
+    let instance = session.initializing()?;
+    let (state, time) = (instance.save()?, instance.time.get());
+    let (before, words) = (instance.snapshot(all)?, texts(&instance)?);
+    // This check does not judge refusals.
+    if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
+        session.note(why);
+    }
+    instance.restore(state, time)?;
+    for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(all)?)) {
+        session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
+    }
+    for (old, new) in words.iter().zip(&texts(&instance)?).filter(|(old, new)| old != new) {
+        session.violated(format!("restored, {} is {:?}; it was {:?} at the time of saving", old.0, new.1, old.1));
+    }
     Ok(())
+}
+
+fn state_leaks(session: &Session) -> Result<(), NotDetermined> {
+    needs!(session, can_get_and_set_state);
+    let instance = session.stepping()?;
+    instance.steps(1, session.h())?;
+    leak(session, "states", &|| {
+        let mut state = instance.save()?;
+        let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut state)))?;
+        instance.must("FreeFMUState", status)
+    })
 }
 
 fn after_error(session: &Session) -> Result<(), NotDetermined> {

@@ -1,5 +1,6 @@
 //! ModelStructure (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). Checks the file; `dependencies` checks the binary against it.
 
+use super::clock_rules::lists;
 use super::clocked::clocked_states;
 use super::dependencies::dependencies_hold;
 use super::xml::with_description;
@@ -24,6 +25,9 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "S02b", clause: "2.0.5, 2.2.8", levels: Levels(Some(Level::Must), None), run: Run::File(sorted),
         requirement: "InitialUnknowns are sorted by index.",
         tried: "Compares the indices of neighbors.", fix: "Sort the list by index before writing it." },
+    Check { id: "S07", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::File(lists),
+        requirement: "A list of the model structure has each entry once, and event indicators are continuous variables of the FMU's own.",
+        tried: "Compares the entries of each list, and looks the event indicators up.", fix: "List each once, and indicators as local continuous variables." },
     Check { id: "S03a", clause: CLAUSE, levels: Levels::MUST, run: Run::File(dependencies_exist),
         requirement: "Every dependency exists.",
         tried: "Looks every dependency up among the variables.", fix: "Refer to indices from 1 in FMI 2.0, to value references in FMI 3.0." },
@@ -57,11 +61,9 @@ fn list(d: &ModelDescription, unknowns: &[Unknown]) -> BTreeSet<String> {
 }
 
 fn twice(d: &ModelDescription, unknowns: &[Unknown]) -> Vec<String> {
-    let again = |(i, u): (usize, &Unknown)| {
-        let bad = unknowns[..i].iter().any(|o| o.reference == u.reference);
-        bad.then(|| format!("line {}: {} occurs twice", u.line, name(d, u.reference)))
-    };
-    unknowns.iter().enumerate().filter_map(again).collect()
+    let mut seen = BTreeSet::new();
+    let again = unknowns.iter().filter(|u| !seen.insert(u.reference));
+    again.map(|u| format!("line {}: {} occurs twice", u.line, name(d, u.reference))).collect()
 }
 
 fn outputs(fmu: &FmuFile) -> Verdict {
@@ -134,7 +136,7 @@ fn dependencies_exist(fmu: &FmuFile) -> Verdict {
 
 fn knowns(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
-        let states: Vec<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
+        let states: BTreeSet<&str> = states_and_derivatives(d).iter().map(|v| v.name.as_str()).collect();
         let mut findings = Vec::new();
         for (kind, unknown, at) in entries(d) {
             let dependencies = unknown.dependencies.as_deref().unwrap_or_default();
@@ -152,7 +154,7 @@ fn knowns(fmu: &FmuFile) -> Verdict {
     })
 }
 
-fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&str]) -> bool {
+fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &BTreeSet<&str>) -> bool {
     let exact = v.initial_or_default() == Some(Initial::Exact) && v.variability != Variability::Constant;
     match v.causality {
         Causality::Input | Causality::Independent => true,
@@ -161,7 +163,7 @@ fn is_known(d: &ModelDescription, v: &ModelVariable, initial: bool, states: &[&s
         Causality::Parameter | Causality::StructuralParameter => {
             d.version == FmiVersion::V3 || v.variability == Variability::Tunable
         }
-        _ => states.contains(&v.name.as_str()) || !v.clocks.is_empty() || v.base == BaseType::Clock,
+        _ => states.contains(v.name.as_str()) || !v.clocks.is_empty() || v.base == BaseType::Clock,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Terminals and icons (FMI 3.0.2, 2.4.9; FMI 2.0.5, 2.3 takes the folder of FMI 3.0).
 
+use super::host::{copy, failed};
 use super::schema;
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::fmu_file::FmuFile;
@@ -8,7 +9,6 @@ use crate::trajectory::trajectory;
 use crate::zip_headers;
 use fmu_import::raw::Raw;
 use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, limits, read_terminals};
-use std::path::Path;
 
 const TERMINALS: &str = "2.0.5, 2.3.2; 3.0.2, 2.4.9.2";
 const FOLDER: &str = "terminalsAndIcons";
@@ -206,30 +206,15 @@ fn stripped(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("the FMU has neither terminalsAndIcons/ nor extra/");
     }
     let whole = trajectory(&session.stepping()?, 20)?;
-    let failed = |e: std::io::Error| NotDetermined(e.to_string());
     // Below the working directory of the probe, which is temporary.
     let target = session.home.join("stripped");
-    copy(&session.dir, &target, &EXTRAS).map_err(failed)?;
+    copy(&session.dir, &target, &EXTRAS).map_err(|e| failed(&e))?;
     let inside = session.binary.strip_prefix(&session.dir).map_err(|e| NotDetermined(e.to_string()))?;
     let raw = Raw::open(&target.join(inside), session.description.version).map_err(NotDetermined)?;
     let duplicate = session.duplicate_at(&target, raw, 30)?;
     match duplicate.stepping().and_then(|instance| trajectory(&instance, 20)) {
         Err(why) => session.failed(&format!("without {}", EXTRAS.join("/ and ")), why),
         Ok(rows) => session.compare("without them", &whole, &rows),
-    }
-    Ok(())
-}
-
-/// Copies a folder, but not the folders of these names in it.
-fn copy(from: &Path, to: &Path, but: &[&str]) -> std::io::Result<()> {
-    std::fs::create_dir_all(to)?;
-    for file in std::fs::read_dir(from)? {
-        let (name, path) = file.map(|f| (f.file_name(), f.path()))?;
-        if path.is_dir() && !but.iter().any(|b| name == *b) {
-            copy(&path, &to.join(name), &[])?;
-        } else if path.is_file() {
-            std::fs::copy(&path, to.join(name))?;
-        }
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! Steps and time (FMI 2.0.5, 4.2.2; FMI 3.0.2, 4.2.1).
 
 use super::derivatives::{input_derivatives, output_derivatives, slopes};
+use super::held::derivatives_are_slopes;
 use super::starts::{ended, no_step_after};
 use crate::check::{Check, Level, Levels, Run};
 use crate::instance::Instance;
@@ -43,7 +44,7 @@ pub(super) const CHECKS: &[Check] = &[
             result changes).",
         tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only." },
     Check { id: "T06a", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results),
-        requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has not returned early without permission (should: \
+        requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has neither returned early nor asked for events without permission (should: \
             lastSuccessfulTime is less than a step from t + h).",
         tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK." },
     Check { id: "T06b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent),
@@ -62,6 +63,9 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.",
         tried: "Compares derivatives with slopes over short steps, and asks for other orders.",
         fix: "Return the derivative at the end of the step, and Error for orders beyond the maximum." },
+    Check { id: "T13", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::SHOULD, run: Run::Probe(derivatives_are_slopes),
+        requirement: "A variable that is the derivative of another has the value of its slope, to 30 %.",
+        tried: "Compares with slopes over steps in which the derivative changes by less than a fifth.", fix: "Update the derivative at the end of a step." },
     Check { id: "T11", clause: "2.0.5, 4.2.1", levels: Levels(Some(Level::Must), None), run: Run::Probe(input_derivatives),
         requirement: "With canInterpolateInputs, first derivatives of continuous inputs can be set.",
         tried: "Sets a derivative of an input of order 1.", fix: "Implement the function, or set canInterpolateInputs to false." },
@@ -238,6 +242,9 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
             .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
                 format!("DoStep(t={t}, h={h}) gave {step_results:?}: a Boolean is not 0 or 1, or was not written")
             });
+        session.require(step_results.event != 1, || {
+            format!("DoStep(t={t}, h={h}) asked for event handling, and the instance has no event mode")
+        });
         session.require(step_results.early != 1, || {
             format!("DoStep(t={t}, h={h}) returned early although that was not allowed")
         });
@@ -249,7 +256,12 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
         } else if step_results.early == 0 && step_results.terminate == 0 && (last - (t + h)).abs() >= h {
             session.lesser(Level::Should, text);
         }
-        if step_results.terminate == 1 {
+        // One finding is enough.
+        if step_results.terminate == 1
+            || step_results.early != 0
+            || step_results.event != 0
+            || step_results.terminate > 1
+        {
             break;
         }
         instance.time.set(t + h);

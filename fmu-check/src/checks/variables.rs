@@ -1,5 +1,6 @@
 //! Variables, types and units (FMI 2.0.5, 2.2.2, 2.2.3, 2.2.7; FMI 3.0.2, 2.4.3, 2.4.4, 2.4.7).
 
+use super::clock_rules::{intervals, kinds, names_of_types, references as references_of_clocks, reinit};
 use super::clocked::alias_units;
 use super::names::grammar;
 use super::units;
@@ -78,6 +79,21 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "V11", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), run: Run::File(flags),
         requirement: "Only continuous variables use intermediateUpdate, and only inputs use canHandleMultipleSetPerTimeInstant.",
         tried: "Looks at the two attributes of all variables.", fix: "Drop the attribute where it does not apply." },
+    Check { id: "V08c", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::MUST, run: Run::File(names_of_types),
+        requirement: "No type definition has the name of a variable.",
+        tried: "Compares the names of types and variables.", fix: "Rename the type." },
+    Check { id: "V15", clause: "3.0.2, 2.4.7.4", levels: Levels(None, Some(Level::Must)), run: Run::File(references_of_clocks),
+        requirement: "The attribute clocks names clocks and belongs to discrete variables, and previous names another discrete variable of the same type.",
+        tried: "Follows both attributes of all variables.", fix: "Give the value references of clocks, and of the variable with the previous value." },
+    Check { id: "V16", clause: "3.0.2, 2.4.4", levels: Levels(None, Some(Level::Must)), run: Run::File(intervals),
+        requirement: "Periodic clocks, and no others, have an interval above 0 and no negative shift, and output clocks have no priority.",
+        tried: "Reads the attributes of all clocks.", fix: "Give constant, fixed and tunable clocks an interval; drop what does not belong to the kind of clock." },
+    Check { id: "V17", clause: "3.0.2, 2.2.8.2", levels: Levels(None, Some(Level::Should)), run: Run::File(kinds),
+        requirement: "A clock is an input, an output or a local variable, and triggered if it is not an input.",
+        tried: "Reads causality and intervalVariability of all clocks.", fix: "Make a clock that the FMU ticks a triggered output." },
+    Check { id: "V18", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::File(reinit),
+        requirement: "Only continuous states have the attribute reinit.",
+        tried: "Looks for the attribute at variables without a derivative.", fix: "Drop the attribute." },
     Check { id: "V13", clause: "3.0.2, 2.4.7.2", levels: Levels(None, Some(Level::Must)), run: Run::File(arrays),
         requirement: "A dimension is a positive number or refers to a structural parameter or constant of type UInt64, and an array has one start value or \
             as many as elements.",
@@ -198,10 +214,7 @@ fn independent(fmu: &FmuFile) -> Verdict {
 /// Whether the file omits the variability. The default of FMI 2.0 is continuous for every type; except for Real this
 /// is illegal, which V05 says, and the other checks read it as discrete.
 fn by_default(fmu: &FmuFile, v: &ModelVariable) -> bool {
-    let element = fmu
-        .root()
-        .and_then(|r| r.child("ModelVariables"))
-        .and_then(|list| list.children.iter().find(|e| e.line == v.line && e.get("name") == Some(&v.name)));
+    let element = fmu.element_of(v);
     element.is_some_and(|e| e.get("variability").is_none())
 }
 
@@ -395,18 +408,11 @@ fn displays(fmu: &FmuFile) -> Verdict {
 }
 
 fn flags(fmu: &FmuFile) -> Verdict {
-    let Some(list) = fmu.root().and_then(|r| r.child("ModelVariables")) else {
-        return Verdict::NotDetermined("the XML cannot be read".into());
-    };
     with_description(fmu, |d| {
         let mut findings = Vec::new();
-        for element in &list.children {
+        for v in &d.variables {
+            let Some(element) = fmu.element_of(v) else { continue };
             let on = |a: &str| element.get(a).is_some_and(|v| matches!(v.trim(), "true" | "1"));
-            let Some(v) =
-                d.variables.iter().find(|v| v.line == element.line && Some(v.name.as_str()) == element.get("name"))
-            else {
-                continue;
-            };
             if on("intermediateUpdate") && (v.variability != Variability::Continuous || v.base == BaseType::Clock) {
                 findings.push(format!(
                     "line {}: variable {}: has intermediateUpdate but is {}",
@@ -426,6 +432,9 @@ fn flags(fmu: &FmuFile) -> Verdict {
 
 fn arrays(fmu: &FmuFile) -> Verdict {
     each(fmu, |d, v| {
+        if v.causality == Causality::StructuralParameter && !v.dimensions.is_empty() {
+            return Some("is a structural parameter with a dimension".into());
+        }
         if v.dimensions.is_empty() {
             let many = v.start.as_deref().is_some_and(|s| s.split_whitespace().count() > 1);
             let text = matches!(v.base, BaseType::String | BaseType::Binary);
@@ -461,6 +470,13 @@ fn arrays(fmu: &FmuFile) -> Verdict {
 
 fn start_value_types(fmu: &FmuFile) -> Verdict {
     each(fmu, |_, v| {
+        if let (BaseType::Binary, Some(most)) = (v.base, v.max_size) {
+            let starts = v.start_texts.iter().map(String::as_str).chain(v.start.as_deref());
+            let longest = starts.map(|hex| hex.trim().len() as u64 / 2).max().unwrap_or(0);
+            if longest > most {
+                return Some(format!("has a start value of {longest} bytes, and maxSize is {most}"));
+            }
+        }
         let start = v.start.as_deref()?;
         let (low, high): (i128, i128) = match v.base {
             BaseType::Int8 => (i8::MIN.into(), i8::MAX.into()),

@@ -35,9 +35,9 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Every capability flag that requires another flag is accompanied by it.",
         tried: "Reads the capability flags of the interfaces.", fix: "Set the flag that is required too, or drop the one that requires it." },
     Check { id: "X10", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment),
-        requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, and the tolerance is not \
-            negative.",
-        tried: "Reads DefaultExperiment.", fix: "Correct the numbers, or leave out those that are not known." },
+        requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, the tolerance is not \
+            negative, and fixedInternalStepSize is positive.",
+        tried: "Reads DefaultExperiment and fixedInternalStepSize.", fix: "Correct the numbers, or leave out those that are not known." },
     Check { id: "X11", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit),
         requirement: "An FMU without model exchange does not use the attribute reinit.",
         tried: "Looks for the attribute reinit where the FMU has no ModelExchange.", fix: "Write reinit only for continuous states of Model Exchange." },
@@ -162,6 +162,12 @@ fn flags(fmu: &FmuFile) -> Verdict {
 
 fn experiment(fmu: &FmuFile) -> Verdict {
     let Some(root) = fmu.root() else { return Verdict::NotDetermined("the XML cannot be read".into()) };
+    let simulation = root.child("CoSimulation");
+    let fixed = simulation
+        .and_then(|i| Some((i.line, model_description::parse_number(i.get("fixedInternalStepSize")?.trim())?)));
+    if let Some((line, step)) = fixed.filter(|(_, step)| *step <= 0.0) {
+        return Verdict::Violated(vec![format!("line {line}: fixedInternalStepSize = {step} is not positive")]);
+    }
     let Some(element) = root.child("DefaultExperiment") else {
         return Verdict::NotApplicable("there is no default experiment".into());
     };

@@ -3,8 +3,9 @@
 use super::Variable;
 use crate::Fault;
 use crate::terminal::{self, MatchingRule, MemberKind, Picture};
-use crate::variable::Causality;
+use crate::variable::{Causality, Variability};
 use serde::{Deserialize, Serialize};
+use std::mem::discriminant;
 
 /// A terminal of the description.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,6 +60,7 @@ pub(super) fn describe(
         for terminal::Member { variable, .. } in *members {
             match variables.iter().find(|v| v.name == *variable) {
                 None => return Err(wrong(format!("names the variable {variable}, which does not exist"))),
+                Some(_) if *rule == MatchingRule::Map => {}
                 // FMI 3.0.2, 2.4.9.2.3; in FMI 2.0 an array is not a variable.
                 Some(v) if v.causality == Causality::Local || v.is_array() => {
                     return Err(wrong(format!(
@@ -67,6 +69,9 @@ pub(super) fn describe(
                 }
                 Some(_) => {}
             }
+        }
+        if *rule == MatchingRule::Map {
+            map(members, variables).map_err(wrong)?;
         }
         let picture = picture.map(|p| picture_of(&p));
         if let Some(TerminalPicture { icon, svg, .. }) = &picture {
@@ -92,6 +97,45 @@ pub(super) fn describe(
         });
     }
     Ok(described)
+}
+
+/// The rules of FMI-LS-STRUCT for a map on a rectilinear grid. The variables exist.
+fn map(members: &[terminal::Member], variables: &[Variable]) -> Result<(), String> {
+    let found = |m: &terminal::Member| variables.iter().find(|v| v.name == m.variable);
+    let of = |kind: MemberKind| members.iter().filter(move |m| m.kind == kind).filter_map(found).collect::<Vec<_>>();
+    let set = |v: &Variable| v.causality == Causality::Parameter || v.variability == Variability::Constant;
+    let (axes, tables) = (of(MemberKind::Domain), of(MemberKind::Codomain));
+    if let Some(v) = axes.iter().find(|v| v.shape.len() != 1 || !set(v)) {
+        return Err(format!("has the domain {}: expected a parameter or a constant with one extent", v.name));
+    }
+    let (extents, sizes): (Vec<usize>, Vec<u32>) =
+        (axes.iter().map(|v| v.shape[0]).collect(), axes.iter().flat_map(|v| v.sized.clone()).collect());
+    if let Some(v) = tables.iter().find(|v| v.shape != extents || v.sized != sizes) {
+        let axes: Vec<&str> = axes.iter().map(|v| v.name.as_str()).collect();
+        return Err(format!("has the codomain {}: its extents are not the lengths of {}", v.name, axes.join(", ")));
+    }
+    let inputs = of(MemberKind::DomainInput);
+    if let Some(v) = inputs.iter().find(|v| v.shape != inputs[0].shape || v.sized != inputs[0].sized || set(v)) {
+        return Err(format!(
+            "has the input {} of a domain: expected an input, an output or a local variable of one shape",
+            v.name
+        ));
+    }
+    for pair in members.windows(2) {
+        let reads = match pair[1].kind {
+            MemberKind::DomainInput => true,
+            MemberKind::CodomainOutput => false,
+            _ => continue,
+        };
+        let (Some(values), Some(now)) = (found(&pair[0]), found(&pair[1])) else { continue };
+        if discriminant(&values.kind) != discriminant(&now.kind) {
+            return Err(format!("has {} of another type than {}", now.name, values.name));
+        }
+        if !reads && !matches!(now.causality, Causality::Output | Causality::Local) {
+            return Err(format!("has the output {} of a codomain, which is an input or a parameter", now.name));
+        }
+    }
+    Ok(())
 }
 
 fn picture_of(Picture { icon, x, y }: &Picture) -> TerminalPicture {

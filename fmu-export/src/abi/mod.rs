@@ -261,6 +261,8 @@ macro_rules! export {
                 $crate::abi::fault()
             }
 
+            // A page has the description of the native library.
+            #[cfg(not(target_family = "wasm"))]
             #[unsafe(no_mangle)]
             pub(crate) unsafe extern "C" fn fmu_description(
                 sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),

@@ -1,6 +1,6 @@
 /* Two small models with the C interfaces of FMI 2.0 and FMI 3.0, for tests of the importer. Each has the variables below.
 
-   Plant (STATES = 1): x' = u - x, output x. At every crossing of x and level it notes the time in y and counts.
+   Plant (STATES = 1): x' = u - x, output x, and z = 1 - 2 u at every instant. At every crossing of x and level it notes the time in y and counts.
    Sampler (STATES = 0): at start + k T it samples the input i; from the next sample on its output y is 1 - 2 i of that sample.
 
    Both refuse a step that does not begin where they are, a discrete input outside of event mode (Model Exchange), and an update
@@ -13,9 +13,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, N };
+enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, Z, N };
 enum { OK, WARNING, DISCARD, ERROR };
-enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL };
+enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL, NO_SOLUTION };
 
 typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct {
@@ -92,6 +92,7 @@ static int derivative(M *m, double *dx) {
 static int get(M *m, const uint32_t *vr, size_t n, double *to) {
     for (size_t i = 0; i < n; i++) {
         if (vr[i] == DER_X) derivative(m, to + i);
+        else if (vr[i] == Z) to[i] = fault(m, NO_SOLUTION) ? 1 + m->v[U] * m->v[U] : 1 - 2 * m->v[U];
         else to[i] = m->v[vr[i]];
     }
     return OK;

@@ -295,6 +295,52 @@ fn faults_are_named() {
 }
 
 #[test]
+fn algebraic_loops_are_solved_or_named() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let plant = workshop.plain("plant", version);
+        for (fault, solver) in [("0", SOLVERS[0]), ("0", SOLVERS[1]), ("12", SOLVERS[1])] {
+            let mut system = System::new(exchange(solver));
+            for name in ["a", "b"] {
+                system.add(name, &plant, false).unwrap();
+                system.set(&format!("{name}.fault"), fault).unwrap();
+                system.record(&format!("{name}.x")).unwrap();
+            }
+            system.connect("a.z", "b.u").unwrap();
+            system.connect("b.z", "a.u").unwrap();
+            if fault == "0" {
+                // u = 1 - 2 u: passing it on would diverge. x' = 1/3 - x.
+                let recording = run(&mut system, &settings(1.0, 0.1));
+                let expected = 1.0 / 3.0 + 2.0 / 3.0 * (-1.0_f64).exp();
+                assert!((recording.columns[0].values[10] - expected).abs() < 1e-6, "{:?}", recording.columns[0].values);
+            } else {
+                let told = refused(&mut system, &settings(1.0, 0.1));
+                let expected = "a.u, b.u: the algebraic loop of these inputs does not converge at t = 0 s";
+                assert!(told.starts_with(expected), "{told}");
+            }
+        }
+    }
+}
+
+/// The integrated plant and a sampler that steps itself, and the other way round.
+#[test]
+fn some_step_themselves() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let (plant, sampler) = (workshop.plain("plant", version), workshop.plain("sampler", version));
+        for stepping in ["s", "p"] {
+            let integration = Integration { stepping: vec![stepping.into()], ..Integration::default() };
+            let method = Method::ModelExchange(Integration { solver: SOLVERS[1], ..integration });
+            let found = run(&mut pair(&plant, &sampler, method), &settings(2.0, T));
+            let both = run(&mut pair(&plant, &sampler, Method::default()), &settings(2.0, T));
+            for (a, b) in found.columns[0].values.iter().zip(&both.columns[0].values) {
+                assert!((a - b).abs() < 1e-8, "{stepping} steps itself: {a}, both do: {b}");
+            }
+        }
+    }
+}
+
+#[test]
 fn settings_that_make_no_sense_are_refused() {
     let workshop = Workshop::new();
     let (plant, sampler) = (workshop.plain("plant", 3), workshop.plain("sampler", 3));

@@ -63,6 +63,7 @@ fn description(name: &str, version: u32) -> String {
         ("level", "parameter", "fixed", "-1"),
         ("count", "output", "discrete", ""),
         ("fault", "parameter", "fixed", "0"),
+        ("z", "output", "continuous", ""),
     ];
     let state = name == "plant";
     let variable = |(index, (name, causality, variability, start)): (usize, &(&str, &str, &str, &str))| {

@@ -110,9 +110,11 @@ impl<'a> Numbering<'a> {
     }
 
     /// Whether a wide array is among these: FMI 2.0 would have to name each of its elements, so nothing is said, which means that
-    /// all count.
+    /// all count. One whose sizes can change is wide by its greatest size, and shows by its first element alone.
     fn has_wide(&self, references: &[u32]) -> bool {
-        let wide = |r: &u32| self.variables.iter().any(|(v, n)| v.value_reference == *r && n.len() > DENSE);
+        let alone = |r: u32| !references.contains(&(r + 1));
+        let is_wide = |v: &Variable, n: usize| n > DENSE || n > 1 && !v.sized.is_empty() && alone(v.value_reference);
+        let wide = |r: &u32| self.variables.iter().any(|(v, n)| v.value_reference == *r && is_wide(v, n.len()));
         references.iter().any(wide)
     }
 

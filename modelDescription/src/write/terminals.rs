@@ -10,9 +10,15 @@ use fmu_core::Description;
 use fmu_core::description::{MemberDescription, TerminalDescription};
 use fmu_core::terminal::{MatchingRule, MemberKind};
 
-/// terminalsAndIcons.xml, for an FMU of either standard; `None` for a model without terminals and icon.
-pub fn write_terminals(description: &Description) -> Option<String> {
+/// What FMI-LS-STRUCT 1.0.0-rc.1 calls its parts.
+const STRUCT: &str = "org.fmi-standard.fmi-ls-struct.map";
+
+/// terminalsAndIcons.xml for an FMU of this standard; `None` for a model without terminals and icon. FMI 2.0 has no maps, whose
+/// members are arrays.
+pub fn write_terminals(description: &Description, version: FmiVersion) -> Option<String> {
     let Description { terminals, icon, .. } = description;
+    let terminals: Vec<_> =
+        terminals.iter().filter(|t| version == FmiVersion::V3 || t.rule != MatchingRule::Map).collect();
     if terminals.is_empty() && icon.is_none() {
         return None;
     }
@@ -20,7 +26,7 @@ pub fn write_terminals(description: &Description) -> Option<String> {
     let corners = [area.x1, area.y1, area.x2, area.y2];
     let system = placed("CoordinateSystem", corners).with("suggestedScalingFactorTo_mm", number::format(to_mm));
     let icon = icon.as_ref().map(|_| placed("Icon", corners));
-    let list = Element::new("Terminals").children(terminals.iter().map(terminal));
+    let list = Element::new("Terminals").children(terminals.iter().copied().map(terminal));
     let root = Element::new("fmiTerminalsAndIcons")
         .with("fmiVersion", FmiVersion::V3.to_string())
         .children([Element::new("GraphicalRepresentation").children([system]).children(icon)])
@@ -32,14 +38,20 @@ fn terminal(t: &TerminalDescription) -> Element {
     let rule = match t.rule {
         MatchingRule::Plug => "plug",
         MatchingRule::Bus => "bus",
+        MatchingRule::Map => STRUCT,
     };
     let picture = t.picture.as_ref().map(|p| {
         let color: Vec<String> = p.color.iter().map(u8::to_string).collect();
         let element = Element::new("TerminalGraphicalRepresentation").with("defaultConnectionColor", color.join(" "));
         place(element, p.area).with("iconBaseName", &*p.icon)
     });
-    Element::new("Terminal")
-        .with("name", &*t.name)
+    let element = Element::new("Terminal").with("name", &*t.name);
+    let element = if t.rule == MatchingRule::Map {
+        element.with("terminalKind", format!("{STRUCT}.rectilinearGrid"))
+    } else {
+        element
+    };
+    element
         .with("matchingRule", rule)
         .with_text("description", &t.description)
         .children(t.members.iter().map(member))
@@ -48,9 +60,13 @@ fn terminal(t: &TerminalDescription) -> Element {
 
 fn member(m: &MemberDescription) -> Element {
     let kind = match m.kind {
-        MemberKind::Signal => "signal",
-        MemberKind::Inflow => "inflow",
-        MemberKind::Outflow => "outflow",
+        MemberKind::Signal => "signal".to_owned(),
+        MemberKind::Inflow => "inflow".to_owned(),
+        MemberKind::Outflow => "outflow".to_owned(),
+        MemberKind::Domain => format!("{STRUCT}.domain"),
+        MemberKind::DomainInput => format!("{STRUCT}.domainInput"),
+        MemberKind::Codomain => format!("{STRUCT}.codomain"),
+        MemberKind::CodomainOutput => format!("{STRUCT}.codomainOutput"),
     };
     Element::new("TerminalMemberVariable")
         .with("variableName", &*m.variable)

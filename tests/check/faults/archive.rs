@@ -60,3 +60,44 @@ fn each_fault_is_found_by_its_check() {
     write(&other, &good());
     assert_eq!(violated(&check(&other, &["archive"])), ["Z01a"]);
 }
+
+/// Faults of sources/buildDescription.xml, in both standards, and a folder in the place of a library.
+#[test]
+fn faults_of_the_build_description() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let set = "<SourceFileSet><SourceFile name=\"fmu.c\"/></SourceFileSet>";
+    let one = format!("<BuildConfiguration modelIdentifier=\"Small\">{set}</BuildConfiguration>");
+    let good = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?><fmiBuildDescription fmiVersion=\"3.0\">{one}</fmiBuildDescription>"
+    );
+    let faults: [(&[&str], String); 8] = [
+        (&[], good.clone()),
+        (&["Z08"], good.replace("</BuildConfiguration>", "")),
+        (&["Z08"], good.replace("name=\"fmu.c\"", "name=\"model.c\"")),
+        (&["Z08"], good.replace(&one, &format!("{one}{one}"))),
+        (&["Z08"], good.replace(&one, "")),
+        (&["Z08"], good.replace("modelIdentifier=\"Small\"", "modelIdentifier=\"Large\"")),
+        (&["Z08"], good.replace("fmiBuildDescription", "buildDescription")),
+        (&[], good.replace(&one, &format!("{one}{}", one.replace("\">", "\" platform=\"x86_64-linux\">")))),
+    ];
+    for xml in [XML, include_str!("fmu3.xml")] {
+        for (expected, build) in &faults {
+            let description = Entry::new("modelDescription.xml", xml.as_bytes());
+            let build = Entry::new("sources/buildDescription.xml", build.as_bytes());
+            write(&path, &[description, build, Entry::new("sources/fmu.c", b"text")]);
+            let report = check(&path, &["Z07", "Z08"]);
+            assert_eq!(violated(&report), *expected, "{}", told(&report));
+        }
+    }
+    let other = good.replace("fmiVersion=\"3.0\"", "fmiVersion=\"2.0\"");
+    for (xml, expected) in [(XML, &[][..]), (include_str!("fmu3.xml"), &["Z08"])] {
+        let description = Entry::new("modelDescription.xml", xml.as_bytes());
+        let build = Entry::new("sources/buildDescription.xml", other.as_bytes());
+        write(&path, &[description, build, Entry::new("sources/fmu.c", b"text")]);
+        assert_eq!(violated(&check(&path, &["Z08"])), expected);
+    }
+    let folder = Entry::new("binaries/linux64/Small.so/x", b"x");
+    write(&path, &[Entry::new("modelDescription.xml", XML.as_bytes()), Entry::new("sources/fmu.c", b"x"), folder]);
+    assert_eq!(violated(&check(&path, &["X03"])), ["X03"]);
+}

@@ -83,6 +83,51 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("HANG", &["L00"]),
 ];
 
+/// Faults at run time that only these groups look at, of both standards.
+const RUNNING: &[(&str, &[&str])] = &[
+    ("NONE", &[]),
+    // Two in one call come in the wrong order.
+    ("G10", &["G10"]),
+    ("G11", &["G11"]),
+    // An input is forgotten after a step, or silently limited.
+    ("G12", &["G12", "T03"]),
+    ("G12c", &["G12"]),
+    ("G13", &["G13"]),
+    ("G14", &["G14"]),
+    // One parameter cannot be set, and another does not keep its value.
+    ("G04o", &["G04", "G06"]),
+    // Reset keeps a tunable parameter, a counter after an event, a text.
+    ("L06t", &["L06"]),
+    ("L06e", &["L06"]),
+    ("L06s", &["L06"]),
+    ("L13", &["L13"]),
+    // A state lacks a text.
+    ("F02x", &["F02b"]),
+    ("F01l", &["F01l"]),
+    ("G_L3c", &["G-L3c"]),
+    // A dependency whose factor is 0 at the start.
+    ("S04h", &["S04"]),
+    // 700 bytes an instance, and memory that nobody touches.
+    ("B07m", &["B07a"]),
+    ("B07u", &["B07a"]),
+];
+const RUNNING_GROUPS: [&str; 9] = ["access", "time", "L06", "L13", "F01l", "F02b", "G-L3c", "B07a", "S04"];
+
+/// What stays altered or is left: each is found by this check.
+const AROUND: &[(&str, &[&str])] = &[
+    ("LOCALE", &["B08g"]),
+    ("TIMER", &["B08g"]),
+    ("AFFINITY", &["B08g"]),
+    ("NICE", &["B08g"]),
+    ("LIMITS", &["B08g"]),
+    ("UMASK", &["B08g"]),
+    ("ENVIRONMENT", &["B08g"]),
+    ("CHDIR", &["B08g"]),
+    ("SHARED", &["B08p"]),
+    ("TEMPORARY", &["B08p"]),
+    ("WRITES", &["B08r"]),
+];
+
 /// Faults of FMI 3.0: what only it has, and one of each group.
 const FAULTS3: &[(&str, &[&str])] = &[
     ("NONE", &[]),
@@ -139,6 +184,11 @@ fn each_fault_of_fmi_3_is_found_by_its_check() {
 }
 
 fn all(version: u8, faults: &[(&str, &[&str])]) {
+    all_of(version, faults, &[]);
+}
+
+/// Each fault is found by its check, and nothing else by these.
+fn all_of(version: u8, faults: &[(&str, &[&str])], only: &[&str]) {
     let dir = tempfile::tempdir().unwrap();
     if compile(version, "NONE").is_none() {
         eprintln!("there is no C compiler: not tested");
@@ -147,9 +197,25 @@ fn all(version: u8, faults: &[(&str, &[&str])]) {
     each(faults, |(fault, ids)| {
         let seconds = if *fault == "HANG" { 4 } else { 120 };
         let binary = compile(version, fault).unwrap();
-        let report = check_within(&pack(dir.path(), version, fault, &binary), &[], seconds);
+        let report = check_within(&pack(dir.path(), version, fault, &binary), only, seconds);
         if violated(&report) == *ids { Ok(()) } else { Err(format!("{fault}: {}", told(&report))) }
     });
+}
+
+#[test]
+fn each_fault_at_run_time_is_found_by_its_check() {
+    for version in [2, 3] {
+        all_of(version, RUNNING, &RUNNING_GROUPS);
+        all_of(version, AROUND, &["B08g", "B08p", "B08r"]);
+    }
+    all_of(3, &[("T06e", &["T06a"])], &["time"]);
+    // Another day, in another process.
+    all_of(2, &[("T10t", &["T10p"])], &["T10p"]);
+    for file in std::fs::read_dir("/dev/shm").into_iter().flatten().flatten() {
+        if file.file_name().to_string_lossy().starts_with("fault-of-fmu-check") {
+            let _ = std::fs::remove_file(file.path());
+        }
+    }
 }
 
 /// An FMU that has derivatives of its outputs.

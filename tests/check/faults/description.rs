@@ -87,6 +87,8 @@ fn faults_of_fmi_2() {
     );
 }
 
+const TICK: &str = "causality=\"input\" intervalVariability=\"triggered\"";
+
 #[test]
 fn faults_of_aliases_and_clocked_states() {
     let state = "<ClockedState valueReference=\"5\"/>\n    <InitialUnknown valueReference=\"3\"";
@@ -109,9 +111,110 @@ fn faults_of_aliases_and_clocked_states() {
     each(
         &clocked,
         &[
-            (&["S06"], "previous=\"18\"", "previous=\"5\""),
+            // Itself, nothing, another type, an input or a clock, and without clocks.
+            (&["V15"], "previous=\"18\"", "previous=\"5\""),
+            (&["V15"], "previous=\"18\"", "previous=\"99\""),
+            (&["V15"], "previous=\"18\"", "previous=\"6\""),
+            (&["V15"], "previous=\"18\"", "previous=\"19\""),
+            (&["V15", "S02a", "S06"], " clocks=\"19\" previous=\"18\"", " previous=\"18\""),
+            // Clocks that name nothing, no clock, or itself.
+            (&["V15"], "clocks=\"19\" previous", "clocks=\"99\" previous"),
+            (&["V15"], "clocks=\"19\" previous", "clocks=\"19 6\" previous"),
+            (&["V15"], "clocks=\"19\" previous", "clocks=\"5\" previous"),
+            (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"constant\""),
+            (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"constant\" intervalDecimal=\"0\""),
+            (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"triggered\" intervalDecimal=\"1\""),
+            (&["V16"], "intervalVariability=\"triggered\"", "intervalVariability=\"countdown\" intervalDecimal=\"1\""),
+            (
+                &["V16"],
+                "intervalVariability=\"triggered\"",
+                "intervalVariability=\"fixed\" intervalDecimal=\"1\" shiftDecimal=\"-1\"",
+            ),
+            (
+                &["V16"],
+                "intervalVariability=\"triggered\"",
+                "intervalVariability=\"fixed\" intervalCounter=\"0\" resolution=\"10\" supportsFraction=\"true\"",
+            ),
+            (
+                &[],
+                "intervalVariability=\"triggered\"",
+                "intervalVariability=\"fixed\" intervalDecimal=\"0.1\" shiftDecimal=\"0.05\" priority=\"1\"",
+            ),
+            (&["V16"], TICK, "causality=\"local\" intervalVariability=\"triggered\" shiftDecimal=\"1\""),
+            (&["V17"], TICK, "causality=\"local\" intervalVariability=\"constant\" intervalDecimal=\"1\""),
+            (
+                &["V04a", "V17"],
+                TICK,
+                "causality=\"parameter\" variability=\"discrete\" intervalVariability=\"triggered\"",
+            ),
+            (
+                &["S01"],
+                "<Output valueReference=\"3\"/>",
+                "<Output valueReference=\"3\"/><Output valueReference=\"18\"/>",
+            ),
             (&["S06"], "previous=\"18\"", ""),
             (&["S06"], "<ClockedState valueReference=\"5\"/>", "<ClockedState valueReference=\"4\"/>"),
         ],
     );
+}
+
+/// Faults of types, arrays and lists, in small descriptions of both standards.
+#[test]
+fn faults_of_types_and_lists() {
+    let types = "<TypeDefinitions><Float64Type name=\"Speed\"/></TypeDefinitions>\n  <LogCategories>";
+    let typed = include_str!("fmu3.xml").replace("<LogCategories>", types).replace(
+        "</ModelVariables>",
+        "<UInt64 name=\"size\" valueReference=\"20\" causality=\"structuralParameter\" variability=\"fixed\" start=\"2\"/>
+         <Float64 name=\"list\" valueReference=\"21\" causality=\"parameter\" variability=\"fixed\" start=\"1 2\"><Dimension valueReference=\"20\"/></Float64></ModelVariables>",
+    );
+    each(
+        &typed,
+        &[
+            (&["V08c"], "name=\"Speed\"", "name=\"gain\""),
+            (
+                &["V13"],
+                "variability=\"fixed\" start=\"2\"/>",
+                "variability=\"fixed\" start=\"2\"><Dimension start=\"1\"/></UInt64>",
+            ),
+            (&["V14"], "value=\"666f6f\"", "value=\"666f6f666f6f66\""),
+            (
+                &["V18"],
+                "start=\"0\"/>\n    <Float64 name=\"y\"",
+                "start=\"0\" reinit=\"true\"/>\n    <Float64 name=\"y\"",
+            ),
+            (&["X10"], "modelIdentifier=\"Small\"", "modelIdentifier=\"Small\" fixedInternalStepSize=\"-1\""),
+        ],
+    );
+    let exchange = include_str!("exchange3.xml");
+    let dir = tempfile::tempdir().unwrap();
+    let only = ["V18", "S01", "S02a", "S07", "X11"];
+    let of = |xml: &str| {
+        let path = dir.path().join("x.fmu");
+        write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/fmu.c", b"x")]);
+        let report = check(&path, &only);
+        (violated(&report), told(&report))
+    };
+    let derivative = "<ContinuousStateDerivative valueReference=\"4\" dependencies=\"1 2 3\"/>";
+    let faults: [(&[&str], &str, &str, &str); 8] = [
+        (&[], exchange, "", ""),
+        (&["S07"], exchange, derivative, &format!("{derivative}{derivative}")),
+        (&["S07"], exchange, "<EventIndicator valueReference=\"8\"", "<EventIndicator valueReference=\"2\""),
+        (&["S07"], exchange, "<EventIndicator valueReference=\"8\"", "<EventIndicator valueReference=\"7\""),
+        (&["V18"], exchange, "start=\"1\"/>", "start=\"1\" reinit=\"true\"/>"),
+        (&[], include_str!("exchange2.xml"), "", ""),
+        (
+            &["S07"],
+            include_str!("exchange2.xml"),
+            "<Unknown index=\"5\" dependencies=\"3 4\"/>",
+            "<Unknown index=\"5\"/><Unknown index=\"5\"/>",
+        ),
+        (&["V18"], include_str!("exchange2.xml"), "<Real start=\"1\"/>", "<Real start=\"1\" reinit=\"true\"/>"),
+    ];
+    for (expected, xml, from, to) in faults {
+        assert!(xml.contains(from), "{from}");
+        let (ids, text) = of(&xml.replacen(from, to, 1));
+        assert_eq!(ids, expected, "{from} -> {to}: {text}");
+    }
+    let (ids, text) = of(&include_str!("fmu.xml").replace("<Real min=\"0\"", "<Real reinit=\"true\" min=\"0\""));
+    assert_eq!(ids, ["X11", "V18"], "{text}");
 }

@@ -21,7 +21,7 @@ typedef struct {
     double last_x;
 } M;
 
-typedef struct { bool again, terminate, states, defined; double next; } Update;
+typedef struct { bool again, terminate, nominals, states, defined; double next; } Update;
 
 static int fail(M *m) { return m->mode = FAILED, ERROR; }
 #define ENTER(allowed) do { if (!m) return ERROR; if (!(m->mode & (allowed))) return fail(m); } while (0)
@@ -30,11 +30,12 @@ static void fresh(M *m) {
     M kept = *m;
     memset(m, 0, sizeof *m);
     m->exchange = kept.exchange, m->events = kept.events, m->early = kept.early;
-    m->gain = 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
+    m->gain = FAULT(STIFF) ? 1e4 : 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
     if (FAULT(E12) && kept.mode) m->x = kept.x;
 }
 
 static M *make(int exchange, int events, int early) {
+    if (FAULT(N00) && events) return NULL;
     M *m = calloc(1, sizeof *m);
     m->exchange = exchange, m->events = events, m->early = early;
     return fresh(m), m;
@@ -90,6 +91,7 @@ static int update(M *m, Update *u) {
     if (FAULT(E23)) u->again = m->k > 3;
     if (FAULT(E24a)) u->states = false;
     if (FAULT(E24b)) u->states = true;
+    if (FAULT(E24n)) u->nominals = true;
     if (FAULT(N06) && !m->exchange) u->next -= 0.1;
     return OK;
 }
@@ -103,6 +105,7 @@ static int enter_event(M *m) {
 static int enter_continuous(M *m) {
     ENTER(m->exchange ? EVENT : 0);
     if (FAULT(E00)) return fail(m);
+    if (FAULT(E16)) m->x += 1e-3;
     return m->mode = CONTINUOUS, OK;
 }
 
@@ -140,7 +143,7 @@ static int vector(M *m, double *to, size_t n, int which) {
     double nominal = 2;
     if (FAULT(E04a)) nominal = 0;
     if (FAULT(E04b)) nominal = 3;
-    to[0] = which == 0 ? m->x : which == 1 ? slope(m) : which == 2 ? indicator(m) : nominal;
+    to[0] = which == 0 ? m->x : which == 1 ? slope(m) + (FAULT(E15) ? 0.1 : 0) : which == 2 ? indicator(m) : nominal;
     if (FAULT(E03) && which == 1) to[1] = 0;
     return OK;
 }
@@ -161,8 +164,10 @@ static int get(M *m, const unsigned *vr, size_t n, double *to) {
         double y = 2 * m->x + m->u, time = m->t;
         if (FAULT(E08)) time = m->start;
         if (FAULT(E11)) y += m->d;
+        if (FAULT(E11h)) y += m->d * (m->x - 1);
+        if (FAULT(NOT_YET) && m->mode == INSTANTIATED && vr[i] != 1) return fail(m);
         if (vr[i] == 7 || vr[i] > 8) return fail(m);
-        const double all[] = {time, m->gain, m->u, m->x, vr[i] == 4 ? slope(m) : 0, y, m->d, 0, indicator(m)};
+        const double all[] = {time, m->gain, m->u, m->x, vr[i] == 4 ? slope(m) * (FAULT(T13) && !m->exchange ? 3 : 1) : 0, y, m->d, 0, indicator(m)};
         to[i] = all[vr[i]];
     }
     return OK;
@@ -236,7 +241,7 @@ static int step(M *m, double t, double h, bool *event, bool *early, double *last
         tick(m);
         *event = false;
     }
-    *last = m->t;
+    *last = m->t - (FAULT(LAST) && !*early ? 1e-4 * h : 0);
     if (FAULT(N01) && m->early && m->k > 4) return fail(m);
     if (FAULT(N02) && m->k == 5) *event = true;
     if (FAULT(N03) && *early) *last = t + 2 * h;
@@ -296,7 +301,7 @@ EXPORT int fmi2EnterEventMode(M *m) { return enter_event(m); }
 EXPORT int fmi2NewDiscreteStates(M *m, EventInfo *info) {
     Update u;
     int status = update(m, &u);
-    *info = (EventInfo){u.again, u.terminate, 0, u.states, u.defined, u.next};
+    *info = (EventInfo){u.again, u.terminate, u.nominals, u.states, u.defined, u.next};
     return status;
 }
 EXPORT int fmi2EnterContinuousTimeMode(M *m) { return enter_continuous(m); }
@@ -335,7 +340,7 @@ EXPORT int fmi3EnterStepMode(M *m) { ENTER(m->exchange ? 0 : EVENT); return m->m
 EXPORT int fmi3UpdateDiscreteStates(M *m, bool *again, bool *end, bool *nominal, bool *state, bool *defined, double *next) {
     Update u;
     int status = update(m, &u);
-    *again = u.again, *end = u.terminate, *nominal = false, *state = u.states, *defined = u.defined, *next = u.next;
+    *again = u.again, *end = u.terminate, *nominal = u.nominals, *state = u.states, *defined = u.defined, *next = u.next;
     return status;
 }
 EXPORT int fmi3EnterContinuousTimeMode(M *m) { return enter_continuous(m); }

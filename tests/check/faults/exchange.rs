@@ -5,7 +5,7 @@
 use crate::{check, each, library, pack_with, told, violated};
 use fmu_check::Verdict;
 
-const GROUPS: [&str; 4] = ["exchange", "events", "derivatives", "event-mode"];
+const GROUPS: [&str; 5] = ["exchange", "events", "derivatives", "event-mode", "T13"];
 
 /// Fault, and the checks that must fail.
 const FAULTS: &[(&str, &[&str])] = &[
@@ -19,28 +19,33 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("E04b", &["E04b"]),
     ("E05", &["E05", "D01"]),
     // A derivative that remembers the last one shows wherever it is read twice.
-    ("E06a", &["E06a", "E06b", "E07", "E09", "D04"]),
+    ("E06a", &["E06a", "E06b", "E07", "E09", "E15", "D04"]),
     ("E06b", &["E06b", "D04"]),
     ("E07", &["E07"]),
     ("E08", &["E08"]),
     ("E09", &["E09"]),
     ("E10", &["E10"]),
     ("E11", &["E11"]),
+    ("E11h", &["E11", "D01"]),
     ("E12", &["E12"]),
     ("E13", &["E13"]),
     ("E14", &["E14"]),
+    ("E15", &["E15"]),
+    ("E16", &["E16"]),
     ("E20", &["E20"]),
     ("E21", &["E21"]),
     ("E22", &["E22"]),
     ("E23", &["E23"]),
     ("E24a", &["E24a"]),
     ("E24b", &["E24b"]),
+    ("E24n", &["E24n"]),
     ("E25", &["E25"]),
     ("E26", &["E26"]),
     ("D01", &["D01"]),
     ("D03", &["D03"]),
     ("D04", &["D04"]),
     ("D05", &["D05"]),
+    ("T13", &["T13"]),
 ];
 
 /// Faults of FMI 3.0: what only it has, and one of each function that differs.
@@ -50,11 +55,16 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("E05", &["E05", "D01"]),
     ("E07", &["E07"]),
     ("E13", &["E13"]),
+    ("E15", &["E15"]),
+    ("E16", &["E16"]),
     ("E21", &["E21"]),
     ("E24b", &["E24b"]),
+    ("E24n", &["E24n"]),
+    ("T13", &["T13"]),
     ("D03", &["D03"]),
     ("D05", &["D05"]),
     ("D02", &["D02"]),
+    ("N00", &["N01"]),
     ("N01", &["N01"]),
     ("N02", &["N02"]),
     // A step from a wrong time is refused.

@@ -1,17 +1,26 @@
 /* A small FMU for co-simulation, FMI 2.0, that breaks no rule; and with a fault of fault.h exactly one, or it is allowed and rude.
    fmu3.c makes FMI 3.0 of it.
-   y' = gain u + bias; n counts steps. Integers: 0 n. Booleans: 0 flag. Strings: 0 label.
+   y' = gain u + bias; n counts steps. Integers: 0 n. Booleans: 0 flag, 1 high. Strings: 0 label.
    Reals: 0 time, 1 gain, 2 u, 3 y, 4 bias. */
+#define _GNU_SOURCE
 #include "fault.h"
+#include <fcntl.h>
+#include <locale.h>
 #include <math.h>
+#include <sched.h>
+#include <signal.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
 #include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 /* The fifth step ends the simulation. */
@@ -20,7 +29,7 @@
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, STEP = 4, TERMINATED = 8, FAILED = 16, ANY = 31 };
 #ifdef FMI3
-#define READABLE ANY
+#define READABLE (FAULT(NOT_YET) ? ANY & ~INSTANTIATED : ANY)
 #else
 #define READABLE (INITIALIZATION | STEP | TERMINATED | FAILED)
 #endif
@@ -88,6 +97,7 @@ static int fail(Fmu *f, const char *text) {
     if (!(f->data.state & (allowed))) return fail(f, "not allowed in this state")
 
 static int alive;
+static void *volatile lost;
 
 static void fresh(Data *d) {
     memset(d, 0, sizeof *d);
@@ -113,19 +123,59 @@ extern int nowhere(void);
 int (*missing)(void) = nowhere;
 #endif
 
+/* Writes a file and leaves it. */
+static void leave(const char *folder, const char *name) {
+    char path[2048];
+    snprintf(path, sizeof path, "%s/%s", folder, name);
+    int file = open(path, O_CREAT | O_TRUNC | O_WRONLY, 0600);
+    if (file >= 0) write(file, "x", 1), close(file);
+}
+
+/* Alters the process that the FMU is a guest of. */
+static void alter(const char *where) {
+    if (FAULT(LOCALE)) setlocale(LC_ALL, "C.UTF-8");
+    if (FAULT(TIMER)) {
+        struct sigevent nothing = {.sigev_notify = SIGEV_NONE};
+        int timer;
+        syscall(SYS_timer_create, CLOCK_MONOTONIC, &nothing, &timer);
+    }
+    if (FAULT(AFFINITY)) {
+        unsigned long first = 1;
+        syscall(SYS_sched_setaffinity, 0, sizeof first, &first);
+    }
+    if (FAULT(NICE)) setpriority(PRIO_PROCESS, 0, 5);
+    if (FAULT(LIMITS)) setrlimit(RLIMIT_STACK, &(struct rlimit){1 << 20, 1 << 20});
+    if (FAULT(UMASK)) umask(0);
+    if (FAULT(ENVIRONMENT)) setenv("LC_NUMERIC", "de_DE", 1);
+    char name[64];
+    snprintf(name, sizeof name, "fault-of-fmu-check-%d", getpid());
+    if (FAULT(SHARED)) leave("/dev/shm", name);
+    if (FAULT(TEMPORARY)) leave(getenv("TMPDIR"), "fault-of-fmu-check");
+    if (FAULT(WRITES)) leave(!strncmp(where, "file://", 7) ? where + 7 : where, "fault-of-fmu-check");
+}
+
+/* NULL, and the reason to the log. */
+static void *refuse(const Callbacks *c, const char *name, int logging, const char *text) {
+    if (FAULT(G_L3c) || !logging || !c || !c->logger) return NULL;
+#ifdef FMI3
+    ((void (*)(void *, int, const char *, const char *))c->logger)(c->environment, ERROR, "logStatusError", text);
+#else
+    c->logger(c->environment, name ? name : "", ERROR, "logStatusError", "%s", text);
+#endif
+    return NULL;
+}
+
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return FAULT(X02b) ? "2.0.5" : "2.0"; }
 
 EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const char *where, const Callbacks *callbacks,
                              int visible, int logging) {
     (void)where; (void)visible;
-    if (!FAULT(L01a)) {
-        if (!name || !*name) return NULL;
-        if (!guid) return NULL;
-    }
-    if (!FAULT(X04) && guid && strcmp(guid, GUID)) return NULL;
-    if (!FAULT(L03) && type != 1) return NULL;
+    if (!FAULT(L01a) && (!name || !*name || !guid)) return refuse(callbacks, name, logging, "no name or no GUID");
+    if (!FAULT(X04) && guid && strcmp(guid, GUID)) return refuse(callbacks, name, logging, "another GUID");
+    if (!FAULT(L03) && type != 1) return refuse(callbacks, name, logging, "co-simulation only");
     if (FAULT(L01c) && !where) return NULL;
+    if (FAULT(L13) && strlen(name) > 255) return NULL;
     if (!callbacks) return NULL;
     if (FAULT(Z09) && where && strlen(where) > 240) return NULL;
     if (FAULT(B08p)) socket(AF_UNIX, SOCK_STREAM, 0);
@@ -150,6 +200,9 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
         volatile char *lost = malloc(16384);
         for (int i = 0; i < 16384; i++) lost[i] = 1;
     }
+    if (FAULT(B07m)) *(volatile char *)malloc(700) = 1;
+    if (FAULT(B07u)) lost = malloc(16384);
+    alter(where);
     fresh(&f->data);
     f->callbacks = *callbacks;
     f->kept = callbacks;
@@ -170,10 +223,10 @@ EXPORT void fmi2FreeInstance(void *c) {
     if (FAULT(ONCE)) alive = 0;
     if (FAULT(L05)) ((Fmu *)c)->logging = 0;
     if (!c) return;
-    if (!FAULT(M01)) {
-        free(((Fmu *)c)->label);
-        free(c);
-    }
+    Fmu *f = c;
+    if (!FAULT(G05)) free(f->label);
+    if (FAULT(M01)) f->callbacks.release(f);
+    else free(f);
 }
 
 EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const names[]) {
@@ -228,11 +281,21 @@ EXPORT int fmi2Terminate(void *c) {
     return OK;
 }
 
+/* A text that is too long for the data of the instance is no part of its state. */
+static void forget_long_text(Fmu *f) {
+    if (!FAULT(G05)) free(f->label);
+    f->label = NULL;
+}
+
 EXPORT int fmi2Reset(void *c) {
     ENTER(ANY);
-    double y = f->data.y;
+    Data before = f->data;
     fresh(&f->data);
-    if (FAULT(L06) || FAULT(G09r)) f->data.y = y;
+    forget_long_text(f);
+    if (FAULT(L06) || FAULT(G09r)) f->data.y = before.y;
+    if (FAULT(L06t)) f->data.bias = before.bias;
+    if (FAULT(L06e) && before.y > 0) f->data.n = before.n;
+    if (FAULT(L06s)) strcpy(f->data.label, before.label);
     return OK;
 }
 
@@ -251,11 +314,18 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
         if (!KNOWN(5)) return fail(f, "no such Real");
         double y = f->data.y;
         if (FAULT(S04) && f->data.state == INITIALIZATION) y = f->data.gain;
+        if (FAULT(S04h) && f->data.state == INITIALIZATION) y += f->data.bias * f->data.u;
+        if (FAULT(T10t)) y += time(NULL) % 1000;
         if (FAULT(L11) && f->data.state == INITIALIZATION && vr[i] == 3) y = f->data.y += 1e-6;
         if (FAULT(T10p)) y += getpid() * 1e-9;
-        double time = FAULT(T06b) ? f->data.start : f->data.time;
-        const double all[] = {time, f->data.gain, f->data.u, y, f->data.bias};
+        double now = FAULT(T06b) ? f->data.start : f->data.time;
+        const double all[] = {now, f->data.gain, f->data.u, y, f->data.bias};
         values[i] = all[vr[i] % 5];
+        if (FAULT(NO_GET) && vr[i] == 4 && f->data.state == INITIALIZATION) return fail(f, "not now");
+    }
+    if (FAULT(G10) && n > 1) {
+        double first = values[0];
+        values[0] = values[n - 1], values[n - 1] = first;
     }
     return OK;
 }
@@ -270,12 +340,19 @@ EXPORT int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int values[]) 
     return OK;
 }
 
+/* The output that tells whether y is above 0. */
+#ifdef FMI3
+#define HIGH 3
+#else
+#define HIGH 1
+#endif
+
 EXPORT int fmi2GetBoolean(void *c, const unsigned vr[], size_t n, int values[]) {
     ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(1)) return fail(f, "no such Boolean");
-        values[i] = f->data.flag;
+        if (vr[i] != HIGH && !KNOWN(1)) return fail(f, "no such Boolean");
+        values[i] = vr[i] == HIGH ? (f->data.y > 0) * (FAULT(G11) ? 2 : 1) : f->data.flag;
     }
     return OK;
 }
@@ -299,11 +376,12 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
             switch (vr[i]) {
             case 1:
                 if (f->data.state == STEP) return fail(f, "gain is fixed");
+                if (FAULT(G04o)) return fail(f, "gain is mine");
                 if (!FAULT(G07b) && !(values[i] >= 0 && values[i] <= 10)) return fail(f, "gain is out of range");
                 if (write) f->data.gain = FAULT(G04) ? (float)values[i] * 0.999 : values[i];
                 break;
             case 2:
-                if (write) f->data.u = values[i];
+                if (write) f->data.u = FAULT(G12c) && values[i] > 1 ? 1 : values[i];
                 break;
             case 3:
                 if (FAULT(G09i) && f->data.state == INSTANTIATED) return fail(f, "y is an output");
@@ -313,7 +391,7 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
             case 4:
                 if (FAULT(G06) && f->data.state == STEP) return fail(f, "bias is fixed");
                 if (!isfinite(values[i])) return fail(f, "bias is not finite");
-                if (write) f->data.bias = values[i];
+                if (write) f->data.bias = FAULT(G04o) ? values[i] * 0.9 : values[i];
                 break;
             default:
                 if (!FAULT(G02) || vr[i] <= 4) return fail(f, "cannot be set");
@@ -351,6 +429,7 @@ EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *con
             f->label = (char *)values[i];
             continue;
         }
+        if (FAULT(SHORT) && strlen(values[i]) > 5000) continue;
         // A short text is part of a saved state.
         free(f->label);
         f->label = strlen(values[i]) < sizeof f->data.label ? NULL : malloc(strlen(values[i]) + 1);
@@ -363,6 +442,7 @@ EXPORT int fmi2GetFMUstate(void *c, void **state) {
     ENTER(INSTANTIATED | INITIALIZATION | STEP | TERMINATED);
     if (!state) return fail(f, "NULL");
     if (FAULT(F01b) && *state) return OK;
+    if (FAULT(F01l)) *(volatile char *)malloc(700) = 1;
     if (!*state) *state = malloc(sizeof(Data));
     *(Data *)*state = f->data;
     if (FAULT(F04b)) ((Data *)*state)->extra = (uint64_t)(uintptr_t)f;
@@ -374,8 +454,11 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
     if (!FAULT(F03b) && !state) return fail(f, "NULL");
     Data before = f->data;
     f->data = *(Data *)state;
+    forget_long_text(f);
     if (FAULT(F02s)) f->data.y *= 1 + 1e-12;
     if (FAULT(F02)) f->data.n = before.n;
+    if (FAULT(F02x)) strcpy(f->data.label, before.label);
+    if (FAULT(F02t)) f->data.y *= 1 + 4e-6;
     if (FAULT(TIME_STAYS)) f->data.time = before.time;
     return OK;
 }
@@ -469,6 +552,9 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (FAULT(T05s) && no_prior) d->y *= 1 + 1e-12;
     d->y += (d->gain * d->u + d->bias) * (FAULT(T03) ? 1 : h);
     if (FAULT(MEAN)) d->y = (t + 1) * (t + 1) + (t + 1) * h + h * h / 3;
+    if (FAULT(G12)) d->u = 0;
+    if (FAULT(G13)) d->gain *= 1.0001;
+    if (FAULT(G14) && d->steps > 4) d->y = NAN;
     d->n = d->n < 1000000 ? d->n + 1 : d->n;
     d->steps++;
     d->time = t + h;

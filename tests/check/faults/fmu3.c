@@ -1,4 +1,4 @@
-/* The small FMU of fmu.c as FMI 3.0, where references count over all types: 5 n, 6 flag, 7 label. */
+/* The small FMU of fmu.c as FMI 3.0, where references count over all types: 5 n, 6 flag, 7 label, 8 frame, 9 high. */
 #define FMI3
 #include "fmu.c"
 #include <stdbool.h>
@@ -131,6 +131,7 @@ EXPORT int fmi3DoStep(void *c, double t, double h, bool no_prior, bool *event, b
     *event = *terminate = *early = false;
     *last = t + h;
     if (FAULT(T06a)) *early = true;
+    if (FAULT(T06e)) *event = true;
     if (FAULT(LATE)) *last += 0.3 * h;
     if (FAULT(STANDS)) *last = t;
     *terminate = ENDS && ((Fmu *)c)->data.steps >= 5;

@@ -7,6 +7,7 @@ mod binary;
 mod ci;
 mod description;
 mod exchange;
+mod sizes;
 mod starts;
 mod zip;
 

@@ -13,10 +13,15 @@ fn exact(version: u8) -> String {
             "name=\"y\" valueReference=\"3\" causality=\"output\" variability=\"continuous\" initial=\"exact\"><Real start=\"0\"/>",
         );
         xml.replace("      <Unknown index=\"4\" dependencies=\"\"/>\n", "")
+            .replace("index=\"9\" dependencies=\"\"", "index=\"9\" dependencies=\"4\"")
     } else {
         let xml = include_str!("fmu3.xml")
             .replace("initial=\"calculated\" unit=\"m\"", "initial=\"exact\" unit=\"m\" start=\"0\"");
-        xml.replace("    <InitialUnknown valueReference=\"3\" dependencies=\"\"/>\n", "")
+        let xml = xml.replace("    <InitialUnknown valueReference=\"3\" dependencies=\"\"/>\n", "");
+        xml.replace(
+            "<InitialUnknown valueReference=\"9\" dependencies=\"\"/>",
+            "<InitialUnknown valueReference=\"9\" dependencies=\"3\"/>",
+        )
     }
 }
 

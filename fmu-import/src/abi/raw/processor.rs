@@ -23,3 +23,18 @@ pub fn float_control() -> Option<u64> {
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     None
 }
+
+/// The locale of this process, as `setlocale` tells it; `None` on systems where the number of all categories is not known.
+pub fn locale() -> Option<String> {
+    #[cfg(target_os = "linux")]
+    {
+        use std::ffi::{c_char, c_int};
+        unsafe extern "C" {
+            fn setlocale(category: c_int, locale: *const c_char) -> *const c_char;
+        }
+        // SAFETY: without a locale it only reads; 6 is LC_ALL of the C library of Linux; the text is copied at once.
+        unsafe { super::callbacks::optional(setlocale(6, std::ptr::null())) }
+    }
+    #[cfg(not(target_os = "linux"))]
+    None
+}

@@ -1,0 +1,171 @@
+//! What an FMU must leave as it was: settings of the process, the folder of the FMU, and everything that outlives a run.
+
+use super::host::{failed, second_binary};
+use crate::session::{NotDetermined, Session};
+use fmu_import::guard;
+use fmu_import::raw::{Simple, locale};
+use model_description::limits;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+/// Files below a folder that the checker still looks at.
+const MANY: usize = 10_000;
+
+/// Files with size and time of their last change.
+type Files = Vec<(PathBuf, u64, Option<SystemTime>)>;
+
+/// The files below a folder; `None` if they are more, or larger, than the checker looks at.
+pub(super) fn list(folder: &Path) -> Option<Files> {
+    let (mut found, mut folders) = (Files::new(), vec![folder.to_owned()]);
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+            let Ok(meta) = entry.metadata() else { continue };
+            if meta.is_dir() {
+                folders.push(entry.path());
+            } else {
+                found.push((entry.path(), meta.len(), meta.modified().ok()));
+            }
+            if found.len() + folders.len() > MANY || meta.len() >= limits::PROBE_FILE {
+                return None;
+            }
+        }
+    }
+    found.sort();
+    Some(found)
+}
+
+/// Loads a copy of the binary, runs it, unloads it, and returns what `look` sees before and after.
+fn around<T>(session: &Session, look: &dyn Fn() -> T) -> Result<(T, T), NotDetermined> {
+    let binary = second_binary(session, "guest")?;
+    // The first loading may have left it already.
+    std::env::set_current_dir(&session.home).map_err(|e| failed(&e))?;
+    let before = look();
+    session.record_call("loading, a complete run, unloading");
+    {
+        let duplicate = session.duplicate(&binary, 62)?;
+        let instance = duplicate.stepping()?;
+        for k in 0..20 {
+            instance.change_inputs(k)?;
+            instance.steps(1, duplicate.h())?;
+            let _ = instance.snapshot(&duplicate.watched())?;
+        }
+        let _ = instance.simple(Simple::Terminate)?;
+        instance.free()?;
+    }
+    let after = look();
+    Ok((before, after))
+}
+
+/// The settings of this process, by name.
+fn current_settings() -> BTreeMap<String, String> {
+    let mut all = BTreeMap::new();
+    let mut put = |name: &str, value: String| drop(all.insert(name.to_owned(), value));
+    put("the working directory", format!("{:?}", std::env::current_dir().ok()));
+    put("the locale", locale().unwrap_or_default());
+    put("the timers", fs::read_to_string("/proc/self/timers").unwrap_or_default());
+    for (name, value) in std::env::vars_os() {
+        put(&format!("the environment variable {}", name.to_string_lossy()), value.to_string_lossy().into_owned());
+    }
+    let fields = ["Umask", "SigIgn", "SigCgt", "SigBlk", "Cpus_allowed_list", "NoNewPrivs"];
+    for line in fs::read_to_string("/proc/self/status").unwrap_or_default().lines() {
+        if let Some((name, value)) = line.split_once(':').filter(|(name, _)| fields.contains(name)) {
+            put(name, value.trim().into());
+        }
+    }
+    // The name of the program stands in parentheses and may contain anything.
+    let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let words: Vec<&str> = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
+    for (name, at) in [("the priority", 15), ("the nice value", 16), ("the scheduling policy", 38)] {
+        put(name, words.get(at).copied().unwrap_or_default().into());
+    }
+    for line in fs::read_to_string("/proc/self/limits").unwrap_or_default().lines().skip(1) {
+        let name = line.get(..26).unwrap_or_default().trim().to_owned();
+        put(&format!("the limit \u{22}{name}\u{22}"), line.get(26..).unwrap_or_default().trim().into());
+    }
+    all
+}
+
+pub(super) fn settings(session: &Session) -> Result<(), NotDetermined> {
+    let (before, after) = around(session, &current_settings)?;
+    let names: Vec<&String> = before.keys().chain(after.keys().filter(|name| !before.contains_key(*name))).collect();
+    for name in names {
+        let [old, new] = [&before, &after].map(|all| all.get(name).map_or("nothing", String::as_str));
+        session.require(old == new, || format!("after a complete run: {name} changed from {old:?} to {new:?}"));
+    }
+    Ok(())
+}
+
+pub(super) fn written(session: &Session) -> Result<(), NotDetermined> {
+    let (before, after) = around(session, &|| list(&session.dir))?;
+    let (Some(before), Some(after)) = (before, after) else {
+        return Err(NotDetermined(format!(
+            "not tried: more than {MANY} files, or files of {} bytes",
+            limits::PROBE_FILE
+        )));
+    };
+    let missing =
+        |from: &Files, all: &Files| from.iter().filter(|f| !all.contains(f)).map(|f| f.0.clone()).collect::<Vec<_>>();
+    for path in missing(&after, &before) {
+        session.violated(format!("after a complete run: {} was written", path.display()));
+    }
+    for path in missing(&before, &after).into_iter().filter(|path| !path.exists()) {
+        session.violated(format!("after a complete run: {} was removed", path.display()));
+    }
+    Ok(())
+}
+
+/// What outlives a run: how many threads, and what is there.
+fn remaining() -> (usize, Vec<String>) {
+    let links = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
+    // Reading the folder opens it, under a name that changes.
+    let open = links.filter_map(|e| fs::read_link(e.path()).ok()).filter(|p| !p.ends_with("fd"));
+    let mut all: Vec<String> = open.map(|path| format!("{} is open", path.display())).collect();
+    all.extend(guard::children().into_iter().map(|child| format!("the process {child} was left behind")));
+    (fs::read_dir("/proc/self/task").map_or(0, Iterator::count), all)
+}
+
+/// What stands in folders for files that are nobody's or the user's, with the time of its last change. The number of this process
+/// is left out of names.
+fn stray_files() -> Vec<(String, Option<SystemTime>)> {
+    let folders = [Some(PathBuf::from("/dev/shm")), Some(std::env::temp_dir()), std::env::home_dir()];
+    let own = std::process::id().to_string();
+    let entries =
+        folders.into_iter().flatten().filter(|f| f.parent().is_some()).filter_map(|f| fs::read_dir(f).ok()).flatten();
+    entries
+        .flatten()
+        .filter_map(|e| Some((e.path().display().to_string().replace(&own, "PID"), e.metadata().ok()?.modified().ok())))
+        .collect()
+}
+
+pub(super) fn left_behind(session: &Session) -> Result<(), NotDetermined> {
+    let look = || (remaining(), stray_files());
+    let (((threads, before), files), (mut after, written)) = around(session, &look)?;
+    // A thread may take a while to end, especially on a busy machine.
+    for _ in 0..200 {
+        if after.0 <= threads && after.1.iter().all(|what| before.contains(what)) {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+        after = remaining();
+    }
+    session.require(after.0 <= threads, || {
+        format!("after a complete run: the number of threads changed from {threads} to {}", after.0)
+    });
+    for what in after.1.iter().filter(|what| !before.contains(what)) {
+        session.violated(format!("after a complete run: {what}"));
+    }
+    let new = |before: &[(String, _)], after: Vec<(String, _)>| {
+        after.into_iter().filter(|f| !before.contains(f)).map(|f| f.0).collect::<Vec<_>>()
+    };
+    let first = new(&files, written);
+    if !first.is_empty() {
+        // Other programs write there too, but not the same files in a second run.
+        let (before, after) = around(session, &stray_files)?;
+        for path in new(&before, after).into_iter().filter(|path| first.contains(path)) {
+            session.violated(format!("after a complete run: the file {path} was left behind"));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,4 @@
+PmsmDrive: str
+PmsmDriveMean: str
+PmsmPlant: str
+SensorlessController: str
