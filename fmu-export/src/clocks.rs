@@ -246,10 +246,16 @@ impl<E: Exported> Instance<E> {
             if let Some(tick) = self.tick_of(clock.number) {
                 tick.active = true;
             }
+            // Event Mode does not end without this tick.
+            self.current.pending = true;
             (functions.activate)(&mut self.current.block.model, clock.number, self.current.elapsed);
             self.stale = true;
         }
         Ok(())
+    }
+
+    pub(crate) fn has_active_clocks(&self) -> bool {
+        self.current.ticks.iter().flatten().any(|tick| tick.active)
     }
 
     /// Ticks what is active, at the update of the discrete states; then no clock is active.

@@ -276,8 +276,11 @@ impl<E: Exported> Abi<'_, E> {
         Ok(())
     }
 
-    /// A sample that the importer did not ask for is taken by the next step.
+    /// A sample that the importer did not ask for is taken by the next step; a clock that is active ticks now.
     pub fn fmi3_enter_step(&mut self) -> Answer {
+        if const { E::CAN.clocked.is_some() } && self.0.has_active_clocks() {
+            self.0.leave_event()?;
+        }
         self.0.current.pending = false;
         Ok(())
     }

@@ -1,0 +1,175 @@
+//! Scheduled Execution: partitions, updates of clocks, locks.
+
+use super::*;
+
+#[test]
+fn partitions_of_scheduled_execution() {
+    let host = Host::started(Kind::Se);
+    assert_eq!((host.set(U, 2.0), host.activate(FIXED, 0.0), host.get(Y)), (OK, OK, Some(0.0)));
+    assert_eq!((host.set(U, 3.0), host.activate(FIXED, 0.2), host.get(Y)), (OK, OK, Some(2.0)));
+    assert_eq!((host.ticks(), host.get(0), host.updates.get()), (2, Some(0.2), 0));
+    // Another clock may be activated at an earlier time; each has its own.
+    assert_eq!((host.activate(CONSTANT, 0.15), host.ticks()), (OK, 3));
+    for (vr, t) in
+        [(FIXED, 0.2), (FIXED, 0.1), (CONSTANT, -0.1), (CONSTANT, f64::NAN), (TRIP, 1.0), (U, 1.0), (99, 1.0)]
+    {
+        let host = Host::started(Kind::Se);
+        assert_eq!(host.activate(FIXED, 0.2), OK);
+        assert_eq!((host.activate(vr, t), host.get(Y).is_some()), (ERROR, true), "{vr} at {t}");
+        assert_eq!(host.activate(FIXED, 9.0), ERROR, "Error is for all partitions");
+    }
+    // An interval of a changing clock follows its tick.
+    assert_eq!((host.activate(CHANGING, 0.3), host.interval(CHANGING)), (OK, Some((0.2, 2))));
+    assert_eq!((host.set_interval(TUNABLE, 0.4), host.interval(TUNABLE)), (OK, Some((0.4, 2))));
+}
+
+/// Ticks of output clocks, and times of countdowns, are told by the callback, which reads each once.
+#[test]
+fn clock_updates_in_scheduled_execution() {
+    let host = Host::started(Kind::Se);
+    let heard = Rc::new(RefCell::new(Vec::new()));
+    let list = heard.clone();
+    *host.act.borrow_mut() = Some(Box::new(move |host| {
+        let told = (host.clock(TRIP), host.clock(TRIP), host.interval(COUNTDOWN), host.interval(COUNTDOWN));
+        list.borrow_mut().push(told);
+    }));
+    assert_eq!(host.activate(TRIGGERED, 1.0), OK);
+    assert_eq!(host.activate(FIXED, 1.0), OK);
+    assert_eq!(host.activate(TRIGGERED, 1.1), OK);
+    assert_eq!(host.activate(COUNTDOWN, 1.35), OK);
+    let changed = |x| (Some((x, 2)), Some((x, 1)));
+    let (first, second) = (changed(0.25), changed(0.25));
+    assert_eq!(
+        *heard.borrow(),
+        [(Some(false), Some(false), first.0, first.1), (Some(true), Some(false), second.0, second.1),]
+    );
+    assert_eq!((host.updates.get(), host.ticks()), (2, 4));
+}
+
+#[test]
+fn what_a_callback_may_not_call() {
+    type Refused = fn(&Host) -> bool;
+    let refused: [(&str, Refused); 8] = [
+        ("fmi3ActivateModelPartition", |h| h.activate(FIXED, 2.0) == OK),
+        ("fmi3GetFloat64", |h| h.get(Y).is_some()),
+        ("fmi3SetFloat64", |h| h.set(U, 1.0) == OK),
+        ("fmi3SetIntervalDecimal", |h| h.set_interval(TUNABLE, 1.0) == OK),
+        ("fmi3GetFMUState", |h| unsafe { fmi3GetFMUState(h.it.get(), &mut null_mut()) == OK }),
+        ("fmi3Terminate", |h| unsafe { fmi3Terminate(h.it.get()) == OK }),
+        ("fmi3Reset", |h| unsafe { fmi3Reset(h.it.get()) == OK }),
+        ("fmi3GetIntervalDecimal", |h| h.interval(TUNABLE).is_some()),
+    ];
+    for (name, call) in refused {
+        let host = Host::started(Kind::Se);
+        *host.act.borrow_mut() = Some(Box::new(move |host| {
+            assert!(!call(host), "{name}");
+            unsafe { fmi3FreeInstance(host.it.get()) };
+            assert_eq!(unsafe { fmi3Reset(host.it.get()) }, ERROR);
+        }));
+        assert_eq!(host.activate(TRIGGERED, 1.0), ERROR);
+        assert!(host.errors()[0].contains(name), "{name}");
+        assert_eq!(unsafe { fmi3Reset(host.it.get()) }, OK);
+    }
+}
+
+#[test]
+fn a_panic_in_a_tick_ends_one_instance() {
+    for kind in [Kind::Cs, Kind::Se] {
+        let (host, other) = (Host::started(kind), Host::started(kind));
+        assert_eq!(unsafe { fmi3SetBoolean(host.it.get(), &PANICS, 1, &Fmi3Boolean(1), 1) }, OK);
+        let tick = |host: &Host| {
+            if kind == Kind::Se {
+                return host.activate(FIXED, 0.0);
+            }
+            assert_eq!(host.set_clock(FIXED, true), OK);
+            host.update()
+        };
+        assert_eq!((tick(&host), tick(&other)), (ERROR, OK));
+        assert!(host.errors()[0].contains("panics is set"));
+        assert_eq!(other.ticks(), 1);
+    }
+}
+
+/// The scheduler is locked around what it could interrupt, never twice; two threads with a lock do not disturb each other.
+mod preemption {
+    use super::*;
+    use std::sync::atomic::{AtomicI32, AtomicU32, Ordering::SeqCst};
+
+    const ROUNDS: i32 = if cfg!(miri) { 20 } else { 1000 };
+
+    static DEPTH: AtomicI32 = AtomicI32::new(0);
+    static LOCKS: AtomicU32 = AtomicU32::new(0);
+
+    /// A lock that a thread holds once.
+    extern "C" fn lock() {
+        while DEPTH.compare_exchange(0, 1, SeqCst, SeqCst).is_err() {
+            std::thread::yield_now();
+        }
+        LOCKS.fetch_add(1, SeqCst);
+    }
+
+    extern "C" fn unlock() {
+        assert_eq!(DEPTH.swap(0, SeqCst), 1);
+    }
+
+    extern "C" fn update(environment: *mut c_void) {
+        assert_eq!(DEPTH.load(SeqCst), 1);
+        let it = unsafe { *environment.cast::<InstancePointer>() };
+        let mut active = Fmi3Boolean(9);
+        assert_eq!(unsafe { fmi3GetClock(it, &TRIP, 1, &mut active) }, OK);
+    }
+
+    #[derive(Clone, Copy)]
+    struct Shared(InstancePointer);
+    unsafe impl Send for Shared {}
+
+    impl Shared {
+        fn activate(self, vr: u32, t: f64) -> c_int {
+            unsafe { fmi3ActivateModelPartition(self.0, vr, t) }
+        }
+    }
+
+    #[test]
+    fn two_threads_with_a_lock() {
+        fmu_export::abi::quiet();
+        drop(std::panic::take_hook());
+        let token = CString::new(This::TOKEN.as_str()).unwrap();
+        let (name, token, no) = (c"kinds".as_ptr(), token.as_ptr(), Fmi3Boolean(0));
+        let mut it: InstancePointer = null_mut();
+        let environment = (&raw mut it).cast();
+        it = unsafe {
+            fmi3InstantiateScheduledExecution(
+                name,
+                token,
+                null(),
+                no,
+                no,
+                environment,
+                None,
+                Some(update),
+                Some(lock),
+                Some(unlock),
+            )
+        };
+        unsafe {
+            assert_eq!(fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0), OK);
+            assert_eq!(fmi3ExitInitializationMode(it), OK);
+        }
+        LOCKS.store(0, SeqCst);
+        let shared = Shared(it);
+        std::thread::scope(|scope| {
+            for vr in [FIXED, TRIGGERED] {
+                scope.spawn(move || {
+                    let shared = shared;
+                    for k in 1..=ROUNDS {
+                        assert_eq!(shared.activate(vr, f64::from(k)), OK);
+                    }
+                });
+            }
+        });
+        let mut n = -1;
+        assert_eq!(unsafe { fmi3GetInt32(it, &TICKS, 1, &mut n, 1) }, OK);
+        assert_eq!((n, LOCKS.load(SeqCst), DEPTH.load(SeqCst)), (2 * ROUNDS, 2 * ROUNDS.cast_unsigned() + 1, 0));
+        unsafe { fmi3FreeInstance(it) };
+    }
+}
