@@ -208,7 +208,7 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     in_initialization(session, &all)
 }
 
-/// The same in Initialization Mode, where more can be set, texts too.
+/// Restores a state in Initialization Mode, where more can be set, texts too.
 fn in_initialization(session: &Session, all: &[&ModelVariable]) -> Result<(), NotDetermined> {
     let instance = session.initializing()?;
     let (state, time) = (instance.save()?, instance.time.get());
