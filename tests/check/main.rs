@@ -1,4 +1,4 @@
-//! `fmu check` on our own archives, on those of other tools, and on whatever is no FMU. `faults/` has a fault for each check.
+//! `fmu check` on our own archives, on those of other tools, and on whatever is no FMU. `fmu-check/tests/faults/` has a fault for each check.
 #![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
 #[path = "../common/mod.rs"]
@@ -8,7 +8,7 @@ mod foreign;
 mod plant;
 mod survives;
 mod terminals;
-#[path = "faults/zip.rs"]
+#[path = "../../fmu-check/tests/faults/zip.rs"]
 mod zip;
 
 use fmu_check::{Options, Verdict, report::Report};

@@ -38,7 +38,10 @@ fn changed_bytes_are_judged() {
     let path = dir.path().join("x.fmu");
     write(
         &path,
-        &[Entry::new("modelDescription.xml", include_bytes!("faults/fmu.xml")), Entry::new("sources/x.c", b"x")],
+        &[
+            Entry::new("modelDescription.xml", include_bytes!("../../fmu-check/tests/faults/fmu.xml")),
+            Entry::new("sources/x.c", b"x"),
+        ],
     );
     let good = std::fs::read(&path).unwrap();
     let mut random = 1_u32;
@@ -61,7 +64,7 @@ fn changed_bytes_are_judged() {
 fn bad_intent_is_harmless() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("x.fmu");
-    let xml = Entry::new("modelDescription.xml", include_bytes!("faults/fmu.xml"));
+    let xml = Entry::new("modelDescription.xml", include_bytes!("../../fmu-check/tests/faults/fmu.xml"));
     write(&path, &[xml.clone(), Entry::new("resources/../../../../tmp/evil-of-fmu-check", b"x")]);
     assert_eq!(status(&path, &[]).0, Some(1));
     // The page begins with what is violated.

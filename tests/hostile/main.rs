@@ -2,7 +2,7 @@
 #![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc, clippy::new_without_default)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-#[path = "../check/faults/zip.rs"]
+#[path = "../../fmu-check/tests/faults/zip.rs"]
 mod zip;
 
 mod archives;

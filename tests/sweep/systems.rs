@@ -105,8 +105,8 @@ fn rude_fmus_run_as_well_as_polite_ones() {
         let library = folder.path(&format!("{fault}.so"));
         let mut cc = Command::new("cc");
         cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden", &format!("-DFAULTS=\"{fault}\"")]);
-        ends(cc.arg(root.join("tests/check/faults/fmu.c")).arg("-o").arg(&library).arg("-lm"), 0);
-        let mut xml = fs::read_to_string(root.join("tests/check/faults/fmu.xml")).unwrap();
+        ends(cc.arg(root.join("fmu-check/tests/faults/fmu.c")).arg("-o").arg(&library).arg("-lm"), 0);
+        let mut xml = fs::read_to_string(root.join("fmu-check/tests/faults/fmu.xml")).unwrap();
         if fault == "ONCE" {
             xml = xml.replace("canGetAndSet", "canBeInstantiatedOnlyOncePerProcess=\"true\" canGetAndSet");
         }

@@ -65,7 +65,7 @@ pub fn library(source: &str, options: &[&str], faults: &str) -> Option<Vec<u8>> 
     if !compiled.contains_key(&key) {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("x.so");
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/check/faults").join(source);
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/faults").join(source);
         let mut cc = Command::new("cc");
         cc.args(["-shared", "-fPIC", "-O1", "-w", "-fvisibility=hidden"]).args(options).arg(source);
         let output = cc.arg("-o").arg(&out).arg("-lm").output().ok()?;
