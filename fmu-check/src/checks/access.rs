@@ -21,7 +21,8 @@ const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "V07", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Probe(start_values),
         requirement: "A start value in the description equals the value in the binary.",
-        tried: "Reads every variable with a start value in Initialization Mode, and in FMI 3.0 from a new instance (should), and compares.", fix: "Generate both from one table." },
+        tried: "Reads every variable with a start value in Initialization Mode, and in FMI 3.0 from a new instance (should), and compares.",
+        fix: "Generate both from one table." },
     Check { id: "V06b", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges),
         requirement: "Integer and enumeration outputs always lie between min and max.",
         tried: "Reads integer outputs with limits over 50 steps.", fix: "Saturate the output, or correct min and max." },

@@ -44,7 +44,8 @@ pub(super) const CHECKS: &[Check] = &[
             result changes).",
         tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only." },
     Check { id: "T06a", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results),
-        requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has neither returned early nor asked for events without permission (should: \
+        requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has neither returned early \
+        nor asked for events without permission (should: \
             lastSuccessfulTime is less than a step from t + h).",
         tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK." },
     Check { id: "T06b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent),

@@ -165,7 +165,8 @@ fn faults_of_types_and_lists() {
     let typed = include_str!("fmu3.xml").replace("<LogCategories>", types).replace(
         "</ModelVariables>",
         "<UInt64 name=\"size\" valueReference=\"20\" causality=\"structuralParameter\" variability=\"fixed\" start=\"2\"/>
-         <Float64 name=\"list\" valueReference=\"21\" causality=\"parameter\" variability=\"fixed\" start=\"1 2\"><Dimension valueReference=\"20\"/></Float64></ModelVariables>",
+         <Float64 name=\"list\" valueReference=\"21\" causality=\"parameter\" variability=\"fixed\" start=\"1 2\">\
+         <Dimension valueReference=\"20\"/></Float64></ModelVariables>",
     );
     each(
         &typed,
