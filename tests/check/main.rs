@@ -4,6 +4,8 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+#[path = "../../fmu-check/tests/faults/findings.rs"]
+mod findings;
 mod foreign;
 mod plant;
 mod survives;
@@ -11,36 +13,12 @@ mod terminals;
 #[path = "../../fmu-check/tests/faults/zip.rs"]
 mod zip;
 
-use fmu_check::{Options, Verdict, report::Report};
+use findings::{check, check_within, told, violated};
+use fmu_check::Verdict;
 use std::path::Path;
-use std::time::Duration;
 
-/// All findings about a file. Time decides nothing here, however busy the machine is.
-pub fn check(path: &Path, only: &[&str]) -> Report {
-    check_within(path, only, 120)
-}
-
-/// The same with the seconds that a probe may take: few for an FMU that hangs.
-pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
-    let options = Options {
-        only: only.iter().map(ToString::to_string).collect(),
-        patience: Some(Duration::from_secs(seconds)),
-        timeout: None,
-        program: Some(env!("CARGO_BIN_EXE_fmu").into()),
-        ..Options::default()
-    };
-    fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// The ids of the violated checks.
-pub fn violated(report: &Report) -> Vec<&'static str> {
-    report.violated().map(|f| f.id).collect()
-}
-
-/// What a check that should have failed said.
-pub fn told(report: &Report) -> String {
-    report.violated().map(|f| format!("{}: {:?}", f.id, f.verdict)).collect::<Vec<_>>().join("\n")
-}
+/// What runs the probes.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_fmu");
 
 /// Our own archives pass whatever is not the packer's platform.
 #[test]

@@ -8,19 +8,17 @@ use fmu_import::Status;
 use fmu_import::raw::{Buffer, Simple};
 use model_description::{BaseType, Causality, CoSimulation, Dimension, ModelVariable, Variability};
 
-const MODE: &str = "3.0.2, 2.3.6 and 2.4.7.2";
-
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "C04", clause: MODE, levels: Levels(None, Some(Level::Must)), run: Run::Probe(resized),
+    Check { id: "C04", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Must)), run: Run::Probe(resized),
         requirement: "After Configuration Mode, arrays have the sizes that were set in it, and the simulation runs.",
         tried: "Changes each structural parameter, reads the arrays that it sizes, and makes 3 steps.",
         fix: "Allocate arrays anew in ExitConfigurationMode, and loop up to their present sizes." },
-    Check { id: "C05", clause: "3.0.2, 2.2.4 and 2.2.7.2", levels: Levels(None, Some(Level::Should)), run: Run::Probe(counts),
+    Check { id: "C05", clause: "3.0.2, 2.2.7.2", levels: Levels(None, Some(Level::Should)), run: Run::Probe(counts),
         requirement: "The number of values of a resized array is judged by its present size, and nothing is written past the values.",
         tried: "Reads and sets resized arrays with one value more, one less, and as many as before.",
         fix: "Compare nValues with the product of the present sizes before copying." },
-    Check { id: "C06", clause: "3.0.2, 2.2.4 and 2.3.6", levels: Levels(None, Some(Level::Should)), run: Run::Probe(closed),
+    Check { id: "C06", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Should)), run: Run::Probe(closed),
         requirement: "In Configuration Mode, only structural parameters can be set, and no step is made.",
         tried: "Sets an input and a parameter in Configuration Mode, and calls DoStep.", fix: "Compare causality and state before assigning." },
     Check { id: "C07", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(bounds),

@@ -7,44 +7,21 @@ mod binary;
 mod ci;
 mod description;
 mod exchange;
+mod findings;
 mod sizes;
 mod starts;
 mod zip;
 
-use fmu_check::{Options, Verdict, report::Report};
+use findings::{check, check_within, told, violated};
+use fmu_check::{Verdict, report::Report};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Mutex, PoisonError};
-use std::time::Duration;
 use zip::{Entry, write};
 
-/// All findings about a file. Time decides nothing here, however busy the machine is.
-pub fn check(path: &Path, only: &[&str]) -> Report {
-    check_within(path, only, 120)
-}
-
-/// The same with the seconds that a probe may take: few for an FMU that hangs.
-pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
-    let options = Options {
-        only: only.iter().map(ToString::to_string).collect(),
-        patience: Some(Duration::from_secs(seconds)),
-        timeout: None,
-        program: Some(env!("CARGO_BIN_EXE_fmu-check").into()),
-        ..Options::default()
-    };
-    fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// The ids of the violated checks.
-pub fn violated(report: &Report) -> Vec<&'static str> {
-    report.violated().map(|f| f.id).collect()
-}
-
-/// What a check that should have failed said.
-pub fn told(report: &Report) -> String {
-    report.violated().map(|f| format!("{}: {:?}", f.id, f.verdict)).collect::<Vec<_>>().join("\n")
-}
+/// What runs the probes.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_fmu-check");
 
 /// The verdict of a check that ran.
 pub fn verdict(report: &Report, id: &str) -> Verdict {

@@ -1,6 +1,7 @@
 //! Random calls, right and wrong, of two instances that share saved states, against a state table written down once more by hand
 //! from FMI 3.0.2, 2.2.8, 2.3.5 and 5. 2e4 calls; `FMU_CALLS=1000000` for more, `FMU_SEED` for others.
 
+use super::draw::Draw;
 use super::*;
 use std::fmt::Write;
 
@@ -73,22 +74,7 @@ impl Twin {
     }
 }
 
-struct Draw(u64);
-
 impl Draw {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.0 >> 33).unwrap() % n
-    }
-
-    fn of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-
-    fn rarely(&mut self) -> bool {
-        self.below(25) == 0
-    }
-
     /// A clock that the importer ticks; rarely the other one, a variable or no reference.
     fn clock(&mut self) -> u32 {
         if self.rarely() { self.of(&[TRIP, X, 99]) } else { self.of(&CLOCKS[..7]) }

@@ -7,6 +7,9 @@
     reason = "an importer calls C functions, rightly or not"
 )]
 
+#[path = "../common/draw.rs"]
+#[allow(unreachable_pub, reason = "a module of several test programs")]
+mod draw;
 mod random;
 
 use fmi::*;

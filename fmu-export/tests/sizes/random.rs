@@ -1,6 +1,7 @@
 //! Random calls, right and wrong, of two instances that share saved states, against a state table written down once more by hand
 //! from FMI 3.0.2, 2.3, 3.2 and 4.2, which runs the model natively. 2e4 calls; `FMU_CALLS=1000000` for more, `FMU_SEED` for others.
 
+use super::draw::Draw;
 use super::*;
 use std::fmt::Write;
 
@@ -112,22 +113,7 @@ impl Twin {
     }
 }
 
-struct Draw(u64);
-
 impl Draw {
-    fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.0 >> 33).unwrap() % n
-    }
-
-    fn of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-
-    fn rarely(&mut self) -> bool {
-        self.below(20) == 0
-    }
-
     /// A number of values, rarely one more or less.
     fn count(&mut self, right: usize) -> usize {
         if self.rarely() { self.of(&[right + 1, right.saturating_sub(1)]) } else { right }
