@@ -1,0 +1,80 @@
+//! The swing of a free rotor when the direct current turns from 120 degrees to 0: start values of psi_M and of its frequency.
+//!
+//! ```text
+//! p       = sum T (u - R i - loss), less its slope over the last 0.1 s
+//! psi_0   = Re((p_end - L_c (i_end - i_start)) (1 - e^(j 120 deg))*) / 3
+//! w_0     = 1.48 / t_50 ~ sqrt(n_p K 0.4 I / J)          t_50: half of the way
+//! ```
+//!
+//! The flux linkage that did not move says that the rotor is blocked.
+
+use super::bench::{Bench, Sample};
+use super::curve::Between;
+use super::excitation::{Record, ROWS};
+use drive_base::frame::{AlphaBeta, SQRT_3};
+use serde::{Deserialize, Serialize};
+
+/// Share of psi_r below which the flux linkage has not moved.
+const BLOCKED: f64 = 0.12;
+/// Time in s at the end that gives the slope.
+const LAST: f64 = 0.1;
+
+/// The flux linkage on its way.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Swing {
+    p: AlphaBeta,
+    i_start: AlphaBeta,
+    /// Samples, and the sample of the next record.
+    k: f64,
+    next: f64,
+    between: Between,
+    /// The last two marks: time in s and flux linkage.
+    marks: [[f64; 3]; 2],
+}
+
+impl Swing {
+    /// The current has just been turned.
+    pub(super) fn start(bench: &Bench, sample: &Sample) -> Self {
+        let between = Between::new(bench.R * bench.T / bench.L_c);
+        let marks = [[0.0; 3]; 2];
+        Self { i_start: sample.i, between, marks, next: 1.0, ..Self::default() }
+    }
+
+    /// Takes a sample, and records in steps of time that grow by 2.5 %.
+    pub(super) fn update(&mut self, bench: &Bench, sample: &Sample, record: &mut Record) {
+        let lost = self.between.lost(bench.R, &bench.curve, sample.i_last, sample.i);
+        self.p += (sample.u - lost) * bench.T;
+        self.k += 1.0;
+        let t = self.k * bench.T;
+        if t - self.marks[1][0] >= LAST {
+            self.marks = [self.marks[1], [t, self.p.alpha(), self.p.beta()]];
+        }
+        if self.k >= self.next && record.len() < ROWS {
+            record.push([t, self.p.alpha(), self.p.beta(), 0.0]);
+            self.next = (1.025 * self.k).max(self.k + 1.0);
+        }
+    }
+
+    /// At rest again: psi_0, w_0 and whether the rotor is blocked.
+    pub(super) fn finish(&self, bench: &mut Bench, sample: &Sample, record: &Record) {
+        let t = self.k * bench.T;
+        let [from, alpha, beta] = self.marks[0];
+        let slope = (self.p - AlphaBeta::new(alpha, beta)) * (1.0 / (t - from).max(bench.T));
+        let way = AlphaBeta::new(1.5, -0.5 * SQRT_3);
+        let share = |p: AlphaBeta, t: f64| (p - slope * t).dot(way) / 3.0;
+        let moved = self.p - slope * t - (sample.i - self.i_start) * bench.L_c;
+        bench.blocked = moved.magnitude() < BLOCKED * bench.psi_r;
+        let psi = moved.dot(way) / 3.0;
+        let plausible = psi > 0.25 * bench.psi_r && psi < 1.15 * bench.psi_r;
+        bench.psi_0 = if plausible { psi } else { 0.6 * bench.psi_r };
+        // The current has turned long before the rotor has: its own flux linkage counts from the start.
+        let own = (sample.i - self.i_start).dot(way) * (bench.L_c / 3.0);
+        let half = 0.5 * psi;
+        let reached = (0..record.len()).find(|&n| {
+            let [t, alpha, beta, _] = record.row(n);
+            share(AlphaBeta::new(alpha, beta), t) - own >= half
+        });
+        let t_50 = reached.map_or(t, |n| record.row(n)[0]);
+        bench.w_0 = 1.48 / t_50;
+    }
+}
