@@ -10,7 +10,7 @@
 
 use super::bench::{Bench, Sample};
 use super::curve::Between;
-use super::excitation::{Record, ROWS};
+use super::excitation::{ROWS, Record};
 use drive_base::frame::{AlphaBeta, SQRT_3};
 use serde::{Deserialize, Serialize};
 
