@@ -12,7 +12,7 @@
 use super::align::Dc;
 use super::bench::{Bench, Sample};
 use super::curve::{Curve, OCTAVE, POINTS};
-use super::least_squares::Normal;
+use super::least_squares::{Normal, Solution};
 use crate::commission::Fault;
 use drive_base::frame::AlphaBeta;
 use drive_base::math::ln;
@@ -101,22 +101,35 @@ impl Staircase {
         Ok((n + 1 < STEPS).then_some(command))
     }
 
-    /// The line through the controlled currents.
+    /// The line through the controlled currents, and half-widths: those of white residuals, or 2.36 standard errors of the
+    /// jackknife that leaves out one current after the other, which sees a tail that is not 1/i.
     fn fit(&self) -> Option<Line> {
-        let mut normal = [Normal::<3>::default(), Normal::default()];
-        for &[u, i] in &self.points[..HIGH.len()] {
-            normal[0].add(&[i, 1.0, -1.0 / i], u);
-            normal[1].add(&[i, 1.0, 0.0], u);
+        let whole = self.without(HIGH.len())?;
+        let (mut half, mut squares) = (whole.half_width, [0.0; 3]);
+        for n in 0..HIGH.len() {
+            let less = self.without(n)?;
+            squares = std::array::from_fn(|k| squares[k] + (less.x[k] - whole.x[k]) * (less.x[k] - whole.x[k]));
         }
-        let mut found = normal[0].solve(0.0)?;
-        if found.x[2] < 0.0 || found.x[1] <= 0.0 {
-            found = normal[1].solve(0.0)?;
-        }
-        let ([R, four_thirds, tail], half) = (found.x, found.half_width);
+        half = std::array::from_fn(|k| half[k].max(2.36 * (squares[k] * (8.0 / 9.0)).sqrt()));
+        let [R, four_thirds, tail] = whole.x;
         let u_dead = 0.75 * four_thirds;
-        let i_x = if u_dead > 0.0 { tail / u_dead } else { 0.0 };
-        let i_x_half = if u_dead > 0.0 { half[2] / u_dead } else { 0.0 };
+        let (i_x, i_x_half) = if u_dead > 0.0 { (tail / u_dead, half[2] / u_dead) } else { (0.0, 0.0) };
         (R > 0.0).then_some(Line { R: [R, half[0]], u_dead: [u_dead, 0.75 * half[1]], i_x: [i_x, i_x_half] })
+    }
+
+    /// Least squares without the current `left_out`; without the tail if that is negative.
+    fn without(&self, left_out: usize) -> Option<Solution<3>> {
+        let solve = |tail: f64| {
+            let mut normal = Normal::default();
+            for (n, &[u, i]) in self.points[..HIGH.len()].iter().enumerate() {
+                if n != left_out {
+                    normal.add(&[i, 1.0, -tail / i], u);
+                }
+            }
+            normal.solve(0.0)
+        };
+        let found = solve(1.0)?;
+        if found.x[2] < 0.0 || found.x[1] <= 0.0 { solve(0.0) } else { Some(found) }
     }
 
     /// f(i) = u - R i in V at the current `i` (A), with this `R` (Ohm): linear in ln i between the points.

@@ -26,7 +26,7 @@ const LARGE: f64 = 0.9;
 /// Share of the flux linkage that the moving rotor may add: in small loops, and in loops whose fit knows about it.
 const MOTION: [f64; 2] = [0.004, 0.1];
 /// R T/L above which L(0) comes from a small loop's output error.
-const SLOW: f64 = 0.02;
+const SLOW: f64 = 0.005;
 /// Greatest residual of a loop over its amplitude, along d and q.
 const RESIDUAL: [f64; 2] = [0.02, 0.01];
 /// Greatest half-widths of R_s and of the inductances.
@@ -351,11 +351,11 @@ impl Commission {
         Ok(AlphaBeta::ZERO)
     }
 
-    /// R_s and the inverter: half-widths of both fits, and half of their difference.
+    /// R_s and the inverter: the mean half-width of both fits, and half of their difference.
     fn show_resistance(&mut self) {
         let [a, b] = [&self.staircases[0].line, &self.staircases[1].line];
         let of = |a: [f64; 2], b: [f64; 2], value: f64, limit: f64| {
-            let half = 0.5 * (a[1] * a[1] + b[1] * b[1]).sqrt() + 0.5 * (a[0] - b[0]).abs();
+            let half = 0.5 * (a[1] + b[1] + (a[0] - b[0]).abs());
             let u = if value > 0.0 { half / value } else { 1.0 };
             Identified::within(value, u, limit)
         };

@@ -98,7 +98,7 @@ fn population() {
         let truths = [
             motor.R,
             motor.u_dead + motor.u_th,
-            2.0 * motor.i_x,
+            motor.i_zero(),
             motor.L_d,
             motor.L_q,
             if r.i_d > 0.0 { motor.chord_d(r.i_d) } else { 1.0 },

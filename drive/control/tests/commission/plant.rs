@@ -159,6 +159,11 @@ impl Motor {
         bisect(&at, i, 3.0 * self.L_q * i.abs()) / i
     }
 
+    /// Twice the current in A where the line of a leg ends whose tail 1/i is that of dead time and threshold together.
+    pub(crate) fn i_zero(&self) -> f64 {
+        2.0 * (self.u_dead * self.i_x + 2.0 * self.u_th * self.i_y) / (self.u_dead + self.u_th)
+    }
+
     fn leg(&self, i: f64) -> f64 {
         let a = i.abs();
         let line = if a < self.i_x { 0.5 * a / self.i_x } else { 1.0 - 0.5 * self.i_x / a };
