@@ -12,8 +12,8 @@ use super::least_squares::Normal;
 use drive_base::math::atan2;
 use serde::{Deserialize, Serialize};
 
-/// Least ratio of the inductances that shows the axis.
-const SALIENT: f64 = 1.15;
+/// Least ratio of the inductances that shows the axis of a free rotor, whose alignment shows it too, and of a blocked one.
+const SALIENT: [f64; 2] = [1.15, 1.03];
 
 /// The loops so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,8 +29,10 @@ pub(super) struct Axes {
     /// L(0) in H of both axes.
     pub(super) L_d: f64,
     pub(super) L_q: f64,
-    /// The inductances show the axis.
-    pub(super) salient: bool,
+    /// The axis is known, by the inductances or by the alignment.
+    pub(super) known: bool,
+    /// (L_q - L_d)/(L_q + L_d) where it is not: both are the mean.
+    pub(super) spread: f64,
 }
 
 impl Loops {
@@ -71,19 +73,19 @@ impl Loops {
         if g_2 >= g_0 {
             return None;
         }
-        if g_0 + g_2 > SALIENT * (g_0 - g_2) {
+        if g_0 + g_2 > SALIENT[usize::from(blocked)] * (g_0 - g_2) {
             let axis = 0.5 * atan2(g_s, g_c);
             let (L_d, L_q) = (1.0 / (g_0 + g_2), 1.0 / (g_0 - g_2));
             // A free rotor's magnet lies near 0, whichever inductance is there.
             if !blocked && axis.abs() > std::f64::consts::FRAC_PI_4 {
                 let axis = axis - std::f64::consts::FRAC_PI_2.copysign(axis);
-                return Some(Axes { axis, L_d: L_q, L_q: L_d, salient: true });
+                return Some(Axes { axis, L_d: L_q, L_q: L_d, known: true, spread: 0.0 });
             }
-            return Some(Axes { axis, L_d, L_q, salient: true });
+            return Some(Axes { axis, L_d, L_q, known: true, spread: 0.0 });
         }
         if blocked {
-            return Some(Axes { axis: 0.0, L_d: 1.0 / g_0, L_q: 1.0 / g_0, salient: false });
+            return Some(Axes { axis: 0.0, L_d: 1.0 / g_0, L_q: 1.0 / g_0, known: false, spread: g_2 / g_0 });
         }
-        Some(Axes { axis: 0.0, L_d: 1.0 / (g_0 + g_c), L_q: 1.0 / (g_0 - g_c), salient: false })
+        Some(Axes { axis: 0.0, L_d: 1.0 / (g_0 + g_c), L_q: 1.0 / (g_0 - g_c), known: true, spread: 0.0 })
     }
 }

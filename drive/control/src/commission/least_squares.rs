@@ -26,6 +26,8 @@ impl<const P: usize> Default for Normal<P> {
 pub(super) struct Solution<const P: usize> {
     pub(super) x: [f64; P],
     pub(super) half_width: [f64; P],
+    /// Variance of the residual.
+    pub(super) variance: f64,
 }
 
 impl<const P: usize> Normal<P> {
@@ -83,7 +85,7 @@ impl<const P: usize> Normal<P> {
             let column = solve(&|k| if k == j { 1.0 } else { 0.0 });
             2.0 * (variance * column[j].max(0.0)).sqrt() * scale[j]
         });
-        Some(Solution { x, half_width })
+        Some(Solution { x, half_width, variance })
     }
 }
 
@@ -98,7 +100,7 @@ mod tests {
             let x = 0.1 * f64::from(k) - 1.0;
             normal.add(&[1.0, x, x * x, 0.0], 3.0 - 2.0 * x + 0.5 * x * x);
         }
-        let Solution { x, half_width } = normal.solve(0.0).unwrap();
+        let Solution { x, half_width, .. } = normal.solve(0.0).unwrap();
         for (x, expected) in x.into_iter().zip([3.0, -2.0, 0.5, 0.0]) {
             assert!((x - expected).abs() < 1e-12, "{x}");
         }

@@ -361,7 +361,8 @@ impl Commission {
         };
         self.results.R_s = of(a.R, b.R, self.bench.R, LIMIT_R);
         self.results.u_dead = of(a.u_dead, b.u_dead, self.bench.u_dead, 0.5);
-        let double = |x: [f64; 2]| [2.0 * x[0], 2.0 * x[1]];
+        // The tails of dead time and threshold differ from 1/i: twice the half-width holds 95 % of the values.
+        let double = |x: [f64; 2]| [2.0 * x[0], 4.0 * x[1]];
         self.results.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * self.bench.i_x, 0.5);
     }
 
@@ -478,23 +479,28 @@ impl Commission {
         self.enter(if self.bench.blocked { Stage::Down } else { Stage::Ready });
     }
 
-    /// Inductances, refused where the loops do not agree or do not fit.
+    /// Inductances, refused where the loops do not agree or do not fit; without the axis, neither chords nor saturation.
     fn show_inductances(&mut self) {
-        let Axes { L_d, L_q, .. } = self.axes;
+        let Axes { L_d, L_q, known, spread, .. } = self.axes;
         let of = |large: Option<Magnetization>, limit: f64, L: f64| {
             let large = large.filter(|m| m.residual <= limit)?;
-            let u = (L / large.at_zero() - 1.0).abs() + 0.01;
+            let u = (L / large.at_zero() - 1.0).abs() + 0.01 + spread;
             (u <= LIMIT_L).then_some((large, u))
         };
+        let chord = |m: &Magnetization, sign: f64, u: f64| {
+            m.chord(sign).filter(|_| known).map_or(Identified::default(), |value| Identified { value, u })
+        };
         let r = &mut self.results;
+        r.north = known && !r.blocked;
         if let Some((d, u)) = of(self.large[0], RESIDUAL[0], L_d) {
-            let chord = |sign: f64| d.chord(sign).map_or(Identified::default(), |value| Identified { value, u });
-            (r.L_d, r.L_d_plus, r.L_d_minus, r.i_d) = (Identified { value: L_d, u }, chord(1.0), chord(-1.0), d.A);
-            let [s_2, s_3] = d.saturation(L_d);
-            (r.s_2, r.s_3) = (Identified { value: s_2, u: 0.5 }, Identified { value: s_3, u: 0.5 });
-            r.north = !r.blocked;
+            (r.L_d, r.i_d) = (Identified { value: L_d, u }, d.A);
+            (r.L_d_plus, r.L_d_minus) = (chord(&d, 1.0, u), chord(&d, -1.0, u));
+            if known {
+                let [s_2, s_3] = d.saturation(L_d);
+                (r.s_2, r.s_3) = (Identified { value: s_2, u: 0.5 }, Identified { value: s_3, u: 0.5 });
+            }
             let difference = r.L_d_minus.value - r.L_d_plus.value;
-            if r.blocked && self.axes.salient && difference.abs() > 0.005 * L_d {
+            if known && r.blocked && difference.abs() > 0.005 * L_d {
                 r.north = true;
                 if difference < 0.0 {
                     std::mem::swap(&mut r.L_d_plus, &mut r.L_d_minus);
@@ -504,9 +510,8 @@ impl Commission {
             }
         }
         if let Some((q, u)) = of(self.large[1], RESIDUAL[1], L_q) {
-            r.L_q = Identified { value: L_q, u };
-            r.L_q_chord = q.chord(1.0).map_or(Identified::default(), |value| Identified { value, u });
-            r.i_q = q.A;
+            (r.L_q, r.i_q) = (Identified { value: L_q, u }, q.A);
+            r.L_q_chord = chord(&q, 1.0, u);
         }
     }
 }

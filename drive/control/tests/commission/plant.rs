@@ -132,6 +132,12 @@ impl Motor {
         self.i_0 = (self.d_0 + self.d_4 * self.psi.powi(4)) * self.psi;
     }
 
+    /// The rotor is blocked.
+    pub(crate) fn held(mut self) -> Self {
+        self.blocked = true;
+        self
+    }
+
     /// Without saturation, dead time, noise and quantization.
     pub(crate) fn ideal(mut self) -> Self {
         self.saturate(0.0, 0.0, 0.0);
@@ -193,7 +199,9 @@ pub(crate) struct Bench {
     psi: AlphaBeta,
     pub(crate) w: f64,
     theta: f64,
-    command: AlphaBeta,
+    /// Commands, the newest first, and which of them acts.
+    commands: [AlphaBeta; 3],
+    pub(crate) delay: usize,
     pub(crate) gates: bool,
     waiting: bool,
     steps: u32,
@@ -215,8 +223,9 @@ impl Bench {
         let h = (motor.T / 4.0).min(1.2 * motor.L_d * 0.4 / Z);
         let steps = (1..60_u32).find(|&n| f64::from(n) * h >= motor.T).unwrap_or(60);
         let (psi, theta) = (AlphaBeta::new(cos, sin) * motor.psi, motor.theta_0 / motor.n_p);
-        let (command, gates) = (AlphaBeta::ZERO, false);
-        Self { motor, random: Random(seed), psi, w: 0.0, theta, command, gates, waiting: false, steps, most: 0.0 }
+        let (commands, gates) = ([AlphaBeta::ZERO; 3], false);
+        let random = Random(seed);
+        Self { motor, random, psi, w: 0.0, theta, commands, delay: 1, gates, waiting: false, steps, most: 0.0 }
     }
 
     fn turned(v: AlphaBeta, cos: f64, sin: f64) -> AlphaBeta {
@@ -243,11 +252,13 @@ impl Bench {
         Phases { a, b, c }
     }
 
-    /// The waiting command acts for a period, and this one waits.
+    /// A command acts for a period, and this one waits.
     pub(crate) fn tick(&mut self, u: AlphaBeta, gates: bool) {
         let m = &self.motor;
-        let span = Phases::from_stator(self.command).span();
-        let acting = if span > m.u_dc { self.command * (m.u_dc / span) } else { self.command };
+        self.commands = [u, self.commands[0], self.commands[1]];
+        let command = self.commands[self.delay];
+        let span = Phases::from_stator(command).span();
+        let acting = if span > m.u_dc { command * (m.u_dc / span) } else { command };
         let h = m.T / f64::from(self.steps);
         if !self.gates {
             // The current has ended, and the rotor coasts.
@@ -265,7 +276,7 @@ impl Bench {
                 self.theta += h / 6.0 * (a.theta + 2.0 * (b.theta + c.theta) + d.theta);
             }
         }
-        (self.gates, self.waiting, self.command) = (self.waiting, gates, u);
+        (self.gates, self.waiting) = (self.waiting, gates);
     }
 
     fn rates(&self, slope: Rates, h: f64, u: AlphaBeta) -> Rates {
