@@ -2,7 +2,7 @@
 //! saturation, without a shaft sensor and without a load machine. The rotor may be free or blocked.
 //!
 //! [`Commission`] is called once a sample with the currents and the link's voltage, and commands voltage and gates. It keeps
-//! no references and allocates nothing; a sample takes bounded time, at most one evaluation of [`output_error`].
+//! no references and allocates nothing; a sample takes bounded time, at most one simulation of a record of 512 rows.
 //!
 //! ```text
 //! Offsets      gates off: means of the phases                                        offsets
@@ -27,9 +27,11 @@ mod offsets;
 mod output_error;
 mod probe;
 mod resistance;
+mod results;
 mod sequence;
 mod swing;
 
+pub use results::{Identified, Results};
 pub use sequence::{Commission, Setup, Voltage};
 
 use fmu_core::enumeration;
@@ -69,65 +71,10 @@ enumeration! {
 
 use CommissionFault as Fault;
 
-/// A value and the half-width of its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Identified {
-    /// Value in its SI unit; 0 until known or if it is refused.
-    pub value: f64,
-    /// Relative half-width; 1: refused.
-    pub u: f64,
-}
-
-impl Default for Identified {
-    fn default() -> Self {
-        Self { value: 0.0, u: 1.0 }
-    }
-}
-
-impl Identified {
-    /// The `value` if its relative half-width `u` is at most `limit`.
-    fn within(value: f64, u: f64, limit: f64) -> Self {
-        if u <= limit { Self { value, u } } else { Self::default() }
-    }
-}
-
-/// What the commissioning has found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Results {
-    /// Stator resistance with one transistor in Ohm.
-    pub R_s: Identified,
-    /// L(0) in H of the d-axis and of the q-axis.
-    pub L_d: Identified,
-    /// L(0) in H of the q-axis.
-    pub L_q: Identified,
-    /// psi(i)/i - without the magnet - in H at `i_d` along the magnet.
-    pub L_d_plus: Identified,
-    /// psi(i)/i - without the magnet - in H at `i_d` against the magnet.
-    pub L_d_minus: Identified,
-    /// psi(i)/i in H at `i_q`.
-    pub L_q_chord: Identified,
-    /// Dead-time voltage of a leg in V, with the threshold of its devices.
-    pub u_dead: Identified,
-    /// Twice the current in A below which a leg loses less.
-    pub i_zero: Identified,
-    /// Second-order d-axis saturation coefficient in A/Wb2.
-    pub s_2: Identified,
-    /// Third-order d-axis saturation coefficient in A/Wb3.
-    pub s_3: Identified,
-    /// Currents in A of the chords.
-    pub i_d: f64,
-    /// Current in A of the q-axis chord.
-    pub i_q: f64,
-    /// Angle of the d-axis in rad at the end; of a blocked rotor modulo pi unless `north`.
-    pub axis: f64,
-    /// The rotor did not turn.
-    pub blocked: bool,
-    /// The saturation shows the magnet's north pole at `axis`.
-    pub north: bool,
-}
-
 /// Integers of eight bytes: the size of a saved state does not depend on them.
 mod fixed_size {
+    #![expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a field by reference")]
+
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     pub(super) fn serialize<S: Serializer>(value: &u64, serializer: S) -> Result<S::Ok, S::Error> {

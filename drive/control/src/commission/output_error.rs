@@ -46,6 +46,16 @@ pub(super) struct OutputError {
     L: f64,
 }
 
+/// How far the fit is.
+pub(super) enum Progress {
+    /// It goes on.
+    Continues,
+    /// The loop has no magnetization.
+    Failed,
+    /// The magnetization.
+    Found(Magnetization),
+}
+
 /// The magnetization of an axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Magnetization {
@@ -87,13 +97,8 @@ impl OutputError {
         Some(Self { along, trial, damping: 1e-3, psi, A, L, cost: f64::MAX, ..Self::default() })
     }
 
-    /// One evaluation; the magnetization at the end, or `Err`: no such machine.
-    pub(super) fn update(
-        &mut self,
-        bench: &Bench,
-        excitation: &Excitation,
-        record: &Record,
-    ) -> Option<Option<Magnetization>> {
+    /// One evaluation.
+    pub(super) fn update(&mut self, bench: &Bench, excitation: &Excitation, record: &Record) -> Progress {
         let (cost, normal) = self.evaluate(bench, excitation, record);
         self.evaluations += 1.0;
         let mut over = self.evaluations >= MOST;
@@ -106,13 +111,13 @@ impl OutputError {
             over |= self.damping > 1e6;
         }
         if over {
-            return Some(self.finish(bench, record));
+            return self.finish(bench, record).map_or(Progress::Failed, Progress::Found);
         }
         let Some(step) = self.normal.solve(self.damping) else {
-            return Some(None);
+            return Progress::Failed;
         };
         self.trial = std::array::from_fn(|k| self.best[k] + step.x[k]);
-        None
+        Progress::Continues
     }
 
     fn finish(&self, bench: &Bench, record: &Record) -> Option<Magnetization> {

@@ -25,42 +25,42 @@ const REPEATED: f64 = 4.0;
 /// Longest time in s that a current may take to end.
 const DECAY: f64 = 5.0;
 
-/// Inductances about the circle, in 1/H.
+/// 1/L about the circle in 1/H: its mean g_0, and g_c and g_s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Tensor {
-    g_0: f64,
-    g_c: f64,
-    g_s: f64,
+    mean: f64,
+    cos: f64,
+    sin: f64,
 }
 
 impl Tensor {
     /// 1/L(phi) through `y` (1/H) at 0, 60 and 120 degrees; the salient part at most 0.75 of the mean one.
     fn through(y: [f64; 3]) -> Self {
         let half_sqrt_3 = 0.5 * drive_base::frame::SQRT_3;
-        let g_0 = (y[0] + y[1] + y[2]) / 3.0;
-        let g_c = (2.0 / 3.0) * (y[0] - 0.5 * (y[1] + y[2]));
-        let g_s = (2.0 / 3.0) * half_sqrt_3 * (y[1] - y[2]);
-        let size = (g_c * g_c + g_s * g_s).sqrt();
-        let share = if size > 0.75 * g_0 { 0.75 * g_0 / size } else { 1.0 };
-        Self { g_0, g_c: g_c * share, g_s: g_s * share }
+        let mean = (y[0] + y[1] + y[2]) / 3.0;
+        let cos = (2.0 / 3.0) * (y[0] - 0.5 * (y[1] + y[2]));
+        let sin = (2.0 / 3.0) * half_sqrt_3 * (y[1] - y[2]);
+        let size = (cos * cos + sin * sin).sqrt();
+        let share = if size > 0.75 * mean { 0.75 * mean / size } else { 1.0 };
+        Self { mean, cos: cos * share, sin: sin * share }
     }
 
     /// L in H at the angle `phi` (rad).
     pub(super) fn inductance(&self, phi: f64) -> f64 {
-        let (sin, cos) = sin_cos(2.0 * phi);
-        1.0 / (self.g_0 + self.g_c * cos + self.g_s * sin)
+        let (s, c) = sin_cos(2.0 * phi);
+        1.0 / (self.mean + self.cos * c + self.sin * s)
     }
 
     /// Angle of the smallest inductance in rad.
     fn axis(&self) -> f64 {
-        0.5 * atan2(self.g_s, self.g_c)
+        0.5 * atan2(self.sin, self.cos)
     }
 
     /// This machine with its smallest inductance at 0 rad.
     pub(super) fn aligned(&self) -> Self {
         let axis = self.axis();
-        let size = 1.0 / self.inductance(axis) - self.g_0;
-        Self { g_0: self.g_0, g_c: size, g_s: 0.0 }
+        let size = 1.0 / self.inductance(axis) - self.mean;
+        Self { mean: self.mean, cos: size, sin: 0.0 }
     }
 }
 
@@ -73,7 +73,8 @@ pub(super) struct Probe {
     /// The levels are found: the six directions follow.
     measures: bool,
     /// Sixths of a turn.
-    direction: f64,
+    #[serde(with = "crate::commission::fixed_size")]
+    direction: u64,
     repetition: f64,
     /// The weaker pulse of the two.
     weak: bool,
@@ -103,10 +104,11 @@ impl Probe {
         if self.V == 0.0 {
             (self.V, self.n) = (LEVELS.0 * sample.u_dc, 1.0);
         }
-        let axis = Axis::<Estimated>::at(std::f64::consts::FRAC_PI_3 * self.direction);
+        let axis = Axis::<Estimated>::at(std::f64::consts::FRAC_PI_3 * self.sixths());
         let k = self.k;
         self.k += 1.0;
-        if k == self.n + bench.delay {
+        // The end of the pulse that acts `delay` samples later.
+        if (k - self.n - bench.delay).abs() < 0.5 {
             let i = axis.from_stator(sample.i).d();
             self.reached = self.reached.max(i);
             self.sums[usize::from(self.weak)] += i;
@@ -133,15 +135,20 @@ impl Probe {
         Probed::Voltage(axis.along(u))
     }
 
+    /// The direction in sixths of a turn.
+    fn sixths(&self) -> f64 {
+        u32::try_from(self.direction).map_or(0.0, f64::from)
+    }
+
     /// The pulse is over.
     fn next(&mut self, bench: &Bench) -> Probed {
         let wait = Probed::Voltage(AlphaBeta::ZERO);
         if !self.measures {
-            self.direction += 1.0;
-            if self.direction < 3.0 {
+            self.direction += 1;
+            if self.direction < 3 {
                 return wait;
             }
-            self.direction = 0.0;
+            self.direction = 0;
             self.sums = [0.0; 2];
             if self.reached >= REACHED * bench.I {
                 self.measures = true;
@@ -174,10 +181,8 @@ impl Probe {
         }
         let L = 0.4 * self.V * self.n * bench.T / more;
         self.L_c = if self.L_c == 0.0 { L } else { self.L_c.min(L) };
-        let third = [0, 1, 2, 0, 1, 2];
-        let n = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0].iter().position(|&d| d == self.direction).unwrap_or(0);
-        self.y[third[n]] += 0.5 / L;
-        self.direction += 1.0;
-        if self.direction < 6.0 { wait } else { Probed::Done(self.L_c, Tensor::through(self.y)) }
+        self.y[usize::try_from(self.direction % 3).unwrap_or(0)] += 0.5 / L;
+        self.direction += 1;
+        if self.direction < 6 { wait } else { Probed::Done(self.L_c, Tensor::through(self.y)) }
     }
 }

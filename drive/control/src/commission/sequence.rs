@@ -6,11 +6,11 @@ use super::bench::{Bench, Sample};
 use super::curve::Curve;
 use super::excitation::{Excitation, Plan, Record};
 use super::offsets::Offsets;
-use super::output_error::{Along, Magnetization, OutputError};
+use super::output_error::{Along, Magnetization, OutputError, Progress};
 use super::probe::{Probe, Probed};
 use super::resistance::{Staircase, adopt};
 use super::swing::Swing;
-use super::{CommissionFault as Fault, CommissionState, Identified, Results};
+use super::{CommissionFault as Fault, CommissionState, Results};
 use drive_base::frame::{AlphaBeta, Phases};
 use serde::{Deserialize, Serialize};
 
@@ -27,12 +27,6 @@ const LARGE: f64 = 0.9;
 const MOTION: [f64; 2] = [0.004, 0.1];
 /// R T/L above which L(0) comes from a small loop's output error.
 const SLOW: f64 = 0.005;
-/// Greatest residual of a loop over its amplitude, along d and q.
-const RESIDUAL: [f64; 2] = [0.02, 0.01];
-/// Greatest half-widths of R_s and of the inductances.
-const LIMIT_R: f64 = 0.01;
-const LIMIT_L: f64 = 0.05;
-
 /// What the commissioning is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Setup {
@@ -221,15 +215,16 @@ impl Commission {
             self.refuse(Fault::Time);
         } else if !(measured.is_finite() && measured.magnitude() <= TOO_MUCH * self.setup.i) {
             self.refuse(Fault::Current);
-        } else if self.samples == 1.0 {
+        } else if self.u_dc <= 0.0 {
             self.u_dc = u_dc;
             self.bench.U = u_dc / drive_base::frame::SQRT_3;
             self.bench.psi_r = self.bench.U / self.setup.speed;
         }
-        if !(u_dc.is_finite() && u_dc > 0.8 * self.u_dc) && !self.is_over() {
-            self.refuse(Fault::Voltage);
-        }
         if self.is_over() {
+            return Voltage::default();
+        }
+        if !(u_dc.is_finite() && u_dc > 0.8 * self.u_dc) {
+            self.refuse(Fault::Voltage);
             return Voltage::default();
         }
         let Phases { a, b, c } = self.offset;
@@ -308,11 +303,11 @@ impl Commission {
                 }
                 self.looped()?;
             }
-            Stage::Fit => {
-                if let Some(found) = self.fit.update(&self.bench, &self.excitation, &self.record) {
-                    self.fitted(found);
-                }
-            }
+            Stage::Fit => match self.fit.update(&self.bench, &self.excitation, &self.record) {
+                Progress::Continues => {}
+                Progress::Failed => self.fitted(None),
+                Progress::Found(magnetization) => self.fitted(Some(magnetization)),
+            },
         }
         Ok(AlphaBeta::ZERO)
     }
@@ -346,24 +341,9 @@ impl Commission {
             self.enter(Stage::Return);
             return Ok(AlphaBeta::ZERO);
         }
-        self.show_resistance();
+        self.results.show_resistance(&self.bench, [&self.staircases[0].line, &self.staircases[1].line]);
         self.enter(if self.bench.blocked { Stage::Down } else { Stage::Ready });
         Ok(AlphaBeta::ZERO)
-    }
-
-    /// R_s and the inverter: the mean half-width of both fits, and half of their difference.
-    fn show_resistance(&mut self) {
-        let [a, b] = [&self.staircases[0].line, &self.staircases[1].line];
-        let of = |a: [f64; 2], b: [f64; 2], value: f64, limit: f64| {
-            let half = 0.5 * (a[1] + b[1] + (a[0] - b[0]).abs());
-            let u = if value > 0.0 { half / value } else { 1.0 };
-            Identified::within(value, u, limit)
-        };
-        self.results.R_s = of(a.R, b.R, self.bench.R, LIMIT_R);
-        self.results.u_dead = of(a.u_dead, b.u_dead, self.bench.u_dead, 0.5);
-        // The tails of dead time and threshold differ from 1/i: twice the half-width holds 95 % of the values.
-        let double = |x: [f64; 2]| [2.0 * x[0], 4.0 * x[1]];
-        self.results.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * self.bench.i_x, 0.5);
     }
 
     fn swing(&mut self, sample: &Sample) -> Result<AlphaBeta, Fault> {
@@ -469,7 +449,7 @@ impl Commission {
             Excited::LargeD | Excited::SmallD => Excited::LargeQ,
             Excited::LargeQ if slow(self.axes.L_q) => Excited::SmallQ,
             Excited::LargeQ | Excited::SmallQ => {
-                self.show_inductances();
+                self.results.show_inductances(&self.axes, self.large);
                 self.enter(Stage::Done);
                 return;
             }
@@ -477,41 +457,5 @@ impl Commission {
         self.excited = next;
         self.dc.u = 0.0;
         self.enter(if self.bench.blocked { Stage::Down } else { Stage::Ready });
-    }
-
-    /// Inductances, refused where the loops do not agree or do not fit; without the axis, neither chords nor saturation.
-    fn show_inductances(&mut self) {
-        let Axes { L_d, L_q, known, spread, .. } = self.axes;
-        let of = |large: Option<Magnetization>, limit: f64, L: f64| {
-            let large = large.filter(|m| m.residual <= limit)?;
-            let u = (L / large.at_zero() - 1.0).abs() + 0.01 + spread;
-            (u <= LIMIT_L).then_some((large, u))
-        };
-        let chord = |m: &Magnetization, sign: f64, u: f64| {
-            m.chord(sign).filter(|_| known).map_or(Identified::default(), |value| Identified { value, u })
-        };
-        let r = &mut self.results;
-        r.north = known && !r.blocked;
-        if let Some((d, u)) = of(self.large[0], RESIDUAL[0], L_d) {
-            (r.L_d, r.i_d) = (Identified { value: L_d, u }, d.A);
-            (r.L_d_plus, r.L_d_minus) = (chord(&d, 1.0, u), chord(&d, -1.0, u));
-            if known {
-                let [s_2, s_3] = d.saturation(L_d);
-                (r.s_2, r.s_3) = (Identified { value: s_2, u: 0.5 }, Identified { value: s_3, u: 0.5 });
-            }
-            let difference = r.L_d_minus.value - r.L_d_plus.value;
-            if known && r.blocked && difference.abs() > 0.005 * L_d {
-                r.north = true;
-                if difference < 0.0 {
-                    std::mem::swap(&mut r.L_d_plus, &mut r.L_d_minus);
-                    r.axis = drive_base::math::wrap(r.axis + std::f64::consts::PI);
-                    r.s_2.value = -r.s_2.value;
-                }
-            }
-        }
-        if let Some((q, u)) = of(self.large[1], RESIDUAL[1], L_q) {
-            (r.L_q, r.i_q) = (Identified { value: L_q, u }, q.A);
-            r.L_q_chord = chord(&q, 1.0, u);
-        }
     }
 }

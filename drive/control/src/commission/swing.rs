@@ -6,8 +6,8 @@
 //! w_0     = 1.48 / t_50 ~ sqrt(n_p K 0.4 I / J)          t_50: half of the way
 //! ```
 //!
-//! Of a blocked rotor, p is a linear function of the current at every instant, whatever its saliency; of a free one, the
-//! current has turned before the rotor has. The residual of the least squares over the whole record, with drift, tells.
+//! A blocked rotor's p is a linear function of the current at every instant, whatever the saliency; a free rotor turns after
+//! the current has turned. The residual of a least squares of p on current and time, over the whole record, separates the two.
 
 use super::bench::{Bench, Sample};
 use super::curve::Between;

@@ -8,6 +8,7 @@ use drive_control::commission::{
     Commission, CommissionFault as Fault, CommissionState as State, Identified, Results, Setup,
 };
 use plant::{Bench, Motor, between_axes};
+use std::fmt::Write as _;
 
 fn setup(motor: &Motor) -> Setup {
     Setup { T_s: motor.T, delay: 1, i: motor.I, speed: motor.w_rated, t_max: 150.0 }
@@ -176,14 +177,14 @@ fn an_abort_at_any_time_is_safe() {
 fn faults_are_named_and_safe() {
     let motor = Motor::draw(1, 7);
     // The rotor turns at the start; so slowly that the dead time hides its EMF, the alignment brakes it.
-    for share in [0.05, 0.3, -1.0] {
+    for (share, hidden) in [(0.05, true), (0.3, false), (-1.0, false)] {
         let start = |commission: &mut Commission, bench: &mut Bench| {
             if commission.state() == State::Offsets {
                 bench.w = share * motor.w_rated / motor.n_p;
             }
         };
         let (mut commission, _) = run_with(&motor, 1, start);
-        if share == 0.05 && commission.state() == State::Done {
+        if hidden && commission.state() == State::Done {
             check(commission.results(), &motor, [0.002, 0.01, 0.02], &[]);
             continue;
         }
@@ -195,7 +196,7 @@ fn faults_are_named_and_safe() {
     for (state, u_dc, gain, fault) in [
         (State::Probe, 0.79, 1.0, Fault::Voltage),
         (State::Saturation, 0.79, 1.0, Fault::Voltage),
-        (State::Resistance, 1.0, 3.0, Fault::Current),
+        (State::Resistance, 1.0, 4.0, Fault::Current),
         (State::Axes, 1.0, f64::NAN, Fault::Current),
         (State::Swing, f64::NAN, 1.0, Fault::Voltage),
     ] {
@@ -265,7 +266,7 @@ impl Errors {
     }
 }
 
-/// Prints the figures, and compares those of 300 free machines of seed 1 with the limits: errors in % at 95 and 99 %, greatest
+/// Prints errors and half-widths in % (-100 and 100: refused), and compares those of 300 free machines of seed 1 with the limits: errors in % at 95 and 99 %, greatest
 /// share refused, share inside the intervals.
 #[test]
 #[ignore = "a minute: cargo test -p drive-control --test commission population -- --ignored --nocapture; MACHINES, SEED, BLOCKED=1 select"]
@@ -275,7 +276,7 @@ fn population() {
     let limits = [
         ("R_s", 0.18, 0.39, 5, 93),
         ("u_dead", 0.27, 1.35, 5, 93),
-        ("i_zero", 9.0, 20.0, 5, 93),
+        ("i_zero", 9.0, 20.0, 10, 93),
         ("L_d", 1.125, 1.95, 5, 93),
         ("L_q", 2.4, 4.5, 18, 93),
         ("L_d_plus", 0.9, 1.2, 5, 93),
@@ -293,11 +294,8 @@ fn population() {
             format!("{index:3} {:?} {:?} {:.1} s", commission.state(), commission.fault(), commission.time());
         for (errors, (name, found, truth)) in errors.iter_mut().zip(compared(r, &motor)) {
             errors.take(found, truth);
-            line += &if found.u < 1.0 {
-                format!(", {name} {:+.3} ({:.3})", 100.0 * (found.value / truth - 1.0), 100.0 * found.u)
-            } else {
-                format!(", {name} -")
-            };
+            let error = 100.0 * (found.value / truth - 1.0);
+            write!(line, ", {name} {error:+.3} ({:.3})", 100.0 * found.u).unwrap();
         }
         let axis = between_axes(r.axis, bench.angle()).to_degrees();
         let x = [motor.L_d, motor.L_q].map(|L| motor.R * motor.T / L);

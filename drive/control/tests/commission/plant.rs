@@ -260,12 +260,7 @@ impl Bench {
         let span = Phases::from_stator(command).span();
         let acting = if span > m.u_dc { command * (m.u_dc / span) } else { command };
         let h = m.T / f64::from(self.steps);
-        if !self.gates {
-            // The current has ended, and the rotor coasts.
-            self.theta += if m.blocked { 0.0 } else { self.w * m.T };
-            let (sin, cos) = (m.n_p * self.theta).sin_cos();
-            self.psi = AlphaBeta::new(cos, sin) * m.psi;
-        } else {
+        if self.gates {
             for _ in 0..self.steps {
                 let a = self.rates(Rates { psi: AlphaBeta::ZERO, w: 0.0, theta: 0.0 }, 0.0, acting);
                 let b = self.rates(a, 0.5 * h, acting);
@@ -275,6 +270,11 @@ impl Bench {
                 self.w += h / 6.0 * (a.w + 2.0 * (b.w + c.w) + d.w);
                 self.theta += h / 6.0 * (a.theta + 2.0 * (b.theta + c.theta) + d.theta);
             }
+        } else {
+            // The current has ended, and the rotor coasts.
+            self.theta += if m.blocked { 0.0 } else { self.w * m.T };
+            let (sin, cos) = (m.n_p * self.theta).sin_cos();
+            self.psi = AlphaBeta::new(cos, sin) * m.psi;
         }
         (self.gates, self.waiting) = (self.waiting, gates);
     }
