@@ -33,8 +33,19 @@ struct Shared {
     notes: Vec<String>,
 }
 
-/// Names of the columns that all results have; neither a measure nor a varied variable may have one.
-pub(crate) const OWN: [&str; 3] = ["run", "end", "error"];
+/// The first column of all results; neither a measure nor a varied variable may have its name.
+pub(crate) const RUN: &str = "run";
+
+/// Names of the last two columns of all results: `end` and `error`, or `run.end` and `run.error` where one of these names is taken.
+pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
+    ["end", "error"].map(|name| {
+        let mut name = name.to_owned();
+        while taken(&name) {
+            name = format!("{RUN}.{name}");
+        }
+        name
+    })
+}
 
 /// Name and unit of a column of results.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -137,8 +148,8 @@ impl Plan {
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
         for (name, measure) in &definition.measure.0 {
-            if OWN.contains(&name.as_str()) {
-                return invalid(format!("measure: {name} is a column of all results ({}): rename it", OWN.join(", ")));
+            if name == RUN {
+                return invalid(format!("measure: {name} is the column with the number of each run: rename it"));
             }
             let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
             measures.push(of(measure, &settings, &mut recorded).map_err(wrong)?);
@@ -431,5 +442,17 @@ impl Runner {
             measures.iter().zip(&*states).zip(&plan.0.columns).map(of).collect()
         };
         Outcome { result: ended.map_err(|error| error.to_string()).and_then(measured), end }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::last_columns;
+
+    #[test]
+    fn the_last_columns_step_aside() {
+        assert_eq!(last_columns(|_| false), ["end", "error"]);
+        assert_eq!(last_columns(|name| name == "error"), ["end", "run.error"]);
+        assert_eq!(last_columns(|name| ["end", "run.end"].contains(&name)), ["run.run.end", "error"]);
     }
 }

@@ -172,14 +172,15 @@ class Plan:
 
         Returns:
             a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
-            `error`. A run that fails has NaN for its measures and one line as its error, otherwise "". Same bits for any number
-            of threads. Enumerations have their names, in the table and in measures of their values ("" where a run fails).
+            `error`; beside a measure of that name, `run.end` and `run.error`. A run that fails has NaN for its measures and one line
+            as its error, otherwise "". Same bits for any number of threads. Enumerations have their names, in the table and in
+            measures of their values ("" where a run fails).
         """
         columns = {str(name): column for name, column in _columns(table).items()}
         runs = columns.pop("run", None)
         for name in columns:
-            if name in ("end", "error"):
-                raise ValueError(f"{name} is a column of all results: name the FMU, fmus={{'x': file}}, and the column x.{name}")
+            if name in self.measures:
+                raise ValueError(f"the measure {name} has the name of a column of the table: rename the measure")
         values = [_values(name, column, self._core, self._name(name)) for name, column in columns.items()]
         if not values:
             raise ValueError("the table has no column; expected one with the values of each varied variable")
@@ -195,7 +196,7 @@ class Plan:
         with _bar(progress, n) as told:
             measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, told)
         results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
-        return dict(zip(["run", *columns, *self.measures, "end", "error"], [runs, *results, end, np.array(errors, dtype=object)]))
+        return dict(zip(self._columns(columns), [runs, *results, end, np.array(errors, dtype=object)]))
 
     def gradient(self, at, *, step=1e-4, threads=None):
         """The measures and their derivatives with respect to variables, by central differences of runs, all in parallel.
@@ -220,13 +221,18 @@ class Plan:
         h = step * np.where(point == 0.0, 1.0, np.abs(point))
         rows = np.concatenate([[point], point + np.diag(h), point - np.diag(h)])
         runs = self.run_many(dict(zip(at, rows.T)), threads=threads)
-        failed = [error for error in runs["error"] if error]
+        failed = [error for error in runs[next(reversed(runs))] if error]
         if failed:
             raise FmuError(None, None, None, f"gradient: {failed[0]}")
         n = len(point)
         values = {name: float(runs[name][0]) for name in self.measures}
         slopes = {name: (runs[name][1 : n + 1] - runs[name][n + 1 :]) / (2.0 * h) for name in self.measures}
         return values, {name: dict(zip(at, slope.tolist())) for name, slope in slopes.items()}
+
+    def _columns(self, varied):
+        """Names of the columns of results."""
+        named = ["run", *varied, *self.measures]
+        return named + self._core.last_columns(named)
 
     def _named(self, columns):
         """Columns of varied variables, enumerations with their names."""
@@ -251,9 +257,9 @@ class Plan:
         """The columns and types that `run_many` returns, without rows. `columns` are the varied ones, by default the design's."""
         columns = self._core.varied if columns is None else columns
         varied = self._named({name: np.empty(0) for name in columns})
-        measures = {name: _named(items, np.empty(0)) for name, items in zip(self.measures, self._core.measure_items)}
-        last = {"end": np.empty(0), "error": np.empty(0, dtype=object)}
-        return {"run": np.empty(0, dtype=np.int64), **varied, **measures, **last}
+        measures = [_named(items, np.empty(0)) for items in self._core.measure_items]
+        last = [np.empty(0), np.empty(0, dtype=object)]
+        return dict(zip(self._columns(varied), [np.empty(0, dtype=np.int64), *varied.values(), *measures, *last]))
 
 
 @contextmanager

@@ -165,6 +165,13 @@ impl Plan {
         self.plan.measures().iter().map(|column| column.items.clone()).collect()
     }
 
+    /// Names of the last two columns of results that also have these columns.
+    #[staticmethod]
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+    fn last_columns(columns: Vec<String>) -> [String; 2] {
+        fmu_sweep::last_columns(|name| columns.iter().any(|column| column == name))
+    }
+
     /// The number that a text stands for as the value of a variable.
     fn number(&self, name: &str, text: &str) -> PyResult<f64> {
         gate(|| {
