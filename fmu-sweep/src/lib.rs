@@ -22,6 +22,7 @@
 
 #![forbid(unsafe_code)]
 
+mod around;
 pub mod definition;
 mod design;
 mod error;

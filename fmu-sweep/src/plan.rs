@@ -73,6 +73,13 @@ pub struct Variable {
     targets: Vec<Target>,
 }
 
+impl Variable {
+    /// The variables of FMUs that it sets.
+    pub(crate) fn targets(&self) -> &[Target] {
+        &self.targets
+    }
+}
+
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
@@ -183,6 +190,21 @@ impl Plan {
         let measures = measures.into_iter().map(|(measure, _)| measure).collect();
         let reuse = definition.reuse.unwrap_or(true);
         Ok(Self(Arc::new(Shared { system, connectors, measures, columns, trace, set, outputs, reuse, notes })))
+    }
+
+    /// The FMUs, ready for runs.
+    pub(crate) fn system(&self) -> &cosimulation::Plan {
+        &self.0.system
+    }
+
+    /// Whether the instances of a run are reset for the next; otherwise each run has new ones.
+    pub(crate) fn reuses(&self) -> bool {
+        self.0.reuse
+    }
+
+    /// What reads the measures from recorded values.
+    pub(crate) fn readers(&self) -> &[Measure] {
+        &self.0.measures
     }
 
     /// Names and units of the measures.
@@ -309,6 +331,14 @@ impl Plan {
         self.run_rows(variables, u64::try_from(length).unwrap_or(u64::MAX), &row, threads, progress)
     }
 
+    /// The measures that the readings of a run have come to.
+    pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<f64>, String> {
+        let of = |((measure, reading), column): ((&Measure, &Reading), &Column)| {
+            measure.end(reading).map_err(|cause| format!("{}: {cause}", column.name))
+        };
+        self.0.measures.iter().zip(readings).zip(&self.0.columns).map(of).collect()
+    }
+
     /// Runs `count` rows that a function makes: it gets the number of a row, from 0, and fills in the values.
     ///
     /// # Errors
@@ -353,11 +383,11 @@ impl Plan {
 }
 
 impl Outcomes {
-    fn empty(measures: usize, rows: usize) -> Self {
+    pub(crate) fn empty(measures: usize, rows: usize) -> Self {
         Self { measures: vec![vec![f64::NAN; rows]; measures], end: vec![f64::NAN; rows], errors: vec![None; rows] }
     }
 
-    fn put(&mut self, row: usize, outcome: Outcome) {
+    pub(crate) fn put(&mut self, row: usize, outcome: Outcome) {
         self.end[row] = outcome.end;
         match outcome.result {
             Ok(values) => self.measures.iter_mut().zip(values).for_each(|(column, x)| column[row] = x),
@@ -435,13 +465,8 @@ impl Runner {
                 ControlFlow::Continue(())
             })
         });
-        let measured = |_| {
-            let of = |((measure, state), column): ((&Measure, &Reading), &Column)| {
-                measure.end(state).map_err(|cause| format!("{}: {cause}", column.name))
-            };
-            measures.iter().zip(&*states).zip(&plan.0.columns).map(of).collect()
-        };
-        Outcome { result: ended.map_err(|error| error.to_string()).and_then(measured), end }
+        let result = ended.map_err(|error| error.to_string()).and_then(|_| plan.measured(states));
+        Outcome { result, end }
     }
 }
 
