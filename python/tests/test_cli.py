@@ -88,7 +88,7 @@ def test_simulate_is_simulate(standard, tmp_path):
 def test_an_ssp_file(standard, tmp_path):
     """Names without a dot are connectors of the system."""
     ssp, out = tmp_path / "drive.ssp", tmp_path / "out.csv"
-    fmu("ssp", "--out", ssp, *(["--fmi", "3"] if standard.name == "fmi3" else []))
+    fmu("ssp", "--fmus", standard, "--out", ssp, *(["--fmi", "3"] if standard.name == "fmi3" else []))
     fmu("simulate", ssp, "--input", "speed_ref=0:0,0.01:50", "--input", "u_dc=325", "--stop", "0.05", "--step", "1e-4", "--csv", out)
     with open(out, newline="") as file:
         header, *lines = csv.reader(file)
