@@ -1,9 +1,9 @@
 //! Runs at a point and beside it, for derivatives of measures with respect to variables.
 //!
 //! Two runs that the master integrates (Model Exchange) differ by more than their values: the solver chooses other steps, and that
-//! difference, of the size of its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system,
-//! [`with_copy`](fmu_import::cosimulation::Plan::with_copy), which is integrated in common steps. What is differentiated is then the computed solution, and its derivative
-//! is as exact as the solution itself, at any tolerance. Events and samples are each run's own.
+//! difference, of the size of its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
+//! ([`with_copy`](fmu_import::cosimulation::Plan::with_copy)), which is integrated in common steps. What is differentiated is then the
+//! computed solution, and its derivative is as exact as the solution itself, at any tolerance. Events and samples are each run's own.
 //!
 //! Source: H. G. Bock, Numerical treatment of inverse problems in chemical reaction kinetics, in: Modelling of Chemical Reaction
 //! Systems, Springer 1981, 102-125: internal numerical differentiation.
