@@ -31,7 +31,7 @@ fn installed() -> PathBuf {
 /// Archives of the Reference-FMUs that the tests integrate.
 fn reference() -> PathBuf {
     let folder = scratch().join("python-reference");
-    let package = ["bouncing-ball", "van-der-pol", "stair", "dahlquist"].map(String::from).to_vec();
+    let package = ["bouncing-ball", "van-der-pol", "stair", "dahlquist", "state-space"].map(String::from).to_vec();
     let build = Build { package, out: Some(folder.clone()), ..Build::default() };
     build::run(&build).expect("Reference-FMUs that build");
     folder
@@ -70,6 +70,7 @@ fn the_package() {
     let files = [
         "simulate",
         "exchange",
+        "arrays",
         "linearize",
         "drives",
         "plot",
