@@ -154,7 +154,7 @@ pub struct ClockTiming {
     pub interval: Option<f64>,
     /// Time from the start to the first tick.
     pub shift: f64,
-    /// Of clocks that tick together, the one with the smallest number is first (Scheduled Execution).
+    /// Smaller numbers are first when clocks tick together (Scheduled Execution).
     pub priority: Option<u32>,
 }
 
