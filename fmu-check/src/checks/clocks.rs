@@ -29,7 +29,8 @@ pub(super) const CHECKS: &[Check] = &[
         fix: "Use one value for the description and the functions." },
     Check { id: "K04", clause: "3.0.2, 2.2.8.4", levels: MUST, run: Run::Probe(qualified),
         requirement: "The qualifier of an interval is one of the three; Changed is told once; only a countdown clock has an interval that is not yet known.",
-        tried: "Calls GetIntervalDecimal twice after each update of a run.", fix: "Tell fmi3IntervalChanged at the first call after a change, then fmi3IntervalUnchanged." },
+        tried: "Calls GetIntervalDecimal twice after each update of a run.", fix: "Tell fmi3IntervalChanged at the first call after a change, then \
+            fmi3IntervalUnchanged." },
     Check { id: "K05", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(counted),
         requirement: "An interval that the FMU tells is finite and not negative.",
         tried: "Looks at the intervals of a run.", fix: "Compute the interval from the time of the event." },

@@ -23,7 +23,8 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Where intermediateVariableGetAllowed is true, the intermediate outputs that the importer asked for can be read.",
         tried: "Gets each intermediate output in the callbacks of 5 steps.", fix: "Allow getters while the callback runs." },
     Check { id: "U02", clause: CLAUSE, levels: MUST, run: Run::Probe(returned),
-        requirement: "Where canReturnEarly is true, the step ends early when the importer asks for it, from the time of the callback to the time that was asked for.",
+        requirement: "Where canReturnEarly is true, the step ends early when the importer asks for it, from the time of the callback to the time that \
+            was asked for.",
         tried: "Asks for a return at the time of the callback, in the middle of the rest, and at the end of the step.",
         fix: "Look at earlyReturnRequested after each callback, and write earlyReturn and lastSuccessfulTime." },
     Check { id: "U03", clause: CLAUSE, levels: MUST, run: Run::Probe(allowed),

@@ -20,7 +20,8 @@ pub(super) const CHECKS: &[Check] = &[
         fix: "Accept fmi3ActivateModelPartition for every clock with causality input, in Clock Activation Mode." },
     Check { id: "P01", clause: "3.0.2, 5.2.1", levels: SHOULD, run: Run::Scheduled(unknown),
         requirement: "fmi3ActivateModelPartition of a reference that is not an input clock returns Error.",
-        tried: "Calls it with an output clock, a variable, and a reference that nothing has.", fix: "Return Error unless the reference is that of an input clock." },
+        tried: "Calls it with an output clock, a variable, and a reference that nothing has.", fix: "Return Error unless the reference is that of an \
+            input clock." },
     Check { id: "P02", clause: "3.0.2, 5.2.1", levels: SHOULD, run: Run::Scheduled(too_early),
         requirement: "Before the initialization ends, fmi3ActivateModelPartition returns Error.",
         tried: "Calls it in Instantiated and in Initialization Mode.", fix: "Check the state at the beginning of the function." },
