@@ -32,7 +32,7 @@ mod sequence;
 mod swing;
 
 pub use results::{Identified, Results};
-pub use sequence::{Commission, Setup, Voltage};
+pub use sequence::{Commission, CommissionSetup, Voltage};
 
 use fmu_core::enumeration;
 use serde::{Deserialize, Serialize};

@@ -29,7 +29,7 @@ const MOTION: [f64; 2] = [0.004, 0.1];
 const SLOW: f64 = 0.005;
 /// What the commissioning is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Setup {
+pub struct CommissionSetup {
     /// Sample period in s, > 0.
     pub T_s: f64,
     /// Samples from taking the currents to the voltage acting: 0, 1 or 2.
@@ -89,7 +89,7 @@ enum Excited {
 /// The commissioning of one machine.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Commission {
-    setup: Setup,
+    setup: CommissionSetup,
     stage: Stage,
     excited: Excited,
     fault: Fault,
@@ -120,7 +120,7 @@ pub struct Commission {
 
 impl Commission {
     /// Before the first sample.
-    pub fn new(setup: Setup) -> Self {
+    pub fn new(setup: CommissionSetup) -> Self {
         let bench = Bench {
             T: setup.T_s,
             delay: f64::from(setup.delay),

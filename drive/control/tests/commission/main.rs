@@ -5,13 +5,13 @@ mod plant;
 
 use drive_base::frame::Phases;
 use drive_control::commission::{
-    Commission, CommissionFault as Fault, CommissionState as State, Identified, Results, Setup,
+    Commission, CommissionFault as Fault, CommissionSetup, CommissionState as State, Identified, Results,
 };
 use plant::{Bench, Motor, between_axes};
 use std::fmt::Write as _;
 
-fn setup(motor: &Motor) -> Setup {
-    Setup { T_s: motor.T, delay: 1, i: motor.I, speed: motor.w_rated, t_max: 150.0 }
+fn setup(motor: &Motor) -> CommissionSetup {
+    CommissionSetup { T_s: motor.T, delay: 1, i: motor.I, speed: motor.w_rated, t_max: 150.0 }
 }
 
 fn is_over(commission: &Commission) -> bool {
@@ -111,7 +111,7 @@ fn exact_data_give_exact_values_that_scale_with_the_sensors() {
 fn every_delay_gives_the_same_values() {
     for delay in [0, 2] {
         let motor = Motor::draw(1, 7);
-        let setup = Setup { delay, ..setup(&motor) };
+        let setup = CommissionSetup { delay, ..setup(&motor) };
         let (mut commission, mut bench) = (Commission::new(setup), Bench::new(motor.clone(), 1));
         bench.delay = usize::try_from(delay).unwrap();
         while !is_over(&commission) {
@@ -208,7 +208,7 @@ fn faults_are_named_and_safe() {
         }
         is_safe(&mut commission, fault);
     }
-    let mut commission = Commission::new(Setup { t_max: 2.0, ..setup(&motor) });
+    let mut commission = Commission::new(CommissionSetup { t_max: 2.0, ..setup(&motor) });
     let mut bench = Bench::new(motor.clone(), 1);
     while !is_over(&commission) {
         period(&mut commission, &mut bench, 1.0, motor.u_dc);
@@ -267,9 +267,9 @@ impl Errors {
 }
 
 /// Prints errors and half-widths in % (-100 and 100: refused), and compares those of 300 free machines of seed 1 with the limits: errors in % at 95 and 99 %, greatest
-/// share refused, share inside the intervals.
+/// share refused, share inside the intervals. `MACHINES`, `SEED` and `BLOCKED=1` select others.
 #[test]
-#[ignore = "a minute: cargo test -p drive-control --test commission population -- --ignored --nocapture; MACHINES, SEED, BLOCKED=1 select"]
+#[ignore = "a minute: cargo test -p drive-control --test commission population -- --ignored --nocapture"]
 fn population() {
     let number = |name: &str, default: u64| std::env::var(name).map_or(default, |n| n.parse().unwrap());
     let (n, seed, blocked) = (number("MACHINES", 300), number("SEED", 1), number("BLOCKED", 0) > 0);
