@@ -1,0 +1,84 @@
+//! Angle and speed of the rotor without the steps of an encoder: a parabola through the neighbors of each row.
+
+use super::record::Record;
+use std::ops::Range;
+
+/// Time in s to each side of a row that its parabola covers.
+const REACH: f64 = 4e-3;
+
+/// Angle and speed. Rows near the end of a stretch have none and belong to no stretch here.
+#[derive(Clone, Debug)]
+pub struct Motion {
+    /// Electrical angle in rad.
+    pub theta: Vec<f64>,
+    /// Electrical speed in rad/s.
+    pub w: Vec<f64>,
+    /// Stretches in which both are known.
+    pub runs: Vec<Range<usize>>,
+}
+
+impl Motion {
+    /// Least squares with `theta = c_0 + c_1 x + c_2 x^2` over `2 m + 1` rows: the angle is `c_0`, the speed `c_1`.
+    pub fn of(record: &Record) -> Self {
+        let m = ((REACH / record.step).round() as usize).max(3);
+        let mut motion = Self { theta: record.theta.clone(), w: vec![0.0; record.theta.len()], runs: Vec::new() };
+        let count = (2 * m + 1) as f64;
+        // Sums of x^2 and x^4 over -m..=m.
+        let square = |x: usize| (x * x) as f64;
+        let (s_2, s_4) = (1..=m).fold((0.0, 0.0), |(a, b), x| (a + 2.0 * square(x), b + 2.0 * square(x) * square(x)));
+        let determinant = count * s_4 - s_2 * s_2;
+        for run in record.runs.iter().filter(|run| run.len() > 2 * m + 8) {
+            let inner = run.start + m..run.end - m;
+            // Running sums of 1, x and x^2 times the angle; started again now and then, so that rounding does not grow.
+            for part in (inner.start..inner.end).step_by(4096).map(|from| from..(from + 4096).min(inner.end)) {
+                let base = record.theta[part.start];
+                let value = |k: usize| record.theta[k] - base;
+                let [mut a, mut b, mut c] = [0.0; 3];
+                for k in part.start - m..=part.start + m {
+                    let x = k as f64 - part.start as f64;
+                    (a, b, c) = (a + value(k), b + x * value(k), c + x * x * value(k));
+                }
+                for k in part.clone() {
+                    if k > part.start {
+                        // All x of the rows kept fall by one; a row leaves at -m - 1 and one comes at m.
+                        let (old, new, edge) = (value(k - 1 - m), value(k + m), m as f64);
+                        let (a_0, b_0) = (a - old, b + edge * old);
+                        c = c - edge * edge * old - 2.0 * b_0 + a_0 + edge * edge * new;
+                        b = b_0 - a_0 + edge * new;
+                        a = a_0 + new;
+                    }
+                    motion.theta[k] = base + (s_4 * a - s_2 * c) / determinant;
+                    motion.w[k] = b / s_2 / record.step;
+                }
+            }
+            motion.runs.push(inner);
+        }
+        motion
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_is_its_own_fit() {
+        let (step, rows) = (1e-4, 9000);
+        let at = |k: usize| {
+            let t = k as f64 * step;
+            (3.0 + 70.0 * t - 40.0 * t * t, 70.0 - 80.0 * t)
+        };
+        let record =
+            Record { theta: (0..rows).map(|k| at(k).0).collect(), step, runs: vec![0..rows], ..Record::empty() };
+        let motion = Motion::of(&record);
+        assert_eq!(motion.runs, [40..rows - 40]);
+        for k in motion.runs[0].clone() {
+            let (theta, w) = at(k);
+            assert!(
+                (motion.theta[k] - theta).abs() < 1e-9 && (motion.w[k] - w).abs() < 1e-6,
+                "{k}: {} {theta}",
+                motion.theta[k]
+            );
+        }
+    }
+}
