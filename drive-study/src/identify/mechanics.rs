@@ -54,7 +54,7 @@ impl Shown {
             let i = record.i[k] * Complex::cis(-(motion.theta[k] - fit.theta_0 + motion.w[k] * fit.tau));
             1.5 * n_p * (psi_M + (L_d - L_q) * i.re) * i.im
         };
-        let (mut rows, mut greatest, mut bins) = (Vec::new(), 0.0_f64, [0_usize; 11]);
+        let (mut rows, mut greatest, mut bins) = (Vec::new(), 0.0_f64, [0_usize; 101]);
         for run in &motion.runs {
             let mut start = run.start;
             while start + width < run.end {
@@ -71,12 +71,12 @@ impl Shown {
                 x[0] = (motion.w[start + width] - motion.w[start]) / n_p;
                 let time = width as f64 * record.step;
                 greatest = greatest.max((made / time).abs());
-                bins[((x[1] / time / speed).abs() * 10.0).clamp(0.0, 10.0).floor() as usize] += 1;
+                bins[((x[1] / time / speed).abs() * 100.0).clamp(0.0, 100.0) as usize] += 1;
                 rows.push((x, y));
                 start += width;
             }
         }
-        let levels = bins.iter().filter(|&&n| n as f64 >= 0.03 * rows.len() as f64 && n > 0).count();
+        let levels = levels(bins, rows.len());
         Self { speed, torque: greatest, levels, rows }
     }
 
@@ -111,9 +111,24 @@ impl Shown {
         };
         let blocks: Vec<Block> = rows.chunks(BLOCK).map(block).collect();
         let units = DMatrix::<f64>::identity(SIZE, SIZE);
-        let gradients: Vec<DVector<f64>> = units.column_iter().map(|c| c.into_owned()).collect();
+        let gradients: Vec<DVector<f64>> = units.column_iter().map(nalgebra::Matrix::into_owned).collect();
         let half = interval::half_widths(&blocks, &gradients)?;
         Some(Mechanics { p: [p[0], p[1], p[2]], half: [half[0], half[1], half[2]] })
+    }
+}
+
+/// Levels in a histogram of the speed with 100 bins: the fullest tenth of the range, without it and its surroundings the next
+/// one, as long as it has 3 % of the windows.
+fn levels(mut bins: [usize; 101], windows: usize) -> usize {
+    let mut levels = 0;
+    loop {
+        let sum = |from: usize| bins[from..from + 10].iter().sum::<usize>();
+        let Some(fullest) = (0..=91).max_by_key(|&from| sum(from)) else { return levels };
+        if sum(fullest) == 0 || (sum(fullest) as f64) < 0.03 * windows as f64 {
+            return levels;
+        }
+        levels += 1;
+        bins[fullest.saturating_sub(5)..(fullest + 15).min(101)].fill(0);
     }
 }
 

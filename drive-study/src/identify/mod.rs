@@ -5,6 +5,14 @@
 //! - [`electrical`]: the linear fit of the voltage equations; [`legs`]: the inverter's curve in it. [`mechanics`]: inertia and friction.
 //! - [`interval`]: half-widths. [`verdict`]: what is written and what is refused. [`machine_file`]: the file for `fmu tune`.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    clippy::cast_possible_wrap,
+    reason = "counts of rows, far below 2^52"
+)]
+
 pub mod columns;
 pub mod electrical;
 pub mod interval;
@@ -138,7 +146,7 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     let mut notes = record.notes.clone();
     let misfit = facts.misfit().then(|| verdict::better(&record, &motion, timing, i_max, &fit));
     notes.push("values scale with the sensors: 1 % more current makes R_s, L_d and L_q 1 % less and J and friction 1 % more; 1 % more voltage makes all but the friction's ratio 1 % more".into());
-    let values = verdict::values(&record, &fit, mechanics.as_ref(), &facts, misfit, doubt);
+    let values = verdict::values(&fit, mechanics.as_ref(), &facts, misfit, doubt);
     let rating = |given: Option<f64>, seen: f64| (given.unwrap_or(seen), given.is_some());
     let ratings = Ratings {
         current: rating(options.current, i_max),

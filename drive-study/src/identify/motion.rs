@@ -3,8 +3,12 @@
 use super::record::Record;
 use std::ops::Range;
 
-/// Time in s to each side of a row that its parabola covers.
+/// Time in s to each side of a row that its parabola covers, at most: a change of the torque within it bends the parabola.
 const REACH: f64 = 4e-3;
+
+/// Noise of the angle in rad from which on it covers that. Noise falls with the root of the time, the error of a bend grows with its
+/// square, so that less noise is best met with a time that falls with the power 0.4.
+const NOISE: f64 = 1e-3;
 
 /// Angle and speed. Rows near the end of a stretch have none and belong to no stretch here.
 #[derive(Clone, Debug)]
@@ -20,7 +24,8 @@ pub struct Motion {
 impl Motion {
     /// Least squares with `theta = c_0 + c_1 x + c_2 x^2` over `2 m + 1` rows: the angle is `c_0`, the speed `c_1`.
     pub fn of(record: &Record) -> Self {
-        let m = ((REACH / record.step).round() as usize).max(3);
+        let reach = REACH * (noise(record) / NOISE).powf(0.4).min(1.0);
+        let m = ((reach / record.step).round() as usize).max(3);
         let mut motion = Self { theta: record.theta.clone(), w: vec![0.0; record.theta.len()], runs: Vec::new() };
         let count = (2 * m + 1) as f64;
         // Sums of x^2 and x^4 over -m..=m.
@@ -29,8 +34,9 @@ impl Motion {
         let determinant = count * s_4 - s_2 * s_2;
         for run in record.runs.iter().filter(|run| run.len() > 2 * m + 8) {
             let inner = run.start + m..run.end - m;
-            // Running sums of 1, x and x^2 times the angle; started again now and then, so that rounding does not grow.
-            for part in (inner.start..inner.end).step_by(4096).map(|from| from..(from + 4096).min(inner.end)) {
+            // Running sums of 1, x and x^2 times the angle; started again now and then, because rounding
+            // grows.
+            for part in (inner.start..inner.end).step_by(16 * m).map(|from| from..(from + 16 * m).min(inner.end)) {
                 let base = record.theta[part.start];
                 let value = |k: usize| record.theta[k] - base;
                 let [mut a, mut b, mut c] = [0.0; 3];
@@ -57,6 +63,16 @@ impl Motion {
     }
 }
 
+/// Noise of the angle in rad, steps of an encoder included: a smooth angle has no third difference.
+fn noise(record: &Record) -> f64 {
+    let (mut squares, mut count) = (0.0, 0.0_f64);
+    for w in record.runs.iter().flat_map(|run| record.theta[run.clone()].windows(4)) {
+        squares += (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2);
+        count += 1.0;
+    }
+    (squares / (20.0 * count.max(1.0))).sqrt()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -71,7 +87,7 @@ mod tests {
         let record =
             Record { theta: (0..rows).map(|k| at(k).0).collect(), step, runs: vec![0..rows], ..Record::empty() };
         let motion = Motion::of(&record);
-        assert_eq!(motion.runs, [40..rows - 40]);
+        assert_eq!(motion.runs, [3..rows - 3]);
         for k in motion.runs[0].clone() {
             let (theta, w) = at(k);
             assert!(

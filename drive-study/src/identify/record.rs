@@ -109,7 +109,7 @@ impl Record {
             for _ in 0..order {
                 all = all.windows(2).map(|w| w[1] - w[0]).collect();
             }
-            all.iter().map(|x| x.norm_sqr()).sum::<f64>() / all.len().max(1) as f64
+            all.iter().map(Complex::norm_sqr).sum::<f64>() / all.len().max(1) as f64
         };
         let sigma = match &zero {
             Some(rows) => (differences(rows.clone(), 1) / 2.0).sqrt(),
@@ -117,7 +117,9 @@ impl Record {
         };
         if let Some(rows) = zero {
             let offset = i[rows.clone()].iter().sum::<Complex>() / rows.len() as f64;
-            i.iter_mut().for_each(|i| *i -= offset);
+            for i in &mut i {
+                *i -= offset;
+            }
         } else {
             notes.push("no row is without voltage at the start: the currents are taken without an offset (--zero 0:0.05 names a time without current)".into());
         }
@@ -210,22 +212,24 @@ fn angle(signals: &Signals, options: &Options, runs: &[Range<usize>]) -> Result<
     for run in runs {
         let mut turns = 0.0;
         let mut last = theta[run.start];
-        for k in run.start + 1..run.end {
-            let jump = theta[k] - last;
+        for (k, theta) in theta.iter_mut().enumerate().take(run.end).skip(run.start + 1) {
+            let jump = *theta - last;
             if jump.abs() > 2.2 * PI {
                 let what = format!(
                     "jumps by {jump:.4} rad, more than a turn, between two rows: check its unit, for example {name} [deg]"
                 );
                 return signals.refuse(k, name, &what);
             }
-            last = theta[k];
+            last = *theta;
             turns -= (jump / (2.0 * PI)).round();
-            theta[k] += turns * 2.0 * PI;
+            *theta += turns * 2.0 * PI;
         }
     }
     let range = theta.iter().fold(0.0_f64, |most, x| most.max((x - theta[0]).abs()));
     ensure!(range > 0.0, "{}: {name} never changes: the fit needs a turning rotor", signals.file);
-    theta.iter_mut().for_each(|x| *x *= factor);
+    for x in &mut theta {
+        *x *= factor;
+    }
     Ok(theta)
 }
 
@@ -281,9 +285,13 @@ fn current(signals: &Signals, theta: &[f64]) -> Result<Vec<Complex>> {
         [Some(a), Some(b), Some(c)] => {
             let sum: Vec<f64> = rows.clone().map(|k| a[k] + b[k] + c[k]).collect();
             let shift = mean(&sum);
-            let rest = (sum.iter().map(|s| (s - shift).powi(2)).sum::<f64>() / sum.len() as f64).sqrt();
-            let all =
-                (rows.clone().map(|k| a[k] * a[k] + b[k] * b[k] + c[k] * c[k]).sum::<f64>() / sum.len() as f64).sqrt();
+            let count = sum.len() as f64;
+            // What changes from row to row is noise of the sensors.
+            let noise = sum.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * count);
+            let spread = sum.iter().map(|s| (s - shift).powi(2)).sum::<f64>() / count;
+            let rest = (spread - noise).max(0.0).sqrt();
+            let square = |k: usize| a[k] * a[k] + b[k] * b[k] + c[k] * c[k];
+            let all = (rows.clone().map(square).sum::<f64>() / count).sqrt();
             if rest > 0.05 * all {
                 let worst = rows.clone().max_by(|&x, &y| (sum[x] - shift).abs().total_cmp(&(sum[y] - shift).abs()));
                 let what = format!(
@@ -320,7 +328,7 @@ fn clipped(signals: &Signals) -> Vec<bool> {
     for x in ["i_a", "i_b", "i_c"].iter().filter_map(|name| signals.get(name)) {
         let (low, high) = x.iter().fold((f64::MAX, f64::MIN), |(low, high), x| (low.min(*x), high.max(*x)));
         for (k, w) in x.windows(3).enumerate() {
-            if w.iter().all(|x| *x == high) || w.iter().all(|x| *x == low) {
+            if w.iter().all(|x| *x >= high) || w.iter().all(|x| *x <= low) {
                 marked[k.saturating_sub(5)..(k + 8).min(rows)].fill(true);
             }
         }

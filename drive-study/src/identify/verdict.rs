@@ -73,6 +73,8 @@ impl Facts {
 
 /// What would fit better: other phases, another direction, another delay.
 pub(super) fn better(record: &Record, motion: &Motion, timing: Timing, i_max: f64, fit: &Fit) -> String {
+    /// A third of a turn.
+    const THIRD: f64 = 2.0 * std::f64::consts::PI / 3.0;
     let changed = |change: fn(Complex) -> Complex| {
         let mut other = record.clone();
         other.i.iter_mut().for_each(|i| *i = change(*i));
@@ -85,22 +87,14 @@ pub(super) fn better(record: &Record, motion: &Motion, timing: Timing, i_max: f6
         turning.w.iter_mut().for_each(|x| *x = -*x);
         Problem::new(&other, &turning, timing, i_max).fit()
     };
-    let third = 2.0 * std::f64::consts::PI / 3.0;
-    let _ = third;
     let tries = [
         ("theta with the other sign", reversed()),
         ("the currents of phases b and c swapped", changed(|i| i.conj())),
-        (
-            "the currents of phases a and b swapped",
-            changed(|i| i.conj() * Complex::cis(2.0 * std::f64::consts::PI / 3.0)),
-        ),
-        (
-            "the currents of phases a and c swapped",
-            changed(|i| i.conj() * Complex::cis(-2.0 * std::f64::consts::PI / 3.0)),
-        ),
+        ("the currents of phases a and b swapped", changed(|i| i.conj() * Complex::cis(THIRD))),
+        ("the currents of phases a and c swapped", changed(|i| i.conj() * Complex::cis(-THIRD))),
         ("the currents with the other sign", changed(|i| -i)),
-        ("the currents one phase on", changed(|i| i * Complex::cis(2.0 * std::f64::consts::PI / 3.0))),
-        ("the currents one phase back", changed(|i| i * Complex::cis(-2.0 * std::f64::consts::PI / 3.0))),
+        ("the currents one phase on", changed(|i| i * Complex::cis(THIRD))),
+        ("the currents one phase back", changed(|i| i * Complex::cis(-THIRD))),
         (
             "voltages one row later",
             Problem::new(record, motion, Timing { delay: timing.delay + 1.0, ..timing }, i_max).fit(),
@@ -117,7 +111,6 @@ pub(super) fn better(record: &Record, motion: &Motion, timing: Timing, i_max: f6
 
 /// All quantities with their verdicts.
 pub(super) fn values(
-    record: &Record,
     fit: &Fit,
     mechanics: Option<&Mechanics>,
     facts: &Facts,
@@ -155,7 +148,6 @@ pub(super) fn values(
         ("u_dead", "V", u_dead, fit.half[4], 0.003, 0.15, vec![&fast, &low]),
         ("i_zero", "A", i_zero, fit.half[4] / u_dead * i_zero, 0.003, 0.15, vec![&fast, &low]),
     ];
-    let _ = record;
     rows.into_iter()
         .map(|(name, unit, value, half, floor, limit, rules)| {
             let half_width = (half / value).hypot(floor).abs();
