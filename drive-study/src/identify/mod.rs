@@ -145,7 +145,7 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     let facts = Facts::of(&record, &motion, &fit, &shown, i_max);
     let mut notes = record.notes.clone();
     let misfit = facts.misfit().then(|| verdict::better(&record, &motion, timing, i_max, &fit));
-    notes.push("values scale with the sensors: 1 % more current makes R_s, L_d and L_q 1 % less and J and friction 1 % more; 1 % more voltage makes all but the friction's ratio 1 % more".into());
+    notes.push("values scale with the sensors: 1 % more current makes R_s, L_d and L_q 1 % less and J and friction 1 % more; 1 % more voltage makes all of them and psi_M 1 % more".into());
     let values = verdict::values(&fit, mechanics.as_ref(), &facts, misfit, doubt);
     let rating = |given: Option<f64>, seen: f64| (given.unwrap_or(seen), given.is_some());
     let ratings = Ratings {
