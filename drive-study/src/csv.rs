@@ -75,6 +75,26 @@ impl Columns {
         Ok(Self { file: file.into(), names, rows })
     }
 
+    /// A table of columns that are in memory; `name` stands for the file, and rows count from 1.
+    ///
+    /// # Errors
+    /// Columns of different lengths, or a value that is not finite.
+    pub fn of(name: &str, columns: &[(String, Vec<f64>)]) -> Result<Self> {
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        for (column, values) in columns {
+            ensure!(values.len() == rows, "{name}: {column} has {} values, the first column {rows}", values.len());
+            if let Some(row) = values.iter().position(|x| !x.is_finite()) {
+                bail!("{name}:{}:{column}: {} is not a finite number", row + 1, values[row]);
+            }
+        }
+        let row = |k: usize| (k + 1, columns.iter().map(|(_, values)| values[k]).collect());
+        Ok(Self {
+            file: name.into(),
+            names: columns.iter().map(|(column, _)| column.clone()).collect(),
+            rows: (0..rows).map(row).collect(),
+        })
+    }
+
     /// Names of the columns that were read.
     pub fn names(&self) -> &[String] {
         &self.names

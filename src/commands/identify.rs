@@ -15,7 +15,7 @@ use std::path::PathBuf;
 /// Each value has an interval (95 %), or a reason why this record does not tell it. Exit status: 0 if all values are written, 1 if
 /// one is refused, 2 for a wrong record, of which nothing is written.
 ///
-///   fmu identify examples/identify/record.csv --n-p 3 --current 15 --out target/motor.toml
+///   fmu identify bench.csv --n-p 3 --current 15 --out target/motor.toml
 ///   fmu identify bench.csv --n-p 4 --map u_a=Vph1,u_b=Vph2,u_c=Vph3 --unit speed=rpm --load none --json
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]

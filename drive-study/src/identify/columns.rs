@@ -2,6 +2,7 @@
 
 use crate::csv::Columns;
 use anyhow::{Context, Result, bail, ensure};
+use serde::Deserialize;
 use std::f64::consts::PI;
 
 /// What a column holds.
@@ -78,7 +79,8 @@ impl Kind {
 const PREFIXES: &[(&str, f64)] = &[("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("m", 1e-3), ("k", 1e3), ("M", 1e6)];
 
 /// Which header holds a column, and in which unit a column is: what the options say.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Naming {
     /// Column and header: `u_a` and `Vph1`.
     pub map: Vec<(String, String)>,
@@ -166,7 +168,7 @@ impl Signals {
         for (name, header) in &naming.map {
             ensure!(
                 columns.iter().any(|(n, _)| n == name),
-                "{file}: --map {name}={header}: there is no column {header}"
+                "{file}: --map {name}={header}: the record has no column {header}"
             );
         }
         Ok(Self { file: file.into(), lines: table.rows().iter().map(|(line, _)| *line).collect(), columns })
@@ -208,7 +210,9 @@ mod tests {
         let naming = Naming { map: pairs(&[("u_a", "Vph1")]), units: pairs(&[("speed", "rpm")]) };
         let signals = Signals::parse(text, "r.csv", &naming).unwrap();
         assert_eq!(signals.names(), "t, u_a, i_a, speed");
-        assert_eq!([0.5e-3, 1.5, 20e-3, PI], ["t", "u_a", "i_a", "speed"].map(|n| signals.get(n).unwrap()[0]));
+        for (name, x) in [("t", 0.5e-3), ("u_a", 1.5), ("i_a", 20e-3), ("speed", PI)] {
+            assert!((signals.get(name).unwrap()[0] - x).abs() < 1e-15, "{name}");
+        }
         for (text, map, message) in [
             (
                 "t,i_a [kg]\n0,1\n",
@@ -216,7 +220,7 @@ mod tests {
                 "r.csv: i_a [kg]: the unit is not known; i_a has one of A, or one with a prefix",
             ),
             ("t,i_a,i_a\n0,1,1\n", None, "r.csv: two columns hold i_a"),
-            ("t,x\n0,1\n", Some(("i_a", "y")), "r.csv: --map i_a=y: there is no column y"),
+            ("t,x\n0,1\n", Some(("i_a", "y")), "r.csv: --map i_a=y: the record has no column y"),
             ("t,x\n0,1\n", Some(("amps", "x")), "--map amps: is no column of a record: use one of t, u_a,"),
         ] {
             let naming = Naming { map: pairs(map.as_slice()), units: Vec::new() };

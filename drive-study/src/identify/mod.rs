@@ -29,13 +29,15 @@ use electrical::{Fit, Problem, Timing};
 use mechanics::{Mechanics, Shown};
 use motion::Motion;
 use record::Record;
+use serde::Deserialize;
 use verdict::{Facts, Value};
 
 /// A vector in the plane of the stator.
 pub type Complex = nalgebra::Complex<f64>;
 
 /// What a record does not say of itself.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Options {
     /// Names and units of columns.
     pub naming: Naming,

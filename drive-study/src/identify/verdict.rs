@@ -109,6 +109,9 @@ pub(super) fn better(record: &Record, motion: &Motion, timing: Timing, i_max: f6
     }
 }
 
+/// Name, unit, value, half-width, floor of the relative half-width, its limit, and the rules that may forbid the value.
+type Row<'a> = (&'static str, &'static str, f64, f64, f64, f64, Vec<&'a Option<String>>);
+
 /// All quantities with their verdicts.
 pub(super) fn values(
     fit: &Fit,
@@ -135,9 +138,8 @@ pub(super) fn values(
     let [R, L_d, L_q, psi_M, ..] = fit.p;
     let (m, half) = mechanics.map_or(([f64::NAN; 3], [f64::NAN; 3]), |m| (m.p, m.half));
     let (u_dead, i_zero) = (fit.u_dead(), fit.i_zero());
-    // Name, unit, value, half-width, floor of the relative half-width, limit, rules.
     #[rustfmt::skip]
-    let rows: [(_, _, f64, f64, f64, f64, Vec<&Option<String>>); 9] = [
+    let rows: [Row<'_>; 9] = [
         ("R_s", "Ohm", R, fit.half[0], 0.003, 0.01, vec![&apart, &fast, &low]),
         ("L_d", "H", L_d, fit.half[1], 0.01, 0.025, vec![&fast, &steady]),
         ("L_q", "H", L_q, fit.half[2], 0.01, 0.025, vec![&fast, &one_speed]),
