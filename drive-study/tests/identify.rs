@@ -1,6 +1,12 @@
 //! `fmu identify` against a bench of its own: a machine and a controller that share no formula with the drive's plant.
 
-#![allow(non_snake_case, reason = "the symbols of the models")]
+#![allow(
+    non_snake_case,
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    clippy::cast_precision_loss,
+    reason = "the symbols of the models; counts of rows"
+)]
 
 use drive_study::identify::columns::Signals;
 use drive_study::identify::{Complex, Identified, Options, identify, machine_file};

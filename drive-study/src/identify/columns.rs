@@ -100,7 +100,7 @@ impl Naming {
             let known = || KNOWN.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
             ensure!(
                 KNOWN.iter().any(|(k, _)| k == name),
-                "{option} {name}: is no column of a record: use one of {}",
+                "{option} {name}: a record has no such column: use one of {}",
                 known()
             );
         }
@@ -221,7 +221,7 @@ mod tests {
             ),
             ("t,i_a,i_a\n0,1,1\n", None, "r.csv: two columns hold i_a"),
             ("t,x\n0,1\n", Some(("i_a", "y")), "r.csv: --map i_a=y: the record has no column y"),
-            ("t,x\n0,1\n", Some(("amps", "x")), "--map amps: is no column of a record: use one of t, u_a,"),
+            ("t,x\n0,1\n", Some(("amps", "x")), "--map amps: a record has no such column: use one of t, u_a,"),
         ] {
             let naming = Naming { map: pairs(map.as_slice()), units: Vec::new() };
             let error = Signals::parse(text, "r.csv", &naming).unwrap_err().to_string();

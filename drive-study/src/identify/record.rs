@@ -104,16 +104,9 @@ impl Record {
         );
 
         let zero = zero(&t, &u, closed.as_deref(), options)?;
-        let differences = |rows: Range<usize>, order: usize| {
-            let mut all: Vec<Complex> = i[rows].to_vec();
-            for _ in 0..order {
-                all = all.windows(2).map(|w| w[1] - w[0]).collect();
-            }
-            all.iter().map(Complex::norm_sqr).sum::<f64>() / all.len().max(1) as f64
-        };
         let sigma = match &zero {
-            Some(rows) => (differences(rows.clone(), 1) / 2.0).sqrt(),
-            None => (differences(runs[0].clone(), 2) / 6.0).sqrt(),
+            Some(rows) => noise(&i, &theta, std::slice::from_ref(rows), false),
+            None => noise(&i, &theta, &runs, true),
         };
         if let Some(rows) = zero {
             let offset = i[rows.clone()].iter().sum::<Complex>() / rows.len() as f64;
@@ -140,6 +133,25 @@ impl Record {
     pub fn peak(&self) -> f64 {
         quantile(self.rows().map(|k| self.i[k].norm()).collect(), 0.999)
     }
+}
+
+/// Noise of a current vector: its third differences, which a smooth signal does not have. A current that turns with the rotor is
+/// turned back before.
+fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> f64 {
+    /// Rows to each side of the slope that gives the turn of a row.
+    const REACH: usize = 20;
+    let (mut squares, mut count) = (0.0, 0.0_f64);
+    for run in runs {
+        for k in run.start..run.end.saturating_sub(3) {
+            let (from, to) = (k.saturating_sub(REACH).max(run.start), (k + 3 + REACH).min(run.end - 1));
+            let turn = if turning { (theta[to] - theta[from]) / (to - from) as f64 } else { 0.0 };
+            let r = Complex::cis(turn);
+            let rest = i[k + 3] - r * (i[k + 2] * 3.0 - r * (i[k + 1] * 3.0 - r * i[k]));
+            squares += rest.norm_sqr();
+            count += 1.0;
+        }
+    }
+    (squares / (20.0 * count.max(1.0))).sqrt()
 }
 
 /// Mean of some values; 0 if there is none.
