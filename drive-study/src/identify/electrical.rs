@@ -10,9 +10,9 @@
 //! three approximates its tail. Noise of the current widens `[i]`, so that its square is taken off the normal matrix. The angle's
 //! offset `theta_0` and delay `tau` are found around the linear fit.
 
-use super::interval::{self, Block};
+use super::interval::{self, Sums};
 use super::motion::Motion;
-use super::record::Record;
+use super::record::BenchRecord;
 use super::{Complex, legs};
 use nalgebra::{DMatrix, DVector};
 use std::ops::Range;
@@ -51,7 +51,7 @@ pub struct Timing {
 
 /// A record prepared for fits.
 pub struct Problem<'a> {
-    record: &'a Record,
+    record: &'a BenchRecord,
     motion: &'a Motion,
     timing: Timing,
     /// Loss of the legs for each bend and row, per volt of dead time, stator axes.
@@ -95,7 +95,7 @@ impl Fit {
 
 impl<'a> Problem<'a> {
     /// Prepares a record; `i_max` is the maximum current in A.
-    pub fn new(record: &'a Record, motion: &'a Motion, timing: Timing, i_max: f64) -> Self {
+    pub fn new(record: &'a BenchRecord, motion: &'a Motion, timing: Timing, i_max: f64) -> Self {
         let bends = BENDS.map(|share| share * i_max);
         let losses = record.i.iter().map(|&i| bends.map(|bend| legs::loss(i, bend))).collect();
         let window = 4.max(16 / timing.every.max(1) as usize);
@@ -201,7 +201,7 @@ impl<'a> Problem<'a> {
         let mut theta_0 = 0.0;
         for _ in 0..4 {
             // A second flux on the q-axis, which the d-equation sees as -int(w).
-            let mut sums = Block::new(LINEAR + 1);
+            let mut sums = Sums::new(LINEAR + 1);
             for Window { d, q, u } in self.all_windows(theta_0, 0.0) {
                 let row = |x: [f64; LINEAR], last: f64| [x[0], x[1], x[2], x[3], x[4], x[5], x[6], last];
                 sums.add(&row(d, -q[3]), u.re);
@@ -250,7 +250,7 @@ impl<'a> Problem<'a> {
 
     fn linear(&self, theta_0: f64, tau: f64) -> Option<Solved> {
         let windows = self.all_windows(theta_0, tau);
-        let mut sums = Block::new(LINEAR);
+        let mut sums = Sums::new(LINEAR);
         let mut power = 0.0;
         for Window { d, q, u } in &windows {
             sums.add(d, u.re);
@@ -266,14 +266,14 @@ impl<'a> Problem<'a> {
     }
 
     /// Blocks of windows with the regressors of all parameters.
-    fn blocks(&self, solved: &Solved, theta_0: f64, tau: f64) -> Vec<Block> {
+    fn blocks(&self, solved: &Solved, theta_0: f64, tau: f64) -> Vec<Sums> {
         let (by_angle, by_time) = (1e-3, 0.02 * self.record.step);
         let turned = self.all_windows(theta_0 + by_angle, tau);
         let late = self.all_windows(theta_0, tau + by_time);
         let rest = |w: &Window| w.u - Complex::new(dot(&w.d, &solved.p), dot(&w.q, &solved.p));
         let triples: Vec<_> = solved.windows.iter().zip(&turned).zip(&late).collect();
         let one = |chunk: &[((&Window, &Window), &Window)]| {
-            let mut block = Block::new(ALL);
+            let mut block = Sums::new(ALL);
             for ((now, turned), late) in chunk {
                 let e = rest(now);
                 let slopes = [(e - rest(turned)) / by_angle, (e - rest(late)) / by_time];
@@ -326,7 +326,7 @@ struct Solved {
     windows: Vec<Window>,
 }
 
-fn solved(sums: &Block) -> Option<DVector<f64>> {
+fn solved(sums: &Sums) -> Option<DVector<f64>> {
     interval::solve(&sums.matrix, &sums.score)
 }
 

@@ -11,14 +11,14 @@ const STUDENT: f64 = 1.18;
 
 /// Sums over one block of rows: the normal matrix and the score, which add up to zero over all blocks.
 #[derive(Clone, Debug)]
-pub struct Block {
+pub struct Sums {
     /// Normal matrix of the block.
     pub matrix: DMatrix<f64>,
     /// Gradient of the block's squares, times -1/2.
     pub score: DVector<f64>,
 }
 
-impl Block {
+impl Sums {
     /// Sums without a row.
     pub fn new(size: usize) -> Self {
         Self { matrix: DMatrix::zeros(size, size), score: DVector::zeros(size) }
@@ -37,7 +37,7 @@ impl Block {
 
 /// Half-widths (95 %) of linear combinations of the parameters, each given by its gradient; `None` where the normal matrix is
 /// singular.
-pub fn half_widths(blocks: &[Block], gradients: &[DVector<f64>]) -> Option<Vec<f64>> {
+pub fn half_widths(blocks: &[Sums], gradients: &[DVector<f64>]) -> Option<Vec<f64>> {
     let size = blocks.first()?.score.len();
     let all = blocks.iter().fold(DMatrix::zeros(size, size), |sum, b| sum + &b.matrix);
     let inverse = scaled_inverse(&all)?;

@@ -7,9 +7,9 @@
 
 use super::Complex;
 use super::electrical::Fit;
-use super::interval::{self, Block};
+use super::interval::{self, Sums};
 use super::motion::Motion;
-use super::record::{Record, quantile};
+use super::record::{BenchRecord, quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// Length of a window in s.
@@ -23,7 +23,7 @@ const SIZE: usize = 3;
 
 /// The fit.
 #[derive(Clone, Debug)]
-pub struct Mechanics {
+pub struct MechanicalFit {
     /// J in kg.m2, B in N.m.s/rad, tau_coulomb in N.m.
     pub p: [f64; SIZE],
     /// Half-widths (95 %).
@@ -44,7 +44,7 @@ pub struct Shown {
 
 impl Shown {
     /// Windows of a record. The load is taken as zero where it is unknown.
-    pub fn of(record: &Record, motion: &Motion, fit: &Fit, n_p: f64) -> Self {
+    pub fn of(record: &BenchRecord, motion: &Motion, fit: &Fit, n_p: f64) -> Self {
         let [_, L_d, L_q, psi_M, ..] = fit.p;
         let width = ((WINDOW / record.step).round() as usize).max(4);
         let speed =
@@ -81,14 +81,14 @@ impl Shown {
     }
 
     /// The fit: least squares with rows that are wrong by 1 % of their torque, and less weight beyond 2.5 standard deviations.
-    pub fn fit(&self) -> Option<Mechanics> {
+    pub fn fit(&self) -> Option<MechanicalFit> {
         let typical = quantile(self.rows.iter().map(|(_, y)| y.abs()).collect(), 0.9);
         let size = |y: f64| 0.01 * y.abs() + 0.005 * typical;
         let mut weights: Vec<f64> = self.rows.iter().map(|(_, y)| 1.0 / size(*y)).collect();
         let base = weights.clone();
         let mut p = DVector::zeros(SIZE);
         for _ in 0..3 {
-            let mut sums = Block::new(SIZE);
+            let mut sums = Sums::new(SIZE);
             for ((x, y), weight) in self.rows.iter().zip(&weights) {
                 sums.add(&x.map(|x| x * weight), y * weight);
             }
@@ -103,17 +103,17 @@ impl Shown {
         }
         let rows: Vec<_> = self.rows.iter().zip(&weights).collect();
         let block = |chunk: &[(&([f64; SIZE], f64), &f64)]| {
-            let mut block = Block::new(SIZE);
+            let mut block = Sums::new(SIZE);
             for ((x, y), weight) in chunk {
                 block.add(&x.map(|x| x * *weight), *weight * (y - dot(x, &p)));
             }
             block
         };
-        let blocks: Vec<Block> = rows.chunks(BLOCK).map(block).collect();
+        let blocks: Vec<Sums> = rows.chunks(BLOCK).map(block).collect();
         let units = DMatrix::<f64>::identity(SIZE, SIZE);
         let gradients: Vec<DVector<f64>> = units.column_iter().map(nalgebra::Matrix::into_owned).collect();
         let half = interval::half_widths(&blocks, &gradients)?;
-        Some(Mechanics { p: [p[0], p[1], p[2]], half: [half[0], half[1], half[2]] })
+        Some(MechanicalFit { p: [p[0], p[1], p[2]], half: [half[0], half[1], half[2]] })
     }
 }
 

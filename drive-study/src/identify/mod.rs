@@ -26,11 +26,11 @@ pub mod verdict;
 use anyhow::{Context, Result, ensure};
 use columns::{Naming, Signals};
 use electrical::{Fit, Problem, Timing};
-use mechanics::{Mechanics, Shown};
+use mechanics::{MechanicalFit, Shown};
 use motion::Motion;
-use record::Record;
+use record::BenchRecord;
 use serde::Deserialize;
-use verdict::{Facts, Value};
+use verdict::{Facts, Quantity};
 
 /// A vector in the plane of the stator.
 pub type Complex = nalgebra::Complex<f64>;
@@ -67,7 +67,7 @@ pub struct Options {
 #[derive(Clone, Debug)]
 pub struct Identified {
     /// The quantities, in the order of a motor file.
-    pub values: Vec<Value>,
+    pub values: Vec<Quantity>,
     /// The fit of the voltages.
     pub fit: Fit,
     /// When the voltage of a row acts.
@@ -96,7 +96,7 @@ pub struct Ratings {
 impl Identified {
     /// The result for other programs: values with unit, relative half-width and reason, and the fit.
     pub fn json(&self) -> serde_json::Value {
-        let value = |v: &Value| {
+        let value = |v: &Quantity| {
             let known = v.refused.is_none();
             let number = |x: f64| (known && x.is_finite()).then_some(x);
             let data = serde_json::json!({
@@ -124,6 +124,10 @@ impl Identified {
     }
 }
 
+/// What no interval contains.
+const SCALE: &str = "values scale with the sensors: 1 % more current makes R_s, L_d and L_q 1 % less and J and friction 1 % more; \
+    1 % more voltage makes all of them and psi_M 1 % more";
+
 /// Delays that are tried.
 const DELAYS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
@@ -136,18 +140,18 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     let Some(n_p) = options.n_p else {
         anyhow::bail!("--n-p is missing: give the number of pole pairs; no record tells it");
     };
-    let record = Record::new(signals, options)?;
+    let record = BenchRecord::new(signals, options)?;
     let motion = Motion::of(&record);
     ensure!(!motion.runs.is_empty(), "{}: no stretch is long enough for a speed", record.file);
     let i_max = options.current.unwrap_or_else(|| record.peak());
     ensure!(i_max > 0.0, "{}: all currents are 0", record.file);
     let (timing, fit, doubt) = timed(&record, &motion, options, i_max)?;
     let shown = Shown::of(&record, &motion, &fit, f64::from(n_p));
-    let mechanics: Option<Mechanics> = record.load.is_some().then(|| shown.fit()).flatten();
+    let mechanics: Option<MechanicalFit> = record.load.is_some().then(|| shown.fit()).flatten();
     let facts = Facts::of(&record, &motion, &fit, &shown, i_max);
     let mut notes = record.notes.clone();
     let misfit = facts.misfit().then(|| verdict::better(&record, &motion, timing, i_max, &fit));
-    notes.push("values scale with the sensors: 1 % more current makes R_s, L_d and L_q 1 % less and J and friction 1 % more; 1 % more voltage makes all of them and psi_M 1 % more".into());
+    notes.push(SCALE.into());
     let values = verdict::values(&fit, mechanics.as_ref(), &facts, misfit, doubt);
     let rating = |given: Option<f64>, seen: f64| (given.unwrap_or(seen), given.is_some());
     let ratings = Ratings {
@@ -160,7 +164,12 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
 }
 
 /// The fit with the given delay, or with the best one; and why the delay is in doubt.
-fn timed(record: &Record, motion: &Motion, options: &Options, i_max: f64) -> Result<(Timing, Fit, Option<String>)> {
+fn timed(
+    record: &BenchRecord,
+    motion: &Motion,
+    options: &Options,
+    i_max: f64,
+) -> Result<(Timing, Fit, Option<String>)> {
     let every = options.every.unwrap_or(1);
     let fit = |delay| {
         let timing = Timing { delay, every };

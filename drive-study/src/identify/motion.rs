@@ -1,6 +1,6 @@
 //! Angle and speed of the rotor without the steps of an encoder: a parabola through the neighbors of each row.
 
-use super::record::Record;
+use super::record::BenchRecord;
 use std::ops::Range;
 
 /// Time in s to each side of a row that its parabola covers, at most: a change of the torque within it bends the parabola.
@@ -23,7 +23,7 @@ pub struct Motion {
 
 impl Motion {
     /// Least squares with `theta = c_0 + c_1 x + c_2 x^2` over `2 m + 1` rows: the angle is `c_0`, the speed `c_1`.
-    pub fn of(record: &Record) -> Self {
+    pub fn of(record: &BenchRecord) -> Self {
         let reach = REACH * (noise(record) / NOISE).powf(0.4).min(1.0);
         let m = ((reach / record.step).round() as usize).max(3);
         let mut motion = Self { theta: record.theta.clone(), w: vec![0.0; record.theta.len()], runs: Vec::new() };
@@ -64,7 +64,7 @@ impl Motion {
 }
 
 /// Noise of the angle in rad, steps of an encoder included: a smooth angle has no third difference.
-fn noise(record: &Record) -> f64 {
+fn noise(record: &BenchRecord) -> f64 {
     let (mut squares, mut count) = (0.0, 0.0_f64);
     for w in record.runs.iter().flat_map(|run| record.theta[run.clone()].windows(4)) {
         squares += (w[3] - 3.0 * w[2] + 3.0 * w[1] - w[0]).powi(2);
@@ -85,8 +85,12 @@ mod tests {
             (3.0 + 70.0 * t - 40.0 * t * t, 70.0 - 80.0 * t)
         };
         #[expect(clippy::single_range_in_vec_init, reason = "one stretch")]
-        let record =
-            Record { theta: (0..rows).map(|k| at(k).0).collect(), step, runs: vec![0..rows], ..Record::empty() };
+        let record = BenchRecord {
+            theta: (0..rows).map(|k| at(k).0).collect(),
+            step,
+            runs: vec![0..rows],
+            ..BenchRecord::empty()
+        };
         let motion = Motion::of(&record);
         assert_eq!((motion.runs.len(), motion.runs[0].clone()), (1, 3..rows - 3));
         for k in motion.runs[0].clone() {

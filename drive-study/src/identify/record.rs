@@ -12,7 +12,7 @@ const ROWS: usize = 2000;
 
 /// A record. All vectors have one element per row.
 #[derive(Clone, Debug)]
-pub struct Record {
+pub struct BenchRecord {
     /// Name of the file.
     pub file: String,
     /// Time in s.
@@ -39,7 +39,7 @@ pub struct Record {
     pub notes: Vec<String>,
 }
 
-impl Record {
+impl BenchRecord {
     /// A record without a row.
     #[cfg(test)]
     pub(super) fn empty() -> Self {

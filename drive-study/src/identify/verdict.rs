@@ -2,14 +2,14 @@
 
 use super::Complex;
 use super::electrical::{Fit, Problem, Timing};
-use super::mechanics::{Mechanics, Shown};
+use super::mechanics::{MechanicalFit, Shown};
 use super::motion::Motion;
-use super::record::{Record, quantile};
+use super::record::{BenchRecord, quantile};
 use serde::Serialize;
 
 /// A quantity of the machine.
 #[derive(Clone, Debug, Serialize)]
-pub struct Value {
+pub struct Quantity {
     /// Name in a motor file.
     pub name: &'static str,
     /// Unit.
@@ -43,7 +43,7 @@ pub struct Facts {
 }
 
 impl Facts {
-    pub(super) fn of(record: &Record, motion: &Motion, fit: &Fit, shown: &Shown, i_max: f64) -> Self {
+    pub(super) fn of(record: &BenchRecord, motion: &Motion, fit: &Fit, shown: &Shown, i_max: f64) -> Self {
         let [R, L_d, L_q, ..] = fit.p;
         let rows = || motion.runs.iter().flat_map(Clone::clone);
         let w = quantile(rows().map(|k| motion.w[k].abs()).collect(), 0.99);
@@ -72,7 +72,7 @@ impl Facts {
 }
 
 /// What would fit better: other phases, another direction, another delay.
-pub(super) fn better(record: &Record, motion: &Motion, timing: Timing, i_max: f64, fit: &Fit) -> String {
+pub(super) fn better(record: &BenchRecord, motion: &Motion, timing: Timing, i_max: f64, fit: &Fit) -> String {
     /// A third of a turn.
     const THIRD: f64 = 2.0 * std::f64::consts::PI / 3.0;
     let changed = |change: fn(Complex) -> Complex| {
@@ -115,11 +115,11 @@ type Row<'a> = (&'static str, &'static str, f64, f64, f64, f64, Vec<&'a Option<S
 /// All quantities with their verdicts.
 pub(super) fn values(
     fit: &Fit,
-    mechanics: Option<&Mechanics>,
+    mechanics: Option<&MechanicalFit>,
     facts: &Facts,
     misfit: Option<String>,
     doubt: Option<String>,
-) -> Vec<Value> {
+) -> Vec<Quantity> {
     let all = misfit.or(doubt).or_else(|| {
         (facts.turn > 0.6)
             .then(|| format!("bandwidth: the rotor turns by {:.2} rad in a step: shorter steps are needed", facts.turn))
@@ -163,7 +163,7 @@ pub(super) fn values(
                 })
             };
             let refused = all.clone().or_else(|| rules.into_iter().flatten().next().cloned()).or_else(wide);
-            Value { name, unit, value, half_width, refused }
+            Quantity { name, unit, value, half_width, refused }
         })
         .collect()
 }
