@@ -317,7 +317,8 @@ fn a_record_becomes_a_running_drive() {
             assert_eq!(words[2..], ["PmsmDrive", "--fmi", "3"]);
             continue;
         }
-        let command = Command::new(env!("CARGO_BIN_EXE_fmu")).args(&words[1..]).current_dir(dir.path()).output().unwrap();
+        let command =
+            Command::new(env!("CARGO_BIN_EXE_fmu")).args(&words[1..]).current_dir(dir.path()).output().unwrap();
         assert!(command.status.success(), "{line}: {}", String::from_utf8_lossy(&command.stderr));
         last = String::from_utf8(command.stdout).unwrap();
         if k == 0 {

@@ -279,7 +279,13 @@ impl<'a> Problem<'a> {
             noiseless[(k, k)] -= count * noise[k - 1];
         }
         let p = interval::solve(&noiseless, &sums.score)?;
-        Some(Solved { squares: power - p.dot(&sums.score), condition: interval::condition(&noiseless), p, windows, noise })
+        Some(Solved {
+            squares: power - p.dot(&sums.score),
+            condition: interval::condition(&noiseless),
+            p,
+            windows,
+            noise,
+        })
     }
 
     /// Blocks of windows with the regressors of all parameters.

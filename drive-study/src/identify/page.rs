@@ -13,6 +13,9 @@ use std::rc::Rc;
 /// Places along a current or a speed at which the record is averaged.
 const PLACES: usize = 60;
 
+/// Change of a current within a window, as a share of the greatest current, up to which its flux linkage is shown.
+const STEADY: f64 = 0.03;
+
 /// The page; `file` is the name of the record.
 ///
 /// # Errors
@@ -150,8 +153,11 @@ fn voltages(found: &Identified) -> Figure {
 fn fluxes(found: &Identified) -> Figure {
     let Seen { voltage, window, .. } = &found.seen;
     let [_, L_d, L_q, psi_M, ..] = found.fit.p;
-    let top = voltage.iter().map(|w| w.q[3].abs()).fold(0.0, f64::max);
-    let turning = || voltage.iter().filter(|w| w.q[3].abs() > 0.1 * top);
+    let greatest = |y: &dyn Fn(&Window) -> f64| voltage.iter().map(y).fold(0.0, f64::max);
+    let (top, most) = (greatest(&|w| w.q[3].abs()), greatest(&|w| w.d[0].hypot(w.q[0])) / window);
+    // While a current changes, its inductance hides the flux.
+    let steady = |w: &&Window| w.q[3].abs() > 0.1 * top && w.d[1].hypot(w.q[2]) < STEADY * most;
+    let turning = || voltage.iter().filter(steady);
     // What an equation leaves beside all terms but those of the flux that turns with the rotor, over the angle.
     let psi_d = turning().map(|w| {
         let flux = L_d * w.q[1] + psi_M * w.q[3];
@@ -196,7 +202,7 @@ fn friction(found: &Identified) -> Figure {
         let friction = fit.p[1] * row.x[1] + fit.p[2] * row.x[2];
         (row.x[1] / row.time, friction / row.time, 1.0)
     }));
-    let panels = vec![panel("", "N.m", pair(&points, &line))];
+    let panels = vec![panel("friction", "N.m", pair(&points, &line))];
     Figure { title: "Friction".into(), x: "speed in rad/s", columns: 1, panels }
 }
 

@@ -220,7 +220,14 @@ pub(crate) const THOROUGH: [Part; 16] = [
 ];
 
 /// What a run shows: columns with their names, every so many samples.
-pub(crate) fn record(m: &Machine, seed: u64, index: u64, time: f64, parts: &[Part], every: usize) -> Vec<(String, Vec<f64>)> {
+pub(crate) fn record(
+    m: &Machine,
+    seed: u64,
+    index: u64,
+    time: f64,
+    parts: &[Part],
+    every: usize,
+) -> Vec<(String, Vec<f64>)> {
     const PRE: f64 = 0.05;
     let names = ["t", "u_alpha", "u_beta", "i_a", "i_b", "i_c", "theta", "tau_load", "u_dc"];
     let mut columns = names.map(|name| (name.to_owned(), Vec::new()));
@@ -258,7 +265,7 @@ pub(crate) fn record(m: &Machine, seed: u64, index: u64, time: f64, parts: &[Par
         let error = reference - state.1;
         let wanted = bandwidth * m.J / K * error + i_sum;
         let i_q = wanted.clamp(-0.5 * m.i_max, 0.5 * m.i_max);
-        if wanted == i_q {
+        if wanted.abs() <= 0.5 * m.i_max {
             i_sum += 0.25 * bandwidth * bandwidth * m.J / K * error * m.T_s;
         }
         let turn = Complex::cis(theta);

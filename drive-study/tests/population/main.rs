@@ -94,7 +94,12 @@ fn figures() {
     }
     for (k, errors) in errors.iter_mut().enumerate() {
         errors.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let at = |share: f64| 100.0 * errors.get(((errors.len() as f64 * share) as usize).min(errors.len().saturating_sub(1))).map_or(0.0, |e| e.0);
+        let at = |share: f64| {
+            100.0
+                * errors
+                    .get(((errors.len() as f64 * share) as usize).min(errors.len().saturating_sub(1)))
+                    .map_or(0.0, |e| e.0)
+        };
         println!(
             "{:12} {:3} of {records}: median {:.2}, 95 % {:.2}, 99 % {:.2}, worst {:.2} % ({:?}); inside {:.0} %",
             NAMES[k],
@@ -170,6 +175,8 @@ fn chain() {
         println!("{index:3} of 24: {a} with the true values, {b} with the identified ones");
         (with_truth, with_found, tried) = (with_truth + a, with_found + b, tried + 24);
     }
-    println!("{with_truth} and {with_found} of {tried}; {refused} of {machines} records refuse a value that fmu tune needs");
+    println!(
+        "{with_truth} and {with_found} of {tried}; {refused} of {machines} records refuse a value that fmu tune needs"
+    );
     assert!(f64::from(with_found) >= 0.98 * f64::from(with_truth));
 }
