@@ -4,7 +4,7 @@ use crate::{pack, release};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use drive_study::identify::columns::{Naming, Signals};
-use drive_study::identify::{self, Identified, Options, machine_file};
+use drive_study::identify::{self, Identified, Options, machine_file, page};
 use std::path::PathBuf;
 
 /// Identifies a machine from a record of its running drive: resistance, inductances, magnet flux, inertia, friction.
@@ -16,6 +16,7 @@ use std::path::PathBuf;
 /// one is refused, 2 for a wrong record, of which nothing is written.
 ///
 ///   fmu identify bench.csv --n-p 3 --current 15 --out target/motor.toml
+///   fmu identify bench.csv --n-p 3 --current 15 --html bench.html
 ///   fmu identify bench.csv --n-p 4 --map u_a=Vph1,u_b=Vph2,u_c=Vph3 --unit speed=rpm --load none --json
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
@@ -62,6 +63,9 @@ pub struct Identify {
     /// `none`: the shaft is free; else the column of the load torque, tau_load or tau_shaft
     #[arg(long, value_name = "none|COLUMN")]
     pub load: Option<String>,
+    /// Page to write: the values, and each fit beside the record
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
     /// Print the result as JSON and nothing else
     #[arg(long)]
     pub json: bool,
@@ -88,12 +92,15 @@ pub fn run(args: &Identify) -> Result<bool> {
         );
         pack::write(out, machine_file::text(&found, &name, &source).as_bytes())?;
     }
+    if let Some(html) = &args.html {
+        pack::write(html, page::page(&found, &file)?.as_bytes())?;
+    }
     if args.json {
         println!("{:#}", found.json());
     } else {
         print(&found);
-        if let Some(out) = &args.out {
-            println!("\n{}", out.display());
+        for (k, written) in args.out.iter().chain(&args.html).enumerate() {
+            println!("{}{}", if k == 0 { "\n" } else { "" }, written.display());
         }
     }
     Ok(found.values.iter().all(|v| v.refused.is_none()))

@@ -32,12 +32,20 @@ const ITERATIONS: usize = 12;
 /// Windows of a block of the sandwich estimate.
 const BLOCK: usize = 25;
 
-/// One window: the regressors of both axes and what they explain.
+/// Greatest share of a diagonal that is taken for noise.
+const MOST_NOISE: f64 = 0.9;
+
+/// One window: the regressors of both axes and what they explain, integrals over its time.
 #[derive(Clone, Copy, Debug)]
-struct Window {
-    d: [f64; LINEAR],
-    q: [f64; LINEAR],
-    u: Complex,
+pub struct Window {
+    /// Time in s at its middle.
+    pub t: f64,
+    /// Regressors of the d-axis.
+    pub d: [f64; LINEAR],
+    /// Regressors of the q-axis.
+    pub q: [f64; LINEAR],
+    /// Integral of the voltage in V.s, rotor axes.
+    pub u: Complex,
 }
 
 /// When the voltage of a row acts.
@@ -69,8 +77,8 @@ pub struct Fit {
     pub theta_0: f64,
     /// Delay of the angle in s.
     pub tau: f64,
-    /// Half-widths (95 %) of R, L_d, L_q, psi_M, and u_dead.
-    pub half: [f64; 5],
+    /// Half-widths (95 %) of R, L_d, L_q, psi_M, u_dead and i_zero.
+    pub half: [f64; 6],
     /// Condition number of the scaled normal matrix.
     pub condition: f64,
     /// What the fit leaves, as a voltage in V (rms of the vector), and what noise would leave.
@@ -175,6 +183,7 @@ impl<'a> Problem<'a> {
             }
             let rise = before.0 - first.0;
             out.push(Window {
+                t: 0.5 * (self.record.t[start] + self.record.t[start + self.window]),
                 d: [i.re, rise.re, -w_i.im, 0.0, s[0].re, s[1].re, s[2].re],
                 q: [i.im, w_i.re, rise.im, angle, s[0].im, s[1].im, s[2].im],
                 u,
@@ -191,6 +200,11 @@ impl<'a> Problem<'a> {
         windows
     }
 
+    /// The windows in the axes of a fit, and their length in s.
+    pub fn seen(&self, fit: &Fit) -> (Vec<Window>, f64) {
+        (self.all_windows(fit.theta_0, fit.tau), self.window as f64 * self.record.step)
+    }
+
     /// Square of the noise in `[i]` of one axis, which a window adds to the diagonals of both inductances.
     fn noise(&self) -> f64 {
         self.record.sigma * self.record.sigma
@@ -202,7 +216,7 @@ impl<'a> Problem<'a> {
         for _ in 0..4 {
             // A second flux on the q-axis, which the d-equation sees as -int(w).
             let mut sums = Sums::new(LINEAR + 1);
-            for Window { d, q, u } in self.all_windows(theta_0, 0.0) {
+            for Window { d, q, u, .. } in self.all_windows(theta_0, 0.0) {
                 let row = |x: [f64; LINEAR], last: f64| [x[0], x[1], x[2], x[3], x[4], x[5], x[6], last];
                 sums.add(&row(d, -q[3]), u.re);
                 sums.add(&row(q, 0.0), u.im);
@@ -252,17 +266,26 @@ impl<'a> Problem<'a> {
         let windows = self.all_windows(theta_0, tau);
         let mut sums = Sums::new(LINEAR);
         let mut power = 0.0;
-        for Window { d, q, u } in &windows {
+        for Window { d, q, u, .. } in &windows {
             sums.add(d, u.re);
             sums.add(q, u.im);
             power += u.norm_sqr();
         }
         let mut noiseless = sums.matrix.clone();
+        // An inductance whose current hardly changes is seen through noise alone; all others are still told.
+        let count = windows.len().max(1) as f64;
+        let noise = [1, 2].map(|k| self.noise().min(MOST_NOISE * sums.matrix[(k, k)] / count));
         for k in [1, 2] {
-            noiseless[(k, k)] -= windows.len() as f64 * self.noise();
+            noiseless[(k, k)] -= count * noise[k - 1];
         }
         let p = interval::solve(&noiseless, &sums.score)?;
-        Some(Solved { squares: power - p.dot(&sums.score), condition: interval::condition(&noiseless), p, windows })
+        Some(Solved {
+            squares: power - p.dot(&sums.score),
+            condition: interval::condition(&noiseless),
+            p,
+            windows,
+            noise,
+        })
     }
 
     /// Blocks of windows with the regressors of all parameters.
@@ -287,7 +310,7 @@ impl<'a> Problem<'a> {
                 block.add(&row(&now.q, slopes.map(|s| s.im)), e.im);
             }
             for k in [1, 2] {
-                let noise = chunk.len() as f64 * self.noise();
+                let noise = chunk.len() as f64 * solved.noise[k - 1];
                 block.matrix[(k, k)] -= noise;
                 block.score[k] += noise * solved.p[k];
             }
@@ -299,9 +322,14 @@ impl<'a> Problem<'a> {
     fn judged(&self, solved: &Solved, theta_0: f64, tau: f64) -> Option<Fit> {
         let blocks = self.blocks(solved, theta_0, tau);
         let unit = |at: &[usize]| DVector::from_fn(ALL, |k, _| if at.contains(&k) { 1.0 } else { 0.0 });
-        let gradients: Vec<_> = [&[0][..], &[1], &[2], &[3], &[4, 5, 6]].map(unit).to_vec();
-        let half = interval::half_widths(&blocks, &gradients)?;
+        let mut gradients: Vec<_> = [&[0][..], &[1], &[2], &[3], &[4, 5, 6]].map(unit).to_vec();
         let p: [f64; LINEAR] = std::array::from_fn(|k| solved.p[k]);
+        // i_zero = 2 sum c_j / sum(c_j / i_xj).
+        let slope: f64 = p[4..].iter().zip(self.bends).map(|(c, bend)| c / bend).sum();
+        let u_dead: f64 = p[4..].iter().sum();
+        let curve = |k: usize| 2.0 / slope * (1.0 - u_dead / slope / self.bends[k - 4]);
+        gradients.push(DVector::from_fn(ALL, |k, _| if (4..LINEAR).contains(&k) { curve(k) } else { 0.0 }));
+        let half = interval::half_widths(&blocks, &gradients)?;
         let windows = solved.windows.len() as f64;
         let time = self.window as f64 * self.record.step;
         let noise = self.record.sigma * (p[1] * p[1] + p[2] * p[2]).sqrt() / time;
@@ -324,6 +352,8 @@ struct Solved {
     squares: f64,
     condition: f64,
     windows: Vec<Window>,
+    /// Square of the noise that was taken off both inductances' diagonals, per window.
+    noise: [f64; 2],
 }
 
 fn solved(sums: &Sums) -> Option<DVector<f64>> {

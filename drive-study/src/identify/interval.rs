@@ -44,14 +44,20 @@ pub fn half_widths(blocks: &[Sums], gradients: &[DVector<f64>]) -> Option<Vec<f6
     let scores = blocks.iter().fold(DMatrix::zeros(size, size), |sum, b| sum + &b.score * b.score.transpose());
     let sandwich = &inverse * scores * &inverse;
     let mut without = Vec::new();
+    // Parameters that one of the stretches alone tells.
+    let mut lost = vec![false; size];
     for stretch in blocks.chunks(blocks.len().div_ceil(STRETCHES)) {
         let matrix = stretch.iter().fold(all.clone(), |sum, b| sum - &b.matrix);
         let score = stretch.iter().fold(DVector::zeros(size), |sum, b| sum - &b.score);
+        lost.iter_mut().zip(matrix.diagonal().iter()).for_each(|(lost, x)| *lost |= *x <= 0.0);
         without.push(scaled_inverse(&matrix)? * score);
     }
     let count = without.len() as f64;
     let middle = without.iter().fold(DVector::zeros(size), |sum, x| sum + x) / count;
     let one = |g: &DVector<f64>| {
+        if g.iter().zip(&lost).any(|(g, lost)| *g != 0.0 && *lost) {
+            return f64::INFINITY;
+        }
         let noise = (g.transpose() * &sandwich * g)[0].max(0.0).sqrt();
         let squares: f64 = without.iter().map(|x| g.dot(&(x - &middle)).powi(2)).sum();
         2.0 * noise.max(STUDENT * ((count - 1.0) / count * squares).sqrt())
@@ -59,11 +65,16 @@ pub fn half_widths(blocks: &[Sums], gradients: &[DVector<f64>]) -> Option<Vec<f6
     Some(gradients.iter().map(one).collect())
 }
 
-/// Inverse of a normal matrix, scaled to a diagonal of ones meanwhile.
+/// Inverse of a normal matrix, scaled to a diagonal of ones meanwhile. A parameter that no row shows has a row and a column of zeros
+/// in it: it stays as it is.
 fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let scale = matrix.diagonal().map(|x| if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 });
     let scale = DMatrix::from_diagonal(&scale);
-    Some(&scale * (&scale * matrix * &scale).try_inverse()? * &scale)
+    let mut scaled = &scale * matrix * &scale;
+    for k in (0..scaled.nrows()).filter(|&k| scale[(k, k)] == 0.0) {
+        scaled[(k, k)] = 1.0;
+    }
+    Some(&scale * scaled.try_inverse()? * &scale)
 }
 
 /// Solves a normal matrix, scaled to a diagonal of ones meanwhile.

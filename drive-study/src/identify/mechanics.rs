@@ -39,7 +39,21 @@ pub struct Shown {
     pub torque: f64,
     /// Speeds that differ by a tenth of the greatest, each for at least 3 % of the time.
     pub levels: usize,
-    rows: Vec<([f64; SIZE], f64)>,
+    /// The windows.
+    pub rows: Vec<TorqueWindow>,
+}
+
+/// One window: the regressors of inertia and friction and what they explain, integrals over its time.
+#[derive(Clone, Copy, Debug)]
+pub struct TorqueWindow {
+    /// Time in s at its middle.
+    pub t: f64,
+    /// Its length in s.
+    pub time: f64,
+    /// Change of the speed, integral of the speed and of its sign.
+    pub x: [f64; SIZE],
+    /// Integral of the electromagnetic torque without the load, N.m.s.
+    pub y: f64,
 }
 
 impl Shown {
@@ -72,7 +86,7 @@ impl Shown {
                 let time = width as f64 * record.step;
                 greatest = greatest.max((made / time).abs());
                 bins[((x[1] / time / speed).abs() * 100.0).clamp(0.0, 100.0) as usize] += 1;
-                rows.push((x, y));
+                rows.push(TorqueWindow { t: 0.5 * (record.t[start] + record.t[start + width]), time, x, y });
                 start += width;
             }
         }
@@ -82,18 +96,18 @@ impl Shown {
 
     /// The fit: least squares with rows that are wrong by 1 % of their torque, and less weight beyond 2.5 standard deviations.
     pub fn fit(&self) -> Option<MechanicalFit> {
-        let typical = quantile(self.rows.iter().map(|(_, y)| y.abs()).collect(), 0.9);
+        let typical = quantile(self.rows.iter().map(|row| row.y.abs()).collect(), 0.9);
         let size = |y: f64| 0.01 * y.abs() + 0.005 * typical;
-        let mut weights: Vec<f64> = self.rows.iter().map(|(_, y)| 1.0 / size(*y)).collect();
+        let mut weights: Vec<f64> = self.rows.iter().map(|row| 1.0 / size(row.y)).collect();
         let base = weights.clone();
         let mut p = DVector::zeros(SIZE);
         for _ in 0..3 {
             let mut sums = Sums::new(SIZE);
-            for ((x, y), weight) in self.rows.iter().zip(&weights) {
+            for (TorqueWindow { x, y, .. }, weight) in self.rows.iter().zip(&weights) {
                 sums.add(&x.map(|x| x * weight), y * weight);
             }
             p = interval::solve(&sums.matrix, &sums.score)?;
-            let rests: Vec<f64> = self.rows.iter().zip(&base).map(|((x, y), b)| b * (y - dot(x, &p))).collect();
+            let rests: Vec<f64> = self.rows.iter().zip(&base).map(|(row, b)| b * (row.y - dot(&row.x, &p))).collect();
             let sigma = 1.4826 * quantile(rests.iter().map(|r| r.abs()).collect(), 0.5);
             for ((weight, base), rest) in weights.iter_mut().zip(&base).zip(&rests) {
                 // Huber: the square root of the weight of a square.
@@ -102,9 +116,9 @@ impl Shown {
             }
         }
         let rows: Vec<_> = self.rows.iter().zip(&weights).collect();
-        let block = |chunk: &[(&([f64; SIZE], f64), &f64)]| {
+        let block = |chunk: &[(&TorqueWindow, &f64)]| {
             let mut block = Sums::new(SIZE);
-            for ((x, y), weight) in chunk {
+            for (TorqueWindow { x, y, .. }, weight) in chunk {
                 block.add(&x.map(|x| x * *weight), *weight * (y - dot(x, &p)));
             }
             block

@@ -4,6 +4,7 @@
 //! - [`columns`]: headers, units, forms of columns. [`record`]: the checked record. [`motion`]: angle and speed.
 //! - [`electrical`]: the linear fit of the voltage equations; [`legs`]: the inverter's curve in it. [`mechanics`]: inertia and friction.
 //! - [`interval`]: half-widths. [`verdict`]: what is written and what is refused. [`machine_file`]: the file for `fmu tune`.
+//!   [`page`]: the fits beside the record.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -20,13 +21,14 @@ pub mod legs;
 pub mod machine_file;
 pub mod mechanics;
 pub mod motion;
+pub mod page;
 pub mod record;
 pub mod verdict;
 
 use anyhow::{Context, Result, ensure};
 use columns::{Naming, Signals};
-use electrical::{Fit, Problem, Timing};
-use mechanics::{MechanicalFit, Shown};
+use electrical::{Fit, Problem, Timing, Window};
+use mechanics::{MechanicalFit, Shown, TorqueWindow};
 use motion::Motion;
 use record::BenchRecord;
 use serde::Deserialize;
@@ -70,6 +72,8 @@ pub struct Identified {
     pub values: Vec<Quantity>,
     /// The fit of the voltages.
     pub fit: Fit,
+    /// The record as the fits see it.
+    pub seen: Seen,
     /// When the voltage of a row acts.
     pub timing: Timing,
     /// Ratings, and whether they are given or the greatest of the record.
@@ -78,6 +82,19 @@ pub struct Identified {
     pub n_p: i32,
     /// What the reader should know.
     pub notes: Vec<String>,
+}
+
+/// The record as the fits see it.
+#[derive(Clone, Debug)]
+pub struct Seen {
+    /// Windows of the voltage equations, in the axes of the fit.
+    pub voltage: Vec<Window>,
+    /// Their length in s.
+    pub window: f64,
+    /// Windows of the torque.
+    pub torque: Vec<TorqueWindow>,
+    /// The fit of inertia and friction, where the load is known.
+    pub mechanics: Option<MechanicalFit>,
 }
 
 /// Ratings of the machine file: the value, and whether it was given.
@@ -160,7 +177,9 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
         torque: rating(options.torque, shown.torque),
         u_dc: record.u_dc,
     };
-    Ok(Identified { values, fit, timing, ratings, n_p, notes })
+    let (voltage, window) = Problem::new(&record, &motion, timing, i_max).seen(&fit);
+    let seen = Seen { voltage, window, torque: shown.rows, mechanics };
+    Ok(Identified { values, fit, seen, timing, ratings, n_p, notes })
 }
 
 /// The fit with the given delay, or with the best one; and why the delay is in doubt.
