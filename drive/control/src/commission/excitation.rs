@@ -44,7 +44,7 @@ impl Default for Record {
 
 impl Record {
     pub(super) fn len(&self) -> usize {
-        usize::try_from(self.length).unwrap_or(ROWS)
+        usize::try_from(self.length).unwrap_or(ROWS).min(ROWS)
     }
 
     pub(super) fn row(&self, n: usize) -> [f64; 4] {

@@ -266,8 +266,9 @@ impl Errors {
     }
 }
 
-/// Prints errors and half-widths in % (-100 and 100: refused), and compares those of 300 free machines of seed 1 with the limits: errors in % at 95 and 99 %, greatest
-/// share refused, share inside the intervals. `MACHINES`, `SEED` and `BLOCKED=1` select others.
+/// Prints errors and half-widths in % (-100 and 100: refused), and compares those of 300 free machines of seed 1 with the
+/// limits: errors in % at 95 and 99 %, greatest share refused, share inside the intervals. `MACHINES`, `SEED` and `BLOCKED=1`
+/// select others.
 #[test]
 #[ignore = "a minute: cargo test -p drive-control --test commission population -- --ignored --nocapture"]
 fn population() {
