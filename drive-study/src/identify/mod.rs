@@ -2,9 +2,9 @@
 //! flux, inertia and friction, each with an interval, or with the reason why the record does not tell it.
 //!
 //! - [`columns`]: headers, units, forms of columns. [`record`]: the checked record. [`motion`]: angle and speed.
-//! - [`windows`]: the voltage equations in integral form; [`electrical`]: their linear fit; [`legs`]: the inverter's curve in it. [`mechanics`]: inertia and friction.
-//! - [`interval`]: half-widths. [`verdict`]: what is written and what is refused. [`machine_file`]: the file for `fmu tune`.
-//!   [`page`]: the fits beside the record.
+//! - [`windows`]: the voltage equations in integral form; [`electrical`]: their linear fit; [`legs`]: the inverter's curve in it.
+//! - [`mechanics`]: inertia and friction. [`interval`]: half-widths. [`verdict`]: what is written and what is refused.
+//! - [`machine_file`]: the file for `fmu tune`. [`page`]: the fits beside the record.
 
 #![allow(
     clippy::cast_possible_truncation,
