@@ -26,7 +26,7 @@ pub use equations::{SensitivityArguments, UpdateResults};
 pub use instantiate::{Arguments, Interface};
 pub use names::{Count, Optional, Sensitivity, Simple, StepStatus, Text, Vector};
 pub use owned::{Handle, SavedState};
-pub use processor::{float_control, locale};
+pub use processor::{armed_timers, float_control, locale};
 
 use super::arguments::Array;
 use super::functions::{CType, Calls, Way};
