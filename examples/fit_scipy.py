@@ -38,7 +38,7 @@ def main():
     fit = least_squares(residual, [3.0, 0.4], jac=jacobian, x_scale=[1.0, 0.1])
     spread = np.sqrt(np.diag(np.linalg.inv(fit.jac.T @ fit.jac)) * 2 * fit.cost / (recorded.size - len(names)))
     for name, value, sigma in zip(names, fit.x, spread):
-        print(f"{name} = {value:.4f} +- {1.96 * sigma:.4f}, true {TRUE[name]}")
+        print(f"{name} = {value:.5f} +- {1.96 * sigma:.5f}, true {TRUE[name]}")
     return point(fit.x)
 
 

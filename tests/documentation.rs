@@ -314,12 +314,12 @@ fn pages_in_a_browser() {
     common::python::pytest("pages", "pages", &["test_browser.py"], &[("FMU_PAGES", &folder)]);
 }
 
-/// Every relative link of README, the pages at the root and `docs` leads to a file.
+/// Every relative link of README, the pages at the root, of `docs` and of the Python package leads to a file.
 #[test]
 fn links_lead_somewhere() {
-    let mut pages: Vec<PathBuf> = [root().to_owned(), root().join("docs")]
+    let mut pages: Vec<PathBuf> = ["", "docs", "python", "python/docs"]
         .iter()
-        .flat_map(|folder| std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()))
+        .flat_map(|folder| std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path()))
         .filter(|path| path.extension().is_some_and(|e| e == "md"))
         .collect();
     pages.sort();

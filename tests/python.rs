@@ -10,10 +10,12 @@ use std::process::Command;
 use std::{env, fs, iter, process};
 
 const TESTS: &str = "../python/tests";
+/// One environment with the tests of FMPy: it is made once.
+const REQUIREMENTS: &str = "../../tests/fmpy/requirements.txt";
 
 /// Installs the package into a folder of its own.
 fn installed() -> PathBuf {
-    let python = environment(&package().join("tests/requirements.txt"));
+    let python = environment(&package().join("tests").join(REQUIREMENTS));
     let folder = scratch().join(format!("fmurun-{}", process::id()));
     let programs = python.parent().expect("python is in a folder").to_owned();
     let path = env::join_paths(iter::once(programs).chain(env::split_paths(&env::var_os("PATH").unwrap_or_default())));
@@ -29,7 +31,7 @@ fn installed() -> PathBuf {
 /// Archives of the Reference-FMUs that the tests integrate.
 fn reference() -> PathBuf {
     let folder = scratch().join("python-reference");
-    let package = ["bouncing-ball", "van-der-pol", "stair", "dahlquist"].map(String::from).to_vec();
+    let package = ["bouncing-ball", "van-der-pol", "stair", "dahlquist", "state-space"].map(String::from).to_vec();
     let build = Build { package, out: Some(folder.clone()), ..Build::default() };
     build::run(&build).expect("Reference-FMUs that build");
     folder
@@ -40,7 +42,7 @@ fn package() -> PathBuf {
 }
 
 fn tests(name: &str, files: &[&str], variables: &[(&str, &Path)]) {
-    tests_with("requirements.txt", name, files, variables);
+    tests_with(REQUIREMENTS, name, files, variables);
 }
 
 fn tests_with(requirements: &str, name: &str, files: &[&str], variables: &[(&str, &Path)]) {
@@ -68,6 +70,7 @@ fn the_package() {
     let files = [
         "simulate",
         "exchange",
+        "arrays",
         "linearize",
         "drives",
         "plot",
@@ -79,6 +82,7 @@ fn the_package() {
         "examples",
         "cli",
         "types",
+        "docs",
         "figures",
     ];
     let files = files.map(|name| format!("test_{name}.py"));
@@ -113,7 +117,7 @@ fn engines() {
 #[ignore = "opt-in: cargo test --test python install -- --ignored --nocapture"]
 fn install() {
     let folder = scratch().join(format!("install-{}", process::id()));
-    let python = environment(&package().join("tests/requirements.txt"));
+    let python = environment(&package().join("tests").join(REQUIREMENTS));
     let begun = std::time::Instant::now();
     let mut pip = Command::new(&python);
     pip.args(["-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir"]);

@@ -79,6 +79,8 @@ pub(super) enum Run {
     Twice(fn(&Session) -> Result<(), NotDetermined>),
     /// Like `Probe`, with instances for Model Exchange.
     Exchange(fn(&Session) -> Result<(), NotDetermined>),
+    /// Like `Probe`, with instances for Scheduled Execution.
+    Scheduled(fn(&Session) -> Result<(), NotDetermined>),
 }
 
 /// Checks that belong together.

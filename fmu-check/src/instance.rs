@@ -61,6 +61,7 @@ impl Session {
     fn function_for(&self, interface: Interface) -> &'static str {
         match (self.description.version, interface) {
             (FmiVersion::V3, Interface::ModelExchange) => "fmi3InstantiateModelExchange",
+            (FmiVersion::V3, Interface::ScheduledExecution) => "fmi3InstantiateScheduledExecution",
             _ => self.instantiation(),
         }
     }

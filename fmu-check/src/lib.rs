@@ -21,6 +21,7 @@ pub mod report;
 mod runner;
 mod session;
 mod states;
+mod ticking;
 mod trajectory;
 mod watch;
 mod zip_headers;

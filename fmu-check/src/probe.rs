@@ -18,7 +18,8 @@ const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
     guard::end_with_parent();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
-    let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe)) = check.map(|c| c.run)
+    let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe) | Run::Scheduled(probe)) =
+        check.map(|c| c.run)
     else {
         anyhow::bail!("there is no probe {}: --list names the checks", args.id);
     };
@@ -67,6 +68,7 @@ pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
 /// Whether the FMU needs a tool that may not be here.
 fn needs_tool(dir: &Path) -> bool {
     let xml = fs::read(dir.join("modelDescription.xml")).unwrap_or_default();
-    let interface = model_description::read(&xml).ok().and_then(|d| d.co_simulation.or(d.model_exchange));
+    let interface =
+        model_description::read(&xml).ok().and_then(|d| d.co_simulation.or(d.model_exchange).or(d.scheduled_execution));
     interface.is_some_and(|i| i.needs_execution_tool())
 }

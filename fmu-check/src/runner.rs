@@ -55,7 +55,11 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     let workers = std::thread::available_parallelism().map_or(2, usize::from);
     let work = || {
         while let Some((check, verdict)) = take(&queue) {
-            let why = if is_exchange(check) { &exchanges } else { &simulates };
+            let why = match check.run {
+                Run::Exchange(_) => &exchanges,
+                Run::Scheduled(_) => &None,
+                _ => &simulates,
+            };
             let found = match (&runner, why) {
                 (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
                 (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
@@ -177,9 +181,10 @@ fn store(place: &Mutex<Option<Judgement>>, verdict: Judgement) {
 pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
-    /// The binaries for co-simulation and for Model Exchange; mostly the same one.
+    /// The binaries for co-simulation, Model Exchange and Scheduled Execution; mostly the same one.
     simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
+    scheduled: Option<PathBuf>,
     /// Time limit of one call.
     timeout: Duration,
     allowance: Allowance,
@@ -217,12 +222,9 @@ impl Runner {
             interface.as_ref().map(|i| Ok::<_, String>(fmu.dir().join(&fmu.host_binary(i)?.name))).transpose()
         };
         let (simulation, exchange) = (binary(&description.co_simulation)?, binary(&description.model_exchange)?);
-        if simulation.is_none() && exchange.is_none() {
-            return Err(if description.scheduled_execution.is_some() {
-                "the FMU is for Scheduled Execution only, and the checker does not run that".into()
-            } else {
-                "the description has no interface for co-simulation or Model Exchange".into()
-            });
+        let scheduled = binary(&description.scheduled_execution)?;
+        if simulation.is_none() && exchange.is_none() && scheduled.is_none() {
+            return Err("the description has no interface".into());
         }
         let program = options.program.clone().map_or_else(std::env::current_exe, Ok).map_err(|e| e.to_string())?;
         Ok(Self {
@@ -230,6 +232,7 @@ impl Runner {
             dir: fmu.dir().to_owned(),
             simulation,
             exchange,
+            scheduled,
             timeout: options.patience.unwrap_or(TIMEOUT),
             allowance: Allowance { file: limits::PROBE_FILE, ..options.allowance },
             left: Mutex::default(),
@@ -250,15 +253,15 @@ impl Runner {
         if self.deadline.is_some_and(|end| Instant::now() > end) {
             return Verdict::NotDetermined(OUT_OF_TIME.into()).into();
         }
-        let binary = match (is_exchange(check), &self.simulation, &self.exchange) {
-            (true, _, None) => {
-                return Verdict::NotApplicable("the FMU has no interface for Model Exchange".into()).into();
-            }
-            (true, _, Some(binary)) | (false, Some(binary), _) => binary,
-            (false, None, Some(binary)) if WITHOUT_INSTANCE.contains(&check.id) => binary,
-            (false, None, _) => {
-                return Verdict::NotApplicable("the FMU has no interface for co-simulation".into()).into();
-            }
+        let (binary, interface) = match check.run {
+            Run::Exchange(_) => (&self.exchange, "Model Exchange"),
+            Run::Scheduled(_) => (&self.scheduled, "Scheduled Execution"),
+            _ => (&self.simulation, "co-simulation"),
+        };
+        let any = || self.exchange.as_ref().or(self.scheduled.as_ref());
+        let other = || any().filter(|_| WITHOUT_INSTANCE.contains(&check.id));
+        let Some(binary) = binary.as_ref().or_else(other) else {
+            return Verdict::NotApplicable(format!("the FMU has no interface for {interface}")).into();
         };
         self.attempt(check, binary)
             .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")).into())

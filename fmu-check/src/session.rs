@@ -118,6 +118,8 @@ pub(super) struct Session {
     calls: PathBuf,
 }
 
+/// Below the environments of the instances.
+const ENVIRONMENT: usize = 0x5000;
 /// Stands in the log of calls where something was found.
 pub(super) const FOUND: &str = "# found";
 /// How an end begins that the FMU asked for, as it may at any time.
@@ -402,8 +404,15 @@ impl Session {
             logging: false,
             event_mode: clocks,
             early_return: false,
-            environment: 0x5000 + 0x10 * self.instances_made.get(),
+            environment: self.environment(),
+            intermediate: None,
+            locks: false,
         }
+    }
+
+    /// The environment of the instance that was made last.
+    pub(super) fn environment(&self) -> usize {
+        ENVIRONMENT + 0x10 * self.instances_made.get()
     }
 
     /// The relative deviation below which two runs are the same to the standards, which nowhere say bit for bit: the

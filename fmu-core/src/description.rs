@@ -9,6 +9,7 @@ use crate::Fault;
 use crate::capability::{Capabilities, Exported};
 use crate::clock::Timing;
 use crate::integer::IntegerType;
+use crate::kinds::Kinds;
 use crate::model::{Block, Experiment, Model};
 use crate::need::Need;
 use crate::probe;
@@ -360,14 +361,14 @@ impl Description {
 
 /// The clocks of every variable. What is on a clock has no value before its first tick, and between events depends on the ticks.
 fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Result<(), Fault> {
+    if const { !M::TABLE.kinds().meets(Kinds::CLOCK) } {
+        return Ok(());
+    }
     let clocks: Vec<(String, u32, Causality)> = variables
         .iter()
         .filter(|v| matches!(v.kind, VariableKind::Clock(_)))
         .map(|v| (v.name.clone(), v.value_reference, v.causality))
         .collect();
-    if clocks.is_empty() {
-        return Ok(());
-    }
     for v in variables.iter_mut() {
         let Some(index) = v.value_reference.checked_sub(1) else { continue };
         for name in M::TABLE.clocks_of(index as usize).split_whitespace() {

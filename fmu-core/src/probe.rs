@@ -214,6 +214,9 @@ impl Wide {
 /// The wide arrays of a model's table.
 pub(crate) fn wide<M: Model>() -> Wide {
     let mut arrays: Vec<(usize, usize)> = Vec::new();
+    if const { M::TABLE.wide() == 0 } {
+        return Wide { len: M::TABLE.len(), arrays };
+    }
     for index in M::TABLE.indices().skip(M::TABLE.len()) {
         match M::TABLE.element(index) {
             Some(0) => arrays.push((index, 1)),

@@ -11,6 +11,7 @@ use crate::bytes::Bytes;
 use crate::enumeration::Place;
 use crate::fault::Fault;
 use crate::integer::Getter;
+use crate::kinds::Kinds;
 use crate::list::List;
 use crate::need::Need;
 use crate::reals::{Inputs, Interval};
@@ -27,10 +28,14 @@ pub(crate) trait Node<W>: Sync {
     fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
+    fn clocks_of(&self, index: usize) -> &'static str;
+}
+
+/// The interface of a part with structural parameters, beside [`Node`]: other parts have no code for it.
+pub(crate) trait SizedNode<W>: Sync {
     fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)>;
     fn extents(&self, whole: &mut W, index: usize) -> Vec<usize>;
     fn check_sizes(&self, whole: &mut W) -> Result<(), Fault>;
-    fn clocks_of(&self, index: usize) -> &'static str;
 }
 
 /// Where the value lives.
@@ -54,9 +59,10 @@ pub(crate) enum Access<W: 'static> {
         len: usize,
         wide: usize,
         hash: Hash,
-        binary: bool,
+        kinds: Kinds,
         sizes: Sizes,
         node: &'static dyn Node<W>,
+        sized: Option<&'static dyn SizedNode<W>>,
     },
 }
 

@@ -131,7 +131,11 @@ impl<W: 'static> Table<W> {
     pub fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)> {
         let (row, inner) = self.row_of(index)?;
         Some(match &row.access {
-            Access::Part { node, .. } => return node.extent(whole, inner),
+            Access::Part { sized: Some(node), .. } => return node.extent(whole, inner),
+            Access::Part { node, .. } => {
+                let (meta, _) = node.entry(whole, inner)?;
+                (meta, meta.dimension.unwrap_or(1))
+            }
             _ if row.meta.sized.is_empty() => (&row.meta, row.meta.dimension.unwrap_or(1)),
             _ => (&row.meta, row.len(whole)),
         })
@@ -140,7 +144,10 @@ impl<W: 'static> Table<W> {
     /// Extents now of the array that has variable `index`; empty for a scalar, and for an array with one extent that is the same always.
     pub fn extents(&self, whole: &mut W, index: usize) -> Vec<usize> {
         match self.row_of(index) {
-            Some((Row { access: Access::Part { node, .. }, .. }, inner)) => node.extents(whole, inner),
+            Some((Row { access: Access::Part { sized: Some(node), .. }, .. }, inner)) => node.extents(whole, inner),
+            Some((Row { access: Access::Part { node, .. }, .. }, inner)) => {
+                node.entry(whole, inner).map(|(meta, _)| meta.shape.to_vec()).unwrap_or_default()
+            }
             Some((row, _)) if row.meta.sized.is_empty() => row.meta.shape.to_vec(),
             Some((row, _)) => row.meta.sized.iter().map(|name| self.size(whole, name)).collect(),
             None => Vec::new(),
@@ -156,7 +163,7 @@ impl<W: 'static> Table<W> {
             return Ok(());
         }
         for row in self.rows {
-            if let Access::Part { node, .. } = &row.access {
+            if let Access::Part { sized: Some(node), .. } = &row.access {
                 node.check_sizes(whole)?;
             }
             if row.meta.sized.is_empty() {

@@ -6,8 +6,9 @@
 
 use crate::clock::Ticks;
 use crate::fault::Fault;
+use crate::kinds::Kinds;
 use crate::reals::Inputs;
-use crate::row::{Access, Constant, Node, Row, Slot};
+use crate::row::{Access, Constant, Node, Row, SizedNode, Slot};
 use crate::rules::{demand, same_text};
 use crate::sizes::{Sizes, check_sized};
 use crate::token::Hash;
@@ -57,6 +58,12 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.element(index)
     }
 
+    fn clocks_of(&self, index: usize) -> &'static str {
+        self.table.clocks_of(index)
+    }
+}
+
+impl<W, P> SizedNode<W> for Part<W, P> {
     fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)> {
         self.table.extent((self.lens)(whole), index)
     }
@@ -68,17 +75,14 @@ impl<W, P> Node<W> for Part<W, P> {
     fn check_sizes(&self, whole: &mut W) -> Result<(), Fault> {
         self.table.check_sizes((self.lens)(whole))
     }
-
-    fn clocks_of(&self, index: usize) -> &'static str {
-        self.table.clocks_of(index)
-    }
 }
 
 impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
-        let Table { len, wide, hash, binary, intermediate, sizes, .. } = *part.table;
-        let access = Access::Part { len, wide, hash, binary, sizes, node: part };
+        let Table { len, wide, hash, kinds, intermediate, sizes, .. } = *part.table;
+        let sized = if sizes.any { Some(part as &dyn SizedNode<W>) } else { None };
+        let access = Access::Part { len, wide, hash, kinds, sizes, node: part, sized };
         let mut row = Self::new(prefix, "", Kind::Boolean, access);
         row.meta.intermediate = intermediate;
         row
@@ -115,6 +119,12 @@ struct WidePlace {
     len: usize,
 }
 
+/// Finds a value of an access that few tables have.
+type Rare<W> = for<'a> fn(&'static Row<W>, &'a mut W, usize) -> Option<Slot<'a>>;
+
+/// Finds an element of a wide array.
+type Beyond<W> = for<'a> fn(&Table<W>, &'a mut W, usize) -> Option<(&'static Meta, Slot<'a>)>;
+
 /// All variables of `W`; [`table!`](crate::table!) makes one from its rows.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
@@ -124,12 +134,15 @@ pub struct Table<W: 'static> {
     /// Number of elements of wide arrays.
     wide: usize,
     hash: Hash,
-    /// A variable is binary.
-    binary: bool,
+    /// The kinds of its variables.
+    kinds: Kinds,
     /// A variable can be read or set inside a communication step.
     pub(crate) intermediate: bool,
     /// What the structural parameters can do.
     pub(crate) sizes: Sizes,
+    /// Functions of tables that need them: others have no code for them.
+    rare: Option<Rare<W>>,
+    beyond: Option<Beyond<W>>,
 }
 
 impl<W: 'static> Table<W> {
@@ -142,15 +155,16 @@ impl<W: 'static> Table<W> {
         assert!(CAPACITY <= u16::MAX as usize);
         // No row past the end.
         let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
-        let (mut len, mut row, mut hash, mut binary, mut intermediate) = (0, 0, Hash::START, false, false);
-        let mut sizes = Sizes::NONE;
+        let (mut len, mut row, mut hash, mut kinds, mut intermediate) = (0, 0, Hash::START, Kinds::NONE, false);
+        let (mut sizes, mut has_rare) = (Sizes::NONE, false);
         let (mut wide_places, mut wide, mut wide_rows) = ([WidePlace { row: 0, first: 0, len: 0 }; WIDE_ROWS], 0, 0);
         while row < rows.len() {
             let meta = &rows[row].meta;
             intermediate |= meta.intermediate;
+            has_rare |= rows[row].access.is_rare();
             let (count, beyond) = match (&rows[row].access, meta.dimension) {
-                (Access::Part { len, wide, hash: of_part, binary: of_bytes, sizes: of_sizes, .. }, _) => {
-                    binary |= *of_bytes;
+                (Access::Part { len, wide, hash: of_part, kinds: of_kinds, sizes: of_sizes, .. }, _) => {
+                    kinds = kinds.and(*of_kinds);
                     sizes = sizes.and(*of_sizes);
                     hash = hash.text(meta.name).join(of_part);
                     if !meta.clocks.is_empty() {
@@ -162,7 +176,7 @@ impl<W: 'static> Table<W> {
                     check(meta);
                     check_sized(rows, row);
                     sizes = sizes.and(Sizes::of(meta));
-                    binary |= matches!(meta.kind, Kind::Binary { .. });
+                    kinds = kinds.and(Kinds::of(&meta.kind));
                     hash = hash.meta(meta);
                     match dimension {
                         Some(n) if n > DENSE => (0, n),
@@ -186,7 +200,9 @@ impl<W: 'static> Table<W> {
             check_unique(rows, row);
             row += 1;
         }
-        Self { rows, places, len, wide_places, wide, hash, binary, intermediate, sizes }
+        let rare: Option<Rare<W>> = if has_rare { Some(find_rare) } else { None };
+        let beyond: Option<Beyond<W>> = if wide > 0 { Some(Self::wide_entry) } else { None };
+        Self { rows, places, len, wide_places, wide, hash, kinds, intermediate, sizes, rare, beyond }
     }
 
     /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
@@ -224,9 +240,9 @@ impl<W: 'static> Table<W> {
         self.len == 0
     }
 
-    /// Whether a variable is binary.
-    pub const fn has_binary(&self) -> bool {
-        self.binary
+    /// The kinds of its variables.
+    pub const fn kinds(&self) -> Kinds {
+        self.kinds
     }
 
     /// Hash of all that the rows say.
@@ -238,26 +254,20 @@ impl<W: 'static> Table<W> {
     #[inline]
     pub fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)> {
         if index >= self.len {
-            return self.wide_entry(whole, index);
+            return (self.beyond?)(self, whole, index);
         }
         let place = self.places[index];
         let row = &self.rows[usize::from(place.row)];
         let slot = match &row.access {
             Access::Real(get) => Slot::Real(get(whole)),
             Access::Reals(get) => Slot::Real(get(whole).get_mut(usize::from(place.inner))?),
-            Access::Float32(get) => Slot::Float32(get(whole)),
             Access::Integer(get) => Slot::Integer(get.find(whole)),
             Access::Boolean(get) => Slot::Boolean(get(whole)),
             Access::Enumeration(field) => Slot::Enumeration(field.find(whole)),
-            Access::List(items) => items.find(whole, usize::from(place.inner))?,
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
-            Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
-            Access::Binary(get) => Slot::Binary(get(whole)),
-            Access::ConstantText(text) => Slot::Said(text),
-            Access::Constant(x) => Slot::Constant(*x),
-            Access::Constants(all) => Slot::Constant(Constant::Real(*all.get(usize::from(place.inner))?)),
             Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
+            _ => (self.rare?)(row, whole, usize::from(place.inner))?,
         };
         Some((&row.meta, slot))
     }
@@ -390,6 +400,36 @@ impl<W: 'static> Table<W> {
             _ => Some((&row.meta, inner)),
         }
     }
+}
+
+impl<W> Access<W> {
+    /// Whether [`find_rare`] finds the value.
+    const fn is_rare(&self) -> bool {
+        !matches!(
+            self,
+            Self::Real(_)
+                | Self::Reals(_)
+                | Self::Integer(_)
+                | Self::Boolean(_)
+                | Self::Enumeration(_)
+                | Self::Text(_)
+                | Self::Said(_)
+                | Self::Part { .. }
+        )
+    }
+}
+
+fn find_rare<'a, W: 'static>(row: &'static Row<W>, whole: &'a mut W, inner: usize) -> Option<Slot<'a>> {
+    Some(match &row.access {
+        Access::Float32(get) => Slot::Float32(get(whole)),
+        Access::List(items) => items.find(whole, inner)?,
+        Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
+        Access::Binary(get) => Slot::Binary(get(whole)),
+        Access::ConstantText(text) => Slot::Said(text),
+        Access::Constant(x) => Slot::Constant(*x),
+        Access::Constants(all) => Slot::Constant(Constant::Real(*all.get(inner)?)),
+        _ => return None,
+    })
 }
 
 const fn check(meta: &Meta) {

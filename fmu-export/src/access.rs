@@ -7,6 +7,7 @@ use crate::message;
 use crate::value::Value;
 use fmu_core::description::TIME;
 use fmu_core::{Causality, Exported, Fault, Kind, Meta, Model, Slot, Table, Variability};
+use std::fmt::Display;
 use std::mem::MaybeUninit;
 
 /// The table's index of a value reference; [`TIME`] becomes an index past every table.
@@ -54,6 +55,11 @@ const fn table<E: Exported>() -> &'static Table<fmu_core::Block<E::Model>> {
     E::Model::TABLE
 }
 
+/// Whether the model has a variable that this type carries.
+pub(crate) const fn has<E: Exported, T: Value>() -> bool {
+    E::Model::TABLE.kinds().meets(T::KINDS)
+}
+
 impl<E: Exported> Instance<E> {
     /// The variables' values, one after the other. In initialization they fit what was set; later they are those of the
     /// last step, inputs and tunable parameters as set.
@@ -63,12 +69,24 @@ impl<E: Exported> Instance<E> {
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
-        if references.len() != out.len() || self.arrays {
+        if const { !has::<E, T>() } {
+            return self.get_none(references, out.len(), T::CARRIES);
+        }
+        // Outputs that are old are computed for a list that is right, and with arrays that is not known yet.
+        let old = self.stale || self.current.dirty;
+        if references.len() != out.len() || self.arrays && old {
             return self.get_counted(references, out);
         }
         self.refresh();
+        // Scalars alone: one value for each reference.
         let done = T::read_reals(&mut self.current.block, references, out);
-        if done == out.len() { Ok(()) } else { self.get_each(&references[done..], &mut out[done..]) }
+        if done == out.len() {
+            Ok(())
+        } else if self.arrays {
+            self.get_counted(references, out)
+        } else {
+            self.get_each(&references[done..], &mut out[done..])
+        }
     }
 
     #[inline(never)]
@@ -76,6 +94,21 @@ impl<E: Exported> Instance<E> {
         self.check_count(references, out.len())?;
         self.refresh();
         self.get_each(references, out)
+    }
+
+    /// Gets variables of a type that the model does not have: an error, if there is a value to get.
+    #[inline(never)]
+    fn get_none(&mut self, references: &[u32], given: usize, carries: &str) -> Result<(), Refusal> {
+        self.check_count(references, given)?;
+        self.refresh();
+        for &reference in references {
+            if self.elements(reference)? > 0 {
+                let time = is_time(reference, self.standard);
+                self.read_number(reference, index::<E>(reference), (carries, false))?;
+                return Err(message::real(time, carries).into());
+            }
+        }
+        Ok(())
     }
 
     /// Gets variables of any type; their number was checked.
@@ -102,19 +135,25 @@ impl<E: Exported> Instance<E> {
     /// The value of `time`, of a derivative or of an indicator, or an error: no variable of this type has the reference.
     #[cold]
     fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
+        let x = self.read_number(reference, index, (T::CARRIES, T::NARROW))?;
+        T::from_real(x).ok_or_else(|| message::real(is_time(reference, self.standard), T::CARRIES).into())
+    }
+
+    /// [`read_other`](Self::read_other) as a real number, for every type.
+    #[cold]
+    #[inline(never)]
+    fn read_number(&mut self, reference: u32, index: usize, (carries, narrow): (&str, bool)) -> Result<f64, Refusal> {
         if let Some((meta, slot)) = table::<E>().entry(&mut self.current.block, index) {
             return Err(match (&slot, meta.kind) {
-                (Slot::Integer(x), Kind::Integer(of)) if T::NARROW => message::narrow::<E::Model>(index, x.get(), of),
-                _ => message::type_of::<E::Model>(index, meta, T::CARRIES),
+                (Slot::Integer(x), Kind::Integer(of)) if narrow => message::narrow::<E::Model>(index, x.get(), of),
+                _ => message::type_of::<E::Model>(index, meta, carries),
             }
             .into());
         }
-        let time = is_time(reference, self.standard);
-        let x = if time { Some(self.current.end) } else { self.calculated(index)? };
-        match x {
-            Some(x) => T::from_real(x).ok_or_else(|| message::real(time, T::CARRIES).into()),
-            None => Err(message::unknown::<E>(reference, self.standard).into()),
+        if is_time(reference, self.standard) {
+            return Ok(self.current.end);
         }
+        self.calculated(index)?.ok_or_else(|| message::unknown::<E>(reference, self.standard).into())
     }
 
     /// The position after the table of a derivative or, in FMI 3.0, of an indicator.
@@ -155,7 +194,9 @@ impl<E: Exported> Instance<E> {
         let state = self.current.life.state();
         let configures =
             const { E::CAN.resizable.is_some() } && matches!(state, State::Configuration | State::Reconfiguration);
-        if references.len() != values.len()
+        if const { !has::<E, T>() } {
+            self.set_none(references, values.len(), T::CARRIES)?;
+        } else if references.len() != values.len()
             || configures
             || !T::write_inputs(&mut self.current.block, references, values, state == State::Continuous)
         {
@@ -170,6 +211,18 @@ impl<E: Exported> Instance<E> {
             self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);
             self.stale |= (self.exchanges() || const { E::CAN.clocked.is_some() })
                 && matches!(state, State::Event | State::Continuous);
+        }
+        Ok(())
+    }
+
+    /// Sets variables of a type that the model does not have: an error, if there is a value to set.
+    #[inline(never)]
+    fn set_none(&mut self, references: &[u32], given: usize, carries: &str) -> Result<(), Refusal> {
+        self.check_count(references, given)?;
+        for &reference in references {
+            if self.elements(reference)? > 0 {
+                return Err(self.refuse(reference, index::<E>(reference), None, &"", carries));
+            }
         }
         Ok(())
     }
@@ -196,22 +249,17 @@ impl<E: Exported> Instance<E> {
     /// Whether the value can be written in this state.
     fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
+        let mut possible = None;
         if let Some((meta, slot)) = found {
             let held = meta.causality == Causality::Input
                 && !matches!(state, State::Configuration | State::Reconfiguration)
                 && T::read(meta, &slot, self.standard) == Some(value);
-            let (possible, settable) =
-                (value.judge(meta, self.standard), self.opens(meta, state) || held || self.sets_state(index));
-            if possible == Some(true) && settable {
+            possible = value.judge(meta, self.standard);
+            if possible == Some(true) && (self.opens(meta, state) || held || self.sets_state(index)) {
                 return Ok(());
             }
-            // FMI 2.0.5, 2.1.3. CVode looks ahead of an event, where FMPy already sets the discrete inputs of after it.
-            let tried = settable || meta.causality == Causality::Input;
-            if state == State::Continuous && tried && possible.is_some() {
-                return Err(Refusal::Discard(self.refusal(reference, index, value)));
-            }
         }
-        Err(self.refusal(reference, index, value).into())
+        Err(self.refuse(reference, index, possible, &value, T::CARRIES))
     }
 
     /// [`open`]; FMI 2.0 has no structural parameters.
@@ -236,20 +284,37 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// Why a value cannot be set.
+    /// Why a value cannot be set, that the variable may take if it is `possible`; `None` for a variable of another type.
     #[cold]
-    fn refusal<T: Value>(&mut self, reference: u32, index: usize, value: T) -> Fault {
-        match table::<E>().entry(&mut self.current.block, index) {
-            Some((meta, _)) => match value.judge(meta, self.standard) {
-                None => message::type_of::<E::Model>(index, meta, T::CARRIES),
-                Some(_) if !self.opens(meta, self.current.life.state()) && !self.sets_state(index) => {
-                    message::fixed::<E::Model>(index, meta, self.current.life.state())
-                }
-                Some(_) => message::range(&mut self.current.block, index, meta, value),
-            },
-            None if is_time(reference, self.standard) => message::real(true, T::CARRIES),
-            None => self.beside_table(reference, T::CARRIES, true),
+    #[inline(never)]
+    fn refuse(
+        &mut self,
+        reference: u32,
+        index: usize,
+        possible: Option<bool>,
+        value: &dyn Display,
+        carries: &str,
+    ) -> Refusal {
+        let state = self.current.life.state();
+        let Some((meta, _)) = table::<E>().entry(&mut self.current.block, index) else {
+            return if is_time(reference, self.standard) {
+                message::real(true, carries).into()
+            } else {
+                self.beside_table(reference, carries, true).into()
+            };
+        };
+        if possible.is_none() {
+            return message::type_of::<E::Model>(index, meta, carries).into();
         }
+        let settable = self.opens(meta, state) || self.sets_state(index);
+        let fault = if settable {
+            message::range(&mut self.current.block, index, meta, value)
+        } else {
+            message::fixed::<E::Model>(index, meta, state)
+        };
+        // FMI 2.0.5, 2.1.3. CVode looks ahead of an event, where FMPy already sets the discrete inputs of after it.
+        let tried = state == State::Continuous && (settable || meta.causality == Causality::Input);
+        if tried { Refusal::Discard(fault) } else { Refusal::Error(fault) }
     }
 
     /// Why a reference past the table cannot be set, or read as another type.

@@ -4,14 +4,14 @@
 use crate::access::index;
 use crate::instance::{Instance, Refusal};
 use crate::message;
-use fmu_core::{Block, Exported, Fault, Kind, Model, Slot};
+use fmu_core::{Block, Exported, Fault, Kind, Kinds, Model, Slot};
 
 /// What the functions for bytes carry.
 const CARRIES: &str = "bytes";
 
 /// Makes room for the greatest size of every binary variable, so that no step and no set allocates.
 pub(crate) fn make_room<M: Model>(block: &mut Block<M>) {
-    if const { !M::TABLE.has_binary() } {
+    if const { !M::TABLE.kinds().meets(Kinds::BINARY) } {
         return;
     }
     for index in M::TABLE.indices() {
@@ -31,6 +31,9 @@ impl<E: Exported> Instance<E> {
     pub fn get_bytes(&mut self, references: &[u32], given: usize, mut take: impl FnMut(&[u8])) -> Result<(), Refusal> {
         self.check_count(references, given)?;
         self.refresh();
+        if const { !E::Model::TABLE.kinds().meets(Kinds::BINARY) } {
+            return Ok(self.no_variable(references, CARRIES)?);
+        }
         for &reference in references {
             let index = self.index_of(reference, CARRIES, is_binary)?;
             let Some((meta, slot)) = E::Model::TABLE.entry(&mut self.current.block, index) else { continue };
@@ -56,6 +59,9 @@ impl<E: Exported> Instance<E> {
         read: impl Fn(usize) -> Result<&'a [u8], Fault>,
     ) -> Result<(), Refusal> {
         self.check_count(references, sizes.len())?;
+        if const { !E::Model::TABLE.kinds().meets(Kinds::BINARY) } {
+            return Ok(self.no_variable(references, CARRIES)?);
+        }
         for (&reference, &size) in references.iter().zip(sizes) {
             let index = self.index_of(reference, CARRIES, is_binary)?;
             self.check_open(index)?;

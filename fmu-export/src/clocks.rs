@@ -9,7 +9,7 @@ use crate::lifecycle::State;
 use crate::message;
 use crate::value::Fmi3Boolean;
 use fmu_core::time::SAME_INSTANT;
-use fmu_core::{Causality, Elapsed, Exported, Fault, Interface, Kind, Model, Slot, Ticks, Timing};
+use fmu_core::{Causality, Elapsed, Exported, Fault, Interface, Kind, Kinds, Model, Slot, Ticks, Timing};
 use serde::{Deserialize, Serialize};
 use std::mem::MaybeUninit;
 
@@ -64,6 +64,9 @@ impl Tick {
 
 /// The clocks of a new model.
 pub(crate) fn ticks<M: Model>() -> Option<Box<[Tick]>> {
+    if const { !M::TABLE.kinds().meets(Kinds::CLOCK) } {
+        return None;
+    }
     let clock =
         |i| M::TABLE.locate(i).and_then(|(_, meta, _)| if let Kind::Clock(t) = meta.kind { Some(t) } else { None });
     let all: Box<[Tick]> = (0..M::TABLE.len()).filter_map(clock).map(|timing| Tick::new(&timing)).collect();
@@ -80,7 +83,9 @@ pub struct Clocks {
 
 impl Clocks {
     pub(crate) fn of<E: Exported>() -> Option<Box<Self>> {
-        E::CAN.clocked.as_ref()?;
+        if const { E::CAN.clocked.is_none() } {
+            return None;
+        }
         let table = E::Model::TABLE;
         let (mut list, mut names) = (Vec::new(), Vec::new());
         for i in 0..table.len() {

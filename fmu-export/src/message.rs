@@ -18,6 +18,9 @@ pub(crate) fn name<M: Model>(index: usize) -> String {
 
 /// [`name`] with the sizes that arrays have now, by which a description counts the elements of a matrix.
 pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String {
+    if const { !M::TABLE.has_sizes() } {
+        return name::<M>(index);
+    }
     match M::TABLE.locate(index) {
         Some((name, meta, element)) if !meta.sized.is_empty() => {
             name + &position(&M::TABLE.extents(block, index), element)

@@ -138,7 +138,9 @@ impl<M: Model> Snapshot<M> {
             }
         }
         // Where sizes are set, arrays have those of before, also if the simulation ends there.
-        if !matches!(self.life.state(), State::Configuration | State::Reconfiguration | State::Terminated) {
+        if const { M::TABLE.has_sizes() }
+            && !matches!(self.life.state(), State::Configuration | State::Reconfiguration | State::Terminated)
+        {
             M::TABLE.check_sizes(&mut self.block)?;
         }
         let sane = match (&self.ticks, ticks::<M>()) {

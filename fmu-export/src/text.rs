@@ -4,7 +4,7 @@ use crate::access::{index, is_time, open};
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
 use crate::message;
-use fmu_core::{Causality, Exported, Fault, Kind, Model, Slot};
+use fmu_core::{Causality, Exported, Fault, Kind, Kinds, Model, Slot};
 use std::ffi::{CStr, CString};
 
 /// What the functions for texts carry.
@@ -21,6 +21,10 @@ impl<E: Exported> Instance<E> {
     pub fn get_texts(&mut self, references: &[u32], given: usize) -> Result<&[CString], Refusal> {
         self.check_count(references, given)?;
         self.refresh();
+        if const { !E::Model::TABLE.kinds().meets(Kinds::TEXT) } {
+            self.no_variable(references, CARRIES)?;
+            return Ok(&[]);
+        }
         let mut texts = Vec::with_capacity(given);
         for index in self.each_index(references)? {
             let bytes = match E::Model::TABLE.entry(&mut self.current.block, index) {
@@ -47,6 +51,9 @@ impl<E: Exported> Instance<E> {
         read: impl Fn(usize) -> Option<&'a CStr>,
     ) -> Result<(), Refusal> {
         self.check_count(references, given)?;
+        if const { !E::Model::TABLE.kinds().meets(Kinds::TEXT) } {
+            return Ok(self.no_variable(references, CARRIES)?);
+        }
         let indices = self.each_index(references)?;
         for &index in &indices {
             self.check_open(index)?;
@@ -84,12 +91,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// The table's index of a variable whose type fits, or why there is none.
-    pub(crate) fn index_of(
-        &mut self,
-        reference: u32,
-        carries: &str,
-        fits: impl Fn(&Kind) -> bool,
-    ) -> Result<usize, Fault> {
+    pub(crate) fn index_of(&mut self, reference: u32, carries: &str, fits: fn(&Kind) -> bool) -> Result<usize, Fault> {
         let index = index::<E>(reference);
         match E::Model::TABLE.entry(&mut self.current.block, index) {
             Some((meta, _)) if fits(&meta.kind) => Ok(index),
@@ -97,6 +99,11 @@ impl<E: Exported> Instance<E> {
             None if is_time(reference, self.standard) => Err(message::real(true, carries)),
             None => Err(self.beside_table(reference, carries, false)),
         }
+    }
+
+    /// The model has no variable of this type: an error, if one is named.
+    pub(crate) fn no_variable(&mut self, references: &[u32], carries: &str) -> Result<(), Fault> {
+        references.first().map_or(Ok(()), |&first| self.index_of(first, carries, |_| false).map(|_| ()))
     }
 
     /// Whether a variable, a text or bytes, can be set in this state. In Continuous-Time Mode an input is discarded as other

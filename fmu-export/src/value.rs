@@ -1,7 +1,7 @@
 //! Values as they cross the C interface: which base type of the table each C type carries.
 
 use crate::lifecycle::Standard;
-use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Meta, Model, Slot};
+use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Kinds, Meta, Model, Slot};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::mem::MaybeUninit;
@@ -16,6 +16,9 @@ const SHORT: usize = 8;
 pub trait Value: Copy + Display + PartialEq {
     /// Name of the type in messages.
     const CARRIES: &'static str;
+
+    /// The kinds of variables that it carries: a model with none of them has no code for this type.
+    const KINDS: Kinds;
 
     /// It carries integers of every type, as far as they fit.
     const NARROW: bool = false;
@@ -65,6 +68,8 @@ impl Display for Fmi2Integer {
 
 impl Value for f64 {
     const CARRIES: &'static str = "a real number";
+    // Time and derivatives have no row.
+    const KINDS: Kinds = Kinds::ALL;
 
     #[inline]
     fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self> {
@@ -139,6 +144,7 @@ fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
 
 impl Value for f32 {
     const CARRIES: &'static str = "a Float32";
+    const KINDS: Kinds = Kinds::FLOAT32;
 
     fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
         match slot {
@@ -164,6 +170,10 @@ macro_rules! integers {
     ($($type:ident $name:ident $carries:literal;)*) => { $(
         impl Value for $type {
             const CARRIES: &'static str = $carries;
+            const KINDS: Kinds = {
+                let own = Kinds::integer(IntegerType::$name);
+                if matches!(IntegerType::$name, ENUMERATIONS) { own.and(Kinds::ENUMERATION) } else { own }
+            };
 
             fn read(meta: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
                 match (meta.kind, slot) {
@@ -223,6 +233,7 @@ integers! {
 
 impl Value for Fmi2Integer {
     const CARRIES: &'static str = "an integer or an enumeration";
+    const KINDS: Kinds = Kinds::INTEGERS.and(Kinds::ENUMERATION);
     const NARROW: bool = true;
 
     fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
@@ -269,6 +280,7 @@ macro_rules! truth_values {
 
         impl Value for $name {
             const CARRIES: &'static str = "a truth value";
+            const KINDS: Kinds = Kinds::BOOLEAN;
 
             fn read(_: &Meta, slot: &Slot<'_>, _: Standard) -> Option<Self> {
                 match slot {

@@ -67,6 +67,8 @@ fn instance(raw: &Raw) -> Handle {
         event_mode: false,
         early_return: false,
         environment: 0,
+        intermediate: None,
+        locks: false,
     };
     raw.instantiate(&arguments).unwrap().unwrap()
 }

@@ -22,6 +22,7 @@
 
 #![forbid(unsafe_code)]
 
+mod around;
 pub mod definition;
 mod design;
 mod error;
@@ -39,7 +40,7 @@ pub use definition::Definition;
 pub use design::Rows;
 pub use error::Error;
 pub use output::Failures;
-pub use plan::{Column, Outcome, Outcomes, Plan, Runner, Variable};
+pub use plan::{Column, Outcome, Outcomes, Plan, Runner, Variable, last_columns};
 pub use pool::threads_here;
 pub use run::{Options, Report, Watch, missing, run};
 pub use sweep::Sweep;

@@ -33,8 +33,19 @@ struct Shared {
     notes: Vec<String>,
 }
 
-/// Names of the columns that all results have; neither a measure nor a varied variable may have one.
-pub(crate) const OWN: [&str; 3] = ["run", "end", "error"];
+/// The first column of all results; neither a measure nor a varied variable may have its name.
+pub(crate) const RUN: &str = "run";
+
+/// Names of the last two columns of all results: `end` and `error`, or `run.end` and `run.error` where one of these names is taken.
+pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
+    ["end", "error"].map(|name| {
+        let mut name = name.to_owned();
+        while taken(&name) {
+            name = format!("{RUN}.{name}");
+        }
+        name
+    })
+}
 
 /// Name and unit of a column of results.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -60,6 +71,13 @@ pub struct Variable {
     /// Name and unit.
     pub column: Column,
     targets: Vec<Target>,
+}
+
+impl Variable {
+    /// The variables of FMUs that it sets.
+    pub(crate) fn targets(&self) -> &[Target] {
+        &self.targets
+    }
 }
 
 /// The result of a run.
@@ -137,8 +155,8 @@ impl Plan {
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
         for (name, measure) in &definition.measure.0 {
-            if OWN.contains(&name.as_str()) {
-                return invalid(format!("measure: {name} is a column of all results ({}): rename it", OWN.join(", ")));
+            if name == RUN {
+                return invalid(format!("measure: {name} is the column with the number of each run: rename it"));
             }
             let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
             measures.push(of(measure, &settings, &mut recorded).map_err(wrong)?);
@@ -172,6 +190,21 @@ impl Plan {
         let measures = measures.into_iter().map(|(measure, _)| measure).collect();
         let reuse = definition.reuse.unwrap_or(true);
         Ok(Self(Arc::new(Shared { system, connectors, measures, columns, trace, set, outputs, reuse, notes })))
+    }
+
+    /// The FMUs, ready for runs.
+    pub(crate) fn system(&self) -> &cosimulation::Plan {
+        &self.0.system
+    }
+
+    /// Whether the instances of a run are reset for the next; otherwise each run has new ones.
+    pub(crate) fn reuses(&self) -> bool {
+        self.0.reuse
+    }
+
+    /// What reads the measures from recorded values.
+    pub(crate) fn readers(&self) -> &[Measure] {
+        &self.0.measures
     }
 
     /// Names and units of the measures.
@@ -298,6 +331,14 @@ impl Plan {
         self.run_rows(variables, u64::try_from(length).unwrap_or(u64::MAX), &row, threads, progress)
     }
 
+    /// The measures that the readings of a run have come to.
+    pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<f64>, String> {
+        let of = |((measure, reading), column): ((&Measure, &Reading), &Column)| {
+            measure.end(reading).map_err(|cause| format!("{}: {cause}", column.name))
+        };
+        self.0.measures.iter().zip(readings).zip(&self.0.columns).map(of).collect()
+    }
+
     /// Runs `count` rows that a function makes: it gets the number of a row, from 0, and fills in the values.
     ///
     /// # Errors
@@ -342,11 +383,11 @@ impl Plan {
 }
 
 impl Outcomes {
-    fn empty(measures: usize, rows: usize) -> Self {
+    pub(crate) fn empty(measures: usize, rows: usize) -> Self {
         Self { measures: vec![vec![f64::NAN; rows]; measures], end: vec![f64::NAN; rows], errors: vec![None; rows] }
     }
 
-    fn put(&mut self, row: usize, outcome: Outcome) {
+    pub(crate) fn put(&mut self, row: usize, outcome: Outcome) {
         self.end[row] = outcome.end;
         match outcome.result {
             Ok(values) => self.measures.iter_mut().zip(values).for_each(|(column, x)| column[row] = x),
@@ -424,12 +465,19 @@ impl Runner {
                 ControlFlow::Continue(())
             })
         });
-        let measured = |_| {
-            let of = |((measure, state), column): ((&Measure, &Reading), &Column)| {
-                measure.end(state).map_err(|cause| format!("{}: {cause}", column.name))
-            };
-            measures.iter().zip(&*states).zip(&plan.0.columns).map(of).collect()
-        };
-        Outcome { result: ended.map_err(|error| error.to_string()).and_then(measured), end }
+        let result = ended.map_err(|error| error.to_string()).and_then(|_| plan.measured(states));
+        Outcome { result, end }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::last_columns;
+
+    #[test]
+    fn the_last_columns_step_aside() {
+        assert_eq!(last_columns(|_| false), ["end", "error"]);
+        assert_eq!(last_columns(|name| name == "error"), ["end", "run.error"]);
+        assert_eq!(last_columns(|name| ["end", "run.end"].contains(&name)), ["run.run.end", "error"]);
     }
 }

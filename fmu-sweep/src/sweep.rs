@@ -2,7 +2,7 @@
 
 use crate::definition::{Runs, Trace, Which};
 use crate::error::invalid;
-use crate::plan::OWN;
+use crate::plan::{RUN, last_columns};
 use crate::{Column, Definition, Error, Outcome, Outcomes, Plan, Rows, Runner, Variable};
 use fmu_import::cosimulation::item;
 use sha2::{Digest, Sha256};
@@ -54,9 +54,8 @@ impl Sweep {
             plan.number(&variable[0], text).map_err(|e| e.to_string())
         };
         let rows = Rows::new(design, &definition.vary, &folder, &number)?;
-        if let Some(name) = rows.names().find(|name| OWN.contains(name)) {
-            let own = OWN.join(", ");
-            return invalid(format!("vary: {name} is a column of all results ({own}): write INSTANCE.{name}"));
+        if rows.names().any(|name| name == RUN) {
+            return invalid(format!("vary: {RUN} is the column with the number of each run: write INSTANCE.{RUN}"));
         }
         let variables = plan.bind(rows.names())?;
         if definition.measure.0.is_empty() && definition.trace.is_none() {
@@ -124,12 +123,15 @@ impl Sweep {
         self.plan.run_rows(&self.variables, count, &row, threads, progress)
     }
 
-    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error`.
+    /// All columns of the results: `run`, the varied variables, the measures, `end`, `error` (or [`last_columns`]).
     pub fn columns(&self) -> Vec<Column> {
-        let varied = self.variables.iter().map(|variable| variable.column.clone());
-        let [run, end, error] = OWN.map(|name| Column { name: name.into(), ..Column::default() });
-        let end = Column { unit: "s".into(), ..end };
-        std::iter::once(run).chain(varied).chain(self.plan.measures().iter().cloned()).chain([end, error]).collect()
+        let plain = |name: &str, unit: &str| Column { name: name.into(), unit: unit.into(), ..Column::default() };
+        let varied = self.variables.iter().map(|variable| &variable.column);
+        let mut all = vec![plain(RUN, "")];
+        all.extend(varied.chain(self.plan.measures()).cloned());
+        let [end, error] = last_columns(|name| all.iter().any(|column| column.name == name));
+        all.extend([plain(&end, "s"), plain(&error, "")]);
+        all
     }
 
     /// The header of the results, with its line break.

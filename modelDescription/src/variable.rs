@@ -154,6 +154,8 @@ pub struct ClockTiming {
     pub interval: Option<f64>,
     /// Time from the start to the first tick.
     pub shift: f64,
+    /// Smaller numbers are first when clocks tick together (Scheduled Execution).
+    pub priority: Option<u32>,
 }
 
 /// One extent of an array (FMI 3.0 only).
@@ -223,6 +225,8 @@ pub struct ModelVariable {
     pub derivative: Option<u32>,
     /// A state may jump at events (Model Exchange only).
     pub reinit: bool,
+    /// It can be read or set inside a communication step (FMI 3.0 only).
+    pub intermediate: bool,
     /// Value references of the clocks that this belongs to (FMI 3.0 only).
     pub clocks: Vec<u32>,
     /// When a clock ticks; `None` where the file does not say it as the standard does.

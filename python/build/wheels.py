@@ -4,7 +4,7 @@
 
 DIR of the archives has fmi2/ and fmi3/ of `fmu build`; every wheel has these archives, so build them with a binary for each platform
 (`fmu build --release-dir` does both). This needs maturin and ziglang (pip install maturin==1.16.0 ziglang==0.17.1), Rust's standard library
-for each target, and mingw for Windows. What is missing is told, and that wheel left out. Prints the paths of the files.
+for each target, and mingw for Windows. What is missing is told, and that wheel left out. Prints the paths of the files, and nothing else.
 """
 
 import argparse
@@ -49,9 +49,9 @@ def main():
                   file=sys.stderr)  # fmt: skip
             continue
         command = [sys.executable, "-m", "maturin", "build", "--quiet", "--release", "--locked", "--target", target, *options, "--out", out]
-        if subprocess.run(command, cwd=package, check=False).returncode:
+        if subprocess.run(command, cwd=package, check=False, stdout=sys.stderr).returncode:
             failed.append(name)
-    if subprocess.run([sys.executable, "-m", "maturin", "sdist", "--out", out], cwd=package, check=False).returncode:
+    if subprocess.run([sys.executable, "-m", "maturin", "sdist", "--out", out], cwd=package, check=False, stdout=sys.stderr).returncode:
         failed.append("the source distribution")
     for path in sorted(set(out.iterdir()) - before):
         print(path)

@@ -172,14 +172,15 @@ class Plan:
 
         Returns:
             a dictionary of arrays: `run`, the columns of the table, the measures, `end` (time reached, s) and, as the last,
-            `error`. A run that fails has NaN for its measures and one line as its error, otherwise "". Same bits for any number
-            of threads. Enumerations have their names, in the table and in measures of their values ("" where a run fails).
+            `error`; beside a measure of that name, `run.end` and `run.error`. A run that fails has NaN for its measures and one line
+            as its error, otherwise "". Same bits for any number of threads. Enumerations have their names, in the table and in
+            measures of their values ("" where a run fails).
         """
         columns = {str(name): column for name, column in _columns(table).items()}
         runs = columns.pop("run", None)
         for name in columns:
-            if name in ("end", "error"):
-                raise ValueError(f"{name} is a column of all results: name the FMU, fmus={{'x': file}}, and the column x.{name}")
+            if name in self.measures:
+                raise ValueError(f"the measure {name} has the name of a column of the table: rename the measure")
         values = [_values(name, column, self._core, self._name(name)) for name, column in columns.items()]
         if not values:
             raise ValueError("the table has no column; expected one with the values of each varied variable")
@@ -195,14 +196,18 @@ class Plan:
         with _bar(progress, n) as told:
             measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, told)
         results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
-        return dict(zip(["run", *columns, *self.measures, "end", "error"], [runs, *results, end, np.array(errors, dtype=object)]))
+        return dict(zip(self._columns(columns), [runs, *results, end, np.array(errors, dtype=object)]))
 
     def gradient(self, at, *, step=1e-4, threads=None):
         """The measures and their derivatives with respect to variables, by central differences of runs, all in parallel.
 
+        In Model Exchange, the two runs of a difference are integrated in common steps: what is differentiated is the computed
+        solution, so the derivatives are as exact as the solution itself, at any tolerance of the solver.
+
         Args:
             at: name -> value: the point
-            step: of the differences, relative to a value, absolute for 0; larger steps suit coarse tolerances of a solver
+            step: of the differences, relative to a value, absolute for 0
+            threads: by default all processors
 
         Returns:
             measure -> value, and measure -> name -> derivative
@@ -218,15 +223,21 @@ class Plan:
             raise ValueError(f"step must be positive and finite, not {step}")
         point = np.array([_number(name, value) for name, value in at.items()])
         h = step * np.where(point == 0.0, 1.0, np.abs(point))
-        rows = np.concatenate([[point], point + np.diag(h), point - np.diag(h)])
-        runs = self.run_many(dict(zip(at, rows.T)), threads=threads)
-        failed = [error for error in runs["error"] if error]
+        if threads is not None and threads < 1:
+            raise ValueError(f"threads must be at least 1, not {threads}")
+        measures, errors = self._core.run_around([self._name(name) for name in at], point, h, threads or 0)
+        failed = [error for error in errors if error]
         if failed:
             raise FmuError(None, None, None, f"gradient: {failed[0]}")
         n = len(point)
-        values = {name: float(runs[name][0]) for name in self.measures}
-        slopes = {name: (runs[name][1 : n + 1] - runs[name][n + 1 :]) / (2.0 * h) for name in self.measures}
+        values = {name: float(runs[0]) for name, runs in zip(self.measures, measures)}
+        slopes = {name: (runs[1 : n + 1] - runs[n + 1 :]) / (2.0 * h) for name, runs in zip(self.measures, measures)}
         return values, {name: dict(zip(at, slope.tolist())) for name, slope in slopes.items()}
+
+    def _columns(self, varied):
+        """Names of the columns of results."""
+        named = ["run", *varied, *self.measures]
+        return named + self._core.last_columns(named)
 
     def _named(self, columns):
         """Columns of varied variables, enumerations with their names."""
@@ -251,9 +262,9 @@ class Plan:
         """The columns and types that `run_many` returns, without rows. `columns` are the varied ones, by default the design's."""
         columns = self._core.varied if columns is None else columns
         varied = self._named({name: np.empty(0) for name in columns})
-        measures = {name: _named(items, np.empty(0)) for name, items in zip(self.measures, self._core.measure_items)}
-        last = {"end": np.empty(0), "error": np.empty(0, dtype=object)}
-        return {"run": np.empty(0, dtype=np.int64), **varied, **measures, **last}
+        measures = [_named(items, np.empty(0)) for items in self._core.measure_items]
+        last = [np.empty(0), np.empty(0, dtype=object)]
+        return dict(zip(self._columns(varied), [np.empty(0, dtype=np.int64), *varied.values(), *measures, *last]))
 
 
 @contextmanager

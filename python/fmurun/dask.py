@@ -211,4 +211,4 @@ def _dead(plan, row, number, code):
     blank = {"f": np.nan, "i": number, "O": ""}
     missing = {name: np.array([blank[of.dtype.kind]], of.dtype) for name, of in plan.meta(list(row)).items()}
     known = {name: np.asarray(column, missing[name].dtype) for name, column in row.items()}
-    return {**missing, **known, "error": np.array([cause], dtype=object)}
+    return {**missing, **known, next(reversed(missing)): np.array([cause], dtype=object)}

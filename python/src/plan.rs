@@ -110,10 +110,31 @@ impl Plan {
             let columns: Vec<Vec<f64>> = columns.iter().map(|column| column.as_array().to_vec()).collect();
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
-            let Outcomes { measures, end, errors } =
-                py.detach(|| self.run(&variables, &columns, threads, progress.as_ref()))?;
+            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let run = |go_on: &GoOn<'_>| self.plan.run_many(&variables, &columns, threads, go_on);
+            let Outcomes { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
             let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
             Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
+        })
+    }
+
+    /// Run at a point, then with each variable above it by its step, then below: columns of the measures, errors.
+    #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
+    fn run_around<'py>(
+        &self,
+        py: Python<'py>,
+        names: Vec<String>,
+        point: Vec<f64>,
+        steps: Vec<f64>,
+        threads: usize,
+    ) -> PyResult<(Vec<Bound<'py, PyArray1<f64>>>, Vec<String>)> {
+        gate(|| {
+            let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
+            let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
+            let run = |go_on: &GoOn<'_>| self.plan.run_around(&variables, &point, &steps, threads, go_on);
+            let Outcomes { measures, errors, .. } = py.detach(|| attended(run, None))?;
+            let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
+            Ok((measures, errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
     }
 
@@ -165,6 +186,13 @@ impl Plan {
         self.plan.measures().iter().map(|column| column.items.clone()).collect()
     }
 
+    /// Names of the last two columns of results that also have these columns.
+    #[staticmethod]
+    #[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+    fn last_columns(columns: Vec<String>) -> [String; 2] {
+        fmu_sweep::last_columns(|name| columns.iter().any(|column| column == name))
+    }
+
     /// The number that a text stands for as the value of a variable.
     fn number(&self, name: &str, text: &str) -> PyResult<f64> {
         gate(|| {
@@ -180,62 +208,58 @@ impl Plan {
             || plain("the plan has no design: Plan.from_toml reads a file that has one; or give rows as a table");
         self.sweep.as_ref().ok_or_else(none)
     }
+}
 
-    /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
-    fn run(
-        &self,
-        variables: &[Variable],
-        columns: &[Vec<f64>],
-        threads: usize,
-        progress: Option<&Py<PyAny>>,
-    ) -> PyResult<Outcomes> {
-        let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
-        let stop = AtomicBool::new(false);
-        let done_rows = AtomicU64::new(0);
-        let tell = |py: Python<'_>| match progress {
-            Some(progress) => progress.call1(py, (done_rows.load(Ordering::Relaxed),)).map(drop),
-            None => Ok(()),
+/// Gets the number of rows done, and says whether to go on.
+type GoOn<'a> = dyn Fn(u64) -> ControlFlow<()> + Sync + 'a;
+
+/// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
+fn attended(
+    run: impl Fn(&GoOn<'_>) -> Result<Outcomes, fmu_sweep::Error> + Sync,
+    progress: Option<&Py<PyAny>>,
+) -> PyResult<Outcomes> {
+    let stop = AtomicBool::new(false);
+    let done_rows = AtomicU64::new(0);
+    let tell = |py: Python<'_>| match progress {
+        Some(progress) => progress.call1(py, (done_rows.load(Ordering::Relaxed),)).map(drop),
+        None => Ok(()),
+    };
+    let go_on = |done| {
+        done_rows.fetch_max(done, Ordering::Relaxed);
+        if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let (done, result) = channel();
+    std::thread::scope(|scope| {
+        let (run, go_on) = (&run, &go_on);
+        let start = || {
+            let done = done.clone();
+            // The receiver exists as long as this thread.
+            let work = move || drop(done.send(run(go_on)));
+            std::thread::Builder::new().spawn_scoped(scope, work)
         };
-        let go_on = |done| {
-            done_rows.fetch_max(done, Ordering::Relaxed);
-            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let (done, result) = channel();
-        std::thread::scope(|scope| {
-            let (plan, columns, go_on) = (&self.plan, &columns, &go_on);
-            let start = || {
-                let done = done.clone();
-                let run = move || {
-                    let outcomes = plan.run_many(variables, columns, threads, go_on);
-                    // The receiver exists as long as this thread.
-                    let _ = done.send(outcomes);
-                };
-                std::thread::Builder::new().spawn_scoped(scope, run)
-            };
-            let work = patiently(start).map_err(|e| plain(&format!("no thread for the runs: {e}")))?;
-            drop(done);
-            let mut signal = Ok(());
-            loop {
-                match result.recv_timeout(SIGNALS) {
-                    Ok(outcomes) => {
-                        let outcomes = signal.and(outcomes.map_err(failed))?;
-                        Python::attach(tell)?;
-                        return Ok(outcomes);
-                    }
-                    Err(RecvTimeoutError::Timeout) if signal.is_ok() => {
-                        let heard = Python::attach(|py| py.check_signals().and_then(|()| tell(py)));
-                        signal = heard;
-                        stop.store(signal.is_err(), Ordering::Relaxed);
-                    }
-                    Err(RecvTimeoutError::Timeout) => {}
-                    Err(RecvTimeoutError::Disconnected) => {
-                        let panic = work.join().err().unwrap_or_else(|| Box::new("no result"));
-                        std::panic::resume_unwind(panic)
-                    }
+        let work = patiently(start).map_err(|e| plain(&format!("no thread for the runs: {e}")))?;
+        drop(done);
+        let mut signal = Ok(());
+        loop {
+            match result.recv_timeout(SIGNALS) {
+                Ok(outcomes) => {
+                    let outcomes = signal.and(outcomes.map_err(failed))?;
+                    Python::attach(tell)?;
+                    return Ok(outcomes);
+                }
+                Err(RecvTimeoutError::Timeout) if signal.is_ok() => {
+                    let heard = Python::attach(|py| py.check_signals().and_then(|()| tell(py)));
+                    signal = heard;
+                    stop.store(signal.is_err(), Ordering::Relaxed);
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    let panic = work.join().err().unwrap_or_else(|| Box::new("no result"));
+                    std::panic::resume_unwind(panic)
                 }
             }
-        })
-    }
+        }
+    })
 }
 
 fn open(definition: Definition, folder: PathBuf) -> Result<Plan, fmu_sweep::Error> {

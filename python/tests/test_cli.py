@@ -40,7 +40,7 @@ def sweep(standard, tmp_path):
         [measure]
         peak = {{ of = 'd.speed', is = 'max' }}
         estimator = {{ of = 'd.controller.estimator', is = 'final' }}
-        angle = {{ of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms' }}
+        error = {{ of = 'd.theta_est - d.theta_e', wrap = '2pi', is = 'rms' }}
     """))
     return path
 
@@ -56,15 +56,16 @@ def test_sweep_is_run_many(sweep, tmp_path):
     assert {"run", "d.plant.motor.R_s", "peak", "end"} <= set(measured)
     assert measured["run"] == tuple(map(str, results["run"]))
     assert header == list(results)
-    assert header[-1] == "error"
-    ok = np.array([not error for error in results["error"]])
+    assert header[-3:] == ["error", "end", "run.error"]
+    ok = np.array([not error for error in results["run.error"]])
     assert 0 < ok.sum() < 60
     for name in ("d.plant.motor.R_s", "d.plant.initial.theta_e", "d.plant.mechanics.J"):
         assert [float(x) for x in measured[name]] == results[name].tolist()
-    of_command = np.array([float(x or "nan") for x in measured["peak"]])
-    assert of_command[ok].tobytes() == results["peak"][ok].tobytes()
-    assert np.isnan(of_command[~ok]).all()
-    assert [line[-1] for line in lines] == results["error"].tolist()
+    for name in ("peak", "error"):
+        of_command = np.array([float(x or "nan") for x in measured[name]])
+        assert of_command[ok].tobytes() == results[name][ok].tobytes()
+        assert np.isnan(of_command[~ok]).all()
+    assert [line[-1] for line in lines] == results["run.error"].tolist()
     assert set(measured["d.controller.estimator"]) == {"Rasmussen", "FluxObserver"}
     for name in ("d.controller.estimator", "estimator"):
         assert list(measured[name]) == results[name].tolist()
@@ -87,7 +88,7 @@ def test_simulate_is_simulate(standard, tmp_path):
 def test_an_ssp_file(standard, tmp_path):
     """Names without a dot are connectors of the system."""
     ssp, out = tmp_path / "drive.ssp", tmp_path / "out.csv"
-    fmu("ssp", "--out", ssp, *(["--fmi", "3"] if standard.name == "fmi3" else []))
+    fmu("ssp", "--fmus", standard, "--out", ssp, *(["--fmi", "3"] if standard.name == "fmi3" else []))
     fmu("simulate", ssp, "--input", "speed_ref=0:0,0.01:50", "--input", "u_dc=325", "--stop", "0.05", "--step", "1e-4", "--csv", out)
     with open(out, newline="") as file:
         header, *lines = csv.reader(file)

@@ -1,6 +1,7 @@
-"""The examples for engines run as they stand; that of Gymnasium is in test_gym.py. Ray and OpenTURNS are opt-in."""
+"""The examples run as they stand; that of Gymnasium is in test_gym.py. Ray and OpenTURNS are opt-in."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,6 +9,9 @@ from pathlib import Path
 import fmurun
 import numpy as np
 import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests/common"))
+import notebook
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -47,6 +51,20 @@ def test_engines(archives, name):
     said = run(name, archives / "fmi3")
     print(said)
     assert {"sweep_ray.py": "equal to one process: True", "openturns_drive.py": "speed plant.motor.R_s "}[name] in said
+
+
+def test_the_notebook_of_the_vehicle(tmp_path, monkeypatch):
+    notebook.check("vehicle.ipynb", tmp_path, monkeypatch)
+
+
+def test_the_fit_finds_the_values(standard):
+    """The recorded run has noise of 1e-3: the fit is within its own 95 % of what made the run."""
+    said = run("fit_scipy.py", standard / "PmsmPlant.fmu")
+    found = re.findall(r"(motor\.\w+) = ([\d.]+) \+- ([\d.]+), true ([\d.]+)", said)
+    assert [name for name, *_ in found] == ["motor.R_s", "motor.psi_M"], said
+    for _, value, spread, true in found:
+        assert 0.0 < float(spread) < 0.01 * float(true)
+        assert abs(float(value) - float(true)) <= 2.0 * float(spread), said
 
 
 def test_examples_are_short():

@@ -85,5 +85,65 @@ def test_a_gradient(reference, plant):
         plan.gradient({"q": 1.0})
 
 
+@pytest.mark.parametrize("rtol", [1e-4, 1e-9])
+def test_a_gradient_is_as_exact_as_the_run(reference, rtol):
+    """The solver's tolerance is not divided by the step of the difference: one step for both runs."""
+    plan = Plan(reference / "fmi3" / "Dahlquist.fmu", fmi_type="ModelExchange", relative_tolerance=rtol, stop_time=2.0, step_size=2.0,
+                measures={"last": "x"})  # fmt: skip
+    value, gradient = plan.gradient({"k": 0.8})
+    errors = abs(value["last"] / np.exp(-1.6) - 1.0), abs(gradient["last"]["k"] / (-2.0 * np.exp(-1.6)) - 1.0)
+    print(f"gradient at rtol {rtol:.0e}: value {errors[0]:.1e}, derivative {errors[1]:.1e}")
+    assert value["last"] == plan.run_many({"k": [0.8]})["last"][0]
+    assert errors[1] <= max(10.0 * rtol, 1e-8)
+
+
+def test_a_gradient_beside_runs_with_steps_of_their_own(reference, standard):
+    """Where the solver chooses its steps by the values, two runs apart differ by its tolerance, divided by a step of 1e-4."""
+
+    def plan(rtol):
+        return Plan(reference / standard.name / "VanDerPol.fmu", fmi_type="ModelExchange", relative_tolerance=rtol, stop_time=20.0,
+                    step_size=20.0, measures={"x": "x0"})  # fmt: skip
+
+    exact = plan(1e-12).gradient({"mu": 1.0})[1]["x"]["mu"]
+    for rtol, goal in ((1e-4, 0.2), (1e-5, 2e-3)):
+        together = abs(plan(rtol).gradient({"mu": 1.0})[1]["x"]["mu"] / exact - 1.0)
+        runs = plan(rtol).run_many({"mu": [1.0 + 1e-4, 1.0 - 1e-4]})["x"]
+        apart = abs((runs[0] - runs[1]) / 2e-4 / exact - 1.0)
+        print(f"gradient of VanDerPol at rtol {rtol:.0e}: {together:.1e}, of two runs apart {apart:.1e}")
+        assert together <= goal < apart
+
+
+def test_a_gradient_across_a_bounce(reference, standard):
+    """h = e g t_1 (t - t_1) - g (t - t_1)^2 / 2 after the first bounce at t_1 = sqrt(2 h_0 / g)."""
+    plan = Plan(reference / standard.name / "BouncingBall.fmu", fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=0.8,
+                step_size=0.1, measures={"h": "h"})  # fmt: skip
+    height = lambda e, g: (t := np.sqrt(2.0 / g)) and e * g * t * (0.8 - t) - g * (0.8 - t) ** 2 / 2.0
+    value, gradient = plan.gradient({"e": 0.7, "g": -9.81})
+    assert abs(value["h"] - height(0.7, 9.81)) < 1e-8
+    assert abs(gradient["h"]["e"] - (height(0.7 + 1e-6, 9.81) - height(0.7 - 1e-6, 9.81)) / 2e-6) < 1e-5
+    assert abs(-gradient["h"]["g"] - (height(0.7, 9.81 + 1e-5) - height(0.7, 9.81 - 1e-5)) / 2e-5) < 1e-5
+
+
+def test_the_gradient_of_a_locked_rotor_and_of_the_coupled_pair(standard):
+    """i = u / R (1 - exp(-R t / L)) by R, which is fixed or tunable; a sampled drive at two tolerances, and in Co-Simulation."""
+    r, l, u, t = 2.0, 6e-3, 10.0, 4e-3
+    plan = Plan(standard / "PmsmPlant.fmu", fmi_type="ModelExchange", relative_tolerance=1e-5, stop_time=t, step_size=t,
+                start_values={"u_a": u, "u_b": -u / 2, "u_c": -u / 2, "mechanics.J": 1e9}, measures={"i": "i_a"})  # fmt: skip
+    _, gradient = plan.gradient({"motor.R_s": r, "motor.L_d": l})
+    decay = np.exp(-r * t / l)
+    by_r, by_l = -u / r**2 * (1.0 - decay) + u * t / (r * l) * decay, -u * t / l**2 * decay
+    assert abs(gradient["i"]["motor.R_s"] / by_r - 1.0) < 1e-3
+    assert abs(gradient["i"]["motor.L_d"] / by_l - 1.0) < 1e-3
+    fmus = {"p": standard / "PmsmPlant.fmu", "c": standard / "SensorlessController.fmu"}
+    arguments = {"input": {"c.speed_ref": [(0.0, 0.0), (0.005, 50.0)]}, "stop_time": 0.02, "step_size": 1e-4, "measures": {"w": "p.speed"}}
+    loose, tight = (Plan(fmus, fmi_type="ModelExchange", relative_tolerance=rtol, **arguments).gradient({"p.motor.psi_M": 0.15})
+                    for rtol in (1e-6, 1e-11))  # fmt: skip
+    stepped = Plan(fmus, **arguments).gradient({"p.motor.psi_M": 0.15})
+    slopes = [gradient["w"]["p.motor.psi_M"] for _, gradient in (loose, tight, stepped)]
+    print(f"gradient of the pair {standard.name}: {slopes}")
+    assert abs(slopes[0] / slopes[1] - 1.0) < 1e-4
+    assert abs(slopes[2] / slopes[1] - 1.0) < 1e-3
+
+
 def test_doctests(run_doctests):
     assert run_doctests("fmurun._linearize") > 2

@@ -122,13 +122,20 @@ def test_enumerations_keep_their_names(standard):
     assert pa.table(runs)["c.estimator"].to_pylist() == runs["c.estimator"].tolist()
 
 
-def test_no_column_is_renamed(standard):
-    plan = pair(standard)
-    with pytest.raises(ValueError, match="error is a column of all results: name the FMU"):
-        plan.run_many({"error": [1.0]})
-    for name in ("run", "end", "error"):
-        with pytest.raises(FmuError, match=rf"measure: {name} is a column of all results \(run, end, error\): rename it"):
-            pair(standard, measures={name: "p.speed"})
+def test_a_measure_may_be_called_error(standard):
+    """It keeps its name, and the column of all results steps aside; a row that fails is told there."""
+    plan, plain = pair(standard, measures={"error": MEASURES["angle"]}), pair(standard)
+    runs, expected = (p.run_many({"p.motor.R_s": [2.9, -1.0]}) for p in (plan, plain))
+    assert list(runs) == ["run", "p.motor.R_s", "error", "end", "run.error"]
+    assert runs["error"].tobytes() == expected["angle"].tobytes()
+    assert runs["run.error"].tolist() == expected["error"].tolist() == ["", expected["error"][1]]
+    same(plan.meta(["p.motor.R_s"]), {name: column[:0] for name, column in runs.items()})
+    with pytest.raises(FmuError, match="gradient: .*R_s = -"):
+        plan.gradient({"p.motor.R_s": -1.0})
+    with pytest.raises(FmuError, match="measure: run is the column with the number of each run: rename it"):
+        pair(standard, measures={"run": "p.speed"})
+    with pytest.raises(ValueError, match=r"the measure p\.motor\.R_s has the name of a column of the table: rename"):
+        pair(standard, measures={"p.motor.R_s": "p.speed"}).run_many({"p.motor.R_s": [2.9]})
 
 
 def test_the_pickle_is_small_and_knows_its_files(standard, tmp_path):

@@ -271,3 +271,25 @@ fn fmpy_gives_the_same() {
     let found: Vec<f64> = last.split_whitespace().map(super::hexadecimal).collect();
     assert_eq!(found, expected().concat());
 }
+
+/// A preset counts an element of a matrix by the sizes of the start, as the description does.
+#[test]
+fn a_preset_finds_an_element_of_a_matrix() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("StateSpace.fmu");
+    let preset = |set: &str| {
+        let mut fmu = std::process::Command::new(env!("CARGO_BIN_EXE_fmu"));
+        fmu.arg("preset").arg(archive("state-space", V3)).args(["--set", set, "--out"]).arg(&out).status().unwrap()
+    };
+    assert!(preset("A[2,1]=5").success() && !preset("A[4]=5").success());
+    let fmu = fmu_import::Fmu::open(&out).unwrap();
+    let a = fmu.description().variable("A").unwrap();
+    assert_eq!(a.start.as_deref(), Some("1 0 0 5 1 0 0 0 1"));
+    // The binary has it too: y = x + u, and x_2 grows with 5 x_1.
+    let of = |fmu| run(exchange(), fmu, &[], 1.0, 0.1);
+    let (with, without) = (rows(&of(&out)), rows(&of(&archive("state-space", V3))));
+    let last = |rows: &[Vec<f64>]| rows.last().unwrap().clone();
+    let (with, without) = (last(&with), last(&without));
+    assert_eq!((with[0].to_bits(), with[2].to_bits()), (without[0].to_bits(), without[2].to_bits()));
+    assert!(with[1] > without[1] + 1.0, "{with:?} {without:?}");
+}

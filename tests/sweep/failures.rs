@@ -63,14 +63,8 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
         (vary(good).replace("d.speed'", "d.speed d.i_d'"), "\"d.i_d\" is not expected"),
         (vary(good).replace("'final'", "'final', after = 2"), "m: after = 2 s, expected a time from 0 to 0.01 s"),
         (vary(good).replace("\nm =", "\n'd.plant.motor.R_s' ="), "is the name of a varied variable"),
-        (
-            vary(good).replace("\nm =", "\nerror ="),
-            "measure: error is a column of all results (run, end, error): rename it",
-        ),
-        (
-            vary("end = { uniform = [0, 1] }"),
-            "vary: end is a column of all results (run, end, error): write INSTANCE.end",
-        ),
+        (vary(good).replace("\nm =", "\nrun ="), "measure: run is the column with the number of each run: rename it"),
+        (vary("run = { uniform = [0, 1] }"), "vary: run is the column with the number of each run: write INSTANCE.run"),
         (format!("{design}[vary]\n{good}\n"), "nothing is measured"),
         (measure.into(), "expected a table [design]"),
         (vary(good).replace("[vary]", "[varied]"), "line 4: unknown field `varied`"),

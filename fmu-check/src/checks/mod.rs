@@ -10,6 +10,7 @@ mod by_name;
 mod calls;
 mod clock_rules;
 mod clocked;
+mod clocks;
 mod configuration;
 mod dependencies;
 mod derivatives;
@@ -19,10 +20,12 @@ mod exchange;
 mod held;
 mod host;
 mod instances;
+mod intermediate;
 mod layered;
 mod lifecycle;
 mod logging;
 mod names;
+mod scheduled;
 mod schema;
 mod schema_rules;
 mod sensitivity;
@@ -51,6 +54,9 @@ pub const GROUPS: &[Group] = &[
     Group { name: "access", title: "Getting and setting", checks: access::CHECKS },
     Group { name: "time", title: "Steps and time", checks: time::CHECKS },
     Group { name: "event-mode", title: "Event mode and early return", checks: event_mode::CHECKS },
+    Group { name: "clocks", title: "Clocks", checks: clocks::CHECKS },
+    Group { name: "intermediate-update", title: "Intermediate updates", checks: intermediate::CHECKS },
+    Group { name: "scheduled-execution", title: "Scheduled Execution", checks: scheduled::CHECKS },
     Group { name: "configuration", title: "Structural parameters", checks: configuration::CHECKS },
     Group { name: "exchange", title: "Model Exchange", checks: exchange::CHECKS },
     Group { name: "events", title: "Events of Model Exchange", checks: events::CHECKS },

@@ -10,6 +10,7 @@ mod exchange;
 mod findings;
 mod sizes;
 mod starts;
+mod ticks;
 mod zip;
 
 use findings::{check, check_within, told, violated};

@@ -147,13 +147,14 @@ impl<E: Exported> Abi<'_, E> {
     /// # Safety
     /// As [`enter`](Self::enter).
     pub unsafe fn fmi3_activate<F: Function>(instance: InstancePointer, clock: u32, t: f64) -> c_int {
+        if const { !E::CAN.scheduled } {
+            // SAFETY: the caller's promise.
+            return unsafe { enter::<E, F>(instance, |mut abi| abi.unsupported("Scheduled Execution")) };
+        }
         let mut done = false;
         // SAFETY: the caller's promise.
         unsafe {
             enter_parts::<E, F>(instance, |mut abi, _| {
-                if const { !E::CAN.scheduled } {
-                    abi.unsupported("Scheduled Execution")?;
-                }
                 if std::mem::replace(&mut done, true) {
                     return Ok(None);
                 }

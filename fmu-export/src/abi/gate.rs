@@ -266,7 +266,8 @@ pub(crate) fn open<E: Exported>(
             let made = (!shelf.is_empty() || !suffix.is_empty()).then(|| Box::new(block.clone()));
             let mut instance = Instance::<E>::new(entry.standard, name, log, Snapshot::of(interface, block));
             (instance.shelf, instance.made, instance.early_return) = (shelf, made, steps.early_return);
-            if steps.callbacks.intermediate.is_some()
+            if const { E::CAN.intermediate.is_some() }
+                && steps.callbacks.intermediate.is_some()
                 && let Err(fault) = instance.look_inside(steps.required)
             {
                 instance.log.error(&format!("{}: {fault}", entry.name));

@@ -175,7 +175,7 @@ macro_rules! functions {
             unsafe {
                 $crate::abi::Abi::<$exported>::enter::<Here>(instance, |mut abi| {
                     $(if const { <$exported as Exported>::CAN.$capability.is_none() } {
-                        abi.unsupported($crate::abi::lacks(stringify!($capability)))?;
+                        return abi.unsupported($crate::abi::lacks(stringify!($capability)));
                     })?
                     abi.$function($($passed),*)?;
                     Ok(())

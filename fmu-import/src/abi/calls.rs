@@ -29,6 +29,18 @@ pub(super) struct Request<'a> {
     /// FMI 3.0's, with the environment that it gets.
     pub(super) logger: Option<v3::LogMessage>,
     pub(super) environment: *mut c_void,
+    /// FMI 3.0's callbacks that may call the FMU again, and the variables that are used in steps.
+    pub(super) updates: Updates<'a>,
+}
+
+/// What an importer does while a call is under way (FMI 3.0).
+#[derive(Default)]
+pub(super) struct Updates<'a> {
+    pub(super) intermediate: Option<v3::IntermediateUpdate>,
+    pub(super) required: &'a [u32],
+    pub(super) clocks: Option<v3::ClockUpdate>,
+    /// Lock and unlock.
+    pub(super) preemption: [Option<v3::Preemption>; 2],
 }
 
 /// `fmi3ClockActive`.
@@ -61,9 +73,11 @@ impl Calls {
     /// The callbacks are NULL or live as long as the instance, and so does what the environment leads to.
     pub(super) unsafe fn instantiate(&self, r: &Request<'_>) -> (&'static str, Option<InstancePointer>) {
         let [name, token, resources] = r.texts.map(|text| text.map_or(ptr::null(), CStr::as_ptr));
-        let (e, log, none) = (r.environment, r.logger, ptr::null());
-        // SAFETY: of all: the standards' types; the texts are NULL or C strings that outlive the call; no intermediate variables
-        // and no further callbacks; the caller promises the rest.
+        let (e, log, Updates { intermediate, required, clocks, preemption: [lock, unlock] }) =
+            (r.environment, r.logger, &r.updates);
+        let (list, n) = (required.as_ptr(), required.len());
+        // SAFETY: of all: the standards' types; the texts are NULL or C strings that outlive the call, and so does the list of
+        // variables; the caller promises the rest.
         unsafe {
             match (self.version, r.interface) {
                 (FmiVersion::V2, interface) => {
@@ -74,7 +88,20 @@ impl Calls {
                 (FmiVersion::V3, Interface::CoSimulation) => {
                     let (Function(full, f), event_mode, early) = (&self.co_simulation, r.event_mode, r.early_return);
                     let call = |f: v3::InstantiateCoSimulation| {
-                        f(name, token, resources, r.visible, r.logging, event_mode, early, ptr::null(), 0, e, log, none)
+                        f(
+                            name,
+                            token,
+                            resources,
+                            r.visible,
+                            r.logging,
+                            event_mode,
+                            early,
+                            list,
+                            n,
+                            e,
+                            log,
+                            *intermediate,
+                        )
                     };
                     (*full, f.map(call))
                 }
@@ -84,7 +111,7 @@ impl Calls {
                 }
                 (FmiVersion::V3, Interface::ScheduledExecution) => {
                     let Function(full, f) = &self.scheduled_execution;
-                    (*full, f.map(|f| f(name, token, resources, r.visible, r.logging, e, log, none, none, none)))
+                    (*full, f.map(|f| f(name, token, resources, r.visible, r.logging, e, log, *clocks, *lock, *unlock)))
                 }
             }
         }
@@ -246,10 +273,10 @@ impl Calls {
         self.deserialize.write(ptr::null_mut(), |f, state| unsafe { f(i.0, bytes.pointer(), bytes.1, state) })
     }
 
-    /// `fmi3GetClock` of one clock.
-    pub(super) fn clock(&self, i: Given<'_>, clock: u32) -> Answer<u8> {
+    /// `fmi3GetClock` of one clock, in a place that holds `before`.
+    pub(super) fn clock(&self, i: Given<'_>, clock: u32, before: u8) -> Answer<u8> {
         // SAFETY: the standard's type; one reference, one place of ours.
-        self.get_clock.write(0, |f, active| unsafe { f(i.0, &raw const clock, 1, active) })
+        self.get_clock.write(before, |f, active| unsafe { f(i.0, &raw const clock, 1, active) })
     }
 
     /// `fmi3SetClock` of one clock.
@@ -263,6 +290,18 @@ impl Calls {
         // SAFETY: the standard's type; one reference, places of ours.
         self.get_interval
             .write((0.0, 0), |f, (interval, qualifier)| unsafe { f(i.0, &raw const clock, 1, interval, qualifier) })
+    }
+
+    /// `fmi3SetIntervalDecimal` of one clock.
+    pub(super) fn set_interval(&self, i: Given<'_>, clock: u32, interval: f64) -> Answer {
+        // SAFETY: the standard's type; one reference, one value.
+        self.set_interval.call(|f| unsafe { f(i.0, &raw const clock, 1, &raw const interval) })
+    }
+
+    /// `fmi3ActivateModelPartition`.
+    pub(super) fn activate_partition(&self, i: Given<'_>, clock: u32, t: f64) -> Answer {
+        // SAFETY: the standard's type.
+        self.activate_partition.call(|f| unsafe { f(i.0, clock, t) })
     }
 
     /// `fmi3GetShiftDecimal` of one clock.

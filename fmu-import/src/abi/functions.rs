@@ -157,6 +157,8 @@ functions! {
     get_clock: v3::GetClock = "" "fmi3GetClock",
     set_clock: v3::SetClock = "" "fmi3SetClock",
     get_interval: v3::GetInterval = "" "fmi3GetIntervalDecimal",
+    set_interval: v3::SetInterval = "" "fmi3SetIntervalDecimal",
+    activate_partition: v3::ActivateModelPartition = "" "fmi3ActivateModelPartition",
     get_shift: v3::GetShift = "" "fmi3GetShiftDecimal",
     input_derivatives_2: v2::InputDerivatives = "fmi2SetRealInputDerivatives" "",
 }

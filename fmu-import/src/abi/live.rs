@@ -1,7 +1,7 @@
 //! An instance of the facade, over the calls of either standard. Dropping it frees the instance.
 
 use super::arguments::Given;
-use super::calls::Request;
+use super::calls::{Request, Updates};
 use super::functions::{CType, Calls, Way};
 use super::log::{Log, Status, copy_text};
 use super::raw::{Buffer, Count, Interface, Sensitivity, Simple, StepResults, StepStatus, Vector, type_name, width};
@@ -103,6 +103,7 @@ impl Live {
             callbacks: Arc::as_ptr(&callbacks),
             logger: Some(log_message),
             environment,
+            updates: Updates::default(),
         };
         // SAFETY: callbacks and log outlive the instance.
         let (name, pointer) = unsafe { calls.instantiate(&request) };
@@ -307,7 +308,7 @@ impl Live {
     }
 
     pub(crate) fn clock(&mut self, clock: u32) -> Outcome<bool> {
-        self.calls.clock(self.given(), clock).outcome().map(|active| active != 0)
+        self.calls.clock(self.given(), clock, 0).outcome().map(|active| active != 0)
     }
 
     pub(crate) fn activate(&mut self, clock: u32) -> Outcome {

@@ -102,6 +102,12 @@ pub(super) mod v3 {
     use super::{InstancePointer, Status, c_char, c_int, c_void};
 
     pub(in crate::abi) type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
+    /// Flags of one byte, and places for `earlyReturnRequested` and `earlyReturnTime`.
+    pub(in crate::abi) type IntermediateUpdate =
+        unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
+    pub(in crate::abi) type ClockUpdate = unsafe extern "C" fn(*mut c_void);
+    /// `fmi3LockPreemptionCallback`, `fmi3UnlockPreemptionCallback`.
+    pub(in crate::abi) type Preemption = unsafe extern "C" fn();
     pub(in crate::abi) type InstantiateCoSimulation = unsafe extern "C" fn(
         *const c_char,
         *const c_char,
@@ -114,7 +120,7 @@ pub(super) mod v3 {
         usize,
         *mut c_void,
         Option<LogMessage>,
-        *const c_void,
+        Option<IntermediateUpdate>,
     ) -> InstancePointer;
     pub(in crate::abi) type InstantiateModelExchange = unsafe extern "C" fn(
         *const c_char,
@@ -133,9 +139,9 @@ pub(super) mod v3 {
         bool,
         *mut c_void,
         Option<LogMessage>,
-        *const c_void,
-        *const c_void,
-        *const c_void,
+        Option<ClockUpdate>,
+        Option<Preemption>,
+        Option<Preemption>,
     ) -> InstancePointer;
     pub(in crate::abi) type EnterInitializationMode =
         unsafe extern "C" fn(InstancePointer, bool, f64, f64, bool, f64) -> Status;
@@ -159,6 +165,9 @@ pub(super) mod v3 {
     pub(in crate::abi) type SetClock = unsafe extern "C" fn(InstancePointer, *const u32, usize, *const u8) -> Status;
     pub(in crate::abi) type GetInterval =
         unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut f64, *mut c_int) -> Status;
+    pub(in crate::abi) type SetInterval =
+        unsafe extern "C" fn(InstancePointer, *const u32, usize, *const f64) -> Status;
+    pub(in crate::abi) type ActivateModelPartition = unsafe extern "C" fn(InstancePointer, u32, f64) -> Status;
     pub(in crate::abi) type GetShift = unsafe extern "C" fn(InstancePointer, *const u32, usize, *mut f64) -> Status;
     /// Number of states, of event indicators.
     pub(in crate::abi) type Count = unsafe extern "C" fn(InstancePointer, *mut usize) -> Status;

@@ -40,6 +40,21 @@ impl Wiring {
         self.held.push((target, values));
     }
 
+    /// These connections and schedules, and those of a copy of the instances, which are numbered from `instances` on.
+    pub(super) fn with_copy(&self, instances: usize) -> Self {
+        let mut both = self.clone();
+        both.feeds.extend(self.feeds.iter().map(|feed| Feed {
+            target: feed.target.shifted(instances),
+            source: match &feed.source {
+                Source::Port(port) => Source::Port(port.shifted(instances)),
+                schedule @ Source::Schedule(_) => schedule.clone(),
+            },
+            continuous: feed.continuous,
+        }));
+        both.held.extend(self.held.iter().map(|(port, held)| (port.shifted(instances), held.clone())));
+        both
+    }
+
     fn targets(&self) -> impl Iterator<Item = &Port> {
         self.feeds.iter().map(|feed| &feed.target).chain(self.held.iter().map(|(target, _)| target))
     }

@@ -21,7 +21,8 @@ pub(super) fn solve(exchange: &mut Exchange, instances: &mut [Instance], t: f64)
         return Ok(());
     }
     if inputs.iter().any(|input| input.source.is_none()) {
-        let cause = "the connections form an algebraic loop of discrete inputs, which do not settle";
+        let cause =
+            "the connections form an algebraic loop of discrete inputs or elements of arrays, which do not settle";
         return Err(Error::usage(&names(&inputs, instances), format!("{cause} at t = {t} s")));
     }
     let (mut u, mut last) = (exchange.values_of(&inputs), f64::INFINITY);

@@ -22,6 +22,11 @@ impl Port {
     pub(super) fn is_fast(&self) -> bool {
         self.base == BaseType::Float64 && self.element.is_none()
     }
+
+    /// The variable in the instance that is `count` places later.
+    pub(super) fn shifted(&self, count: usize) -> Self {
+        Self { instance: self.instance + count, ..self.clone() }
+    }
 }
 
 /// An FMU with the name of its instance.

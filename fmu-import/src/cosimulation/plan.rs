@@ -38,9 +38,10 @@ pub struct Plan {
     method: Method,
     parts: Parts,
     /// The FMU of each part to make instances of.
-    live: Arc<[Live]>,
+    live: Vec<Arc<Live>>,
     wiring: Wiring,
     set: Vec<(Port, Values)>,
+    records: Vec<Port>,
     exchange: Exchange,
     grid: Grid,
     columns: Vec<Column>,
@@ -86,7 +87,7 @@ impl System {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let columns = self.columns().collect();
-        let live = |fmu: &Fmu| Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) };
+        let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });
         let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
         Ok(Plan {
             live,
@@ -97,6 +98,7 @@ impl System {
             parts: self.parts,
             wiring: self.wiring,
             set: self.set,
+            records: self.records,
         })
     }
 
@@ -155,9 +157,45 @@ impl Plan {
             wiring: self.wiring.clone(),
             set: self.set.clone(),
             exchange: Exchange::new(self.parts.0.len(), &self.wiring, &ports),
+            records: ports,
             grid: self.grid,
             columns,
         })
+    }
+
+    /// The system and a copy of it beside it: neither feeds the other, the columns are those of the system, then those of the copy.
+    /// FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by these values
+    /// alone and not by the solver's choice of steps.
+    #[must_use]
+    pub fn with_copy(&self) -> Self {
+        let count = self.parts.0.len();
+        let both =
+            |ports: &[Port]| ports.iter().cloned().chain(ports.iter().map(|p| p.shifted(count))).collect::<Vec<_>>();
+        let twice = |columns: &[Column]| columns.iter().chain(columns).cloned().collect();
+        let (wiring, records) = (self.wiring.with_copy(count), both(&self.records));
+        let set = self.set.iter().map(|(port, values)| (port.shifted(count), values.clone()));
+        Self {
+            method: self.method.clone(),
+            parts: Parts(self.parts.0.iter().chain(&self.parts.0).cloned().collect()),
+            live: self.live.iter().chain(&self.live).cloned().collect(),
+            set: self.set.iter().cloned().chain(set).collect(),
+            exchange: Exchange::new(2 * count, &wiring, &records),
+            wiring,
+            records,
+            grid: self.grid,
+            columns: twice(&self.columns),
+        }
+    }
+
+    /// The variable of the copy in [`with_copy`](Self::with_copy) that a target of this plan is.
+    #[must_use]
+    pub fn in_copy(&self, target: &Target) -> Target {
+        Target { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
+    }
+
+    /// Whether the master integrates an FMU (Model Exchange).
+    pub fn integrates(&self) -> bool {
+        self.parts.0.iter().any(|part| part.kind == Kind::ModelExchange)
     }
 
     /// Start, stop and step.

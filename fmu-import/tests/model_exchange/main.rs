@@ -441,6 +441,8 @@ fn raw_calls() {
             event_mode: false,
             early_return: false,
             environment: 0,
+            intermediate: None,
+            locks: false,
         };
         let p = raw.instantiate(&arguments).unwrap().unwrap();
         let ok = |status: Option<Status>| assert_eq!(status, Some(Status::OK));

@@ -104,6 +104,7 @@ fn variable(
         aliases: element.all("Alias").map(alias).collect::<Result<_, _>>()?,
         derivative: integer(typed, "derivative")?,
         reinit: boolean(typed, "reinit")?.unwrap_or(false),
+        intermediate: boolean(element, "intermediateUpdate")?.unwrap_or(false),
         clocks: integers(element, "clocks")?.unwrap_or_default(),
         timing: timing(element).filter(|_| base == BaseType::Clock),
         line: element.line,
@@ -121,6 +122,7 @@ fn timing(element: &Element) -> Option<ClockTiming> {
         ticks: IntervalVariability::from_word(element.get("intervalVariability")?)?,
         interval: of("intervalCounter", "intervalDecimal"),
         shift: of("shiftCounter", "shiftDecimal").unwrap_or(0.0),
+        priority: element.get("priority").and_then(|text| text.trim().parse().ok()),
     })
 }
 

@@ -1,8 +1,9 @@
 //! Instantiation with arbitrary arguments.
 
-use super::super::calls::Request;
+use super::super::calls::{Request, Updates};
 use super::super::signatures::v2::Callbacks;
 use super::callbacks::{allocate, logger2, logger3, release};
+use super::updates::{clock_update, intermediate_update, lock_preemption, unlock_preemption};
 use super::{Handle, Raw};
 use std::ffi::{CString, c_void};
 use std::ptr;
@@ -46,6 +47,10 @@ pub struct Arguments {
     pub early_return: bool,
     /// The environment, which the callbacks receive unchanged.
     pub environment: usize,
+    /// The variables that the importer uses inside steps; `None` for no `intermediateUpdate` (FMI 3.0 only).
+    pub intermediate: Option<Vec<u32>>,
+    /// Whether there are `lockPreemption` and `unlockPreemption` (Scheduled Execution only, which always has `clockUpdate`).
+    pub locks: bool,
 }
 
 impl Raw {
@@ -75,6 +80,12 @@ impl Raw {
             callbacks: if a.callbacks { lasting } else { ptr::null() },
             logger: if a.logger { Some(logger3) } else { None },
             environment,
+            updates: Updates {
+                intermediate: a.intermediate.as_ref().map(|_| intermediate_update as _),
+                required: a.intermediate.as_deref().unwrap_or_default(),
+                clocks: Some(clock_update),
+                preemption: [a.locks.then_some(lock_preemption as _), a.locks.then_some(unlock_preemption as _)],
+            },
         };
         // SAFETY: the struct of callbacks lives on; no callback follows the environment.
         let (name, made) = unsafe { self.calls.instantiate(&request) };

@@ -19,6 +19,7 @@ mod optional;
 mod owned;
 mod processor;
 mod states;
+mod updates;
 
 pub use buffer::{Buffer, type_name, width};
 pub use callbacks::{LogCall, allocations, take_events};
@@ -27,6 +28,7 @@ pub use instantiate::{Arguments, Interface};
 pub use names::{Count, Optional, Sensitivity, Simple, StepStatus, Text, Vector};
 pub use owned::{Handle, SavedState};
 pub use processor::{armed_timers, float_control, locale};
+pub use updates::{Answered, Heard, Inside, Meanwhile};
 
 use super::arguments::Array;
 use super::functions::{CType, Calls, Way};

@@ -1,0 +1,64 @@
+//! Clocks, intermediate updates and Scheduled Execution: faults of a small C FMU with a clock of each kind.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+use crate::{check, each, library, pack_with, told, violated};
+use fmu_check::Verdict;
+
+const GROUPS: [&str; 3] = ["clocks", "intermediate-update", "scheduled-execution"];
+
+const FAULTS: &[(&str, &[&str])] = &[
+    ("NONE", &[]),
+    ("K00", &["K00"]),
+    // An active clock that nobody has set.
+    ("K01", &["K01", "K02"]),
+    ("K02", &["K02"]),
+    // An interval, a shift, an interval that cannot be set.
+    ("K03", &["K03"]),
+    ("K03s", &["K03"]),
+    ("K03f", &["K03"]),
+    ("K04", &["K04"]),
+    ("K05", &["K05"]),
+    // A clock that the FMU ticks; Step Mode.
+    ("K06", &["K06"]),
+    ("K06s", &["K06"]),
+    ("K07", &["K07"]),
+    ("K08", &["K08"]),
+    // A time after the step, another environment, a call outside of a step.
+    ("U00", &["U00"]),
+    ("U00e", &["U00"]),
+    ("U00g", &["U00"]),
+    ("U01", &["U01"]),
+    ("U02", &["U02"]),
+    ("U03", &["U03"]),
+    ("U05", &["U05"]),
+    ("U06", &["U06"]),
+    ("P00", &["P00"]),
+    ("P01", &["P01"]),
+    ("P02", &["P02"]),
+    // A lock that stays; a call of NULL.
+    ("P03", &["P03"]),
+    ("P03n", &["P03"]),
+    ("P04", &["P04"]),
+    ("P04e", &["P04"]),
+    ("P05", &["P05"]),
+];
+
+#[test]
+fn clocks_tick_and_callbacks_come_as_they_should() {
+    let (dir, xml) = (tempfile::tempdir().unwrap(), include_str!("ticks.xml"));
+    if library("ticks.c", &[], "NONE").is_none() {
+        return;
+    }
+    each(FAULTS, |(fault, ids)| {
+        let binary = library("ticks.c", &[], fault).unwrap();
+        let report = check(&pack_with(dir.path(), fault, xml, &binary), &GROUPS);
+        let open = |v: &Verdict| matches!(v, Verdict::NotDetermined(_) | Verdict::NotApplicable(_));
+        let open = report.findings.iter().find(|f| *fault == "NONE" && f.id != "U04" && open(&f.verdict));
+        let good = violated(&report) == *ids && open.is_none();
+        if good { Ok(()) } else { Err(format!("{fault}: {} {open:?}", told(&report))) }
+    });
+    // The callback of an FMU that does not announce it.
+    let silent = xml.replace("providesIntermediateUpdate=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\"", "");
+    let report = check(&pack_with(dir.path(), "U04", &silent, &library("ticks.c", &[], "NONE").unwrap()), &GROUPS);
+    assert_eq!(violated(&report), ["U04"], "{}", told(&report));
+}

@@ -1,0 +1,97 @@
+//! Runs at a point and beside it, for derivatives of measures with respect to variables.
+//!
+//! Two runs that the master integrates (Model Exchange) differ by more than their values: the solver chooses other steps, and that
+//! difference, of the size of its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
+//! ([`with_copy`](fmu_import::cosimulation::Plan::with_copy)), which is integrated in common steps. What is differentiated is then the
+//! computed solution, and its derivative is as exact as the solution itself, at any tolerance. Events and samples are each run's own.
+//!
+//! Source: H. G. Bock, Numerical treatment of inverse problems in chemical reaction kinetics, in: Modelling of Chemical Reaction
+//! Systems, Springer 1981, 102-125: internal numerical differentiation.
+
+use crate::plan::{Outcome, Outcomes, Plan, Variable};
+use crate::{Error, measure::Measure, pool};
+use fmu_import::cosimulation::{Target, Worker};
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, PoisonError};
+
+impl Plan {
+    /// Runs at a point, then with each variable above it by its step, then with each below it: as many rows as twice the variables,
+    /// and one. `progress` is called with the number of rows done.
+    ///
+    /// # Errors
+    /// An FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run is in its row.
+    pub fn run_around(
+        &self,
+        variables: &[Variable],
+        point: &[f64],
+        steps: &[f64],
+        threads: usize,
+        progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
+    ) -> Result<Outcomes, Error> {
+        let n = point.len().min(steps.len());
+        let row = |row: usize, values: &mut Vec<f64>| {
+            values.clear();
+            values.extend_from_slice(point);
+            if let Some(k) = row.checked_sub(1) {
+                values[k % n] += if k < n { steps[k] } else { -steps[k - n] };
+            }
+        };
+        let count = |n: usize| u64::try_from(n).unwrap_or(u64::MAX);
+        let index = |row: u64| usize::try_from(row).unwrap_or(usize::MAX);
+        if !self.system().integrates() || self.only_one_instance().is_some() {
+            return self.run_rows(variables, count(2 * n + 1), &|k, values| row(index(k), values), threads, progress);
+        }
+        let pairs = Arc::new(self.system().with_copy());
+        let copied = |v: &Variable| v.targets().iter().map(|target| self.system().in_copy(target)).collect();
+        let copies: Vec<Vec<Target>> = variables.iter().map(copied).collect();
+        let all = Mutex::new((Outcomes::empty(self.measures().len(), 2 * n + 1), 0));
+        pool::run(
+            count(n + 1),
+            threads,
+            |_| Ok((self.runner(variables)?, pairs.worker()?, [Vec::new(), Vec::new()])),
+            |(runner, worker, [above, below]), block| {
+                let k = index(block);
+                row(k, above);
+                let outcomes = if k == 0 {
+                    vec![(0, runner.run(above, &mut |_, _| {}))]
+                } else {
+                    row(k + n, below);
+                    let set = variables.iter().map(Variable::targets).zip(&*above);
+                    let set = set.chain(copies.iter().map(Vec::as_slice).zip(&*below));
+                    let set = set.flat_map(|(targets, x)| targets.iter().map(|target| (target, *x)));
+                    let [above, below] = self.pair(worker, set);
+                    vec![(k, above), (k + n, below)]
+                };
+                let mut all = all.lock().unwrap_or_else(PoisonError::into_inner);
+                all.1 += count(outcomes.len());
+                for (k, outcome) in outcomes {
+                    all.0.put(k, outcome);
+                }
+                let done = all.1;
+                drop(all);
+                if progress(done).is_break() { Err(Error::Interrupted) } else { Ok(()) }
+            },
+        )?;
+        Ok(all.into_inner().unwrap_or_else(PoisonError::into_inner).0)
+    }
+
+    /// Runs the system and its copy with these values.
+    fn pair<'a>(&self, worker: &mut Worker, set: impl IntoIterator<Item = (&'a Target, f64)>) -> [Outcome; 2] {
+        let renewed = if self.reuses() { Ok(()) } else { worker.renew() };
+        let (mut end, columns) = (f64::NAN, self.system().columns().len());
+        let begin = || self.readers().iter().map(|_| Measure::begin()).collect::<Vec<_>>();
+        let mut readings = [begin(), begin()];
+        let ended = renewed.and_then(|()| {
+            worker.run(set, |t, row| {
+                end = t;
+                let (one, copy) = row.split_at(columns);
+                for (readings, row) in readings.iter_mut().zip([one, copy]) {
+                    self.readers().iter().zip(readings).for_each(|(measure, reading)| measure.take(reading, t, row));
+                }
+                ControlFlow::Continue(())
+            })
+        });
+        let ended = ended.map_err(|error| error.to_string());
+        readings.map(|readings| Outcome { result: ended.clone().and_then(|_| self.measured(&readings)), end })
+    }
+}
