@@ -1,7 +1,7 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{
-    atlas, build, compare, info, map, merge, new, page, preset, prove, reproduce, simulate, ssp, sweep, tune,
+    atlas, build, compare, identify, info, map, merge, new, page, preset, prove, reproduce, simulate, ssp, sweep, tune,
 };
 use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -33,6 +33,7 @@ enum Command {
     Compare(compare::Compare),
     Atlas(atlas::Atlas),
     Tune(tune::Tune),
+    Identify(identify::Identify),
     Map(map::Map),
     Ssp(ssp::Ssp),
     Preset(preset::Preset),
@@ -115,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Map(args) => map::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Identify(args) => identify::run(&args).map(|whole| ExitCode::from(u8::from(!whole))),
         Command::Preset(args) => preset::run(&args).map(|text| {
             print!("{text}");
             ExitCode::SUCCESS

@@ -34,8 +34,7 @@ pub fn finish(
     for file in written.iter().chain([&materials]) {
         let bytes = fs::read(file).with_context(|| file.display().to_string())?;
         let name = file.strip_prefix(folder).unwrap_or(file).to_string_lossy().replace('\\', "/");
-        let hash = Sha256::digest(bytes).iter().fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"));
-        sums.insert(name, hash);
+        sums.insert(name, sha256(&bytes));
     }
     let mut text = String::new();
     for (name, hash) in sums {
@@ -91,4 +90,8 @@ fn bill(workspace: &Workspace, packages: &[String], moment: Moment) -> Value {
         "components": components.into_values().collect::<Vec<_>>(),
         "dependencies": dependencies,
     })
+}
+/// SHA-256 of some bytes in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().fold(String::new(), |hash, byte| hash + &format!("{byte:02x}"))
 }

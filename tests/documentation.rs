@@ -305,6 +305,18 @@ fn pages_in_a_browser() {
         vec!["reproduce", "--out", &path("reproduce")],
         vec!["atlas", "--every", "20", "--out", &path("atlas")],
         vec!["map", "motors/traction-63kw.toml", "--u-dc", "320,400", "--out", &path("map")],
+        vec![
+            "identify",
+            "examples/bench.csv",
+            "--n-p",
+            "3",
+            "--every",
+            "5",
+            "--load",
+            "tau_load",
+            "--html",
+            &path("bench.html"),
+        ],
     ]
     .map(|command| command.into_iter().map(String::from).collect::<Vec<_>>());
     for command in commands {

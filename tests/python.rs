@@ -84,6 +84,7 @@ fn the_package() {
         "types",
         "docs",
         "figures",
+        "identify",
     ];
     let files = files.map(|name| format!("test_{name}.py"));
     tests("fmurun", &files.each_ref().map(String::as_str), &[]);

@@ -295,3 +295,42 @@ fn a_motor_file_is_enough_outside_a_checkout() {
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(refused.status.code() == Some(2) && said.lines().count() == 1 && said.contains("none.toml"), "{said}");
 }
+
+/// docs/identify.md: the commands from a record to a running drive, exactly as printed. `fmu build` has run: its archive is there.
+#[test]
+fn a_record_becomes_a_running_drive() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let dir = tempfile::tempdir().unwrap();
+    let copy = |from: &Path, to: &str| {
+        let to = dir.path().join(to);
+        std::fs::create_dir_all(to.parent().unwrap()).unwrap();
+        std::fs::copy(from, to).unwrap();
+    };
+    copy(&root.join("examples/bench.csv"), "examples/bench.csv");
+    copy(&common::archives().join("fmi3/PmsmDrive.fmu"), "target/fmu/fmi3/PmsmDrive.fmu");
+    let page = std::fs::read_to_string(root.join("docs/identify.md")).unwrap();
+    let block = |language: &str| page.split_once(&format!("```{language}\n")).unwrap().1.split_once("\n```").unwrap().0;
+    let mut last = String::new();
+    for (k, line) in block("sh").lines().enumerate() {
+        let words: Vec<_> = line.split_whitespace().collect();
+        if words[..2] == ["fmu", "build"] {
+            assert_eq!(words[2..], ["PmsmDrive", "--fmi", "3"]);
+            continue;
+        }
+        let command =
+            Command::new(env!("CARGO_BIN_EXE_fmu")).args(&words[1..]).current_dir(dir.path()).output().unwrap();
+        assert!(command.status.success(), "{line}: {}", String::from_utf8_lossy(&command.stderr));
+        last = String::from_utf8(command.stdout).unwrap();
+        if k == 0 {
+            let values: Vec<_> = last.lines().take_while(|line| !line.is_empty()).collect();
+            assert_eq!(values.join("\n"), block("text"), "docs/identify.md shows other values");
+        }
+    }
+    // 78.5 rad/s are 749.6 rpm.
+    assert!(last.contains("speed_ref 749.6 rpm"), "{last}");
+    let speed = last.split_once("speed ").unwrap().1.split_once(" rpm").unwrap().0;
+    assert!((speed.parse::<f64>().unwrap() / 749.6 - 1.0).abs() < 0.005, "{last}");
+    for file in ["bench.toml", "bench.html", "tune/bench.PmsmDrive.ssv", "run.html"] {
+        assert!(dir.path().join("target").join(file).metadata().unwrap().len() > 500, "{file}");
+    }
+}

@@ -1,4 +1,4 @@
-//! A table of numbers from a CSV file: a header with names, `#` before comments, a decimal point.
+//! A table of numbers from a CSV file: a header with names, `#` before comments.
 
 use anyhow::{Context, Result, bail, ensure};
 use std::path::Path;
@@ -29,33 +29,75 @@ impl Columns {
     /// File and line, and what was expected: no header, semicolons, another number of cells than names, a cell that is not a
     /// finite number, no row.
     pub fn parse(text: &str, file: &str) -> Result<Self> {
-        let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim()));
-        let mut lines = lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-        let cells = |line: &str| line.split(',').map(|c| c.trim().trim_matches('"').to_owned()).collect::<Vec<_>>();
+        if let Some((line, header)) = lines(text).next() {
+            ensure!(
+                separator(header) == ',',
+                "{file}:{line}: has semicolons or tabs; write commas between columns and a decimal point"
+            );
+        }
+        Self::parse_some(text, file, |_| true)
+    }
+
+    /// Reads the columns of `file` whose header `wanted` accepts, between commas, semicolons or tabs. With semicolons or tabs, a
+    /// number may have a decimal comma.
+    ///
+    /// # Errors
+    /// Those of [`parse`](Self::parse), but for semicolons and the cells of other columns.
+    pub fn parse_some(text: &str, file: &str, wanted: impl Fn(&str) -> bool) -> Result<Self> {
+        let mut lines = lines(text);
         let Some((first, header)) = lines.next() else {
             bail!("{file}: is empty; expected a header and rows of numbers")
         };
-        ensure!(
-            !header.contains(';') && !header.contains('\t'),
-            "{file}:{first}: has semicolons or tabs; write commas between columns and a decimal point"
-        );
-        let names = cells(header.trim_start_matches('\u{feff}'));
-        if let Some(number) = names.iter().find(|name| name.parse::<f64>().is_ok()) {
+        let separator = separator(header);
+        let cells = |line| str::split(line, separator).map(|c: &str| c.trim().trim_matches('"'));
+        let all: Vec<String> = cells(header.trim_start_matches('\u{feff}')).map(str::to_owned).collect();
+        if let Some(number) = all.iter().find(|name| name.parse::<f64>().is_ok()) {
             bail!("{file}:{first}: {number} is a number; the first line names the columns");
         }
+        let chosen: Vec<bool> = all.iter().map(|name| wanted(name)).collect();
+        let names: Vec<String> =
+            all.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(n, _)| n.clone()).collect();
         let mut rows = Vec::new();
         for (line, text) in lines {
-            let cells = cells(text);
-            let (found, expected) = (cells.len(), names.len());
+            let (found, expected) = (cells(text).count(), all.len());
             ensure!(found == expected, "{file}:{line}: expected {expected} numbers, found {found}");
-            let number = |cell: &String| match cell.parse::<f64>() {
-                Ok(x) if x.is_finite() => Ok(x),
-                _ => bail!("{file}:{line}: {cell:?} is not a finite number"),
-            };
-            rows.push((line, cells.iter().map(number).collect::<Result<Vec<_>>>()?));
+            let mut row = Vec::with_capacity(names.len());
+            for ((cell, name), _) in cells(text).zip(&all).zip(&chosen).filter(|(_, chosen)| **chosen) {
+                let number = if separator == ',' { cell.parse() } else { cell.replace(',', ".").parse() };
+                match number {
+                    Ok(x) if f64::is_finite(x) => row.push(x),
+                    _ => bail!("{file}:{line}:{name}: {cell:?} is not a finite number"),
+                }
+            }
+            rows.push((line, row));
         }
-        ensure!(!rows.is_empty(), "{file}: has no row of numbers below {}", names.join(","));
+        ensure!(!rows.is_empty(), "{file}: has no row of numbers below {}", all.join(","));
         Ok(Self { file: file.into(), names, rows })
+    }
+
+    /// A table of columns that are in memory; `name` stands for the file, and rows count from 1.
+    ///
+    /// # Errors
+    /// Columns of different lengths, or a value that is not finite.
+    pub fn of(name: &str, columns: &[(String, Vec<f64>)]) -> Result<Self> {
+        let rows = columns.first().map_or(0, |(_, values)| values.len());
+        for (column, values) in columns {
+            ensure!(values.len() == rows, "{name}: {column} has {} values, the first column {rows}", values.len());
+            if let Some(row) = values.iter().position(|x| !x.is_finite()) {
+                bail!("{name}:{}:{column}: {} is not a finite number", row + 1, values[row]);
+            }
+        }
+        let row = |k: usize| (k + 1, columns.iter().map(|(_, values)| values[k]).collect());
+        Ok(Self {
+            file: name.into(),
+            names: columns.iter().map(|(column, _)| column.clone()).collect(),
+            rows: (0..rows).map(row).collect(),
+        })
+    }
+
+    /// Names of the columns that were read.
+    pub fn names(&self) -> &[String] {
+        &self.names
     }
 
     /// The file's name.
@@ -83,6 +125,17 @@ impl Columns {
     }
 }
 
+/// Lines with content and their numbers; `#` starts a comment.
+fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim_matches([' ', '\r'])));
+    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
+}
+
+/// What stands between the columns of a header.
+fn separator(header: &str) -> char {
+    ['\t', ';'].into_iter().find(|c| header.contains(*c)).unwrap_or(',')
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -99,8 +152,8 @@ mod tests {
             ("1,2\n3,4\n", "t.csv:1: 1 is a number"),
             ("a,b\n", "t.csv: has no row of numbers below a,b"),
             ("a,b\n1\n", "t.csv:2: expected 2 numbers, found 1"),
-            ("a,b\n1,x\n", "t.csv:2: \"x\" is not a finite number"),
-            ("a,b\n1,NaN\n", "t.csv:2: \"NaN\" is not a finite number"),
+            ("a,b\n1,x\n", "t.csv:2:b: \"x\" is not a finite number"),
+            ("a,b\n1,NaN\n", "t.csv:2:b: \"NaN\" is not a finite number"),
         ] {
             let error = Columns::parse(text, "t.csv").unwrap_err().to_string();
             assert!(error.starts_with(message), "{error}");

@@ -5,6 +5,7 @@
 //! - [`atlas`]: what wrong estimates of resistance and magnet flux lose at low speed.
 //! - [`tune`]: parameter values for a machine.
 //! - [`map`]: efficiency over speed and torque.
+//! - [`identify`]: a machine's data from a record.
 //! - [`plane`]: torque and losses over speed, drawn for the documentation.
 
 #![forbid(unsafe_code)]
@@ -15,6 +16,7 @@ pub mod atlas;
 pub mod compare;
 pub mod csv;
 pub mod expected;
+pub mod identify;
 pub mod ink;
 pub mod map;
 mod output;

@@ -2,6 +2,7 @@
 
 - `simulate_fmu`: one run, as FMPy does it: same arguments, same result, Co-Simulation or Model Exchange.
 - `Plan`: a system of FMUs for many runs on all processors, and on clusters by `fmurun.dask.sweep`.
+- `identify`: a machine's data from a record of its running drive.
 - `linearize`: matrices A, B, C and D of an FMU for Model Exchange.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
 - `plot`: a result, with matplotlib; notebooks show results by themselves.
@@ -14,9 +15,10 @@ Every error of an FMU is an `FmuError`.
 from . import drives
 from ._batch import Batch
 from ._error import FmuError
+from ._identify import identify
 from ._linearize import Linearization, linearize
 from ._plan import Plan
 from ._plot import plot
 from ._simulate import simulate_fmu
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "plot", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "identify", "linearize", "plot", "simulate_fmu"]

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import drives as drives
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "linearize", "plot", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "identify", "linearize", "plot", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
@@ -113,6 +113,22 @@ class Linearization:
     dx: NDArray[np.float64]
     method: str
 
+def identify(
+    frame: Any,
+    *,
+    n_p: int,
+    current: float | None = None,
+    speed: float | None = None,
+    torque: float | None = None,
+    u_dc: float | None = None,
+    delay: float | None = None,
+    every: int | None = None,
+    rate: float | None = None,
+    zero: tuple[float, float] | None = None,
+    load: str | None = None,
+    map: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+) -> dict[str, Any]: ...
 def linearize(
     fmu: _Path,
     point: Mapping[str, _Value] | None = None,

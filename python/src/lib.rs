@@ -10,6 +10,7 @@ mod course;
 mod describe;
 mod error;
 mod exchange;
+mod identify;
 mod input;
 mod instance;
 mod lane;
@@ -31,6 +32,8 @@ mod _core {
     use super::cache::{Fmu, open};
     #[pymodule_export]
     use super::error::panic;
+    #[pymodule_export]
+    use super::identify::identify;
     #[pymodule_export]
     use super::instance::{FmuState, Instance};
     #[pymodule_export]

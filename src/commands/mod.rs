@@ -3,6 +3,7 @@
 pub mod atlas;
 pub mod build;
 pub mod compare;
+pub mod identify;
 pub mod info;
 pub mod map;
 pub mod merge;

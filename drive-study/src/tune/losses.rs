@@ -1,8 +1,8 @@
-//! Losses of the inverter and temperature coefficients: values of the file for the plant alone, which the controller does not
-//! know.
+//! Losses of the inverter and temperature coefficients: values of the file for the plant, which the controller does not know, and
+//! the dead time, which it compensates.
 
 use super::motor::{Inverter, MotorFile, Number};
-use super::rules::{Setting, given, real};
+use super::rules::{Setting, Value, given, real};
 use anyhow::{Result, bail};
 
 /// The settings of `[inverter]` and `[temperature]`; none where the file has neither. `T_s` is the sample period in s.
@@ -18,7 +18,8 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
         add("magnet.alpha", &temperature.magnet);
     }
     let Some(inverter) = &motor.data.inverter else { return Ok(all) };
-    let Inverter { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw, u_sw, k_sw, f_sw } = inverter;
+    let Inverter { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw, u_sw, k_sw, f_sw, u_dead, i_zero } =
+        inverter;
     for (name, x) in [
         ("inverter.u_transistor", u_transistor),
         ("inverter.r_transistor", r_transistor),
@@ -28,6 +29,7 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
         ("inverter.i_sw", i_sw),
         ("inverter.u_sw", u_sw),
         ("inverter.k_sw", k_sw),
+        ("inverter.i_zero", i_zero),
     ] {
         add(name, x);
     }
@@ -36,7 +38,7 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
             bail!("{}: inverter.E_sw needs inverter.{key}: give the one at which it was measured", motor.place(energy));
         }
     }
-    all.push(match f_sw {
+    let period = match f_sw {
         None => real("inverter.T_pwm", T_s, "one PWM period per sample"),
         Some(f) if *f.get_ref() > 0.0 && f.get_ref().is_finite() => {
             Setting { origin: Some(f.span().start), ..real("inverter.T_pwm", 1.0 / f.get_ref(), "1 / f_sw") }
@@ -44,8 +46,24 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
         Some(f) => {
             bail!("{}: inverter.f_sw = {} Hz must be greater than 0: correct the value", motor.place(f), f.get_ref())
         }
-    });
+    };
+    if let (Some(u_dead), Value::Real(T_pwm)) = (u_dead, &period.value) {
+        let time = u_dead.get_ref() * T_pwm / motor.data.dc_link.u_dc.get_ref();
+        all.push(Setting {
+            origin: Some(u_dead.span().start),
+            ..real("inverter.dead_time", time, "u_dead T_pwm / u_dc")
+        });
+    }
+    all.push(period);
     Ok(all)
+}
+
+/// The settings of the controller's dead-time compensation; none where the file has no dead-time voltage.
+pub fn compensation(motor: &MotorFile) -> Vec<Setting> {
+    let Some(Inverter { u_dead: Some(u_dead), i_zero, .. }) = &motor.data.inverter else { return Vec::new() };
+    let mut all = vec![given("compensation.u_dead", u_dead)];
+    all.extend(i_zero.as_ref().map(|i_zero| given("compensation.i_zero", i_zero)));
+    all
 }
 
 #[cfg(test)]
@@ -65,7 +83,9 @@ mod tests {
         assert!(of("").unwrap().is_empty());
         assert_eq!(of("[temperature]\nmagnet = -1.1e-3").unwrap(), [("magnet.alpha", Real(-1.1e-3))]);
         let period = ("inverter.T_pwm", Real(5e-5));
-        assert_eq!(of("[inverter]\nr_diode = 0.1").unwrap(), [("inverter.r_diode", Real(0.1)), period]);
+        assert_eq!(of("[inverter]\nr_diode = 0.1").unwrap(), [("inverter.r_diode", Real(0.1)), period.clone()]);
+        let dead = of("[inverter]\nu_dead = 5.4\ni_zero = 0.2").unwrap();
+        assert_eq!(dead, [("inverter.i_zero", Real(0.2)), ("inverter.dead_time", Real(5.4 * 5e-5 / 540.0)), period]);
         assert_eq!(of("[inverter]\nf_sw = 8000.0").unwrap(), [("inverter.T_pwm", Real(1.25e-4))]);
         for (text, message) in [
             ("E_sw = 1e-3\nu_sw = 300.0", "inverter.E_sw needs inverter.i_sw"),

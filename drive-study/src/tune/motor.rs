@@ -185,6 +185,10 @@ pub struct Inverter {
     pub k_sw: Option<Number>,
     /// Switching frequency in Hz; 1 / T_s if omitted.
     pub f_sw: Option<Number>,
+    /// Voltage in V that a leg loses to the dead time; none if omitted.
+    pub u_dead: Option<Number>,
+    /// Current in A below which that voltage falls linearly to zero; 0.1 A if omitted.
+    pub i_zero: Option<Number>,
 }
 
 /// Temperature coefficients in 1/K, from the 20 degC of the file's values.

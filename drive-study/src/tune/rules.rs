@@ -108,6 +108,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
     plant.extend(losses::settings(motor, bandwidths.T_s.value)?);
+    controller.extend(losses::compensation(motor));
     let fitted = flux_map::fit(motor)?;
     if let Some(fitted) = &fitted {
         plant.retain(|setting| setting.name != "motor.psi_M");

@@ -1,0 +1,151 @@
+//! Fit of inertia and friction to the torque that the currents make:
+//!
+//! ```text
+//! J [w_m] + B int(w_m) + tau_coulomb int(tanh(w_m / (0.003 w_max))) = int(tau_e - tau_load)
+//! tau_e = 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q
+//! ```
+
+use super::Complex;
+use super::electrical::Fit;
+use super::interval::{self, Sums};
+use super::motion::Motion;
+use super::record::{BenchRecord, quantile};
+use nalgebra::{DMatrix, DVector};
+
+/// Length of a window in s.
+const WINDOW: f64 = 0.05;
+
+/// Windows of a block of the sandwich estimate.
+const BLOCK: usize = 6;
+
+/// J, B, tau_coulomb.
+const SIZE: usize = 3;
+
+/// The fit.
+#[derive(Clone, Debug)]
+pub struct MechanicalFit {
+    /// J in kg.m2, B in N.m.s/rad, tau_coulomb in N.m.
+    pub p: [f64; SIZE],
+    /// Half-widths (95 %).
+    pub half: [f64; SIZE],
+}
+
+/// What the record shows of speed and torque, in windows of 50 ms.
+#[derive(Clone, Debug)]
+pub struct Shown {
+    /// Greatest mechanical speed in rad/s.
+    pub speed: f64,
+    /// Greatest electromagnetic torque in N.m.
+    pub torque: f64,
+    /// Speeds that differ by a tenth of the greatest, each for at least 3 % of the time.
+    pub levels: usize,
+    /// The windows.
+    pub rows: Vec<TorqueWindow>,
+}
+
+/// One window: the regressors of inertia and friction and what they explain, integrals over its time.
+#[derive(Clone, Copy, Debug)]
+pub struct TorqueWindow {
+    /// Time in s at its middle.
+    pub t: f64,
+    /// Its length in s.
+    pub time: f64,
+    /// Change of the speed, integral of the speed and of its sign.
+    pub x: [f64; SIZE],
+    /// Integral of the electromagnetic torque without the load, N.m.s.
+    pub y: f64,
+}
+
+impl Shown {
+    /// Windows of a record. The load is taken as zero where it is unknown.
+    pub fn of(record: &BenchRecord, motion: &Motion, fit: &Fit, n_p: f64) -> Self {
+        let [_, L_d, L_q, psi_M, ..] = fit.p;
+        let width = ((WINDOW / record.step).round() as usize).max(4);
+        let speed =
+            quantile(motion.runs.iter().flat_map(Clone::clone).map(|k| motion.w[k].abs()).collect(), 0.999) / n_p;
+        let sign = |w: f64| (w / (0.003 * speed)).tanh();
+        let torque = |k: usize| {
+            let i = record.i[k] * Complex::cis(-(motion.theta[k] - fit.theta_0 + motion.w[k] * fit.tau));
+            1.5 * n_p * (psi_M + (L_d - L_q) * i.re) * i.im
+        };
+        let (mut rows, mut greatest, mut bins) = (Vec::new(), 0.0_f64, [0_usize; 101]);
+        for run in &motion.runs {
+            let mut start = run.start;
+            while start + width < run.end {
+                let (mut x, mut y, mut made) = ([0.0; SIZE], 0.0, 0.0);
+                for k in start..=start + width {
+                    let part = if k == start || k == start + width { 0.5 * record.step } else { record.step };
+                    let w_m = motion.w[k] / n_p;
+                    let tau = torque(k);
+                    x[1] += part * w_m;
+                    x[2] += part * sign(w_m);
+                    made += part * tau;
+                    y += part * (tau - record.load.as_ref().map_or(0.0, |load| load[k]));
+                }
+                x[0] = (motion.w[start + width] - motion.w[start]) / n_p;
+                let time = width as f64 * record.step;
+                greatest = greatest.max((made / time).abs());
+                bins[((x[1] / time / speed).abs() * 100.0).clamp(0.0, 100.0) as usize] += 1;
+                rows.push(TorqueWindow { t: 0.5 * (record.t[start] + record.t[start + width]), time, x, y });
+                start += width;
+            }
+        }
+        let levels = levels(bins, rows.len());
+        Self { speed, torque: greatest, levels, rows }
+    }
+
+    /// The fit: least squares with rows that are wrong by 1 % of their torque, and less weight beyond 2.5 standard deviations.
+    pub fn fit(&self) -> Option<MechanicalFit> {
+        let typical = quantile(self.rows.iter().map(|row| row.y.abs()).collect(), 0.9);
+        let size = |y: f64| 0.01 * y.abs() + 0.005 * typical;
+        let mut weights: Vec<f64> = self.rows.iter().map(|row| 1.0 / size(row.y)).collect();
+        let base = weights.clone();
+        let mut p = DVector::zeros(SIZE);
+        for _ in 0..3 {
+            let mut sums = Sums::new(SIZE);
+            for (TorqueWindow { x, y, .. }, weight) in self.rows.iter().zip(&weights) {
+                sums.add(&x.map(|x| x * weight), y * weight);
+            }
+            p = interval::solve(&sums.matrix, &sums.score)?;
+            let rests: Vec<f64> = self.rows.iter().zip(&base).map(|(row, b)| b * (row.y - dot(&row.x, &p))).collect();
+            let sigma = 1.4826 * quantile(rests.iter().map(|r| r.abs()).collect(), 0.5);
+            for ((weight, base), rest) in weights.iter_mut().zip(&base).zip(&rests) {
+                // Huber: the square root of the weight of a square.
+                let keep = if rest.abs() > 2.5 * sigma { 2.5 * sigma / rest.abs() } else { 1.0 };
+                *weight = base * keep.sqrt();
+            }
+        }
+        let rows: Vec<_> = self.rows.iter().zip(&weights).collect();
+        let block = |chunk: &[(&TorqueWindow, &f64)]| {
+            let mut block = Sums::new(SIZE);
+            for (TorqueWindow { x, y, .. }, weight) in chunk {
+                block.add(&x.map(|x| x * *weight), *weight * (y - dot(x, &p)));
+            }
+            block
+        };
+        let blocks: Vec<Sums> = rows.chunks(BLOCK).map(block).collect();
+        let units = DMatrix::<f64>::identity(SIZE, SIZE);
+        let gradients: Vec<DVector<f64>> = units.column_iter().map(nalgebra::Matrix::into_owned).collect();
+        let half = interval::half_widths(&blocks, &gradients)?;
+        Some(MechanicalFit { p: [p[0], p[1], p[2]], half: [half[0], half[1], half[2]] })
+    }
+}
+
+/// Levels in a histogram of the speed with 100 bins: the fullest tenth of the range, without it and its surroundings the next
+/// one, as long as it has 3 % of the windows.
+fn levels(mut bins: [usize; 101], windows: usize) -> usize {
+    let mut levels = 0;
+    loop {
+        let sum = |from: usize| bins[from..from + 10].iter().sum::<usize>();
+        let Some(fullest) = (0..=91).max_by_key(|&from| sum(from)) else { return levels };
+        if sum(fullest) == 0 || (sum(fullest) as f64) < 0.03 * windows as f64 {
+            return levels;
+        }
+        levels += 1;
+        bins[fullest.saturating_sub(5)..(fullest + 15).min(101)].fill(0);
+    }
+}
+
+fn dot(x: &[f64; SIZE], p: &DVector<f64>) -> f64 {
+    x.iter().zip(p.iter()).map(|(x, p)| x * p).sum()
+}

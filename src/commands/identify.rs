@@ -1,0 +1,157 @@
+//! The command `fmu identify`: a machine's data from a record.
+
+use crate::{pack, release};
+use anyhow::{Context, Result, bail, ensure};
+use clap::Args;
+use drive_study::identify::columns::{Naming, Signals};
+use drive_study::identify::{self, Identified, Options, machine_file, page};
+use std::path::PathBuf;
+
+/// Identifies a machine from a record of its running drive: resistance, inductances, magnet flux, inertia, friction.
+///
+/// RECORD.csv has one row per sample of the controller: time t, voltage, current, electrical angle theta, and where they are known
+/// u_dc and the load torque. A header may name a unit: `i_a [mA]`, `speed [rpm]`. docs/identify.md lists the forms of columns.
+///
+/// Each value has an interval (95 %), or a reason why this record does not tell it. Exit status: 0 if all values are written, 1 if
+/// one is refused, 2 for a wrong record, of which nothing is written.
+///
+///   fmu identify bench.csv --n-p 3 --current 15 --out target/motor.toml
+///   fmu identify bench.csv --n-p 3 --current 15 --html bench.html
+///   fmu identify bench.csv --n-p 4 --map u_a=Vph1,u_b=Vph2,u_c=Vph3 --unit speed=rpm --load none --json
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+pub struct Identify {
+    /// Record of a running drive
+    #[arg(value_name = "RECORD.csv")]
+    pub record: PathBuf,
+    /// Machine file to write, for `fmu tune`; its name without .toml names the machine
+    #[arg(long, value_name = "MOTOR.toml")]
+    pub out: Option<PathBuf>,
+    /// Pole pairs
+    #[arg(long = "n-p", value_name = "N")]
+    pub n_p: Option<i32>,
+    /// Maximum current in A, peak value [default: the greatest of the record]
+    #[arg(long, value_name = "A")]
+    pub current: Option<f64>,
+    /// Rated mechanical speed in rad/s [default: the greatest of the record]
+    #[arg(long, value_name = "RAD/S")]
+    pub speed: Option<f64>,
+    /// Rated torque in N.m [default: the greatest of the record]
+    #[arg(long, value_name = "N.M")]
+    pub torque: Option<f64>,
+    /// DC-link voltage in V [default: the mean of the column u_dc]
+    #[arg(long, value_name = "V")]
+    pub u_dc: Option<f64>,
+    /// Samples from a row to the action of its voltage [default: the best of 0, 0.5, 1, 1.5, 2]
+    #[arg(long, value_name = "SAMPLES")]
+    pub delay: Option<f64>,
+    /// The record keeps one of N samples of the controller [default: 1]
+    #[arg(long, value_name = "N")]
+    pub every: Option<u32>,
+    /// Rows per second, where the record has no column t
+    #[arg(long, value_name = "HZ")]
+    pub rate: Option<f64>,
+    /// Columns under other headers: u_a=Vph1,i_a=I1
+    #[arg(long, value_name = "COLUMN=HEADER,...", value_delimiter = ',')]
+    pub map: Vec<String>,
+    /// Units of columns: speed=rpm
+    #[arg(long, value_name = "COLUMN=UNIT,...", value_delimiter = ',')]
+    pub unit: Vec<String>,
+    /// Times in s between which there is no current, for the sensors' offset [default: the start without voltage]
+    #[arg(long, value_name = "FROM:TO")]
+    pub zero: Option<String>,
+    /// `none`: the shaft is free; else the column of the load torque, tau_load or tau_shaft
+    #[arg(long, value_name = "none|COLUMN")]
+    pub load: Option<String>,
+    /// Page to write: the values, and each fit beside the record
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
+    /// Print the result as JSON and nothing else
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Runs the command; whether every value is written.
+///
+/// # Errors
+/// The record or an option is wrong, or the file cannot be written.
+pub fn run(args: &Identify) -> Result<bool> {
+    let options = options(args)?;
+    let file = args.record.display().to_string();
+    let bytes = std::fs::read(&args.record).with_context(|| format!("reading {file}"))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let found = identify::identify(&Signals::parse(&text, &file, &options.naming)?, &options)?;
+    let name = |path: &PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let name = args.out.as_ref().or(Some(&args.record)).and_then(name).unwrap_or_else(|| "motor".into());
+    let source = format!("fmu identify of {file} (sha256 {})", release::sha256(&bytes));
+    if let Some(out) = &args.out {
+        ensure!(
+            out.extension().is_some_and(|e| e == "toml"),
+            "--out {}: expected a file name with .toml",
+            out.display()
+        );
+        pack::write(out, machine_file::text(&found, &name, &source).as_bytes())?;
+    }
+    if let Some(html) = &args.html {
+        pack::write(html, page::page(&found, &file)?.as_bytes())?;
+    }
+    if args.json {
+        println!("{:#}", found.json());
+    } else {
+        print(&found);
+        for (k, written) in args.out.iter().chain(&args.html).enumerate() {
+            println!("{}{}", if k == 0 { "\n" } else { "" }, written.display());
+        }
+    }
+    Ok(found.values.iter().all(|v| v.refused.is_none()))
+}
+
+fn options(args: &Identify) -> Result<Options> {
+    let pairs = |option: &str, list: &[String]| {
+        let pair = |text: &String| match text.split_once('=') {
+            Some((name, other)) => Ok((name.trim().to_owned(), other.trim().to_owned())),
+            None => bail!("{option} {text}: expected COLUMN=..., for example {option} u_a=Vph1"),
+        };
+        list.iter().map(pair).collect::<Result<Vec<_>>>()
+    };
+    let zero = args.zero.as_deref().map(|text| {
+        let both = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+        both.with_context(|| format!("--zero {text}: expected two times in s, for example --zero 0:0.05"))
+    });
+    let mut map = pairs("--map", &args.map)?;
+    let no_load = args.load.as_deref() == Some("none");
+    if let Some(column) = args.load.as_deref().filter(|load| !["none", "tau_load", "tau_shaft"].contains(load)) {
+        map.push(("tau_load".into(), column.into()));
+    }
+    Ok(Options {
+        naming: Naming { map, units: pairs("--unit", &args.unit)? },
+        n_p: args.n_p,
+        current: args.current,
+        speed: args.speed,
+        torque: args.torque,
+        u_dc: args.u_dc,
+        delay: args.delay,
+        every: args.every,
+        rate: args.rate,
+        zero: zero.transpose()?,
+        no_load,
+    })
+}
+
+/// Prints the values and the notes.
+fn print(found: &Identified) {
+    for value in &found.values {
+        let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value);
+        let width = format!("+-{:.2} %", 100.0 * value.half_width);
+        match &value.refused {
+            None => println!("{:12}{number:>12} {:10}{width:>11}", value.name, value.unit),
+            Some(why) => println!("{:12}{:>12} {:10}{:>11}  refused: {why}", value.name, "-", value.unit, ""),
+        }
+    }
+    println!("\nsensor of the angle: offset {:.4} rad, delay {:.1} us", found.fit.theta_0, found.fit.tau * 1e6);
+    println!("the voltage of a row acts {} samples later", found.timing.delay);
+    println!("rest of the fit: {:.3} V; noise explains {:.3} V", found.fit.rest, found.fit.noise);
+    for note in &found.notes {
+        println!("\nnote: {note}");
+    }
+}
