@@ -334,3 +334,28 @@ fn a_record_becomes_a_running_drive() {
         assert!(dir.path().join("target").join(file).metadata().unwrap().len() > 500, "{file}");
     }
 }
+
+/// `fmu identify`: 1 and a file with a comment where a value is refused; 2, one line and no file for a wrong record.
+#[test]
+fn a_refusal_and_a_wrong_record_have_their_exit_status() {
+    let dir = tempfile::tempdir().unwrap();
+    let record = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/bench.csv")).unwrap();
+    let run = |text: &str, name: &str| {
+        let (csv, out) = (dir.path().join(name).with_extension("csv"), dir.path().join(name).with_extension("toml"));
+        std::fs::write(&csv, text).unwrap();
+        let (csv, file) = (csv.to_str().unwrap(), out.to_str().unwrap());
+        let given = ["--n-p", "3", "--current", "15", "--delay", "0", "--every", "5", "--json", "--out"];
+        (fmu(&[&["identify", csv], &given[..], &[file]].concat()), out)
+    };
+    let (unloaded, out) = run(&record.replace("tau_load", "note"), "unloaded");
+    assert_eq!(unloaded.status.code(), Some(1));
+    let text = std::fs::read_to_string(out).unwrap();
+    assert!(text.contains("refused: the load is unknown: add tau_load or tau_shaft, or give --load none"), "{text}");
+    let json: serde_json::Value = serde_json::from_slice(&unloaded.stdout).unwrap();
+    assert!(json["values"]["J"]["value"].is_null() && json["values"]["R_s"]["refused"].is_null(), "{json}");
+    let (wrong, out) = run(&record.replace("u_ab [V]", "u_ab [mA]"), "wrong");
+    let message = String::from_utf8(wrong.stderr).unwrap();
+    assert_eq!(wrong.status.code(), Some(2), "{message}");
+    assert!(message.contains("u_ab [mA]: the unit is not known") && message.lines().count() == 1, "{message}");
+    assert!(!out.exists() && wrong.stdout.is_empty());
+}

@@ -218,6 +218,10 @@ pub(super) struct Importer<'a, 'b> {
     pub(super) z: Vec<f64>,
     /// The FMU asked for the end.
     pub(super) over: bool,
+    /// Variables to read before the next event, while the FMU is still in Continuous-Time Mode.
+    pub(super) watched: Vec<&'b ModelVariable>,
+    /// Their values before the last event.
+    pub(super) before: Vec<Vec<u64>>,
 }
 
 impl Session {
@@ -233,9 +237,13 @@ impl Session {
 }
 
 impl<'a, 'b> Importer<'a, 'b> {
+    fn new(instance: &'a Instance<'b>, next: Option<f64>, z: Vec<f64>) -> Self {
+        Self { instance, next, z, over: false, watched: Vec::new(), before: Vec::new() }
+    }
+
     /// Begins with the event that ends the initialization.
     pub(super) fn start(instance: &'a Instance<'b>) -> Result<Self, NotDetermined> {
-        let mut importer = Self { instance, next: None, z: Vec::new(), over: false };
+        let mut importer = Self::new(instance, None, Vec::new());
         importer.leave(&mut |_, _| ())?;
         Ok(importer)
     }
@@ -248,7 +256,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         see: &mut dyn FnMut(&Instance<'_>, &Event),
         look: &mut dyn FnMut(&Self, bool) -> Result<(), NotDetermined>,
     ) -> Result<(), NotDetermined> {
-        let mut importer = Self { instance, next: None, z: Vec::new(), over: false };
+        let mut importer = Self::new(instance, None, Vec::new());
         let (session, dt) = (instance.session, instance.session.integrator_step());
         session.record_calls(&format!("{steps} integrator steps of {dt} s with events"), || {
             importer.leave(see)?;
@@ -268,7 +276,7 @@ impl<'a, 'b> Importer<'a, 'b> {
 
     /// Goes on in Continuous-Time Mode.
     pub(super) fn resume(instance: &'a Instance<'b>, next: Option<f64>) -> Result<Self, NotDetermined> {
-        Ok(Self { instance, next, z: instance.indicators()?, over: false })
+        Ok(Self::new(instance, next, instance.indicators()?))
     }
 
     fn leave(&mut self, see: &mut dyn FnMut(&Instance<'_>, &Event)) -> Result<Event, NotDetermined> {
@@ -314,6 +322,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         self.over |= terminate != 0;
         let event = !self.over && (due || crossed || enter != 0);
         if event {
+            self.before = i.snapshot(&self.watched)?;
             self.event(see)?;
         }
         Ok(event)

@@ -141,6 +141,21 @@ impl Archive {
         Err(Error::file(&self.path, others.unwrap_or_else(|| self.missing_binary(folders[0], &name))))
     }
 
+    /// The names of its files, and what a library below `binaries/` begins with, which says what platform it is for.
+    pub(super) fn outline(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
+        let mut files = BTreeMap::new();
+        for (index, name) in self.names.iter().enumerate().filter(|(_, name)| !name.ends_with('/')) {
+            let mut head = Vec::new();
+            if name.starts_with("binaries/") {
+                let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
+                let entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
+                entry.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
+            }
+            files.insert(name.clone(), head);
+        }
+        Ok(files)
+    }
+
     /// Every file, with its name.
     pub(super) fn files(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
         let mut files = BTreeMap::new();

@@ -251,16 +251,29 @@ pub fn children() -> Vec<String> {
     return Vec::new();
 }
 
-/// Standard output for this process alone: what FMUs print goes to standard error from now on.
-///
-/// # Errors
-/// There is none.
-#[cfg(unix)]
-pub fn keep_stdout() -> io::Result<std::fs::File> {
-    use std::os::fd::AsFd;
-    let kept = io::stdout().as_fd().try_clone_to_owned()?;
-    rustix::stdio::dup2_stdout(io::stderr())?;
-    Ok(kept.into())
+/// What the three standard streams of this process lead to: device and number of the file; nothing on systems that do not tell.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Streams([Option<(u64, u64)>; 3]);
+
+impl Streams {
+    /// What they lead to now.
+    pub fn now() -> Self {
+        #[cfg(unix)]
+        {
+            use std::os::fd::{AsFd, BorrowedFd};
+            let of = |stream: BorrowedFd<'_>| rustix::fs::fstat(stream).ok().map(|file| (file.st_dev, file.st_ino));
+            Self([of(io::stdin().as_fd()), of(io::stdout().as_fd()), of(io::stderr().as_fd())])
+        }
+        #[cfg(not(unix))]
+        Self([None; 3])
+    }
+
+    /// The streams that lead elsewhere now, or nowhere.
+    pub fn lost(&self) -> Vec<&'static str> {
+        let names = ["standard input", "standard output", "standard error"];
+        let pairs = self.0.iter().zip(Self::now().0);
+        names.into_iter().zip(pairs).filter(|(_, (before, now))| *before != now).map(|(name, _)| name).collect()
+    }
 }
 
 /// Plays the guard if this process was started as one: call it before anything else in `main`.

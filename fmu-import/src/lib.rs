@@ -76,6 +76,26 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
     Ok((Arc::unwrap_or_clone(archive.description), files))
 }
 
+/// What an `.fmu` file is, as far as few of its bytes say.
+pub struct Outline {
+    /// Its description.
+    pub description: ModelDescription,
+    /// Terminals and icons, if there are any that can be read.
+    pub terminals: Option<TerminalsAndIcons>,
+    /// The names of its files, and what those below `binaries/` begin with.
+    pub files: BTreeMap<String, Vec<u8>>,
+}
+
+/// Reads an `.fmu` file as far as needed to describe it: its memory does not grow with what the archive unpacks to.
+///
+/// # Errors
+/// The file is missing, no archive, or has no readable description.
+pub fn outline(path: &Path) -> Result<Outline, Error> {
+    let mut archive = Archive::open(path)?;
+    let (files, terminals) = (archive.outline()?, archive.terminals().ok().flatten());
+    Ok(Outline { description: Arc::unwrap_or_clone(archive.description), terminals, files })
+}
+
 /// An archive in a folder of its own, for [`describe`].
 pub struct Unpacked {
     folder: Folder,

@@ -3,11 +3,9 @@
 use anyhow::Result;
 use clap::Args;
 use fmu_import::platform::Platform;
-use fmu_import::{machine, printable};
-use model_description::{
-    BaseType, Causality, Dimension, Interface, ModelDescription, ModelVariable, Variability, read_terminals,
-};
-use std::collections::{BTreeMap, BTreeSet};
+use fmu_import::{Outline, machine, printable};
+use model_description::{BaseType, Causality, Dimension, Interface, ModelDescription, ModelVariable, Variability};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 /// Describes an FMU: standard, interfaces, platforms, size, terminals, and its variables by group.
@@ -34,12 +32,12 @@ pub struct Info {
 /// # Errors
 /// The file is not an FMU.
 pub fn run(args: &Info) -> Result<String> {
-    let (md, files) = fmu_import::contents(&args.file)?;
-    let md = &md;
+    let outline = fmu_import::outline(&args.file)?;
+    let md = &outline.description;
     let size = std::fs::metadata(&args.file)?.len();
     let mut lines = Vec::new();
     if args.part.is_none() {
-        lines.extend(head(md, &files, size));
+        lines.extend(head(&outline, size));
     }
     let part = args.part.as_deref().unwrap_or_default().to_lowercase();
     for (group, belongs) in GROUPS {
@@ -74,7 +72,7 @@ fn is_parameter(v: &ModelVariable) -> bool {
     matches!(v.causality, Causality::Parameter | Causality::StructuralParameter)
 }
 
-fn head(md: &ModelDescription, files: &BTreeMap<String, Vec<u8>>, size: u64) -> Vec<String> {
+fn head(Outline { description: md, terminals, files }: &Outline, size: u64) -> Vec<String> {
     let mut lines = vec![format!("{}: {}", md.model_name, md.description.as_deref().unwrap_or("(no description)"))];
     let mut line = |name: &str, text: String| lines.push(format!("  {name:<12} {text}"));
     let interface = |name: &str, of: &Option<Interface>| of.as_ref().map(|_| name.to_owned());
@@ -105,8 +103,6 @@ fn head(md: &ModelDescription, files: &BTreeMap<String, Vec<u8>>, size: u64) -> 
     if !times.is_empty() {
         line("experiment", times.join(", "));
     }
-    let terminals = files.get("terminalsAndIcons/terminalsAndIcons.xml");
-    let terminals = terminals.and_then(|bytes| read_terminals(bytes).ok());
     let terminals: Vec<&str> = terminals.iter().flat_map(|t| &t.terminals).map(|t| t.name.as_str()).collect();
     if !terminals.is_empty() {
         line("terminals", terminals.join(", "));

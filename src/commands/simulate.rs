@@ -10,10 +10,10 @@ use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
-use fmu_import::guard::Allowance;
+use fmu_import::guard::{Allowance, Streams};
 use fmu_import::ssp::load::Loaded;
 use fmu_import::ssp::{ssv, values};
-use fmu_import::{Fmu, Kind, Message, journal, printable, printable_lines};
+use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_description::ModelVariable;
 use std::io::{self, IsTerminal, Write};
@@ -168,7 +168,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
     let all_exchange = fmus.iter().all(|(_, fmu)| fmu.description().model_exchange.is_some());
     match cannot_step {
         Some((name, _)) if all_exchange && !args.me && !args.event_mode && !args.early_return => {
-            message::note(&format!("{name} has no Co-Simulation: the FMUs are integrated, as with --me"));
+            message::note(&printable(&format!("{name} has no Co-Simulation: the FMUs are integrated, as with --me")));
         }
         _ if !args.me => {
             return Method::CoSimulation { event_mode: args.event_mode, early_return: args.early_return };
@@ -213,6 +213,7 @@ pub fn run(args: &Simulate) -> Result<()> {
 fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     // An FMU may change it; the files of the command are named from here.
     let home = std::env::current_dir()?;
+    let streams = Streams::now();
     let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
@@ -244,6 +245,15 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     if args.logging {
         show(&system.take_messages());
     }
+    // The numbers of closed descriptors would become those of the files of the command.
+    let lost = streams.lost();
+    if !lost.is_empty() {
+        let names: Vec<&str> = system.instances().iter().map(Instance::name).collect();
+        let text = format!("{}: the FMU closed or replaced {} of its process", names.join(" or "), lost.join(", "));
+        // Files that it holds may be closed too, and their numbers may be those of others by now.
+        std::mem::forget(system);
+        bail!("{text}");
+    }
     let recording = outcome?;
     journal::writes();
     std::env::set_current_dir(&home)?;
@@ -262,6 +272,8 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     } else {
         writeln!(out, "{text}").context("standard output")?;
     }
+    // Before the FMUs are freed and unloaded.
+    drop(out);
     if let Some(bad) = bad {
         return Err(Failed(bad).into());
     }
@@ -377,7 +389,7 @@ fn halves<'a>(text: &'a str, form: &str) -> Result<(&'a str, &'a str)> {
 
 fn show(messages: &[(String, Message)]) {
     for (instance, Message { status, category, text }) in messages {
-        eprintln!("{instance}: {status} [{}] {}", printable(category), printable_lines(text));
+        eprintln!("{}: {status} [{}] {}", printable(instance), printable(category), printable_lines(text));
     }
 }
 

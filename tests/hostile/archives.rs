@@ -105,6 +105,34 @@ fn bombs() {
     assert!(with(&many).runs("check", &["--only", STATIC]).status < 2);
 }
 
+/// An archive that unpacks to 1 GB: `fmu info` needs little memory for it, and unpacking counts as time of `fmu simulate`.
+#[test]
+fn a_gigabyte_in_a_megabyte() {
+    let gigabyte = 1_000_000_000;
+    let mut packed = flate2::write::DeflateEncoder::new(Vec::new(), flate2::Compression::fast());
+    let mut crc = flate2::Crc::new();
+    for block in std::iter::repeat_n(vec![0_u8; 10_000_000], gigabyte / 10_000_000) {
+        std::io::Write::write_all(&mut packed, &block).unwrap();
+        crc.update(&block);
+    }
+    let size = u32::try_from(gigabyte).unwrap();
+    let packed = packed.finish().unwrap();
+    let place =
+        with(&[Entry { method: 8, crc: Some(crc.sum()), size: Some(size), ..Entry::new("resources/x", &packed) }]);
+    // Data in private memory, in kB.
+    let script = "ulimit -d 100000; exec \"$0\" info \"$1\"";
+    let output = std::process::Command::new("bash")
+        .args(["-c", script, env!("CARGO_BIN_EXE_fmu")])
+        .arg(place.fmu())
+        .output()
+        .unwrap();
+    let (said, errors) = (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+    assert!(output.status.success() && said.contains("size "), "{said}{errors}");
+    let ended = place.runs("simulate", &["--timeout", "0.1"]);
+    let part = "did not return within 0.1 s; --timeout changes the limit";
+    assert!(ended.status == 2 && ended.errors.contains(part), "{ended:?}");
+}
+
 /// An XML document of 70 MB in 70 KB.
 #[test]
 fn a_description_that_swells() {

@@ -106,6 +106,19 @@ fn names_are_escaped() {
         assert!(ended.status == 0 && ended.out.contains("\\u{1b}[2J") && ended.out.contains("\\u{202e}"), "{ended:?}");
         let ended = place.runs("simulate", &["--set", "x.y=1", "--record", "x.y\u{1b}"]);
         assert_eq!(ended.status, 2);
+        // In the header of a recording too.
+        let ended = place.runs("simulate", &["--csv", "-"]);
+        let header = "time,x.y\\u{1b}[2J\\u{1b}]0;title\\u{7}\\u{202e}\n0,1\n";
+        assert!(ended.status == 0 && ended.out.starts_with(header), "{ended:?}");
+        // A name that the command line gives, on standard error.
+        let named = format!("\u{1b}[2J={}", place.fmu().display());
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_fmu"))
+            .args(["simulate", &named, "--logging", "--csv", "-"])
+            .output()
+            .unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && errors.contains("\\u{1b}[2J"), "{errors}");
+        assert!(![&output.stdout, &output.stderr].iter().any(|said| said.contains(&0x1b)), "{errors}");
     }
     let ended = place.runs("check", &["--only", crate::STATIC, "--verbose"]);
     assert!(ended.status < 2, "{ended:?}");

@@ -24,6 +24,15 @@ impl Sums {
         Self { matrix: DMatrix::zeros(size, size), score: DVector::zeros(size) }
     }
 
+    /// Leaves parameters out: they stay 0.
+    pub fn leave_out(&mut self, out: impl Fn(usize) -> bool) {
+        for k in (0..self.score.len()).filter(|&k| out(k)) {
+            self.matrix.fill_row(k, 0.0);
+            self.matrix.fill_column(k, 0.0);
+            self.score[k] = 0.0;
+        }
+    }
+
     /// Adds a row of regressors with what the fit leaves of its value.
     pub fn add(&mut self, row: &[f64], rest: f64) {
         for (a, x) in row.iter().enumerate() {
@@ -65,16 +74,22 @@ pub fn half_widths(blocks: &[Sums], gradients: &[DVector<f64>]) -> Option<Vec<f6
     Some(gradients.iter().map(one).collect())
 }
 
-/// Inverse of a normal matrix, scaled to a diagonal of ones meanwhile. A parameter that no row shows has a row and a column of zeros
-/// in it: it stays as it is.
+/// Inverse of a normal matrix, scaled to a diagonal of ones meanwhile.
 fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let (scaled, scale) = scaled(matrix);
+    Some(&scale * scaled.try_inverse()? * &scale)
+}
+
+/// A normal matrix with a diagonal of ones, and the scale. A parameter that no row shows has a row and a column of zeros beside
+/// its one: it stays 0.
+fn scaled(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let scale = matrix.diagonal().map(|x| if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 });
     let scale = DMatrix::from_diagonal(&scale);
     let mut scaled = &scale * matrix * &scale;
     for k in (0..scaled.nrows()).filter(|&k| scale[(k, k)] == 0.0) {
         scaled[(k, k)] = 1.0;
     }
-    Some(&scale * scaled.try_inverse()? * &scale)
+    (scaled, scale)
 }
 
 /// Solves a normal matrix, scaled to a diagonal of ones meanwhile.
@@ -84,8 +99,7 @@ pub fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>
 
 /// Condition number of a normal matrix with a diagonal of ones.
 pub fn condition(matrix: &DMatrix<f64>) -> f64 {
-    let scale = DMatrix::from_diagonal(&matrix.diagonal().map(|x| 1.0 / x.max(f64::MIN_POSITIVE).sqrt()));
-    let values = (&scale * matrix * &scale).symmetric_eigenvalues();
+    let values = scaled(matrix).0.symmetric_eigenvalues();
     let least = values.min();
     if least > 0.0 { values.max() / least } else { f64::INFINITY }
 }

@@ -35,7 +35,11 @@ pub fn text(found: &Identified, name: &str, source: &str) -> String {
     write(&mut line, &["J", "B", "tau_coulomb"]);
     line(format_args!("\n[rating]"));
     let origin = |given: bool| if given { "given" } else { "the greatest of the record" };
-    line(format_args!("speed = {}  # rad/s, mechanical: {}", number(speed.0), origin(speed.1)));
+    if speed.0 > 0.0 {
+        line(format_args!("speed = {}  # rad/s, mechanical: {}", number(speed.0), origin(speed.1)));
+    } else {
+        line(format_args!("# speed = ...  # rad/s: the rotor stood still; give --speed"));
+    }
     line(format_args!("torque = {}  # N.m: {}", number(torque.0), origin(torque.1)));
     line(format_args!("current = {}  # A, maximum: {}", number(current.0), origin(current.1)));
     line(format_args!("\n[dc_link]"));
@@ -45,6 +49,14 @@ pub fn text(found: &Identified, name: &str, source: &str) -> String {
     }
     line(format_args!("\n[inverter]"));
     write(&mut line, &["u_dead", "i_zero"]);
+    if let Some(values) = found.fit.saturation() {
+        line(format_args!(
+            "\n# [saturation]  # as the fit has it, without intervals; L_d and L_q are those of no current"
+        ));
+        for (name, value) in ["s_2", "s_3", "s_dq"].iter().zip(values) {
+            line(format_args!("# {name} = {}", number(value)));
+        }
+    }
     out
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! J [w_m] + B int(w_m) + tau_coulomb int(tanh(w_m / (0.003 w_max))) = int(tau_e - tau_load)
-//! tau_e = 1.5 n_p (psi_M + (L_d - L_q) i_d) i_q
+//! tau_e = 1.5 n_p (psi_d i_q - psi_q i_d)
 //! ```
 
 use super::Complex;
@@ -59,14 +59,14 @@ pub struct TorqueWindow {
 impl Shown {
     /// Windows of a record. The load is taken as zero where it is unknown.
     pub fn of(record: &BenchRecord, motion: &Motion, fit: &Fit, n_p: f64) -> Self {
-        let [_, L_d, L_q, psi_M, ..] = fit.p;
         let width = ((WINDOW / record.step).round() as usize).max(4);
         let speed =
             quantile(motion.runs.iter().flat_map(Clone::clone).map(|k| motion.w[k].abs()).collect(), 0.999) / n_p;
         let sign = |w: f64| (w / (0.003 * speed)).tanh();
         let torque = |k: usize| {
             let i = record.i[k] * Complex::cis(-(motion.theta[k] - fit.theta_0 + motion.w[k] * fit.tau));
-            1.5 * n_p * (psi_M + (L_d - L_q) * i.re) * i.im
+            let psi = fit.flux(i);
+            1.5 * n_p * (psi.re * i.im - psi.im * i.re)
         };
         let (mut rows, mut greatest, mut bins) = (Vec::new(), 0.0_f64, [0_usize; 101]);
         for run in &motion.runs {

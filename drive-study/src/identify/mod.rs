@@ -2,9 +2,9 @@
 //! flux, inertia and friction, each with an interval, or with the reason why the record does not tell it.
 //!
 //! - [`columns`]: headers, units, forms of columns. [`record`]: the checked record. [`motion`]: angle and speed.
-//! - [`electrical`]: the linear fit of the voltage equations; [`legs`]: the inverter's curve in it. [`mechanics`]: inertia and friction.
-//! - [`interval`]: half-widths. [`verdict`]: what is written and what is refused. [`machine_file`]: the file for `fmu tune`.
-//!   [`page`]: the fits beside the record.
+//! - [`windows`]: the voltage equations in integral form; [`electrical`]: their linear fit; [`legs`]: the inverter's curve in it.
+//! - [`mechanics`]: inertia and friction. [`interval`]: half-widths. [`verdict`]: what is written and what is refused.
+//! - [`machine_file`]: the file for `fmu tune`. [`page`]: the fits beside the record.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -24,15 +24,17 @@ pub mod motion;
 pub mod page;
 pub mod record;
 pub mod verdict;
+pub mod windows;
 
 use anyhow::{Context, Result, ensure};
 use columns::{Naming, Signals};
-use electrical::{Fit, Problem, Timing, Window};
+use electrical::Fit;
 use mechanics::{MechanicalFit, Shown, TorqueWindow};
 use motion::Motion;
 use record::BenchRecord;
 use serde::Deserialize;
 use verdict::{Facts, Quantity};
+use windows::{Problem, Timing, Window};
 
 /// A vector in the plane of the stator.
 pub type Complex = nalgebra::Complex<f64>;
@@ -136,6 +138,7 @@ impl Identified {
             "rest": self.fit.rest,
             "noise": self.fit.noise,
             "condition": self.fit.condition,
+            "saturation": self.fit.saturation().map(|[s_2, s_3, s_dq]| serde_json::json!({ "s_2": s_2, "s_3": s_3, "s_dq": s_dq })),
             "notes": self.notes,
         })
     }
@@ -147,6 +150,9 @@ const SCALE: &str = "values scale with the sensors: 1 % more current makes R_s, 
 
 /// Delays that are tried.
 const DELAYS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
+
+/// How much more the fit leaves with the voltages of a wrong row, at least.
+const SHIFTED: f64 = 1.3;
 
 /// Identifies the machine of a record.
 ///
@@ -162,12 +168,13 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     ensure!(!motion.runs.is_empty(), "{}: no stretch is long enough for a speed", record.file);
     let i_max = options.current.unwrap_or_else(|| record.peak());
     ensure!(i_max > 0.0, "{}: all currents are 0", record.file);
-    let (timing, fit, doubt) = timed(&record, &motion, options, i_max)?;
+    let (timing, first, doubt) = timed(&record, &motion, options, i_max)?;
+    let fit = Problem::new(&record, &motion, timing, i_max).refined(first.clone()).unwrap_or(first);
     let shown = Shown::of(&record, &motion, &fit, f64::from(n_p));
     let mechanics: Option<MechanicalFit> = record.load.is_some().then(|| shown.fit()).flatten();
-    let facts = Facts::of(&record, &motion, &fit, &shown, i_max);
+    let facts = Facts::of(&record, &motion, timing, &fit, &shown, i_max);
     let mut notes = record.notes.clone();
-    let misfit = facts.misfit().then(|| verdict::better(&record, &motion, timing, i_max, &fit));
+    let misfit = (facts.misfit() || !fit.is_possible()).then(|| verdict::better(&record, &motion, timing, i_max, &fit));
     notes.push(SCALE.into());
     let values = verdict::values(&fit, mechanics.as_ref(), &facts, misfit, doubt);
     let rating = |given: Option<f64>, seen: f64| (given.unwrap_or(seen), given.is_some());
@@ -177,8 +184,8 @@ pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
         torque: rating(options.torque, shown.torque),
         u_dc: record.u_dc,
     };
-    let (voltage, window) = Problem::new(&record, &motion, timing, i_max).seen(&fit);
-    let seen = Seen { voltage, window, torque: shown.rows, mechanics };
+    let problem = Problem::new(&record, &motion, timing, i_max);
+    let seen = Seen { voltage: problem.seen(&fit), window: problem.length(), torque: shown.rows, mechanics };
     Ok(Identified { values, fit, seen, timing, ratings, n_p, notes })
 }
 
@@ -196,8 +203,15 @@ fn timed(
     };
     let nothing = || format!("{}: determines no parameter: record a running motor with changing currents", record.file);
     if let Some(delay) = options.delay {
-        let (timing, fit) = fit(delay).with_context(nothing)?;
-        return Ok((timing, fit, None));
+        let (timing, found) = fit(delay).with_context(nothing)?;
+        // More is left than noise explains: perhaps a row is shifted.
+        let others = [delay + 1.0, delay - 1.0].into_iter().filter(|d| *d >= 0.0 && found.rest > SHIFTED * found.noise);
+        let better = others.filter_map(fit).find(|(_, other)| SHIFTED * other.rest < found.rest);
+        let doubt = better.map(|(other, _)| {
+            let way = if other.delay > delay { "later" } else { "earlier" };
+            format!("the model fits better with voltages one row {way}, --delay {}: correct the columns", other.delay)
+        });
+        return Ok((timing, found, doubt));
     }
     let mut all: Vec<_> = DELAYS.into_iter().filter_map(fit).collect();
     all.sort_by(|(_, a), (_, b)| a.rest.total_cmp(&b.rest));

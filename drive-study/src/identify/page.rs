@@ -1,7 +1,7 @@
 //! A page with the values, and each fit beside the record: voltages over time, flux linkages over currents, torque over time, and
 //! friction over speed.
 
-use super::electrical::Window;
+use super::windows::Window;
 use super::{Identified, Seen};
 use anyhow::Result;
 use fmu_plot::figure::{Curve, Figure, Panel};

@@ -10,6 +10,12 @@ use std::ops::Range;
 /// Fewest rows of a record.
 const ROWS: usize = 2000;
 
+/// Rows per second.
+const RATES: std::ops::RangeInclusive<f64> = 200.0..=200e3;
+
+/// Greatest current of a record over the maximum current.
+const MOST: f64 = 3.0;
+
 /// A record. All vectors have one element per row.
 #[derive(Clone, Debug)]
 pub struct BenchRecord {
@@ -70,6 +76,13 @@ impl BenchRecord {
         let t = time(signals, options)?;
         let step = median(t.windows(2).map(|w| w[1] - w[0]).collect());
         let mut runs = stretches(signals, &t, step)?;
+        let rate = 1.0 / step;
+        if !RATES.contains(&rate) {
+            let what = format!(
+                "the rate of {rate:.4} Hz is not within 200 Hz to 200 kHz: check the unit of t, for example t [ms]"
+            );
+            return signals.refuse(1, "t", &what);
+        }
         let theta = angle(signals, options, &runs)?;
         let u_dc_column = signals.get("u_dc");
         let u_dc = options.u_dc.or_else(|| u_dc_column.map(mean));
@@ -88,9 +101,18 @@ impl BenchRecord {
             "{}: all voltages are 0: record the commanded voltages",
             signals.file
         );
-        let mut i = current(signals, &theta)?;
-        let closed = signals.get("enable").map(|e| e.iter().map(|&e| e > 0.5).collect::<Vec<_>>());
         let clipped = clipped(signals);
+        let mut i = current(signals, &theta, &clipped)?;
+        if let Some(most) = options.current
+            && let Some(row) = i.iter().position(|i| i.norm() > MOST * most)
+        {
+            let what = format!(
+                "|i| = {:.4} A is above {MOST} times --current {most}: check the units, for example i_a [mA]",
+                i[row].norm()
+            );
+            return signals.refuse(row, "i", &what);
+        }
+        let closed = signals.get("enable").map(|e| e.iter().map(|&e| e > 0.5).collect::<Vec<_>>());
         if clipped.iter().any(|&c| c) {
             let count = clipped.iter().filter(|&&c| c).count();
             notes.push(format!("clipped currents: {count} rows were left out"));
@@ -237,8 +259,6 @@ fn angle(signals: &Signals, options: &Options, runs: &[Range<usize>]) -> Result<
             *theta += turns * 2.0 * PI;
         }
     }
-    let range = theta.iter().fold(0.0_f64, |most, x| most.max((x - theta[0]).abs()));
-    ensure!(range > 0.0, "{}: {name} never changes: the fit needs a turning rotor", signals.file);
     for x in &mut theta {
         *x *= factor;
     }
@@ -289,28 +309,29 @@ fn voltage(signals: &Signals, theta: &[f64]) -> Result<(Vec<Complex>, bool)> {
     )
 }
 
-/// The current vector.
-fn current(signals: &Signals, theta: &[f64]) -> Result<Vec<Complex>> {
+/// The current vector. The sum of the phases is judged where no current is `clipped`.
+fn current(signals: &Signals, theta: &[f64], clipped: &[bool]) -> Result<Vec<Complex>> {
     let rows = 0..theta.len();
     let phases = ["i_a", "i_b", "i_c"].map(|name| signals.get(name));
     match phases {
         [Some(a), Some(b), Some(c)] => {
-            let sum: Vec<f64> = rows.clone().map(|k| a[k] + b[k] + c[k]).collect();
+            let whole: Vec<usize> = rows.clone().filter(|&k| !clipped[k]).collect();
+            let sum: Vec<f64> = whole.iter().map(|&k| a[k] + b[k] + c[k]).collect();
             let shift = mean(&sum);
-            let count = sum.len() as f64;
+            let count = sum.len().max(1) as f64;
             // What changes from row to row is noise of the sensors.
             let noise = sum.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * count);
             let spread = sum.iter().map(|s| (s - shift).powi(2)).sum::<f64>() / count;
             let rest = (spread - noise).max(0.0).sqrt();
             let square = |k: usize| a[k] * a[k] + b[k] * b[k] + c[k] * c[k];
-            let all = (rows.clone().map(square).sum::<f64>() / count).sqrt();
+            let all = (whole.iter().map(|&k| square(k)).sum::<f64>() / count).sqrt();
             if rest > 0.05 * all {
-                let worst = rows.clone().max_by(|&x, &y| (sum[x] - shift).abs().total_cmp(&(sum[y] - shift).abs()));
+                let worst = (0..sum.len()).max_by(|&x, &y| (sum[x] - shift).abs().total_cmp(&(sum[y] - shift).abs()));
                 let what = format!(
                     "i_a + i_b + i_c has {:.1} % of the currents: check signs, units and the wiring of the sensors",
                     100.0 * rest / all
                 );
-                return signals.refuse(worst.unwrap_or(0), "i_a", &what);
+                return signals.refuse(worst.map_or(0, |k| whole[k]), "i_a", &what);
             }
             Ok(rows.map(|k| vector(a[k], b[k], c[k])).collect())
         }

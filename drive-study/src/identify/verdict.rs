@@ -1,11 +1,16 @@
 //! Which values of a fit are written, and why the others are refused.
 
 use super::Complex;
-use super::electrical::{Fit, Problem, Timing};
+use super::electrical::Fit;
 use super::mechanics::{MechanicalFit, Shown};
 use super::motion::Motion;
 use super::record::{BenchRecord, quantile};
+use super::windows::{Problem, Timing};
 use serde::Serialize;
+
+/// Greatest R T/L of a step, and of a step that is a sample of the controller: the voltage is held there, and the current's course
+/// is known.
+const DECAY: (f64, f64) = (0.2, 0.35);
 
 /// A quantity of the machine.
 #[derive(Clone, Debug, Serialize)]
@@ -29,10 +34,14 @@ pub struct Facts {
     turn: f64,
     /// R T over the smaller inductance.
     decay: f64,
+    /// The greatest that is accepted.
+    most_decay: f64,
     /// Current that 99 % of the rows stay below, over the maximum current.
     current: f64,
     /// `i_d` stays within 2 % of the maximum current around its median in nine of ten rows.
     steady_i_d: bool,
+    /// The rotor stands.
+    standing: bool,
     /// Levels of speed.
     levels: usize,
     /// The load is unknown.
@@ -43,7 +52,14 @@ pub struct Facts {
 }
 
 impl Facts {
-    pub(super) fn of(record: &BenchRecord, motion: &Motion, fit: &Fit, shown: &Shown, i_max: f64) -> Self {
+    pub(super) fn of(
+        record: &BenchRecord,
+        motion: &Motion,
+        timing: Timing,
+        fit: &Fit,
+        shown: &Shown,
+        i_max: f64,
+    ) -> Self {
         let [R, L_d, L_q, ..] = fit.p;
         let rows = || motion.runs.iter().flat_map(Clone::clone);
         let w = quantile(rows().map(|k| motion.w[k].abs()).collect(), 0.99);
@@ -56,8 +72,10 @@ impl Facts {
         Self {
             turn: w * record.step,
             decay: R * record.step / L_d.min(L_q),
+            most_decay: if timing.every == 1 { DECAY.1 } else { DECAY.0 },
             current: quantile(rows().map(|k| record.i[k].norm()).collect(), 0.99) / i_max,
             steady_i_d: far < 0.02 * i_max + 2.0 * record.sigma,
+            standing: w == 0.0,
             levels: shown.levels,
             unloaded: record.load.is_none(),
             rest: (fit.rest / fit.noise.max(f64::MIN_POSITIVE), fit.rest / voltage.max(f64::MIN_POSITIVE)),
@@ -100,7 +118,9 @@ pub(super) fn better(record: &BenchRecord, motion: &Motion, timing: Timing, i_ma
             Problem::new(record, motion, Timing { delay: timing.delay + 1.0, ..timing }, i_max).fit(),
         ),
     ];
-    let sound = |f: &Fit| f.p[..4].iter().all(|&x| x > 0.0) && f.rest < fit.rest / 3.0;
+    // A fit with a wrong sign may leave little.
+    let most = if fit.is_possible() { fit.rest / 3.0 } else { 1.5 * fit.rest };
+    let sound = |f: &Fit| f.p[..4].iter().all(|&x| x > 0.0) && f.rest < most;
     let best = tries.into_iter().filter_map(|(what, f)| Some((what, f.filter(sound)?)));
     match best.min_by(|(_, a), (_, b)| a.rest.total_cmp(&b.rest)) {
         Some((what, _)) => format!("the model does not fit; it fits with {what}: correct the columns"),
@@ -124,15 +144,17 @@ pub(super) fn values(
         (facts.turn > 0.6)
             .then(|| format!("bandwidth: the rotor turns by {:.2} rad in a step: shorter steps are needed", facts.turn))
     });
-    let fast =
-        (facts.decay > 0.2).then(|| format!("bandwidth: R_s T/L = {:.2}: shorter steps are needed", facts.decay));
+    let fast = (facts.decay > facts.most_decay)
+        .then(|| format!("bandwidth: R_s T/L = {:.2}: shorter steps are needed", facts.decay));
     let apart = (facts.condition > 1e6)
         .then(|| "psi_M and R_s are not separable: record two speeds or two currents".to_owned());
     let low = (facts.current < 0.3).then(|| {
         "R_s is not separable from the inverter's loss: record more current, or a test with direct current".to_owned()
     });
     let steady = facts.steady_i_d.then(|| "i_d was constant: record steps of i_d".to_owned());
-    let one_speed = (facts.levels < 2).then(|| "the speed was constant: record two speeds".to_owned());
+    let rest = facts.standing.then(|| "the rotor stood still: record a turning rotor".to_owned());
+    let one_speed =
+        (facts.levels < 2 && !facts.standing).then(|| "the speed was constant: record two speeds".to_owned());
     let two_speeds = (facts.levels < 3).then(|| "the record has too few speeds: record three".to_owned());
     let load = facts.unloaded.then(|| "the load is unknown: add tau_load or tau_shaft, or give --load none".to_owned());
     let [R, L_d, L_q, psi_M, ..] = fit.p;
@@ -144,10 +166,10 @@ pub(super) fn values(
         ("R_s", "Ohm", R, fit.half[0], 0.003, 0.01, vec![&apart, &fast, &low]),
         ("L_d", "H", L_d, fit.half[1], 0.01, 0.025, vec![&fast, &steady]),
         ("L_q", "H", L_q, fit.half[2], 0.01, 0.025, vec![&fast, &one_speed]),
-        ("psi_M", "Wb", psi_M, fit.half[3], 0.003, 0.01, vec![&apart]),
-        ("J", "kg.m2", m[0], half[0], 0.005, 0.025, vec![&load, &one_speed]),
-        ("B", "N.m.s/rad", m[1], half[1], 0.0, 0.15, vec![&load, &one_speed, &two_speeds]),
-        ("tau_coulomb", "N.m", m[2], half[2], 0.0, 0.15, vec![&load, &one_speed, &two_speeds]),
+        ("psi_M", "Wb", psi_M, fit.half[3], 0.003, 0.01, vec![&rest, &apart]),
+        ("J", "kg.m2", m[0], half[0], 0.005, 0.025, vec![&rest, &load, &one_speed]),
+        ("B", "N.m.s/rad", m[1], half[1], 0.0, 0.15, vec![&rest, &load, &one_speed, &two_speeds]),
+        ("tau_coulomb", "N.m", m[2], half[2], 0.0, 0.15, vec![&rest, &load, &one_speed, &two_speeds]),
         ("u_dead", "V", u_dead, fit.half[4], 0.03, 0.15, vec![&fast, &low]),
         ("i_zero", "A", i_zero, fit.half[5], 0.3, 0.35, vec![&fast, &low]),
     ];

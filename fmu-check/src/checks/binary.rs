@@ -1,5 +1,6 @@
 //! The binary as a file: its format, what it exports and what it needs (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
+use super::author::paths;
 use crate::check::{Check, Level, Levels, Run, Verdict};
 use crate::fmu_file::{Binary, FmuFile};
 use crate::session::{NotDetermined, Session};
@@ -50,6 +51,11 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "B11", clause: "hardening", levels: Levels::HARD, run: Run::File(processor),
         requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).",
         tried: "Reads the note .note.gnu.property.", fix: "Build for x86-64, not with -march=native." },
+    Check { id: "B12", clause: "hardening", levels: Levels::HARD, run: Run::File(paths),
+        requirement: "Neither a binary nor the start value of a string names a file or folder in somebody's home folder, or a drive: other machines do not \
+            have it.",
+        tried: "Looks for such paths in the data of every library, without debug information and the names of sources, and in start values.",
+        fix: "Pack the file into resources/, and build its path from the one that the instantiation gets." },
     Check { id: "X02b", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(versions),
         requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.",
         tried: "Calls GetVersion, and in FMI 2.0 GetTypesPlatform.", fix: "Return the constants of the official headers." },
@@ -103,7 +109,7 @@ pub(super) fn functions(version: FmiVersion) -> Vec<&'static str> {
 }
 
 /// The libraries named after a modelIdentifier; other libraries in their folders are helpers.
-fn libraries(fmu: &FmuFile) -> Vec<&Binary> {
+pub(super) fn libraries(fmu: &FmuFile) -> Vec<&Binary> {
     let description = fmu.description.as_ref().ok();
     let names: Vec<&str> = description.map_or_else(Vec::new, |d| {
         let interfaces = [&d.co_simulation, &d.model_exchange, &d.scheduled_execution].into_iter().flatten();

@@ -37,7 +37,7 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis." },
     Check { id: "E26", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::Exchange(discrete),
         requirement: "Discrete variables do not change in Continuous-Time Mode.",
-        tried: "Reads discrete variables between events.", fix: "Assign discrete variables in updates only." },
+        tried: "Reads discrete variables between events, and before each event.", fix: "Assign discrete variables in updates only." },
 ];
 
 /// Steps of the integrator in a probe of events.
@@ -171,21 +171,28 @@ fn discrete(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("there are no discrete outputs or local variables");
     }
     let instance = session.excited()?;
-    let held = RefCell::new(Vec::new());
+    let mut importer = Importer::start(&instance)?;
+    importer.watched.clone_from(&variables);
+    let dt = session.integrator_step();
     let mut found = 0;
-    Importer::survey(&instance, 200, &mut |_, _| (), &mut |importer, event| {
-        let now = importer.instance.snapshot(&variables)?;
-        for ((v, old), new) in variables.iter().zip(held.borrow().iter()).zip(&now) {
-            if !event && old != new && found < 10 {
-                found += 1;
-                session.violated(format!(
-                    "{}, discrete, changed in Continuous-Time Mode before t = {:?}",
-                    v.name,
-                    importer.instance.time.get()
-                ));
+    session.record_calls(&format!("200 integrator steps of {dt} s with events"), || {
+        let mut held = instance.snapshot(&variables)?;
+        for _ in 0..200 {
+            if importer.over {
+                break;
             }
+            let event = importer.step(dt, &mut |_, _| ())?;
+            let now = instance.snapshot(&variables)?;
+            let end = if event { &importer.before } else { &now };
+            for (v, _) in variables.iter().zip(held.iter().zip(end)).filter(|(_, (old, new))| old != new) {
+                found += 1;
+                if found <= 10 {
+                    let t = instance.time.get();
+                    session.violated(format!("{}, discrete, changed in Continuous-Time Mode before t = {t:?}", v.name));
+                }
+            }
+            held = now;
         }
-        *held.borrow_mut() = now;
         Ok(())
     })
 }

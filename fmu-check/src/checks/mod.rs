@@ -4,6 +4,7 @@
 
 mod access;
 mod archive;
+mod author;
 mod binary;
 mod by_name;
 mod calls;

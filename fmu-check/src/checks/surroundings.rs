@@ -3,7 +3,7 @@
 use super::host::{failed, second_binary};
 use crate::session::{NotDetermined, Session};
 use fmu_import::guard;
-use fmu_import::raw::{Simple, locale};
+use fmu_import::raw::{Simple, armed_timers, locale};
 use model_description::limits;
 use std::collections::BTreeMap;
 use std::fs;
@@ -64,6 +64,7 @@ fn current_settings() -> BTreeMap<String, String> {
     let mut put = |name: &str, value: String| drop(all.insert(name.to_owned(), value));
     put("the working directory", format!("{:?}", std::env::current_dir().ok()));
     put("the locale", locale().unwrap_or_default());
+    put("the interval timers", armed_timers().unwrap_or_default().join(", "));
     put("the timers", fs::read_to_string("/proc/self/timers").unwrap_or_default());
     for (name, value) in std::env::vars_os() {
         put(&format!("the environment variable {}", name.to_string_lossy()), value.to_string_lossy().into_owned());

@@ -117,13 +117,15 @@ const RUNNING_GROUPS: [&str; 9] = ["access", "time", "L06", "L13", "F01l", "F02b
 const AROUND: &[(&str, &[&str])] = &[
     ("LOCALE", &["B08g"]),
     ("TIMER", &["B08g"]),
+    ("ALARM", &["B08g"]),
+    ("PROFILE", &["B08g"]),
+    ("BRIEF", &[]),
     ("AFFINITY", &["B08g"]),
     ("NICE", &["B08g"]),
     ("LIMITS", &["B08g"]),
     ("UMASK", &["B08g"]),
     ("ENVIRONMENT", &["B08g"]),
     ("CHDIR", &["B08g"]),
-    ("SHARED", &["B08p"]),
     ("TEMPORARY", &["B08p"]),
     ("WRITES", &["B08r"]),
 ];
@@ -207,6 +209,8 @@ fn each_fault_at_run_time_is_found_by_its_check() {
     for version in [2, 3] {
         all_of(version, RUNNING, &RUNNING_GROUPS);
         all_of(version, AROUND, &["B08g", "B08p", "B08r"]);
+        // Alone, because the other rows would see its file come and change too.
+        all_of(version, &[("SHARED", &["B08p"])], &["B08g", "B08p", "B08r"]);
     }
     all_of(3, &[("T06e", &["T06a"])], &["time"]);
     // Another day, in another process.
@@ -250,10 +254,20 @@ fn faults_of_the_file() {
         (&["-Wl,-z,execstack"], &["B05"]),
         (&["-Wl,--no-as-needed", "-lgcc_s"], &["B03"]),
         (&["-Wl,-z,x86-64-v3"], &["B11"]),
+        (&["-DFAULT_AUTHOR"], &["B12"]),
+        (&["-DSOURCE", "-g"], &[]),
     ] {
         let binary = library("fmu.c", more, "NONE").unwrap();
         let report = check(&pack(dir.path(), 2, "flags", &binary), &["binary", "instances"]);
         assert_eq!(violated(&report), ids, "{more:?}: {}", told(&report));
+    }
+    let xml = include_str!("fmu.xml");
+    for (start, ids) in
+        [("/home/ann/table.csv", &["B12"][..]), ("D:\\tables\\x.csv", &["B12"]), ("/etc/hosts", &[]), ("x.csv", &[])]
+    {
+        let xml = xml.replace("<String start=\"a\"/>", &format!("<String start=\"{start}\"/>"));
+        let report = check(&pack_with(dir.path(), "start", &xml, b"no library"), &["B12"]);
+        assert_eq!(violated(&report), ids, "{start}: {}", told(&report));
     }
     let report = check(&pack(dir.path(), 2, "text", b"no library"), &[]);
     assert_eq!(violated(&report), ["B00", "B10"], "{}", told(&report));

@@ -1,7 +1,8 @@
 /* A small FMU for Model Exchange and co-simulation, FMI 2.0 and with -DFMI3 FMI 3.0, that breaks no rule; and with
    a fault of fault.h exactly one.
    x' = gain (u - x), y = 2 x + u; event indicator z = x - 0.5, whose crossing adds 100 to n; time events at start + k 0.1 add 1
-   to n, and every third one 0.25 to x. References: 0 time, 1 gain, 2 u, 3 x, 4 der(x), 5 y, 6 d (discrete, without use), 7 n, 8 z. */
+   to n, and every third one 0.25 to x. References: 0 time, 1 gain, 2 u, 3 x, 4 der(x), 5 y, 6 d (discrete, without use), 7 n, 8 z,
+   9 above (Boolean: x was above 0.5 at the last event). */
 #include "fault.h"
 #include <math.h>
 #include <stdbool.h>
@@ -194,6 +195,17 @@ static int get_n(M *m, const unsigned *vr, size_t n, int *to) {
     return OK;
 }
 
+static int get_above(M *m, const unsigned *vr, size_t n, int *to) {
+    ENTER(EVALUATED | FAILED | INSTANTIATED);
+    for (size_t i = 0; i < n; i++) {
+        if (vr[i] != 9) return fail(m);
+        to[i] = m->above;
+        if (FAULT(E26b)) to[i] = (m->k + due(m, m->t)) % 2;
+        if (FAULT(E26c)) to[i] = m->x > 0.9;
+    }
+    return OK;
+}
+
 /* Columns of the matrix: u, x; rows: der(x), x, y. */
 static int entry(M *m, unsigned unknown, unsigned known, double *to) {
     if ((known != 2 && known != 3) || (unknown != 3 && unknown != 4 && unknown != 5)) return ERROR;
@@ -269,7 +281,7 @@ static int drop(M **state) { return free(*state), *state = NULL, OK; }
 
 #ifdef ALL_OF_EXCHANGE
 #define NONE(name) EXPORT int fmi2##name(M *m) { return m ? fail(m) : ERROR; }
-NONE(GetBoolean) NONE(GetString) NONE(SetInteger) NONE(SetBoolean) NONE(SetString)
+NONE(GetString) NONE(SetInteger) NONE(SetBoolean) NONE(SetString)
 NONE(SerializedFMUstateSize) NONE(SerializeFMUstate) NONE(DeSerializeFMUstate)
 #endif
 
@@ -289,6 +301,7 @@ EXPORT int fmi2Reset(M *m) { return reset(m); }
 EXPORT int fmi2GetReal(M *m, const unsigned *vr, size_t n, double *to) { return get(m, vr, n, to); }
 EXPORT int fmi2SetReal(M *m, const unsigned *vr, size_t n, const double *from) { return set(m, vr, n, from); }
 EXPORT int fmi2GetInteger(M *m, const unsigned *vr, size_t n, int *to) { return get_n(m, vr, n, to); }
+EXPORT int fmi2GetBoolean(M *m, const unsigned *vr, size_t n, int *to) { return get_above(m, vr, n, to); }
 EXPORT int fmi2GetFMUstate(M *m, M **to) { return save(m, to); }
 EXPORT int fmi2SetFMUstate(M *m, M *from) { return load(m, from); }
 EXPORT int fmi2FreeFMUstate(M *m, M **state) { return drop(state); }
@@ -329,6 +342,12 @@ EXPORT int fmi3Reset(M *m) { return reset(m); }
 EXPORT int fmi3GetFloat64(M *m, const unsigned *vr, size_t n, double *to, size_t nv) { return get(m, vr, n, to); }
 EXPORT int fmi3SetFloat64(M *m, const unsigned *vr, size_t n, const double *from, size_t nv) { return set(m, vr, n, from); }
 EXPORT int fmi3GetInt32(M *m, const unsigned *vr, size_t n, int *to, size_t nv) { return get_n(m, vr, n, to); }
+EXPORT int fmi3GetBoolean(M *m, const unsigned *vr, size_t n, bool *to, size_t nv) {
+    int wide[16] = {0};
+    int status = n > 16 ? ERROR : get_above(m, vr, n, wide);
+    for (size_t i = 0; status == OK && i < n; i++) to[i] = wide[i];
+    return status;
+}
 EXPORT int fmi3GetFMUState(M *m, M **to) { return save(m, to); }
 EXPORT int fmi3SetFMUState(M *m, M *from) { return load(m, from); }
 EXPORT int fmi3FreeFMUState(M *m, M **state) { return drop(state); }

@@ -41,6 +41,9 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("E24n", &["E24n"]),
     ("E25", &["E25"]),
     ("E26", &["E26"]),
+    // A Boolean that changes before the event begins, and one that follows a state without an event.
+    ("E26b", &["E26"]),
+    ("E26c", &["E26"]),
     ("D01", &["D01"]),
     ("D03", &["D03"]),
     ("D04", &["D04"]),
@@ -60,6 +63,8 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("E21", &["E21"]),
     ("E24b", &["E24b"]),
     ("E24n", &["E24n"]),
+    ("E26b", &["E26"]),
+    ("E26c", &["E26"]),
     ("T13", &["T13"]),
     ("D03", &["D03"]),
     ("D05", &["D05"]),

@@ -19,6 +19,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/syscall.h>
+#include <sys/time.h>
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
@@ -123,6 +124,14 @@ extern int nowhere(void);
 int (*missing)(void) = nowhere;
 #endif
 
+/* A file of the author's, and the name of a source, as a message has it. */
+#ifdef FAULT_AUTHOR
+const char *const table = "/home/ann/model/table.csv";
+#endif
+#ifdef SOURCE
+const char *const source = "/home/ann/model/main.c:7: x > 0";
+#endif
+
 /* Writes a file and leaves it. */
 static void leave(const char *folder, const char *name) {
     char path[2048];
@@ -139,6 +148,10 @@ static void alter(const char *where) {
         int timer;
         syscall(SYS_timer_create, CLOCK_MONOTONIC, &nothing, &timer);
     }
+    if (FAULT(ALARM)) alarm(1000);
+    if (FAULT(PROFILE)) setitimer(ITIMER_PROF, &(struct itimerval){{1000, 0}, {1000, 0}}, NULL);
+    // One that is taken back is no alteration.
+    if (FAULT(BRIEF)) alarm(1000), alarm(0);
     if (FAULT(AFFINITY)) {
         unsigned long first = 1;
         syscall(SYS_sched_setaffinity, 0, sizeof first, &first);

@@ -13,13 +13,26 @@ pub struct Entry {
     pub mode: u32,
     pub disk: u16,
     pub crc: Option<u32>,
+    /// Size when unpacked, if that is another one.
+    pub size: Option<u32>,
     pub local_name: Option<String>,
 }
 
 impl Entry {
     pub fn new(name: &str, bytes: &[u8]) -> Self {
         let (name, bytes) = (name.into(), bytes.into());
-        Self { name, bytes, needed: 10, flags: 0, method: 0, mode: 0o100_644, disk: 0, crc: None, local_name: None }
+        Self {
+            name,
+            bytes,
+            needed: 10,
+            flags: 0,
+            method: 0,
+            mode: 0o100_644,
+            disk: 0,
+            crc: None,
+            size: None,
+            local_name: None,
+        }
     }
 }
 
@@ -36,7 +49,7 @@ pub fn write(path: &Path, entries: &[Entry]) {
             for x in [e.needed, e.flags, e.method, 0, 33] {
                 h.extend(x.to_le_bytes());
             }
-            for x in [crc, size, size] {
+            for x in [crc, size, e.size.unwrap_or(size)] {
                 h.extend(x.to_le_bytes());
             }
             for x in [u16::try_from(name.len()).unwrap(), 0] {

@@ -1,5 +1,6 @@
 //! Recordings: sampled variables.
 
+use crate::text::printable;
 use model_description::DisplayUnit;
 use std::io::{self, Write};
 
@@ -67,14 +68,14 @@ impl Recording {
         self.columns.iter().find(|c| c.name == name)
     }
 
-    /// Comma-separated, one header line; every number reads back to the same double. Texts follow the numbers, in quotation marks
-    /// where they need them (RFC 4180).
+    /// Comma-separated, one header line; every number reads back to the same double. Texts follow the numbers. Names and texts are
+    /// in quotation marks where they need them (RFC 4180); control characters of names are escaped, as a terminal shows them.
     ///
     /// # Errors
     /// As the writer's.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         let columns = self.columns.iter().map(|c| c.name.as_str()).chain(self.texts.iter().map(|c| c.name.as_str()));
-        let names: Vec<_> = std::iter::once("time").chain(columns).collect();
+        let names: Vec<_> = std::iter::once("time").chain(columns).map(|name| cell(&printable(name))).collect();
         writeln!(out, "{}", names.join(","))?;
         for (k, t) in self.time.iter().enumerate() {
             write!(out, "{t}")?;
@@ -156,6 +157,16 @@ mod tests {
                         0.0001,104.71975511965977,\"a \"\"b\"\", c\nd\"\n";
         assert_eq!(String::from_utf8(text).unwrap(), expected);
         assert!(recording.last_values().ends_with("\np.status  \"a \\\"b\\\", c\\nd\""), "{}", recording.last_values());
+    }
+
+    #[test]
+    fn names_command_no_terminal_and_break_no_row() {
+        let column = |name: &str| Column { name: name.into(), ..Column::default() };
+        let mut recording = Recording::new([column("p.a\u{1b}[2J\n"), column("p.b[1,2]")].into_iter());
+        recording.push(0.0, &[1.0, 2.0]);
+        let mut text = Vec::new();
+        recording.write_csv(&mut text).unwrap();
+        assert_eq!(String::from_utf8(text).unwrap(), "time,p.a\\u{1b}[2J\\u{a},\"p.b[1,2]\"\n0,1,2\n");
     }
 
     #[test]

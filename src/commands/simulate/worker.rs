@@ -2,9 +2,12 @@
 
 use super::{Simulate, simulate};
 use crate::Failed;
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context, Result, anyhow, bail};
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use fmu_import::journal;
+use std::fs::File;
+use std::io;
+use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
@@ -13,6 +16,10 @@ static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
 
 /// File for the status and the error of the worker, below its folder for temporary files.
 const RESULT: &str = "result";
+
+/// File there for what the command prints to standard output. It is made when the run is over: nothing that an FMU writes to
+/// descriptors of the process gets into it.
+const OUTPUT: &str = "output";
 
 /// Time between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(100);
@@ -25,7 +32,8 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
     let timeout = Duration::try_from_secs_f64(args.timeout).map_err(|e| anyhow!("--timeout {}: {e}", args.timeout))?;
     let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
     let mut command = guard::command(&std::env::current_exe()?, allowance);
-    command.args(["simulate", "--worker"]).args(std::env::args_os().skip(2));
+    // What the FMUs print goes to standard error.
+    command.args(["simulate", "--worker"]).args(std::env::args_os().skip(2)).stdout(io::stderr());
     let mut worker = Guarded::start(command)?;
     let folder = worker.folder().to_owned();
     let (mut since, mut progress) = (Instant::now(), None);
@@ -51,12 +59,20 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
     let result = std::fs::read_to_string(folder.join(RESULT)).ok();
     let result = result.as_deref().and_then(|text| text.split_once(' '));
     match (&report.end, result) {
-        (End::Ended(status), Some((code, cause))) if status.code().is_some_and(|c| c.to_string() == code) => match code
-        {
-            "0" => Ok(()),
-            "1" => Err(Failed(cause.into()).into()),
-            _ => Err(anyhow!("{cause}")),
-        },
+        (End::Ended(status), Some((code, cause))) if status.code().is_some_and(|c| c.to_string() == code) => {
+            if let Ok(mut printed) = File::open(folder.join(OUTPUT)) {
+                match io::copy(&mut printed, &mut io::stdout()) {
+                    // A reader such as `head` closes the pipe early.
+                    Err(e) if e.kind() == io::ErrorKind::BrokenPipe => {}
+                    other => drop(other.context("standard output")?),
+                }
+            }
+            match code {
+                "0" => Ok(()),
+                "1" => Err(Failed(cause.into()).into()),
+                _ => Err(anyhow!("{cause}")),
+            }
+        }
         (end, _) => {
             let last = journal::read(&folder).map_or_else(|| "the process of the FMUs".into(), |last| last.describe());
             match end {
@@ -94,15 +110,32 @@ pub(super) fn look(args: &Simulate) -> impl FnMut() -> bool + use<> {
     }
 }
 
+/// A file that is made when the first byte is written to it.
+struct Later {
+    path: PathBuf,
+    file: Option<File>,
+}
+
+impl io::Write for Later {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let file = match self.file.take() {
+            Some(file) => file,
+            None => File::create_new(&self.path)?,
+        };
+        self.file.insert(file).write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.as_mut().map_or(Ok(()), File::flush)
+    }
+}
+
 /// The worker. It leaves its status and its error in a file, because an FMU may have closed everything else.
 pub(super) fn work(args: &Simulate) -> Result<()> {
     guard::end_with_parent();
     let folder = std::env::temp_dir();
     journal::open(&folder)?;
-    #[cfg(unix)]
-    let outcome = simulate(args, guard::keep_stdout()?);
-    #[cfg(not(unix))]
-    let outcome = simulate(args, std::io::stdout());
+    let outcome = simulate(args, Later { path: folder.join(OUTPUT), file: None });
     let (status, text) = match &outcome {
         Ok(()) => (0, String::new()),
         Err(error) => (crate::exit_status(error), format!("{error:#}")),

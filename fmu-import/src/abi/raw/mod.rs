@@ -27,7 +27,7 @@ pub use equations::{SensitivityArguments, UpdateResults};
 pub use instantiate::{Arguments, Interface};
 pub use names::{Count, Optional, Sensitivity, Simple, StepStatus, Text, Vector};
 pub use owned::{Handle, SavedState};
-pub use processor::{float_control, locale};
+pub use processor::{armed_timers, float_control, locale};
 pub use updates::{Answered, Heard, Inside, Meanwhile};
 
 use super::arguments::Array;

@@ -1,4 +1,4 @@
-//! Floating-point control of the processor, which a call must not change.
+//! What a call must not change: the floating-point control of the processor, the locale and the timers of the process.
 
 /// Floating-point control of this thread: rounding, masks of exceptions, flushing to zero; without the flags that every
 /// calculation sets. `None` where this is not known.
@@ -36,5 +36,26 @@ pub fn locale() -> Option<String> {
         unsafe { super::callbacks::optional(setlocale(6, std::ptr::null())) }
     }
     #[cfg(not(target_os = "linux"))]
+    None
+}
+
+/// The interval timers of this process that are armed, as `setitimer` and `alarm` leave them; `None` where this is not known.
+pub fn armed_timers() -> Option<Vec<&'static str>> {
+    #[cfg(all(target_os = "linux", target_pointer_width = "64"))]
+    {
+        use std::ffi::{c_int, c_long};
+        unsafe extern "C" {
+            fn getitimer(which: c_int, value: *mut [c_long; 4]) -> c_int;
+        }
+        let is_armed = |which: c_int| {
+            let mut value = [0; 4];
+            // SAFETY: it writes a `struct itimerval`, which has four longs on Linux of 64 bits, to a place that is ours.
+            let read = unsafe { getitimer(which, &raw mut value) };
+            read == 0 && value[2..] != [0, 0]
+        };
+        let names = [(0, "ITIMER_REAL"), (1, "ITIMER_VIRTUAL"), (2, "ITIMER_PROF")];
+        Some(names.into_iter().filter(|(which, _)| is_armed(*which)).map(|(_, name)| name).collect())
+    }
+    #[cfg(not(all(target_os = "linux", target_pointer_width = "64")))]
     None
 }
