@@ -10,6 +10,7 @@
 
 pub mod battery;
 pub mod clocked;
+pub mod commission;
 pub mod current;
 mod cycle;
 pub mod documentation;

@@ -1,0 +1,79 @@
+//! Dc current along an angle phi, which the rotor follows, and its rest.
+//!
+//! ```text
+//! along phi        PI on the current
+//! across           u_q = 0, with R known 0.5 R i_q: the machine brakes its own swing, whatever J is
+//!                  u_q = -2 K_p (i_q -+ 0.35 I) beyond 0.35 I
+//! at rest          means of i_q over 10 ms within 0.002 I + 4 sigma / sqrt N for 0.4 s
+//! ```
+
+use super::bench::{Bench, Sample};
+use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use drive_base::math::within;
+use serde::{Deserialize, Serialize};
+
+/// Share of I of the alignment.
+pub(super) const ALIGNED: f64 = 0.4;
+/// Share of I of the current across that is left alone.
+const ACROSS: f64 = 0.35;
+/// Share of U of all voltages.
+pub(super) const VOLTAGE: f64 = 0.95;
+
+/// The control of a dc current.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Dc {
+    /// Direction of the current.
+    pub(super) axis: Axis<Estimated>,
+    /// Integral in V.
+    pub(super) u: f64,
+}
+
+impl Dc {
+    /// Turns to the angle `phi` (rad); the integral stays.
+    pub(super) fn turn(&mut self, phi: f64) {
+        self.axis = Axis::at(phi);
+    }
+
+    /// Command in V for the current `i_ref` (A).
+    pub(super) fn command(&mut self, bench: &Bench, sample: &Sample, i_ref: f64) -> AlphaBeta {
+        let e = i_ref - self.axis.from_stator(sample.i).d();
+        let (asked, most) = (bench.K_p() * e + self.u, VOLTAGE * bench.U);
+        let u = within(asked, most);
+        self.u = within(self.u + bench.K_i() * bench.T * e + (u - asked), most);
+        self.axis.to_stator(DqHat::new(u, self.across(bench, sample)))
+    }
+
+    /// Command in V with the constant voltage `u` (V) along phi.
+    pub(super) fn open(&self, bench: &Bench, sample: &Sample, u: f64) -> AlphaBeta {
+        self.axis.to_stator(DqHat::new(u, self.across(bench, sample)))
+    }
+
+    fn across(&self, bench: &Bench, sample: &Sample) -> f64 {
+        let i = self.axis.from_stator(sample.i).q();
+        let beyond = i - within(i, ACROSS * bench.I);
+        let u = 0.5 * bench.R * (i - beyond) - 2.0 * bench.K_p() * beyond;
+        within(u, 0.25 * bench.U)
+    }
+}
+
+/// Whether the rotor is at rest, from the current across phi.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Rest {
+    sum: f64,
+    samples: f64,
+    quiet: f64,
+}
+
+impl Rest {
+    /// Takes a sample of the current across phi in A; true: at rest.
+    pub(super) fn update(&mut self, bench: &Bench, i_q: f64) -> bool {
+        self.sum += i_q;
+        self.samples += 1.0;
+        if self.samples * bench.T >= 0.01 && self.samples >= 10.0 {
+            let still = (self.sum / self.samples).abs() < 0.002 * bench.I + 4.0 * bench.sigma / self.samples.sqrt();
+            self.quiet = if still { self.quiet + 1.0 } else { 0.0 };
+            (self.sum, self.samples) = (0.0, 0.0);
+        }
+        self.quiet >= 40.0
+    }
+}

@@ -1,0 +1,66 @@
+//! What the parts of the commissioning share: the test conditions, and what earlier parts have found.
+
+use super::curve::Curve;
+use super::probe::Tensor;
+use drive_base::frame::AlphaBeta;
+use serde::{Deserialize, Serialize};
+
+/// A sample: currents, and the voltage that acted since the last one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sample {
+    /// Current in A, less the offsets, at this sample and at the last one.
+    pub(super) i: AlphaBeta,
+    pub(super) i_last: AlphaBeta,
+    /// Command in V that acted between the two.
+    pub(super) u: AlphaBeta,
+    /// DC-link voltage in V.
+    pub(super) u_dc: f64,
+}
+
+/// Conditions and findings.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Bench {
+    /// Sample period in s.
+    pub(super) T: f64,
+    /// Samples from the command to its action.
+    pub(super) delay: f64,
+    /// Greatest current in A of the commissioning.
+    pub(super) I: f64,
+    /// u_dc / sqrt 3 at the start in V.
+    pub(super) U: f64,
+    /// U over the rated electrical speed: the flux linkage lies within 0.25 and 1.15 of it. In Wb.
+    pub(super) psi_r: f64,
+    /// Standard deviation of a component of the current in A.
+    pub(super) sigma: f64,
+    /// Smallest inductance in H of the probe, and that of every direction.
+    pub(super) L_c: f64,
+    pub(super) tensor: Tensor,
+    /// Stator resistance in Ohm, with one transistor; 0: unknown.
+    pub(super) R: f64,
+    /// Dead-time voltage in V, and the current in A where the line of a leg ends.
+    pub(super) u_dead: f64,
+    pub(super) i_x: f64,
+    pub(super) curve: Curve,
+    /// Start values: flux linkage in Wb, and rad/s of a swing about 0.4 I.
+    pub(super) psi_0: f64,
+    pub(super) w_0: f64,
+    /// The rotor does not turn.
+    pub(super) blocked: bool,
+}
+
+impl Bench {
+    /// Bandwidth of the dc current control in rad/s.
+    fn w_c(&self) -> f64 {
+        0.12 / self.T
+    }
+
+    /// Proportional gain in Ohm.
+    pub(super) fn K_p(&self) -> f64 {
+        self.w_c() * self.L_c
+    }
+
+    /// Integral gain in Ohm/s: without overshoot for every R.
+    pub(super) fn K_i(&self) -> f64 {
+        0.25 * self.w_c() * self.K_p().max(self.R)
+    }
+}

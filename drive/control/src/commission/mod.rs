@@ -1,0 +1,87 @@
+//! Self-commissioning at standstill: offsets of the current sensors, R_s with the loss of the inverter, L_d, L_q and their
+//! saturation, without a shaft sensor and without a load machine. The rotor may be free or blocked.
+//!
+//! [`Commission`] is called once a sample with the currents and the link's voltage, and commands voltage and gates. It keeps
+//! no references and allocates nothing; a sample takes bounded time, at most one simulation of a record of 512 rows.
+//!
+//! ```text
+//! Offsets      gates off: means of the phases                                        offsets
+//! Probe        0 V: a turning rotor shows; then short pulses in six directions       probe
+//! Align        direct current along 120 degrees until the rotor rests                align
+//! Resistance   a staircase of currents, there and again at 0                         resistance, curve
+//! Swing        the current turns to 0: the rotor swings, unless it is blocked        swing
+//! Axes         small triangles of current at 0, 45, 90 and 135 degrees               excitation, axes
+//! Saturation   large triangles along d and q, simulated until the currents fit       output_error
+//! ```
+//!
+//! Each result has the relative half-width of its 95 % interval; 1 means refused. Faults end with the gates off. All values
+//! scale with the gains of the sensors: currents read 1 % high give R and L 1 % low.
+
+mod align;
+mod axes;
+mod bench;
+mod curve;
+mod excitation;
+mod least_squares;
+mod offsets;
+mod output_error;
+mod probe;
+mod resistance;
+mod results;
+mod sequence;
+mod swing;
+
+pub use results::{Identified, Results};
+pub use sequence::{Commission, CommissionSetup, Voltage};
+
+use fmu_core::enumeration;
+use serde::{Deserialize, Serialize};
+
+enumeration! {
+    /// What the commissioning does; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum CommissionState("CommissionState", "What the commissioning does") {
+        1 Idle "Not started";
+        2 Offsets "Offsets of the current sensors, with the gates off";
+        3 Probe "Short pulses in six directions";
+        4 Align "A direct current aligns the rotor";
+        5 Resistance "A staircase of direct currents";
+        6 Swing "The rotor swings to another angle";
+        7 Axes "Small triangles of current in four directions";
+        8 Saturation "Large triangles of current along both axes";
+        11 Done "The results are shown";
+        12 Refused "commission_fault has the reason; the gates are off";
+    }
+}
+
+enumeration! {
+    /// Why the commissioning has stopped; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum CommissionFault("CommissionFault", "Why the commissioning has stopped") {
+        1 None "It has not";
+        2 Current "A current above 1.35 commission.i";
+        3 Voltage "u_dc fell by 20 %, or does not drive the currents";
+        4 Resistance "The staircase gives no resistance";
+        5 Inductance "The pulses or loops give no inductance";
+        6 NotFollowing "The rotor turns at the start, or does not come to rest";
+        10 Time "commission.t_max is over";
+        11 Aborted "commission_start or enable became false";
+    }
+}
+
+use CommissionFault as Fault;
+
+/// Integers of eight bytes: the size of a saved state does not depend on them.
+mod fixed_size {
+    #![expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a field by reference")]
+
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(super) fn serialize<S: Serializer>(value: &u64, serializer: S) -> Result<S::Ok, S::Error> {
+        value.to_le_bytes().serialize(serializer)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
+        <[u8; 8]>::deserialize(deserializer).map(u64::from_le_bytes)
+    }
+}

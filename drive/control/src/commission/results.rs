@@ -1,0 +1,123 @@
+//! Results with the half-widths of their intervals, and what refuses them.
+
+use super::axes::Axes;
+use super::bench::Bench;
+use super::output_error::Magnetization;
+use super::resistance::Line;
+use serde::{Deserialize, Serialize};
+
+/// Greatest residual of a loop over its amplitude, along d and q.
+const RESIDUAL: [f64; 2] = [0.02, 0.01];
+/// Greatest half-widths of R_s and of the inductances.
+const LIMIT_R: f64 = 0.01;
+const LIMIT_L: f64 = 0.05;
+
+/// A value and the half-width of its 95 % interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identified {
+    /// Value in its SI unit; 0 until known or if it is refused.
+    pub value: f64,
+    /// Relative half-width; 1: refused.
+    pub u: f64,
+}
+
+impl Default for Identified {
+    fn default() -> Self {
+        Self { value: 0.0, u: 1.0 }
+    }
+}
+
+impl Identified {
+    /// The `value` if its relative half-width `u` is at most `limit`.
+    fn within(value: f64, u: f64, limit: f64) -> Self {
+        if u <= limit { Self { value, u } } else { Self::default() }
+    }
+}
+
+/// What the commissioning has found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Results {
+    /// Stator resistance with one transistor in Ohm.
+    pub R_s: Identified,
+    /// L(0) in H of the d-axis and of the q-axis.
+    pub L_d: Identified,
+    /// L(0) in H of the q-axis.
+    pub L_q: Identified,
+    /// psi(i)/i - without the magnet - in H at `i_d` along the magnet.
+    pub L_d_plus: Identified,
+    /// psi(i)/i - without the magnet - in H at `i_d` against the magnet.
+    pub L_d_minus: Identified,
+    /// psi(i)/i in H at `i_q`.
+    pub L_q_chord: Identified,
+    /// Dead-time voltage of a leg in V, with the threshold of its devices.
+    pub u_dead: Identified,
+    /// Twice the current in A below which a leg loses less.
+    pub i_zero: Identified,
+    /// Second-order d-axis saturation coefficient in A/Wb2.
+    pub s_2: Identified,
+    /// Third-order d-axis saturation coefficient in A/Wb3.
+    pub s_3: Identified,
+    /// Currents in A of the chords.
+    pub i_d: f64,
+    /// Current in A of the q-axis chord.
+    pub i_q: f64,
+    /// Angle of the d-axis in rad at the end; of a blocked rotor modulo pi unless `north`.
+    pub axis: f64,
+    /// The rotor did not turn.
+    pub blocked: bool,
+    /// The saturation shows the magnet's north pole at `axis`.
+    pub north: bool,
+}
+
+impl Results {
+    /// R_s and the inverter: the mean half-width of both fits, and half of their difference.
+    pub(super) fn show_resistance(&mut self, bench: &Bench, lines: [&Line; 2]) {
+        let [a, b] = lines;
+        let of = |a: [f64; 2], b: [f64; 2], value: f64, limit: f64| {
+            let half = 0.5 * (a[1] + b[1] + (a[0] - b[0]).abs());
+            let u = if value > 0.0 { half / value } else { 1.0 };
+            Identified::within(value, u, limit)
+        };
+        self.R_s = of(a.R, b.R, bench.R, LIMIT_R);
+        self.u_dead = of(a.u_dead, b.u_dead, bench.u_dead, 0.5);
+        // The tails of dead time and threshold differ from 1/i: twice the half-width holds 95 % of the values.
+        let double = |x: [f64; 2]| [2.0 * x[0], 4.0 * x[1]];
+        self.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * bench.i_x, 0.5);
+    }
+
+    /// Inductances, refused where the loops do not agree or do not fit; without the axis, neither chords nor saturation.
+    pub(super) fn show_inductances(&mut self, axes: &Axes, large: [Option<Magnetization>; 2]) {
+        let Axes { L_d, L_q, known, spread, .. } = *axes;
+        let of = |loop_: Option<Magnetization>, limit: f64, L: f64| {
+            let large = loop_.filter(|m| m.residual <= limit)?;
+            let u = (L / large.at_zero() - 1.0).abs() + 0.01 + spread;
+            (u <= LIMIT_L).then_some((large, u))
+        };
+        let chord = |m: &Magnetization, sign: f64, u: f64| {
+            m.chord(sign).filter(|_| known).map_or(Identified::default(), |value| Identified { value, u })
+        };
+        let r = self;
+        r.north = known && !r.blocked;
+        if let Some((d, u)) = of(large[0], RESIDUAL[0], L_d) {
+            (r.L_d, r.i_d) = (Identified { value: L_d, u }, d.A);
+            (r.L_d_plus, r.L_d_minus) = (chord(&d, 1.0, u), chord(&d, -1.0, u));
+            if known {
+                let [s_2, s_3] = d.saturation(L_d);
+                (r.s_2, r.s_3) = (Identified { value: s_2, u: 0.5 }, Identified { value: s_3, u: 0.5 });
+            }
+            let difference = r.L_d_minus.value - r.L_d_plus.value;
+            if known && r.blocked && difference.abs() > 0.005 * L_d {
+                r.north = true;
+                if difference < 0.0 {
+                    std::mem::swap(&mut r.L_d_plus, &mut r.L_d_minus);
+                    r.axis = drive_base::math::wrap(r.axis + std::f64::consts::PI);
+                    r.s_2.value = -r.s_2.value;
+                }
+            }
+        }
+        if let Some((q, u)) = of(large[1], RESIDUAL[1], L_q) {
+            (r.L_q, r.i_q) = (Identified { value: L_q, u }, q.A);
+            r.L_q_chord = chord(&q, 1.0, u);
+        }
+    }
+}
