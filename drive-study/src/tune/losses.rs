@@ -5,6 +5,10 @@ use super::motor::{Inverter, MotorFile, Number};
 use super::rules::{Setting, Value, given, real};
 use anyhow::{Result, bail};
 
+/// Current below which the dead-time voltage falls to zero where the file gives none, over the maximum current: the middle of
+/// 0.5 % to 4 %, which the ripple of usual switching frequencies and the capacitances of the transistors give.
+const ZERO: f64 = 0.02;
+
 /// The settings of `[inverter]` and `[temperature]`; none where the file has neither. `T_s` is the sample period in s.
 ///
 /// # Errors
@@ -18,8 +22,7 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
         add("magnet.alpha", &temperature.magnet);
     }
     let Some(inverter) = &motor.data.inverter else { return Ok(all) };
-    let Inverter { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw, u_sw, k_sw, f_sw, u_dead, i_zero } =
-        inverter;
+    let Inverter { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw, u_sw, k_sw, f_sw, u_dead, .. } = inverter;
     for (name, x) in [
         ("inverter.u_transistor", u_transistor),
         ("inverter.r_transistor", r_transistor),
@@ -29,10 +32,10 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
         ("inverter.i_sw", i_sw),
         ("inverter.u_sw", u_sw),
         ("inverter.k_sw", k_sw),
-        ("inverter.i_zero", i_zero),
     ] {
         add(name, x);
     }
+    all.extend(zero("inverter.i_zero", motor));
     for (key, x) in [("i_sw", i_sw), ("u_sw", u_sw)] {
         if let (Some(energy), None) = (E_sw, x) {
             bail!("{}: inverter.E_sw needs inverter.{key}: give the one at which it was measured", motor.place(energy));
@@ -60,10 +63,16 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
 
 /// The settings of the controller's dead-time compensation; none where the file has no dead-time voltage.
 pub fn compensation(motor: &MotorFile) -> Vec<Setting> {
-    let Some(Inverter { u_dead: Some(u_dead), i_zero, .. }) = &motor.data.inverter else { return Vec::new() };
-    let mut all = vec![given("compensation.u_dead", u_dead)];
-    all.extend(i_zero.as_ref().map(|i_zero| given("compensation.i_zero", i_zero)));
-    all
+    let Some(Inverter { u_dead: Some(u_dead), .. }) = &motor.data.inverter else { return Vec::new() };
+    std::iter::once(given("compensation.u_dead", u_dead)).chain(zero("compensation.i_zero", motor)).collect()
+}
+
+/// The setting `name` of the current below which the dead-time voltage falls to zero: as given, or by rule where the file has a
+/// dead-time voltage alone.
+fn zero(name: &'static str, motor: &MotorFile) -> Option<Setting> {
+    let Inverter { u_dead, i_zero, .. } = motor.data.inverter.as_ref()?;
+    let by_rule = || real(name, ZERO * motor.data.rating.current.get_ref(), "0.02 rating.current");
+    i_zero.as_ref().map(|x| given(name, x)).or_else(|| u_dead.as_ref().map(|_| by_rule()))
 }
 
 #[cfg(test)]
@@ -84,6 +93,8 @@ mod tests {
         assert_eq!(of("[temperature]\nmagnet = -1.1e-3").unwrap(), [("magnet.alpha", Real(-1.1e-3))]);
         let period = ("inverter.T_pwm", Real(5e-5));
         assert_eq!(of("[inverter]\nr_diode = 0.1").unwrap(), [("inverter.r_diode", Real(0.1)), period.clone()]);
+        let dead = of("[inverter]\nu_dead = 5.4").unwrap();
+        assert_eq!(dead[0], ("inverter.i_zero", Real(0.02 * 15.0)));
         let dead = of("[inverter]\nu_dead = 5.4\ni_zero = 0.2").unwrap();
         assert_eq!(dead, [("inverter.i_zero", Real(0.2)), ("inverter.dead_time", Real(5.4 * 5e-5 / 540.0)), period]);
         assert_eq!(of("[inverter]\nf_sw = 8000.0").unwrap(), [("inverter.T_pwm", Real(1.25e-4))]);

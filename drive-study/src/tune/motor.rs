@@ -187,7 +187,7 @@ pub struct Inverter {
     pub f_sw: Option<Number>,
     /// Voltage in V that a leg loses to the dead time; none if omitted.
     pub u_dead: Option<Number>,
-    /// Current in A below which that voltage falls linearly to zero; 0.1 A if omitted.
+    /// Current in A below which that voltage falls linearly to zero; 2 % of the maximum current if omitted.
     pub i_zero: Option<Number>,
 }
 

@@ -58,7 +58,7 @@ pub(crate) struct Machine {
     pub(crate) u_dead: f64,
     pub(crate) bend: f64,
     pub(crate) threshold: f64,
-    knee: f64,
+    pub(crate) knee: f64,
     range: f64,
     sigma: f64,
     offset: [f64; 3],

@@ -114,14 +114,16 @@ fn figures() {
     }
 }
 
-/// The machine's file with its true values.
+/// The machine's file with its true values; the inverter's are what a leg loses at large currents, thresholds of the devices
+/// included, and a line of the same slope at zero.
 fn true_file(m: &Machine) -> String {
-    let Machine { n_p, R, L: [L_d, L_q], psi_M, J, B, tau_coulomb, u_dc, i_max, speed, torque, u_dead, bend, .. } = m;
+    let Machine { n_p, R, L: [L_d, L_q], psi_M, J, B, tau_coulomb, u_dc, i_max, speed, torque, .. } = m;
+    let u_dead = m.u_dead + m.threshold;
+    let i_zero = u_dead / (0.5 * m.u_dead / m.bend + m.threshold / m.knee);
     format!(
         "name = \"truth\"\nsource = \"drawn\"\n[machine]\nn_p = {n_p}\nR_s = {R:e}\nL_d = {L_d:e}\nL_q = {L_q:e}\npsi_M = {psi_M:e}\n\
          [mechanics]\nJ = {J:e}\nB = {B:e}\ntau_coulomb = {tau_coulomb:e}\n[rating]\nspeed = {speed:e}\ntorque = {torque:e}\n\
-         current = {i_max:e}\n[dc_link]\nu_dc = {u_dc:e}\n[inverter]\nu_dead = {u_dead:e}\ni_zero = {:e}\n",
-        2.0 * bend
+         current = {i_max:e}\n[dc_link]\nu_dc = {u_dc:e}\n[inverter]\nu_dead = {u_dead:e}\ni_zero = {i_zero:e}\n"
     )
 }
 
