@@ -198,7 +198,7 @@ impl<E: Exported> Instance<E> {
     /// The array does not have one element for each state.
     pub fn get_states(&mut self, out: &mut [f64]) -> Result<(), Fault> {
         count("nContinuousStates", out.len(), self.state_count())?;
-        self.refresh();
+        self.refresh_initial();
         let mut places = out.iter_mut();
         E::CAN.each_state(&mut self.current.block.model, |_, x| {
             if let Some(place) = places.next() {

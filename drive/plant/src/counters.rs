@@ -14,7 +14,7 @@
 use crate::circuit::Rates;
 use crate::integration::LONGEST_STEP;
 use crate::losses::flow::Switches;
-use crate::machine::{self, Machine};
+use crate::machine;
 use crate::model::PmsmPlant;
 use crate::power::Energy;
 use crate::signals::PlantInputs;
@@ -105,7 +105,7 @@ impl PmsmPlant {
     /// The rates with the flux linkage `psi` (Wb) in stator axes, the `speed` (rad/s) and the `angle` (rad).
     fn rates_at(&self, inputs: &PlantInputs, psi: AlphaBeta, speed: f64, angle: f64) -> Rates {
         let motor = self.motor(inputs);
-        let (machine, axis) = (Machine::<_>::new(&motor, self.parameters.magnetics()), axis_at(&motor, angle));
+        let (machine, axis) = (self.machine_of(&motor), axis_at(&motor, angle));
         let idle = self.blocked && inputs.is_off();
         let (psi, i) = if idle {
             let i = self.idle_current(&motor, speed);

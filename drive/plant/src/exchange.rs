@@ -15,7 +15,7 @@
 
 use crate::circuit::{Circuit, Rates, blocked_rates};
 use crate::losses::flow::{Dissipation, Path, Switches};
-use crate::machine::{self, Machine};
+use crate::machine;
 use crate::mechanics::{Shaft, Standstill};
 use crate::model::PmsmPlant;
 use crate::power::{Powers, dc_current};
@@ -23,7 +23,9 @@ use crate::signals::{PlantInputs, PlantOutputs};
 use crate::state::Instant;
 use crate::tables::PlantParameters;
 use crate::thermal::ThermalMode;
+use drive_base::connection::Measured;
 use drive_base::frame::{Axis, Phases, Rotor, Vector};
+use drive_base::math::wrap;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{
     CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
@@ -49,11 +51,7 @@ impl PmsmPlant {
         // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
-        let i = if idle {
-            self.idle_current(motor, speed)
-        } else {
-            Machine::<_>::new(motor, self.parameters.magnetics()).current(psi)
-        };
+        let i = if idle { self.idle_current(motor, speed) } else { self.machine_of(motor).current(psi) };
         Instant { psi, i, speed, angle, axis, idle }
     }
 
@@ -71,10 +69,11 @@ impl PmsmPlant {
     }
 
     /// Derivatives and powers at an instant.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "the derivatives need half of it")]
+    #[inline(always)]
     pub(super) fn rates<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> Rates<S> {
         let mechanics = &self.parameters.mechanics;
-        let machine = Machine::<_>::new(&self.motor(inputs), self.parameters.magnetics());
+        let machine = self.machine_of(&self.motor(inputs));
         let shaft = Shaft::new(mechanics, inputs.tau_load, Standstill::new(mechanics, at.speed.value()));
         if at.idle {
             return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
@@ -138,6 +137,15 @@ impl PmsmPlant {
     /// [`ContinuousTime::observe`] under these `inputs`.
     pub fn outputs_under(&self, inputs: &PlantInputs) -> PlantOutputs {
         self.outputs(inputs, &self.present(inputs))
+    }
+
+    /// What the sensors of a controller measure under these `inputs`: the same as in the outputs, to the last bit.
+    pub fn measured_under(&self, inputs: &PlantInputs) -> Measured {
+        let at = self.present(inputs);
+        let theta_e = wrap(at.angle * f64::from(self.parameters.motor.n_p));
+        let iron = !self.parameters.iron.is_none();
+        let i = if iron { at.axis.from_stator(self.rates(inputs, &at).i) } else { at.i };
+        Measured { i: Phases::from_stator(at.axis.to_stator(i)), theta_e, speed: at.speed }
     }
 
     /// [`Differentiable::tangent`] under these changing `inputs`.

@@ -4,7 +4,7 @@ use crate::counters::Point;
 use crate::flux_map;
 use crate::legs::Legs;
 use crate::losses::{Losses, efficiency};
-use crate::machine::{self, Machine};
+use crate::machine;
 use crate::power::Energy;
 use crate::power::Powers;
 use crate::signals::{Gates, PlantInputs, PlantOutputs};
@@ -112,8 +112,7 @@ impl PmsmPlant {
     ) -> PlantOutputs<S> {
         let motor = &self.parameters.motor;
         let &Instant { psi, speed, angle, axis, .. } = at;
-        let (theta, tau_e) =
-            (angle * f64::from(motor.n_p), Machine::<_>::new(motor, self.parameters.magnetics()).torque(psi, at.i));
+        let (theta, tau_e) = (angle * f64::from(motor.n_p), self.machine_of(motor).torque(psi, at.i));
         PlantOutputs {
             i: Phases::from_stator(axis.to_stator(i)),
             speed,

@@ -167,12 +167,10 @@ impl Events for PmsmDrive {
                 self.set_inputs();
             }
             // With iron loss, the currents depend on the voltages: the controller samples them before they change.
-            let shown = self.pair.plant.model.inputs.clone();
             let Pair { plant, controller, .. } = &mut self.pair;
-            plant.model.inputs.apply(self.before);
-            plant.model.observe(now, &mut plant.out);
-            plant.model.inputs = shown;
-            controller.model.inputs.measure(plant.out.measured());
+            let mut inputs = plant.model.inputs.clone();
+            inputs.apply(self.before);
+            controller.model.inputs.measure(plant.model.measured_under(&inputs));
             controller.model.sample()?;
             self.before = plant.model.inputs.commanded();
             self.watch_load();

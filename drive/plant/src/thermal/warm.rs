@@ -68,6 +68,12 @@ impl PmsmPlant {
         Machine::with(&self.warm.motor, self.parameters.magnetics(), self.warm.inverse)
     }
 
+    /// The machine of [`motor`](Self::motor), whose inductances no temperature changes.
+    #[inline]
+    pub(crate) fn machine_of<S: Scalar>(&self, motor: &Motor<S>) -> Machine<'_, S> {
+        Machine::with(motor, self.parameters.magnetics(), self.warm.inverse)
+    }
+
     /// The heat (W) of these `losses` (W) at the temperatures `at` (K) under these `inputs`.
     #[inline]
     pub fn heat<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Temperatures<S>, losses: &Losses<S>) -> Heat<S> {
