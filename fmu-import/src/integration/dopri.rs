@@ -36,15 +36,16 @@ pub(super) fn step<H: Hybrid>(system: &mut H, step: &mut Step) -> Result<(), Tri
 }
 
 /// Slopes of state `i` in the order of the weights.
-fn slopes(step: &Step, i: usize) -> impl Iterator<Item = f64> {
-    std::iter::once(step.f[i]).chain(step.k.iter().map(move |k| k[i])).chain(std::iter::once(step.f_end[i]))
+fn slopes(step: &Step, i: usize) -> [f64; 7] {
+    let [a, b, c, d, e] = step.k.each_ref().map(|k| k[i]);
+    [step.f[i], a, b, c, d, e, step.f_end[i]]
 }
 
 /// The error estimate relative to the tolerance, root mean square over the states: a step with at most 1 is good.
 pub(super) fn error(step: &Step, rtol: f64, nominals: &[f64]) -> f64 {
     let h = step.t_end - step.t;
     let of = |(i, nominal): (usize, &f64)| {
-        let e: f64 = h * slopes(step, i).zip(E).map(|(k, e)| e * k).sum::<f64>();
+        let e: f64 = h * slopes(step, i).iter().zip(E).map(|(k, e)| e * k).sum::<f64>();
         let size = nominal.max(step.x[i].abs()).max(step.x_end[i].abs());
         (e / (rtol * size)).powi(2)
     };
@@ -67,7 +68,7 @@ pub(super) fn interpolate(step: &Step, theta: f64, x: &mut [f64]) {
         let difference = step.x_end[i] - step.x[i];
         let start = h * step.f[i] - difference;
         let end = difference - h * step.f_end[i] - start;
-        let last = h * slopes(step, i).zip(D).map(|(k, d)| d * k).sum::<f64>();
+        let last = h * slopes(step, i).iter().zip(D).map(|(k, d)| d * k).sum::<f64>();
         *x = step.x[i] + theta * (difference + rest * (start + theta * (end + rest * last)));
     }
 }

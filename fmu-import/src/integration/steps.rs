@@ -11,7 +11,7 @@ pub(super) struct Step {
     pub(super) x_end: Vec<f64>,
     pub(super) f_end: Vec<f64>,
     /// The stages between.
-    pub(super) k: Vec<Vec<f64>>,
+    pub(super) k: [Vec<f64>; 5],
     /// A state of a stage.
     pub(super) trial: Vec<f64>,
 }
@@ -19,7 +19,7 @@ pub(super) struct Step {
 impl Step {
     pub(super) fn new(states: usize) -> Self {
         let zeros = || vec![0.0; states];
-        let k = (0..5).map(|_| zeros()).collect();
+        let k = std::array::from_fn(|_| zeros());
         Self { t: 0.0, t_end: 0.0, x: zeros(), f: zeros(), x_end: zeros(), f_end: zeros(), k, trial: zeros() }
     }
 
@@ -45,9 +45,14 @@ impl Step {
     }
 }
 
+/// `x + h (a_0 f + (a_1 k_0 + a_2 k_1 + ...))`, slope by slope: states are independent of one another.
 fn combine(to: &mut [f64], x: &[f64], h: f64, a: &[f64], f: &[f64], k: &[Vec<f64>]) {
-    for (i, to) in to.iter_mut().enumerate() {
-        let slope: f64 = a[0] * f[i] + a[1..].iter().zip(k).map(|(a, k)| a * k[i]).sum::<f64>();
-        *to = x[i] + h * slope;
+    // The neutral element of sums: -0 + x has the bits of x.
+    to.fill(-0.0);
+    for (a, k) in a[1..].iter().zip(k) {
+        to.iter_mut().zip(k).for_each(|(to, k)| *to += a * k);
+    }
+    for ((to, x), f) in to.iter_mut().zip(x).zip(f) {
+        *to = x + h * (a[0] * f + *to);
     }
 }
