@@ -107,7 +107,8 @@ pub struct Commissioning {
 impl Commissioning {
     /// One sample of an enabled controller with `commission_start` = `asked`, currents `i` (A) and link voltage `u_dc` (V).
     pub(crate) fn update(&mut self, par: &ControllerParameters, asked: bool, i: Phases, u_dc: f64) -> Turn {
-        let first = asked && !std::mem::replace(&mut self.asked, asked);
+        let before = std::mem::replace(&mut self.asked, asked);
+        let first = asked && !before;
         if !asked {
             // What has run until now leaves the machine without current for a sample.
             return if self.abort() { Turn::Rests } else { Turn::Works };

@@ -21,8 +21,8 @@ use drive_base::motor::Motor;
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, Elapsed, Enumerated, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
-    integrate,
+    Block, Elapsed, Enumerated, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal,
+    Warns, integrate,
 };
 use serde::{Deserialize, Serialize};
 
