@@ -5,6 +5,10 @@
 mod common;
 
 use common::python::{pytest, scratch};
+use drive::PmsmDrive;
+use drive::control::commission::CommissionState;
+use drive::control::commissioning::CommissionMode;
+use fmu_core::{Block, Constant, Elapsed, Model, Slot, Step};
 use std::path::Path;
 use std::process::Command;
 use std::{fs, process};
@@ -142,4 +146,47 @@ fn the_closed_loop_as_an_ssp() {
         fmu(&[&["simulate", &ssp, "--stop", "0.6", "--csv", &path(&format!("{name}.csv"))], &inputs[..]].concat());
     }
     pytest("fmpy", "ssp", &["test_ssp.py"], &[("FMU_SSP", &folder)]);
+}
+
+/// A drive commissions itself, natively: the bits that the packed one must have.
+#[test]
+fn self_commissioning() {
+    let mut drive = Block::<PmsmDrive>::default();
+    let commission = &mut drive.model.pair.controller.model.parameters.commission;
+    (commission.mode, commission.i, commission.speed) = (CommissionMode::Standstill, 7.5, 314.0);
+    let plant = &mut drive.model.pair.plant.model.parameters;
+    (plant.inverter.dead_time, plant.initial.theta_e) = (2e-6, 0.7);
+    drive.model.inputs.commission_start = true;
+    drive.initialize();
+    let (mut now, mut steps) = (Elapsed::ZERO, 0);
+    while drive.out.controller.commission_state != CommissionState::Done {
+        let step = Step { start: now, h: 5e-3 };
+        drive.step(&step).unwrap();
+        (now, steps) = (step.end(), steps + 1);
+        assert!(steps < 6000, "{:?}", drive.out.controller.commission_fault);
+    }
+    let table = PmsmDrive::TABLE;
+    let mut native = serde_json::Map::new();
+    for index in 0..table.len() {
+        let name = table.locate(index).unwrap().0;
+        if let Some((_, Slot::Constant(Constant::Real(x)))) = table.entry(&mut drive, index) {
+            native.insert(name, hexadecimal(x).into());
+        }
+    }
+    assert!(native.len() >= 20 && native["identified_R_s"] != hexadecimal(0.0), "{native:?}");
+    native.insert("steps".into(), steps.into());
+    let file = scratch().join(format!("commissioning-{}.json", process::id()));
+    fs::write(&file, serde_json::to_string(&native).unwrap()).unwrap();
+    pytest("fmpy", "commissioning", &["test_commissioning.py"], &[("FMU_COMMISSIONING", &file)]);
+    fs::remove_file(file).unwrap();
+}
+
+/// A number as Python's `float.fromhex` reads it.
+fn hexadecimal(x: f64) -> String {
+    let (bits, sign) = (x.to_bits(), if x.is_sign_negative() { "-" } else { "" });
+    let (exponent, fraction) = ((bits >> 52) & 0x7ff, bits & ((1 << 52) - 1));
+    match exponent {
+        0 => format!("{sign}0x0.{fraction:013x}p-1022"),
+        _ => format!("{sign}0x1.{fraction:013x}p{}", i64::try_from(exponent).unwrap() - 1023),
+    }
 }

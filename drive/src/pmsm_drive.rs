@@ -23,6 +23,7 @@ use crate::pair::Pair;
 use crate::{PmsmPlant, SensorlessController};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
+use drive_control::commissioning::IDENTIFIED;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
 use drive_plant::signals::{PlantInputs, PlantOutputs};
@@ -61,6 +62,8 @@ pub struct DriveInputs {
     pub asc: bool,
     /// The sensor of the shaft works.
     pub sensor_valid: bool,
+    /// The self-commissioning runs, unless `controller.commission.mode` is Off.
+    pub commission_start: bool,
     /// Temperatures in K.
     pub thermal: ThermalInputs,
 }
@@ -77,6 +80,7 @@ impl Default for DriveInputs {
             enable: true,
             asc: false,
             sensor_valid: true,
+            commission_start: false,
             thermal: ThermalInputs::default(),
         }
     }
@@ -139,6 +143,7 @@ impl PmsmDrive {
         // There is no voltage to control with.
         controller.enable = inputs.enable && !link.precharges;
         controller.sensor_valid = inputs.sensor_valid;
+        controller.commission_start = inputs.commission_start;
     }
 
     /// Voltage of the DC-link capacitor in V; 0 without the link.
@@ -197,7 +202,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 17;
+    const STATE_VERSION: u16 = 18;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -390,6 +395,13 @@ pub(crate) const INPUTS: &Table<DriveInputs> = table![
                 |i| &mut i.sensor_valid,
             )
             .optional(),
+            I::boolean_input(
+                "commission_start",
+                "A rising edge starts the self-commissioning that controller.commission.mode selects, while the drive is enabled; false \
+                 aborts it, and the controller works",
+                |i| &mut i.commission_start,
+            )
+            .optional(),
             I::input(
                 "u_dc",
                 &VOLT,
@@ -413,6 +425,7 @@ type V = Row<Block<PmsmDrive>>;
 const TABLE: &Table<Block<PmsmDrive>> = table![
     V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
     V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: IDENTIFIED, lens: |m| m.model.pair.controller.model.commissioning_mut() }),
     V::part("", &Part { table: plant::FLUX, lens: |m| m.model.pair.plant.model.flux_mut() }),
     V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.pair.plant.model.parameters }),
     V::part(

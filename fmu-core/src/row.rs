@@ -49,6 +49,7 @@ pub(crate) enum Access<W: 'static> {
     List(&'static dyn List<W>),
     Text(fn(&mut W) -> &mut String),
     Said(fn(&W) -> &str),
+    Computed(fn(&W) -> f64),
     Binary(fn(&mut W) -> &mut Bytes),
     ConstantText(&'static str),
     Constant(Constant),
@@ -73,7 +74,7 @@ pub(crate) enum Access<W: 'static> {
 /// Real numbers, continuous or sampled:
 ///
 /// ```
-/// # use fmu_core::unit::{AMPERE, KELVIN, OHM, Quantity, VOLT};
+/// # use fmu_core::unit::{AMPERE, KELVIN, OHM, Quantity, VOLT, WATT};
 /// # use fmu_core::{Row, Table, table};
 /// # #[derive(Default)] struct Model { u: f64, u_k: f64, i: f64, i_k: f64, x: f64, x_k: f64, r: f64, g: f64, band: f64 }
 /// # type V = Row<Model>;
@@ -83,6 +84,7 @@ pub(crate) enum Access<W: 'static> {
 ///     V::discrete_input("u_k", &VOLT, "Read at sample instants", |m| &mut m.u_k).at_least(-5.0).at_most(5.0),
 ///     V::output("i", &AMPERE, "Continuous", |m| &mut m.i).mean(),
 ///     V::discrete_output("i_k", &AMPERE, "Changes at sample instants", |m| &mut m.i_k),
+///     V::computed_output("p_k", &WATT, "Discrete, read from the state by a function", |m| m.u_k * m.i_k),
 ///     V::state("x", &VOLT, "For inspection, continuous", |m| &mut m.x).unbounded().nominal(10.0),
 ///     V::discrete_local("x_k", &VOLT, "For inspection, sampled", |m| &mut m.x_k),
 ///     V::parameter("R", &OHM, "Fixed after initialization", |m| &mut m.r).above(0.0).below(1e6),

@@ -426,6 +426,7 @@ fn find_rare<'a, W: 'static>(row: &'static Row<W>, whole: &'a mut W, inner: usiz
         Access::Clock(interval) => Slot::Clock(interval.map(|get| get(whole))),
         Access::Binary(get) => Slot::Binary(get(whole)),
         Access::ConstantText(text) => Slot::Said(text),
+        Access::Computed(compute) => Slot::Constant(Constant::Real(compute(whole))),
         Access::Constant(x) => Slot::Constant(*x),
         Access::Constants(all) => Slot::Constant(Constant::Real(*all.get(inner)?)),
         _ => return None,

@@ -10,7 +10,7 @@ use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Standard, State};
 use crate::message;
 use crate::snapshot::{Snapshot, ramps};
-use fmu_core::{Block, Causality, Elapsed, Exported, Fault, Kind, Meta, Model, Slot, Step, Variability};
+use fmu_core::{Block, Causality, Constant, Elapsed, Exported, Fault, Kind, Meta, Model, Slot, Step, Variability};
 
 /// Parts into which a step with changing inputs is divided: each uses the inputs at its middle.
 const PARTS: u32 = 32;
@@ -288,7 +288,10 @@ impl<E: Exported> Instance<E> {
         tangent(&current.block.model, current.elapsed, along, &mut dx[..now], change).map_err(Refusal::Discard)?;
         E::CAN.spread(&mut direction.model, dx);
         for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-            *out += pick::<E>(&mut scratch.block, &scratch.dx, index::<E>(unknown));
+            // A computed output is discrete: held.
+            if !matches!(E::Model::TABLE.entry(&mut scratch.block, index::<E>(unknown)), Some((_, Slot::Constant(_)))) {
+                *out += pick::<E>(&mut scratch.block, &scratch.dx, index::<E>(unknown));
+            }
         }
         Self::finite(unknowns, out)
     }
@@ -507,6 +510,7 @@ fn clear<E: Exported>(direction: &mut Block<E::Model>) {
 fn real<M: Model>(block: &mut Block<M>, index: usize) -> f64 {
     match M::TABLE.entry(block, index) {
         Some((_, Slot::Real(x))) => *x,
+        Some((_, Slot::Constant(Constant::Real(x)))) => x,
         _ => f64::NAN,
     }
 }

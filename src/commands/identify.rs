@@ -4,6 +4,9 @@ use crate::{pack, release};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use drive_study::identify::columns::{Naming, Signals};
+use drive_study::identify::electrical::Fit;
+use drive_study::identify::run::commissioned;
+use drive_study::identify::verdict::Quantity;
 use drive_study::identify::{self, Identified, Options, machine_file, page};
 use std::path::PathBuf;
 
@@ -12,18 +15,28 @@ use std::path::PathBuf;
 /// RECORD.csv has one row per sample of the controller: time t, voltage, current, electrical angle theta, and where they are known
 /// u_dc and the load torque. A header may name a unit: `i_a [mA]`, `speed [rpm]`. docs/identify.md lists the forms of columns.
 ///
+/// With --run, the record is a run of the self-commissioning in PmsmDrive or SensorlessController, as `fmu simulate --csv` writes it: the
+/// values are the outputs identified_* of its last row.
+///
 /// Each value has an interval (95 %), or a reason why this record does not tell it. Exit status: 0 if all values are written, 1 if
 /// one is refused, 2 for a wrong record, of which nothing is written.
 ///
 ///   fmu identify bench.csv --n-p 3 --current 15 --out target/motor.toml
 ///   fmu identify bench.csv --n-p 3 --current 15 --html bench.html
 ///   fmu identify bench.csv --n-p 4 --map u_a=Vph1,u_b=Vph2,u_c=Vph3 --unit speed=rpm --load none --json
+///   fmu identify --run run.csv --n-p 3 --current 15 --speed 157 --torque 14 --u-dc 540 --given psi_M=0.545,J=0.015 --out motor.toml
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Identify {
     /// Record of a running drive
-    #[arg(value_name = "RECORD.csv")]
-    pub record: PathBuf,
+    #[arg(value_name = "RECORD.csv", required_unless_present = "run", conflicts_with = "run")]
+    pub record: Option<PathBuf>,
+    /// Recording of a self-commissioning instead: its last row has the values
+    #[arg(long, value_name = "RUN.csv", conflicts_with_all = ["delay", "every", "rate", "map", "unit", "zero", "load"])]
+    pub run: Option<PathBuf>,
+    /// Values of the machine file that a commissioning does not tell: psi_M=0.545,J=0.015
+    #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', requires = "run")]
+    pub given: Vec<String>,
     /// Machine file to write, for `fmu tune`; its name without .toml names the machine
     #[arg(long, value_name = "MOTOR.toml")]
     pub out: Option<PathBuf>,
@@ -77,46 +90,87 @@ pub struct Identify {
 /// The record or an option is wrong, or the file cannot be written.
 pub fn run(args: &Identify) -> Result<bool> {
     let options = options(args)?;
-    let file = args.record.display().to_string();
-    let bytes = std::fs::read(&args.record).with_context(|| format!("reading {file}"))?;
+    let path = args.run.as_ref().or(args.record.as_ref()).context("RECORD.csv is missing")?;
+    let file = path.display().to_string();
+    let bytes = std::fs::read(path).with_context(|| format!("reading {file}"))?;
     let text = String::from_utf8_lossy(&bytes);
-    let found = identify::identify(&Signals::parse(&text, &file, &options.naming)?, &options)?;
     let name = |path: &PathBuf| path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let name = args.out.as_ref().or(Some(&args.record)).and_then(name).unwrap_or_else(|| "motor".into());
+    let name = args.out.as_ref().or(Some(path)).and_then(name).unwrap_or_else(|| "motor".into());
     let source = format!("fmu identify of {file} (sha256 {})", release::sha256(&bytes));
-    if let Some(out) = &args.out {
-        ensure!(
-            out.extension().is_some_and(|e| e == "toml"),
-            "--out {}: expected a file name with .toml",
-            out.display()
-        );
-        pack::write(out, machine_file::text(&found, &name, &source).as_bytes())?;
-    }
-    if let Some(html) = &args.html {
-        pack::write(html, page::page(&found, &file)?.as_bytes())?;
-    }
-    if args.json {
-        println!("{:#}", found.json());
+    let html = args.html.is_some();
+    let result = if args.run.is_some() {
+        let found = commissioned(&text, &file, &options)?;
+        Written {
+            machine: found.text(&name, &source),
+            page: html.then(|| page::commissioning(&found, &file)).transpose()?,
+            json: found.json(),
+            rows: rows(found.values.iter().chain(&found.more)) + &notes(&found.notes),
+            whole: found.values.iter().all(|v| v.refused.is_none()),
+        }
     } else {
-        print(&found);
+        let found = identify::identify(&Signals::parse(&text, &file, &options.naming)?, &options)?;
+        Written {
+            machine: machine_file::text(&found, &name, &source),
+            page: html.then(|| page::page(&found, &file)).transpose()?,
+            json: found.json(),
+            rows: rows(found.values.iter()) + &facts(&found) + &notes(&found.notes),
+            whole: found.values.iter().all(|v| v.refused.is_none()),
+        }
+    };
+    result.write(args)?;
+    Ok(result.whole)
+}
+
+/// What the command writes.
+struct Written {
+    machine: String,
+    page: Option<String>,
+    json: serde_json::Value,
+    rows: String,
+    /// Every value is written.
+    whole: bool,
+}
+
+impl Written {
+    fn write(&self, args: &Identify) -> Result<()> {
+        if let Some(out) = &args.out {
+            ensure!(
+                out.extension().is_some_and(|e| e == "toml"),
+                "--out {}: expected a file name with .toml",
+                out.display()
+            );
+            pack::write(out, self.machine.as_bytes())?;
+        }
+        if let (Some(html), Some(page)) = (&args.html, &self.page) {
+            pack::write(html, page.as_bytes())?;
+        }
+        if args.json {
+            println!("{:#}", self.json);
+            return Ok(());
+        }
+        print!("{}", self.rows);
         for (k, written) in args.out.iter().chain(&args.html).enumerate() {
             println!("{}{}", if k == 0 { "\n" } else { "" }, written.display());
         }
+        Ok(())
     }
-    Ok(found.values.iter().all(|v| v.refused.is_none()))
 }
 
 fn options(args: &Identify) -> Result<Options> {
     let pairs = |option: &str, list: &[String]| {
         let pair = |text: &String| match text.split_once('=') {
             Some((name, other)) => Ok((name.trim().to_owned(), other.trim().to_owned())),
-            None => bail!("{option} {text}: expected COLUMN=..., for example {option} u_a=Vph1"),
+            None => bail!("{option} {text}: expected NAME=..., for example --map u_a=Vph1"),
         };
         list.iter().map(pair).collect::<Result<Vec<_>>>()
     };
     let zero = args.zero.as_deref().map(|text| {
         let both = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
         both.with_context(|| format!("--zero {text}: expected two times in s, for example --zero 0:0.05"))
+    });
+    let given = pairs("--given", &args.given)?.into_iter().map(|(name, value)| {
+        let number = value.parse().with_context(|| format!("--given {name}={value}: expected a number"))?;
+        Ok((name, number))
     });
     let mut map = pairs("--map", &args.map)?;
     let no_load = args.load.as_deref() == Some("none");
@@ -135,23 +189,35 @@ fn options(args: &Identify) -> Result<Options> {
         rate: args.rate,
         zero: zero.transpose()?,
         no_load,
+        given: given.collect::<Result<_>>()?,
     })
 }
 
-/// Prints the values and the notes.
-fn print(found: &Identified) {
-    for value in &found.values {
+/// The values, one a line.
+fn rows<'a>(values: impl Iterator<Item = &'a Quantity>) -> String {
+    let row = |value: &Quantity| {
         let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value);
         let width = format!("+-{:.2} %", 100.0 * value.half_width);
+        let width = if value.half_width.is_nan() { "given".to_owned() } else { width };
         match &value.refused {
-            None => println!("{:12}{number:>12} {:10}{width:>11}", value.name, value.unit),
-            Some(why) => println!("{:12}{:>12} {:10}{:>11}  refused: {why}", value.name, "-", value.unit, ""),
+            None => format!("{:12}{number:>12} {:10}{width:>11}\n", value.name, value.unit),
+            Some(why) => format!("{:12}{:>12} {:10}{:>11}  refused: {why}\n", value.name, "-", value.unit, ""),
         }
-    }
-    println!("\nsensor of the angle: offset {:.4} rad, delay {:.1} us", found.fit.theta_0, found.fit.tau * 1e6);
-    println!("the voltage of a row acts {} samples later", found.timing.delay);
-    println!("rest of the fit: {:.3} V; noise explains {:.3} V", found.fit.rest, found.fit.noise);
-    for note in &found.notes {
-        println!("\nnote: {note}");
-    }
+    };
+    values.map(row).collect()
+}
+
+/// What the fit says besides its values.
+fn facts(found: &Identified) -> String {
+    let Fit { theta_0, tau, rest, noise, .. } = found.fit;
+    format!(
+        "\nsensor of the angle: offset {theta_0:.4} rad, delay {:.1} us\nthe voltage of a row acts {} samples later\nrest of the fit: {rest:.3} V; \
+         noise explains {noise:.3} V\n",
+        tau * 1e6,
+        found.timing.delay
+    )
+}
+
+fn notes(notes: &[String]) -> String {
+    notes.iter().map(|note| format!("\nnote: {note}\n")).collect()
 }

@@ -5,6 +5,7 @@
 //! - [`windows`]: the voltage equations in integral form; [`electrical`]: their linear fit; [`legs`]: the inverter's curve in it.
 //! - [`mechanics`]: inertia and friction. [`interval`]: half-widths. [`verdict`]: what is written and what is refused.
 //! - [`machine_file`]: the file for `fmu tune`. [`page`]: the fits beside the record.
+//! - [`run`]: the machine of a run of the self-commissioning instead.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -23,6 +24,7 @@ pub mod mechanics;
 pub mod motion;
 pub mod page;
 pub mod record;
+pub mod run;
 pub mod verdict;
 pub mod windows;
 
@@ -65,6 +67,8 @@ pub struct Options {
     pub zero: Option<(f64, f64)>,
     /// There is no load.
     pub no_load: bool,
+    /// Values that a commissioning does not tell, by their names in a motor file.
+    pub given: Vec<(String, f64)>,
 }
 
 /// The result.
@@ -112,26 +116,24 @@ pub struct Ratings {
     pub u_dc: Option<f64>,
 }
 
+impl Ratings {
+    fn json(&self) -> serde_json::Value {
+        let rating = |(x, given): (f64, bool)| serde_json::json!({ "value": x, "given": given });
+        serde_json::json!({
+            "current": rating(self.current),
+            "speed": rating(self.speed),
+            "torque": rating(self.torque),
+        })
+    }
+}
+
 impl Identified {
     /// The result for other programs: values with unit, relative half-width and reason, and the fit.
     pub fn json(&self) -> serde_json::Value {
-        let value = |v: &Quantity| {
-            let known = v.refused.is_none();
-            let number = |x: f64| (known && x.is_finite()).then_some(x);
-            let data = serde_json::json!({
-                "value": number(v.value), "half_width": number(v.half_width), "unit": v.unit, "refused": v.refused,
-            });
-            (v.name.to_owned(), data)
-        };
-        let rating = |(x, given): (f64, bool)| serde_json::json!({ "value": x, "given": given });
         serde_json::json!({
-            "values": self.values.iter().map(value).collect::<serde_json::Map<_, _>>(),
+            "values": self.values.iter().map(Quantity::json).collect::<serde_json::Map<_, _>>(),
             "n_p": self.n_p,
-            "rating": {
-                "current": rating(self.ratings.current),
-                "speed": rating(self.ratings.speed),
-                "torque": rating(self.ratings.torque),
-            },
+            "rating": self.ratings.json(),
             "u_dc": self.ratings.u_dc,
             "angle": { "offset": self.fit.theta_0, "delay": self.fit.tau },
             "voltage_delay": self.timing.delay,
@@ -238,6 +240,9 @@ impl Options {
             if let Some(x) = x {
                 ensure!(x > 0.0 && x.is_finite(), "{name} {x}: expected a number above 0");
             }
+        }
+        for (name, x) in &self.given {
+            ensure!(*x > 0.0 && x.is_finite(), "--given {name}={x}: expected a number above 0");
         }
         if let Some(n_p) = self.n_p {
             ensure!((1..=200).contains(&n_p), "--n-p {n_p}: expected 1 to 200");

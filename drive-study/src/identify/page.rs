@@ -1,9 +1,13 @@
 //! A page with the values, and each fit beside the record: voltages over time, flux linkages over currents, torque over time, and
 //! friction over speed.
 
+use super::run::Commissioned;
+use super::verdict::Quantity;
 use super::windows::Window;
 use super::{Identified, Seen};
 use anyhow::Result;
+use drive::control::commission::CommissionState;
+use fmu_core::Enumerated;
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, REFERENCE};
 use fmu_plot::page::{self, escape};
@@ -21,42 +25,76 @@ const STEADY: f64 = 0.03;
 /// # Errors
 /// Those of [`page::figure`].
 pub fn page(found: &Identified, file: &str) -> Result<String> {
-    let refused = found.values.iter().filter(|v| v.refused.is_some()).count();
+    drawn(file, &found.values, &found.notes, &figures(found))
+}
+
+/// The page of a commissioning: its values, and the run. `file` is the name of the recording.
+///
+/// # Errors
+/// Those of [`page::figure`].
+pub fn commissioning(found: &Commissioned, file: &str) -> Result<String> {
+    let (time, signals) = &found.seen;
+    let x: Rc<[f64]> = time.as_slice().into();
+    let panels = [
+        ("commission_state", "commission_state"),
+        ("i_", "currents"),
+        ("u_", "voltage references"),
+        ("speed", "speed"),
+    ]
+    .into_iter()
+    .filter_map(|(start, title)| {
+        let of = || signals.iter().filter(|(name, ..)| name.starts_with(start));
+        let unit = of().next()?.1;
+        let curves = of().zip(CURVES).map(|((name, _, y), ink)| Curve::new(name, ink, &x, y.clone())).collect();
+        Some(panel(title, unit, curves))
+    })
+    .collect();
+    let figure = Figure { title: "Run".into(), x: "time in s", columns: 1, panels };
+    let states = CommissionState::ALL.iter().map(|state| format!("{} {}", state.value(), state.name()));
+    let text = format!("The numbers of commission_state: {}.", states.collect::<Vec<_>>().join(", "));
+    let values: Vec<_> = found.values.iter().chain(&found.more).cloned().collect();
+    drawn(file, &values, &found.notes, &[(figure, &text)])
+}
+
+/// A page of values, notes, and figures with what they show.
+fn drawn(file: &str, values: &[Quantity], notes: &[String], figures: &[(Figure, &str)]) -> Result<String> {
+    let refused = values.iter().filter(|v| v.refused.is_some()).count();
     let (class, verdict) = match refused {
         0 => ("", "all values are written".to_owned()),
-        _ => (" off", format!("{} of {} values are written", found.values.len() - refused, found.values.len())),
+        _ => (" off", format!("{} of {} values are written", values.len() - refused, values.len())),
     };
-    let mut html = format!("<p class=\"verdict{class}\">{verdict}</p>\n{}", table(found));
+    let mut html = format!("<p class=\"verdict{class}\">{verdict}</p>\n{}", table(values));
     html.push_str("<ul class=\"notes\">\n");
-    for note in &found.notes {
+    for note in notes {
         let _ = writeln!(html, "<li>{}</li>", escape(note));
     }
     html.push_str("</ul>\n");
-    for (figure, text) in figures(found) {
-        if figure.is_empty() {
-            continue;
-        }
-        let drawn = page::figure(&figure, "The plot needs JavaScript.")?;
+    for (figure, text) in figures.iter().filter(|(figure, _)| !figure.is_empty()) {
+        let drawn = page::figure(figure, "The plot needs JavaScript.")?;
         let _ = write!(html, "<h2>{}</h2>\n<p>{text}</p>\n{drawn}", escape(&figure.title));
     }
     Ok(page::page(&format!("Machine of {file}"), &html))
 }
 
 /// The values with their intervals, or with the reasons why there is none.
-fn table(found: &Identified) -> String {
+fn table(values: &[Quantity]) -> String {
     let mut html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"values\"><table>\n<thead><tr><th class=\"name\">quantity</th>\
         <th class=\"number\">value</th><th>unit</th><th class=\"number\">interval</th><th>verdict</th></tr></thead>\n<tbody>\n"
         .to_owned();
-    for value in &found.values {
+    for value in values {
         let _ = write!(html, "<tr><th class=\"name\">{}</th>", value.name);
         let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value).to_string();
         let unit = value.unit;
         let _ = match &value.refused {
             None => writeln!(
                 html,
-                "<td class=\"number\">{}</td><td>{unit}</td><td class=\"number\">± {:.2} %</td><td class=\"in\">written</td></tr>",
+                "<td class=\"number\">{}</td><td>{unit}</td><td class=\"number\">{}</td><td class=\"in\">written</td></tr>",
                 number.replace('-', "−"),
-                100.0 * value.half_width
+                if value.half_width.is_nan() {
+                    "given".into()
+                } else {
+                    format!("± {:.2} %", 100.0 * value.half_width)
+                }
             ),
             Some(why) => writeln!(
                 html,

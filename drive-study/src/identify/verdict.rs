@@ -21,10 +21,22 @@ pub struct Quantity {
     pub unit: &'static str,
     /// The value, whether it is written or not.
     pub value: f64,
-    /// Relative half-width of the interval (95 %).
+    /// Relative half-width of the interval (95 %); NaN: the value is given.
     pub half_width: f64,
     /// Why it is not written, and what helps.
     pub refused: Option<String>,
+}
+
+impl Quantity {
+    /// Its name, and the rest for other programs.
+    pub(super) fn json(&self) -> (String, serde_json::Value) {
+        let known = self.refused.is_none();
+        let number = |x: f64| (known && x.is_finite()).then_some(x);
+        let data = serde_json::json!({
+            "value": number(self.value), "half_width": number(self.half_width), "unit": self.unit, "refused": self.refused,
+        });
+        (self.name.to_owned(), data)
+    }
 }
 
 /// What the record shows, beside the fit.

@@ -84,6 +84,7 @@ impl SensorlessController {
             u_share,
             weakens,
             R_s_est,
+            ..ControllerOutputs::default()
         }
     }
 
@@ -251,7 +252,7 @@ impl SensorlessController {
 }
 
 /// The voltage `u` (V) limited to the hexagon of `u_dc` (V), and whether it was outside.
-fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
+pub(super) fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
     let span = Phases::from_stator(u).span();
     (limit_span(u, span, u_dc), span > u_dc)
 }

@@ -11,6 +11,7 @@
 pub mod battery;
 pub mod clocked;
 pub mod commission;
+pub mod commissioning;
 pub mod current;
 mod cycle;
 pub mod documentation;

@@ -1,7 +1,10 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
 use crate::battery;
+use crate::commission::{CommissionFault, CommissionState};
+use crate::commissioning::{self, CommissionMode, Held, IDENTIFIED, Turn};
 use crate::current;
+use crate::cycle::within_hexagon;
 use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
 use crate::gains::Gains;
 use crate::lock::{LOST, Lock};
@@ -13,12 +16,13 @@ use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
 use crate::trip::{self, Cause, Trip};
 use crate::weakening;
 use crate::zero_speed::{self, ZeroSpeed};
+use drive_base::frame::Phases;
 use drive_base::motor::Motor;
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
-    Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal, Warns,
-    integrate,
+    Block, Elapsed, Enumerated, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal,
+    Warns, integrate,
 };
 use serde::{Deserialize, Serialize};
 
@@ -39,9 +43,15 @@ pub struct SensorlessController {
     pub(super) tuned: bool,
     pub(super) in_use: InUse,
     pub(super) state: State,
+    commissioning: Held,
 }
 
 impl SensorlessController {
+    /// The self-commissioning, unless `commission.mode` is Off.
+    pub fn commissioning_mut(&mut self) -> &mut Held {
+        &mut self.commissioning
+    }
+
     /// The outputs that are visible now: the results of the last sample but one.
     #[inline]
     pub fn shown(&self) -> &ControllerOutputs {
@@ -52,10 +62,13 @@ impl SensorlessController {
     /// non-finite, the controller restarts at rest from its last angle and reports the loss.
     fn compute(&mut self) {
         if !self.inputs.enable || self.inputs.asc {
-            self.state.computed = self.rest();
+            self.stop();
             return;
         }
         if (self.parameters.trip.used || !self.inputs.sensor_valid) && self.protect() {
+            return;
+        }
+        if self.commissioning.is_some() && self.commissions() {
             return;
         }
         let theta = self.state.computed.theta_est;
@@ -112,11 +125,41 @@ impl SensorlessController {
         let Self { inputs, parameters: par, state, .. } = self;
         let sensor = par.estimator == Kind::Sensored && inputs.sensor_valid && !state.sensor_lost;
         state.trip.update(par, inputs, sensor);
-        self.state.computed = self.rest();
+        self.stop();
         true
     }
 
-    /// Not enabled, or the machine is short-circuited: resets everything except the sample grid and the displayed outputs.
+    /// Takes the sample for the self-commissioning; returns whether the controller does not work.
+    #[cold]
+    #[inline(never)]
+    fn commissions(&mut self) -> bool {
+        let (i, &ControllerInputs { commission_start, u_dc, .. }) = (self.currents(), &self.inputs);
+        let Some(commissioning) = &mut self.commissioning else { return false };
+        match commissioning.update(&self.parameters, commission_start, i, u_dc) {
+            Turn::Works => return false,
+            Turn::Rests => self.state.computed = self.rest(),
+            Turn::Commissions { voltage, first } => {
+                if first {
+                    self.state.computed = self.rest();
+                }
+                let (u, voltage_limited) = within_hexagon(voltage.u, u_dc);
+                let out = &mut self.state.computed;
+                *out = ControllerOutputs { u: Phases::from_stator(u), enabled: voltage.gates, voltage_limited, ..*out };
+            }
+        }
+        true
+    }
+
+    /// Rests, and ends a self-commissioning that runs.
+    #[cold]
+    fn stop(&mut self) {
+        if let Some(commissioning) = &mut self.commissioning {
+            commissioning.rest(self.inputs.commission_start);
+        }
+        self.state.computed = self.rest();
+    }
+
+    /// Not enabled, short-circuited, or before and after a self-commissioning: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
         let sensor_lost = self.inputs.enable && self.state.sensor_lost;
@@ -206,6 +249,7 @@ impl SensorlessController {
         let u_dc = if self.state.samples == 0 { u_dc } else { 0.0 };
         weakening::validate(par, u_dc)?;
         trip::validate(par, u_dc)?;
+        commissioning::validate(par)?;
         battery::validate(par)?;
         // The start value is accepted with an estimator that does not read it.
         let reads = estimator.class() == Class::FluxObserver;
@@ -239,7 +283,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 14;
+    const STATE_VERSION: u16 = 15;
 
     fn derive(&mut self) {
         if !self.tuned {
@@ -265,8 +309,10 @@ impl Model for SensorlessController {
 
     fn initialize(&mut self) {
         self.lose_sensor(false);
-        let ControllerInputs { enable, asc, .. } = self.inputs;
-        self.state = State::new(&self.parameters, enable && !asc);
+        let ControllerInputs { enable, asc, commission_start, .. } = self.inputs;
+        let commissions = self.parameters.commission.mode != CommissionMode::Off;
+        self.commissioning = commissions.then(Box::default);
+        self.state = State::new(&self.parameters, enable && !asc && !(commissions && commission_start));
         self.state.shown.short_circuit = asc;
         self.tuned = false;
     }
@@ -292,12 +338,19 @@ impl Sampled for SensorlessController {
     fn show(&mut self) {
         if std::mem::take(&mut self.state.hidden) {
             self.state.shown.clone_from(&self.state.computed);
+            if let Some(commissioning) = &mut self.commissioning {
+                commissioning.show();
+            }
         }
     }
 
     fn sample(&mut self) -> Result<(), Fault> {
         self.finite()?;
         self.compute();
+        if let Some(commissioning) = &self.commissioning {
+            let out = &mut self.state.computed;
+            (out.commission_state, out.commission_fault) = commissioning.status();
+        }
         self.state.hidden = true;
         self.state.samples += 1;
         Ok(())
@@ -324,6 +377,17 @@ impl Warns for SensorlessController {
                 )
             });
         }
+        if self.inputs.commission_start && out.commission_state == CommissionState::Refused {
+            return log.warn("commission", || {
+                let why = out.commission_fault;
+                let about = CommissionFault::ENUMERATION.items.iter().find(|item| item.value == why.value());
+                format!(
+                    "the self-commissioning is refused, commission_fault = {}: {}; the gates are off until commission_start falls",
+                    why.name(),
+                    about.map_or("", |item| item.description)
+                )
+            });
+        }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || clipped(tau_ref, [out.tau_min, out.tau_max]));
@@ -337,6 +401,8 @@ impl Warns for SensorlessController {
             enabled: true,
             sensor_lost: out.sensor_lost,
             R_s_est: out.R_s_est,
+            commission_state: out.commission_state,
+            commission_fault: out.commission_fault,
             ..ControllerOutputs::default()
         };
         if *out == restarted {
@@ -397,7 +463,15 @@ pub(crate) const ROWS: &[V] = const {
         &mut m.model.inputs.sensor_valid
     })
     .optional(),
+    V::boolean_input(
+        "commission_start",
+        "A rising edge starts the self-commissioning that commission.mode selects, while the controller is enabled; false aborts it, and \
+         the controller works",
+        |m| &mut m.model.inputs.commission_start,
+    )
+    .optional(),
     V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: IDENTIFIED, lens: |m| &mut m.model.commissioning }),
     V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
 ]
 };

@@ -1,5 +1,6 @@
 //! Inputs and outputs of the controller.
 
+use crate::commission::{CommissionFault, CommissionState};
 use crate::trip::Cause;
 use drive_base::connection::{Commanded, Measured};
 use drive_base::frame::{DqHat, Phases};
@@ -27,6 +28,8 @@ pub struct ControllerInputs {
     pub asc: bool,
     /// The sensor of the shaft works.
     pub sensor_valid: bool,
+    /// The self-commissioning runs, unless `commission.mode` is Off.
+    pub commission_start: bool,
 }
 
 impl ControllerInputs {
@@ -38,7 +41,7 @@ impl ControllerInputs {
 
     /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
-        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, enable: _, asc: _, sensor_valid: _ } = self;
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, .. } = self;
         all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
     }
 }
@@ -55,6 +58,7 @@ impl Default for ControllerInputs {
             enable: true,
             asc: false,
             sensor_valid: true,
+            commission_start: false,
         }
     }
 }
@@ -97,6 +101,10 @@ pub struct ControllerOutputs {
     pub weakens: bool,
     /// Resistance in Ohm that the estimator uses: adapted, or the controller's estimate.
     pub R_s_est: f64,
+    /// What the self-commissioning does.
+    pub commission_state: CommissionState,
+    /// Why the self-commissioning has stopped.
+    pub commission_fault: CommissionFault,
 }
 
 impl ControllerOutputs {

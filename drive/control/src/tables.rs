@@ -1,6 +1,7 @@
 //! The controller's parameters, and the tables of its parameters and outputs.
 
 use crate::battery::{DC_LIMITS, DcLimits};
+use crate::commissioning::{COMMISSION, CommissionParameters};
 use crate::current::{CURRENT_LOOP, CurrentLoop};
 use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
@@ -140,6 +141,8 @@ pub struct ControllerParameters {
     pub fallback: Kind,
     /// Dead-time compensation.
     pub compensation: Compensation,
+    /// Self-commissioning.
+    pub commission: CommissionParameters,
     /// Parameters of the estimators.
     pub estimators: EstimatorParameters,
 }
@@ -170,6 +173,7 @@ impl Default for ControllerParameters {
             sensor: Sensor::default(),
             fallback: Kind::Sensored,
             compensation: Compensation::default(),
+            commission: CommissionParameters::default(),
             estimators: EstimatorParameters::default(),
         }
     }
@@ -248,6 +252,7 @@ pub(crate) const PARAMETER_ROWS: &[P] = const {
             &Field(|p| &mut p.fallback),
         ),
         P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
+        P::part("commission.", &Part { table: COMMISSION, lens: |p| &mut p.commission }),
         P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
     ]
 };
@@ -321,6 +326,16 @@ pub const STATUS: &Table<ControllerOutputs> = table![
         &OHM,
         "Stator resistance that the estimator uses: motor.R_s, or what adaptation.resistance makes of it",
         |o| &mut o.R_s_est,
+    ),
+    O::enumeration_output(
+        "commission_state",
+        "What the self-commissioning does: it ends with Done or Refused",
+        &Field(|o| &mut o.commission_state),
+    ),
+    O::enumeration_output(
+        "commission_fault",
+        "Why the self-commissioning was refused",
+        &Field(|o| &mut o.commission_fault),
     ),
 ];
 

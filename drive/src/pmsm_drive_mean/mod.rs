@@ -26,6 +26,7 @@ use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part, sam
 use crate::steady::{Condition, Point, Steady};
 use drive_base::frame::Dq;
 use drive_base::math::all_finite;
+use drive_control::commissioning::{Held, IDENTIFIED};
 use drive_control::model::clipped;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables as control;
@@ -65,6 +66,8 @@ pub struct PmsmDriveMean {
     held: ControllerOutputs,
     /// Time in s for which the torque reference has been beyond its limits.
     clipped_for: f64,
+    /// None: a drive in its steady state does not commission itself.
+    commissioning: Held,
 }
 
 impl Default for PmsmDriveMean {
@@ -84,6 +87,7 @@ impl Default for PmsmDriveMean {
             moved: false,
             held: ControllerOutputs::default(),
             clipped_for: 0.0,
+            commissioning: None,
         }
     }
 }
@@ -303,6 +307,7 @@ type V = Row<Block<PmsmDriveMean>>;
 const TABLE: &Table<Block<PmsmDriveMean>> = table![
     V::part("", &Part { table: INPUTS, lens: |m| &mut m.model.inputs }),
     V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out.drive }),
+    V::part("", &Part { table: IDENTIFIED, lens: |m| &mut m.model.commissioning }),
     V::part("", &Part { table: plant::FLUX, lens: |m| &mut m.out.psi }),
     V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.drive.plant }),
     V::part("controller.", &Part { table: control::PARAMETERS, lens: |m| &mut m.model.drive.controller }),

@@ -6,6 +6,7 @@ use crate::pmsm_drive::Means;
 use crate::steady::{Point, Region, within};
 use drive_base::frame::{Axis, Phases, Rotor};
 use drive_base::math::wrap;
+use drive_control::commission::{CommissionFault, CommissionState};
 use drive_control::signals::{ControllerOutputs, DqParts};
 use drive_control::trip::Cause;
 use drive_plant::losses::efficiency;
@@ -75,6 +76,8 @@ impl PmsmDriveMean {
             tripped: Cause::None,
             sensor_lost: false,
             R_s_est: self.drive.controller.motor.R_s,
+            commission_state: CommissionState::Idle,
+            commission_fault: CommissionFault::None,
         }
     }
 }

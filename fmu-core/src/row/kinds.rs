@@ -167,6 +167,18 @@ impl<W: 'static> Row<W> {
         Self::new(name, description, Kind::Text, Access::Said(say)).with(Causality::Output, Variability::Discrete)
     }
 
+    /// A real output that changes at sample instants and has no place of its own: `compute` reads it from the state, without an
+    /// allocation.
+    pub const fn computed_output(
+        name: &'static str,
+        quantity: &'static Quantity,
+        description: &'static str,
+        compute: fn(&W) -> f64,
+    ) -> Self {
+        let row = Self::new(name, description, Kind::Real(quantity), Access::Computed(compute));
+        row.with(Causality::Output, Variability::Discrete)
+    }
+
     /// A text that never changes, for inspection: a revision, a source.
     pub const fn text_constant(name: &'static str, description: &'static str, text: &'static str) -> Self {
         Self::new(name, description, Kind::Text, Access::ConstantText(text)).constant_local()

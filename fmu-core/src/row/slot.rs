@@ -6,7 +6,7 @@ use crate::integer::Whole;
 use crate::variable::{Kind, Meta};
 use std::hash::{DefaultHasher, Hasher as _};
 
-/// The value of a constant that is not a text.
+/// A value other than a text that nothing can set: a constant, or computed from the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Constant {
     /// A real number.
@@ -40,7 +40,7 @@ pub enum Slot<'a> {
     Said(&'a str),
     /// A clock, and its interval in s if the importer may set it.
     Clock(Option<&'a mut f64>),
-    /// A constant.
+    /// A constant, or a computed value.
     Constant(Constant),
     /// Bytes.
     Binary(&'a mut Bytes),
@@ -79,6 +79,7 @@ impl Slot<'_> {
             Self::Said(x) => hash(*x),
             Self::Binary(x) => hash::<[u8]>(x),
             Self::Clock(x) => x.as_ref().map_or(0, |x| x.to_bits()),
+            Self::Constant(Constant::Real(x)) => x.to_bits(),
             Self::Constant(_) => 0,
         }
     }

@@ -31,7 +31,7 @@ mod results;
 mod sequence;
 mod swing;
 
-pub use results::{Identified, Results};
+pub use results::{Identified, LIMIT_DEAD, LIMIT_L, LIMIT_R, Results};
 pub use sequence::{Commission, CommissionSetup, Voltage};
 
 use fmu_core::enumeration;

@@ -8,9 +8,12 @@ use serde::{Deserialize, Serialize};
 
 /// Greatest residual of a loop over its amplitude, along d and q.
 const RESIDUAL: [f64; 2] = [0.02, 0.01];
-/// Greatest half-widths of R_s and of the inductances.
-const LIMIT_R: f64 = 0.01;
-const LIMIT_L: f64 = 0.05;
+/// Greatest half-widths of R_s, of the inductances, and of the dead time.
+pub const LIMIT_R: f64 = 0.01;
+/// See [`LIMIT_R`].
+pub const LIMIT_L: f64 = 0.05;
+/// See [`LIMIT_R`].
+pub const LIMIT_DEAD: f64 = 0.5;
 
 /// A value and the half-width of its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,10 +82,10 @@ impl Results {
             Identified::within(value, u, limit)
         };
         self.R_s = of(a.R, b.R, bench.R, LIMIT_R);
-        self.u_dead = of(a.u_dead, b.u_dead, bench.u_dead, 0.5);
+        self.u_dead = of(a.u_dead, b.u_dead, bench.u_dead, LIMIT_DEAD);
         // The tails of dead time and threshold differ from 1/i: twice the half-width holds 95 % of the values.
         let double = |x: [f64; 2]| [2.0 * x[0], 4.0 * x[1]];
-        self.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * bench.i_x, 0.5);
+        self.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * bench.i_x, LIMIT_DEAD);
     }
 
     /// Inductances, refused where the loops do not agree or do not fit; without the axis, neither chords nor saturation.

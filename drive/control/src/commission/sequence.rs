@@ -196,6 +196,11 @@ impl Commission {
         }
     }
 
+    /// Whether it has neither ended nor stopped.
+    pub fn is_running(&self) -> bool {
+        !self.is_over()
+    }
+
     fn is_over(&self) -> bool {
         matches!(self.stage, Stage::Done | Stage::Refused)
     }

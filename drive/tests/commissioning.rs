@@ -1,0 +1,316 @@
+//! Self-commissioning inside the controller: when it runs and when it ends, the drive that has the bits of the pair, and states
+//! that are saved and restored on the way.
+#![allow(missing_docs, non_snake_case)]
+
+use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Results};
+use drive::control::commissioning::CommissionMode;
+use drive::control::trip::Cause;
+use drive::motor::Motor;
+use drive::plant::signals::Gates;
+use drive::{Pair, PmsmDrive, SensorlessController};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, ContinuousTime, Elapsed, Model, Slot, Step, Warns, integrate};
+
+const T_S: f64 = 1e-4;
+
+/// The 2.2 kW machine with the estimator of the default, whose controller waits for `commission_start`.
+fn set(controller: &mut SensorlessController) {
+    let par = &mut controller.parameters;
+    (par.motor, par.J, par.s_2) = (Motor::IPMSM_2_2_KW, 0.015, 40.0);
+    (par.limit.i, par.limit.i_q) = (15.0, 15.0);
+    (par.commission.mode, par.commission.i, par.commission.speed) = (CommissionMode::Standstill, 15.0, 157.0);
+}
+
+fn pair() -> Pair {
+    let mut pair = Pair::default();
+    set(&mut pair.controller.model);
+    let plant = &mut pair.plant.model.parameters;
+    (plant.motor, plant.mechanics.J, plant.initial.theta_e) = (Motor::IPMSM_2_2_KW, 0.015, 0.5);
+    (plant.inverter.dead_time, plant.inverter.i_zero) = (1e-6, 0.1);
+    pair.controller.model.parameters.sensor.noise = 0.01;
+    pair.controller.model.parameters.sensor.offset.a = 0.05;
+    pair.set_inputs(0.0, 0.0, 540.0);
+    pair
+}
+
+fn started() -> Pair {
+    let mut pair = pair();
+    pair.controller.model.inputs.commission_start = true;
+    pair.start().unwrap();
+    pair
+}
+
+fn status(pair: &Pair) -> (State, Fault) {
+    (pair.controller.out.commission_state, pair.controller.out.commission_fault)
+}
+
+fn gates(pair: &Pair) -> Gates {
+    pair.plant.model.inputs.gates()
+}
+
+fn results(pair: &mut Pair) -> Results {
+    *pair.controller.model.commissioning_mut().as_ref().unwrap().shown()
+}
+
+fn steps(pair: &mut Pair, n: usize) {
+    for _ in 0..n {
+        pair.step(T_S).unwrap();
+    }
+}
+
+/// Runs until it is in this state, for 60 s at most.
+fn until(pair: &mut Pair, state: State) {
+    for _ in 0..600_000 {
+        if status(pair).0 == state {
+            return;
+        }
+        pair.step(T_S).unwrap();
+    }
+    panic!("{state:?} does not come: {:?}", status(pair));
+}
+
+const STATES: [State; 7] =
+    [State::Offsets, State::Probe, State::Align, State::Resistance, State::Swing, State::Axes, State::Saturation];
+
+#[test]
+fn it_ends_with_results_that_stay_until_the_next_start() {
+    let mut pair = started();
+    assert!(!pair.controller.out.enabled, "the gates are off from the beginning");
+    until(&mut pair, State::Done);
+    assert_eq!(status(&pair).1, Fault::None);
+    let found = results(&mut pair);
+    let motor = Motor::IPMSM_2_2_KW;
+    for (value, truth) in [(found.R_s, motor.R_s), (found.L_d, motor.L_d), (found.L_q, motor.L_q), (found.u_dead, 5.4)]
+    {
+        assert!(value.u < 0.05 && (value.value / truth - 1.0).abs() < 0.01, "{value:?} {truth}");
+    }
+    // As long as it is asked for, nothing else happens.
+    pair.set_inputs(50.0, 0.0, 540.0);
+    steps(&mut pair, 2000);
+    assert!(gates(&pair) == Gates::Off && !pair.controller.out.enabled);
+    assert!(pair.plant.out.speed.abs() < 0.1, "{} rad/s: the machine coasts", pair.plant.out.speed);
+    // Then the controller works, and the values stay.
+    pair.controller.model.inputs.commission_start = false;
+    steps(&mut pair, 20_000);
+    assert!(gates(&pair) == Gates::Switch && (pair.plant.out.speed / 50.0 - 1.0).abs() < 0.05);
+    assert_eq!((status(&pair), results(&mut pair)), ((State::Done, Fault::None), found));
+    // A start while it turns is refused. Another one forgets the values.
+    pair.controller.model.inputs.commission_start = true;
+    steps(&mut pair, 3);
+    assert_eq!((status(&pair).0, results(&mut pair), gates(&pair)), (State::Offsets, Results::default(), Gates::Off));
+    until(&mut pair, State::Refused);
+    steps(&mut pair, 1);
+    assert_eq!((status(&pair), gates(&pair)), ((State::Refused, Fault::NotFollowing), Gates::Off));
+    let mut said = String::new();
+    pair.controller.model.warn(&mut Warnings::to(&mut |(_, _, text)| said += &text()));
+    assert!(said.contains("commission_fault = NotFollowing: The rotor turns at the start"), "{said}");
+}
+
+/// The current that the controller has held at rest does not count as an offset.
+#[test]
+fn the_current_before_the_start_is_no_offset() {
+    let mut pair = pair();
+    pair.start().unwrap();
+    steps(&mut pair, 5000);
+    assert!(pair.controller.out.i_ref.d > 4.0, "the low-speed law holds 5 A");
+    pair.controller.model.inputs.commission_start = true;
+    until(&mut pair, State::Probe);
+    let stored = serde_json::to_value(&pair.controller.model).unwrap();
+    let sequence = &stored["commissioning"]["sequence"];
+    let [sigma, a] = [&sequence["bench"]["sigma"], &sequence["offset"]["a"]].map(|x| x.as_f64().unwrap());
+    assert!((0.006..0.01).contains(&sigma), "noise of 10 mA in three phases: {sigma}");
+    assert!((a - 0.05 * 2.0 / 3.0).abs() < 1e-3, "without the common part of the phases: {a}");
+}
+
+#[test]
+fn an_abort_opens_the_gates_at_once_in_every_state() {
+    let mut pair = started();
+    for state in STATES {
+        until(&mut pair, state);
+        steps(&mut pair, 7);
+        for how in 0..4 {
+            let mut aborted = pair.clone();
+            let model = &mut aborted.controller.model;
+            match how {
+                0 => model.inputs.commission_start = false,
+                1 => model.inputs.enable = false,
+                2 => model.inputs.asc = true,
+                _ => (model.parameters.trip.used, model.parameters.trip.u_dc, model.inputs.u_dc) = (true, 550.0, 551.0),
+            }
+            // The sample that sees it, and the exchange that brings its command to the plant.
+            steps(&mut aborted, 1);
+            assert_eq!(status(&aborted), (State::Refused, Fault::Aborted), "{state:?} {how}");
+            assert!(!aborted.controller.out.enabled && aborted.controller.out.u == drive::frame::Phases::default());
+            steps(&mut aborted, 1);
+            assert_eq!(gates(&aborted), if how == 2 { Gates::Short } else { Gates::Off }, "{state:?} {how}");
+            let tripped = if how == 3 { Cause::OverVoltage } else { Cause::None };
+            assert_eq!(aborted.controller.out.tripped, tripped);
+            if how == 1 {
+                // Enabled again, it does not begin by itself, and the controller waits for the end of the request.
+                aborted.controller.model.inputs.enable = true;
+                steps(&mut aborted, 10);
+                assert_eq!((status(&aborted), gates(&aborted)), ((State::Refused, Fault::Aborted), Gates::Off));
+            }
+            if how < 2 {
+                aborted.controller.model.inputs.commission_start = false;
+                steps(&mut aborted, 3);
+                assert!(aborted.controller.out.enabled && status(&aborted) == (State::Refused, Fault::Aborted));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_link_that_falls_by_a_fifth_and_too_little_time_are_named() {
+    for state in STATES {
+        let mut pair = started();
+        until(&mut pair, state);
+        steps(&mut pair, 300);
+        pair.set_inputs(0.0, 0.0, 430.0);
+        steps(&mut pair, 2);
+        assert_eq!((status(&pair), gates(&pair)), ((State::Refused, Fault::Voltage), Gates::Off), "{state:?}");
+        if state == State::Resistance {
+            break;
+        }
+    }
+    let mut pair = started();
+    pair.controller.model.parameters.commission.t_max = 0.5;
+    pair.start().unwrap();
+    until(&mut pair, State::Refused);
+    assert_eq!(status(&pair).1, Fault::Time);
+}
+
+#[test]
+fn a_rising_edge_counts_while_the_controller_is_enabled() {
+    let mut pair = pair();
+    pair.controller.model.inputs.enable = false;
+    pair.start().unwrap();
+    steps(&mut pair, 3);
+    pair.controller.model.inputs.commission_start = true;
+    steps(&mut pair, 3);
+    pair.controller.model.inputs.enable = true;
+    steps(&mut pair, 3000);
+    assert_eq!((status(&pair), gates(&pair)), ((State::Idle, Fault::None), Gates::Off));
+    pair.controller.model.inputs.commission_start = false;
+    steps(&mut pair, 3);
+    pair.controller.model.inputs.commission_start = true;
+    steps(&mut pair, 2);
+    assert_eq!(status(&pair).0, State::Offsets);
+}
+
+/// Without a mode, the input has no effect, nothing is allocated, and the outputs say that nothing is known.
+#[test]
+fn off_it_is_not_there() {
+    let mut off = pair();
+    off.controller.model.parameters.commission = Default::default();
+    let mut asked = off.clone();
+    asked.controller.model.inputs.commission_start = true;
+    (off.start().unwrap(), asked.start().unwrap());
+    for _ in 0..2000 {
+        (off.step(T_S).unwrap(), asked.step(T_S).unwrap());
+        assert!(off.controller.out == asked.controller.out && off.plant.out == asked.plant.out);
+    }
+    assert!(asked.controller.model.commissioning_mut().is_none());
+    assert_eq!(shown(&mut asked.controller, "identified_R_s"), 0.0);
+    assert_eq!(shown(&mut asked.controller, "identified_R_s_u"), 1.0);
+    assert!(asked.controller.out.enabled);
+}
+
+fn shown<M: Model>(block: &mut Block<M>, name: &str) -> f64 {
+    let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(found, ..)| found == name)).unwrap();
+    match M::TABLE.entry(block, index) {
+        Some((_, Slot::Constant(fmu_core::Constant::Real(x)))) => x,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+#[test]
+fn a_current_above_the_limit_is_refused_before_the_start() {
+    let mut pair = pair();
+    pair.controller.model.parameters.commission.i = 15.1;
+    let fault = pair.controller.model.validate().unwrap_err();
+    assert_eq!(fault.message(), "commission.i = 15.1 A is not allowed: at most limit.i = 15 A");
+    pair.controller.model.parameters.commission.mode = CommissionMode::Off;
+    pair.controller.model.validate().unwrap();
+}
+
+fn drive() -> Block<PmsmDrive> {
+    let mut drive = Block::<PmsmDrive>::default();
+    drive.model.pair = pair();
+    (drive.model.inputs.u_dc, drive.model.inputs.commission_start) = (540.0, true);
+    drive.initialize();
+    drive.model.validate().unwrap();
+    drive
+}
+
+/// Bit for bit: the drive in steps of 1 ms, the pair in steps of T_s.
+#[test]
+fn the_drive_is_the_pair() {
+    let (mut pair, mut drive) = (started(), drive());
+    let (mut now, mut done) = (Elapsed::ZERO, 0);
+    for k in 0..30_000 {
+        let start = k != 25_000;
+        pair.controller.model.inputs.commission_start = start;
+        drive.model.inputs.commission_start = start;
+        steps(&mut pair, 10);
+        let step = Step { start: now, h: 1e-3 };
+        drive.step(&step).unwrap();
+        now = step.end();
+        assert!(drive.out.controller == pair.controller.out && drive.out.plant.i == pair.plant.out.i, "{k} ms");
+        for name in ["identified_R_s", "identified_L_q_u"] {
+            assert_eq!(
+                shown(&mut drive, name).to_bits(),
+                shown(&mut pair.controller, name).to_bits(),
+                "{k} ms: {name}"
+            );
+        }
+        done += u32::from(status(&pair).0 == State::Done);
+    }
+    assert!(done > 1000 && status(&pair).0 != State::Done, "a second start");
+}
+
+/// In Model Exchange the sequence comes to the same values.
+#[test]
+fn model_exchange_finds_the_same_resistance() {
+    let (mut pair, mut drive, mut now) = (started(), drive(), Elapsed::ZERO);
+    while shown(&mut drive, "identified_R_s") == 0.0 {
+        let step = Step { start: now, h: T_S };
+        integrate::hybrid::<PmsmDrive, 5>(&mut drive.model, &step, 1e-5).unwrap();
+        now = step.end();
+        let Block { model, out } = &mut drive;
+        model.observe(now, out);
+        assert!(now.seconds() < 15.0 && out.controller.commission_fault == Fault::None);
+    }
+    until(&mut pair, State::Axes);
+    let [here, there] = [shown(&mut drive, "identified_R_s"), shown(&mut pair.controller, "identified_R_s")];
+    assert!((here / there - 1.0).abs() < 1e-5, "{here} {there}");
+}
+
+/// Stored in the middle of each state and restored, the drive has the same bits.
+#[test]
+fn a_restored_drive_is_the_same_drive() {
+    let (mut whole, mut restored) = (started(), started());
+    let (mut seen, mut last, mut since) = (vec![], State::Idle, 0);
+    while status(&whole).0 != State::Done {
+        since = if status(&whole).0 == last { since + 1 } else { 0 };
+        last = status(&whole).0;
+        if since == 40 {
+            seen.push(last);
+            let bytes = postcard::to_stdvec(&restored).unwrap();
+            restored = started();
+            steps(&mut restored, 500);
+            restored = postcard::from_bytes(&bytes).unwrap();
+        }
+        (steps(&mut whole, 1), steps(&mut restored, 1));
+        assert!(whole.controller.out == restored.controller.out && whole.plant.out == restored.plant.out, "{last:?}");
+    }
+    assert!(whole.controller.model == restored.controller.model);
+    assert!(STATES.iter().all(|state| seen.contains(state)), "{seen:?}");
+}
+
+/// A controller without commissioning is hardly larger than before.
+#[test]
+fn the_default_is_small() {
+    let (with, without) = (size_of::<drive::control::commission::Commission>(), size_of::<SensorlessController>());
+    assert!(with > 20_000 && without < 4000, "{with} and {without} bytes");
+}
