@@ -43,6 +43,7 @@ const MAX_SAMPLES: f64 = 1e6;
 
 /// Inputs, held over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a variable")]
 pub struct DriveInputs {
     /// Mechanical speed reference in rad/s.
     pub speed_ref: f64,

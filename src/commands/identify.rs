@@ -219,5 +219,5 @@ fn facts(found: &Identified) -> String {
 }
 
 fn notes(notes: &[String]) -> String {
-    notes.iter().map(|note| format!("\nnote: {note}\n")).collect()
+    notes.iter().fold(String::new(), |all, note| all + "\nnote: " + note + "\n")
 }

@@ -45,7 +45,7 @@ pub fn commissioning(found: &Commissioned, file: &str) -> Result<String> {
     .filter_map(|(start, title)| {
         let of = || signals.iter().filter(|(name, ..)| name.starts_with(start));
         let unit = of().next()?.1;
-        let curves = of().zip(CURVES).map(|((name, _, y), ink)| Curve::new(name, ink, &x, y.clone())).collect();
+        let curves = of().zip(CURVES).map(|((name, _, y), ink)| Curve::new(*name, ink, &x, y.clone())).collect();
         Some(panel(title, unit, curves))
     })
     .collect();

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Inputs, read at the sample instants.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a variable")]
 pub struct ControllerInputs {
     /// Measured stator currents in A.
     pub i: Phases,
