@@ -1,9 +1,9 @@
 //! Self-commissioning inside the controller: when it runs and when it ends, the drive that has the bits of the pair, and states
 //! that are saved and restored on the way.
-#![allow(missing_docs, non_snake_case)]
+#![allow(missing_docs, non_snake_case, clippy::float_cmp)]
 
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Results};
-use drive::control::commissioning::CommissionMode;
+use drive::control::commissioning::{CommissionMode, CommissionParameters};
 use drive::control::trip::Cause;
 use drive::motor::Motor;
 use drive::plant::signals::Gates;
@@ -202,12 +202,14 @@ fn a_rising_edge_counts_while_the_controller_is_enabled() {
 #[test]
 fn off_it_is_not_there() {
     let mut off = pair();
-    off.controller.model.parameters.commission = Default::default();
+    off.controller.model.parameters.commission = CommissionParameters::default();
     let mut asked = off.clone();
     asked.controller.model.inputs.commission_start = true;
-    (off.start().unwrap(), asked.start().unwrap());
+    off.start().unwrap();
+    asked.start().unwrap();
     for _ in 0..2000 {
-        (off.step(T_S).unwrap(), asked.step(T_S).unwrap());
+        off.step(T_S).unwrap();
+        asked.step(T_S).unwrap();
         assert!(off.controller.out == asked.controller.out && off.plant.out == asked.plant.out);
     }
     assert!(asked.controller.model.commissioning_mut().is_none());
@@ -301,7 +303,8 @@ fn a_restored_drive_is_the_same_drive() {
             steps(&mut restored, 500);
             restored = postcard::from_bytes(&bytes).unwrap();
         }
-        (steps(&mut whole, 1), steps(&mut restored, 1));
+        steps(&mut whole, 1);
+        steps(&mut restored, 1);
         assert!(whole.controller.out == restored.controller.out && whole.plant.out == restored.plant.out, "{last:?}");
     }
     assert!(whole.controller.model == restored.controller.model);
