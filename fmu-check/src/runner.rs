@@ -47,8 +47,12 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     }
     let runner = Runner::new(fmu, options);
     check_file(fmu, &of_file, options.deadline());
+    let by_exchange = |check: &Check| match (check.run, &runner) {
+        (Run::Any(_), Ok(runner)) => runner.simulation.is_none(),
+        _ => is_exchange(check),
+    };
     let [simulates, exchanges] = [false, true].map(|exchange| {
-        let mut checks = queue.iter().filter(|(check, _)| exchange == is_exchange(check));
+        let mut checks = queue.iter().filter(|(check, _)| exchange == by_exchange(check));
         checks.next().and_then(|_| why_no_run_succeeds(&runner, if exchange { "E00" } else { "L00" }))
     });
     let queue = Mutex::new(queue);
@@ -56,8 +60,8 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     let work = || {
         while let Some((check, verdict)) = take(&queue) {
             let why = match check.run {
-                Run::Exchange(_) => &exchanges,
                 Run::Scheduled(_) => &None,
+                _ if by_exchange(check) => &exchanges,
                 _ => &simulates,
             };
             let found = match (&runner, why) {
@@ -202,6 +206,8 @@ pub(super) struct Runner {
 
 /// Checks whose calls have wild arguments: a hang shows sooner there.
 const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
+/// Checks of what a second instance does; in all others, one that hangs is only in the way.
+const SEVERAL: [&str; 8] = ["L04a", "L04b", "L04c", "B05d", "G07a", "F03a", "F04a", "E14"];
 
 /// How a probe's process ended.
 enum Outcome {
@@ -259,7 +265,10 @@ impl Runner {
             _ => (&self.simulation, "co-simulation"),
         };
         let any = || self.exchange.as_ref().or(self.scheduled.as_ref());
-        let other = || any().filter(|_| WITHOUT_INSTANCE.contains(&check.id));
+        let other = || match check.run {
+            Run::Any(_) => self.exchange.as_ref(),
+            _ => any().filter(|_| WITHOUT_INSTANCE.contains(&check.id)),
+        };
         let Some(binary) = binary.as_ref().or_else(other) else {
             return Verdict::NotApplicable(format!("the FMU has no interface for {interface}")).into();
         };
@@ -438,6 +447,12 @@ impl Runner {
                 "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
+            Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => {
+                Err(format!(
+                    "{} {how} within {limit} s, and that of the first instance did: see L04a",
+                    call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
+                ))
+            }
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
             // The limit is the checker's own.
             Outcome::End(end) if end.describe().contains("SIGXFSZ") => Err(format!(
@@ -465,6 +480,17 @@ impl Runner {
 fn read(out: &Path) -> Vec<Line> {
     let text = fs::read_to_string(out).unwrap_or_default();
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// Whether a call is one of a further instance, and the same function of the first instance of the case has returned.
+fn is_of_second(call: &str, out: &Path) -> bool {
+    let Some((_, call)) = call.get(2..).filter(|c| c.starts_with('[')).and_then(|c| c.split_once("] ")) else {
+        return false;
+    };
+    let function = call.split('(').next().unwrap_or_default();
+    let log = fs::read_to_string(out.with_extension("log")).unwrap_or_default();
+    let case = log.rsplit("# case ").next().unwrap_or_default();
+    case.lines().any(|line| line.strip_prefix(function).is_some_and(|rest| rest.contains(" -> ")))
 }
 
 /// The calls of the first case with a finding: that with the mark, or the last one.

@@ -97,6 +97,8 @@ pub(super) struct Session {
     /// The level of a crash, if it is lower than that of the check.
     lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
+    /// A getter has returned OK and written nothing.
+    pub(super) unwritten: Cell<bool>,
     /// The step of the integrator in s, if it is not the usual one.
     pub(super) integrator: Cell<Option<f64>>,
     log: RefCell<File>,
@@ -152,6 +154,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(false),
+            unwritten: Cell::new(false),
             integrator: Cell::new(args.integrator),
             log: RefCell::new(log),
             trace: args.trace,
@@ -195,6 +198,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(true),
+            unwritten: Cell::new(false),
             integrator: self.integrator.clone(),
             log: RefCell::new(tempfile::tempfile().map_err(lost)?),
             trace: false,
@@ -347,6 +351,11 @@ impl Session {
         self.of_case.get()
     }
 
+    /// How many instances this case has made.
+    pub(super) fn made_in_case(&self) -> usize {
+        self.of_case.get()
+    }
+
     /// Tells the parent, from time to time, that calls without entries of their own return.
     fn show_progress(&self) {
         if self.shown.get().elapsed() < Duration::from_millis(100) {
@@ -396,7 +405,10 @@ impl Session {
             name: Some(text(name)),
             token: Some(text(&self.description.token)),
             resources: Some(text(&resources)),
-            interface: Interface::CoSimulation,
+            interface: match self.description.co_simulation {
+                Some(_) => Interface::CoSimulation,
+                None => Interface::ModelExchange,
+            },
             logger: true,
             callbacks: true,
             memory: true,
@@ -449,9 +461,10 @@ impl Session {
         std::fs::read_dir(self.resources()).is_ok_and(|mut files| files.next().is_some())
     }
 
-    /// A capability.
+    /// A capability of co-simulation, or of Model Exchange where there is no co-simulation.
     pub(super) fn flag(&self, name: &str) -> bool {
-        self.description.co_simulation.as_ref().is_some_and(|c| c.flag(name))
+        let d = &self.description;
+        d.co_simulation.as_ref().or(d.model_exchange.as_ref()).is_some_and(|i| i.flag(name))
     }
 
     /// Variables whose values are numbers, which all probes can compare.

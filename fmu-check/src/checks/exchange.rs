@@ -2,6 +2,9 @@
 
 use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
+use super::exchange_held::{completed_step, mode_alone, pure, same_bits};
+use super::held::set_all;
+use super::state::in_initialization;
 use crate::check::{Check, Level, Levels, Run};
 use crate::exchange::{Importer, UNSTABLE, deviation, differ};
 use crate::instance::Instance;
@@ -9,7 +12,7 @@ use crate::session::{Line, NotDetermined, Session};
 use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
-use model_description::{BaseType, Causality, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable};
 use std::cell::Cell;
 
 const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
@@ -44,14 +47,16 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Continuous states that are set can be read back, as a vector and as variables.",
         tried: "Sets the states and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
     Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
-        requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.",
-        tried: "Evaluates derivatives in other orders, repeatedly and in another instance, and compares.",
+        requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls \
+            (should: event indicators, and a time that goes back to the last completed step).",
+        tried: "Evaluates both in other orders, repeatedly and in another instance, and compares.",
         fix: "Mark cached results as old in every Set function." },
     Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
         requirement: "Equal time, states and inputs give equal derivatives, bit for bit.",
         tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory." },
     Check { id: "E07", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step),
-        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.",
+        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states, derivatives, inputs, \
+            parameters nor the time.",
         tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing." },
     Check { id: "E08", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent),
         requirement: "The independent variable is the time that SetTime set.",
@@ -72,8 +77,8 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "The vector of derivatives has the values of the variables that are the derivatives.",
         tried: "Reads both at several points.", fix: "Let both functions read one value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
-        requirement: "EnterContinuousTimeMode and EnterEventMode change no state.",
-        tried: "Reads the states before and after each change of the mode.", fix: "Reinitialize states in the update of the discrete states only." },
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, input or parameter, nor the time.",
+        tried: "Reads them before and after each change of the mode.", fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
         requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
         tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },
@@ -220,7 +225,7 @@ fn declared_nominals(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// States near those given, one of them or all moved a little.
-fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
+pub(super) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
     let nominal = session.description.states();
     let size = |i: usize| nominal.get(i).and_then(|v| v.nominal).unwrap_or(1.0).abs().max(x[i].abs());
     x.iter().enumerate().map(|(i, x)| if i == k || k >= nominal.len() { x + 1e-3 * size(i) } else { *x }).collect()
@@ -244,102 +249,6 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
         session.require(status.is_ok() && found == one, || {
             format!("the state {} was set to {one:?}, but getting it returned {status}, {found:?}", v.name)
-        });
-    }
-    Ok(())
-}
-
-/// Derivatives at one point, each evaluated after something else has happened.
-fn evaluations(session: &Session) -> Result<Vec<(&'static str, Vec<f64>)>, NotDetermined> {
-    let begin = || -> Result<_, NotDetermined> {
-        let instance = session.excited()?;
-        let mut importer = Importer::start(&instance)?;
-        importer.run(50, &mut |_| Ok(()))?;
-        let over = importer.over;
-        Ok((instance, over))
-    };
-    let (instance, over) = begin()?;
-    if over {
-        return Err(NotDetermined("the FMU ends the simulation at once".into()));
-    }
-    let (t, x) = (instance.time.get(), instance.states()?);
-    let inputs: Vec<(&ModelVariable, Vec<u64>)> = session
-        .number_inputs()
-        .filter(|v| v.variability == Variability::Continuous)
-        .filter_map(|v| Some((v, session.different_value(v, 3.0)?)))
-        .collect();
-    let point = |instance: &Instance<'_>, order: [usize; 3]| -> Result<(), NotDetermined> {
-        for what in order {
-            match what {
-                0 => instance.must("SetTime", instance.set_time(t)?)?,
-                1 => instance.must("SetContinuousStates", instance.set_states(&x)?)?,
-                _ => {
-                    for (v, values) in &inputs {
-                        instance.must("Set", instance.set(v, values)?)?;
-                    }
-                }
-            }
-        }
-        Ok(())
-    };
-    point(&instance, [0, 1, 2])?;
-    let mut found = vec![("first", instance.derivatives()?), ("read twice", instance.derivatives()?)];
-    let _ = instance.snapshot(&session.watched())?;
-    let _ = instance.indicators()?;
-    found.push(("after outputs and indicators", instance.derivatives()?));
-    for (k, what) in [(0, "after another state"), (usize::MAX, "after other states")] {
-        instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, k))?)?;
-        let _ = instance.derivatives()?;
-        instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
-        let _ = instance.derivatives()?;
-        point(&instance, [1, 2, 0])?;
-        found.push((what, instance.derivatives()?));
-    }
-    let (other, _) = begin()?;
-    point(&other, [2, 1, 0])?;
-    found.push(("in another instance, set in another order", other.derivatives()?));
-    Ok(found)
-}
-
-fn pure(session: &Session) -> Result<(), NotDetermined> {
-    needs_states!(session);
-    let found = evaluations(session)?;
-    let (_, first) = &found[0];
-    for (what, values) in &found[1..] {
-        if let Some((_, largest)) = deviation(std::slice::from_ref(first), std::slice::from_ref(values)) {
-            session.deviates(largest, &format!("the derivatives are {first:?}; {what}, {values:?}"));
-        }
-    }
-    Ok(())
-}
-
-fn same_bits(session: &Session) -> Result<(), NotDetermined> {
-    needs_states!(session);
-    let found = evaluations(session)?;
-    let (_, first) = &found[0];
-    for (what, values) in &found[1..] {
-        let same = first.iter().zip(values).all(|(a, b)| a.to_bits() == b.to_bits());
-        session.require(same, || format!("the derivatives are {first:?}; {what}, {values:?}"));
-    }
-    Ok(())
-}
-
-fn completed_step(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.exchange(State::Continuous)?;
-    for k in 0..5 {
-        instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
-        let before = [instance.states()?, instance.derivatives()?];
-        let (status, flags) = instance.completed()?;
-        session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
-            format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
-        });
-        if !status.is_ok() || flags != [0, 0] {
-            return Ok(());
-        }
-        let after = [instance.states()?, instance.derivatives()?];
-        let changed = before.iter().zip(&after).any(|(a, b)| differ(a, b));
-        session.require(!changed, || {
-            format!("step {k}: states and derivatives were {before:?} before CompletedIntegratorStep, {after:?} after")
         });
     }
     Ok(())
@@ -392,32 +301,6 @@ fn both_ways(session: &Session) -> Result<(), NotDetermined> {
         if importer.over {
             break;
         }
-    }
-    Ok(())
-}
-
-fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
-    needs_states!(session);
-    let instance = session.excited()?;
-    let compare = |what: &str, before: &[f64]| {
-        let after = instance.states()?;
-        session.require(!differ(before, &after), || format!("{what}: the states were {before:?}, and are {after:?}"));
-        Ok::<_, NotDetermined>(())
-    };
-    for _ in 0..3 {
-        let event = instance.iterate()?;
-        if event.terminates() || !event.ended() {
-            return Ok(());
-        }
-        let before = instance.states()?;
-        instance.perform(Simple::EnterContinuousTimeMode)?;
-        compare("EnterContinuousTimeMode", &before)?;
-        let t = instance.time.get() + session.integrator_step();
-        let next = event.next().unwrap_or(f64::INFINITY);
-        instance.must("SetTime", instance.set_time(t.min(next))?)?;
-        let before = instance.states()?;
-        instance.perform(Simple::EnterEventMode)?;
-        compare("EnterEventMode", &before)?;
     }
     Ok(())
 }
@@ -480,9 +363,13 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
     let first = run(&session.exchange(State::Event)?)?;
     session.cases(Life::ModelExchange.states(), |&state| {
         let running = state == State::Continuous;
-        let instance = session.exchange(if running { State::Event } else { state })?;
+        let instance = session.exchange(if running { State::Initialization } else { state })?;
         if running {
-            Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
+            // This check does not judge refusals.
+            if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
+                session.note(why);
+            }
+            let _ = instance.perform(Simple::ExitInitializationMode).and_then(|()| Importer::start(&instance)?.run(20, &mut |_| Ok(())));
         }
         let status = instance.simple(Simple::Reset)?;
         if !status.is_ok() {
@@ -503,6 +390,9 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
     if !session.exchange_saves() {
         return session.not_applicable("canGetAndSetFMUState is false for Model Exchange");
     }
+    let comparable = |v: &&ModelVariable| v.clocks.is_empty() && v.causality != Causality::Independent;
+    let all: Vec<&ModelVariable> = session.numeric().filter(comparable).collect();
+    session.case(|| in_initialization(session, &|| session.exchange(State::Initialization), &all));
     let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
         if let Some((k, largest)) = deviation(first, second) {
             session.deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
@@ -521,9 +411,13 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
         let mut importer = Importer::start(&instance)?;
         importer.run(50, &mut |_| Ok(()))?;
         let (saved, t, next) = (instance.save()?, instance.time.get(), importer.next);
+        let before = instance.snapshot(&all)?;
         let mut first = importer.trajectory(100)?;
         for _ in 0..2 {
             instance.restore(saved, t)?;
+            for (v, (old, new)) in all.iter().zip(before.iter().zip(instance.snapshot(&all)?)) {
+                session.compare_variables(&[*v], "restored in Continuous-Time Mode", &[vec![old.clone()]], &[vec![new]]);
+            }
             let second = Importer::resume(&instance, next)?.trajectory(100)?;
             compare("Continuous-Time Mode", &first, &second);
             first = second;

@@ -69,6 +69,40 @@ fn look_at(
     look(&instance, STEPS).map(|_| ())
 }
 
+pub(super) fn written(session: &Session) -> Result<(), NotDetermined> {
+    let all: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).take(200).collect();
+    look_at(session, &mut |instance, k| {
+        for v in &all {
+            session.unwritten.set(false);
+            let (status, _) = instance.get(v)?;
+            if status.is_ok() && session.unwritten.get() {
+                session.violated(format!("line {}: Get({}) after {k} steps returned OK and wrote nothing", v.line, v.name));
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    })
+}
+
+/// Continuous outputs at both sides of the end of the initialization.
+pub(super) fn initialized(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| v.variability == Variability::Continuous && v.causality == Causality::Output;
+    let outputs: Vec<_> = session.watched().into_iter().filter(fits).collect();
+    if outputs.is_empty() {
+        return session.not_applicable("there is no continuous output");
+    }
+    let instance = session.initializing()?;
+    let before = instance.snapshot(&outputs)?;
+    instance.exit()?;
+    for (v, (old, new)) in outputs.iter().zip(before.into_iter().zip(instance.snapshot(&outputs)?)) {
+        if !old.is_empty() && !new.is_empty() {
+            let what = "after ExitInitializationMode, compared with before";
+            session.compare_variables(&[*v], what, &[vec![old]], &[vec![new]]);
+        }
+    }
+    Ok(())
+}
+
 pub(super) fn booleans_read(session: &Session) -> Result<(), NotDetermined> {
     let all: Vec<_> =
         session.numeric().filter(|v| v.base == BaseType::Boolean && v.clocks.is_empty()).take(60).collect();

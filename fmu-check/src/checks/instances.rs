@@ -1,5 +1,6 @@
 //! Several instances, threads, copies, loading and unloading.
 
+use super::held::{set_all, texts};
 use super::host::{failed, second_binary};
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
@@ -15,7 +16,7 @@ use std::time::{Duration, Instant};
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "L04a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(interleaved),
         requirement: "Interleaved instances give the same results as each alone.",
-        tried: "Runs 8 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "L04b", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, run: Run::Probe(threads),
         requirement: "Instances in several threads give the same results as each alone.",
         tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share." },
@@ -35,7 +36,7 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded." },
 ];
 
-fn only_once(session: &Session) -> bool {
+pub(super) fn only_once(session: &Session) -> bool {
     session.flag("canBeInstantiatedOnlyOncePerProcess")
 }
 
@@ -45,15 +46,26 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     if only_once(session) {
         return session.not_applicable(ONLY_ONCE);
     }
-    let alone = trajectory(&session.stepping()?, 20)?;
+    let alone = session.stepping()?;
+    let mut expected = vec![(trajectory(&alone, 20)?, texts(&alone)?)];
+    // Every other instance has parameters of its own, where the FMU takes these values.
+    let trial = session.initializing()?;
+    if set_all(&trial, 1.0).is_ok() && trial.exit().is_ok() {
+        expected.push((trajectory(&trial, 20)?, texts(&trial)?));
+    }
+    let kinds = expected.len();
     // Creating them is part of the requirement.
     let mut all = Vec::new();
     for k in 0..8 {
         let Some(instance) = session.instantiate(&session.arguments(&format!("probe {k}")))? else {
-            session.violated(format!("instance {} could not be created beside {k} others", k + 2));
+            session.violated(format!("instance {} could not be created beside {} others", all.len() + 1, k + kinds));
             return Ok(());
         };
-        instance.initialize()?;
+        instance.enter()?;
+        if k % kinds == 1 {
+            set_all(&instance, 1.0)?;
+        }
+        instance.exit()?;
         all.push((instance, Vec::new()));
     }
     for k in 0..20 {
@@ -64,7 +76,11 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
         }
     }
     for (k, (instance, rows)) in all.into_iter().enumerate() {
-        session.compare(&format!("instance {k}"), &alone, &rows);
+        let (alone, words) = &expected[k % kinds];
+        session.compare(&format!("instance {k}"), alone, &rows);
+        for (old, new) in words.iter().zip(&texts(&instance)?).filter(|(old, new)| old != new) {
+            session.violated(format!("instance {k}: {} is {:?}, and {:?} alone", old.0, new.1, old.1));
+        }
         instance.free()?;
     }
     Ok(())

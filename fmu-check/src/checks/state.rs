@@ -205,12 +205,18 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(&all)?)) {
         session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
     }
-    in_initialization(session, &all)
+    in_initialization(session, &|| session.initializing(), &all)
 }
 
 /// Restores a state in Initialization Mode, where more can be set, texts too.
-fn in_initialization(session: &Session, all: &[&ModelVariable]) -> Result<(), NotDetermined> {
-    let instance = session.initializing()?;
+pub(super) fn in_initialization<'b>(
+    session: &'b Session,
+    begin: &dyn Fn() -> Result<Instance<'b>, NotDetermined>,
+    all: &[&ModelVariable],
+) -> Result<(), NotDetermined> {
+    // Not from the start values, which a state may forget to have; where the FMU takes others.
+    let trial = begin()?;
+    let instance = if set_all(&trial, 2.0).is_ok() { trial } else { begin()? };
     let (state, time) = (instance.save()?, instance.time.get());
     let (before, words) = (instance.snapshot(all)?, texts(&instance)?);
     // This check does not judge refusals.

@@ -33,9 +33,9 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "A step size or time that is NaN or infinite gives Error and returns promptly.",
         tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.",
         fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit)." },
-    Check { id: "T03", clause: STEP, levels: Levels::HARD, run: Run::Probe(halves),
-        requirement: "Halving the communication step gives approximately the same results with inputs held.",
-        tried: "Runs 40 steps whole and in halves, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean." },
+    Check { id: "T03", clause: STEP, levels: Levels::HARD, run: Run::Probe(step_sizes),
+        requirement: "Halving or doubling the communication step gives approximately the same results with inputs held.",
+        tried: "Runs 40 steps whole, in halves and in pairs, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean." },
     Check { id: "T04", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, run: Run::Probe(variable),
         requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.",
         tried: "Makes 200 steps of random sizes.", fix: "Divide the step into internal ones, the last of them shorter." },
@@ -168,25 +168,32 @@ fn non_finite_step(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
-fn halves(session: &Session) -> Result<(), NotDetermined> {
+fn step_sizes(session: &Session) -> Result<(), NotDetermined> {
     if !session.flag("canHandleVariableCommunicationStepSize") {
         return session.not_applicable("the communication step may not change");
     }
+    compare_steps(session, false)?;
+    compare_steps(session, true)
+}
+
+/// Compares a run with one in steps of half the size, or of twice the size.
+fn compare_steps(session: &Session, longer: bool) -> Result<(), NotDetermined> {
     let (h, n) = (session.h(), 40);
     let fits = |v: &&&model_description::ModelVariable| v.base == BaseType::Float64 && !v.is_array();
     let all = session.watched();
     let watched: Vec<_> = all.iter().filter(fits).copied().collect();
-    let run = |parts: u32| {
+    let run = |steps: usize, h: f64| {
         let instance = session.stepping()?;
         instance.change_inputs(3)?;
         (0..n)
             .map(|_| {
-                instance.steps(usize::try_from(parts).unwrap_or(1), h / f64::from(parts))?;
+                instance.steps(steps, h)?;
                 instance.snapshot(&watched)
             })
             .collect::<Result<Vec<_>, _>>()
     };
-    let (whole, half) = (run(1)?, run(2)?);
+    let other = if longer { 2.0 * h } else { h / 2.0 };
+    let (whole, half) = if longer { (run(2, h)?, run(1, other)?) } else { (run(1, h)?, run(2, other)?) };
     let number = |bits: &[u64]| bits.first().map_or(0.0, |b| f64::from_bits(*b));
     for (i, v) in watched.iter().enumerate() {
         let scale = whole.iter().map(|row| number(&row[i]).abs()).fold(v.nominal.unwrap_or(0.0).abs(), f64::max);
@@ -194,10 +201,8 @@ fn halves(session: &Session) -> Result<(), NotDetermined> {
             whole.iter().zip(&half).map(|(a, b)| (number(&a[i]) - number(&b[i])).abs()).fold(0.0, f64::max);
         session.require(largest_difference <= 0.1 * scale + 1e-9, || {
             format!(
-                "{} ({}): results with steps of {h} and {} differ by {largest_difference}; the scale is {scale}",
-                v.name,
-                v.variability,
-                h / 2.0
+                "{} ({}): results with steps of {h} and {other} differ by {largest_difference}; the scale is {scale}",
+                v.name, v.variability
             )
         });
     }

@@ -10,7 +10,7 @@ use std::ffi::CString;
 
 pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     let mut instance = session.initializing()?;
-    let mut refused = Vec::new();
+    let (mut refused, mut kept) = (Vec::new(), Vec::new());
     for v in session.numeric().filter(|v| settable(v)) {
         let Some(values) = session.different_value(v, 1.0) else { continue };
         let status = instance.set(v, &values)?;
@@ -31,6 +31,7 @@ pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
             continue;
         };
         if same(v, session.description.version, &values, &back) {
+            kept.push((v, values));
             continue;
         }
         if session.is_v2() && is_rounded(v, &values, &back) {
@@ -42,8 +43,39 @@ pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     }
     match refused.first() {
         Some(first) => Err(NotDetermined(format!("{first}; {} variables were refused", refused.len()))),
-        None => Ok(()),
+        None => set_before_initialization(session, &kept),
     }
+}
+
+/// What is set before Initialization Mode is still there in it: parameters, and in FMI 3.0 inputs.
+fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64>)]) -> Result<(), NotDetermined> {
+    let fits = |v: &ModelVariable| {
+        v.causality == Causality::Parameter || (v.causality == Causality::Input && !session.is_v2())
+    };
+    let instance = session.fresh()?;
+    let kept: Vec<_> = kept.iter().filter(|(v, _)| fits(v)).collect();
+    for (v, values) in &kept {
+        // L07 looks at the call. All these values together may be none that the model takes.
+        if !instance.set(v, values)?.is_ok() {
+            return Ok(());
+        }
+    }
+    if let Err(NotDetermined(why)) = instance.enter() {
+        session.note(why);
+        return Ok(());
+    }
+    for (v, values) in kept {
+        let (status, back) = instance.get(v)?;
+        if !status.is_ok() {
+            break;
+        }
+        if !same(v, session.description.version, values, &back) {
+            let [set, got] = [values, &back].map(|bits| show(v, session.description.version, bits));
+            let text = format!("{}: set to {set} before the initialization, got {got} in it", v.name);
+            session.value_deviates(v, values, back, &text);
+        }
+    }
+    Ok(())
 }
 
 /// Whether a real variable has the values in single precision, which FMI 2.0 cannot say: it has one type of real numbers.

@@ -1,0 +1,184 @@
+//! What an evaluation, the end of a step and a change of the mode must leave as it was (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
+
+use super::exchange::moved;
+use crate::check::Level;
+use crate::exchange::{Importer, deviation, differ};
+use crate::instance::Instance;
+use crate::session::{NotDetermined, Session};
+use fmu_import::raw::Simple;
+use model_description::{Causality, ModelVariable, Variability};
+
+/// Values at one point, each evaluated after something else has happened: what, the derivatives, and the event indicators.
+type Evaluations = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
+
+fn evaluations(session: &Session) -> Result<Evaluations, NotDetermined> {
+    let begin = || -> Result<_, NotDetermined> {
+        let instance = session.excited()?;
+        let mut importer = Importer::start(&instance)?;
+        importer.run(50, &mut |_| Ok(()))?;
+        let over = importer.over;
+        Ok((instance, over))
+    };
+    let (instance, over) = begin()?;
+    if over {
+        return Err(NotDetermined("the FMU ends the simulation at once".into()));
+    }
+    let (t, dt, x) = (instance.time.get(), session.integrator_step(), instance.states()?);
+    let inputs: Vec<(&ModelVariable, Vec<u64>)> = session
+        .number_inputs()
+        .filter(|v| v.variability == Variability::Continuous)
+        .filter_map(|v| Some((v, session.different_value(v, 3.0)?)))
+        .collect();
+    let point = |instance: &Instance<'_>, order: [usize; 3]| -> Result<(), NotDetermined> {
+        for what in order {
+            match what {
+                0 => instance.must("SetTime", instance.set_time(t)?)?,
+                1 => instance.must("SetContinuousStates", instance.set_states(&x)?)?,
+                _ => {
+                    for (v, values) in &inputs {
+                        instance.must("Set", instance.set(v, values)?)?;
+                    }
+                }
+            }
+        }
+        Ok(())
+    };
+    let read = |instance: &Instance<'_>| Ok::<_, NotDetermined>((instance.derivatives()?, instance.indicators()?));
+    let away = |k: usize| -> Result<(), NotDetermined> {
+        instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, k))?)?;
+        let _ = read(&instance)?;
+        instance.must("SetTime", instance.set_time(t + dt)?)?;
+        let _ = read(&instance)?;
+        Ok(())
+    };
+    // As an integrator does that tries a shorter step.
+    away(usize::MAX)?;
+    let back = instance.set_time(t)?;
+    if !back.is_ok() {
+        session.lesser(Level::Should, format!("SetTime({t:?}) after SetTime({:?}) returned {back}", t + dt));
+        return Ok(Vec::new());
+    }
+    point(&instance, [0, 1, 2])?;
+    let mut found = Vec::new();
+    let mut add = |what, (derivatives, indicators)| found.push((what, derivatives, indicators));
+    add("first", read(&instance)?);
+    add("read twice", read(&instance)?);
+    let _ = instance.snapshot(&session.watched())?;
+    add("after outputs", read(&instance)?);
+    for (k, what) in [(0, "after another state"), (usize::MAX, "after other states")] {
+        away(k)?;
+        point(&instance, [1, 2, 0])?;
+        add(what, read(&instance)?);
+    }
+    let (other, _) = begin()?;
+    point(&other, [2, 1, 0])?;
+    add("in another instance, set in another order", read(&other)?);
+    Ok(found)
+}
+
+pub(super) fn pure(session: &Session) -> Result<(), NotDetermined> {
+    if session.states() == 0 {
+        return session.not_applicable("there are no continuous states");
+    }
+    let found = evaluations(session)?;
+    let Some((_, derivatives, indicators)) = found.first() else { return Ok(()) };
+    for (what, values, z) in &found[1..] {
+        if let Some((_, largest)) = deviation(std::slice::from_ref(derivatives), std::slice::from_ref(values)) {
+            session.deviates(largest, &format!("the derivatives are {derivatives:?}; {what}, {values:?}"));
+        }
+        if let Some((_, largest)) = deviation(std::slice::from_ref(indicators), std::slice::from_ref(z)) {
+            let text = format!("the event indicators are {indicators:?}; {what}, {z:?}");
+            session.deviates_at(Some(Level::Should), largest, &text);
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn same_bits(session: &Session) -> Result<(), NotDetermined> {
+    if session.states() == 0 {
+        return session.not_applicable("there are no continuous states");
+    }
+    let found = evaluations(session)?;
+    let Some((_, first, _)) = found.first() else { return Ok(()) };
+    for (what, values, _) in &found[1..] {
+        let same = first.iter().zip(values).all(|(a, b)| a.to_bits() == b.to_bits());
+        session.require(same, || format!("the derivatives are {first:?}; {what}, {values:?}"));
+    }
+    Ok(())
+}
+
+/// Inputs, parameters and the time, with their values.
+struct Held<'a, 'b> {
+    instance: &'a Instance<'b>,
+    variables: Vec<&'b ModelVariable>,
+    values: Vec<Vec<u64>>,
+    states: Vec<f64>,
+}
+
+impl<'a, 'b> Held<'a, 'b> {
+    fn read(instance: &'a Instance<'b>) -> Result<Self, NotDetermined> {
+        let fits = |v: &&ModelVariable| {
+            v.clocks.is_empty() && matches!(v.causality, Causality::Input | Causality::Parameter | Causality::Independent)
+        };
+        let variables: Vec<_> = instance.session.numeric().filter(fits).take(200).collect();
+        let values = instance.snapshot(&variables)?;
+        Ok(Self { instance, variables, values, states: instance.states()? })
+    }
+
+    /// Requires that a call has changed nothing of it.
+    fn require(&self, call: &str) -> Result<(), NotDetermined> {
+        let session = self.instance.session;
+        let (before, after) = (&self.states, self.instance.states()?);
+        session.require(!differ(before, &after), || format!("{call}: the states were {before:?}, and are {after:?}"));
+        for (v, (old, new)) in self.variables.iter().zip(self.values.iter().zip(self.instance.snapshot(&self.variables)?)) {
+            if !old.is_empty() && !new.is_empty() {
+                session.compare_variables(&[*v], &format!("after {call}"), &[vec![old.clone()]], &[vec![new]]);
+            }
+        }
+        Ok(())
+    }
+}
+
+pub(super) fn completed_step(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.excited()?;
+    if Importer::start(&instance)?.over {
+        return Err(NotDetermined("the FMU ends the simulation at once".into()));
+    }
+    for k in 0..5 {
+        instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
+        let (held, before) = (Held::read(&instance)?, instance.derivatives()?);
+        let (status, flags) = instance.completed()?;
+        session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
+            format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
+        });
+        if !status.is_ok() || flags != [0, 0] {
+            return Ok(());
+        }
+        held.require("CompletedIntegratorStep")?;
+        let after = instance.derivatives()?;
+        session.require(!differ(&before, &after), || {
+            format!("step {k}: the derivatives were {before:?} before CompletedIntegratorStep, {after:?} after")
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.excited()?;
+    for _ in 0..3 {
+        let event = instance.iterate()?;
+        if event.terminates() || !event.ended() {
+            return Ok(());
+        }
+        let before = Held::read(&instance)?;
+        instance.perform(Simple::EnterContinuousTimeMode)?;
+        before.require("EnterContinuousTimeMode")?;
+        let t = instance.time.get() + session.integrator_step();
+        let next = event.next().unwrap_or(f64::INFINITY);
+        instance.must("SetTime", instance.set_time(t.min(next))?)?;
+        let before = Held::read(&instance)?;
+        instance.perform(Simple::EnterEventMode)?;
+        before.require("EnterEventMode")?;
+    }
+    Ok(())
+}
