@@ -460,7 +460,10 @@ impl Runner {
                 limits::PROBE_FILE,
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
-            Outcome::End(end) => Ok((end.describe(), call.into())),
+            Outcome::End(end) => match panic(end, out) {
+                Some(why) => Err(format!("the checker failed: {why}")),
+                None => Ok((end.describe(), call.into())),
+            },
         }
     }
 
@@ -480,6 +483,15 @@ impl Runner {
 fn read(out: &Path) -> Vec<Line> {
     let text = fs::read_to_string(out).unwrap_or_default();
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// What a panic of this program says, if one has ended a probe; the panic of an FMU in Rust does not come as far as here.
+fn panic(end: &End, out: &Path) -> Option<String> {
+    let End::Ended(status) = end else { return None };
+    let console = fs::read(out.with_file_name("console")).ok().filter(|_| status.code() == Some(101))?;
+    let console = String::from_utf8_lossy(&console);
+    let (_, text) = console.rsplit_once(" panicked at ")?;
+    Some(text.lines().take(2).collect::<Vec<_>>().join(" "))
 }
 
 /// Whether a call is one of a further instance, and the same function of the first instance of the case has returned.

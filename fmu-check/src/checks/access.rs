@@ -9,7 +9,7 @@ use super::values::{
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session};
+use crate::session::{NotDetermined, Session, settable};
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
@@ -30,8 +30,8 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Getting and setting zero variables succeeds, even with NULL pointers.",
         tried: "Gets and sets no variables, with NULL arrays.", fix: "Return OK before looking at the arrays." },
     Check { id: "G01b", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Any(null_arrays),
-        requirement: "A NULL array gives Error.",
-        tried: "Gets and sets one variable with NULL arrays.", fix: "Check the pointers if the number is above 0." },
+        requirement: "A NULL array gives Error, and so does a NULL text.",
+        tried: "Gets and sets one variable with NULL arrays, and sets a text to NULL.", fix: "Check the pointers if the number is above 0." },
     Check { id: "G01c", clause: "3.0.2, 2.2.4", levels: Levels(None, Some(Level::Should)), run: Run::Any(wrong_counts),
         requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.",
         tried: "Passes too few and too many values.", fix: "Compare nValues with the sizes of the variables before copying." },
@@ -46,7 +46,7 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Sets a constant.", fix: "Return Error for variables with variability constant." },
     Check { id: "G03b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(not_settable),
         requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.",
-        tried: "Sets an output, the time and a fixed parameter between steps, and reads back.",
+        tried: "Sets an output, the time and a fixed parameter between steps, and reads back; sets a calculated output in the initialization.",
         fix: "Compare causality, variability and state before assigning, and return Error." },
     Check { id: "G03c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(all_or_nothing),
         requirement: "A set call for several variables that fails changes none of them.",
@@ -77,7 +77,8 @@ pub(super) const CHECKS: &[Check] = &[
         fix: "Leave the variable alone when the initialization computes others, and restore all start values in Reset." },
     Check { id: "G10", clause: GET, levels: Levels::MUST, run: Run::Probe(several),
         requirement: "Several variables in one call have the values that each of them has alone.",
-        tried: "Reads up to 12 variables of a type one by one, in one call, and in reverse order.", fix: "Return the values in the order of the references." },
+        tried: "Reads up to 12 variables of a type one by one, in one call, and in reverse order; sets parameters and inputs in one call.",
+        fix: "Go through the references in their order." },
     Check { id: "G15", clause: GET, levels: Levels::MUST, run: Run::Probe(written),
         requirement: "A getter that returns OK has written the value.",
         tried: "Reads all numbers over 20 steps, into memory with a pattern.", fix: "Write every value, or return Error." },
@@ -110,7 +111,7 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 /// The start values of a variable as bits; `None` for text that is not of the type.
-fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
+pub(super) fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
     let one = |word: &str| match v.base {
         BaseType::Boolean => Some(u64::from(matches!(word, "true" | "1"))),
         base if base.is_float() => parse_number(word).map(|x| bits(base, x)),
@@ -250,7 +251,16 @@ fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
         let status = pass(&instance, way, &call, v.base, (list.as_ref().map(slice::from_ref), 1), (place, 1))?;
         session.require(status == Status::ERROR, || format!("{call} returned {status}"));
         Ok(())
-    })
+    })?;
+    let text = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
+    let Some(v) = session.description.variables.iter().find(text) else { return Ok(()) };
+    session.case(|| {
+        let (instance, call) = (session.initializing()?, format!("SetString({}, NULL)", v.name));
+        let status = instance.call(&call, |raw| raw.set_strings(instance.handle, &[v.value_reference], &[None]))?;
+        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+        Ok(())
+    });
+    Ok(())
 }
 
 fn wrong_counts(session: &Session) -> Result<(), NotDetermined> {
@@ -386,6 +396,18 @@ fn not_settable(session: &Session) -> Result<(), NotDetermined> {
             });
             Ok(())
         });
+        // What is calculated cannot be set before either.
+        if v.initial_or_default() == Some(Initial::Calculated) {
+            session.case(|| {
+                let (instance, values) = (session.initializing()?, session.different_value(v, 7.0));
+                let Some(values) = values else { return Ok(()) };
+                let status = instance.set(v, &values)?;
+                session.require(status == Status::ERROR, || {
+                    format!("Set({}), initial=calculated, in Initialization Mode returned {status}", v.name)
+                });
+                Ok(())
+            });
+        }
     }
     Ok(())
 }

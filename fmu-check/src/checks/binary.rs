@@ -61,7 +61,7 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Calls GetVersion, and in FMI 2.0 GetTypesPlatform.", fix: "Return the constants of the official headers." },
     Check { id: "B08", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run),
         requirement: "A complete run writes nothing to the console and creates no file in the working directory.",
-        tried: "Runs 20 steps and watches console and working directory.",
+        tried: "Runs 20 steps, provokes an Error, and watches console and working directory.",
         fix: "Send messages to the log callback, and write files only where a parameter says so." },
 ];
 
@@ -411,5 +411,7 @@ fn complete_run(session: &Session) -> Result<(), NotDetermined> {
     if status.is_ok() {
         instance.free()?;
     }
+    // What goes wrong is a matter of the log, too.
+    let _ = session.stepping()?.provoke();
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
-use super::exchange_held::{completed_step, mode_alone, pure, same_bits};
+use super::exchange_held::{completed_step, interleaved, mode_alone, pure, same_bits, start_times};
 use super::held::set_all;
 use super::state::in_initialization;
 use crate::check::{Check, Level, Levels, Run};
@@ -77,8 +77,15 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "The vector of derivatives has the values of the variables that are the derivatives.",
         tried: "Reads both at several points.", fix: "Let both functions read one value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
-        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, input or parameter, nor the time.",
-        tried: "Reads them before and after each change of the mode.", fix: "Reinitialize states in the update of the discrete states only." },
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, input or parameter, nor the time, and updates of an event no input or \
+            parameter.",
+        tried: "Reads them before and after each change of the mode, and before and after the updates.", fix: "Reinitialize states in the update of the discrete states only." },
+    Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
+        requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
+        tried: "Runs 3 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+    Check { id: "E18", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(start_times),
+        requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are after them.",
+        tried: "Integrates 20 steps from each.", fix: "Take the start time from its argument, and count time events from it." },
     Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
         requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
         tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },
@@ -261,7 +268,9 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
     };
     let instance = session.exchange(State::Continuous)?;
     for _ in 0..3 {
+        // Forth and back, as an integrator does that tries a shorter step.
         let t = instance.time.get() + 0.1 * session.integrator_step();
+        instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
         instance.must("SetTime", instance.set_time(t)?)?;
         let (status, bits) = instance.get(time)?;
         let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
@@ -377,7 +386,10 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             return Ok(());
         }
         instance.experiment(session.start(), None);
-        instance.bring_to(State::Event)?;
+        if let Err(why) = instance.bring_to(State::Event) {
+            session.failed(&format!("after Reset after {state:?}"), why);
+            return Ok(());
+        }
         if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
             let text = format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
             session.deviates(largest, &text);

@@ -1,11 +1,13 @@
 //! What an evaluation, the end of a step and a change of the mode must leave as it was (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
 
 use super::exchange::moved;
+use super::instances::only_once;
 use crate::check::Level;
 use crate::exchange::{Importer, deviation, differ};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use fmu_import::raw::Simple;
+use crate::states::State;
+use fmu_import::raw::{Arguments, Interface, Simple};
 use model_description::{Causality, ModelVariable, Variability};
 
 /// Values at one point, each evaluated after something else has happened: what, the derivatives, and the event indicators.
@@ -130,6 +132,11 @@ impl<'a, 'b> Held<'a, 'b> {
         let session = self.instance.session;
         let (before, after) = (&self.states, self.instance.states()?);
         session.require(!differ(before, &after), || format!("{call}: the states were {before:?}, and are {after:?}"));
+        self.require_but_states(call)
+    }
+
+    fn require_but_states(&self, call: &str) -> Result<(), NotDetermined> {
+        let session = self.instance.session;
         for (v, (old, new)) in self.variables.iter().zip(self.values.iter().zip(self.instance.snapshot(&self.variables)?)) {
             if !old.is_empty() && !new.is_empty() {
                 session.compare_variables(&[*v], &format!("after {call}"), &[vec![old.clone()]], &[vec![new]]);
@@ -166,7 +173,9 @@ pub(super) fn completed_step(session: &Session) -> Result<(), NotDetermined> {
 pub(super) fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.excited()?;
     for _ in 0..3 {
+        let before = Held::read(&instance)?;
         let event = instance.iterate()?;
+        before.require_but_states("the updates of an event")?;
         if event.terminates() || !event.ended() {
             return Ok(());
         }
@@ -181,4 +190,57 @@ pub(super) fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
         before.require("EnterEventMode")?;
     }
     Ok(())
+}
+
+pub(super) fn interleaved(session: &Session) -> Result<(), NotDetermined> {
+    if only_once(session) {
+        return session.not_applicable("canBeInstantiatedOnlyOncePerProcess is true");
+    }
+    let alone = session.exchange(State::Event)?;
+    let expected = Importer::start(&alone)?.trajectory(60)?;
+    let mut instances = Vec::new();
+    for k in 0..3 {
+        let interface = Interface::ModelExchange;
+        let Some(instance) = session.instantiate(&Arguments { interface, ..session.arguments("probe") })? else {
+            session.violated(format!("instance {} could not be created beside {} others", k + 2, k + 1));
+            return Ok(());
+        };
+        instance.bring_to(State::Event)?;
+        instances.push(instance);
+    }
+    let mut importers = instances.iter().map(Importer::start).collect::<Result<Vec<_>, _>>()?;
+    let mut rows = vec![Vec::new(); importers.len()];
+    for _ in 0..60 {
+        for (importer, rows) in importers.iter_mut().zip(&mut rows) {
+            rows.extend(importer.trajectory(1)?);
+        }
+    }
+    for (k, rows) in rows.iter().enumerate() {
+        if let Some((step, largest)) = deviation(&expected, rows) {
+            session.deviates(largest, &format!("instance {}: the run differs from one alone after {step} steps", k + 2));
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn start_times(session: &Session) -> Result<(), NotDetermined> {
+    session.cases([0.0, -1.0, 1000.0, 1e6], |start| {
+        let interface = Interface::ModelExchange;
+        let instance = session.made(&Arguments { interface, ..session.arguments("probe") })?;
+        instance.experiment(start, None);
+        let run = || {
+            instance.bring_to(State::Event)?;
+            let mut importer = Importer::start(&instance)?;
+            let next = importer.next;
+            importer.run(20, &mut |_| Ok(()))?;
+            Ok(next)
+        };
+        match run() {
+            Err(why) => session.failed(&format!("startTime={start}"), why),
+            Ok(next) => session.require(next.is_none_or(|next| next > start), || {
+                format!("startTime={start}: nextEventTime of the first event is {next:?}")
+            }),
+        }
+        Ok(())
+    })
 }

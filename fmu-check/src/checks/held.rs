@@ -50,7 +50,48 @@ pub(super) fn several(session: &Session) -> Result<(), NotDetermined> {
             }
         }
     }
+    several_set(session)?;
     if tried == 0 { session.not_applicable("no type has several variables") } else { Ok(()) }
+}
+
+/// What is set in one call reads back as if it had been set alone.
+fn several_set(session: &Session) -> Result<(), NotDetermined> {
+    let version = session.description.version;
+    for &base in BaseType::ALL {
+        let mut list: Vec<(&ModelVariable, u64)> = Vec::new();
+        for v in scalars(session, base, settable) {
+            let (one, values) = (session.initializing()?, session.different_value(v, 1.0));
+            // G04 looks at each alone.
+            if let Some(values) = values
+                && one.set(v, &values)?.is_ok()
+                && one.get(v).is_ok_and(|(status, back)| status.is_ok() && same(v, version, &values, &back))
+            {
+                list.push((v, values[0]));
+            }
+        }
+        if list.len() < 2 {
+            continue;
+        }
+        let instance = session.initializing()?;
+        let references: Vec<u32> = list.iter().map(|(v, _)| v.value_reference).collect();
+        let mut buffer = Buffer::of(base, version, &list.iter().map(|(_, value)| *value).collect::<Vec<_>>());
+        let call = format!("Set({} variables of the type {base})", list.len());
+        let status = instance.call(&call, |raw| {
+            raw.set(instance.handle, base, Some(&references), list.len(), Some(&mut buffer), list.len())
+        })?;
+        // Together they may be values that the model does not take.
+        if !status.is_ok() {
+            return Ok(());
+        }
+        for (v, value) in &list {
+            let (status, back) = instance.get(v)?;
+            session.require(!status.is_ok() || same(v, version, &[*value], &back), || {
+                let [set, got] = [&[*value][..], &back].map(|bits| show(v, version, bits));
+                format!("{call}: {} was set to {set}, and is {got}", v.name)
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Runs with changing inputs and looks after each step, until something is found.
@@ -310,7 +351,7 @@ pub(super) fn set_all(instance: &Instance<'_>, scale: f64) -> Result<(), NotDete
     for v in session.description.variables.iter().filter(|v| settable(v)) {
         if v.base == BaseType::String && !v.is_array() {
             let _ = instance.call(&format!("SetString({})", v.name), |raw| {
-                raw.set_strings(instance.handle, &[v.value_reference], &[Some(c"another text")])
+                raw.set_strings(instance.handle, &[v.value_reference], &[Some(c"another text, and a longer one than what many an FMU has room for in the memory of the instance")])
             })?;
         } else if !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock)
             && let Some(values) = session.different_value(v, scale)

@@ -29,7 +29,7 @@ pub(super) const CHECKS: &[Check] = &[
         fix: "Hide all symbols but those of the standard, or link with -Bsymbolic." },
     Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(leaks),
         requirement: "Creating and freeing instances leaks no memory.",
-        tried: "Creates and frees some thousand instances and measures memory.",
+        tried: "Creates, runs, reads and frees some thousand instances and measures memory.",
         fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
     Check { id: "B07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads),
         requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.",
@@ -219,11 +219,13 @@ pub(super) fn leak(
 }
 
 fn leaks(session: &Session) -> Result<(), NotDetermined> {
+    let watched = session.watched();
     leak(session, "instances", &|| {
         let arguments = session.arguments("probe");
         let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
         instance.initialize()?;
         instance.steps(2, session.h())?;
+        let _ = (instance.snapshot(&watched)?, texts(&instance)?);
         instance.free()
     })
 }

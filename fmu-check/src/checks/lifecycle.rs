@@ -95,6 +95,11 @@ fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
 
 fn allowed(session: &Session) -> Result<(), NotDetermined> {
     attempt(session, Life::CoSimulation, '+');
+    session.case(|| {
+        let status = session.stepping()?.simple(Simple::Terminate)?;
+        session.require(status.is_ok(), || format!("Terminate in Step, before the first step, returned {status}"));
+        Ok(())
+    });
     Ok(())
 }
 
@@ -266,8 +271,12 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
                 return Ok(());
             }
             instance.experiment(session.start(), None);
-            let second = run(&instance)?;
-            session.compare(&format!("Reset after {state:?}, compared with a new instance"), &first, &second);
+            match run(&instance) {
+                Ok(second) => {
+                    session.compare(&format!("Reset after {state:?}, compared with a new instance"), &first, &second);
+                }
+                Err(why) => session.failed(&format!("after Reset after {state:?}"), why),
+            }
             Ok(())
         });
     }

@@ -189,21 +189,26 @@ fn adjoint(session: &Session) -> Result<(), NotDetermined> {
     }
     let (instance, all) = (at_a_point(session)?, Variables::of(session));
     let (unknowns, knowns) = (Variables::references(&all.unknowns), Variables::references(&all.knowns()));
-    let (v, w) = (pattern(knowns.len()), pattern(unknowns.len()));
-    let (status, forward) = instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;
-    instance.must("GetDirectionalDerivative", status)?;
-    let (status, backward) = instance.sensitivity(Sensitivity::GetAdjointDerivative, [&unknowns, &knowns], &w)?;
-    if !status.is_ok() {
-        session.violated(format!("GetAdjointDerivative returned {status}"));
-        return Ok(());
+    let (v, mut w) = (pattern(knowns.len()), pattern(unknowns.len()));
+    for turned in [false, true] {
+        if turned {
+            w.iter_mut().for_each(|w| *w = 1.5 - *w);
+        }
+        let (status, forward) = instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;
+        instance.must("GetDirectionalDerivative", status)?;
+        let (status, backward) = instance.sensitivity(Sensitivity::GetAdjointDerivative, [&unknowns, &knowns], &w)?;
+        if !status.is_ok() {
+            session.violated(format!("GetAdjointDerivative returned {status}"));
+            return Ok(());
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let size = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a * b).abs()).sum::<f64>();
+        let (one, other) = (dot(&w, &forward), dot(&backward, &v));
+        let scale = size(&w, &forward).max(size(&backward, &v));
+        session.require((one - other).abs() <= 1e-6 * scale, || {
+            format!("w'(J v) is {one}, (J'w)'v is {other} (tolerance 1e-6 of {scale})")
+        });
     }
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let size = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a * b).abs()).sum::<f64>();
-    let (one, other) = (dot(&w, &forward), dot(&backward, &v));
-    let scale = size(&w, &forward).max(size(&backward, &v));
-    session.require((one - other).abs() <= 1e-6 * scale, || {
-        format!("w'(J v) is {one}, (J'w)'v is {other} (tolerance 1e-6 of {scale})")
-    });
     Ok(())
 }
 

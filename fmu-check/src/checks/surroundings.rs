@@ -122,7 +122,11 @@ fn remaining() -> (usize, Vec<String>) {
     let links = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
     // Reading the folder opens it, under a name that changes.
     let open = links.filter_map(|e| fs::read_link(e.path()).ok()).filter(|p| !p.ends_with("fd"));
-    let mut all: Vec<String> = open.map(|path| format!("{} is open", path.display())).collect();
+    let mut counted = BTreeMap::new();
+    open.for_each(|path| *counted.entry(path).or_insert(0) += 1);
+    // Each with its number: the same file may be open many times.
+    let each = |(path, n): (PathBuf, usize)| (1..=n).map(move |k| format!("{} is open ({k})", path.display()));
+    let mut all: Vec<String> = counted.into_iter().flat_map(each).collect();
     all.extend(guard::children().into_iter().map(|child| format!("the process {child} was left behind")));
     (fs::read_dir("/proc/self/task").map_or(0, Iterator::count), all)
 }

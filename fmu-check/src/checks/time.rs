@@ -9,14 +9,14 @@ use crate::session::{ENDED, NotDetermined, Session};
 use crate::trajectory::{difference, trajectory};
 use fmu_import::Status;
 use fmu_import::raw::StepStatus;
-use model_description::{BaseType, Causality, CoSimulation};
+use model_description::{BaseType, Causality, CoSimulation, ModelVariable};
 
 const STEP: &str = "2.0.5, 4.2.2; 3.0.2, 4.2.1";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "T01a", clause: STEP, levels: Levels::SHOULD, run: Run::Probe(start_times),
-        requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6.",
+        requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6, and the independent variable has the time of the step.",
         tried: "Runs 20 steps from each start time.", fix: "Use startTime instead of 0." },
     Check { id: "T01b", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap),
         requirement: "A communication point other than the end of the last step gives Error.",
@@ -93,6 +93,14 @@ fn start_times(session: &Session) -> Result<(), NotDetermined> {
         let life = instance.initialize().and_then(|()| instance.steps(20, session.h()));
         if let Err(why) = life {
             session.failed(&format!("startTime={start}"), why);
+        } else if let Some(time) = independent_variable(session)
+            && let (status, bits) = instance.get(time)?
+            && status.is_ok()
+        {
+            let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
+            session.require((found - instance.time.get()).abs() < session.h(), || {
+                format!("startTime={start}: after the step to {}, {} is {found}", instance.time.get(), time.name)
+            });
         }
         Ok(())
     })
@@ -178,8 +186,8 @@ fn step_sizes(session: &Session) -> Result<(), NotDetermined> {
 
 /// Compares a run with one in steps of half the size, or of twice the size.
 fn compare_steps(session: &Session, longer: bool) -> Result<(), NotDetermined> {
-    let (h, n) = (session.h(), 40);
-    let fits = |v: &&&model_description::ModelVariable| v.base == BaseType::Float64 && !v.is_array();
+    let (h, n) = (session.h(), if longer { 20 } else { 40 });
+    let fits = |v: &&&ModelVariable| v.base == BaseType::Float64 && !v.is_array();
     let all = session.watched();
     let watched: Vec<_> = all.iter().filter(fits).copied().collect();
     let run = |steps: usize, h: f64| {
@@ -275,18 +283,19 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
+fn independent_variable(session: &Session) -> Option<&ModelVariable> {
+    let fits = |v: &&ModelVariable| v.causality == Causality::Independent && v.base == BaseType::Float64;
+    session.description.variables.iter().find(fits)
+}
+
 fn independent(session: &Session) -> Result<(), NotDetermined> {
-    let time = session
-        .description
-        .variables
-        .iter()
-        .find(|v| v.causality == Causality::Independent && v.base == BaseType::Float64);
-    let Some(time) = time else {
+    let Some(time) = independent_variable(session) else {
         return session.not_applicable("there is no independent variable of type Float64");
     };
     let (instance, h) = (session.stepping()?, session.h());
-    for _ in 0..5 {
-        instance.steps(1, h)?;
+    let varies = session.flag("canHandleVariableCommunicationStepSize");
+    for part in [1.0, 1.0, 2.0, 1.0, 3.0] {
+        instance.steps(1, if varies { part * h } else { h })?;
         let (status, bits) = instance.get(time)?;
         let (t, step_results) = (instance.time.get(), bits.first().map_or(f64::NAN, |b| f64::from_bits(*b)));
         let is_close = status.is_ok() && (step_results - t).abs() <= 1e-6 * h + 4.0 * f64::EPSILON * t.abs();

@@ -1,5 +1,6 @@
 //! Setting values: they read back, take effect, and do no harm if they are invalid.
 
+use super::access::expected;
 use crate::check::Level;
 use crate::encoding::{bits, same, show};
 use crate::session::{NotDetermined, Session, settable};
@@ -31,6 +32,15 @@ pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
             continue;
         };
         if same(v, session.description.version, &values, &back) {
+            // And back again: both values of a Boolean.
+            if let Some(start) = expected(v, session.elements(v))
+                && instance.set(v, &start)?.is_ok()
+                && let Some(back) = instance.get_back(v)?
+                && !same(v, session.description.version, &start, &back)
+            {
+                let [set, got] = [&start, &back].map(|bits| show(v, session.description.version, bits));
+                session.value_deviates(v, &start, back, &format!("{}: set back to {set}, got {got}", v.name));
+            }
             kept.push((v, values));
             continue;
         }

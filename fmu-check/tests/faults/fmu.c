@@ -46,7 +46,7 @@ typedef struct {
 typedef struct {
     double start, time, stop, gain, u, y, bias;
     int32_t n, flag, state, has_stop, ready, steps;
-    char label[64];
+    char label[256];
     uint64_t extra;
 #ifdef FMI3
     uint64_t frame_size;
