@@ -75,7 +75,7 @@ pub(super) enum Run {
     Probe(fn(&Session) -> Result<(), NotDetermined>),
     /// Like `Probe`, with instances for Model Exchange where there is no co-simulation: no steps.
     Any(fn(&Session) -> Result<(), NotDetermined>),
-    /// Like `Probe`; any output to the console or the working directory is a violation.
+    /// Like `Any`; any output to the console or the working directory is a violation.
     Silent(fn(&Session) -> Result<(), NotDetermined>),
     /// Like `Probe`, in two processes that must report the same.
     Twice(fn(&Session) -> Result<(), NotDetermined>),

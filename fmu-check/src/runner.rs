@@ -48,7 +48,7 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     let runner = Runner::new(fmu, options);
     check_file(fmu, &of_file, options.deadline());
     let by_exchange = |check: &Check| match (check.run, &runner) {
-        (Run::Any(_), Ok(runner)) => runner.simulation.is_none(),
+        (Run::Any(_) | Run::Silent(_), Ok(runner)) => runner.simulation.is_none(),
         _ => is_exchange(check),
     };
     let [simulates, exchanges] = [false, true].map(|exchange| {
@@ -266,7 +266,7 @@ impl Runner {
         };
         let any = || self.exchange.as_ref().or(self.scheduled.as_ref());
         let other = || match check.run {
-            Run::Any(_) => self.exchange.as_ref(),
+            Run::Any(_) | Run::Silent(_) => self.exchange.as_ref(),
             _ => any().filter(|_| WITHOUT_INSTANCE.contains(&check.id)),
         };
         let Some(binary) = binary.as_ref().or_else(other) else {

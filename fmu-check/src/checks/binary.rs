@@ -6,7 +6,7 @@ use crate::fmu_file::{Binary, FmuFile};
 use crate::session::{NotDetermined, Session};
 use fmu_import::elf::{FLOOR, NEEDED, dynamic, is_system, newest_glibc, strings};
 use fmu_import::machine;
-use fmu_import::raw::{Simple, Text};
+use fmu_import::raw::Text;
 use model_description::FmiVersion;
 use object::elf;
 use object::read::elf::{ElfFile64, ProgramHeader};
@@ -398,20 +398,11 @@ fn versions(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// Initialization, 20 steps, termination.
 fn complete_run(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.stepping()?;
-    for k in 0..20 {
-        instance.change_inputs(k)?;
-        let _ = instance.step(session.h())?;
-        let _ = instance.snapshot(&session.watched())?;
-    }
-    let status = instance.simple(Simple::Terminate)?;
-    session.note(format!("Terminate returned {status}"));
-    if status.is_ok() {
-        instance.free()?;
-    }
+    session.complete_run()?;
     // What goes wrong is a matter of the log, too.
-    let _ = session.stepping()?.provoke();
+    if session.description.co_simulation.is_some() {
+        let _ = session.stepping()?.provoke();
+    }
     Ok(())
 }

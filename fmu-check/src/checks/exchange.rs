@@ -74,8 +74,8 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.",
         fix: "Add them to dependencies, or leave dependencies out." },
     Check { id: "E15", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(both_ways),
-        requirement: "The vector of derivatives has the values of the variables that are the derivatives.",
-        tried: "Reads both at several points.", fix: "Let both functions read one value." },
+        requirement: "The vectors of states and derivatives have the values of the variables that are the states and derivatives.",
+        tried: "Reads both at several points and after events.", fix: "Let both functions read one value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
         requirement: "EnterContinuousTimeMode and EnterEventMode change no state, input or parameter, nor the time, and updates of an event no input or \
             parameter.",
@@ -284,13 +284,24 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
 fn both_ways(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
     let d = &session.description;
-    let variables: Vec<&ModelVariable> = d.derivatives.iter().filter_map(|u| d.referenced(u.reference)).collect();
+    let derivatives: Vec<&ModelVariable> = d.derivatives.iter().filter_map(|u| d.referenced(u.reference)).collect();
     let instance = session.excited()?;
     let mut importer = Importer::start(&instance)?;
-    for _ in 0..5 {
-        let vector = instance.derivatives()?;
+    // At the start, after some steps, and after events.
+    let mut looked = 0;
+    for k in 0..400 {
+        let event = importer.step(session.integrator_step(), &mut |_, _| ())?;
+        if importer.over || looked == 8 {
+            break;
+        }
+        if !event && k % 50 != 0 {
+            continue;
+        }
+        looked += 1;
+        let mut vector = instance.states()?;
+        vector.extend(instance.derivatives()?);
         let mut rest = &vector[..];
-        for v in &variables {
+        for v in d.states().iter().chain(&derivatives) {
             let (of_vector, more) = rest.split_at(session.elements(v).min(rest.len()));
             rest = more;
             let (status, found) = instance.get(v)?;
@@ -305,10 +316,6 @@ fn both_ways(session: &Session) -> Result<(), NotDetermined> {
                 );
                 return Ok(());
             }
-        }
-        importer.run(20, &mut |_| Ok(()))?;
-        if importer.over {
-            break;
         }
     }
     Ok(())

@@ -3,8 +3,10 @@
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session, settable};
+use fmu_import::Status;
 use fmu_import::raw::{Buffer, take_events};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
+use std::ffi::CString;
 
 /// Steps of a run that looks at values.
 const STEPS: u32 = 20;
@@ -116,6 +118,10 @@ pub(super) fn written(session: &Session) -> Result<(), NotDetermined> {
         for v in &all {
             session.unwritten.set(false);
             let (status, _) = instance.get(v)?;
+            if status == Status::ERROR {
+                session.violated(format!("line {}: Get({}) after {k} steps returned {status}", v.line, v.name));
+                return Ok(true);
+            }
             if status.is_ok() && session.unwritten.get() {
                 session.violated(format!("line {}: Get({}) after {k} steps returned OK and wrote nothing", v.line, v.name));
                 return Ok(true);
@@ -350,12 +356,14 @@ pub(super) fn set_all(instance: &Instance<'_>, scale: f64) -> Result<(), NotDete
     let session = instance.session;
     for v in session.description.variables.iter().filter(|v| settable(v)) {
         if v.base == BaseType::String && !v.is_array() {
+            // Longer than what an FMU may have room for, and another one for another scale.
+            let text = CString::new(format!("another text {scale} ").repeat(6)).unwrap_or_default();
             let _ = instance.call(&format!("SetString({})", v.name), |raw| {
-                raw.set_strings(instance.handle, &[v.value_reference], &[Some(c"another text, and a longer one than what many an FMU has room for in the memory of the instance")])
+                raw.set_strings(instance.handle, &[v.value_reference], &[Some(&text)])
             })?;
         } else if !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock)
             && let Some(values) = session.different_value(v, scale)
-            && instance.set(v, &values)? == fmu_import::Status::ERROR
+            && instance.set(v, &values)? == Status::ERROR
         {
             return Err(NotDetermined(format!("{} cannot be set", v.name)));
         }

@@ -5,9 +5,10 @@ use super::host::{failed, second_binary};
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::State;
 use crate::trajectory::trajectory;
 use fmu_import::guard::patiently;
-use fmu_import::raw::Raw;
+use fmu_import::raw::{Arguments, Interface, Raw};
 use std::sync::{Mutex, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
@@ -27,7 +28,7 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.",
         tried: "Loads two copies with their symbols visible to each other and compares.",
         fix: "Hide all symbols but those of the standard, or link with -Bsymbolic." },
-    Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(leaks),
+    Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Any(leaks),
         requirement: "Creating and freeing instances leaks no memory.",
         tried: "Creates, runs, reads and frees some thousand instances and measures memory.",
         fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
@@ -220,6 +221,17 @@ pub(super) fn leak(
 
 fn leaks(session: &Session) -> Result<(), NotDetermined> {
     let watched = session.watched();
+    if session.description.model_exchange.is_some() {
+        let arguments = || Arguments { interface: Interface::ModelExchange, ..session.arguments("probe") };
+        leak(session, "instances for Model Exchange", &|| {
+            let instance = session.made(&arguments())?;
+            instance.bring_to(State::Continuous)?;
+            instance.free()
+        })?;
+    }
+    if session.description.co_simulation.is_none() {
+        return Ok(());
+    }
     leak(session, "instances", &|| {
         let arguments = session.arguments("probe");
         let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;

@@ -3,7 +3,7 @@
 use super::host::{failed, second_binary};
 use crate::session::{NotDetermined, Session};
 use fmu_import::guard;
-use fmu_import::raw::{Simple, armed_timers, locale};
+use fmu_import::raw::{armed_timers, locale};
 use model_description::limits;
 use std::collections::BTreeMap;
 use std::fs;
@@ -45,14 +45,7 @@ fn around<T>(session: &Session, look: &dyn Fn() -> T) -> Result<(T, T), NotDeter
     session.record_call("loading, a complete run, unloading");
     {
         let duplicate = session.duplicate(&binary, 62)?;
-        let instance = duplicate.stepping()?;
-        for k in 0..20 {
-            instance.change_inputs(k)?;
-            instance.steps(1, duplicate.h())?;
-            let _ = instance.snapshot(&duplicate.watched())?;
-        }
-        let _ = instance.simple(Simple::Terminate)?;
-        instance.free()?;
+        duplicate.complete_run()?;
     }
     let after = look();
     Ok((before, after))

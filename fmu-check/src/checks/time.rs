@@ -294,13 +294,15 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
     };
     let (instance, h) = (session.stepping()?, session.h());
     let varies = session.flag("canHandleVariableCommunicationStepSize");
-    for part in [1.0, 1.0, 2.0, 1.0, 3.0] {
-        instance.steps(1, if varies { part * h } else { h })?;
+    for part in [0.0, 1.0, 1.0, 2.0, 1.0, 3.0] {
+        if part > 0.0 {
+            instance.steps(1, if varies { part * h } else { h })?;
+        }
         let (status, bits) = instance.get(time)?;
         let (t, step_results) = (instance.time.get(), bits.first().map_or(f64::NAN, |b| f64::from_bits(*b)));
         let is_close = status.is_ok() && (step_results - t).abs() <= 1e-6 * h + 4.0 * f64::EPSILON * t.abs();
         session.require(is_close, || {
-            format!("after the step to {t}, Get({}) returned {status}, {step_results}", time.name)
+            format!("at the communication point {t}, Get({}) returned {status}, {step_results}", time.name)
         });
     }
     Ok(())

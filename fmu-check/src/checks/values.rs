@@ -266,7 +266,8 @@ pub(super) fn tunable(session: &Session) -> Result<(), NotDetermined> {
         }
         if let Err(NotDetermined(why)) = instance.steps(2, session.h()) {
             // The model may have rules that the description cannot express.
-            session.note(format!("{} = {}: {why}", v.name, show(v, session.description.version, &values)));
+            let values = show(v, session.description.version, &values);
+            session.lesser(Level::Hard, format!("{} was set to {values} between steps, and then {why}", v.name));
             return Ok(());
         }
         let Some(back) = instance.get_back(v)? else { return Ok(()) };
