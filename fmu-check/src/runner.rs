@@ -447,12 +447,10 @@ impl Runner {
                 "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
-            Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => {
-                Err(format!(
-                    "{} {how} within {limit} s, and that of the first instance did: see L04a",
-                    call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
-                ))
-            }
+            Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => Err(format!(
+                "{} {how} within {limit} s, and that of the first instance did: see L04a",
+                call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
+            )),
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
             // The limit is the checker's own.
             Outcome::End(end) if end.describe().contains("SIGXFSZ") => Err(format!(

@@ -301,8 +301,32 @@ fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
                 session.case(|| must_be_refused(session, way, base, reference, "a reference that does not exist"));
             }
         }
+        for way in WAYS {
+            session.case(|| text_must_be_refused(session, way, reference, "a reference that does not exist"));
+        }
     }
     Ok(())
+}
+
+/// [`must_be_refused`] for texts.
+fn text_must_be_refused(session: &Session, way: &str, reference: u32, what: &str) -> Result<(), NotDetermined> {
+    let instance = session.stepping()?;
+    let call = format!("{way}String(reference={reference})");
+    let status = instance.call(&call, |raw| match way {
+        "Set" => raw.set_strings(instance.handle, &[reference], &[Some(c"text")]),
+        _ => raw.get_strings(instance.handle, &[reference], 1).map(|(status, _)| status),
+    })?;
+    refused(session, status, &format!("{call}, {what}, returned {status}"));
+    Ok(())
+}
+
+/// Requires an Error; one that gives up all instances is a lesser matter.
+fn refused(session: &Session, status: Status, text: &str) {
+    if status == Status::FATAL {
+        session.lesser(Level::Should, text);
+    } else {
+        session.require(status == Status::ERROR, || text.into());
+    }
 }
 
 /// A getter or setter that must return Error.
@@ -317,13 +341,7 @@ fn must_be_refused(
     let mut buffer = Buffer::of(base, session.description.version, &[bits(base, 0.0)]);
     let call = format!("{way}({base}, reference={reference})");
     let status = pass(&instance, way, &call, base, (Some(&[reference]), 1), (Some(&mut buffer), 1))?;
-    let text = format!("{call}, {what}, returned {status}");
-    if status == Status::FATAL {
-        // Refused, but with more than is wrong: it gives up all instances.
-        session.lesser(Level::Should, text);
-    } else {
-        session.require(status == Status::ERROR, || text);
-    }
+    refused(session, status, &format!("{call}, {what}, returned {status}"));
     Ok(())
 }
 
@@ -343,6 +361,15 @@ fn wrong_type(session: &Session) -> Result<(), NotDetermined> {
         let what = format!("{} of the type {}", v.name, v.base);
         for way in WAYS {
             session.case(|| must_be_refused(session, way, base, v.value_reference, &what));
+        }
+    }
+    let all = &session.description.variables;
+    let is_text = |r: u32| all.iter().any(|v| v.base == BaseType::String && v.value_reference == r);
+    let fits = |v: &&ModelVariable| v.base.is_float() && !v.is_array() && !is_text(v.value_reference);
+    if let Some(v) = all.iter().find(fits) {
+        let what = format!("{} of the type {}", v.name, v.base);
+        for way in WAYS {
+            session.case(|| text_must_be_refused(session, way, v.value_reference, &what));
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
-use super::exchange_held::{completed_step, interleaved, mode_alone, pure, same_bits, start_times};
+use super::exchange_held::{completed_step, inputs_read_back, interleaved, mode_alone, pure, same_bits, start_times};
 use super::held::set_all;
 use super::state::in_initialization;
 use crate::check::{Check, Level, Levels, Run};
@@ -44,8 +44,8 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.",
         tried: "Compares the nominals with the description.", fix: "Generate both from one table." },
     Check { id: "E05", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip),
-        requirement: "Continuous states that are set can be read back, as a vector and as variables.",
-        tried: "Sets the states and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
+        requirement: "Continuous states that are set can be read back, as a vector and as variables (should: inputs too, in both modes).",
+        tried: "Sets states and inputs and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
     Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
         requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls \
             (should: event indicators, and a time that goes back to the last completed step).",
@@ -77,7 +77,7 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "The vectors of states and derivatives have the values of the variables that are the states and derivatives.",
         tried: "Reads both at several points and after events.", fix: "Let both functions read one value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
-        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, input or parameter, nor the time, and updates of an event no input or \
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input or parameter, nor the time, and updates of an event no input or \
             parameter.",
         tried: "Reads them before and after each change of the mode, and before and after the updates.", fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
@@ -239,6 +239,7 @@ pub(super) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
 }
 
 fn round_trip(session: &Session) -> Result<(), NotDetermined> {
+    inputs_read_back(session)?;
     needs_states!(session);
     let instance = session.exchange(State::Continuous)?;
     let x = moved(session, &instance.states()?, usize::MAX);
@@ -385,7 +386,9 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
                 session.note(why);
             }
-            let _ = instance.perform(Simple::ExitInitializationMode).and_then(|()| Importer::start(&instance)?.run(20, &mut |_| Ok(())));
+            let _ = instance
+                .perform(Simple::ExitInitializationMode)
+                .and_then(|()| Importer::start(&instance)?.run(20, &mut |_| Ok(())));
         }
         let status = instance.simple(Simple::Reset)?;
         if !status.is_ok() {
@@ -435,7 +438,12 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
         for _ in 0..2 {
             instance.restore(saved, t)?;
             for (v, (old, new)) in all.iter().zip(before.iter().zip(instance.snapshot(&all)?)) {
-                session.compare_variables(&[*v], "restored in Continuous-Time Mode", &[vec![old.clone()]], &[vec![new]]);
+                session.compare_variables(
+                    &[*v],
+                    "restored in Continuous-Time Mode",
+                    &[vec![old.clone()]],
+                    &[vec![new]],
+                );
             }
             let second = Importer::resume(&instance, next)?.trajectory(100)?;
             compare("Continuous-Time Mode", &first, &second);

@@ -123,7 +123,10 @@ pub(super) fn written(session: &Session) -> Result<(), NotDetermined> {
                 return Ok(true);
             }
             if status.is_ok() && session.unwritten.get() {
-                session.violated(format!("line {}: Get({}) after {k} steps returned OK and wrote nothing", v.line, v.name));
+                session.violated(format!(
+                    "line {}: Get({}) after {k} steps returned OK and wrote nothing",
+                    v.line, v.name
+                ));
                 return Ok(true);
             }
         }

@@ -367,7 +367,9 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn terminated(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.simulation(Step)?;
+    let instance = session.stepping()?;
+    instance.change_inputs(2)?;
+    instance.steps(2, session.h())?;
     let watched = session.watched();
     // What cannot be read before cannot be read after.
     let watched: Vec<_> =

@@ -16,13 +16,13 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Runs with an Error and logging on, and reads the categories of all messages.", fix: "List all categories that are used in LogCategories." },
     Check { id: "G-L2a", clause: LOG, levels: Levels::MUST, run: Run::Any(switch),
         requirement: "SetDebugLogging accepts an empty list, meaning all categories, and each category of LogCategories.",
-        tried: "Switches logging with an empty list and with each category.", fix: "Accept 0 categories with NULL, and every listed one." },
+        tried: "Switches logging with an empty list and with each category, also between steps.", fix: "Accept 0 categories with NULL, and every listed one." },
     Check { id: "G-L2b", clause: "hardening", levels: Levels::HARD, run: Run::Any(unknown),
         requirement: "A category that does not exist or is NULL gives Error and does no harm.",
         tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error." },
     Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors),
         requirement: "With logging on, every Error is accompanied by a message of that status.",
-        tried: "Provokes an Error with logging on.", fix: "Log in the one place that returns Error." },
+        tried: "Provokes an Error with logging on, resets, and provokes another.", fix: "Log in the one place that returns Error." },
     Check { id: "G-L3c", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Any(refusals),
         requirement: "With logging on, an instantiation that returns NULL is accompanied by a message.",
         tried: "Instantiates with a wrong token.", fix: "Log the reason before returning NULL." },
@@ -92,6 +92,19 @@ fn switch(session: &Session) -> Result<(), NotDetermined> {
             session.require(status.is_ok(), || format!("{call} returned {status}"));
         }
     }
+    if session.description.co_simulation.is_none() {
+        return Ok(());
+    }
+    // Between steps, it changes no result.
+    let plain = session.stepping()?.run(6, session.h())?;
+    let instance = session.stepping()?;
+    let mut rows = instance.run(3, session.h())?;
+    let status =
+        instance.call("SetDebugLogging(false, 0, NULL)", |raw| raw.debug_logging(instance.handle, false, None, 0))?;
+    if status.is_ok() {
+        rows.extend(instance.run(3, session.h())?);
+        session.compare("after SetDebugLogging", &plain, &rows);
+    }
     Ok(())
 }
 
@@ -112,13 +125,22 @@ fn errors(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
     instance.initialize()?;
     instance.steps(2, session.h())?;
-    let _ = take_events();
-    let how = instance.provoke()?;
-    let events = take_events();
-    let reported = events.iter().any(|e| e.status == Status::ERROR.0);
-    session.require(reported, || {
-        format!("{how} returned Error, but none of the {} messages has that status", events.len())
-    });
+    for when in ["", " after Reset"] {
+        if !when.is_empty() {
+            if !instance.simple(Simple::Reset)?.is_ok() {
+                break;
+            }
+            instance.experiment(session.start(), None);
+            instance.initialize()?;
+        }
+        let _ = take_events();
+        let how = instance.provoke()?;
+        let events = take_events();
+        let reported = events.iter().any(|e| e.status == Status::ERROR.0);
+        session.require(reported, || {
+            format!("{how}{when} returned Error, but none of the {} messages has that status", events.len())
+        });
+    }
     Ok(())
 }
 

@@ -194,7 +194,8 @@ fn adjoint(session: &Session) -> Result<(), NotDetermined> {
         if turned {
             w.iter_mut().for_each(|w| *w = 1.5 - *w);
         }
-        let (status, forward) = instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;
+        let (status, forward) =
+            instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;
         instance.must("GetDirectionalDerivative", status)?;
         let (status, backward) = instance.sensitivity(Sensitivity::GetAdjointDerivative, [&unknowns, &knowns], &w)?;
         if !status.is_ok() {

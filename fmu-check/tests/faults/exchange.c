@@ -55,6 +55,7 @@ static double instant(const M *m) { return m->start + m->k * 0.1; }
 static bool due(const M *m, double t) { return t >= instant(m) - 1e-6; }
 
 static double slope(M *m) {
+    if (FAULT(E16s) && m->mode == EVENT) return 0;
     double dx = m->gain * (m->u - m->x);
     if (FAULT(E06a)) {
         dx += 1e-4 * (m->x - m->last_x);
@@ -160,7 +161,7 @@ static int vector(M *m, double *to, size_t n, int which) {
     double nominal = 2;
     if (FAULT(E04a)) nominal = 0;
     if (FAULT(E04b)) nominal = 3;
-    if (FAULT(E06z) && which == 2) return to[0] = m->last_z, OK;
+    if (FAULT(E06z) && which == 2 && m->mode == CONTINUOUS && m->last_z) return to[0] = m->last_z, OK;
     to[0] = which == 0 ? m->x : which == 1 ? slope(m) + (FAULT(E15) ? 0.1 : 0) : which == 2 ? indicator(m) : nominal;
     if (FAULT(E03) && which == 1) to[1] = 0;
     return OK;
@@ -197,6 +198,7 @@ static int set(M *m, const unsigned *vr, size_t n, const double *from) {
     ENTER(INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP);
     for (size_t i = 0; i < n; i++) {
         if (vr[i] == 1 && m->mode & (INSTANTIATED | INITIALIZATION)) m->gain = from[i];
+        else if (vr[i] == 2 && FAULT(E05u) && m->mode == EVENT) continue;
         else if (vr[i] == 2) m->u = from[i];
         else if (vr[i] == 3 && m->mode == CONTINUOUS) m->x = from[i];
         else if (vr[i] == 6 && m->mode != CONTINUOUS) m->d = from[i];

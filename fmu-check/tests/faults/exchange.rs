@@ -5,8 +5,7 @@
 use crate::{check, each, library, pack_with, told, violated};
 use fmu_check::Verdict;
 
-const GROUPS: [&str; 9] =
-    ["exchange", "events", "derivatives", "event-mode", "T13", "B07a", "B08", "B08f", "B08g"];
+const GROUPS: [&str; 9] = ["exchange", "events", "derivatives", "event-mode", "T13", "B07a", "B08", "B08f", "B08g"];
 
 /// Fault, and the checks that must fail.
 const FAULTS: &[(&str, &[&str])] = &[
@@ -30,6 +29,8 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("E07u", &["E07"]),
     ("E16u", &["E16"]),
     ("E16t", &["E16"]),
+    ("E16s", &["E16"]),
+    ("E05u", &["E05"]),
     ("E16d", &["E16"]),
     ("E12m", &["E12"]),
     ("E12g", &["E12"]),

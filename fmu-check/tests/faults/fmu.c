@@ -262,6 +262,7 @@ EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const name
     }
     (void)names;
     f->logging = on;
+    if (FAULT(G_L2c) && f->data.state == STEP) f->data.n = 0;
     return OK;
 }
 
@@ -320,6 +321,7 @@ EXPORT int fmi2Reset(void *c) {
     forget_long_text(f);
     if (FAULT(L06) || FAULT(G09r)) f->data.y = before.y;
     if (FAULT(L06t)) f->data.bias = before.bias;
+    if (FAULT(G_L3r)) f->callbacks.logger = NULL;
     if (FAULT(L06m) && before.state == STEP) f->data.state = STEP;
     if (FAULT(L06e) && before.y > 0) f->data.n = before.n;
     if (FAULT(L06s)) strcpy(f->data.label, before.label);
@@ -339,7 +341,7 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(5)) return fail(f, "no such Real");
-        double y = f->data.y;
+        double y = f->data.state == TERMINATED && FAULT(L10y) ? 0 : f->data.y;
         if (FAULT(G16) && f->data.state == INITIALIZATION) y = 7;
         if (FAULT(G15r) && vr[i] == 1 && f->data.state == STEP) return fail(f, "gain is no more");
         if (FAULT(S04) && f->data.state == INITIALIZATION) y = f->data.gain;
@@ -394,9 +396,9 @@ EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *val
     ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(1)) return fail(f, "no such String");
+        if (!KNOWN(FAULT(V12s) ? 99 : 1)) return fail(f, "no such String");
         values[i] = f->label ? f->label : f->data.label;
-        if (FAULT(B07s)) values[i] = memset(malloc(3000), 0, 3000);
+        if (FAULT(B07s)) values[i] = strcpy(malloc(3000 + strlen(values[i])), values[i]);
     }
     return OK;
 }
