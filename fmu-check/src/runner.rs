@@ -155,7 +155,7 @@ fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verd
     let runner = runner.as_ref().ok()?;
     let began = Instant::now();
     let verdict = runner.run(check).verdict;
-    let least = Duration::from_secs(2).min(runner.timeout);
+    let least = Duration::from_secs(1).min(runner.timeout);
     let _ = runner.wild.set((20 * began.elapsed()).clamp(least, runner.timeout));
     match verdict {
         Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(

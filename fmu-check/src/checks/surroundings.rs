@@ -51,6 +51,11 @@ fn around<T>(session: &Session, look: &dyn Fn() -> T) -> Result<(T, T), NotDeter
     Ok((before, after))
 }
 
+/// A set of signals, as the kernel writes it, without 32 and 33: the C library uses them for its threads, and programs cannot.
+fn without_those_of_the_library(signals: &str) -> String {
+    u64::from_str_radix(signals, 16).map_or(signals.into(), |set| format!("{:016x}", set & !(3 << 31)))
+}
+
 /// The settings of this process, by name.
 fn current_settings() -> BTreeMap<String, String> {
     let mut all = BTreeMap::new();
@@ -65,7 +70,10 @@ fn current_settings() -> BTreeMap<String, String> {
     let fields = ["Umask", "SigIgn", "SigCgt", "SigBlk", "Cpus_allowed_list", "NoNewPrivs"];
     for line in fs::read_to_string("/proc/self/status").unwrap_or_default().lines() {
         if let Some((name, value)) = line.split_once(':').filter(|(name, _)| fields.contains(name)) {
-            put(name, value.trim().into());
+            put(
+                name,
+                if name.starts_with("Sig") { without_those_of_the_library(value.trim()) } else { value.trim().into() },
+            );
         }
     }
     // The name of the program stands in parentheses and may contain anything.
@@ -166,4 +174,19 @@ pub(super) fn left_behind(session: &Session) -> Result<(), NotDetermined> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn signals_of_the_c_library_are_no_setting() {
+        let own = super::without_those_of_the_library;
+        assert_eq!(
+            own("0000000100000440"),
+            own("0000000000000440"),
+            "SIGSETXID, which glibc catches once there are threads"
+        );
+        assert_ne!(own("0000000001000440"), own("0000000000000440"), "SIGXFSZ");
+        assert_eq!(own("no number"), "no number");
+    }
 }

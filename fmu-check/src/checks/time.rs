@@ -141,7 +141,7 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());
             }
-            let enough = k >= 1000 && began.elapsed() > Duration::from_secs(1);
+            let enough = k >= 1000 && began.elapsed() > Duration::from_millis(500);
             if !status.is_ok() || (k % 100 == 0 && (enough || session.half_time_used())) {
                 session.note(format!("{k} steps"));
                 return Ok(());

@@ -396,7 +396,7 @@ EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *val
     ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(FAULT(V12s) ? 99 : 1)) return fail(f, "no such String");
+        if (!KNOWN(FAULT(V12s) ? ~0u : 1)) return fail(f, "no such String");
         values[i] = f->label ? f->label : f->data.label;
         if (FAULT(B07s)) values[i] = strcpy(malloc(3000 + strlen(values[i])), values[i]);
     }
