@@ -49,6 +49,8 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     }
     let alone = session.stepping()?;
     let mut expected = vec![(trajectory(&alone, 20)?, texts(&alone)?)];
+    let own: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+    let before = alone.snapshot(&own)?;
     // Every other instance has parameters of its own, where the FMU takes these values.
     let trial = session.initializing()?;
     if set_all(&trial, 1.0).is_ok() && trial.exit().is_ok() {
@@ -74,6 +76,11 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
             instance.change_inputs(k)?;
             instance.steps(1, session.h())?;
             rows.push(instance.snapshot(&session.watched())?);
+        }
+    }
+    for (v, (old, new)) in own.iter().zip(before.into_iter().zip(alone.snapshot(&own)?)) {
+        if !old.is_empty() && !new.is_empty() {
+            session.compare_variables(&[*v], "an instance that nobody called meanwhile", &[vec![old]], &[vec![new]]);
         }
     }
     for (k, (instance, rows)) in all.into_iter().enumerate() {

@@ -24,7 +24,7 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Makes a step that does not begin where the last ended.",
         fix: "Compare currentCommunicationPoint with the time of the FMU, with room for rounding." },
     Check { id: "T01c", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated),
-        requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps.",
+        requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps, and so is t = t_0 + k h.",
         tried: "Makes up to 100000 steps within the default experiment, with t = t + h.",
         fix: "Compare times with a tolerance relative to the step, and count steps in integers." },
     Check { id: "T02a", clause: STEP, levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(non_positive_step),
@@ -121,6 +121,25 @@ fn gap(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn accumulated(session: &Session) -> Result<(), NotDetermined> {
+    many_steps(session)?;
+    // Nor is it a matter of rounding: another importer multiplies.
+    let (instance, h, start) = (session.stepping()?, session.h(), session.start());
+    let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
+    for k in 0..200 {
+        let t = start + f64::from(k) * h;
+        if t + h > stop || instance.over.get() {
+            break;
+        }
+        let status = instance.step_at(t, h)?;
+        if !status.is_ok() && status != Status::DISCARD && !instance.over.get() {
+            session.violated(format!("step {k}, DoStep(t={t:?}, h={h:?}), t = {start} + {k} h, returned {status}"));
+            break;
+        }
+    }
+    Ok(())
+}
+
+fn many_steps(session: &Session) -> Result<(), NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
     // Beyond its default experiment, an FMU may lack data: what happens there shows nothing.
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);

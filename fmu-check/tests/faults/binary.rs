@@ -133,6 +133,8 @@ const INVENTED: &[(&str, &[&str])] = &[
     ("T06i", &["T06b"]),
     ("T01s", &["T01a"]),
     ("T03l", &["T03"]),
+    ("T01k", &["T01c"]),
+    ("L04g", &["L04a"]),
     // One state at a time, one without its mode, bytes without a parameter.
     ("F01o", &["F01b"]),
     ("F01m", &["F01a", "F04a"]),
@@ -145,9 +147,9 @@ const INVENTED: &[(&str, &[&str])] = &[
     ("B07s", &["B07a"]),
     ("B08e", &["B08"]),
 ];
-const INVENTED_CHECKS: [&str; 22] = [
+const INVENTED_CHECKS: [&str; 24] = [
     "G15", "G10", "G04", "G16", "G03b", "G01b", "G06", "L06", "L07", "T06b", "T01a", "T03", "F01b", "F01a", "F04a",
-    "G-L4", "B07a", "B08", "G-L2a", "G-L3a", "V12", "L10",
+    "G-L4", "B07a", "B08", "G-L2a", "G-L3a", "V12", "L10", "T01c", "L04a",
 ];
 
 /// What stays altered or is left: each is found by this check.

@@ -245,6 +245,7 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 
 EXPORT void fmi2FreeInstance(void *c) {
     if (FAULT(ONCE)) alive = 0;
+    if (first == c) first = NULL;
     if (FAULT(L05)) ((Fmu *)c)->logging = 0;
     if (!c) return;
     Fmu *f = c;
@@ -291,6 +292,7 @@ EXPORT int fmi2ExitInitializationMode(void *c) {
     ENTER(INITIALIZATION);
     f->data.state = STEP;
     if (FAULT(G09x)) f->data.y *= 0.5;
+    if (FAULT(L04g) && first && first != f) first->data.gain = f->data.gain;
     return OK;
 }
 
@@ -582,6 +584,7 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (FAULT(T04) && h > 0.02) return fail(f, "too long");
     if (FAULT(T01c) && d->steps > 400) return fail(f, "no more");
     if (!isfinite(d->u)) return fail(f, "u is not finite");
+    if (FAULT(T01k) && t != d->time) return fail(f, "the step does not begin exactly where the last ended");
     while (FAULT(SECOND) && f != first) usleep(1000);
     if (FAULT(A01) && f->set) return fail(f, "a parameter was set");
     if (ENDS && !FAULT(T12s) && d->steps >= 5) return fail(f, "the simulation has ended");
