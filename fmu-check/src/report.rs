@@ -339,9 +339,9 @@ pub(super) fn explain(id: &str) -> Option<String> {
     let mut all = GROUPS.iter().flat_map(|g| g.checks.iter().map(move |c| (g, c)));
     let (group, c) = all.find(|(_, c)| c.id.eq_ignore_ascii_case(id))?;
     let of = |name: &str, l: Option<Level>| l.map(|l| format!("{} in FMI {name}", level(l)));
-    let calls: String = calls::explained(c.id).iter().map(|line| format!("  {line}\n")).collect();
-    let calls =
-        if calls.is_empty() { calls } else { format!("\nThe calls, and the states in which they are made\n{calls}") };
+    let calls = calls::explained(c.id);
+    let head = "\nThe calls, and the states in which they are made\n  ";
+    let calls = if calls.is_empty() { String::new() } else { format!("{head}{}\n", calls.join("\n  ")) };
     let levels: Vec<_> = [of("2.0", c.levels.0), of("3.0", c.levels.1)].into_iter().flatten().collect();
     Some(format!(
         "{} ({}): {}\n\nRequirement, in our words\n  {}\n\nClause\n  {}\n\nHow it is tried\n  {}\n\nUsual fix\n  {}\n{calls}",

@@ -9,7 +9,8 @@ use super::values::{
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};

@@ -2,8 +2,9 @@
 
 use crate::check::Level;
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
 use crate::states::{Life, State};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{SavedState, Sensitivity, Simple, Vector};
 use model_description::{Causality, CoSimulation, FmiVersion, ModelVariable, Variability};

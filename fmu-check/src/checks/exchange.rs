@@ -2,7 +2,9 @@
 
 use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
-use super::exchange_held::{completed_step, inputs_read_back, interleaved, mode_alone, pure, same_bits, start_times};
+use super::exchange_held::{
+    completed_step, independent, inputs_read_back, interleaved, mode_alone, pure, same_bits, start_times,
+};
 use super::held::set_all;
 use super::state::in_initialization;
 use crate::check::{Check, Level, Levels, Run};
@@ -257,26 +259,6 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
         session.require(status.is_ok() && found == one, || {
             format!("the state {} was set to {one:?}, but getting it returned {status}, {found:?}", v.name)
-        });
-    }
-    Ok(())
-}
-
-fn independent(session: &Session) -> Result<(), NotDetermined> {
-    let fits = |v: &&ModelVariable| v.causality == Causality::Independent && v.base == BaseType::Float64;
-    let Some(time) = session.description.variables.iter().find(fits) else {
-        return session.not_applicable("there is no independent variable of type Float64");
-    };
-    let instance = session.exchange(State::Continuous)?;
-    for _ in 0..3 {
-        // Forth and back, as an integrator does that tries a shorter step.
-        let t = instance.time.get() + 0.1 * session.integrator_step();
-        instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
-        instance.must("SetTime", instance.set_time(t)?)?;
-        let (status, bits) = instance.get(time)?;
-        let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
-        session.require(status.is_ok() && (found - t).abs() <= 1e-9 * t.abs(), || {
-            format!("after SetTime({t:?}), Get({}) returned {status}, {found:?}", time.name)
         });
     }
     Ok(())

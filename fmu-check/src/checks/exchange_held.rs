@@ -9,7 +9,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::states::State;
 use fmu_import::raw::{Arguments, Interface, Simple};
-use model_description::{Causality, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable, Variability};
 
 /// Values at one point, each evaluated after something else has happened: what, the derivatives, and the event indicators.
 type Evaluations = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
@@ -176,6 +176,26 @@ pub(super) fn completed_step(session: &Session) -> Result<(), NotDetermined> {
             return Ok(());
         }
         before.require("CompletedIntegratorStep")?;
+    }
+    Ok(())
+}
+
+pub(super) fn independent(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| v.causality == Causality::Independent && v.base == BaseType::Float64;
+    let Some(time) = session.description.variables.iter().find(fits) else {
+        return session.not_applicable("there is no independent variable of type Float64");
+    };
+    let instance = session.exchange(State::Continuous)?;
+    for _ in 0..3 {
+        // Forth and back, as an integrator does that tries a shorter step.
+        let t = instance.time.get() + 0.1 * session.integrator_step();
+        instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
+        instance.must("SetTime", instance.set_time(t)?)?;
+        let (status, bits) = instance.get(time)?;
+        let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
+        session.require(status.is_ok() && (found - t).abs() <= 1e-9 * t.abs(), || {
+            format!("after SetTime({t:?}), Get({}) returned {status}, {found:?}", time.name)
+        });
     }
     Ok(())
 }

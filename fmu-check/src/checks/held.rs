@@ -2,7 +2,8 @@
 
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{Buffer, take_events};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};

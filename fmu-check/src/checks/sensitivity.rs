@@ -192,7 +192,7 @@ fn adjoint(session: &Session) -> Result<(), NotDetermined> {
     let (v, mut w) = (pattern(knowns.len()), pattern(unknowns.len()));
     for turned in [false, true] {
         if turned {
-            w.iter_mut().for_each(|w| *w = 1.5 - *w);
+            w = w.iter().map(|w| 1.5 - w).collect();
         }
         let (status, forward) =
             instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;

@@ -3,7 +3,8 @@
 use super::access::expected;
 use crate::check::Level;
 use crate::encoding::{bits, same, show};
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, Causality, ModelVariable, Variability};
