@@ -49,8 +49,8 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Continuous states that are set can be read back, as a vector and as variables (should: inputs too, in both modes).",
         tried: "Sets states and inputs and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
     Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
-        requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls \
-            (should: event indicators, and a time that goes back to the last completed step).",
+        requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of \
+            the Set calls (should: event indicators, and a time that goes back to the last completed step).",
         tried: "Evaluates both in other orders, repeatedly and in another instance, and compares.",
         fix: "Mark cached results as old in every Set function." },
     Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
@@ -79,9 +79,10 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "The vectors of states and derivatives have the values of the variables that are the states and derivatives.",
         tried: "Reads both at several points and after events.", fix: "Let both functions read one value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
-        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input or parameter, nor the time, and updates of an event no input or \
-            parameter.",
-        tried: "Reads them before and after each change of the mode, and before and after the updates.", fix: "Reinitialize states in the update of the discrete states only." },
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input or parameter, nor the time, and updates of an \
+            event no input or parameter.",
+        tried: "Reads them before and after each change of the mode, and before and after the updates.",
+        fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
         requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
         tried: "Runs 3 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },

@@ -17,7 +17,8 @@ use std::time::{Duration, Instant};
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "L04a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(interleaved),
         requirement: "Interleaved instances give the same results as each alone.",
-        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one alone.",
+        fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "L04b", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, run: Run::Probe(threads),
         requirement: "Instances in several threads give the same results as each alone.",
         tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share." },

@@ -21,10 +21,10 @@ fn each(xml: &str, faults: &[(&[&str], &str, &str)]) {
     }
 }
 
-/// Revolutions per minute the wrong way round, and in the two right ways.
-const RPM_AS_FACTOR: &str = "<UnitDefinitions><Unit name=\"rpm\"><BaseUnit rad=\"1\" s=\"-1\" factor=\"9.549296585513721\"/></Unit></UnitDefinitions><LogCategories>";
-const RPM: &str = "<UnitDefinitions><Unit name=\"rpm\"><BaseUnit rad=\"1\" s=\"-1\" factor=\"0.10471975511965977\"/></Unit></UnitDefinitions><LogCategories>";
-const PER_MINUTE: &str = "<UnitDefinitions><Unit name=\"1/min\"><BaseUnit s=\"-1\" factor=\"0.016666666666666666\"/></Unit></UnitDefinitions><LogCategories>";
+/// A unit definition before the log categories.
+fn unit(name: &str, base: &str) -> String {
+    format!("<UnitDefinitions><Unit name=\"{name}\"><BaseUnit {base}/></Unit></UnitDefinitions><LogCategories>")
+}
 
 #[test]
 fn faults_of_fmi_2() {
@@ -35,9 +35,10 @@ fn faults_of_fmi_2() {
             (&["X01a"], "encoding=\"UTF-8\"", "encoding=\"latin1\""),
             (&["X01a"], "</ModelStructure>", ""),
             (&["X01a"], "A small FMU", "A small&#7; FMU"),
-            (&["V09c"], "<LogCategories>", RPM_AS_FACTOR),
-            (&[], "<LogCategories>", RPM),
-            (&[], "<LogCategories>", PER_MINUTE),
+            // Revolutions per minute the wrong way round, and in the two right ways.
+            (&["V09c"], "<LogCategories>", &unit("rpm", "rad=\"1\" s=\"-1\" factor=\"9.549296585513721\"")),
+            (&[], "<LogCategories>", &unit("rpm", "rad=\"1\" s=\"-1\" factor=\"0.10471975511965977\"")),
+            (&[], "<LogCategories>", &unit("1/min", "s=\"-1\" factor=\"0.016666666666666666\"")),
             (&["X01b", "X08"], "canGetAndSetFMUstate", "canGetAndSetFMUState"),
             (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\" color=\"red\"/>"),
             (&["X01b"], "<DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"/>", "<Surprise/>"),
