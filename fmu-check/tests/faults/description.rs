@@ -151,6 +151,19 @@ fn faults_of_aliases_and_clocked_states() {
                 "intervalVariability=\"fixed\" intervalDecimal=\"0.1\" shiftDecimal=\"0.05\" priority=\"1\"",
             ),
             (&["V16"], TICK, "causality=\"local\" intervalVariability=\"triggered\" shiftDecimal=\"1\""),
+            // An output clock with a priority, or with a period; a continuous variable on a clock; a local clock as an output.
+            (&["V16", "S01"], TICK, "causality=\"output\" intervalVariability=\"triggered\" priority=\"1\""),
+            (&["V17", "S01"], TICK, "causality=\"output\" intervalVariability=\"constant\" intervalDecimal=\"1\""),
+            (
+                &["V15"],
+                "causality=\"output\" variability=\"continuous\"",
+                "clocks=\"19\" causality=\"output\" variability=\"continuous\"",
+            ),
+            (
+                &["S01"],
+                "<Output valueReference=\"3\"/>",
+                "<Output valueReference=\"3\"/><Output valueReference=\"19\"/>",
+            ),
             (&["V17"], TICK, "causality=\"local\" intervalVariability=\"constant\" intervalDecimal=\"1\""),
             (
                 &["V04a", "V17"],
