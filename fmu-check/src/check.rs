@@ -73,7 +73,9 @@ pub(super) enum Run {
     File(fn(&FmuFile) -> Verdict),
     /// Calls the binary in its own process.
     Probe(fn(&Session) -> Result<(), NotDetermined>),
-    /// Like `Probe`; any output to the console or the working directory is a violation.
+    /// Like `Probe`, with instances for Model Exchange where there is no co-simulation: no steps.
+    Any(fn(&Session) -> Result<(), NotDetermined>),
+    /// Like `Any`; any output to the console or the working directory is a violation.
     Silent(fn(&Session) -> Result<(), NotDetermined>),
     /// Like `Probe`, in two processes that must report the same.
     Twice(fn(&Session) -> Result<(), NotDetermined>),

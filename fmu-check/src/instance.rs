@@ -2,7 +2,9 @@
 
 use crate::check::Level;
 use crate::encoding::show;
+use crate::exchange::Importer;
 use crate::session::{ENDED, NotDetermined, Session};
+use crate::states::State;
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Simple, StepStatus};
 use model_description::{FmiVersion, ModelVariable};
@@ -23,18 +25,20 @@ pub(super) struct Instance<'b> {
     pub(super) over: Cell<bool>,
 }
 
+/// Marks a call with the number of its instance; the first of a case needs none.
+fn mark(number: usize) -> String {
+    if number > 1 { format!("[{number}] ") } else { String::new() }
+}
+
 impl Session {
     /// Instantiates; `None` for NULL.
     pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
         let function = self.function_for(arguments.interface);
-        self.record_call(&format!("{function}({:?})", arguments.name.as_deref().unwrap_or_default()));
+        let mark = mark(self.made_in_case() + 1);
+        self.record_call(&format!("{mark}{function}({:?})", arguments.name.as_deref().unwrap_or_default()));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
         let made = handle.map(|handle| Instance::new(self, handle, arguments.event_mode));
-        match &made {
-            Some(Instance { number: number @ 2.., .. }) => self.record_result(&format!("instance [{number}]")),
-            Some(_) => self.record_result(&"an instance"),
-            None => self.record_result(&"NULL"),
-        }
+        self.record_result(if made.is_some() { &"an instance" } else { &"NULL" });
         Ok(made)
     }
 
@@ -81,6 +85,36 @@ impl Session {
     }
 }
 
+impl Session {
+    /// A complete run of each interface that this binary has, which nobody judges.
+    pub(super) fn complete_run(&self) -> Result<(), NotDetermined> {
+        let d = &self.description;
+        if d.co_simulation.is_some() {
+            let instance = self.stepping()?;
+            for k in 0..20 {
+                instance.change_inputs(k)?;
+                let _ = instance.step(self.h())?;
+                let _ = instance.snapshot(&self.watched())?;
+            }
+            let _ = instance.simple(Simple::Terminate)?;
+            instance.free()?;
+        }
+        let own = self.binary.file_stem().unwrap_or_default();
+        if d.model_exchange.as_ref().is_some_and(|i| own == i.model_identifier.as_str()) {
+            let instance = self.exchange(State::Event)?;
+            let run = Importer::start(&instance).and_then(|mut importer| {
+                importer.run(20, &mut |instance| instance.snapshot(&self.watched()).map(|_| ()))?;
+                Ok(importer.over)
+            });
+            if run.is_ok_and(|over| !over) {
+                let _ = instance.simple(Simple::Terminate)?;
+            }
+            instance.free()?;
+        }
+        Ok(())
+    }
+}
+
 impl<'b> Instance<'b> {
     fn new(session: &'b Session, handle: Handle, event_mode: bool) -> Self {
         let (start, stop, time) = (Cell::new(session.start()), Cell::new(None), Cell::new(session.start()));
@@ -106,9 +140,7 @@ impl Instance<'_> {
         function: impl FnOnce(&Raw) -> Option<(Status, T)>,
     ) -> Result<(Status, T), NotDetermined> {
         let name = self.session.raw.name(call);
-        // The first instance of a case needs no number.
-        let mark = if self.number > 1 { format!("[{}] ", self.number) } else { String::new() };
-        self.session.record_call(&format!("{mark}{name}"));
+        self.session.record_call(&format!("{}{name}", mark(self.number)));
         let missing =
             || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
         let (status, value) = function(&self.session.raw).ok_or_else(missing)?;
@@ -240,8 +272,9 @@ impl Instance<'_> {
         let status = self.call(&format!("Get({})", v.name), |raw| {
             raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
         })?;
+        let not_written = status.is_ok() && n > 0 && buffer == untouched;
+        self.session.unwritten.set(self.session.unwritten.get() || not_written);
         if !self.session.silent.get() && status.is_ok() {
-            let not_written = n > 0 && buffer == untouched;
             let value = if not_written { "not written".into() } else { show(v, version, &buffer.bits()) };
             self.session.record_value(&value);
         }
@@ -351,7 +384,7 @@ impl Instance<'_> {
 
     /// Frees the instance.
     pub(super) fn free(self) -> Result<(), NotDetermined> {
-        self.session.record_call(&self.session.raw.name("FreeInstance"));
+        self.session.record_call(&format!("{}{}", mark(self.number), self.session.raw.name("FreeInstance")));
         self.session.raw.free(self.handle).ok_or_else(|| NotDetermined("the function FreeInstance is missing".into()))
     }
 }

@@ -18,10 +18,10 @@ const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
     guard::end_with_parent();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
-    let Some(Run::Probe(probe) | Run::Silent(probe) | Run::Twice(probe) | Run::Exchange(probe) | Run::Scheduled(probe)) =
-        check.map(|c| c.run)
-    else {
-        anyhow::bail!("there is no probe {}: --list names the checks", args.id);
+    let probe = match check.map(|c| c.run) {
+        None | Some(Run::File(_)) => anyhow::bail!("there is no probe {}: --list names the checks", args.id),
+        Some(Run::Probe(probe) | Run::Any(probe) | Run::Silent(probe) | Run::Twice(probe)) => probe,
+        Some(Run::Exchange(probe) | Run::Scheduled(probe)) => probe,
     };
     match Session::open(args) {
         Ok(session) => {

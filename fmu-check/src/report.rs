@@ -1,7 +1,7 @@
 //! The report of `fmu check` as text, JSON and HTML.
 
 use crate::check::{Finding, Level, Verdict};
-use crate::checks::GROUPS;
+use crate::checks::{GROUPS, calls};
 use crate::fmu_file::FmuFile;
 use serde::Serialize;
 use std::fmt::Write;
@@ -339,9 +339,12 @@ pub(super) fn explain(id: &str) -> Option<String> {
     let mut all = GROUPS.iter().flat_map(|g| g.checks.iter().map(move |c| (g, c)));
     let (group, c) = all.find(|(_, c)| c.id.eq_ignore_ascii_case(id))?;
     let of = |name: &str, l: Option<Level>| l.map(|l| format!("{} in FMI {name}", level(l)));
+    let calls = calls::explained(c.id);
+    let head = "\nThe calls, and the states in which they are made\n  ";
+    let calls = if calls.is_empty() { String::new() } else { format!("{head}{}\n", calls.join("\n  ")) };
     let levels: Vec<_> = [of("2.0", c.levels.0), of("3.0", c.levels.1)].into_iter().flatten().collect();
     Some(format!(
-        "{} ({}): {}\n\nRequirement, in our words\n  {}\n\nClause\n  {}\n\nHow it is tried\n  {}\n\nUsual fix\n  {}\n",
+        "{} ({}): {}\n\nRequirement, in our words\n  {}\n\nClause\n  {}\n\nHow it is tried\n  {}\n\nUsual fix\n  {}\n{calls}",
         c.id,
         group.name,
         levels.join(", "),

@@ -4,16 +4,17 @@
 //! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
 //! call ended it. A probe with several cases is restarted after the case that ended it.
 
-use crate::check::{Check, Judgement, Level, Options, Run, Verdict};
+use crate::check::{Check, Judgement, Options, Run, Verdict};
 use crate::checks::GROUPS;
+use crate::evidence::{calls, is_of_second, judge, panic, read, side_effects};
 use crate::fmu_file::FmuFile;
-use crate::session::{FOUND, Line};
+use crate::session::Line;
 use crate::watch::{Pace, Watch};
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use model_description::{Interface, limits};
 use std::collections::VecDeque;
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -47,8 +48,12 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     }
     let runner = Runner::new(fmu, options);
     check_file(fmu, &of_file, options.deadline());
+    let by_exchange = |check: &Check| match (check.run, &runner) {
+        (Run::Any(_) | Run::Silent(_), Ok(runner)) => runner.simulation.is_none(),
+        _ => is_exchange(check),
+    };
     let [simulates, exchanges] = [false, true].map(|exchange| {
-        let mut checks = queue.iter().filter(|(check, _)| exchange == is_exchange(check));
+        let mut checks = queue.iter().filter(|(check, _)| exchange == by_exchange(check));
         checks.next().and_then(|_| why_no_run_succeeds(&runner, if exchange { "E00" } else { "L00" }))
     });
     let queue = Mutex::new(queue);
@@ -56,8 +61,8 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     let work = || {
         while let Some((check, verdict)) = take(&queue) {
             let why = match check.run {
-                Run::Exchange(_) => &exchanges,
                 Run::Scheduled(_) => &None,
+                _ if by_exchange(check) => &exchanges,
                 _ => &simulates,
             };
             let found = match (&runner, why) {
@@ -151,7 +156,7 @@ fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verd
     let runner = runner.as_ref().ok()?;
     let began = Instant::now();
     let verdict = runner.run(check).verdict;
-    let least = Duration::from_secs(2).min(runner.timeout);
+    let least = Duration::from_secs(1).min(runner.timeout);
     let _ = runner.wild.set((20 * began.elapsed()).clamp(least, runner.timeout));
     match verdict {
         Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
@@ -202,6 +207,8 @@ pub(super) struct Runner {
 
 /// Checks whose calls have wild arguments: a hang shows sooner there.
 const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
+/// Checks of what a second instance does; in all others, one that hangs is only in the way.
+const SEVERAL: [&str; 8] = ["L04a", "L04b", "L04c", "B05d", "G07a", "F03a", "F04a", "E14"];
 
 /// How a probe's process ended.
 enum Outcome {
@@ -259,7 +266,10 @@ impl Runner {
             _ => (&self.simulation, "co-simulation"),
         };
         let any = || self.exchange.as_ref().or(self.scheduled.as_ref());
-        let other = || any().filter(|_| WITHOUT_INSTANCE.contains(&check.id));
+        let other = || match check.run {
+            Run::Any(_) | Run::Silent(_) => self.exchange.as_ref(),
+            _ => any().filter(|_| WITHOUT_INSTANCE.contains(&check.id)),
+        };
         let Some(binary) = binary.as_ref().or_else(other) else {
             return Verdict::NotApplicable(format!("the FMU has no interface for {interface}")).into();
         };
@@ -438,6 +448,10 @@ impl Runner {
                 "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
+            Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => Err(format!(
+                "{} {how} within {limit} s, and that of the first instance did: see L04a",
+                call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
+            )),
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
             // The limit is the checker's own.
             Outcome::End(end) if end.describe().contains("SIGXFSZ") => Err(format!(
@@ -445,7 +459,10 @@ impl Runner {
                 limits::PROBE_FILE,
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
-            Outcome::End(end) => Ok((end.describe(), call.into())),
+            Outcome::End(end) => match panic(end, out) {
+                Some(why) => Err(format!("the checker failed: {why}")),
+                None => Ok((end.describe(), call.into())),
+            },
         }
     }
 
@@ -460,92 +477,4 @@ impl Runner {
             _ => *found = Verdict::Violated(left.clone()).into(),
         }
     }
-}
-
-fn read(out: &Path) -> Vec<Line> {
-    let text = fs::read_to_string(out).unwrap_or_default();
-    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
-}
-
-/// The calls of the first case with a finding: that with the mark, or the last one.
-fn calls(log: &str) -> Vec<String> {
-    const MOST: usize = 60;
-    let cases: Vec<&str> = log.split("# case ").collect();
-    let found = cases.iter().find(|case| case.contains(FOUND)).or(cases.last());
-    let lines: Vec<_> = found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND).collect();
-    // The number of the case is the first line of all but the first part.
-    let first = usize::from(cases.len() > 1 && found.is_some_and(|f| !std::ptr::eq(*f, cases[0])));
-    let calls: Vec<String> = lines.iter().skip(first).map(|l| (*l).to_owned()).collect();
-    if calls.len() <= MOST {
-        return calls;
-    }
-    let left_out = format!("({} calls)", calls.len() - MOST);
-    [&calls[..MOST / 2], &[left_out], &calls[calls.len() - MOST / 2..]].concat()
-}
-
-/// Unwanted console output and files of the process.
-fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
-    let mut console = Vec::new();
-    if let Ok(file) = File::open(folder.join("console")) {
-        let _ = file.take(64 << 10).read_to_end(&mut console);
-    }
-    let console = String::from_utf8_lossy(&console);
-    let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
-    let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);
-    findings
-        .extend(files.map(|f| format!("created a file in the working directory: {}", f.file_name().to_string_lossy())));
-    findings
-}
-
-/// The verdict from the lines of the probe and from its crashes (how, and in which call).
-fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Judgement {
-    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), slow, None);
-    let (mut lesser, mut lower, mut fatal) = (Vec::new(), None, false);
-    for line in lines {
-        match line {
-            Line::Violated(text) => violated.push(text),
-            Line::Lesser(level, text) => {
-                // The more binding level is the smaller one.
-                lower = Some(lower.map_or(level, |other: Level| other.min(level)));
-                lesser.push(text);
-            }
-            Line::Note(text) => notes.push(text),
-            Line::NotDetermined(why) => not_determined = not_determined.or(Some(why)),
-            Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
-            Line::Case(_) | Line::Integrator(_) | Line::Done => {}
-        }
-    }
-    for (how, call) in crashes {
-        if let Some((level, call)) = [(Level::Should, "S "), (Level::Hard, "H ")]
-            .iter()
-            .find_map(|(level, mark)| Some((*level, call.strip_prefix(mark)?)))
-        {
-            lower = Some(lower.map_or(level, |other| other.min(level)));
-            lesser.push(format!("{call} {how}"));
-            fatal = true;
-            continue;
-        }
-        if let Some(call) = call.strip_prefix("C ") {
-            violated.push(format!("{call} {how}"));
-            fatal = true;
-            continue;
-        }
-        // Preparing the probe failed: another check reports that.
-        let call = call.strip_prefix("P ").unwrap_or("the start");
-        if id == "B00" || (["L00", "E00"].contains(&id) && !call.starts_with("loading")) {
-            violated.push(format!("{call} {how}"));
-            fatal = true;
-        } else {
-            not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));
-        }
-    }
-    let lower = lower.filter(|_| violated.is_empty());
-    violated.extend(lesser);
-    let verdict = match (violated.is_empty(), not_determined, not_applicable) {
-        (false, ..) => Verdict::Violated(violated),
-        (_, Some(why), _) => Verdict::NotDetermined(why),
-        (_, _, Some(why)) => Verdict::NotApplicable(why),
-        _ => Verdict::Pass(notes),
-    };
-    Judgement { verdict, lower, fatal, calls: Vec::new() }
 }

@@ -4,11 +4,10 @@
 //! process. `Err(NotDetermined)` ends a probe that cannot decide.
 
 use crate::check::Level;
-use crate::encoding::bits;
 use clap::Args;
 use fmu_import::raw::{Arguments, Interface, Raw};
 use fmu_import::{file_uri, printable_lines};
-use model_description::{BaseType, Causality, FmiVersion, Initial, ModelDescription, ModelVariable, Variability};
+use model_description::{BaseType, FmiVersion, ModelDescription};
 use serde::{Deserialize, Serialize};
 use std::cell::{Cell, RefCell};
 use std::ffi::CString;
@@ -97,6 +96,8 @@ pub(super) struct Session {
     /// The level of a crash, if it is lower than that of the check.
     lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
+    /// A getter has returned OK and written nothing.
+    pub(super) unwritten: Cell<bool>,
     /// The step of the integrator in s, if it is not the usual one.
     pub(super) integrator: Cell<Option<f64>>,
     log: RefCell<File>,
@@ -152,6 +153,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(false),
+            unwritten: Cell::new(false),
             integrator: Cell::new(args.integrator),
             log: RefCell::new(log),
             trace: args.trace,
@@ -195,6 +197,7 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(true),
+            unwritten: Cell::new(false),
             integrator: self.integrator.clone(),
             log: RefCell::new(tempfile::tempfile().map_err(lost)?),
             trace: false,
@@ -347,6 +350,11 @@ impl Session {
         self.of_case.get()
     }
 
+    /// How many instances this case has made.
+    pub(super) fn made_in_case(&self) -> usize {
+        self.of_case.get()
+    }
+
     /// Tells the parent, from time to time, that calls without entries of their own return.
     fn show_progress(&self) {
         if self.shown.get().elapsed() < Duration::from_millis(100) {
@@ -396,7 +404,10 @@ impl Session {
             name: Some(text(name)),
             token: Some(text(&self.description.token)),
             resources: Some(text(&resources)),
-            interface: Interface::CoSimulation,
+            interface: match self.description.co_simulation {
+                Some(_) => Interface::CoSimulation,
+                None => Interface::ModelExchange,
+            },
             logger: true,
             callbacks: true,
             memory: true,
@@ -449,78 +460,9 @@ impl Session {
         std::fs::read_dir(self.resources()).is_ok_and(|mut files| files.next().is_some())
     }
 
-    /// A capability.
+    /// A capability of co-simulation, or of Model Exchange where there is no co-simulation.
     pub(super) fn flag(&self, name: &str) -> bool {
-        self.description.co_simulation.as_ref().is_some_and(|c| c.flag(name))
+        let d = &self.description;
+        d.co_simulation.as_ref().or(d.model_exchange.as_ref()).is_some_and(|i| i.flag(name))
     }
-
-    /// Variables whose values are numbers, which all probes can compare.
-    pub(super) fn numeric(&self) -> impl Iterator<Item = &ModelVariable> {
-        self.description
-            .variables
-            .iter()
-            .filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
-    }
-
-    /// The numeric outputs, or all numeric variables where there are none.
-    pub(super) fn watched(&self) -> Vec<&ModelVariable> {
-        let outputs: Vec<_> =
-            self.numeric().filter(|v| v.causality == Causality::Output && v.clocks.is_empty()).collect();
-        if outputs.is_empty() { self.numeric().filter(|v| v.clocks.is_empty()).collect() } else { outputs }
-    }
-
-    /// Inputs that are floating-point numbers.
-    pub(super) fn float_inputs(&self) -> Vec<&ModelVariable> {
-        let fits = |v: &&ModelVariable| v.causality == Causality::Input && v.base.is_float() && v.clocks.is_empty();
-        self.description.variables.iter().filter(fits).collect()
-    }
-
-    /// Number of elements of a variable.
-    pub(super) fn elements(&self, v: &ModelVariable) -> usize {
-        self.description.shape(v).unwrap_or_default().iter().product()
-    }
-
-    /// Number of values that references stand for; one that does not exist counts as one value.
-    pub(super) fn values_of(&self, references: &[u32]) -> usize {
-        let of = |r: &u32| self.description.variables.iter().find(|v| v.value_reference == *r);
-        references.iter().map(|r| of(r).map_or(1, |v| self.elements(v))).sum()
-    }
-
-    /// A value near the start value, within the range, that differs from it.
-    pub(super) fn different_value(&self, v: &ModelVariable, scale: f64) -> Option<Vec<u64>> {
-        let n = self.elements(v);
-        if v.base == BaseType::Boolean {
-            let on = v.start.as_deref().is_some_and(|s| matches!(s.trim(), "true" | "1"));
-            return Some(vec![u64::from(!on); n]);
-        }
-        let first = v.start.as_deref().and_then(|s| s.split_whitespace().next());
-        let start: f64 = first.and_then(model_description::parse_number).unwrap_or(0.0);
-        let (min, max) = (v.min.unwrap_or(f64::NEG_INFINITY), v.max.unwrap_or(f64::INFINITY));
-        let nominal = v.nominal.unwrap_or(1.0).abs();
-        if v.base.is_float() {
-            let step = if start == 0.0 { 0.01 * nominal } else { 0.01 * start.abs() } * scale;
-            let value =
-                [start + step, start - step].into_iter().find(|x| (min..=max).contains(x) && *x > min && *x < max)?;
-            return Some(vec![bits(v.base, value); n]);
-        }
-        if v.base == BaseType::Enumeration {
-            let items = &self.description.type_definition(v.declared_type.as_deref()?)?.items;
-            let other = items.iter().map(|i| i.value).find(|i| first != Some(i.to_string().as_str()))?;
-            return Some(vec![other.cast_unsigned(); n]);
-        }
-        let value = [start + 1.0, start - 1.0].into_iter().find(|x| (min..=max).contains(x) && *x >= 0.0)?;
-        Some(vec![bits(v.base, value); n])
-    }
-}
-
-/// Whether a variable can be set before initialization mode ends.
-pub(super) fn settable(v: &ModelVariable) -> bool {
-    v.variability != Variability::Constant
-        && v.causality != Causality::Independent
-        && v.clocks.is_empty()
-        && match v.causality {
-            Causality::Input | Causality::Parameter => true,
-            Causality::StructuralParameter | Causality::CalculatedParameter => false,
-            _ => v.initial_or_default() == Some(Initial::Exact),
-        }
 }

@@ -1,6 +1,6 @@
 //! Getting and setting (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7): refused calls and start values.
 
-use super::held::{booleans_read, finite, inputs_keep, parameters_keep, several};
+use super::held::{booleans_read, finite, initialized, inputs_keep, parameters_keep, several, written};
 use super::starts::stand;
 use super::values::{
     binaries, booleans, iterated_initialization, not_a_number, out_of_range, round_trip, strings, too_many_bytes,
@@ -10,6 +10,7 @@ use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability, parse_number};
@@ -19,52 +20,52 @@ const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
-    Check { id: "V07", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Probe(start_values),
+    Check { id: "V07", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Any(start_values),
         requirement: "A start value in the description equals the value in the binary.",
         tried: "Reads every variable with a start value in Initialization Mode, and in FMI 3.0 from a new instance (should), and compares.",
         fix: "Generate both from one table." },
     Check { id: "V06b", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges),
         requirement: "Integer and enumeration outputs always lie between min and max.",
         tried: "Reads integer outputs with limits over 50 steps.", fix: "Saturate the output, or correct min and max." },
-    Check { id: "G01a", clause: GET, levels: Levels::HARD, run: Run::Probe(zero_variables),
+    Check { id: "G01a", clause: GET, levels: Levels::HARD, run: Run::Any(zero_variables),
         requirement: "Getting and setting zero variables succeeds, even with NULL pointers.",
         tried: "Gets and sets no variables, with NULL arrays.", fix: "Return OK before looking at the arrays." },
-    Check { id: "G01b", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arrays),
-        requirement: "A NULL array gives Error.",
-        tried: "Gets and sets one variable with NULL arrays.", fix: "Check the pointers if the number is above 0." },
-    Check { id: "G01c", clause: "3.0.2, 2.2.4", levels: Levels(None, Some(Level::Should)), run: Run::Probe(wrong_counts),
+    Check { id: "G01b", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Any(null_arrays),
+        requirement: "A NULL array gives Error, and so does a NULL text.",
+        tried: "Gets and sets one variable with NULL arrays, and sets a text to NULL.", fix: "Check the pointers if the number is above 0." },
+    Check { id: "G01c", clause: "3.0.2, 2.2.4", levels: Levels(None, Some(Level::Should)), run: Run::Any(wrong_counts),
         requirement: "A wrong number of values gives Error, and the FMU writes nothing past the values.",
         tried: "Passes too few and too many values.", fix: "Compare nValues with the sizes of the variables before copying." },
-    Check { id: "G02", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(unknown_reference),
+    Check { id: "G02", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Any(unknown_reference),
         requirement: "A value reference that does not exist gives Error.",
         tried: "Gets and sets a reference that no variable has.", fix: "Return Error in the default branch, also of setters." },
-    Check { id: "V12", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(wrong_type),
+    Check { id: "V12", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Any(wrong_type),
         requirement: "A getter or setter for another type than that of the variable gives Error.",
         tried: "Gets and sets variables with the functions of another type.", fix: "Look references up by type." },
-    Check { id: "G03a", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Probe(constants),
+    Check { id: "G03a", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.4", levels: Levels::MUST, run: Run::Any(constants),
         requirement: "Setting a constant gives Error.",
         tried: "Sets a constant.", fix: "Return Error for variables with variability constant." },
     Check { id: "G03b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(not_settable),
         requirement: "Setting a variable that cannot be set (output, time, fixed parameter after initialization) gives Error and changes nothing.",
-        tried: "Sets an output, the time and a fixed parameter between steps, and reads back.",
+        tried: "Sets an output, the time and a fixed parameter between steps, and reads back; sets a calculated output in the initialization.",
         fix: "Compare causality, variability and state before assigning, and return Error." },
     Check { id: "G03c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(all_or_nothing),
         requirement: "A set call for several variables that fails changes none of them.",
         tried: "Sets an input together with a reference that does not exist.", fix: "Check all references before assigning any." },
-    Check { id: "G04", clause: GET, levels: Levels::MUST, run: Run::Probe(round_trip),
+    Check { id: "G04", clause: GET, levels: Levels::MUST, run: Run::Any(round_trip),
         requirement: "A value that is set before the end of initialization reads back.",
-        tried: "Sets every settable number in Initialization Mode and reads it.", fix: "Store the value as it came." },
-    Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Probe(strings),
+        tried: "Sets every settable number in Initialization Mode, then all before it, and reads them in it.", fix: "Store the value as it came." },
+    Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Any(strings),
         requirement: "The FMU copies strings that are set: the importer may overwrite its own.",
         tried: "Sets strings, overwrites them, and reads back.", fix: "Copy the string." },
-    Check { id: "G05b", clause: "3.0.2, 2.2.7.2", levels: Levels(None, Some(Level::Must)), run: Run::Probe(binaries),
+    Check { id: "G05b", clause: "3.0.2, 2.2.7.2", levels: Levels(None, Some(Level::Must)), run: Run::Any(binaries),
         requirement: "The FMU copies bytes that are set, also none and as many as maxSize: the importer may overwrite its own.",
         tried: "Sets bytes, overwrites them, and reads back.", fix: "Copy the bytes with their size." },
-    Check { id: "G05m", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(too_many_bytes),
+    Check { id: "G05m", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Any(too_many_bytes),
         requirement: "More bytes than maxSize are refused.",
         tried: "Sets one byte more.", fix: "Compare the size with maxSize before copying." },
     Check { id: "G06", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(tunable),
-        requirement: "A tunable parameter can be set between steps and keeps its value.",
+        requirement: "A tunable parameter can be set between steps and keeps its value (hard: the next steps succeed).",
         tried: "Sets each tunable parameter between steps, makes two, and reads it.", fix: "Accept variability tunable in step mode." },
     Check { id: "L11", clause: "2.0.5, 4.2.4; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Probe(iterated_initialization),
         requirement: "Initialization can be iterated: values set and read in between leave no trace.",
@@ -77,7 +78,15 @@ pub(super) const CHECKS: &[Check] = &[
         fix: "Leave the variable alone when the initialization computes others, and restore all start values in Reset." },
     Check { id: "G10", clause: GET, levels: Levels::MUST, run: Run::Probe(several),
         requirement: "Several variables in one call have the values that each of them has alone.",
-        tried: "Reads up to 12 variables of a type one by one, in one call, and in reverse order.", fix: "Return the values in the order of the references." },
+        tried: "Reads up to 12 variables of a type one by one, in one call, and in reverse order; sets parameters and inputs in one call.",
+        fix: "Go through the references in their order." },
+    Check { id: "G15", clause: "2.0.5, 4.2.4; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(written),
+        requirement: "Every variable can be read between steps, and a getter that returns OK has written the value.",
+        tried: "Reads all numbers over 20 steps, into memory with a pattern.", fix: "Let getters know all variables, and write every value." },
+    Check { id: "G16", clause: "hardening", levels: Levels::HARD, run: Run::Probe(initialized),
+        requirement: "Continuous outputs have the same values at the end of Initialization Mode and after it.",
+        tried: "Reads continuous outputs before and after ExitInitializationMode.",
+        fix: "Compute outputs in Initialization Mode when they are read." },
     Check { id: "G11", clause: "2.0.5, 2.1.2; 3.0.2, 2.2.3", levels: Levels::SHOULD, run: Run::Probe(booleans_read),
         requirement: "A Boolean that is read is 0 or 1.",
         tried: "Reads all Booleans over 20 steps.", fix: "Return the result of a comparison, not a number." },
@@ -94,7 +103,7 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "G07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(not_a_number),
         requirement: "NaN, infinities and huge numbers in an input cause no hang, no crash and no disturbance of another instance.",
         tried: "Sets NaN, infinities and huge numbers at each input and makes 3 steps.", fix: "Check inputs for finiteness, and bound every loop." },
-    Check { id: "G07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(out_of_range),
+    Check { id: "G07b", clause: "hardening", levels: Levels::HARD, run: Run::Any(out_of_range),
         requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.",
         tried: "Sets parameters outside min and max.", fix: "Compare with min and max, and refuse at the latest in ExitInitializationMode." },
     Check { id: "G08", clause: "hardening", levels: Levels::HARD, run: Run::Probe(booleans),
@@ -103,7 +112,7 @@ pub(super) const CHECKS: &[Check] = &[
 ];
 
 /// The start values of a variable as bits; `None` for text that is not of the type.
-fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
+pub(super) fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
     let one = |word: &str| match v.base {
         BaseType::Boolean => Some(u64::from(matches!(word, "true" | "1"))),
         base if base.is_float() => parse_number(word).map(|x| bits(base, x)),
@@ -243,7 +252,16 @@ fn null_arrays(session: &Session) -> Result<(), NotDetermined> {
         let status = pass(&instance, way, &call, v.base, (list.as_ref().map(slice::from_ref), 1), (place, 1))?;
         session.require(status == Status::ERROR, || format!("{call} returned {status}"));
         Ok(())
-    })
+    })?;
+    let text = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
+    let Some(v) = session.description.variables.iter().find(text) else { return Ok(()) };
+    session.case(|| {
+        let (instance, call) = (session.initializing()?, format!("SetString({}, NULL)", v.name));
+        let status = instance.call(&call, |raw| raw.set_strings(instance.handle, &[v.value_reference], &[None]))?;
+        session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+        Ok(())
+    });
+    Ok(())
 }
 
 fn wrong_counts(session: &Session) -> Result<(), NotDetermined> {
@@ -284,8 +302,32 @@ fn unknown_reference(session: &Session) -> Result<(), NotDetermined> {
                 session.case(|| must_be_refused(session, way, base, reference, "a reference that does not exist"));
             }
         }
+        for way in WAYS {
+            session.case(|| text_must_be_refused(session, way, reference, "a reference that does not exist"));
+        }
     }
     Ok(())
+}
+
+/// [`must_be_refused`] for texts.
+fn text_must_be_refused(session: &Session, way: &str, reference: u32, what: &str) -> Result<(), NotDetermined> {
+    let instance = session.stepping()?;
+    let call = format!("{way}String(reference={reference})");
+    let status = instance.call(&call, |raw| match way {
+        "Set" => raw.set_strings(instance.handle, &[reference], &[Some(c"text")]),
+        _ => raw.get_strings(instance.handle, &[reference], 1).map(|(status, _)| status),
+    })?;
+    refused(session, status, &format!("{call}, {what}, returned {status}"));
+    Ok(())
+}
+
+/// Requires an Error; one that gives up all instances is a lesser matter.
+fn refused(session: &Session, status: Status, text: &str) {
+    if status == Status::FATAL {
+        session.lesser(Level::Should, text);
+    } else {
+        session.require(status == Status::ERROR, || text.into());
+    }
 }
 
 /// A getter or setter that must return Error.
@@ -300,13 +342,7 @@ fn must_be_refused(
     let mut buffer = Buffer::of(base, session.description.version, &[bits(base, 0.0)]);
     let call = format!("{way}({base}, reference={reference})");
     let status = pass(&instance, way, &call, base, (Some(&[reference]), 1), (Some(&mut buffer), 1))?;
-    let text = format!("{call}, {what}, returned {status}");
-    if status == Status::FATAL {
-        // Refused, but with more than is wrong: it gives up all instances.
-        session.lesser(Level::Should, text);
-    } else {
-        session.require(status == Status::ERROR, || text);
-    }
+    refused(session, status, &format!("{call}, {what}, returned {status}"));
     Ok(())
 }
 
@@ -326,6 +362,15 @@ fn wrong_type(session: &Session) -> Result<(), NotDetermined> {
         let what = format!("{} of the type {}", v.name, v.base);
         for way in WAYS {
             session.case(|| must_be_refused(session, way, base, v.value_reference, &what));
+        }
+    }
+    let all = &session.description.variables;
+    let is_text = |r: u32| all.iter().any(|v| v.base == BaseType::String && v.value_reference == r);
+    let fits = |v: &&ModelVariable| v.base.is_float() && !v.is_array() && !is_text(v.value_reference);
+    if let Some(v) = all.iter().find(fits) {
+        let what = format!("{} of the type {}", v.name, v.base);
+        for way in WAYS {
+            session.case(|| text_must_be_refused(session, way, v.value_reference, &what));
         }
     }
     Ok(())
@@ -379,6 +424,18 @@ fn not_settable(session: &Session) -> Result<(), NotDetermined> {
             });
             Ok(())
         });
+        // What is calculated cannot be set before either.
+        if v.initial_or_default() == Some(Initial::Calculated) {
+            session.case(|| {
+                let (instance, values) = (session.initializing()?, session.different_value(v, 7.0));
+                let Some(values) = values else { return Ok(()) };
+                let status = instance.set(v, &values)?;
+                session.require(status == Status::ERROR, || {
+                    format!("Set({}), initial=calculated, in Initialization Mode returned {status}", v.name)
+                });
+                Ok(())
+            });
+        }
     }
     Ok(())
 }

@@ -2,8 +2,9 @@
 
 use crate::check::Level;
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
 use crate::states::{Life, State};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{SavedState, Sensitivity, Simple, Vector};
 use model_description::{Causality, CoSimulation, FmiVersion, ModelVariable, Variability};
@@ -90,6 +91,30 @@ pub(super) fn attempt(session: &Session, life: Life, sign: char) {
             });
         }
     }
+}
+
+/// The calls that a check of this table makes, with the states: what the standard's tables of states say, for `--explain`.
+pub(crate) fn explained(id: &str) -> Vec<String> {
+    let (signs, life, columns): (_, _, &[(usize, &str)]) = match id {
+        "L07" => ("+s", Life::CoSimulation, &[(0, "FMI 2.0"), (1, "FMI 3.0")]),
+        "L08" => ("-", Life::CoSimulation, &[(0, "FMI 2.0"), (1, "FMI 3.0")]),
+        "E01" => ("+", Life::ModelExchange, &[(2, "FMI 2.0"), (3, "FMI 3.0")]),
+        "E01i" => ("s", Life::ModelExchange, &[(2, "FMI 2.0"), (3, "FMI 3.0")]),
+        "E02" => ("-", Life::ModelExchange, &[(2, "FMI 2.0"), (3, "FMI 3.0")]),
+        "N05" => ("-", Life::EventMode, &[(4, "FMI 3.0")]),
+        _ => return Vec::new(),
+    };
+    let mut lines = Vec::new();
+    for (column, standard) in columns {
+        for Call(name, _, cells, _) in CALLS {
+            let states = life.states().iter().zip(cells[*column].chars()).filter(|(_, cell)| signs.contains(*cell));
+            let states: Vec<_> = states.map(|(state, _)| format!("{state:?}")).collect();
+            if !states.is_empty() {
+                lines.push(format!("{standard}: {name} in {}", states.join(", ")));
+            }
+        }
+    }
+    lines
 }
 
 fn any(_: &Session) -> bool {

@@ -3,7 +3,8 @@
 use crate::check::{Check, Level, Levels, Run};
 use crate::encoding::{bits, show};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{Buffer, Simple};
 use model_description::{BaseType, Causality, CoSimulation, Dimension, ModelVariable, Variability};

@@ -2,7 +2,8 @@
 
 use super::held::set_all;
 use crate::exchange::{Importer, differ};
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, ModelVariable, Unknown, Variability};
 

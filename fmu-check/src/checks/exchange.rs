@@ -2,6 +2,11 @@
 
 use super::calls::attempt;
 use super::dependencies::exchange_dependencies;
+use super::exchange_held::{
+    completed_step, independent, inputs_read_back, interleaved, mode_alone, pure, same_bits, start_times,
+};
+use super::held::set_all;
+use super::state::in_initialization;
 use crate::check::{Check, Level, Levels, Run};
 use crate::exchange::{Importer, UNSTABLE, deviation, differ};
 use crate::instance::Instance;
@@ -9,7 +14,7 @@ use crate::session::{Line, NotDetermined, Session};
 use crate::states::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
-use model_description::{BaseType, Causality, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable};
 use std::cell::Cell;
 
 const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
@@ -41,17 +46,19 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.",
         tried: "Compares the nominals with the description.", fix: "Generate both from one table." },
     Check { id: "E05", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip),
-        requirement: "Continuous states that are set can be read back, as a vector and as variables.",
-        tried: "Sets the states and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
+        requirement: "Continuous states that are set can be read back, as a vector and as variables (should: inputs too, in both modes).",
+        tried: "Sets states and inputs and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
     Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
-        requirement: "Derivatives depend on time, states and inputs alone: not on earlier evaluations, nor on the order of the Set calls.",
-        tried: "Evaluates derivatives in other orders, repeatedly and in another instance, and compares.",
+        requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of \
+            the Set calls (should: event indicators, and a time that goes back to the last completed step).",
+        tried: "Evaluates both in other orders, repeatedly and in another instance, and compares.",
         fix: "Mark cached results as old in every Set function." },
     Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
         requirement: "Equal time, states and inputs give equal derivatives, bit for bit.",
         tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory." },
     Check { id: "E07", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step),
-        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states nor derivatives.",
+        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states, derivatives, inputs, \
+            parameters nor the time.",
         tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing." },
     Check { id: "E08", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent),
         requirement: "The independent variable is the time that SetTime set.",
@@ -69,11 +76,19 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.",
         fix: "Add them to dependencies, or leave dependencies out." },
     Check { id: "E15", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(both_ways),
-        requirement: "The vector of derivatives has the values of the variables that are the derivatives.",
-        tried: "Reads both at several points.", fix: "Let both functions read one value." },
+        requirement: "The vectors of states and derivatives have the values of the variables that are the states and derivatives.",
+        tried: "Reads both at several points and after events.", fix: "Let both functions read one value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
-        requirement: "EnterContinuousTimeMode and EnterEventMode change no state.",
-        tried: "Reads the states before and after each change of the mode.", fix: "Reinitialize states in the update of the discrete states only." },
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input or parameter, nor the time, and updates of an \
+            event no input or parameter.",
+        tried: "Reads them before and after each change of the mode, and before and after the updates.",
+        fix: "Reinitialize states in the update of the discrete states only." },
+    Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
+        requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
+        tried: "Runs 3 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+    Check { id: "E18", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(start_times),
+        requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are after them.",
+        tried: "Integrates 20 steps from each.", fix: "Take the start time from its argument, and count time events from it." },
     Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
         requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
         tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },
@@ -220,13 +235,14 @@ fn declared_nominals(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// States near those given, one of them or all moved a little.
-fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
+pub(super) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
     let nominal = session.description.states();
     let size = |i: usize| nominal.get(i).and_then(|v| v.nominal).unwrap_or(1.0).abs().max(x[i].abs());
     x.iter().enumerate().map(|(i, x)| if i == k || k >= nominal.len() { x + 1e-3 * size(i) } else { *x }).collect()
 }
 
 fn round_trip(session: &Session) -> Result<(), NotDetermined> {
+    inputs_read_back(session)?;
     needs_states!(session);
     let instance = session.exchange(State::Continuous)?;
     let x = moved(session, &instance.states()?, usize::MAX);
@@ -249,130 +265,27 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// Derivatives at one point, each evaluated after something else has happened.
-fn evaluations(session: &Session) -> Result<Vec<(&'static str, Vec<f64>)>, NotDetermined> {
-    let begin = || -> Result<_, NotDetermined> {
-        let instance = session.excited()?;
-        let mut importer = Importer::start(&instance)?;
-        importer.run(50, &mut |_| Ok(()))?;
-        let over = importer.over;
-        Ok((instance, over))
-    };
-    let (instance, over) = begin()?;
-    if over {
-        return Err(NotDetermined("the FMU ends the simulation at once".into()));
-    }
-    let (t, x) = (instance.time.get(), instance.states()?);
-    let inputs: Vec<(&ModelVariable, Vec<u64>)> = session
-        .number_inputs()
-        .filter(|v| v.variability == Variability::Continuous)
-        .filter_map(|v| Some((v, session.different_value(v, 3.0)?)))
-        .collect();
-    let point = |instance: &Instance<'_>, order: [usize; 3]| -> Result<(), NotDetermined> {
-        for what in order {
-            match what {
-                0 => instance.must("SetTime", instance.set_time(t)?)?,
-                1 => instance.must("SetContinuousStates", instance.set_states(&x)?)?,
-                _ => {
-                    for (v, values) in &inputs {
-                        instance.must("Set", instance.set(v, values)?)?;
-                    }
-                }
-            }
-        }
-        Ok(())
-    };
-    point(&instance, [0, 1, 2])?;
-    let mut found = vec![("first", instance.derivatives()?), ("read twice", instance.derivatives()?)];
-    let _ = instance.snapshot(&session.watched())?;
-    let _ = instance.indicators()?;
-    found.push(("after outputs and indicators", instance.derivatives()?));
-    for (k, what) in [(0, "after another state"), (usize::MAX, "after other states")] {
-        instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, k))?)?;
-        let _ = instance.derivatives()?;
-        instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
-        let _ = instance.derivatives()?;
-        point(&instance, [1, 2, 0])?;
-        found.push((what, instance.derivatives()?));
-    }
-    let (other, _) = begin()?;
-    point(&other, [2, 1, 0])?;
-    found.push(("in another instance, set in another order", other.derivatives()?));
-    Ok(found)
-}
-
-fn pure(session: &Session) -> Result<(), NotDetermined> {
-    needs_states!(session);
-    let found = evaluations(session)?;
-    let (_, first) = &found[0];
-    for (what, values) in &found[1..] {
-        if let Some((_, largest)) = deviation(std::slice::from_ref(first), std::slice::from_ref(values)) {
-            session.deviates(largest, &format!("the derivatives are {first:?}; {what}, {values:?}"));
-        }
-    }
-    Ok(())
-}
-
-fn same_bits(session: &Session) -> Result<(), NotDetermined> {
-    needs_states!(session);
-    let found = evaluations(session)?;
-    let (_, first) = &found[0];
-    for (what, values) in &found[1..] {
-        let same = first.iter().zip(values).all(|(a, b)| a.to_bits() == b.to_bits());
-        session.require(same, || format!("the derivatives are {first:?}; {what}, {values:?}"));
-    }
-    Ok(())
-}
-
-fn completed_step(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.exchange(State::Continuous)?;
-    for k in 0..5 {
-        instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
-        let before = [instance.states()?, instance.derivatives()?];
-        let (status, flags) = instance.completed()?;
-        session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
-            format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
-        });
-        if !status.is_ok() || flags != [0, 0] {
-            return Ok(());
-        }
-        let after = [instance.states()?, instance.derivatives()?];
-        let changed = before.iter().zip(&after).any(|(a, b)| differ(a, b));
-        session.require(!changed, || {
-            format!("step {k}: states and derivatives were {before:?} before CompletedIntegratorStep, {after:?} after")
-        });
-    }
-    Ok(())
-}
-
-fn independent(session: &Session) -> Result<(), NotDetermined> {
-    let fits = |v: &&ModelVariable| v.causality == Causality::Independent && v.base == BaseType::Float64;
-    let Some(time) = session.description.variables.iter().find(fits) else {
-        return session.not_applicable("there is no independent variable of type Float64");
-    };
-    let instance = session.exchange(State::Continuous)?;
-    for _ in 0..3 {
-        let t = instance.time.get() + 0.1 * session.integrator_step();
-        instance.must("SetTime", instance.set_time(t)?)?;
-        let (status, bits) = instance.get(time)?;
-        let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
-        session.require(status.is_ok() && (found - t).abs() <= 1e-9 * t.abs(), || {
-            format!("after SetTime({t:?}), Get({}) returned {status}, {found:?}", time.name)
-        });
-    }
-    Ok(())
-}
-
 fn both_ways(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
     let d = &session.description;
-    let variables: Vec<&ModelVariable> = d.derivatives.iter().filter_map(|u| d.referenced(u.reference)).collect();
+    let derivatives: Vec<&ModelVariable> = d.derivatives.iter().filter_map(|u| d.referenced(u.reference)).collect();
     let instance = session.excited()?;
     let mut importer = Importer::start(&instance)?;
-    for _ in 0..5 {
-        let vector = instance.derivatives()?;
+    // At the start, after some steps, and after events.
+    let mut looked = 0;
+    for k in 0..400 {
+        let event = importer.step(session.integrator_step(), &mut |_, _| ())?;
+        if importer.over || looked == 8 {
+            break;
+        }
+        if !event && k % 50 != 0 {
+            continue;
+        }
+        looked += 1;
+        let mut vector = instance.states()?;
+        vector.extend(instance.derivatives()?);
         let mut rest = &vector[..];
-        for v in &variables {
+        for v in d.states().iter().chain(&derivatives) {
             let (of_vector, more) = rest.split_at(session.elements(v).min(rest.len()));
             rest = more;
             let (status, found) = instance.get(v)?;
@@ -388,36 +301,6 @@ fn both_ways(session: &Session) -> Result<(), NotDetermined> {
                 return Ok(());
             }
         }
-        importer.run(20, &mut |_| Ok(()))?;
-        if importer.over {
-            break;
-        }
-    }
-    Ok(())
-}
-
-fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
-    needs_states!(session);
-    let instance = session.excited()?;
-    let compare = |what: &str, before: &[f64]| {
-        let after = instance.states()?;
-        session.require(!differ(before, &after), || format!("{what}: the states were {before:?}, and are {after:?}"));
-        Ok::<_, NotDetermined>(())
-    };
-    for _ in 0..3 {
-        let event = instance.iterate()?;
-        if event.terminates() || !event.ended() {
-            return Ok(());
-        }
-        let before = instance.states()?;
-        instance.perform(Simple::EnterContinuousTimeMode)?;
-        compare("EnterContinuousTimeMode", &before)?;
-        let t = instance.time.get() + session.integrator_step();
-        let next = event.next().unwrap_or(f64::INFINITY);
-        instance.must("SetTime", instance.set_time(t.min(next))?)?;
-        let before = instance.states()?;
-        instance.perform(Simple::EnterEventMode)?;
-        compare("EnterEventMode", &before)?;
     }
     Ok(())
 }
@@ -480,9 +363,15 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
     let first = run(&session.exchange(State::Event)?)?;
     session.cases(Life::ModelExchange.states(), |&state| {
         let running = state == State::Continuous;
-        let instance = session.exchange(if running { State::Event } else { state })?;
+        let instance = session.exchange(if running { State::Initialization } else { state })?;
         if running {
-            Importer::start(&instance)?.run(20, &mut |_| Ok(()))?;
+            // This check does not judge refusals.
+            if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
+                session.note(why);
+            }
+            let _ = instance
+                .perform(Simple::ExitInitializationMode)
+                .and_then(|()| Importer::start(&instance)?.run(20, &mut |_| Ok(())));
         }
         let status = instance.simple(Simple::Reset)?;
         if !status.is_ok() {
@@ -490,7 +379,10 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             return Ok(());
         }
         instance.experiment(session.start(), None);
-        instance.bring_to(State::Event)?;
+        if let Err(why) = instance.bring_to(State::Event) {
+            session.failed(&format!("after Reset after {state:?}"), why);
+            return Ok(());
+        }
         if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
             let text = format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
             session.deviates(largest, &text);
@@ -503,6 +395,9 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
     if !session.exchange_saves() {
         return session.not_applicable("canGetAndSetFMUState is false for Model Exchange");
     }
+    let comparable = |v: &&ModelVariable| v.clocks.is_empty() && v.causality != Causality::Independent;
+    let all: Vec<&ModelVariable> = session.numeric().filter(comparable).collect();
+    session.case(|| in_initialization(session, &|| session.exchange(State::Initialization), &all));
     let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
         if let Some((k, largest)) = deviation(first, second) {
             session.deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
@@ -521,9 +416,18 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
         let mut importer = Importer::start(&instance)?;
         importer.run(50, &mut |_| Ok(()))?;
         let (saved, t, next) = (instance.save()?, instance.time.get(), importer.next);
+        let before = instance.snapshot(&all)?;
         let mut first = importer.trajectory(100)?;
         for _ in 0..2 {
             instance.restore(saved, t)?;
+            for (v, (old, new)) in all.iter().zip(before.iter().zip(instance.snapshot(&all)?)) {
+                session.compare_variables(
+                    &[*v],
+                    "restored in Continuous-Time Mode",
+                    &[vec![old.clone()]],
+                    &[vec![new]],
+                );
+            }
             let second = Importer::resume(&instance, next)?.trajectory(100)?;
             compare("Continuous-Time Mode", &first, &second);
             first = second;

@@ -2,9 +2,12 @@
 
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
+use fmu_import::Status;
 use fmu_import::raw::{Buffer, take_events};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
+use std::ffi::CString;
 
 /// Steps of a run that looks at values.
 const STEPS: u32 = 20;
@@ -50,7 +53,48 @@ pub(super) fn several(session: &Session) -> Result<(), NotDetermined> {
             }
         }
     }
+    several_set(session)?;
     if tried == 0 { session.not_applicable("no type has several variables") } else { Ok(()) }
+}
+
+/// What is set in one call reads back as if it had been set alone.
+fn several_set(session: &Session) -> Result<(), NotDetermined> {
+    let version = session.description.version;
+    for &base in BaseType::ALL {
+        let mut list: Vec<(&ModelVariable, u64)> = Vec::new();
+        for v in scalars(session, base, settable) {
+            let (one, values) = (session.initializing()?, session.different_value(v, 1.0));
+            // G04 looks at each alone.
+            if let Some(values) = values
+                && one.set(v, &values)?.is_ok()
+                && one.get(v).is_ok_and(|(status, back)| status.is_ok() && same(v, version, &values, &back))
+            {
+                list.push((v, values[0]));
+            }
+        }
+        if list.len() < 2 {
+            continue;
+        }
+        let instance = session.initializing()?;
+        let references: Vec<u32> = list.iter().map(|(v, _)| v.value_reference).collect();
+        let mut buffer = Buffer::of(base, version, &list.iter().map(|(_, value)| *value).collect::<Vec<_>>());
+        let call = format!("Set({} variables of the type {base})", list.len());
+        let status = instance.call(&call, |raw| {
+            raw.set(instance.handle, base, Some(&references), list.len(), Some(&mut buffer), list.len())
+        })?;
+        // Together they may be values that the model does not take.
+        if !status.is_ok() {
+            return Ok(());
+        }
+        for (v, value) in &list {
+            let (status, back) = instance.get(v)?;
+            session.require(!status.is_ok() || same(v, version, &[*value], &back), || {
+                let [set, got] = [&[*value][..], &back].map(|bits| show(v, version, bits));
+                format!("{call}: {} was set to {set}, and is {got}", v.name)
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Runs with changing inputs and looks after each step, until something is found.
@@ -67,6 +111,47 @@ fn look_at(
         instance.steps(1, session.h())?;
     }
     look(&instance, STEPS).map(|_| ())
+}
+
+pub(super) fn written(session: &Session) -> Result<(), NotDetermined> {
+    let all: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).take(200).collect();
+    look_at(session, &mut |instance, k| {
+        for v in &all {
+            session.unwritten.set(false);
+            let (status, _) = instance.get(v)?;
+            if status == Status::ERROR {
+                session.violated(format!("line {}: Get({}) after {k} steps returned {status}", v.line, v.name));
+                return Ok(true);
+            }
+            if status.is_ok() && session.unwritten.get() {
+                session.violated(format!(
+                    "line {}: Get({}) after {k} steps returned OK and wrote nothing",
+                    v.line, v.name
+                ));
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    })
+}
+
+/// Continuous outputs at both sides of the end of the initialization.
+pub(super) fn initialized(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| v.variability == Variability::Continuous && v.causality == Causality::Output;
+    let outputs: Vec<_> = session.watched().into_iter().filter(fits).collect();
+    if outputs.is_empty() {
+        return session.not_applicable("there is no continuous output");
+    }
+    let instance = session.initializing()?;
+    let before = instance.snapshot(&outputs)?;
+    instance.exit()?;
+    for (v, (old, new)) in outputs.iter().zip(before.into_iter().zip(instance.snapshot(&outputs)?)) {
+        if !old.is_empty() && !new.is_empty() {
+            let what = "after ExitInitializationMode, compared with before";
+            session.compare_variables(&[*v], what, &[vec![old]], &[vec![new]]);
+        }
+    }
+    Ok(())
 }
 
 pub(super) fn booleans_read(session: &Session) -> Result<(), NotDetermined> {
@@ -275,12 +360,14 @@ pub(super) fn set_all(instance: &Instance<'_>, scale: f64) -> Result<(), NotDete
     let session = instance.session;
     for v in session.description.variables.iter().filter(|v| settable(v)) {
         if v.base == BaseType::String && !v.is_array() {
+            // Longer than what an FMU may have room for, and another one for another scale.
+            let text = CString::new(format!("another text {scale} ").repeat(6)).unwrap_or_default();
             let _ = instance.call(&format!("SetString({})", v.name), |raw| {
-                raw.set_strings(instance.handle, &[v.value_reference], &[Some(c"another text")])
+                raw.set_strings(instance.handle, &[v.value_reference], &[Some(&text)])
             })?;
         } else if !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock)
             && let Some(values) = session.different_value(v, scale)
-            && instance.set(v, &values)? == fmu_import::Status::ERROR
+            && instance.set(v, &values)? == Status::ERROR
         {
             return Err(NotDetermined(format!("{} cannot be set", v.name)));
         }

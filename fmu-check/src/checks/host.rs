@@ -13,17 +13,17 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "B06", clause: "hardening", levels: Levels::HARD, run: Run::Probe(small_stack),
         requirement: "The binary loads and runs in a secondary thread with a stack of 256 KiB.",
         tried: "Loads and runs in a thread with 256 KiB.", fix: "Put large arrays on the heap." },
-    Check { id: "B08f", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(floating_point),
+    Check { id: "B08f", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Any(floating_point),
         requirement: "Neither loading nor any call changes the floating-point control (rounding, exceptions, flushing to zero).",
         tried: "Reads the control registers after each call.", fix: "Restore them before returning; avoid -ffast-math when linking." },
-    Check { id: "B08g", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(settings),
+    Check { id: "B08g", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Any(settings),
         requirement: "A complete run changes no setting of the process: working directory, environment, umask, signals, locale, processors, priority, \
             timers and limits.",
         tried: "Compares the settings before loading and after unloading.", fix: "Leave them alone, or restore them before returning." },
-    Check { id: "B08r", clause: "3.0.2, 2.5.1.5", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(written),
+    Check { id: "B08r", clause: "3.0.2, 2.5.1.5", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Any(written),
         requirement: "A run neither writes nor removes files in the folder of the FMU, its resources included.",
         tried: "Compares the folder before loading and after unloading.", fix: "Write where the importer says, for example to a path that is a parameter." },
-    Check { id: "B08p", clause: "hardening", levels: Levels::HARD, run: Run::Probe(left_behind),
+    Check { id: "B08p", clause: "hardening", levels: Levels::HARD, run: Run::Any(left_behind),
         requirement: "A complete run, from loading to unloading, leaves nothing behind: threads, child processes, open files, files in temporary folders.",
         tried: "Compares the process and these folders before loading and after unloading.",
         fix: "Close and remove files, end threads and processes." },
@@ -118,24 +118,30 @@ fn floating_point(session: &Session) -> Result<(), NotDetermined> {
     if !check_control("loading") {
         return Ok(());
     }
-    let instance = duplicate.fresh()?;
-    let steps: [Watched<'_>; 6] = [
-        ("the instantiation", &|| Ok(())),
-        ("entering initialization mode", &|| instance.enter()),
-        ("leaving initialization mode", &|| instance.exit()),
-        ("setting inputs", &|| instance.change_inputs(1)),
-        ("DoStep", &|| instance.steps(3, duplicate.h())),
-        ("getting outputs", &|| instance.snapshot(&duplicate.watched()).map(|_| ())),
-    ];
-    for (what, step) in steps {
-        step()?;
-        if !check_control(what) {
+    if session.description.co_simulation.is_some() {
+        let instance = duplicate.fresh()?;
+        let steps: [Watched<'_>; 6] = [
+            ("the instantiation", &|| Ok(())),
+            ("entering initialization mode", &|| instance.enter()),
+            ("leaving initialization mode", &|| instance.exit()),
+            ("setting inputs", &|| instance.change_inputs(1)),
+            ("DoStep", &|| instance.steps(3, duplicate.h())),
+            ("getting outputs", &|| instance.snapshot(&duplicate.watched()).map(|_| ())),
+        ];
+        for (what, step) in steps {
+            step()?;
+            if !check_control(what) {
+                return Ok(());
+            }
+        }
+        let _ = instance.simple(Simple::Terminate)?;
+        instance.free()?;
+        if !check_control("termination") {
             return Ok(());
         }
     }
-    let _ = instance.simple(Simple::Terminate)?;
-    instance.free()?;
-    check_control("termination");
+    duplicate.complete_run()?;
+    check_control("a run of all interfaces");
     Ok(())
 }
 

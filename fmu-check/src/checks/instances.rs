@@ -1,12 +1,14 @@
 //! Several instances, threads, copies, loading and unloading.
 
+use super::held::{set_all, texts};
 use super::host::{failed, second_binary};
 use crate::check::{Check, Levels, Run};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
+use crate::states::State;
 use crate::trajectory::trajectory;
 use fmu_import::guard::patiently;
-use fmu_import::raw::Raw;
+use fmu_import::raw::{Arguments, Interface, Raw};
 use std::sync::{Mutex, PoisonError};
 use std::thread::Builder;
 use std::time::{Duration, Instant};
@@ -15,7 +17,8 @@ use std::time::{Duration, Instant};
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "L04a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(interleaved),
         requirement: "Interleaved instances give the same results as each alone.",
-        tried: "Runs 8 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one alone.",
+        fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "L04b", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, run: Run::Probe(threads),
         requirement: "Instances in several threads give the same results as each alone.",
         tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share." },
@@ -26,16 +29,16 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.",
         tried: "Loads two copies with their symbols visible to each other and compares.",
         fix: "Hide all symbols but those of the standard, or link with -Bsymbolic." },
-    Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Probe(leaks),
+    Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Any(leaks),
         requirement: "Creating and freeing instances leaks no memory.",
-        tried: "Creates and frees some thousand instances and measures memory.",
+        tried: "Creates, runs, reads and frees some thousand instances and measures memory.",
         fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
     Check { id: "B07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads),
         requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.",
         tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded." },
 ];
 
-fn only_once(session: &Session) -> bool {
+pub(super) fn only_once(session: &Session) -> bool {
     session.flag("canBeInstantiatedOnlyOncePerProcess")
 }
 
@@ -45,15 +48,28 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     if only_once(session) {
         return session.not_applicable(ONLY_ONCE);
     }
-    let alone = trajectory(&session.stepping()?, 20)?;
+    let alone = session.stepping()?;
+    let mut expected = vec![(trajectory(&alone, 20)?, texts(&alone)?)];
+    let own: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+    let before = alone.snapshot(&own)?;
+    // Every other instance has parameters of its own, where the FMU takes these values.
+    let trial = session.initializing()?;
+    if set_all(&trial, 1.0).is_ok() && trial.exit().is_ok() {
+        expected.push((trajectory(&trial, 20)?, texts(&trial)?));
+    }
+    let kinds = expected.len();
     // Creating them is part of the requirement.
     let mut all = Vec::new();
     for k in 0..8 {
         let Some(instance) = session.instantiate(&session.arguments(&format!("probe {k}")))? else {
-            session.violated(format!("instance {} could not be created beside {k} others", k + 2));
+            session.violated(format!("instance {} could not be created beside {} others", all.len() + 1, k + kinds));
             return Ok(());
         };
-        instance.initialize()?;
+        instance.enter()?;
+        if k % kinds == 1 {
+            set_all(&instance, 1.0)?;
+        }
+        instance.exit()?;
         all.push((instance, Vec::new()));
     }
     for k in 0..20 {
@@ -63,8 +79,17 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
             rows.push(instance.snapshot(&session.watched())?);
         }
     }
+    for (v, (old, new)) in own.iter().zip(before.into_iter().zip(alone.snapshot(&own)?)) {
+        if !old.is_empty() && !new.is_empty() {
+            session.compare_variables(&[*v], "an instance that nobody called meanwhile", &[vec![old]], &[vec![new]]);
+        }
+    }
     for (k, (instance, rows)) in all.into_iter().enumerate() {
-        session.compare(&format!("instance {k}"), &alone, &rows);
+        let (alone, words) = &expected[k % kinds];
+        session.compare(&format!("instance {k}"), alone, &rows);
+        for (old, new) in words.iter().zip(&texts(&instance)?).filter(|(old, new)| old != new) {
+            session.violated(format!("instance {k}: {} is {:?}, and {:?} alone", old.0, new.1, old.1));
+        }
         instance.free()?;
     }
     Ok(())
@@ -203,11 +228,24 @@ pub(super) fn leak(
 }
 
 fn leaks(session: &Session) -> Result<(), NotDetermined> {
+    let watched = session.watched();
+    if session.description.model_exchange.is_some() {
+        let arguments = || Arguments { interface: Interface::ModelExchange, ..session.arguments("probe") };
+        leak(session, "instances for Model Exchange", &|| {
+            let instance = session.made(&arguments())?;
+            instance.bring_to(State::Continuous)?;
+            instance.free()
+        })?;
+    }
+    if session.description.co_simulation.is_none() {
+        return Ok(());
+    }
     leak(session, "instances", &|| {
         let arguments = session.arguments("probe");
         let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
         instance.initialize()?;
         instance.steps(2, session.h())?;
+        let _ = (instance.snapshot(&watched)?, texts(&instance)?);
         instance.free()
     })
 }

@@ -20,10 +20,10 @@ pub(super) const CHECKS: &[Check] = &[
         requirement: "A minimal run succeeds: instantiation, initialization, steps, termination.",
         tried: "Instantiates, initializes, makes 10 steps of the default experiment, reads outputs, terminates.",
         fix: "Look at the call that is named; the other checks of the binary rest on this run." },
-    Check { id: "X04", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(token),
+    Check { id: "X04", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Any(token),
         requirement: "Instantiation with a wrong token (GUID) returns NULL.",
         tried: "Instantiates with a wrong token.", fix: "Compare the argument with the token compiled in, and return NULL if it differs." },
-    Check { id: "L01a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(null_arguments),
+    Check { id: "L01a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Any(null_arguments),
         requirement: "Instantiation returns NULL if the instance name is NULL or empty or the token is NULL.",
         tried: "Instantiates with an empty name, without a name and without a token.", fix: "Check the arguments, and return NULL." },
     Check { id: "L01b", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Probe(without_logger),
@@ -95,6 +95,11 @@ fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
 
 fn allowed(session: &Session) -> Result<(), NotDetermined> {
     attempt(session, Life::CoSimulation, '+');
+    session.case(|| {
+        let status = session.stepping()?.simple(Simple::Terminate)?;
+        session.require(status.is_ok(), || format!("Terminate in Step, before the first step, returned {status}"));
+        Ok(())
+    });
     Ok(())
 }
 
@@ -266,8 +271,12 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
                 return Ok(());
             }
             instance.experiment(session.start(), None);
-            let second = run(&instance)?;
-            session.compare(&format!("Reset after {state:?}, compared with a new instance"), &first, &second);
+            match run(&instance) {
+                Ok(second) => {
+                    session.compare(&format!("Reset after {state:?}, compared with a new instance"), &first, &second);
+                }
+                Err(why) => session.failed(&format!("after Reset after {state:?}"), why),
+            }
             Ok(())
         });
     }
@@ -358,7 +367,9 @@ fn recovery(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn terminated(session: &Session) -> Result<(), NotDetermined> {
-    let instance = session.simulation(Step)?;
+    let instance = session.stepping()?;
+    instance.change_inputs(2)?;
+    instance.steps(2, session.h())?;
     let watched = session.watched();
     // What cannot be read before cannot be read after.
     let watched: Vec<_> =

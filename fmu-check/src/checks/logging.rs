@@ -1,9 +1,10 @@
 //! Logging and memory (FMI 2.0.5, 2.1.5; FMI 3.0.2, 2.3.1).
 
+use super::instances::only_once;
 use crate::check::{Check, Level, Levels, Run};
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, LogCall, allocations, take_events};
+use fmu_import::raw::{Arguments, LogCall, Simple, allocations, take_events};
 use std::ffi::CString;
 
 const LOG: &str = "2.0.5, 2.1.5; 3.0.2, 2.3.1";
@@ -13,16 +14,16 @@ pub(super) const CHECKS: &[Check] = &[
     Check { id: "G-L1b", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(categories),
         requirement: "Every message has a category from LogCategories, or NULL if there are none (in FMI 2.0 since 2.0.3).",
         tried: "Runs with an Error and logging on, and reads the categories of all messages.", fix: "List all categories that are used in LogCategories." },
-    Check { id: "G-L2a", clause: LOG, levels: Levels::MUST, run: Run::Probe(switch),
+    Check { id: "G-L2a", clause: LOG, levels: Levels::MUST, run: Run::Any(switch),
         requirement: "SetDebugLogging accepts an empty list, meaning all categories, and each category of LogCategories.",
-        tried: "Switches logging with an empty list and with each category.", fix: "Accept 0 categories with NULL, and every listed one." },
-    Check { id: "G-L2b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(unknown),
+        tried: "Switches logging with an empty list and with each category, also between steps.", fix: "Accept 0 categories with NULL, and every listed one." },
+    Check { id: "G-L2b", clause: "hardening", levels: Levels::HARD, run: Run::Any(unknown),
         requirement: "A category that does not exist or is NULL gives Error and does no harm.",
         tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error." },
     Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors),
         requirement: "With logging on, every Error is accompanied by a message of that status.",
-        tried: "Provokes an Error with logging on.", fix: "Log in the one place that returns Error." },
-    Check { id: "G-L3c", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(refusals),
+        tried: "Provokes an Error with logging on, resets, and provokes another.", fix: "Log in the one place that returns Error." },
+    Check { id: "G-L3c", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Any(refusals),
         requirement: "With logging on, an instantiation that returns NULL is accompanied by a message.",
         tried: "Instantiates with a wrong token.", fix: "Log the reason before returning NULL." },
     Check { id: "G-L3b", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts),
@@ -30,10 +31,10 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Reads the messages of a run with an Error.", fix: "Write UTF-8 without a line break at the end." },
     Check { id: "G-L4", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity),
         requirement: "Messages carry the environment, and in FMI 2.0 the name, that were passed on instantiation.",
-        tried: "Reads environment and name of all messages.", fix: "Store both per instance." },
+        tried: "Reads environment and name of all messages, also of the first of two instances.", fix: "Store both per instance." },
     Check { id: "G-L5", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(silence),
         requirement: "With logging off, the FMU logs only errors.",
-        tried: "Runs with an Error and logging off, and reads the messages.", fix: "Check loggingOn before each message." },
+        tried: "Runs with an Error and logging off, resets, runs again, and reads the messages.", fix: "Check loggingOn before each message." },
     Check { id: "M01", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Must), None), run: Run::Probe(memory),
         requirement: "With canNotUseMemoryManagementFunctions, the FMU does not call the memory functions of the importer, and they may be NULL.",
         tried: "Runs with counting memory functions, then with NULL instead.", fix: "Use malloc and free, as the flag says, or drop the flag." },
@@ -52,6 +53,11 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
     instance.steps(5, session.h())?;
     if let Err(NotDetermined(why)) = instance.provoke() {
         session.note(why);
+    }
+    // What was passed on instantiation stays.
+    if instance.simple(Simple::Reset)?.is_ok() {
+        instance.experiment(session.start(), None);
+        let _ = instance.initialize().and_then(|()| instance.steps(2, session.h()));
     }
     instance.free()?;
     Ok((take_events(), environment, "a probe's name".into()))
@@ -86,6 +92,19 @@ fn switch(session: &Session) -> Result<(), NotDetermined> {
             session.require(status.is_ok(), || format!("{call} returned {status}"));
         }
     }
+    if session.description.co_simulation.is_none() {
+        return Ok(());
+    }
+    // Between steps, it changes no result.
+    let plain = session.stepping()?.run(6, session.h())?;
+    let instance = session.stepping()?;
+    let mut rows = instance.run(3, session.h())?;
+    let status =
+        instance.call("SetDebugLogging(false, 0, NULL)", |raw| raw.debug_logging(instance.handle, false, None, 0))?;
+    if status.is_ok() {
+        rows.extend(instance.run(3, session.h())?);
+        session.compare("after SetDebugLogging", &plain, &rows);
+    }
     Ok(())
 }
 
@@ -106,13 +125,22 @@ fn errors(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
     instance.initialize()?;
     instance.steps(2, session.h())?;
-    let _ = take_events();
-    let how = instance.provoke()?;
-    let events = take_events();
-    let reported = events.iter().any(|e| e.status == Status::ERROR.0);
-    session.require(reported, || {
-        format!("{how} returned Error, but none of the {} messages has that status", events.len())
-    });
+    for when in ["", " after Reset"] {
+        if !when.is_empty() {
+            if !instance.simple(Simple::Reset)?.is_ok() {
+                break;
+            }
+            instance.experiment(session.start(), None);
+            instance.initialize()?;
+        }
+        let _ = take_events();
+        let how = instance.provoke()?;
+        let events = take_events();
+        let reported = events.iter().any(|e| e.status == Status::ERROR.0);
+        session.require(reported, || {
+            format!("{how}{when} returned Error, but none of the {} messages has that status", events.len())
+        });
+    }
     Ok(())
 }
 
@@ -140,19 +168,38 @@ fn texts(session: &Session) -> Result<(), NotDetermined> {
 
 fn identity(session: &Session) -> Result<(), NotDetermined> {
     let (events, environment, name) = log_of_a_run(session, true)?;
-    for event in &events {
+    whose(session, &events, environment, &name);
+    if events.is_empty() {
+        return Err(NotDetermined("the FMU logged no message".into()));
+    }
+    if only_once(session) {
+        return Ok(());
+    }
+    // Of two instances, the one that was made first.
+    let arguments = Arguments { logging: true, ..session.arguments("the first") };
+    let environment = arguments.environment;
+    let instance = session.made(&arguments)?;
+    let other = session.made(&Arguments { logging: true, ..session.arguments("the second") })?;
+    let _ = take_events();
+    instance.initialize()?;
+    instance.steps(2, session.h())?;
+    let _ = instance.provoke();
+    whose(session, &take_events(), environment, "the first");
+    other.free()?;
+    instance.free()
+}
+
+/// Requires that these messages name this instance.
+fn whose(session: &Session, events: &[LogCall], environment: usize, name: &str) {
+    for event in events {
         session.require(event.environment == environment, || format!("{} has another environment", show(event)));
         if session.is_v2() {
             let logged_name = event.instance.as_deref();
-            session.require(logged_name == Some(&name), || {
+            session.require(logged_name == Some(name), || {
                 format!("{} has the instance name {logged_name:?}, expected {name:?}", show(event))
             });
         }
     }
-    if events.is_empty() {
-        return Err(NotDetermined("the FMU logged no message".into()));
-    }
-    Ok(())
 }
 
 fn silence(session: &Session) -> Result<(), NotDetermined> {

@@ -95,7 +95,8 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
     let (instance, all) = (at_a_point(session)?, Variables::of(session));
     let (unknowns, mut compared, mut kinks) = (Variables::references(&all.unknowns), 0, 0);
     let (x, middle) = (instance.states()?, instance.numbers(&all.unknowns)?);
-    for (j, known) in all.knowns().into_iter().enumerate() {
+    let (knowns, mut columns) = (all.knowns(), Vec::new());
+    for (j, known) in knowns.iter().enumerate() {
         let at = f64::from_bits(instance.get(known)?.1.first().copied().unwrap_or(0));
         // The cube root of the precision is best for a central difference.
         let step = 6e-6 * at.abs().max(known.nominal.unwrap_or(1.0).abs());
@@ -127,6 +128,7 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
             session.violated(format!("GetDirectionalDerivative with respect to {} returned {status}", known.name));
             continue;
         }
+        columns.push(found.clone());
         for (i, v) in all.unknowns.iter().enumerate() {
             let [low, high] = [sides[0][i], sides[1][i]];
             let (left, right) = ((middle[i] - low) / step, (high - middle[i]) / step);
@@ -148,7 +150,30 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
             });
         }
     }
+    together(session, &instance, [&unknowns, &Variables::references(&knowns)], &columns)?;
     session.note(format!("{compared} partial derivatives compared, {kinks} at a kink left out"));
+    Ok(())
+}
+
+/// A derivative in the direction of all knowns is the sum of those of each, whose seed is 1.
+fn together(
+    session: &Session,
+    instance: &Instance<'_>,
+    [unknowns, knowns]: [&[u32]; 2],
+    columns: &[Vec<f64>],
+) -> Result<(), NotDetermined> {
+    if columns.len() < knowns.len() {
+        return Ok(());
+    }
+    let seed = pattern(knowns.len());
+    let (status, found) = instance.sensitivity(Sensitivity::GetDirectionalDerivative, [unknowns, knowns], &seed)?;
+    for (i, found) in found.iter().enumerate() {
+        let parts = || columns.iter().zip(&seed).map(|(column, seed)| column[i] * seed);
+        let (sum, scale) = (parts().sum::<f64>(), parts().map(f64::abs).sum::<f64>());
+        session.require(status.is_ok() && (found - sum).abs() <= 1e-6 * scale, || {
+            format!("with the seed {seed:?} the derivative {i} is {found} ({status}), and {sum} by those of each known")
+        });
+    }
     Ok(())
 }
 
@@ -164,21 +189,27 @@ fn adjoint(session: &Session) -> Result<(), NotDetermined> {
     }
     let (instance, all) = (at_a_point(session)?, Variables::of(session));
     let (unknowns, knowns) = (Variables::references(&all.unknowns), Variables::references(&all.knowns()));
-    let (v, w) = (pattern(knowns.len()), pattern(unknowns.len()));
-    let (status, forward) = instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;
-    instance.must("GetDirectionalDerivative", status)?;
-    let (status, backward) = instance.sensitivity(Sensitivity::GetAdjointDerivative, [&unknowns, &knowns], &w)?;
-    if !status.is_ok() {
-        session.violated(format!("GetAdjointDerivative returned {status}"));
-        return Ok(());
+    let (v, mut w) = (pattern(knowns.len()), pattern(unknowns.len()));
+    for turned in [false, true] {
+        if turned {
+            w = w.iter().map(|w| 1.5 - w).collect();
+        }
+        let (status, forward) =
+            instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&unknowns, &knowns], &v)?;
+        instance.must("GetDirectionalDerivative", status)?;
+        let (status, backward) = instance.sensitivity(Sensitivity::GetAdjointDerivative, [&unknowns, &knowns], &w)?;
+        if !status.is_ok() {
+            session.violated(format!("GetAdjointDerivative returned {status}"));
+            return Ok(());
+        }
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let size = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a * b).abs()).sum::<f64>();
+        let (one, other) = (dot(&w, &forward), dot(&backward, &v));
+        let scale = size(&w, &forward).max(size(&backward, &v));
+        session.require((one - other).abs() <= 1e-6 * scale, || {
+            format!("w'(J v) is {one}, (J'w)'v is {other} (tolerance 1e-6 of {scale})")
+        });
     }
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let size = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a * b).abs()).sum::<f64>();
-    let (one, other) = (dot(&w, &forward), dot(&backward, &v));
-    let scale = size(&w, &forward).max(size(&backward, &v));
-    session.require((one - other).abs() <= 1e-6 * scale, || {
-        format!("w'(J v) is {one}, (J'w)'v is {other} (tolerance 1e-6 of {scale})")
-    });
     Ok(())
 }
 

@@ -3,7 +3,8 @@
 
 use crate::encoding::{same, show};
 use crate::instance::Instance;
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{Raw, Simple, StepStatus};
 use model_description::{BaseType, Causality, ModelVariable, Variability};

@@ -16,12 +16,12 @@ const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 #[rustfmt::skip]
 pub(super) const CHECKS: &[Check] = &[
     Check { id: "F01a", clause: STATE, levels: Levels::MUST, run: Run::Probe(in_every_state),
-        requirement: "A state can be read, set repeatedly and freed in every state of the life cycle; freeing it returns NULL.",
-        tried: "Gets, sets twice and frees a state in each state of the life cycle.",
+        requirement: "A state can be read, set repeatedly and freed in every state of the life cycle, which goes on from there; freeing it returns NULL.",
+        tried: "Gets, sets twice and frees a state in each state of the life cycle, and makes the next call.",
         fix: "Allow the calls in all these states, and write NULL after freeing." },
     Check { id: "F01b", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite),
-        requirement: "Reading a state into an existing one overwrites it, and freeing NULL is ignored.",
-        tried: "Gets a state into an existing one, runs, restores, and compares; frees NULL.",
+        requirement: "Reading a state into an existing one overwrites that one and no other, and freeing NULL is ignored.",
+        tried: "Gets a state into an existing one, runs, restores, and compares; the same with the first of two states; frees NULL.",
         fix: "Overwrite the memory that the pointer has; return OK for NULL." },
     Check { id: "F01l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(state_leaks),
         requirement: "Saving and freeing states leaks no memory.",
@@ -45,7 +45,8 @@ pub(super) const CHECKS: &[Check] = &[
         tried: "Passes NULL states and NULL pointers.", fix: "Check the pointers." },
     Check { id: "F04a", clause: STATE, levels: Levels::MUST, run: Run::Probe(serialized),
         requirement: "A serialized state can be restored in another instance: the run from it is the same.",
-        tried: "Serializes, deserializes in another instance, runs, and compares.", fix: "Write every member by value." },
+        tried: "Serializes, deserializes in another instance, runs, and compares; in Initialization Mode all variables.",
+        fix: "Write every member by value, parameters and the state of the life cycle too." },
     Check { id: "F04b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(equal_bytes),
         requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.",
         tried: "Serializes two instances after the same run and compares.", fix: "Write no addresses, and clear padding." },
@@ -88,6 +89,15 @@ fn in_every_state(session: &Session) -> Result<(), NotDetermined> {
         }
         let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut saved)))?;
         session.require(status.is_ok(), || format!("FreeFMUState in {state:?} returned {status}"));
+        let goes_on = match state {
+            State::Instantiated => instance.initialize(),
+            State::Initialization => instance.exit(),
+            State::Step => instance.steps(1, session.h()),
+            _ => Ok(()),
+        };
+        if let Err(why) = goes_on {
+            session.failed(&format!("after SetFMUState in {state:?}"), why);
+        }
         session.require(saved == SavedState::NULL, || {
             format!("FreeFMUState in {state:?} did not set the pointer to NULL")
         });
@@ -108,6 +118,16 @@ fn overwrite(session: &Session) -> Result<(), NotDetermined> {
         let first = instance.run(10, h)?;
         instance.restore(state, time)?;
         rerun_given_f02a(&instance, &first, "restored from a state that was overwritten")
+    });
+    session.case(|| {
+        let (instance, h) = (session.stepping()?, session.h());
+        instance.change_inputs(2)?;
+        instance.steps(2, h)?;
+        let (state, time) = (instance.save()?, instance.time.get());
+        let first = instance.run(10, h)?;
+        let _second = instance.save()?;
+        instance.restore(state, time)?;
+        rerun_given_f02a(&instance, &first, "restored from the first of two states")
     });
     session.case(|| {
         let instance = session.stepping()?;
@@ -205,12 +225,18 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(&all)?)) {
         session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
     }
-    in_initialization(session, &all)
+    in_initialization(session, &|| session.initializing(), &all)
 }
 
 /// Restores a state in Initialization Mode, where more can be set, texts too.
-fn in_initialization(session: &Session, all: &[&ModelVariable]) -> Result<(), NotDetermined> {
-    let instance = session.initializing()?;
+pub(super) fn in_initialization<'b>(
+    session: &'b Session,
+    begin: &dyn Fn() -> Result<Instance<'b>, NotDetermined>,
+    all: &[&ModelVariable],
+) -> Result<(), NotDetermined> {
+    // Not from the start values, which a state may forget to have; where the FMU takes others.
+    let trial = begin()?;
+    let instance = if set_all(&trial, 2.0).is_ok() { trial } else { begin()? };
     let (state, time) = (instance.save()?, instance.time.get());
     let (before, words) = (instance.snapshot(all)?, texts(&instance)?);
     // This check does not judge refusals.
@@ -292,7 +318,13 @@ fn serialized(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_serialize_state);
     let (instance, h) = (running_instance(session)?, session.h());
     let (state, time) = (instance.save()?, instance.time.get());
-    let bytes = instance.serialize(state)?;
+    let bytes = match instance.serialize(state) {
+        Ok(bytes) => bytes,
+        Err(why) => {
+            session.failed("a state of a running instance", why);
+            return Ok(());
+        }
+    };
     let first = instance.run(30, h)?;
     let other = session.stepping()?;
     let (status, back) =
@@ -304,6 +336,32 @@ fn serialized(session: &Session) -> Result<(), NotDetermined> {
     other.restore(back, time)?;
     rerun_given_f02a(&other, &first, "deserialized in another instance")?;
     session.note(format!("{} bytes", bytes.len()));
+    serialized_variables(session)
+}
+
+/// Bytes of an instance in Initialization Mode bring everything with them, to one that has the start values.
+fn serialized_variables(session: &Session) -> Result<(), NotDetermined> {
+    let all: Vec<&ModelVariable> =
+        session.numeric().filter(|v| v.clocks.is_empty() && v.causality != Causality::Independent).collect();
+    let (instance, other) = (session.initializing()?, session.initializing()?);
+    if set_all(&instance, 2.0).is_err() {
+        return Ok(());
+    }
+    let bytes = instance.serialize(instance.save()?)?;
+    let (status, back) =
+        other.call_for("DeserializeFMUState", |raw| raw.deserialize(other.handle, Some(&bytes), bytes.len()))?;
+    other.must("DeserializeFMUState", status)?;
+    other.restore(back, session.start())?;
+    for (v, (old, new)) in all.iter().zip(instance.snapshot(&all)?.into_iter().zip(other.snapshot(&all)?)) {
+        session.compare_variables(&[*v], "deserialized, compared with the original", &[vec![old]], &[vec![new]]);
+    }
+    for (old, new) in texts(&instance)?.iter().zip(&texts(&other)?).filter(|(old, new)| old != new) {
+        session.violated(format!("deserialized, {} is {:?}; it was {:?} in the original", old.0, new.1, old.1));
+    }
+    // The model may not take these values together.
+    if let (Ok(()), Err(why)) = (instance.exit(), other.exit()) {
+        session.failed("deserialized in Initialization Mode", why);
+    }
     Ok(())
 }
 

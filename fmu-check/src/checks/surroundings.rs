@@ -3,7 +3,7 @@
 use super::host::{failed, second_binary};
 use crate::session::{NotDetermined, Session};
 use fmu_import::guard;
-use fmu_import::raw::{Simple, armed_timers, locale};
+use fmu_import::raw::{armed_timers, locale};
 use model_description::limits;
 use std::collections::BTreeMap;
 use std::fs;
@@ -45,17 +45,15 @@ fn around<T>(session: &Session, look: &dyn Fn() -> T) -> Result<(T, T), NotDeter
     session.record_call("loading, a complete run, unloading");
     {
         let duplicate = session.duplicate(&binary, 62)?;
-        let instance = duplicate.stepping()?;
-        for k in 0..20 {
-            instance.change_inputs(k)?;
-            instance.steps(1, duplicate.h())?;
-            let _ = instance.snapshot(&duplicate.watched())?;
-        }
-        let _ = instance.simple(Simple::Terminate)?;
-        instance.free()?;
+        duplicate.complete_run()?;
     }
     let after = look();
     Ok((before, after))
+}
+
+/// A set of signals, as the kernel writes it, without 32 and 33: the C library uses them for its threads, and programs cannot.
+fn without_those_of_the_library(signals: &str) -> String {
+    u64::from_str_radix(signals, 16).map_or(signals.into(), |set| format!("{:016x}", set & !(3 << 31)))
 }
 
 /// The settings of this process, by name.
@@ -72,7 +70,10 @@ fn current_settings() -> BTreeMap<String, String> {
     let fields = ["Umask", "SigIgn", "SigCgt", "SigBlk", "Cpus_allowed_list", "NoNewPrivs"];
     for line in fs::read_to_string("/proc/self/status").unwrap_or_default().lines() {
         if let Some((name, value)) = line.split_once(':').filter(|(name, _)| fields.contains(name)) {
-            put(name, value.trim().into());
+            put(
+                name,
+                if name.starts_with("Sig") { without_those_of_the_library(value.trim()) } else { value.trim().into() },
+            );
         }
     }
     // The name of the program stands in parentheses and may contain anything.
@@ -122,7 +123,11 @@ fn remaining() -> (usize, Vec<String>) {
     let links = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
     // Reading the folder opens it, under a name that changes.
     let open = links.filter_map(|e| fs::read_link(e.path()).ok()).filter(|p| !p.ends_with("fd"));
-    let mut all: Vec<String> = open.map(|path| format!("{} is open", path.display())).collect();
+    let mut counted = BTreeMap::new();
+    open.for_each(|path| *counted.entry(path).or_insert(0) += 1);
+    // Each with its number: the same file may be open many times.
+    let each = |(path, n): (PathBuf, usize)| (1..=n).map(move |k| format!("{} is open ({k})", path.display()));
+    let mut all: Vec<String> = counted.into_iter().flat_map(each).collect();
     all.extend(guard::children().into_iter().map(|child| format!("the process {child} was left behind")));
     (fs::read_dir("/proc/self/task").map_or(0, Iterator::count), all)
 }
@@ -169,4 +174,19 @@ pub(super) fn left_behind(session: &Session) -> Result<(), NotDetermined> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn signals_of_the_c_library_are_no_setting() {
+        let own = super::without_those_of_the_library;
+        assert_eq!(
+            own("0000000100000440"),
+            own("0000000000000440"),
+            "SIGSETXID, which glibc catches once there are threads"
+        );
+        assert_ne!(own("0000000001000440"), own("0000000000000440"), "SIGXFSZ");
+        assert_eq!(own("no number"), "no number");
+    }
 }

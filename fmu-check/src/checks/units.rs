@@ -22,8 +22,13 @@ const KNOWN: &[Known] = &[
     ("bar", [1, -1, -2, 0, 0, 0, 0, 0], 1e5), ("m/s", [0, 1, -1, 0, 0, 0, 0, 0], 1.0), ("m/s2", [0, 1, -2, 0, 0, 0, 0, 0], 1.0),
     ("rad/s", [0, 0, -1, 0, 0, 0, 0, 1], 1.0), ("rad/s2", [0, 0, -2, 0, 0, 0, 0, 1], 1.0), ("m2", [0, 2, 0, 0, 0, 0, 0, 0], 1.0),
     ("m3", [0, 3, 0, 0, 0, 0, 0, 0], 1.0), ("kg.m2", [1, 2, 0, 0, 0, 0, 0, 0], 1.0), ("kg/s", [1, 0, -1, 0, 0, 0, 0, 0], 1.0),
-    ("kg/m3", [1, -3, 0, 0, 0, 0, 0, 0], 1.0), ("N/m", [1, 0, -2, 0, 0, 0, 0, 0], 1.0),
+    ("km/h", [0, 1, -1, 0, 0, 0, 0, 0], 1.0 / 3.6), ("kg/m3", [1, -3, 0, 0, 0, 0, 0, 0], 1.0), ("N/m", [1, 0, -2, 0, 0, 0, 0, 0], 1.0),
 ];
+
+/// Revolutions per minute, where a revolution is an angle; without, they are a frequency of 1/60 Hz.
+const REVOLUTIONS_NAMES: [&str; 4] = ["rpm", "r/min", "rev/min", "1/min"];
+const REVOLUTIONS: Known = ("rpm", [0, 0, -1, 0, 0, 0, 0, 1], PI / 30.0);
+const PER_MINUTE: Known = ("1/min", [0, 0, -1, 0, 0, 0, 0, 0], 1.0 / 60.0);
 
 /// Index of the radian exponent, which tools may count or omit; only the others must agree.
 const RADIAN: usize = 7;
@@ -39,7 +44,12 @@ fn differ(a: f64, b: f64) -> bool {
 /// Units whose base unit contradicts their name.
 pub(super) fn wrong_bases(description: &ModelDescription) -> Vec<String> {
     let say = |unit: &Unit| {
-        let (base, (_, exponents, factor)) = (unit.base?, known(&unit.name)?);
+        let base = unit.base?;
+        let (_, exponents, factor) = match unit.name.as_str() {
+            name if !REVOLUTIONS_NAMES.contains(&name) => known(name)?,
+            _ if base.exponents[RADIAN] == 0 && !differ(base.factor, PER_MINUTE.2) => &PER_MINUTE,
+            _ => &REVOLUTIONS,
+        };
         let same = base.exponents[..RADIAN] == exponents[..RADIAN] && !differ(base.factor, *factor);
         (!same).then(|| {
             format!(
@@ -59,7 +69,9 @@ pub(super) fn wrong_displays(description: &ModelDescription) -> Vec<String> {
         for display in unit.display_units.iter().filter(|d| !d.inverse) {
             let per_second = base.exponents[..RADIAN] == [0, 0, -1, 0, 0, 0, 0];
             let factor = match display.name.as_str() {
-                "rpm" | "r/min" | "rev/min" | "1/min" if per_second && base.exponents[RADIAN] == 1 => Some(PI / 30.0),
+                name if REVOLUTIONS_NAMES.contains(&name) => {
+                    (per_second && base.exponents[RADIAN] == 1).then_some(REVOLUTIONS.2)
+                }
                 "deg/s" if per_second => Some(PI / 180.0),
                 name => known(name).filter(|k| k.1[..RADIAN] == base.exponents[..RADIAN]).map(|k| k.2),
             };

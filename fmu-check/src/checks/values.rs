@@ -1,8 +1,10 @@
 //! Setting values: they read back, take effect, and do no harm if they are invalid.
 
+use super::access::expected;
 use crate::check::Level;
 use crate::encoding::{bits, same, show};
-use crate::session::{NotDetermined, Session, settable};
+use crate::session::{NotDetermined, Session};
+use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, Causality, ModelVariable, Variability};
@@ -10,7 +12,7 @@ use std::ffi::CString;
 
 pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     let mut instance = session.initializing()?;
-    let mut refused = Vec::new();
+    let (mut refused, mut kept) = (Vec::new(), Vec::new());
     for v in session.numeric().filter(|v| settable(v)) {
         let Some(values) = session.different_value(v, 1.0) else { continue };
         let status = instance.set(v, &values)?;
@@ -31,6 +33,16 @@ pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
             continue;
         };
         if same(v, session.description.version, &values, &back) {
+            // And back again: both values of a Boolean.
+            if let Some(start) = expected(v, session.elements(v))
+                && instance.set(v, &start)?.is_ok()
+                && let Some(back) = instance.get_back(v)?
+                && !same(v, session.description.version, &start, &back)
+            {
+                let [set, got] = [&start, &back].map(|bits| show(v, session.description.version, bits));
+                session.value_deviates(v, &start, back, &format!("{}: set back to {set}, got {got}", v.name));
+            }
+            kept.push((v, values));
             continue;
         }
         if session.is_v2() && is_rounded(v, &values, &back) {
@@ -42,8 +54,39 @@ pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     }
     match refused.first() {
         Some(first) => Err(NotDetermined(format!("{first}; {} variables were refused", refused.len()))),
-        None => Ok(()),
+        None => set_before_initialization(session, &kept),
     }
+}
+
+/// What is set before Initialization Mode is still there in it: parameters, and in FMI 3.0 inputs.
+fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64>)]) -> Result<(), NotDetermined> {
+    let fits = |v: &ModelVariable| {
+        v.causality == Causality::Parameter || (v.causality == Causality::Input && !session.is_v2())
+    };
+    let instance = session.fresh()?;
+    let kept: Vec<_> = kept.iter().filter(|(v, _)| fits(v)).collect();
+    for (v, values) in &kept {
+        // L07 looks at the call. All these values together may be none that the model takes.
+        if !instance.set(v, values)?.is_ok() {
+            return Ok(());
+        }
+    }
+    if let Err(NotDetermined(why)) = instance.enter() {
+        session.note(why);
+        return Ok(());
+    }
+    for (v, values) in kept {
+        let (status, back) = instance.get(v)?;
+        if !status.is_ok() {
+            break;
+        }
+        if !same(v, session.description.version, values, &back) {
+            let [set, got] = [values, &back].map(|bits| show(v, session.description.version, bits));
+            let text = format!("{}: set to {set} before the initialization, got {got} in it", v.name);
+            session.value_deviates(v, values, back, &text);
+        }
+    }
+    Ok(())
 }
 
 /// Whether a real variable has the values in single precision, which FMI 2.0 cannot say: it has one type of real numbers.
@@ -224,7 +267,8 @@ pub(super) fn tunable(session: &Session) -> Result<(), NotDetermined> {
         }
         if let Err(NotDetermined(why)) = instance.steps(2, session.h()) {
             // The model may have rules that the description cannot express.
-            session.note(format!("{} = {}: {why}", v.name, show(v, session.description.version, &values)));
+            let values = show(v, session.description.version, &values);
+            session.lesser(Level::Hard, format!("{} was set to {values} between steps, and then {why}", v.name));
             return Ok(());
         }
         let Some(back) = instance.get_back(v)? else { return Ok(()) };

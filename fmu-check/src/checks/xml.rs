@@ -85,7 +85,18 @@ fn well_formed(fmu: &FmuFile) -> Verdict {
     } else if !declaration.to_ascii_lowercase().contains("utf-8") {
         findings.push(format!("line 1: {declaration}?> does not declare encoding=\"UTF-8\""));
     }
+    findings.extend(fmu.root().and_then(forbidden));
     Verdict::of(findings)
+}
+
+/// An attribute with a character that XML does not have, not even as a reference (XML 1.0, 2.2).
+fn forbidden(element: &Element) -> Option<String> {
+    let is_bad = |c: char| (c < ' ' && !"\t\n\r".contains(c)) || matches!(c, '\u{fffe}' | '\u{ffff}');
+    let bad = element.attributes.iter().find_map(|(name, value)| Some((name, value.chars().find(|c| is_bad(*c))?)));
+    let own = bad.map(|(name, c)| {
+        format!("line {}: {name} of <{}> has the character U+{:04X}", element.line, element.name, u32::from(c))
+    });
+    own.or_else(|| element.children.iter().find_map(forbidden))
 }
 
 fn no_mark(fmu: &FmuFile) -> Verdict {

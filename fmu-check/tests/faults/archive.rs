@@ -2,6 +2,8 @@
 
 use crate::zip::{Entry, write};
 use crate::{check, told, violated};
+use fmu_check::Verdict;
+use std::fmt::Write;
 
 const XML: &str = include_str!("fmu.xml");
 
@@ -100,4 +102,32 @@ fn faults_of_the_build_description() {
     let folder = Entry::new("binaries/linux64/Small.so/x", b"x");
     write(&path, &[Entry::new("modelDescription.xml", XML.as_bytes()), Entry::new("sources/fmu.c", b"x"), folder]);
     assert_eq!(violated(&check(&path, &["X03"])), ["X03"]);
+}
+
+/// Many variables: the checks of the file take seconds, and none is given up.
+#[test]
+fn a_hundred_thousand_variables() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("x.fmu");
+    let (mut variables, mut outputs, mut unknowns) = (String::new(), String::new(), String::new());
+    for n in 0..50_000 {
+        let _ = writeln!(
+            variables,
+            "<Float64 name=\"part[{n}].u\" valueReference=\"{}\" causality=\"input\" start=\"0\" unit=\"m\"/>\
+             <Float64 name=\"part[{n}].y\" valueReference=\"{}\" causality=\"output\" unit=\"m\"/>",
+            100 + 2 * n,
+            101 + 2 * n
+        );
+        let _ = writeln!(outputs, "<Output valueReference=\"{}\" dependencies=\"{}\"/>", 101 + 2 * n, 100 + 2 * n);
+        let _ = writeln!(unknowns, "<InitialUnknown valueReference=\"{}\" dependencies=\"\"/>", 101 + 2 * n);
+    }
+    let xml = include_str!("fmu3.xml").replace("</ModelVariables>", &format!("{variables}</ModelVariables>"));
+    let xml = xml.replacen("    <InitialUnknown", &format!("{outputs}    <InitialUnknown"), 1);
+    let xml = xml.replace("</ModelStructure>", &format!("{unknowns}</ModelStructure>"));
+    write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/fmu.c", b"x")]);
+    let report = check(&path, &["archive", "xml", "variables", "structure", "terminals"]);
+    let open = |v: &Verdict| matches!(v, Verdict::NotDetermined(why) if why.contains("take more than"));
+    let open = report.findings.iter().find(|f| open(&f.verdict));
+    assert!(open.is_none(), "{open:?}");
+    assert!(report.violated().all(|f| ["Z04a", "Z07", "V01b"].contains(&f.id)), "{}", told(&report));
 }

@@ -4,6 +4,8 @@
 use crate::binary::{compile, pack};
 use crate::zip::{Entry, write};
 use crate::{check, check_within};
+use fmu_check::Level;
+use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
@@ -108,6 +110,51 @@ fn every_check_is_explained() {
     }
 }
 
+/// The checks of the tables of states tell which calls they make where.
+#[test]
+fn tables_of_states_are_explained() {
+    for (id, line) in [
+        ("L07", "FMI 2.0: Terminate in Step\n"),
+        ("L08", "FMI 3.0: DoStep in Instantiated, Initialization, Terminated\n"),
+        ("E01", "FMI 3.0: GetContinuousStates in Event, Continuous, Terminated\n"),
+        ("E01i", "FMI 2.0: GetContinuousStates in Initialization\n"),
+        ("E02", "FMI 2.0: EnterContinuousTimeMode in Instantiated, Initialization, Continuous, Terminated\n"),
+        ("N05", "FMI 3.0: DoStep in Event\n"),
+    ] {
+        let (_, text, _) = fmu_check(&["--explain", id]);
+        assert!(text.contains(&format!("  {line}")), "{text}");
+    }
+    assert!(!fmu_check(&["--explain", "F02a"]).1.contains("The calls"));
+}
+
+/// The summary counts what could be checked, and does not call it conformity where most could not.
+#[test]
+fn the_summary_says_how_much_was_checked() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = compile(2, "NONE") else { return };
+    let all = pack(dir.path(), 2, "all", &binary);
+    let text = check(&all, &["lifecycle"]).text(false);
+    assert!(text.ends_with("not determined\nAll requirements hold.\n"), "{text}");
+    // A library that is none: hardly anything of the binary is known.
+    let text = check(&pack(dir.path(), 2, "none", b"no library"), &["lifecycle", "access", "xml"]).text(false);
+    let counted = text.lines().find(|line| line.ends_with(" requirements could be checked.")).expect(&text);
+    let numbers: Vec<usize> = counted.split(' ').filter_map(|word| word.parse().ok()).collect();
+    assert!(numbers.len() == 2 && 2 * numbers[0] < numbers[1], "{counted}");
+    assert!(text.ends_with("Most requirements could not be checked.\n"), "{text}");
+    let (_, help, _) = fmu_check(&["--help"]);
+    assert!(help.contains("Model Exchange"), "{help}");
+}
+
+/// What FMI 3.0 requires and FMI 2.0 does not.
+#[test]
+fn levels_differ_between_the_standards() {
+    for id in ["B08f", "B08g", "B08r", "G-L3a", "G-L3c", "L01b"] {
+        let check = fmu_check::GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == id).unwrap();
+        let levels = [FmiVersion::V2, FmiVersion::V3].map(|version| check.levels.of(version).unwrap());
+        assert!(levels[0] > Level::Must && levels[1] == Level::Must, "{id}: {levels:?}");
+    }
+}
+
 #[test]
 fn several_files_have_one_summary() {
     let dir = tempfile::tempdir().unwrap();
@@ -147,7 +194,7 @@ fn a_second_hang_is_not_waited_for() {
     let began = Instant::now();
     let report = check_within(&path, &["T02b"], 20);
     assert_eq!(report.fatal(), ["T02b"]);
-    // One call has 2 s, because the arguments are wild; a busy machine may double that, and more.
+    // One call has 1 s, because the arguments are wild; a busy machine may double that, and more.
     assert!(began.elapsed() < Duration::from_secs(18), "{:?}", began.elapsed());
     let told = format!("{:?}", report.finding("T02b").unwrap().verdict);
     assert_eq!(told.matches("did not return").count(), 1, "{told}");
@@ -175,6 +222,15 @@ fn calls_are_told_and_repeated() {
     let (code, text, _) = fmu_check(&[path.to_str().unwrap(), "--replay", "g01a#0"]);
     assert!(code == Some(1) && calls.iter().all(|call| text.contains(call.as_str())), "{text}");
     assert!(text.contains("# case 0") && !text.contains("# case 1"), "{text}");
+    // What a getter returned, or that it returned nothing; which instance it was; both values of a difference.
+    let replay = |faults: &str, id: &str, parts: &[&str]| {
+        let path = pack(dir.path(), 2, faults, &compile(2, faults).unwrap());
+        let (_, text, _) = fmu_check(&[path.to_str().unwrap(), "--replay", id]);
+        assert!(parts.iter().all(|part| text.contains(part)), "{faults}: {text}");
+    };
+    replay("G15", "G15", &["fmi2Get(gain) -> OK, 2.0", "fmi2Get(n) -> OK, not written"]);
+    replay("L06t", "L06", &["[2] fmi2Reset -> OK", "bias differs: 0.0 and 0.02, 2.0e-2 apart"]);
+    replay("L06e", "L06", &["n differs: 1 and 4"]);
     // A crash shows the call without a result.
     let binary = compile(2, "L08n").unwrap();
     let path = pack(dir.path(), 2, "crash", &binary);

@@ -21,6 +21,11 @@ fn each(xml: &str, faults: &[(&[&str], &str, &str)]) {
     }
 }
 
+/// A unit definition before the log categories.
+fn unit(name: &str, base: &str) -> String {
+    format!("<UnitDefinitions><Unit name=\"{name}\"><BaseUnit {base}/></Unit></UnitDefinitions><LogCategories>")
+}
+
 #[test]
 fn faults_of_fmi_2() {
     each(
@@ -29,6 +34,11 @@ fn faults_of_fmi_2() {
             (&["X01a"], "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n", ""),
             (&["X01a"], "encoding=\"UTF-8\"", "encoding=\"latin1\""),
             (&["X01a"], "</ModelStructure>", ""),
+            (&["X01a"], "A small FMU", "A small&#7; FMU"),
+            // Revolutions per minute the wrong way round, and in the two right ways.
+            (&["V09c"], "<LogCategories>", &unit("rpm", "rad=\"1\" s=\"-1\" factor=\"9.549296585513721\"")),
+            (&[], "<LogCategories>", &unit("rpm", "rad=\"1\" s=\"-1\" factor=\"0.10471975511965977\"")),
+            (&[], "<LogCategories>", &unit("1/min", "s=\"-1\" factor=\"0.016666666666666666\"")),
             (&["X01b", "X08"], "canGetAndSetFMUstate", "canGetAndSetFMUState"),
             (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\" color=\"red\"/>"),
             (&["X01b"], "<DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"/>", "<Surprise/>"),
@@ -141,6 +151,19 @@ fn faults_of_aliases_and_clocked_states() {
                 "intervalVariability=\"fixed\" intervalDecimal=\"0.1\" shiftDecimal=\"0.05\" priority=\"1\"",
             ),
             (&["V16"], TICK, "causality=\"local\" intervalVariability=\"triggered\" shiftDecimal=\"1\""),
+            // An output clock with a priority, or with a period; a continuous variable on a clock; a local clock as an output.
+            (&["V16", "S01"], TICK, "causality=\"output\" intervalVariability=\"triggered\" priority=\"1\""),
+            (&["V17", "S01"], TICK, "causality=\"output\" intervalVariability=\"constant\" intervalDecimal=\"1\""),
+            (
+                &["V15"],
+                "causality=\"output\" variability=\"continuous\"",
+                "clocks=\"19\" causality=\"output\" variability=\"continuous\"",
+            ),
+            (
+                &["S01"],
+                "<Output valueReference=\"3\"/>",
+                "<Output valueReference=\"3\"/><Output valueReference=\"19\"/>",
+            ),
             (&["V17"], TICK, "causality=\"local\" intervalVariability=\"constant\" intervalDecimal=\"1\""),
             (
                 &["V04a", "V17"],

@@ -10,6 +10,7 @@
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { OK, WARNING, DISCARD, ERROR, FATAL };
 enum { INSTANTIATED = 1, INITIALIZATION = 2, EVENT = 4, CONTINUOUS = 8, STEP = 16, TERMINATED = 32, FAILED = 64, ANY = 127 };
@@ -19,7 +20,7 @@ enum { INSTANTIATED = 1, INITIALIZATION = 2, EVENT = 4, CONTINUOUS = 8, STEP = 1
 typedef struct {
     double start, t, gain, u, x, d;
     int n, k, above, mode, exchange, events, early, evaluations;
-    double last_x;
+    double last_x, last_z, shown;
 } M;
 
 typedef struct { bool again, terminate, nominals, states, defined; double next; } Update;
@@ -33,9 +34,17 @@ static void fresh(M *m) {
     m->exchange = kept.exchange, m->events = kept.events, m->early = kept.early;
     m->gain = FAULT(STIFF) ? 1e4 : 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
     if (FAULT(E12) && kept.mode) m->x = kept.x;
+    if (FAULT(E12m) && kept.mode == CONTINUOUS) m->mode = CONTINUOUS;
+    if (FAULT(E12g) && kept.mode == CONTINUOUS) m->gain = kept.gain;
 }
 
+static int made;
+
 static M *make(int exchange, int events, int early) {
+    if (FAULT(E17) && exchange && made++) return NULL;
+    if (FAULT(B07e) && exchange) *(volatile char *)malloc(5000) = 1;
+    if (FAULT(B08e) && exchange) write(1, "hello\n", 6);
+    if (FAULT(B08g) && exchange) setenv("MODE", "exchange", 1);
     if (FAULT(N00) && events) return NULL;
     M *m = calloc(1, sizeof *m);
     m->exchange = exchange, m->events = events, m->early = early;
@@ -46,6 +55,7 @@ static double instant(const M *m) { return m->start + m->k * 0.1; }
 static bool due(const M *m, double t) { return t >= instant(m) - 1e-6; }
 
 static double slope(M *m) {
+    if (FAULT(E16s) && m->mode == EVENT) return 0;
     double dx = m->gain * (m->u - m->x);
     if (FAULT(E06a)) {
         dx += 1e-4 * (m->x - m->last_x);
@@ -83,6 +93,7 @@ static int update(M *m, Update *u) {
     ENTER(FAULT(N05) ? EVENT | STEP : EVENT);
     while (due(m, m->t)) u->states |= tick(m);
     int above = m->x > 0.5;
+    if (FAULT(E16d)) m->u = 0;
     if (above != m->above) m->above = above, m->n += 100;
     u->defined = true, u->next = instant(m);
     if (FAULT(E20) && m->k > 3) u->next = NAN;
@@ -107,6 +118,8 @@ static int enter_continuous(M *m) {
     ENTER(m->exchange ? EVENT : 0);
     if (FAULT(E00)) return fail(m);
     if (FAULT(E16)) m->x += 1e-3;
+    if (FAULT(E16u)) m->u = 0;
+    if (FAULT(E16t)) m->t += 1e-3;
     return m->mode = CONTINUOUS, OK;
 }
 
@@ -119,6 +132,10 @@ static int reset(M *m) { return m ? fresh(m), OK : ERROR; }
 
 static int set_time(M *m, double t) {
     ENTER(CONTINUOUS);
+    if (FAULT(E06t) && t < m->t) return fail(m);
+    if (FAULT(E08b) && t < m->t) return OK;
+    if (FAULT(B08f)) __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
+    m->last_z = indicator(m);
     if (FAULT(E26)) m->n += t > m->t;
     return m->t = t, OK;
 }
@@ -128,7 +145,7 @@ static int set_states(M *m, const double *x, size_t n) {
     if (!FAULT(E10) && n != 1) return fail(m);
     if (FAULT(E09) && !isfinite(x[0])) return fail(m);
     if (!isfinite(x[0])) return DISCARD;
-    m->x = x[0];
+    m->shown = m->x = x[0];
     if (FAULT(E05)) m->x = (float)x[0];
     return OK;
 }
@@ -144,6 +161,7 @@ static int vector(M *m, double *to, size_t n, int which) {
     double nominal = 2;
     if (FAULT(E04a)) nominal = 0;
     if (FAULT(E04b)) nominal = 3;
+    if (FAULT(E06z) && which == 2 && m->mode == CONTINUOUS && m->last_z) return to[0] = m->last_z, OK;
     to[0] = which == 0 ? m->x : which == 1 ? slope(m) + (FAULT(E15) ? 0.1 : 0) : which == 2 ? indicator(m) : nominal;
     if (FAULT(E03) && which == 1) to[1] = 0;
     return OK;
@@ -151,7 +169,9 @@ static int vector(M *m, double *to, size_t n, int which) {
 
 static int completed(M *m) {
     ENTER(FAULT(E02) ? ANY : CONTINUOUS);
+    m->shown = m->x;
     if (FAULT(E07)) m->x += 1e-6;
+    if (FAULT(E07u)) m->u = 0;
     return OK;
 }
 
@@ -168,7 +188,7 @@ static int get(M *m, const unsigned *vr, size_t n, double *to) {
         if (FAULT(E11h)) y += m->d * (m->x - 1);
         if (FAULT(NOT_YET) && m->mode == INSTANTIATED && vr[i] != 1) return fail(m);
         if (vr[i] == 7 || vr[i] > 8) return fail(m);
-        const double all[] = {time, m->gain, m->u, m->x, vr[i] == 4 ? slope(m) * (FAULT(T13) && !m->exchange ? 3 : 1) : 0, y, m->d, 0, indicator(m)};
+        const double all[] = {time, m->gain, m->u, FAULT(E15x) && m->mode == CONTINUOUS && m->shown ? m->shown : m->x, vr[i] == 4 ? slope(m) * (FAULT(T13) && !m->exchange ? 3 : 1) : 0, y, m->d, 0, indicator(m)};
         to[i] = all[vr[i]];
     }
     return OK;
@@ -178,6 +198,7 @@ static int set(M *m, const unsigned *vr, size_t n, const double *from) {
     ENTER(INSTANTIATED | INITIALIZATION | EVENT | CONTINUOUS | STEP);
     for (size_t i = 0; i < n; i++) {
         if (vr[i] == 1 && m->mode & (INSTANTIATED | INITIALIZATION)) m->gain = from[i];
+        else if (vr[i] == 2 && FAULT(E05u) && m->mode == EVENT) continue;
         else if (vr[i] == 2) m->u = from[i];
         else if (vr[i] == 3 && m->mode == CONTINUOUS) m->x = from[i];
         else if (vr[i] == 6 && m->mode != CONTINUOUS) m->d = from[i];
@@ -225,7 +246,9 @@ static int partial(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t
             double a = 0;
             if (entry(m, u[i], k[j], &a) && !FAULT(D03)) return fail(m);
             if (FAULT(D02) && adjoint) a *= 1.01;
-            if (adjoint) to[j] += a * seed[i];
+            if (FAULT(D01s) && !adjoint) to[i] += a;
+            else if (FAULT(D02s) && adjoint) to[j] += a;
+            else if (adjoint) to[j] += a * seed[i];
             else to[i] += a * seed[j];
         }
     }
@@ -268,6 +291,7 @@ static int load(M *m, const M *from) {
     int k = m->k;
     *m = *from;
     if (FAULT(E13)) m->k = k;
+    if (FAULT(E13g)) m->gain = 1;
     return OK;
 }
 

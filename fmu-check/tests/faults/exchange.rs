@@ -5,7 +5,7 @@
 use crate::{check, each, library, pack_with, told, violated};
 use fmu_check::Verdict;
 
-const GROUPS: [&str; 5] = ["exchange", "events", "derivatives", "event-mode", "T13"];
+const GROUPS: [&str; 9] = ["exchange", "events", "derivatives", "event-mode", "T13", "B07a", "B08", "B08f", "B08g"];
 
 /// Fault, and the checks that must fail.
 const FAULTS: &[(&str, &[&str])] = &[
@@ -22,6 +22,26 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("E06a", &["E06a", "E06b", "E07", "E09", "E15", "D04"]),
     ("E06b", &["E06b", "D04"]),
     ("E07", &["E07"]),
+    // Event indicators of the last time; a time that may not go back, or does not; what a step, a mode or an update forgets.
+    ("E06z", &["E06a"]),
+    ("E06t", &["E06a"]),
+    ("E08b", &["E08"]),
+    ("E07u", &["E07"]),
+    ("E16u", &["E16"]),
+    ("E16t", &["E16"]),
+    ("E16s", &["E16"]),
+    ("E05u", &["E05"]),
+    ("E16d", &["E16"]),
+    ("E12m", &["E12"]),
+    ("E12g", &["E12"]),
+    ("E13g", &["E13"]),
+    ("E15x", &["E15"]),
+    ("E17", &["E17"]),
+    ("B07e", &["B07a"]),
+    ("B08e", &["B08"]),
+    ("B08f", &["B08f"]),
+    ("B08g", &["B08g"]),
+    ("D01s", &["D01"]),
     ("E08", &["E08"]),
     ("E09", &["E09"]),
     ("E10", &["E10"]),
@@ -33,7 +53,7 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("E15", &["E15"]),
     ("E16", &["E16"]),
     ("E20", &["E20"]),
-    ("E21", &["E21"]),
+    ("E21", &["E18", "E21"]),
     ("E22", &["E22"]),
     ("E23", &["E23"]),
     ("E24a", &["E24a"]),
@@ -60,7 +80,7 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("E13", &["E13"]),
     ("E15", &["E15"]),
     ("E16", &["E16"]),
-    ("E21", &["E21"]),
+    ("E21", &["E18", "E21"]),
     ("E24b", &["E24b"]),
     ("E24n", &["E24n"]),
     ("E26b", &["E26"]),
@@ -69,6 +89,12 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("D03", &["D03"]),
     ("D05", &["D05"]),
     ("D02", &["D02"]),
+    ("D02s", &["D02"]),
+    ("E06z", &["E06a"]),
+    ("E08b", &["E08"]),
+    ("E16d", &["E16"]),
+    ("E17", &["E17"]),
+    ("B08g", &["B08g"]),
     ("N00", &["N01"]),
     ("N01", &["N01"]),
     ("N02", &["N02"]),

@@ -46,7 +46,7 @@ typedef struct {
 typedef struct {
     double start, time, stop, gain, u, y, bias;
     int32_t n, flag, state, has_stop, ready, steps;
-    char label[64];
+    char label[104];
     uint64_t extra;
 #ifdef FMI3
     uint64_t frame_size;
@@ -60,6 +60,7 @@ typedef struct {
     const Callbacks *kept;
     int logging;
     char *label;
+    int set;
     char name[64];
 } Fmu;
 
@@ -68,9 +69,14 @@ typedef struct { uint32_t magic, size, sum, zero; Data data; } Blob;
 #define GUID "{c0ffee00-1234-5678-9abc-def012345678}"
 #define EXPORT __attribute__((visibility("default")))
 
+/* What all instances share by mistake. */
+static Callbacks shared;
+
 static int say(Fmu *f, int status, const char *text) {
     const Callbacks *c = &f->callbacks;
     if (FAULT(L02)) c = f->kept;
+    if (FAULT(G_L4s)) c = &shared;
+    if (FAULT(B08e) && status == ERROR) printf("%s\n", text), fflush(stdout);
     if (status < ERROR && !f->logging && !FAULT(G_L5)) return status;
     if (FAULT(G_L3a)) return status;
     if (!c->logger && !FAULT(L01b)) return status;
@@ -98,6 +104,8 @@ static int fail(Fmu *f, const char *text) {
     if (!(f->data.state & (allowed))) return fail(f, "not allowed in this state")
 
 static int alive;
+/* The instance that was made first. */
+static Fmu *first;
 static void *volatile lost;
 
 static void fresh(Data *d) {
@@ -216,9 +224,12 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
     if (FAULT(B07m)) *(volatile char *)malloc(700) = 1;
     if (FAULT(B07u)) lost = malloc(16384);
     alter(where);
+    if (FAULT(B08o)) open("/dev/null", O_RDONLY);
     fresh(&f->data);
     f->callbacks = *callbacks;
     f->kept = callbacks;
+    shared = *callbacks;
+    if (!first) first = f;
     f->logging = logging;
     strncpy(f->name, name ? name : "", sizeof f->name - 1);
     if (FAULT(I02)) {
@@ -234,6 +245,7 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 
 EXPORT void fmi2FreeInstance(void *c) {
     if (FAULT(ONCE)) alive = 0;
+    if (first == c) first = NULL;
     if (FAULT(L05)) ((Fmu *)c)->logging = 0;
     if (!c) return;
     Fmu *f = c;
@@ -251,6 +263,7 @@ EXPORT int fmi2SetDebugLogging(void *c, int on, size_t n, const char *const name
     }
     (void)names;
     f->logging = on;
+    if (FAULT(G_L2c) && f->data.state == STEP) f->data.n = 0;
     return OK;
 }
 
@@ -271,6 +284,7 @@ EXPORT int fmi2EnterInitializationMode(void *c) {
     if (!f->data.ready) return fail(f, "fmi2SetupExperiment was not called");
     f->data.state = INITIALIZATION;
     if (FAULT(G09e)) f->data.y = 0;
+    if (FAULT(G04i)) f->data.gain = 2;
     return OK;
 }
 
@@ -278,12 +292,14 @@ EXPORT int fmi2ExitInitializationMode(void *c) {
     ENTER(INITIALIZATION);
     f->data.state = STEP;
     if (FAULT(G09x)) f->data.y *= 0.5;
+    if (FAULT(L04g) && first && first != f) first->data.gain = f->data.gain;
     return OK;
 }
 
 EXPORT int fmi2Terminate(void *c) {
     if (FAULT(L08n) && ((volatile Fmu *)c)->logging > 1) return ERROR;
     ENTER(FAULT(L08) ? ANY : STEP);
+    if (FAULT(L07t) && !f->data.steps) return fail(f, "no step was made");
     if (FAULT(T12e) && f->data.steps >= 5) return fail(f, "the simulation has ended");
     if (FAULT(L10)) f->data.y = 1234;
     if (FAULT(B08)) {
@@ -307,6 +323,8 @@ EXPORT int fmi2Reset(void *c) {
     forget_long_text(f);
     if (FAULT(L06) || FAULT(G09r)) f->data.y = before.y;
     if (FAULT(L06t)) f->data.bias = before.bias;
+    if (FAULT(G_L3r)) f->callbacks.logger = NULL;
+    if (FAULT(L06m) && before.state == STEP) f->data.state = STEP;
     if (FAULT(L06e) && before.y > 0) f->data.n = before.n;
     if (FAULT(L06s)) strcpy(f->data.label, before.label);
     return OK;
@@ -325,13 +343,18 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(5)) return fail(f, "no such Real");
-        double y = f->data.y;
+        double y = f->data.state == TERMINATED && FAULT(L10y) ? 0 : f->data.y;
+        if (FAULT(G16) && f->data.state == INITIALIZATION) y = 7;
+        if (FAULT(G15r) && vr[i] == 1 && f->data.state == STEP) return fail(f, "gain is no more");
         if (FAULT(S04) && f->data.state == INITIALIZATION) y = f->data.gain;
         if (FAULT(S04h) && f->data.state == INITIALIZATION) y += f->data.bias * f->data.u;
         if (FAULT(T10t)) y += time(NULL) % 1000;
         if (FAULT(L11) && f->data.state == INITIALIZATION && vr[i] == 3) y = f->data.y += 1e-6;
         if (FAULT(T10p)) y += getpid() * 1e-9;
         double now = FAULT(T06b) ? f->data.start : f->data.time;
+        if (FAULT(T06n)) now = f->data.start + f->data.steps * 0.01;
+        if (FAULT(T06i) && !f->data.steps) now = NAN;
+        if (FAULT(T01s)) now -= f->data.start;
         const double all[] = {now, f->data.gain, f->data.u, y, f->data.bias};
         values[i] = all[vr[i] % 5];
         if (FAULT(NO_GET) && vr[i] == 4 && f->data.state == INITIALIZATION) return fail(f, "not now");
@@ -348,6 +371,7 @@ EXPORT int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int values[]) 
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(FAULT(V12) ? 4 : 1)) return fail(f, "no such Integer");
+        if (FAULT(G15) && f->data.n == 2) continue;
         values[i] = FAULT(V06b) && f->data.n > 3 ? -7 : f->data.n;
     }
     return OK;
@@ -374,8 +398,9 @@ EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *val
     ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(1)) return fail(f, "no such String");
+        if (!KNOWN(FAULT(V12s) ? ~0u : 1)) return fail(f, "no such String");
         values[i] = f->label ? f->label : f->data.label;
+        if (FAULT(B07s)) values[i] = strcpy(malloc(3000 + strlen(values[i])), values[i]);
     }
     return OK;
 }
@@ -386,6 +411,8 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
     for (int write = FAULT(G03c); write < 2; write++) {
         for (size_t i = 0; i < n; i++) {
             if (!KNOWN(5)) return fail(f, "no such Real");
+            if (FAULT(G10s) && i > 0) continue;
+            f->set |= f->data.state == STEP && vr[i] == 4;
             switch (vr[i]) {
             case 1:
                 if (f->data.state == STEP) return fail(f, "gain is fixed");
@@ -398,6 +425,7 @@ EXPORT int fmi2SetReal(void *c, const unsigned vr[], size_t n, const double valu
                 break;
             case 3:
                 if (FAULT(G09i) && f->data.state == INSTANTIATED) return fail(f, "y is an output");
+                if (FAULT(G03i) && f->data.state == INITIALIZATION) continue;
                 if (!FAULT(G03b) && (!FAULT(STARTS) || f->data.state == STEP)) return fail(f, "y starts only");
                 if (write) f->data.y = values[i];
                 break;
@@ -426,6 +454,7 @@ EXPORT int fmi2SetBoolean(void *c, const unsigned vr[], size_t n, const int valu
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such Boolean");
         if (f->data.state == STEP) return fail(f, "flag is fixed");
+        if (FAULT(G04b) && !values[i]) continue;
         f->data.flag = FAULT(G08) ? values[i] : values[i] != 0;
     }
     return OK;
@@ -436,7 +465,7 @@ EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *con
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
         if (!KNOWN(1)) return fail(f, "no such String");
-        if (!values[i]) return fail(f, "NULL");
+        if (!FAULT(G01n) && !values[i]) return fail(f, "NULL");
         if (f->data.state == STEP) return fail(f, "label is fixed");
         if (FAULT(G05)) {
             f->label = (char *)values[i];
@@ -455,6 +484,8 @@ EXPORT int fmi2GetFMUstate(void *c, void **state) {
     ENTER(INSTANTIATED | INITIALIZATION | STEP | TERMINATED);
     if (!state) return fail(f, "NULL");
     if (FAULT(F01b) && *state) return OK;
+    static Data only;
+    if (FAULT(F01o)) *state = &only;
     if (FAULT(F01l)) *(volatile char *)malloc(700) = 1;
     if (!*state) *state = malloc(sizeof(Data));
     *(Data *)*state = f->data;
@@ -469,6 +500,7 @@ EXPORT int fmi2SetFMUstate(void *c, void *state) {
     f->data = *(Data *)state;
     forget_long_text(f);
     if (FAULT(F02s)) f->data.y *= 1 + 1e-12;
+    if (FAULT(F01m)) f->data.state = STEP;
     if (FAULT(F02)) f->data.n = before.n;
     if (FAULT(F02x)) strcpy(f->data.label, before.label);
     if (FAULT(F02t)) f->data.y *= 1 + 4e-6;
@@ -480,6 +512,7 @@ EXPORT int fmi2FreeFMUstate(void *c, void **state) {
     ENTER(ANY);
     if (!state) return OK;
     if (FAULT(F01a)) return OK;
+    if (FAULT(F01o)) *state = NULL;
     free(*state);
     *state = NULL;
     return OK;
@@ -504,6 +537,7 @@ EXPORT int fmi2SerializeFMUstate(void *c, void *state, char bytes[], size_t size
     if (!FAULT(F04d) && size != sizeof(Blob)) return fail(f, "another size");
     Blob blob = {MAGIC, sizeof(Blob), 0, 0, *(Data *)state};
     if (FAULT(F04a)) blob.data.n = 1;
+    if (FAULT(F04v)) blob.data.bias = 0;
     blob.sum = sum(&blob.data, sizeof blob.data);
     memcpy(bytes, &blob, sizeof blob);
     return OK;
@@ -550,6 +584,9 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (FAULT(T04) && h > 0.02) return fail(f, "too long");
     if (FAULT(T01c) && d->steps > 400) return fail(f, "no more");
     if (!isfinite(d->u)) return fail(f, "u is not finite");
+    if (FAULT(T01k) && t != d->time) return fail(f, "the step does not begin exactly where the last ended");
+    while (FAULT(SECOND) && f != first) usleep(1000);
+    if (FAULT(A01) && f->set) return fail(f, "a parameter was set");
     if (ENDS && !FAULT(T12s) && d->steps >= 5) return fail(f, "the simulation has ended");
 #ifndef FMI3
     if (ENDS && d->steps == 4) {
@@ -563,7 +600,7 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (FAULT(B08f)) __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
     if (FAULT(T05) && no_prior) d->y += 1e-2;
     if (FAULT(T05s) && no_prior) d->y *= 1 + 1e-12;
-    d->y += (d->gain * d->u + d->bias) * (FAULT(T03) ? 1 : h);
+    d->y += (d->gain * d->u + d->bias) * (FAULT(T03) ? 1 : FAULT(T03l) && h > 0.015 ? 0.01 : h);
     if (FAULT(MEAN)) d->y = (t + 1) * (t + 1) + (t + 1) * h + h * h / 3;
     if (FAULT(G12)) d->u = 0;
     if (FAULT(G13)) d->gain *= 1.0001;

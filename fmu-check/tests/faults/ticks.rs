@@ -62,3 +62,23 @@ fn clocks_tick_and_callbacks_come_as_they_should() {
     let report = check(&pack_with(dir.path(), "U04", &silent, &library("ticks.c", &[], "NONE").unwrap()), &GROUPS);
     assert_eq!(violated(&report), ["U04"], "{}", told(&report));
 }
+
+/// An FMU of Scheduled Execution alone is checked as that.
+#[test]
+fn scheduled_execution_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = library("ticks.c", &[], "NONE") else { return };
+    let xml: Vec<_> = include_str!("ticks.xml").lines().filter(|line| !line.contains("<CoSimulation")).collect();
+    let path = pack_with(dir.path(), "scheduled", &xml.join("\n"), &binary);
+    let report = check(&path, &["L00", "T01a", "K00", "E00", "P00", "P03"]);
+    for id in ["L00", "T01a", "K00", "E00"] {
+        let verdict = &report.finding(id).unwrap().verdict;
+        assert!(
+            matches!(verdict, Verdict::NotApplicable(why) if why.contains("no interface for")),
+            "{id}: {verdict:?}"
+        );
+    }
+    for id in ["P00", "P03"] {
+        assert!(matches!(report.finding(id).unwrap().verdict, Verdict::Pass(_)), "{id}: {report:?}");
+    }
+}

@@ -1,6 +1,6 @@
 //! Callbacks for the FMU that record their calls.
 
-use super::super::log::{Status, copy_text};
+use super::super::log::Status;
 use super::super::signatures::v2::{calloc, free};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -66,7 +66,7 @@ pub(super) unsafe extern "C" fn logger2<const LATE: bool>(
     let (instance, category, text) = unsafe {
         let format = optional(format);
         let plain = cfg!(target_vendor = "apple") || format.as_deref() != Some("%s");
-        (optional(instance), optional(category), if plain { format } else { Some(copy_text(first)) })
+        (optional(instance), optional(category), if plain { format } else { optional(first) })
     };
     push(LogCall { environment: environment.addr(), instance, status: status.0, category, text, late: LATE });
 }

@@ -1,0 +1,116 @@
+//! What a probe has left: its findings, its calls, its console, and the verdict from them.
+
+use crate::check::{Judgement, Level, Verdict};
+use crate::session::{FOUND, Line};
+use fmu_import::guard::End;
+use std::fs::{self, File};
+use std::io::Read;
+use std::path::Path;
+
+pub(super) fn read(out: &Path) -> Vec<Line> {
+    let text = fs::read_to_string(out).unwrap_or_default();
+    text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
+}
+
+/// What a panic of this program says, if one has ended a probe; the panic of an FMU in Rust does not come as far as here.
+pub(super) fn panic(end: &End, out: &Path) -> Option<String> {
+    let End::Ended(status) = end else { return None };
+    let console = fs::read(out.with_file_name("console")).ok().filter(|_| status.code() == Some(101))?;
+    let console = String::from_utf8_lossy(&console);
+    let (_, text) = console.rsplit_once(" panicked at ")?;
+    Some(text.lines().take(2).collect::<Vec<_>>().join(" "))
+}
+
+/// Whether a call is one of a further instance, and the same function of the first instance of the case has returned.
+pub(super) fn is_of_second(call: &str, out: &Path) -> bool {
+    let Some((_, call)) = call.get(2..).filter(|c| c.starts_with('[')).and_then(|c| c.split_once("] ")) else {
+        return false;
+    };
+    let function = call.split('(').next().unwrap_or_default();
+    let log = fs::read_to_string(out.with_extension("log")).unwrap_or_default();
+    let case = log.rsplit("# case ").next().unwrap_or_default();
+    case.lines().any(|line| line.strip_prefix(function).is_some_and(|rest| rest.contains(" -> ")))
+}
+
+/// The calls of the first case with a finding: that with the mark, or the last one.
+pub(super) fn calls(log: &str) -> Vec<String> {
+    const MOST: usize = 60;
+    let cases: Vec<&str> = log.split("# case ").collect();
+    let found = cases.iter().find(|case| case.contains(FOUND)).or(cases.last());
+    let lines: Vec<_> = found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND).collect();
+    // The number of the case is the first line of all but the first part.
+    let first = usize::from(cases.len() > 1 && found.is_some_and(|f| !std::ptr::eq(*f, cases[0])));
+    let calls: Vec<String> = lines.iter().skip(first).map(|l| (*l).to_owned()).collect();
+    if calls.len() <= MOST {
+        return calls;
+    }
+    let left_out = format!("({} calls)", calls.len() - MOST);
+    [&calls[..MOST / 2], &[left_out], &calls[calls.len() - MOST / 2..]].concat()
+}
+
+/// Unwanted console output and files of the process.
+pub(super) fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
+    let mut console = Vec::new();
+    if let Ok(file) = File::open(folder.join("console")) {
+        let _ = file.take(64 << 10).read_to_end(&mut console);
+    }
+    let console = String::from_utf8_lossy(&console);
+    let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
+    let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);
+    findings
+        .extend(files.map(|f| format!("created a file in the working directory: {}", f.file_name().to_string_lossy())));
+    findings
+}
+
+/// The verdict from the lines of the probe and from its crashes (how, and in which call).
+pub(super) fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Judgement {
+    let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), slow, None);
+    let (mut lesser, mut lower, mut fatal) = (Vec::new(), None, false);
+    for line in lines {
+        match line {
+            Line::Violated(text) => violated.push(text),
+            Line::Lesser(level, text) => {
+                // The more binding level is the smaller one.
+                lower = Some(lower.map_or(level, |other: Level| other.min(level)));
+                lesser.push(text);
+            }
+            Line::Note(text) => notes.push(text),
+            Line::NotDetermined(why) => not_determined = not_determined.or(Some(why)),
+            Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
+            Line::Case(_) | Line::Integrator(_) | Line::Done => {}
+        }
+    }
+    for (how, call) in crashes {
+        if let Some((level, call)) = [(Level::Should, "S "), (Level::Hard, "H ")]
+            .iter()
+            .find_map(|(level, mark)| Some((*level, call.strip_prefix(mark)?)))
+        {
+            lower = Some(lower.map_or(level, |other| other.min(level)));
+            lesser.push(format!("{call} {how}"));
+            fatal = true;
+            continue;
+        }
+        if let Some(call) = call.strip_prefix("C ") {
+            violated.push(format!("{call} {how}"));
+            fatal = true;
+            continue;
+        }
+        // Preparing the probe failed: another check reports that.
+        let call = call.strip_prefix("P ").unwrap_or("the start");
+        if id == "B00" || (["L00", "E00"].contains(&id) && !call.starts_with("loading")) {
+            violated.push(format!("{call} {how}"));
+            fatal = true;
+        } else {
+            not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));
+        }
+    }
+    let lower = lower.filter(|_| violated.is_empty());
+    violated.extend(lesser);
+    let verdict = match (violated.is_empty(), not_determined, not_applicable) {
+        (false, ..) => Verdict::Violated(violated),
+        (_, Some(why), _) => Verdict::NotDetermined(why),
+        (_, _, Some(why)) => Verdict::NotApplicable(why),
+        _ => Verdict::Pass(notes),
+    };
+    Judgement { verdict, lower, fatal, calls: Vec::new() }
+}
