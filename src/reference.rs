@@ -44,7 +44,7 @@ pub fn files(
 ) -> Result<BTreeMap<String, Entry>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
     let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
-    let system = system(archive, &fed)?;
+    let system = system(archive, &fed).with_context(|| stimuli.display().to_string())?;
     let inputs: Vec<Feed> = fed.iter().map(|(input, texts)| Feed::of(&system, input, texts)).collect::<Result<_>>()?;
     let inputs = held(&inputs, experiment);
     let result = thinned(&simulate(system, experiment)?, every(experiment));
@@ -223,9 +223,9 @@ fn thinned(recording: &Recording, every: usize) -> String {
         recording.columns.iter().for_each(|c| {
             let _ = write!(csv, ",{}", c.values[k]);
         });
-        texts.iter().for_each(|c| {
-            let _ = write!(csv, ",{}", cell(&c.values[k]));
-        });
+        for column in &texts {
+            let _ = write!(csv, ",{}", cell(&column.values[k]));
+        }
         csv.push('\n');
     }
     csv
