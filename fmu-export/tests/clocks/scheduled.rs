@@ -115,6 +115,8 @@ mod preemption {
 
     extern "C" fn update(environment: *mut c_void) {
         assert_eq!(DEPTH.load(SeqCst), 1);
+        // The other thread must wait for the lock until this call is over.
+        std::thread::sleep(std::time::Duration::from_micros(50));
         let it = unsafe { *environment.cast::<InstancePointer>() };
         let mut active = Fmi3Boolean(9);
         assert_eq!(unsafe { fmi3GetClock(it, &TRIP, 1, &mut active) }, OK);
