@@ -167,6 +167,7 @@ mod preemption {
                             OK => good.fetch_add(1, SeqCst),
                             status => {
                                 assert_eq!(status, ERROR);
+                                std::thread::yield_now();
                                 0
                             }
                         };
