@@ -74,6 +74,18 @@ fn a_wrong_element_is_found() {
     assert_eq!(said.matches(": 1.0e0").count(), 2, "{said}");
 }
 
+/// FMPy records bytes and no texts.
+#[test]
+fn outputs_that_fmpy_does_not_record_are_left_out_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = fed("feedthrough", "time,Int32_input\n0,3\n1,3\n", folder.path(), ("\0", ""));
+    let output = prove(&folder.path().join("out"), &[path]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success() && !said.contains("not replayed"), "{said}");
+    let readme = fs::read_to_string(folder.path().join("out/fmi3/Feedthrough/Readme.txt")).unwrap();
+    assert!(readme.contains("FMPy 0.3.32: 0.0e0\n"), "{readme}");
+}
+
 /// Texts and bytes in this program, which FMPy does not feed.
 #[test]
 fn texts_and_bytes_are_replayed() {
