@@ -9,8 +9,8 @@ use crate::pack::Entry;
 use anyhow::{Context, Result, bail};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
-use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
-use model_description::Causality;
+use fmu_import::cosimulation::{Recording, Schedule, Sequence, Settings, System, cell};
+use model_description::{BaseType, Causality};
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::fs;
@@ -20,7 +20,8 @@ use std::path::Path;
 /// Folder of the layered standard in an archive.
 pub const FOLDER: &str = "extra/org.fmi-standard.fmi-ls-ref/";
 
-/// File of a package that feeds its FMU: CSV with time first and a column per input; lines join the points.
+/// File of a package that feeds its FMU: CSV with time first and a column per input; lines join the points of a real number, other
+/// values are held.
 pub const STIMULI: &str = "stimuli.csv";
 
 /// Greatest number of variables, and of intervals.
@@ -42,9 +43,11 @@ pub fn files(
     parameters: Option<(&str, &str)>,
 ) -> Result<BTreeMap<String, Entry>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
-    let fed = if stimuli.is_file() { Schedule::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
-    let inputs = held(&fed, experiment);
-    let result = thinned(&run(archive, experiment, fed)?, every(experiment));
+    let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
+    let system = system(archive, &fed).with_context(|| stimuli.display().to_string())?;
+    let inputs: Vec<Feed> = fed.iter().map(|(input, texts)| Feed::of(&system, input, texts)).collect::<Result<_>>()?;
+    let inputs = held(&inputs, experiment);
+    let result = thinned(&simulate(system, experiment)?, every(experiment));
     let mut texts = vec![(format!("{name}_ref.csv"), result)];
     let step = experiment.step;
     let of = format!("Result of the default experiment in communication steps of {step} s");
@@ -98,21 +101,37 @@ const ROOT: &str = "<fmiReferences xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls
      fmi-ls:fmi-ls-name=\"org.fmi-standard.fmi-ls-ref\" fmi-ls:fmi-ls-version=\"1.0.0-beta.1\" \
      fmi-ls:fmi-ls-description=\"Layered Standard providing information on related files included in an FMU.\">\n";
 
-/// The experiment in Co-Simulation, every communication point recorded: the first outputs that are real numbers.
+/// The experiment in Co-Simulation, every communication point recorded: the first outputs, those that are real numbers before others.
 ///
 /// # Errors
 /// Those of the FMU.
-pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>) -> Result<Recording> {
+pub fn run(archive: &Path, experiment: &Experiment, fed: &[(String, Sequence)]) -> Result<Recording> {
+    simulate(system(archive, fed)?, experiment)
+}
+
+/// The FMU, fed, with the outputs that are recorded.
+fn system(archive: &Path, fed: &[(String, Sequence)]) -> Result<System> {
     let fmu = Fmu::open(archive)?;
     let mut system = System::default();
     system.add("fmu", &fmu, false)?;
     let outputs = fmu.description().variables.iter().filter(|v| v.causality == Causality::Output);
-    for output in outputs.filter(|v| v.base.is_float() && !v.is_array()).take(VARIABLES) {
-        system.record_as(&format!("fmu.{}", output.name), &output.name)?;
+    let (reals, others): (Vec<_>, Vec<_>) =
+        outputs.filter(|v| v.base != BaseType::Clock).partition(|v| v.base.is_float() && !v.is_array());
+    for output in reals.into_iter().chain(others).take(VARIABLES) {
+        let port = format!("fmu.{}", output.name);
+        if system.is_text(&port)? {
+            system.record_text_as(&port, &output.name)?;
+        } else {
+            system.record_as(&port, &output.name)?;
+        }
     }
-    for (input, schedule) in fed {
-        system.input(&format!("fmu.{input}"), schedule)?;
+    for (input, texts) in fed {
+        system.sequence(&format!("fmu.{input}"), texts)?;
     }
+    Ok(system)
+}
+
+fn simulate(mut system: System, experiment: &Experiment) -> Result<Recording> {
     let Experiment { start, stop, step, .. } = *experiment;
     if (stop - start) / step > MOST_STEPS {
         bail!("the default experiment has more than {MOST_STEPS:e} steps");
@@ -121,19 +140,42 @@ pub fn run(archive: &Path, experiment: &Experiment, fed: Vec<(String, Schedule)>
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
 }
 
+/// An input over time.
+enum Feed {
+    /// A real number.
+    Lines(Schedule),
+    /// Anything else: an integer, a text, bytes, a whole array.
+    Held(Sequence),
+}
+
+impl Feed {
+    fn of(system: &System, input: &str, texts: &Sequence) -> Result<Self> {
+        let real = system.is_real(&format!("fmu.{input}"))?;
+        Ok(if real { Self::Lines(texts.lines().map_err(anyhow::Error::msg)?) } else { Self::Held(texts.clone()) })
+    }
+
+    /// The cell at time `t` (s).
+    fn at(&self, t: f64) -> String {
+        match self {
+            Self::Lines(schedule) => schedule.at(t).to_string(),
+            Self::Held(texts) => cell(texts.at(t)),
+        }
+    }
+}
+
 /// Share of a step that a change of the inputs takes, and the time from there to the communication point.
 const EDGE: f64 = 1e-3;
 
 /// Rows of the inputs as the run feeds them: held over its communication steps. A change is over just before its communication
 /// point, so an importer with shorter steps feeds the same, and straight lines connect the rows.
-fn held(fed: &[(String, Schedule)], experiment: &Experiment) -> String {
+fn held(fed: &[Feed], experiment: &Experiment) -> String {
     let Experiment { start, stop, step, .. } = *experiment;
-    let at = |t: f64| fed.iter().map(|(_, schedule)| schedule.at(t)).collect::<Vec<f64>>();
+    let at = |t: f64| fed.iter().map(|feed| feed.at(t)).collect::<Vec<String>>();
     let digits = (4.0 - step.log10()).ceil().clamp(0.0, 17.0);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 17")]
     let digits = digits as usize;
     let mut csv = String::new();
-    let mut row = |t: f64, values: &[f64]| {
+    let mut row = |t: f64, values: &[String]| {
         let time = format!("{t:.digits$}");
         let time = if digits > 0 { time.trim_end_matches('0').trim_end_matches('.') } else { &time };
         csv.push_str(time);
@@ -168,9 +210,11 @@ pub fn every(experiment: &Experiment) -> usize {
     every
 }
 
-/// CSV with every `every`-th row, and the last one.
+/// CSV with every `every`-th row, and the last one. A row is a line, so a text of several lines is left out.
 fn thinned(recording: &Recording, every: usize) -> String {
-    let names = std::iter::once("time").chain(recording.columns.iter().map(|c| c.name.as_str()));
+    let texts: Vec<_> = recording.texts.iter().filter(|c| !c.values.iter().any(|x| x.contains(['\n', '\r']))).collect();
+    let numbers = recording.columns.iter().map(|c| c.name.as_str());
+    let names = std::iter::once("time").chain(numbers).chain(texts.iter().map(|c| c.name.as_str()));
     let mut csv = names.map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(",") + "\n";
     let last = recording.time.len().saturating_sub(1);
     for (k, t) in recording.time.iter().enumerate().filter(|(k, _)| k % every == 0 || *k == last) {
@@ -179,6 +223,9 @@ fn thinned(recording: &Recording, every: usize) -> String {
         recording.columns.iter().for_each(|c| {
             let _ = write!(csv, ",{}", c.values[k]);
         });
+        for column in &texts {
+            let _ = write!(csv, ",{}", cell(&column.values[k]));
+        }
         csv.push('\n');
     }
     csv
@@ -195,14 +242,18 @@ mod tests {
         let experiment = Experiment { stop: 1.0, step: 0.25, ..Experiment::DEFAULT };
         let lines = |points: &[(f64, f64)]| Schedule::lines(points.to_vec()).unwrap();
         let fed = [
-            ("a".to_owned(), lines(&[(0.0, 0.0), (0.25, 0.0), (0.75, 10.0), (1.0, 10.0)])),
-            ("b".to_owned(), lines(&[(0.0, 1.0), (0.5, 1.0), (0.5001, 2.0)])),
+            lines(&[(0.0, 0.0), (0.25, 0.0), (0.75, 10.0), (1.0, 10.0)]),
+            lines(&[(0.0, 1.0), (0.5, 1.0), (0.5001, 2.0)]),
         ];
-        let csv = held(&fed, &experiment);
+        let texts = Sequence::parse("0:1 2,0.6:a, b").unwrap();
+        let with_texts = [Feed::Lines(fed[0].clone()), Feed::Held(texts)];
+        let rows = "0,0,1 2\n0.4995,0,1 2\n0.49975,5,1 2\n0.7495,5,1 2\n0.74975,10,\"a, b\"\n1,10,\"a, b\"\n";
+        assert_eq!(held(&with_texts, &experiment), rows);
+        let csv = held(&fed.clone().map(Feed::Lines), &experiment);
         assert_eq!(csv, "0,0,1\n0.4995,0,1\n0.49975,5,1\n0.7495,5,1\n0.74975,10,2\n1,10,2\n");
         let rows: Vec<Vec<f64>> =
             csv.lines().map(|line| line.split(',').map(|x| x.parse().unwrap()).collect()).collect();
-        for (column, (_, schedule)) in fed.iter().enumerate() {
+        for (column, schedule) in fed.iter().enumerate() {
             let read = lines(&rows.iter().map(|row| (row[0], row[column + 1])).collect::<Vec<_>>());
             for n in 0..160 {
                 let t = f64::from(n) / 160.0;

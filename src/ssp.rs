@@ -8,7 +8,8 @@ use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;
 use fmu_import::cosimulation::{Settings, System};
 use fmu_import::ssp::ssv::{Parameter, read};
-use fmu_import::ssp::{DESCRIPTION, FMU_TYPE, values};
+use fmu_import::ssp::values::{self, Given};
+use fmu_import::ssp::{DESCRIPTION, FMU_TYPE};
 use fmu_import::{Fmu, Values as Read};
 use model_description::{
     BaseType, BaseUnit, Causality, Element, ModelDescription, ModelVariable, Unit, format_number, parse_number,
@@ -97,7 +98,7 @@ pub fn files(
     let mut given: Vec<(&str, Parameter)> = Vec::new();
     for v in parameters {
         let read = read(&v.text).map_err(|cause| anyhow::anyhow!("{}: {cause}", v.file))?;
-        values::set(&mut system, &v.component, &v.file, &read)?;
+        values::set(&mut system, &Given::all(&v.component, &v.file, &read))?;
         let typed = typed(&system, &v.component, &read, options.names)?;
         let typed = typed.iter().map(|(name, value)| (name.as_str(), value));
         put(binding_file(&v.component), ssv::text_of(&v.component, typed).into_bytes());

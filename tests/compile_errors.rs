@@ -140,6 +140,17 @@ fn models() -> Vec<Wrong> {
         ),
         model("number", ("<Self, 1>", "<Self, 12>"), "the above error was encountered while instantiating", 17),
         model(
+            "events_number",
+            (
+                "integrate::smooth::<Self, 1>(self, step, 1.0)\n    }\n}",
+                "integrate::hybrid::<Self, 13>(self, step, 1.0)\n    }\n}\nimpl Events for Ball {\n    \
+                 fn event(&mut self, _: Elapsed) -> Result<Outcome, Fault> { Ok(Outcome::default()) }\n    \
+                 fn next(&self, _: Elapsed) -> Next { Next::Never }\n}",
+            ),
+            "the above error was encountered while instantiating",
+            17,
+        ),
+        model(
             "inside",
             ("Ball: ContinuousTime", "Ball: ContinuousTime + Intermediate"),
             "`Ball` has no intermediate updates",

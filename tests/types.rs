@@ -5,6 +5,7 @@ mod common;
 
 use fmu::commands::build::{self, Build};
 use fmu_import::cosimulation::{Settings, System};
+use fmu_import::ssp::{ssv, values};
 use fmu_import::{Fmu, Instance, Kind, Values};
 use model_description::FmiVersion::{self, V2, V3};
 use model_description::{BaseType, Causality};
@@ -279,8 +280,8 @@ fn a_parameter_file_sets_texts() {
     for version in [V2, V3] {
         let mut system = System::default();
         system.add("it", &Fmu::open(archive(version)).unwrap(), false).unwrap();
-        fmu_import::ssp::values::set(&mut system, "it", "values.ssv", &fmu_import::ssp::ssv::read(file).unwrap())
-            .unwrap();
+        let given = values::Given::all("it", "values.ssv", &ssv::read(file).unwrap());
+        values::set(&mut system, &given).unwrap();
         system.record("it.local.uint8").unwrap();
         system.record("it.letters").unwrap();
         let settings = Settings { start: 0.0, stop: 0.1, step: 0.1, sequential: false };

@@ -87,7 +87,8 @@ macro_rules! enumeration {
         $(#[$attribute])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         $visibility enum $type {
-            $($(#[$mark])* #[doc = $about] $item = $value,)*
+            // The compiler's advice about a missing `#[default]` shows this line.
+            $($(#[$mark])* #[doc = $about] $item = $value,)* // not here: `#[default] 1 Off "...";` in your enumeration
         }
 
         impl $type {

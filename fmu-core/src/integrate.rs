@@ -65,6 +65,8 @@ pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     step: &Step,
     longest: f64,
 ) -> Result<(), Fault> {
+    // Here and not in `run`: the compiler then names the line that calls this function.
+    const { check_number::<M>(N) };
     let stop = run::<M, N>(model, step, longest, false)?;
     model.begin(stop.at);
     Ok(())
@@ -80,6 +82,7 @@ pub fn to_event<M: ContinuousTime + Events, const N: usize>(
     step: &Step,
     longest: f64,
 ) -> Result<Stop, Fault> {
+    const { check_number::<M>(N) };
     run::<M, N>(model, step, longest, true)
 }
 
@@ -90,7 +93,6 @@ fn run<M: ContinuousTime + Events, const N: usize>(
     longest: f64,
     stops: bool,
 ) -> Result<Stop, Fault> {
-    const { check_number::<M>(N) };
     const { check_indicators::<M>() };
     let (mut now, end) = (step.start, step.end());
     let count = substeps(step.h, longest)?;

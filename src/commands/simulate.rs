@@ -12,7 +12,8 @@ use clap::{Args, ValueEnum};
 use fmu_import::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::ssp::load::Loaded;
-use fmu_import::ssp::{ssv, values};
+use fmu_import::ssp::ssv;
+use fmu_import::ssp::values::{self, Given};
 use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
 use indicatif::{ProgressBar, ProgressStyle};
 use model_description::ModelVariable;
@@ -350,12 +351,14 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
             eprintln!("connected {} -> {}", printable(&from), printable(&to));
         }
     }
+    let mut parameters = Vec::new();
     for text in &args.parameters {
         let (instance, file) = halves(text, "--parameters INSTANCE=FILE.ssv")?;
         let content = std::fs::read_to_string(file).with_context(|| format!("reading {file}"))?;
         let given = ssv::read(&content).map_err(|cause| anyhow!("{file}: {cause}"))?;
-        values::set(&mut loaded.system, instance, file, &given)?;
+        parameters.extend(Given::all(instance, file, &given));
     }
+    values::set(&mut loaded.system, &parameters)?;
     for (port, value) in values {
         loaded.set(port, value)?;
     }

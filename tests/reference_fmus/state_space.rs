@@ -2,9 +2,11 @@
 
 use super::{BOTH, archive, checks, exchange, open, run, script};
 use fmu_import::cosimulation::{Method, Recording, Schedule, Settings, System};
+use fmu_import::ssp::load::Loaded;
 use fmu_import::{Instance, Kind, Values};
 use model_description::FmiVersion::{V2, V3};
 use model_description::{Causality, Dimension};
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -292,4 +294,55 @@ fn a_preset_finds_an_element_of_a_matrix() {
     let (with, without) = (last(&with), last(&without));
     assert_eq!((with[0].to_bits(), with[2].to_bits()), (without[0].to_bits(), without[2].to_bits()));
     assert!(with[1] > without[1] + 1.0, "{with:?} {without:?}");
+}
+
+/// Values of an SSP may name elements before the sizes: the structural parameters of all its files come first, and together.
+#[test]
+fn an_ssp_sets_sizes_before_arrays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("sized.ssp");
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(&path).unwrap());
+    let mut put = |name: &str, bytes: &[u8]| {
+        zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        zip.write_all(bytes).unwrap();
+    };
+    let binding = |values: &[(&str, &str)]| {
+        let one = |(name, value): &(&str, &str)| {
+            let kind = if name.contains('[') { "Real" } else { "Integer" };
+            format!("<ssv:Parameter name=\"{name}\"><ssv:{kind} value=\"{value}\"/></ssv:Parameter>")
+        };
+        let all: String = values.iter().map(one).collect();
+        format!(
+            "<ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version=\"1.0\" name=\"s\">\
+             <ssv:Parameters>{all}</ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding>\
+             </ssd:ParameterBindings>"
+        )
+    };
+    let (inner, outer) = (
+        binding(&[("x0[5]", "3"), ("A[4,5]", "0.5"), ("n", "2"), ("m", "4")]),
+        binding(&[("it.x0[2]", "7"), ("it.r", "5"), ("it.n", "5")]),
+    );
+    let description = format!(
+        "<ssd:SystemStructureDescription xmlns:ssd=\"http://ssp-standard.org/SSP1/SystemStructureDescription\" \
+         xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" version=\"1.0\" name=\"sized\">\
+         <ssd:System name=\"sized\"><ssd:Elements><ssd:Component name=\"it\" source=\"it.fmu\" \
+         type=\"application/x-fmu-sharedlibrary\">{inner}</ssd:Component></ssd:Elements>{outer}</ssd:System>\
+         </ssd:SystemStructureDescription>"
+    );
+    put("SystemStructure.ssd", description.as_bytes());
+    put("it.fmu", &std::fs::read(archive("state-space", V3)).unwrap());
+    zip.finish().unwrap();
+    let mut loaded = Loaded::open(&path, false).unwrap();
+    assert!(loaded.notes.is_empty(), "{:?}", loaded.notes);
+    for port in ["it.x[2]", "it.x[5]", "it.y[4]", "it.n", "it.m", "it.r"] {
+        loaded.record(port).unwrap();
+    }
+    // Sizes that change later leave no value behind that does not fit.
+    let settings = Settings { start: 0.0, stop: 1e-3, step: 1e-3, sequential: false };
+    let wrong = loaded.system.configure([("it.n", "2")]).unwrap_err().to_string();
+    assert!(wrong.contains("x0 has 2 elements, not 5"), "{wrong}");
+    loaded.system.configure([("it.n", "5")]).unwrap();
+    let recording = loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let last: Vec<f64> = recording.columns.iter().map(|column| column.values[1]).collect();
+    assert_eq!(last, [7.0 + 1e-3 * (7.0 + 2.0), 3.0 + 1e-3 * 3.0, 1e-3 * (0.5 * 3.0 + 4.0) + 4.0, 5.0, 4.0, 5.0]);
 }

@@ -34,6 +34,7 @@ pub fn euler_hybrid<M: ContinuousTime + Events, const N: usize>(
     step: &Step,
     fixed: f64,
 ) -> Result<(), Fault> {
+    const { check_number::<M>(N) };
     let mut left = points(step, fixed)?;
     handle(model, step.start)?;
     while let Some(k) = walk::<M, N>(model, &mut left, fixed)? {
@@ -52,6 +53,7 @@ pub fn euler_to_event<M: ContinuousTime + Events, const N: usize>(
     step: &Step,
     fixed: f64,
 ) -> Result<Stop, Fault> {
+    const { check_number::<M>(N) };
     let (end, grid, mut left) = (step.end(), SampleGrid { period: fixed }, points(step, fixed)?);
     handle(model, step.start)?;
     let event = walk::<M, N>(model, &mut left, fixed)?;
@@ -75,7 +77,6 @@ fn walk<M: ContinuousTime + Events, const N: usize>(
     left: &mut Range<u64>,
     fixed: f64,
 ) -> Result<Option<u64>, Fault> {
-    const { check_number::<M>(N) };
     const { check_indicators::<M>() };
     let count = M::INDICATORS.len();
     let (mut before, mut after) = ([0.0; MAX_INDICATORS], [0.0; MAX_INDICATORS]);

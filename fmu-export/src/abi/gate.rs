@@ -14,7 +14,7 @@ use crate::resources::folder;
 use crate::snapshot::Snapshot;
 use fmu_core::{Exported, Fault, Interface, Model};
 use std::any::Any;
-use std::cell::UnsafeCell;
+use std::cell::{Cell, UnsafeCell};
 use std::ffi::{CStr, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{
@@ -75,8 +75,17 @@ impl<E: Exported> Handle<E> {
     #[inline]
     fn lock<F: Function>(&self) -> Option<Lock> {
         let locks = const { E::CAN.scheduled && F::ENTRY.preempted };
-        if locks && !self.calling.load(Relaxed) { self.callbacks.lock() } else { None }
+        if locks && CALLING.get() != self.address() { self.callbacks.lock() } else { None }
     }
+
+    fn address(&self) -> *const () {
+        std::ptr::from_ref(self).cast()
+    }
+}
+
+thread_local! {
+    /// The handle whose callback this thread runs: its calls have the lock already, and those of other threads wait for it.
+    static CALLING: Cell<*const ()> = const { Cell::new(std::ptr::null()) };
 }
 
 /// Passes a call to the instance.
@@ -148,7 +157,13 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
         });
         let Some(request) = request else { return status };
         handle.calling.store(true, Relaxed);
-        reply = handle.callbacks.call(request);
+        if const { E::CAN.scheduled } {
+            let outer = CALLING.replace(handle.address());
+            reply = handle.callbacks.call(request);
+            CALLING.set(outer);
+        } else {
+            reply = handle.callbacks.call(request);
+        }
         handle.calling.store(false, Relaxed);
         // Another thread may be in a call, if the importer gave no lock.
         while !handle.take() {

@@ -48,7 +48,7 @@ pub use exchange::Inputs;
 pub use grid::Settings;
 pub use method::{Integration, Method};
 pub use plan::{Plan, Target, Worker};
-pub use recording::{Column, Recording, TextColumn, item};
+pub use recording::{Column, Recording, TextColumn, cell, item};
 pub use run::{Ended, Point};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
@@ -120,10 +120,11 @@ impl System {
     }
 
     /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode. Arrays
-    /// have other sizes then, and have lost their values, so this comes before everything that names variables.
+    /// have other sizes then, so this comes before everything that names variables; values that were set are set again.
     ///
     /// # Errors
-    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, or the FMU refuses.
+    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, an array that was set has
+    /// another size now, or the FMU refuses.
     pub fn configure<'a>(&mut self, sizes: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<(), Error> {
         let mut changed = vec![false; self.instances.len()];
         for (written, text) in sizes {
@@ -136,8 +137,12 @@ impl System {
             self.parts.0[port.instance].sizes.retain(|(other, _)| *other != port);
             self.parts.0[port.instance].sizes.push((port, values));
         }
-        let all = self.parts.0.iter().zip(&mut self.instances).zip(changed);
-        all.filter(|(_, changed)| *changed).try_for_each(|((part, instance), _)| part.configure(instance))
+        for (index, instance) in self.instances.iter_mut().enumerate().filter(|(index, _)| changed[*index]) {
+            self.parts.0[index].configure(instance)?;
+            let mut set = self.set.iter().filter(|(port, _)| port.instance == index);
+            set.try_for_each(|(port, values)| instance.set(&port.name, values))?;
+        }
+        Ok(())
     }
 
     /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. An element of an array

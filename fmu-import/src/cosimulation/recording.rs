@@ -105,8 +105,8 @@ impl Recording {
     }
 }
 
-/// A text as CSV has it.
-fn cell(text: &str) -> String {
+/// A text as CSV has it, in quotation marks where it needs them (RFC 4180).
+pub fn cell(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 

@@ -16,7 +16,7 @@ pub struct Schedule {
 }
 
 /// Instants closer than this (s) are the same: communication points are `start + k h`, rounded.
-const SAME: f64 = 1e-9;
+pub(super) const SAME: f64 = 1e-9;
 
 impl Schedule {
     /// Steps: each value holds from its time (s) on; before the first, the first value holds.

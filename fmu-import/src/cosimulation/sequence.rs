@@ -1,6 +1,6 @@
 //! Values over time as a user writes them: of an input of any type, each held from its time on.
 
-use super::schedule::{Schedule, last_before};
+use super::schedule::{SAME, Schedule, last_before};
 use crate::Values;
 use model_description::{ModelDescription, ModelVariable};
 use std::path::Path;
@@ -112,6 +112,12 @@ impl Sequence {
         };
         let points = self.points.iter().map(number).collect::<Result<Vec<_>, _>>()?;
         Schedule::jumping(points, &self.unit)
+    }
+
+    /// The text at time `t` (s); before the first, the first.
+    pub fn at(&self, t: f64) -> &str {
+        let until = self.points.partition_point(|(time, ..)| *time <= t + SAME);
+        &self.points[until.saturating_sub(1)].1
     }
 
     /// The texts as values of this variable.

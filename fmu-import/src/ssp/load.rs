@@ -1,8 +1,9 @@
 //! An SSP as a system of our co-simulation.
 
+use super::DESCRIPTION;
 use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
-use super::{DESCRIPTION, values};
+use super::values::{self, Given};
 use crate::cosimulation::{Method, Schedule, Sequence, Settings, System};
 use crate::{Fmu, archive};
 use anyhow::{Context, Result, anyhow, bail};
@@ -191,16 +192,18 @@ impl Loaded {
             loaded.connect(&structure, connection).map_err(wrong)?;
         }
         // Inner values first: those of the system replace them.
+        let mut given = Vec::new();
         for component in &structure.components {
             for binding in &component.bindings {
                 let (file, parameters) = package.parameters(binding)?;
-                loaded.bind(&file, &parameters, &format!("{}.", component.name))?;
+                given.extend(loaded.bound(&file, &parameters, &format!("{}.", component.name)));
             }
         }
         for binding in &structure.bindings {
             let (file, parameters) = package.parameters(binding)?;
-            loaded.bind(&file, &parameters, "")?;
+            given.extend(loaded.bound(&file, &parameters, ""));
         }
+        values::set(&mut loaded.system, &given)?;
         Ok(loaded)
     }
 
@@ -362,8 +365,9 @@ impl Loaded {
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
-    /// Sets the values of a binding; names begin with `prefix` and those of the system's connectors stand for themselves.
-    fn bind(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Result<()> {
+    /// The values of a binding; names begin with `prefix` and those of the system's connectors stand for themselves.
+    fn bound(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Vec<Given> {
+        let mut given = Vec::new();
         for p in parameters {
             let full = format!("{prefix}{}", p.name);
             let ports = match self.connectors.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name) {
@@ -373,11 +377,12 @@ impl Loaded {
             for port in ports {
                 let has = |i: &crate::Instance| {
                     let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
-                    i.description().variable_or_array(variable).map(|_| (i.name().to_owned(), variable.to_owned()))
+                    values::find(i.description(), variable).map(|_| (i.name().to_owned(), variable.to_owned()))
                 };
                 match self.system.instances().iter().find_map(has) {
                     Some((instance, name)) => {
-                        values::set(&mut self.system, &instance, file, &[Parameter { name, ..p.clone() }])?;
+                        let parameter = Parameter { name, ..p.clone() };
+                        given.push(Given { instance, file: file.into(), parameter });
                     }
                     None => {
                         self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line));
@@ -385,7 +390,7 @@ impl Loaded {
                 }
             }
         }
-        Ok(())
+        given
     }
 }
 

@@ -5,18 +5,43 @@ use crate::cosimulation::System;
 use anyhow::{Context, Result, bail};
 use model_description::{ModelDescription, ModelVariable};
 
-/// Sets the values on an instance, each judged by its FMU, structural parameters first and together; `file` is named where one is
-/// wrong.
+/// A value of an SSV file for an instance.
+#[derive(Clone, Debug)]
+pub struct Given {
+    /// Name of the instance.
+    pub instance: String,
+    /// The file, for errors.
+    pub file: String,
+    /// Name and value of the variable.
+    pub parameter: Parameter,
+}
+
+impl Given {
+    /// The values of a file for one instance.
+    pub fn all(instance: &str, file: &str, parameters: &[Parameter]) -> Vec<Self> {
+        let one = |p: &Parameter| Self { instance: instance.into(), file: file.into(), parameter: p.clone() };
+        parameters.iter().map(one).collect()
+    }
+
+    fn port(&self) -> String {
+        format!("{}.{}", self.instance, self.parameter.name)
+    }
+}
+
+/// Sets the values in their order, each judged by its FMU; before them the structural parameters of all files, those of an instance
+/// in one Configuration Mode.
 ///
 /// # Errors
 /// Names file and line: the variable does not exist, has another unit or type, or the FMU refuses the value.
-pub fn set(system: &mut System, instance: &str, file: &str, parameters: &[Parameter]) -> Result<()> {
-    let is_size = |p: &&Parameter| system.is_size(&format!("{instance}.{}", p.name)).unwrap_or(false);
-    let (sizes, others): (Vec<_>, Vec<_>) = parameters.iter().partition(is_size);
-    let named: Vec<_> = sizes.iter().map(|p| (format!("{instance}.{}", p.name), p.value.as_str())).collect();
-    system.configure(named.iter().map(|(name, value)| (name.as_str(), *value))).with_context(|| file.to_owned())?;
-    for p in others {
-        one(system, instance, p).with_context(|| format!("{file}: line {}", p.line))?;
+pub fn set(system: &mut System, given: &[Given]) -> Result<()> {
+    let (sizes, others): (Vec<_>, Vec<_>) =
+        given.iter().partition(|value| system.is_size(&value.port()).unwrap_or(false));
+    let ports: Vec<_> = sizes.iter().map(|size| (size.port(), size.parameter.value.as_str())).collect();
+    let mut files: Vec<_> = sizes.iter().map(|size| size.file.as_str()).collect();
+    files.dedup();
+    system.configure(ports.iter().map(|(port, value)| (port.as_str(), *value))).with_context(|| files.join(", "))?;
+    for Given { instance, file, parameter } in others {
+        one(system, instance, parameter).with_context(|| format!("{file}: line {}", parameter.line))?;
     }
     Ok(())
 }
@@ -37,6 +62,6 @@ fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<()> {
 }
 
 /// The variable of this name, or the array before its brackets, whose size may be one that was set.
-fn find<'a>(description: &'a ModelDescription, name: &str) -> Option<&'a ModelVariable> {
+pub(super) fn find<'a>(description: &'a ModelDescription, name: &str) -> Option<&'a ModelVariable> {
     description.variable(name).or_else(|| description.variable(name.rsplit_once('[')?.0))
 }

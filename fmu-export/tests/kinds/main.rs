@@ -6,7 +6,12 @@
     reason = "an importer calls C functions, rightly or not"
 )]
 
+#[path = "../counting/mod.rs"]
 mod counting;
+#[path = "../common/draw.rs"]
+#[allow(unreachable_pub, reason = "a module of several test programs")]
+mod draw;
+mod random;
 
 use fmi::*;
 use fmu_core::{Block, Bytes, Elapsed, Exported, Fault, Info, Items, Model, Row, Step, Table, enumeration, table};
