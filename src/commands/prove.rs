@@ -19,9 +19,10 @@ use std::process::Command;
 /// Writes examples for the FMI tools page: FMUs with inputs, options, reference results, and the importers that replay them.
 ///
 /// Each FMU gets a folder DIR/fmi2/NAME or DIR/fmi3/NAME with NAME.fmu, NAME_in.csv (where it is fed), NAME_ref.csv, NAME_ref.opt and
-/// Readme.txt. In the CSV files, an array is a column with spaces between its elements, and bytes are hexadecimal digits. The contents come from the reference files that `fmu build` writes into every archive. The command then runs the
-/// archive again from these files, in this program and, if the Python has it, in FMPy, and validates it with `fmu check`; Readme.txt
-/// lists versions and deviations. Exit status 1 if an importer deviates by more than 1e-9 of a column's largest value.
+/// Readme.txt. In the CSV files, an array is a column with spaces between its elements, and bytes are hexadecimal digits. The contents
+/// come from the reference files that `fmu build` writes into every archive. The command then runs the archive again from these files, in
+/// this program and, if the Python has it, in FMPy, and validates it with `fmu check`; Readme.txt lists versions and deviations. Exit
+/// status 1 if an importer deviates by more than 1e-9 of a column's largest value.
 ///
 /// All FMUs of the Cargo package or workspace around the current folder:
 ///   fmu prove examples-url
