@@ -20,22 +20,37 @@
 mod align;
 mod axes;
 mod bench;
+mod circle;
 mod curve;
 mod excitation;
 mod least_squares;
+mod levels;
+mod mechanics;
 mod offsets;
 mod output_error;
 mod probe;
 mod resistance;
 mod results;
 mod sequence;
+mod starting;
 mod swing;
+mod turning;
 
 pub use results::{Identified, Results};
 pub use sequence::{Commission, CommissionSetup, Voltage};
 
 use fmu_core::enumeration;
 use serde::{Deserialize, Serialize};
+
+enumeration! {
+    /// What is commissioned; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum Commissioning("Commissioning", "What is commissioned") {
+        1 Off "Nothing";
+        2 Standstill "Resistance and inductances at standstill, the rotor free or blocked";
+        3 Spin "Then flux linkage, inertia and friction of the turning machine, without a load";
+    }
+}
 
 enumeration! {
     /// What the commissioning does; values never change.
@@ -49,6 +64,8 @@ enumeration! {
         6 Swing "The rotor swings to another angle";
         7 Axes "Small triangles of current in four directions";
         8 Saturation "Large triangles of current along both axes";
+        9 Start "A rotating current takes the rotor along";
+        10 Levels "Levels of speed, and sweeps between them";
         11 Done "The results are shown";
         12 Refused "commission_fault has the reason; the gates are off";
     }
@@ -64,6 +81,9 @@ enumeration! {
         4 Resistance "The staircase gives no resistance";
         5 Inductance "The pulses or loops give no inductance";
         6 NotFollowing "The rotor turns at the start, or does not come to rest";
+        7 Lost "The observer has lost the turning rotor";
+        8 Flux "The levels of speed give no flux linkage";
+        9 Mechanics "The levels and sweeps do not fit inertia and friction";
         10 Time "commission.t_max is over";
         11 Aborted "commission_start or enable became false";
     }

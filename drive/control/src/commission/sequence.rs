@@ -1,16 +1,19 @@
 //! The sequence of the commissioning, one sample at a time.
 
-use super::align::{ALIGNED, Dc, Rest};
+use super::align::{ALIGNED, Dc, LONGEST, Rest};
 use super::axes::{Axes, Loops};
 use super::bench::{Bench, Sample};
 use super::curve::Curve;
 use super::excitation::{Excitation, Plan, Record};
+use super::levels::{Level, Levels, rho};
 use super::offsets::Offsets;
 use super::output_error::{Along, Magnetization, OutputError, Progress};
 use super::probe::{Probe, Probed};
 use super::resistance::{Staircase, adopt};
+use super::starting::{Started, Starting};
 use super::swing::Swing;
-use super::{CommissionFault as Fault, CommissionState, Results};
+use super::turning::Turning;
+use super::{CommissionFault as Fault, CommissionState, Commissioning, Results};
 use drive_base::frame::{AlphaBeta, Phases};
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +21,6 @@ use serde::{Deserialize, Serialize};
 const FIRST: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 /// Current over I at which the gates go off.
 const TOO_MUCH: f64 = 1.35;
-/// Longest time in s of an alignment or a swing.
-const LONGEST: f64 = 12.0;
 /// Amplitudes of the loops over I: axes, small and large.
 const SMALL: [f64; 2] = [0.3, 0.35];
 const LARGE: f64 = 0.9;
@@ -30,6 +31,10 @@ const SLOW: f64 = 0.005;
 /// What the commissioning is given.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CommissionSetup {
+    /// What is commissioned; with `Off`, nothing happens.
+    pub mode: Commissioning,
+    /// Number of pole pairs, > 0.
+    pub n_p: i32,
     /// Sample period in s, > 0.
     pub T_s: f64,
     /// Samples from taking the currents to the voltage acting: 0, 1 or 2.
@@ -67,6 +72,8 @@ enum Stage {
     Down,
     Loop,
     Fit,
+    Start,
+    Levels,
     Done,
     Refused,
 }
@@ -115,6 +122,9 @@ pub struct Commission {
     axes: Axes,
     fit: OutputError,
     large: [Option<Magnetization>; 2],
+    starting: Starting,
+    turning: Turning,
+    levels: Levels,
     results: Results,
 }
 
@@ -125,6 +135,7 @@ impl Commission {
             T: setup.T_s,
             delay: f64::from(setup.delay),
             I: setup.i,
+            n_p: f64::from(setup.n_p),
             curve: Curve::new(setup.i),
             ..Bench::default()
         };
@@ -153,6 +164,9 @@ impl Commission {
             axes: Axes::default(),
             fit: OutputError::default(),
             large: [None; 2],
+            starting: Starting::default(),
+            turning: Turning::default(),
+            levels: Levels::default(),
             results: Results::default(),
         }
     }
@@ -160,6 +174,7 @@ impl Commission {
     /// What it does now.
     pub fn state(&self) -> CommissionState {
         match self.stage {
+            _ if self.setup.mode == Commissioning::Off => CommissionState::Idle,
             Stage::Offsets => CommissionState::Offsets,
             Stage::Still | Stage::Probe => CommissionState::Probe,
             Stage::First | Stage::Return => CommissionState::Align,
@@ -169,6 +184,8 @@ impl Commission {
                 Excited::At0 | Excited::At45 | Excited::At90 | Excited::At135 => CommissionState::Axes,
                 Excited::LargeD | Excited::SmallD | Excited::LargeQ | Excited::SmallQ => CommissionState::Saturation,
             },
+            Stage::Start => CommissionState::Start,
+            Stage::Levels => CommissionState::Levels,
             Stage::Done => CommissionState::Done,
             Stage::Refused => CommissionState::Refused,
         }
@@ -184,6 +201,11 @@ impl Commission {
         &self.results
     }
 
+    /// Scratch.
+    pub fn debug(&self) -> String {
+        format!("w^ {:.3} psi {:.3} {} {:?}", self.turning.w / self.setup.speed, self.turning.motor.psi_M / self.bench.psi_r, self.starting.debug(), self.levels.debug())
+    }
+
     /// Time in s since the start.
     pub fn time(&self) -> f64 {
         self.samples * self.setup.T_s
@@ -197,7 +219,7 @@ impl Commission {
     }
 
     fn is_over(&self) -> bool {
-        matches!(self.stage, Stage::Done | Stage::Refused)
+        matches!(self.stage, Stage::Done | Stage::Refused) || self.setup.mode == Commissioning::Off
     }
 
     fn refuse(&mut self, fault: Fault) {
@@ -249,7 +271,8 @@ impl Commission {
             }
         };
         self.commands = [u, self.commands[0], self.commands[1]];
-        Voltage { u, gates: !matches!(self.stage, Stage::Offsets | Stage::Done | Stage::Refused) }
+        let coasts = self.stage == Stage::Start && self.starting.coasts();
+        Voltage { u, gates: !(coasts || matches!(self.stage, Stage::Offsets | Stage::Done | Stage::Refused)) }
     }
 
     /// The gates are off.
@@ -305,9 +328,23 @@ impl Commission {
             }
             Stage::Fit => match self.fit.update(&self.bench, &self.excitation, &self.record) {
                 Progress::Continues => {}
-                Progress::Failed => self.fitted(None),
-                Progress::Found(magnetization) => self.fitted(Some(magnetization)),
+                Progress::Failed => self.fitted(None)?,
+                Progress::Found(magnetization) => self.fitted(Some(magnetization))?,
             },
+            Stage::Start => match self.starting.update(&self.bench, &mut self.turning, sample)? {
+                Started::Voltage(u) => return Ok(u),
+                Started::Off => {}
+                Started::Done(i_f) => {
+                    self.levels = Levels::new(&self.bench, &self.turning, sample, i_f);
+                    self.enter(Stage::Levels);
+                }
+            },
+            Stage::Levels => {
+                match self.levels.update(&self.bench, &mut self.turning, sample, &mut self.results)? {
+                    Level::Voltage(u) => return Ok(u),
+                    Level::Done => self.enter(Stage::Done),
+                }
+            }
         }
         Ok(AlphaBeta::ZERO)
     }
@@ -407,8 +444,7 @@ impl Commission {
                     self.axes = self.loops.axes(self.bench.blocked).ok_or(Fault::Inductance)?;
                     self.results.axis = self.axes.axis;
                 }
-                self.next_loop();
-                return Ok(());
+                return self.next_loop();
             }
             Excited::LargeD | Excited::SmallD => (Along::D, self.axes.L_d),
             Excited::LargeQ | Excited::SmallQ => (Along::Q, self.axes.L_q),
@@ -418,13 +454,13 @@ impl Commission {
                 self.fit = fit;
                 self.enter(Stage::Fit);
             }
-            None => self.fitted(None),
+            None => self.fitted(None)?,
         }
         Ok(())
     }
 
     /// The fit of a loop is over.
-    fn fitted(&mut self, found: Option<Magnetization>) {
+    fn fitted(&mut self, found: Option<Magnetization>) -> Result<(), Fault> {
         let Axes { L_d, L_q, .. } = self.axes;
         match self.excited {
             Excited::LargeD => self.large[0] = found,
@@ -435,10 +471,10 @@ impl Commission {
             }
             Excited::At0 | Excited::At45 | Excited::At90 | Excited::At135 => {}
         }
-        self.next_loop();
+        self.next_loop()
     }
 
-    fn next_loop(&mut self) {
+    fn next_loop(&mut self) -> Result<(), Fault> {
         let slow = |L: f64| self.bench.R * self.bench.T / L > SLOW;
         let next = match self.excited {
             Excited::At0 => Excited::At45,
@@ -450,12 +486,27 @@ impl Commission {
             Excited::LargeQ if slow(self.axes.L_q) => Excited::SmallQ,
             Excited::LargeQ | Excited::SmallQ => {
                 self.results.show_inductances(&self.axes, self.large);
-                self.enter(Stage::Done);
-                return;
+                return self.stood();
             }
         };
         self.excited = next;
         self.dc.u = 0.0;
         self.enter(if self.bench.blocked { Stage::Down } else { Stage::Ready });
+        Ok(())
+    }
+
+    /// The part at standstill is complete.
+    fn stood(&mut self) -> Result<(), Fault> {
+        if self.setup.mode == Commissioning::Standstill {
+            self.enter(Stage::Done);
+            return Ok(());
+        }
+        if self.bench.blocked {
+            return Err(Fault::NotFollowing);
+        }
+        self.turning = Turning::new(&self.bench, [self.axes.L_d, self.axes.L_q], rho(&self.bench));
+        self.starting = Starting::default();
+        self.enter(Stage::Start);
+        Ok(())
     }
 }

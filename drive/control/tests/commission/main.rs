@@ -5,13 +5,21 @@ mod plant;
 
 use drive_base::frame::Phases;
 use drive_control::commission::{
-    Commission, CommissionFault as Fault, CommissionSetup, CommissionState as State, Identified, Results,
+    Commission, CommissionFault as Fault, CommissionSetup, CommissionState as State, Commissioning, Identified, Results,
 };
 use plant::{Bench, Motor, between_axes};
 use std::fmt::Write as _;
 
 fn setup(motor: &Motor) -> CommissionSetup {
-    CommissionSetup { T_s: motor.T, delay: 1, i: motor.I, speed: motor.w_rated, t_max: 150.0 }
+    CommissionSetup {
+        mode: Commissioning::Standstill,
+        n_p: motor.pole_pairs(),
+        T_s: motor.T,
+        delay: 1,
+        i: motor.I,
+        speed: motor.w_rated,
+        t_max: 150.0,
+    }
 }
 
 fn is_over(commission: &Commission) -> bool {
@@ -23,6 +31,54 @@ fn period(commission: &mut Commission, bench: &mut Bench, gain: f64, u_dc: f64) 
     let Phases { a, b, c } = bench.measure();
     let out = commission.update(Phases { a: gain * a, b: gain * b, c: gain * c }, u_dc);
     bench.tick(out.u, out.gates);
+}
+
+/// The quantities of the turning machine.
+fn spun(r: &Results, m: &Motor) -> [(&'static str, Identified, f64); 5] {
+    [
+        ("psi_M", r.psi_M, m.psi),
+        ("J", r.J, m.J),
+        ("B", r.B, m.B),
+        ("tau_coulomb", r.tau_coulomb, m.tau_coulomb),
+        ("tau_friction", r.tau_friction, m.friction(0.3 * m.w_rated / m.n_p)),
+    ]
+}
+
+#[test]
+#[ignore = "scratch"]
+fn scratch() {
+    let from: u64 = std::env::var("FROM").map_or(0, |n| n.parse().unwrap());
+    let to: u64 = std::env::var("TO").map_or(10, |n| n.parse().unwrap());
+    let seed: u64 = std::env::var("SEED").map_or(1, |n| n.parse().unwrap());
+    let trace = std::env::var("TRACE").is_ok();
+    for index in from..to {
+        let motor = Motor::draw(seed, index);
+        let mut s = setup(&motor);
+        s.mode = Commissioning::Spin;
+        let (mut c, mut bench) = (Commission::new(s), Bench::new(motor.clone(), seed * 31337 + index));
+        let (mut n, mut last, mut begun, mut spin_most) = (0u64, State::Idle, 0.0, 0.0f64);
+        let mut still_most = 0.0;
+        while !is_over(&c) {
+            period(&mut c, &mut bench, 1.0, motor.u_dc);
+            n += 1;
+            if c.state() != last {
+                last = c.state();
+                if last == State::Start { begun = c.time(); still_most = bench.most; bench.most = 0.0; }
+            }
+            if matches!(c.state(), State::Start | State::Levels) {
+                spin_most = spin_most.max(bench.most);
+                if trace && n % 100 == 0 {
+                    println!("{:.3} {:?} w {:.3} i {:.3} {}", c.time(), c.state(), bench.w * motor.n_p / motor.w_rated, bench.current() / motor.I, c.debug());
+                }
+            }
+        }
+        let x = motor.J * motor.w_rated / motor.n_p / (1.5 * motor.n_p * motor.psi * 0.5 * motor.I);
+        print!("{index:3} {:?} {:?} {:.1} {:.1} s, i {:.2} {:.2}, w_r {:.0} T_a {:.3} Lq/Ld {:.2}", c.state(), c.fault(), begun, c.time(), still_most / motor.I, spin_most / motor.I, motor.w_rated, x, motor.L_q / motor.L_d);
+        for (name, found, truth) in spun(c.results(), &motor) {
+            print!(", {name} {:+.3} ({:.3})", 100.0 * (found.value / truth - 1.0), 100.0 * found.u);
+        }
+        println!();
+    }
 }
 
 /// Runs to the end; `meddle` may change anything before each sample.

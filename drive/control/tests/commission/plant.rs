@@ -43,8 +43,8 @@ pub(crate) struct Motor {
     pub(crate) L_q: f64,
     pub(crate) psi: f64,
     pub(crate) J: f64,
-    B: f64,
-    tau_coulomb: f64,
+    pub(crate) B: f64,
+    pub(crate) tau_coulomb: f64,
     w_coulomb: f64,
     pub(crate) u_dc: f64,
     /// Twice the rated current.
@@ -130,6 +130,16 @@ impl Motor {
         self.cross = 2.0 * k_x / (self.L_q * x * x);
         self.q_0 = 1.0 / self.L_q - 0.5 * self.cross * self.psi * self.psi;
         self.i_0 = (self.d_0 + self.d_4 * self.psi.powi(4)) * self.psi;
+    }
+
+    /// Number of pole pairs.
+    pub(crate) fn pole_pairs(&self) -> i32 {
+        (1..1000).find(|&n| f64::from(n) >= self.n_p).unwrap()
+    }
+
+    /// Friction in N.m at the mechanical speed `w` (rad/s).
+    pub(crate) fn friction(&self, w: f64) -> f64 {
+        self.B * w + self.tau_coulomb * drive_base::math::tanh(w / self.w_coulomb)
     }
 
     /// The rotor is blocked.
@@ -272,7 +282,10 @@ impl Bench {
             }
         } else {
             // The current has ended, and the rotor coasts.
-            self.theta += if m.blocked { 0.0 } else { self.w * m.T };
+            self.w = if m.blocked { 0.0 } else { self.w * (-m.B / m.J * m.T).exp() };
+            let braked = m.tau_coulomb / m.J * m.T;
+            self.w -= self.w.clamp(-braked, braked);
+            self.theta += self.w * m.T;
             let (sin, cos) = (m.n_p * self.theta).sin_cos();
             self.psi = AlphaBeta::new(cos, sin) * m.psi;
         }
@@ -293,8 +306,15 @@ impl Bench {
         let tau = 1.5 * m.n_p * (own.alpha() * q - own.beta() * d);
         let (s_2, c_2) = (2.0 * sin * cos, cos * cos - sin * sin);
         let s_6 = s_2 * (4.0 * c_2 * c_2 - 1.0);
-        let friction = m.B * w + m.tau_coulomb * drive_base::math::tanh(w / m.w_coulomb) + m.cogging * s_6;
+        let friction = m.friction(w) + m.cogging * s_6;
         Rates { psi: dpsi, w: (tau - friction) / m.J, theta: w }
+    }
+
+    pub(crate) fn current(&self) -> f64 {
+        let (sin, cos) = drive_base::math::sin_cos(self.motor.n_p * self.theta);
+        let psi = Self::turned(self.psi, cos, -sin);
+        let [d, q] = self.motor.current(psi.alpha(), psi.beta());
+        (d * d + q * q).sqrt()
     }
 
     /// Electrical angle in rad.

@@ -1,0 +1,276 @@
+//! Levels of speed and the sweeps between them, cut into [parts](super::circle): psi_M, J and friction.
+//!
+//! ```text
+//! levels      0.15, 0.3, 0.45 w_r in the order 3 2 1 3 1 2 3 1 3
+//! sweep       constant i_q = i_f +- i_a, so that 0.15 w_r take T_b = max(0.06 s, 30 / w_r);
+//!             i_a at most 0.3 psi_M / L_q (beyond, an error of L_q turns the angle) and 0.6 I; i_f: friction
+//! level       speed PI of bandwidth b = min(rho / 6, 30 1/s); settles for max(0.3 s, 6 / b, 12 / w)
+//! measures    max(0.3 s, 4 turns, min(3.5 s, sqrt(300 T_a / w_r))), T_a = J w_r / (n_p K I / 2)
+//! rho         sqrt(0.3 w_r / (0.06 T_b)) of the PLL, 2 pi 15 at least, 0.08 / T at most
+//! ```
+//!
+//! J / (n_p K) of the speed control and of i_a follows the last sweep. psi_M is the mean radius at the highest level; at
+//! the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
+
+use super::bench::{Bench, Sample};
+use super::circle::{Part, Points};
+use super::mechanics::Mechanics;
+use super::results::Identified;
+use super::turning::Turning;
+use crate::commission::{Fault, Results};
+use drive_base::frame::{AlphaBeta, DqHat};
+use serde::{Deserialize, Serialize};
+
+/// Speed of a level over the rated one, times the levels in their order; and where the braking ends.
+const LEVEL: f64 = 0.15;
+const ORDER: [f64; 9] = [3.0, 2.0, 1.0, 3.0, 1.0, 2.0, 3.0, 1.0, 3.0];
+const BRAKED: f64 = 0.1;
+/// Currents over I: of a sweep, and of the speed control.
+const SWEEP: f64 = 0.6;
+const CONTROL: f64 = 0.8;
+/// Shortest part in turns, longest in s.
+const TURNS: f64 = 2.2;
+const LONGEST: f64 = 1.2;
+/// Greatest deviation of a part from a circle.
+const DEVIATION: f64 = 0.05;
+/// Time in s over which the d-axis current of the start ends.
+const FADE: f64 = 0.03;
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+enum Phase {
+    #[default]
+    Sweep,
+    Settle,
+    Measure,
+}
+
+/// Mean radius of a level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Radii {
+    sum: f64,
+    squares: f64,
+    parts: f64,
+}
+
+/// The levels on their way.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Levels {
+    phase: Phase,
+    /// Place in the order.
+    #[serde(with = "super::fixed_size")]
+    at: u64,
+    /// Samples of this phase and of the whole.
+    k: f64,
+    whole: f64,
+    /// J / (n_p K) in A.s2/rad.
+    inertia: f64,
+    /// Current of the friction in A, integral of the speed control in A.
+    i_f: f64,
+    integral: f64,
+    /// Current of the sweep in A, its start: speed in rad/s and sample.
+    i_a: f64,
+    from: [f64; 2],
+    /// Current along the d-axis at the start in A.
+    i_d: f64,
+    /// Sum of i_q in A over the level, and samples.
+    sums: [f64; 2],
+    points: Points,
+    mechanics: Mechanics,
+    radii: [Radii; 3],
+}
+
+/// What a sample of the levels gives.
+pub(super) enum Level {
+    /// The voltage of this sample in V.
+    Voltage(AlphaBeta),
+    /// The results are complete.
+    Done,
+}
+
+/// Time in s for a step of 0.15 w_r.
+fn T_b(bench: &Bench) -> f64 {
+    (30.0 / bench.w_r()).max(0.06)
+}
+
+/// Bandwidth of the PLL in rad/s.
+pub(super) fn rho(bench: &Bench) -> f64 {
+    (0.3 * bench.w_r() / (0.06 * T_b(bench))).sqrt().max(94.0).min(0.08 / bench.T)
+}
+
+impl Levels {
+    /// The start is over; the friction takes `i_f` (A).
+    pub(super) fn new(bench: &Bench, turning: &Turning, sample: &Sample, i_f: f64) -> Self {
+        let i_d = turning.current(sample).d();
+        let mut levels = Self { inertia: 0.4 * bench.I / (bench.w_0 * bench.w_0), i_f, i_d, ..Self::default() };
+        levels.sweep(bench, turning);
+        levels
+    }
+
+    pub(super) fn debug(&self) -> String {
+        format!("{:?} at {} m {:.3e} i_a {:.3} i_f {:.3}", self.phase, self.at, self.inertia, self.i_a, self.i_f)
+    }
+
+    fn target(&self, bench: &Bench) -> f64 {
+        let at = usize::try_from(self.at).unwrap_or(ORDER.len());
+        bench.w_r() * ORDER.get(at).map_or(BRAKED, |n| LEVEL * n)
+    }
+
+    fn enter(&mut self, phase: Phase) {
+        (self.phase, self.k) = (phase, 0.0);
+    }
+
+    fn sweep(&mut self, bench: &Bench, turning: &Turning) {
+        let most = (0.3 * turning.motor.psi_M / turning.motor.L_q).min(SWEEP * bench.I);
+        self.i_a = (self.inertia * LEVEL * bench.w_r() / T_b(bench)).min(most);
+        self.from = [turning.w, 0.0];
+        self.enter(Phase::Sweep);
+        self.points.begin();
+    }
+
+    /// One sample.
+    pub(super) fn update(
+        &mut self,
+        bench: &Bench,
+        turning: &mut Turning,
+        sample: &Sample,
+        results: &mut Results,
+    ) -> Result<Level, Fault> {
+        turning.observe(bench, sample);
+        self.k += 1.0;
+        self.whole += 1.0;
+        let (T, w, target) = (bench.T, turning.w, self.target(bench));
+        let t = self.k * T;
+        let i_q = match self.phase {
+            Phase::Sweep => {
+                let up = (target - self.from[0]).signum();
+                if (target - w) * up <= 0.0 {
+                    self.swept(bench, turning, t);
+                    if self.target(bench) == BRAKED * bench.w_r() {
+                        self.show(bench, turning, results)?;
+                        return Ok(Level::Done);
+                    }
+                    self.integral = self.i_f;
+                    self.enter(Phase::Settle);
+                } else if t > 4.0 * (target - self.from[0]).abs() * self.inertia / self.i_a + 1.0 {
+                    return Err(Fault::Lost);
+                } else if t > 0.01 {
+                    self.take(bench, turning, sample, LONGEST);
+                }
+                self.i_f + up * self.i_a
+            }
+            Phase::Settle => {
+                if t > (6.0 / self.bandwidth(turning)).max(12.0 / target).max(0.3) {
+                    if (w / target - 1.0).abs() > 0.1 {
+                        return Err(Fault::Lost);
+                    }
+                    self.sums = [0.0; 2];
+                    self.points.begin();
+                    self.enter(Phase::Measure);
+                }
+                self.speed(bench, turning, target)
+            }
+            Phase::Measure => {
+                let T_a = 2.0 * self.inertia * bench.w_r() / bench.I;
+                let turns = 4.0 * std::f64::consts::TAU / target;
+                let whole = (300.0 * T_a / bench.w_r()).sqrt().min(3.5).max(turns).max(0.3);
+                let parts = (whole / LONGEST.max(1.2 * TURNS / 4.0 * turns)).ceil();
+                self.take(bench, turning, sample, whole / parts);
+                let [sum, samples] = &mut self.sums;
+                (*sum, *samples) = (*sum + turning.current(sample).q(), *samples + 1.0);
+                if t >= whole {
+                    self.i_f = *sum / *samples;
+                    if (w / target - 1.0).abs() > 0.1 {
+                        return Err(Fault::Lost);
+                    }
+                    self.part(bench);
+                    self.follow(bench, turning);
+                    self.at += 1;
+                    self.sweep(bench, turning);
+                }
+                self.speed(bench, turning, target)
+            }
+        };
+        let i_d = self.i_d * (1.0 - self.whole * T / FADE).max(0.0);
+        Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(i_d, i_q))))
+    }
+
+    fn bandwidth(&self, turning: &Turning) -> f64 {
+        (turning.rho / 6.0).min(30.0)
+    }
+
+    /// Current of the speed control in A.
+    fn speed(&mut self, bench: &Bench, turning: &Turning, target: f64) -> f64 {
+        let b = self.bandwidth(turning);
+        let (e, most) = (target - turning.w, CONTROL * bench.I);
+        let asked = self.inertia * b * e + self.integral;
+        let i_q = drive_base::math::within(asked, most);
+        self.integral += self.inertia * b * b * 0.25 * bench.T * e + (i_q - asked);
+        i_q
+    }
+
+    /// A sample of a part that lasts `longest` (s) at most.
+    fn take(&mut self, bench: &Bench, turning: &Turning, sample: &Sample, longest: f64) {
+        self.points.take(turning.delta, sample.i, turning.theta);
+        if self.points.time(bench.T) >= longest {
+            self.part(bench);
+            self.points.begin();
+        }
+    }
+
+    /// A part ends.
+    fn part(&mut self, bench: &Bench) {
+        let Some(part) = self.points.end(bench.T) else { return };
+        if part.deviation > DEVIATION || part.turns < TURNS {
+            return;
+        }
+        let Part { acceleration, sigma, w, torque, radius, .. } = part;
+        let each = 1.0 / bench.n_p;
+        self.mechanics.add(acceleration * each, sigma * each, w * each, 1.5 * bench.n_p * torque);
+        if self.phase == Phase::Measure {
+            let level = ORDER[usize::try_from(self.at).unwrap_or(0).min(ORDER.len() - 1)];
+            let n = if level < 1.5 { 0 } else if level < 2.5 { 1 } else { 2 };
+            let r = &mut self.radii[n];
+            (r.sum, r.squares, r.parts) = (r.sum + radius, r.squares + radius * radius, r.parts + 1.0);
+        }
+    }
+
+    /// A sweep of `t` (s) ends: the inertia.
+    fn swept(&mut self, bench: &Bench, turning: &Turning, t: f64) {
+        self.part(bench);
+        let change = (turning.w - self.from[0]).abs();
+        let found = self.i_a * t / change.max(1e-9 * bench.w_r());
+        self.inertia = found.clamp(0.3 * self.inertia, 2.0 * self.inertia);
+    }
+
+    /// The observer's flux linkage follows that of the levels.
+    fn follow(&self, bench: &Bench, turning: &mut Turning) {
+        let best = self.radii.iter().rev().find(|r| r.parts > 0.0);
+        if let Some(r) = best {
+            turning.motor.psi_M = (r.sum / r.parts).clamp(0.25 * bench.psi_r, 1.15 * bench.psi_r);
+        }
+    }
+
+    /// The results.
+    fn show(&self, bench: &Bench, turning: &Turning, results: &mut Results) -> Result<(), Fault> {
+        let [low, _, high] = self.radii;
+        if low.parts < 1.0 || high.parts < 1.0 {
+            return Err(Fault::Flux);
+        }
+        let psi = high.sum / high.parts;
+        if !(psi > 0.25 * bench.psi_r && psi < 1.15 * bench.psi_r) {
+            return Err(Fault::Flux);
+        }
+        // Errors of the voltage go by 1/w: half of the difference between 0.15 and 0.45 w_r is the error at 0.45 w_r.
+        let error = 0.5 * (low.sum / low.parts / psi - 1.0);
+        let variance = (high.squares / high.parts - psi * psi).max(0.0) / (psi * psi);
+        let u = (error * error + 4.0 * variance / high.parts + 0.001 * 0.001).sqrt();
+        let K = 1.5 * bench.n_p * psi;
+        let w_f = 0.3 * bench.w_r() / bench.n_p;
+        let J = self.inertia * bench.n_p * K;
+        results.show_flux(Identified { value: psi, u });
+        let found = self.mechanics.solve(J, K * bench.I, w_f).ok_or(Fault::Mechanics)?;
+        results.show_mechanics(found);
+        let _ = turning;
+        Ok(())
+    }
+}
