@@ -64,12 +64,13 @@ pub(super) struct Levels {
     whole: f64,
     /// J / (n_p K) in A.s2/rad.
     inertia: f64,
-    /// Current of the friction in A, integral of the speed control in A.
-    i_f: f64,
+    /// Current of the friction at the last level in A, its slope in A.s/rad, and the speed of that level in rad/s.
+    friction: [f64; 3],
+    /// Integral of the speed control in A.
     integral: f64,
-    /// Current of the sweep in A, its start: speed in rad/s and sample.
+    /// Current of the sweep in A, and its first speed in rad/s.
     i_a: f64,
-    from: [f64; 2],
+    from: f64,
     /// Current along the d-axis at the start in A.
     i_d: f64,
     /// Sum of i_q in A over the level, and samples.
@@ -77,6 +78,7 @@ pub(super) struct Levels {
     points: Points,
     mechanics: Mechanics,
     radii: [Radii; 3],
+    last: Part,
 }
 
 /// What a sample of the levels gives.
@@ -92,6 +94,13 @@ fn T_b(bench: &Bench) -> f64 {
     (30.0 / bench.w_r()).max(0.06)
 }
 
+/// Duration in s of a part at the speed `w` (rad/s) in a stretch of `whole` (s): 40 turns or 1.2 s, whichever is less, but at
+/// least 2.5 turns and a tenth of the stretch.
+fn part(w: f64, whole: f64) -> f64 {
+    let turn = std::f64::consts::TAU / w;
+    LONGEST.min(40.0 * turn).max(2.5 * turn).max(0.1 * whole)
+}
+
 /// Bandwidth of the PLL in rad/s.
 pub(super) fn rho(bench: &Bench) -> f64 {
     (0.3 * bench.w_r() / (0.06 * T_b(bench))).sqrt().max(94.0).min(0.08 / bench.T)
@@ -100,14 +109,16 @@ pub(super) fn rho(bench: &Bench) -> f64 {
 impl Levels {
     /// The start is over; the friction takes `i_f` (A).
     pub(super) fn new(bench: &Bench, turning: &Turning, sample: &Sample, i_f: f64) -> Self {
+        // A heavy rotor still swings: its friction is at most a tenth of I.
+        let i_f = i_f.clamp(0.0, 0.1 * bench.I);
         let i_d = turning.current(sample).d();
-        let mut levels = Self { inertia: 0.4 * bench.I / (bench.w_0 * bench.w_0), i_f, i_d, ..Self::default() };
+        let mut levels = Self { inertia: 0.4 * bench.I / (bench.w_0 * bench.w_0), friction: [i_f, 0.0, 0.0], i_d, ..Self::default() };
         levels.sweep(bench, turning);
         levels
     }
 
     pub(super) fn debug(&self) -> String {
-        format!("{:?} at {} m {:.3e} i_a {:.3} i_f {:.3}", self.phase, self.at, self.inertia, self.i_a, self.i_f)
+        format!("{:?} at {} | m {:.3e} i_a {:.4} i_f {:.4} dev {:.4}", self.phase, self.at, self.inertia, self.i_a, self.friction[0], self.last.deviation)
     }
 
     fn target(&self, bench: &Bench) -> f64 {
@@ -119,10 +130,20 @@ impl Levels {
         (self.phase, self.k) = (phase, 0.0);
     }
 
+    /// Current of the friction in A at the speed `w` (rad/s).
+    fn i_f(&self, w: f64) -> f64 {
+        let [i, slope, at] = self.friction;
+        i + slope * (w - at)
+    }
+
+    /// Greatest current of a sweep in A.
+    fn most(&self, bench: &Bench, turning: &Turning) -> f64 {
+        (0.3 * turning.motor.psi_M / turning.motor.L_q).min(SWEEP * bench.I)
+    }
+
     fn sweep(&mut self, bench: &Bench, turning: &Turning) {
-        let most = (0.3 * turning.motor.psi_M / turning.motor.L_q).min(SWEEP * bench.I);
-        self.i_a = (self.inertia * LEVEL * bench.w_r() / T_b(bench)).min(most);
-        self.from = [turning.w, 0.0];
+        self.i_a = (self.inertia * LEVEL * bench.w_r() / T_b(bench)).min(self.most(bench, turning));
+        self.from = turning.w;
         self.enter(Phase::Sweep);
         self.points.begin();
     }
@@ -142,27 +163,39 @@ impl Levels {
         let t = self.k * T;
         let i_q = match self.phase {
             Phase::Sweep => {
-                let up = (target - self.from[0]).signum();
+                let up = (target - self.from).signum();
+                let longest = part(w, (target - self.from).abs() * self.inertia / self.i_a);
                 if (target - w) * up <= 0.0 {
                     self.swept(bench, turning, t);
                     if self.target(bench) == BRAKED * bench.w_r() {
                         self.show(bench, turning, results)?;
                         return Ok(Level::Done);
                     }
-                    self.integral = self.i_f;
+                    self.integral = self.i_f(w);
                     self.enter(Phase::Settle);
-                } else if t > 4.0 * (target - self.from[0]).abs() * self.inertia / self.i_a + 1.0 {
-                    return Err(Fault::Lost);
-                } else if t > 0.01 {
-                    self.take(bench, turning, sample, LONGEST);
-                }
-                self.i_f + up * self.i_a
-            }
-            Phase::Settle => {
-                if t > (6.0 / self.bandwidth(turning)).max(12.0 / target).max(0.3) {
-                    if (w / target - 1.0).abs() > 0.1 {
+                } else if t > 2.0 * (target - self.from).abs() * self.inertia / self.i_a + 0.3 {
+                    // Inertia or friction is greater than it seemed.
+                    let most = self.most(bench, turning);
+                    let stands = (w - self.from) * up < 0.01 * bench.w_r();
+                    if (stands && self.i_a >= most) || w < 0.5 * BRAKED * bench.w_r() {
                         return Err(Fault::Lost);
                     }
+                    self.i_a = (2.0 * self.i_a).min(most);
+                    self.inertia *= if stands { 1.0 } else { 2.0 };
+                    (self.from, self.k) = (w, 0.0);
+                    self.points.begin();
+                } else if t > 0.01 {
+                    self.take(bench, turning, sample, longest);
+                }
+                self.i_f(w) + up * self.i_a
+            }
+            Phase::Settle => {
+                let wait = (6.0 / self.bandwidth(bench, turning)).max(12.0 / target).max(0.3);
+                let off = (w / target - 1.0).abs();
+                if t > 3.0 * wait && off > 0.1 {
+                    return Err(Fault::Lost);
+                }
+                if t > wait && off < 0.03 {
                     self.sums = [0.0; 2];
                     self.points.begin();
                     self.enter(Phase::Measure);
@@ -173,12 +206,13 @@ impl Levels {
                 let T_a = 2.0 * self.inertia * bench.w_r() / bench.I;
                 let turns = 4.0 * std::f64::consts::TAU / target;
                 let whole = (300.0 * T_a / bench.w_r()).sqrt().min(3.5).max(turns).max(0.3);
-                let parts = (whole / LONGEST.max(1.2 * TURNS / 4.0 * turns)).ceil();
-                self.take(bench, turning, sample, whole / parts);
+                self.take(bench, turning, sample, whole / (whole / part(target, whole)).floor().max(1.0));
                 let [sum, samples] = &mut self.sums;
                 (*sum, *samples) = (*sum + turning.current(sample).q(), *samples + 1.0);
                 if t >= whole {
-                    self.i_f = *sum / *samples;
+                    let (i, [last, slope, w_last]) = (*sum / *samples, self.friction);
+                    let slope = if w_last > 0.0 { ((i - last) / (target - w_last)).max(0.0) } else { slope };
+                    self.friction = [i, slope, target];
                     if (w / target - 1.0).abs() > 0.1 {
                         return Err(Fault::Lost);
                     }
@@ -194,13 +228,14 @@ impl Levels {
         Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(i_d, i_q))))
     }
 
-    fn bandwidth(&self, turning: &Turning) -> f64 {
-        (turning.rho / 6.0).min(30.0)
+    /// Bandwidth of the speed control in rad/s: noise of w makes little current.
+    fn bandwidth(&self, bench: &Bench, turning: &Turning) -> f64 {
+        (turning.rho / 6.0).min(30.0).min(20.0 * bench.I / (self.inertia * bench.w_r()))
     }
 
     /// Current of the speed control in A.
     fn speed(&mut self, bench: &Bench, turning: &Turning, target: f64) -> f64 {
-        let b = self.bandwidth(turning);
+        let b = self.bandwidth(bench, turning);
         let (e, most) = (target - turning.w, CONTROL * bench.I);
         let asked = self.inertia * b * e + self.integral;
         let i_q = drive_base::math::within(asked, most);
@@ -220,6 +255,7 @@ impl Levels {
     /// A part ends.
     fn part(&mut self, bench: &Bench) {
         let Some(part) = self.points.end(bench.T) else { return };
+        self.last = part;
         if part.deviation > DEVIATION || part.turns < TURNS {
             return;
         }
@@ -237,7 +273,7 @@ impl Levels {
     /// A sweep of `t` (s) ends: the inertia.
     fn swept(&mut self, bench: &Bench, turning: &Turning, t: f64) {
         self.part(bench);
-        let change = (turning.w - self.from[0]).abs();
+        let change = (turning.w - self.from).abs();
         let found = self.i_a * t / change.max(1e-9 * bench.w_r());
         self.inertia = found.clamp(0.3 * self.inertia, 2.0 * self.inertia);
     }

@@ -14,7 +14,7 @@ use super::results::Identified;
 use serde::{Deserialize, Serialize};
 
 /// Parts that are kept.
-const PARTS: usize = 128;
+const PARTS: usize = 192;
 /// Fewest parts, and greatest share of those left out.
 const FEWEST: f64 = 8.0;
 const LEFT_OUT: f64 = 0.2;

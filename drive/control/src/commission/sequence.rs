@@ -202,8 +202,14 @@ impl Commission {
     }
 
     /// Scratch.
+    pub fn angle(&self) -> f64 {
+        self.turning.theta
+    }
+
+    /// Scratch.
     pub fn debug(&self) -> String {
-        format!("w^ {:.3} psi {:.3} {} {:?}", self.turning.w / self.setup.speed, self.turning.motor.psi_M / self.bench.psi_r, self.starting.debug(), self.levels.debug())
+        let x = if self.stage == Stage::Levels { self.levels.debug() } else { self.starting.debug() };
+        format!("{x} psi^ {:.3} w^ {:.3} psi_0 {:.4}", self.turning.motor.psi_M / self.bench.psi_r, self.turning.w / self.setup.speed, self.bench.psi_0 / self.bench.psi_r)
     }
 
     /// Time in s since the start.

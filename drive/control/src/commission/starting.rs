@@ -8,7 +8,7 @@
 //! psi_M   = |e| / w - (L_d - L_q) i_d, above 0.3 w_h, within 0.25 and 1.15 psi_r
 //! ```
 //!
-//! The rotor follows if mean |e| / w_h is within 0.3 and 1.3 psi_r and the observer turns at w_h, over the second half of
+//! The rotor follows if the mean of |e| / w - (L_d - L_q) i_d is within 0.3 and 1.3 psi_r and the observer turns at w_h, over the second half of
 //! the hold. If not, the gates go off and the rotor coasts. Zero voltage would short-circuit a turning machine: a pulse of
 //! it, as long as the delay, shows by its current whether the rotor still turns. Then it is aligned again, three times at
 //! most. Derived here, except for the damping of [`start`](crate::start).
@@ -54,7 +54,11 @@ pub(super) struct Starting {
     theta: f64,
     w: f64,
     e: DqHat,
-    /// Sums over the second half of the hold: |e|, the observer's speed, the current across the rotor, samples.
+    /// Means of the active flux in Wb, and of the current along it in A.
+    eta: f64,
+    i_d: f64,
+    /// Sums over the second half of the hold: psi_M in Wb, the observer's speed, the current i_q that gives the
+    /// same torque at i_d = 0 in A, samples.
     sums: [f64; 4],
 }
 
@@ -89,6 +93,8 @@ impl Starting {
                     turning.begin(bench, sample, 0.0);
                     turning.motor.psi_M = bench.psi_0;
                     (self.theta, self.w, self.e, self.sums) = (0.0, 0.0, DqHat::ZERO, [0.0; 4]);
+                    self.i_d = ALIGNED * bench.I;
+                    self.eta = bench.psi_0 + (turning.motor.L_d - turning.motor.L_q) * self.i_d;
                     self.enter(Phase::Ramp);
                 } else if t > LONGEST {
                     return Err(Fault::NotFollowing);
@@ -138,11 +144,15 @@ impl Starting {
         self.e += (e - self.e) * (1.0 - drive_base::math::exp(-rate * T));
         let i = Axis::<Estimated>::at(self.theta).from_stator(sample.i);
         let size = self.e.magnitude();
+        let saliency = turning.motor.L_d - turning.motor.L_q;
+        let i_d = (i.d() * self.e.q() - i.q() * self.e.d()) / size.max(1e-12);
+        // Over the swings of the rotor on its current.
+        let slow = T / (3.0 / w_0).max(0.05);
+        self.i_d += slow * (i_d - self.i_d);
         if self.w > 0.3 * w_h {
-            let i_d = (i.d() * self.e.q() - i.q() * self.e.d()) / size.max(1e-12);
-            let psi = size / self.w - (turning.motor.L_d - turning.motor.L_q) * i_d;
-            let psi = psi.clamp(0.25 * bench.psi_r, 1.15 * bench.psi_r);
-            turning.motor.psi_M += T / 0.05 * (psi - turning.motor.psi_M);
+            self.eta += slow * (size / self.w - self.eta);
+            let psi = self.eta - saliency * self.i_d;
+            turning.motor.psi_M = psi.clamp(0.25 * bench.psi_r, 1.15 * bench.psi_r);
         }
         let t = self.k * T;
         if self.phase == Phase::Ramp {
@@ -153,15 +163,15 @@ impl Starting {
         } else {
             let hold = (10.0 / bench.w_0).max(0.5).max(12.0 / w_h);
             if t > 0.5 * hold {
-                let across = turning.current(sample).q();
-                for (sum, x) in self.sums.iter_mut().zip([size, turning.w, across, 1.0]) {
+                let i = turning.current(sample);
+                let across = (1.0 + saliency * i.d() / turning.motor.psi_M) * i.q();
+                for (sum, x) in self.sums.iter_mut().zip([self.eta - saliency * self.i_d, turning.w, across, 1.0]) {
                     *sum += x;
                 }
             }
             if t > hold {
-                let [e, w, i_q, _] = self.sums.map(|sum| sum / self.sums[3]);
-                let eta = e / w_h;
-                if eta > 0.3 * bench.psi_r && eta < 1.3 * bench.psi_r && (w / w_h - 1.0).abs() < 0.1 {
+                let [psi, w, i_q, _] = self.sums.map(|sum| sum / self.sums[3]);
+                if psi > 0.3 * bench.psi_r && psi < 1.3 * bench.psi_r && (w / w_h - 1.0).abs() < 0.1 {
                     turning.hand_over();
                     return Ok(Started::Done(i_q));
                 }
@@ -175,7 +185,7 @@ impl Starting {
             }
         }
         let grown = if self.phase == Phase::Ramp { ALIGNED * I + (I_f - ALIGNED * I) * (t / 0.1).min(1.0) } else { I_f };
-        let slip = self.e.q() / turning.motor.psi_M - self.w;
+        let slip = self.e.q() / self.eta.max(0.1 * bench.psi_r) - self.w;
         let i_q = damping(w_0, inertia, 1.0, slip, I_f);
         Ok(Started::Voltage(turning.in_any_frame(bench, sample, (self.theta, self.w), DqHat::new(grown, i_q))))
     }
@@ -185,7 +195,7 @@ impl Starting {
     }
 
     pub(super) fn debug(&self) -> String {
-        format!("{:?} {} w_f {:.1} e {:?} sums {:?}", self.phase, self.tries, self.w, self.e, self.sums)
+        let s = self.sums; format!("{:?} {} | w_f {:.1} psi {:.5} w {:.1} i_q {:.4}", self.phase, self.tries, self.w, s[0]/s[3], s[1]/s[3], s[2]/s[3])
     }
 
     /// The gates are off.

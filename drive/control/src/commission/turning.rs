@@ -21,7 +21,7 @@ use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
 /// Rate of the observer over the rated speed, and the least one in 1/s.
-const RATE: (f64, f64) = (0.075, 10.0);
+const RATE: (f64, f64) = (0.7, 10.0);
 
 /// A turning machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,7 +57,7 @@ impl Turning {
     }
 
     fn parameters(&self, bench: &Bench) -> EstimatorParameters {
-        let bandwidth = (RATE.0 * bench.w_r()).max(RATE.1);
+        let bandwidth = (RATE.0 * self.w.abs()).max(RATE.1);
         EstimatorParameters {
             gradient: GradientParameters { bandwidth, clamped: false },
             tracker: TrackerParameters { kind: TrackerKind::Pll, bandwidth: self.rho },

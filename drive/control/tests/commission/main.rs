@@ -58,6 +58,8 @@ fn scratch() {
         let (mut c, mut bench) = (Commission::new(s), Bench::new(motor.clone(), seed * 31337 + index));
         let (mut n, mut last, mut begun, mut spin_most) = (0u64, State::Idle, 0.0, 0.0f64);
         let mut still_most = 0.0;
+        let mut seen = String::new();
+        let every: u64 = std::env::var("EVERY").map_or(1 << 40, |n| n.parse().unwrap());
         while !is_over(&c) {
             period(&mut c, &mut bench, 1.0, motor.u_dc);
             n += 1;
@@ -67,13 +69,18 @@ fn scratch() {
             }
             if matches!(c.state(), State::Start | State::Levels) {
                 spin_most = spin_most.max(bench.most);
-                if trace && n % 100 == 0 {
-                    println!("{:.3} {:?} w {:.3} i {:.3} {}", c.time(), c.state(), bench.w * motor.n_p / motor.w_rated, bench.current() / motor.I, c.debug());
+                if trace {
+                    let text = c.debug();
+                    let key = text.split('|').next().unwrap().to_string();
+                    if key != seen || (n % every == 0) {
+                        println!("{:.3} {:?} w {:.3} i {:.4} {:.4} off {:.4} {}", c.time(), c.state(), bench.w * motor.n_p / motor.w_rated, bench.dq()[0] / motor.I, bench.dq()[1] / motor.I, drive_base::math::wrap(c.angle() - bench.angle()), if every < 10 { "" } else { &text });
+                        seen = key;
+                    }
                 }
             }
         }
         let x = motor.J * motor.w_rated / motor.n_p / (1.5 * motor.n_p * motor.psi * 0.5 * motor.I);
-        print!("{index:3} {:?} {:?} {:.1} {:.1} s, i {:.2} {:.2}, w_r {:.0} T_a {:.3} Lq/Ld {:.2}", c.state(), c.fault(), begun, c.time(), still_most / motor.I, spin_most / motor.I, motor.w_rated, x, motor.L_q / motor.L_d);
+        print!("{index:3} {:?} {:?} {:.1} {:.1} s, i {:.2} {:.2}, w_r {:.0} T_a {:.3} Lq/Ld {:.2} psi {:.3}", c.state(), c.fault(), begun, c.time(), still_most / motor.I, spin_most / motor.I, motor.w_rated, x, motor.L_q / motor.L_d, motor.psi * motor.w_rated / motor.u_dc * 1.732);
         for (name, found, truth) in spun(c.results(), &motor) {
             print!(", {name} {:+.3} ({:.3})", 100.0 * (found.value / truth - 1.0), 100.0 * found.u);
         }

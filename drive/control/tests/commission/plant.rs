@@ -310,11 +310,10 @@ impl Bench {
         Rates { psi: dpsi, w: (tau - friction) / m.J, theta: w }
     }
 
-    pub(crate) fn current(&self) -> f64 {
+    pub(crate) fn dq(&self) -> [f64; 2] {
         let (sin, cos) = drive_base::math::sin_cos(self.motor.n_p * self.theta);
         let psi = Self::turned(self.psi, cos, -sin);
-        let [d, q] = self.motor.current(psi.alpha(), psi.beta());
-        (d * d + q * q).sqrt()
+        self.motor.current(psi.alpha(), psi.beta())
     }
 
     /// Electrical angle in rad.
