@@ -118,8 +118,19 @@ impl Between {
     /// Voltage in V that the resistance `R` (Ohm) and the legs take on the average between the currents `from` and `to` (A).
     pub(super) fn lost(&self, R: f64, curve: &Curve, from: AlphaBeta, to: AlphaBeta) -> AlphaBeta {
         let step = to - from;
-        let legs = self.at.iter().fold(AlphaBeta::ZERO, |sum, &s| sum + curve.loss(from + step * s));
-        (from + step * self.mean) * R + legs * 0.125
+        (from + step * self.mean) * R + self.legs(curve, from, to, AlphaBeta::ZERO)
+    }
+
+    /// Voltage in V that the legs take, where the current is off the way from `from` to `to` (A) by a parabola of the height
+    /// `bow` (A).
+    pub(super) fn legs(&self, curve: &Curve, from: AlphaBeta, to: AlphaBeta, bow: AlphaBeta) -> AlphaBeta {
+        let (step, mut middle) = (to - from, 0.0625);
+        let each = self.at.iter().fold(AlphaBeta::ZERO, |sum, &s| {
+            let off = bow * (4.0 * middle * (1.0 - middle));
+            middle += 0.125;
+            sum + curve.loss(from + step * s + off)
+        });
+        each * 0.125
     }
 }
 

@@ -118,7 +118,35 @@ impl Levels {
     }
 
     pub(super) fn debug(&self) -> String {
-        format!("{:?} at {} | m {:.3e} i_a {:.4} i_f {:.4} dev {:.4}", self.phase, self.at, self.inertia, self.i_a, self.friction[0], self.last.deviation)
+        format!("{:?} at {} | m {:.3e} i_a {:.4} i_f {:.4} dev {:.4} sig {:.4} radii {:?}", self.phase, self.at, self.inertia, self.i_a, self.friction[0], self.last.deviation, self.last.sigma, self.radii.map(|r| r.sum / r.parts))
+    }
+
+    /// The levels are over: the control brakes.
+    fn brakes(&self) -> bool {
+        usize::try_from(self.at).is_ok_and(|at| at >= ORDER.len())
+    }
+
+    /// Time in s for the next level and the braking; 0 before each level has been measured.
+    fn needed(&self, bench: &Bench, turning: &Turning) -> f64 {
+        if self.radii.iter().any(|r| r.parts < 1.0) {
+            return 0.0;
+        }
+        let target = self.target(bench);
+        let way = (target - turning.w).abs() + target - BRAKED * bench.w_r();
+        let sweeps = way * self.inertia / self.most(bench, turning).min(self.inertia * LEVEL * bench.w_r() / T_b(bench));
+        1.3 * sweeps + 3.0 * self.wait(bench, turning, target) + self.measured(bench, target)
+    }
+
+    /// Time in s in which the speed control settles at `target` (rad/s).
+    fn wait(&self, bench: &Bench, turning: &Turning, target: f64) -> f64 {
+        (6.0 / self.bandwidth(bench, turning)).max(12.0 / target).max(0.3)
+    }
+
+    /// Time in s of the measurement at `target` (rad/s).
+    fn measured(&self, bench: &Bench, target: f64) -> f64 {
+        let T_a = 2.0 * self.inertia * bench.w_r() / bench.I;
+        let turns = 4.0 * std::f64::consts::TAU / target;
+        (300.0 * T_a / bench.w_r()).sqrt().min(3.5).max(turns).max(0.3)
     }
 
     fn target(&self, bench: &Bench) -> f64 {
@@ -148,12 +176,13 @@ impl Levels {
         self.points.begin();
     }
 
-    /// One sample.
+    /// One sample, `left` (s) before the end of the time.
     pub(super) fn update(
         &mut self,
         bench: &Bench,
         turning: &mut Turning,
         sample: &Sample,
+        left: f64,
         results: &mut Results,
     ) -> Result<Level, Fault> {
         turning.observe(bench, sample);
@@ -167,8 +196,7 @@ impl Levels {
                 let longest = part(w, (target - self.from).abs() * self.inertia / self.i_a);
                 if (target - w) * up <= 0.0 {
                     self.swept(bench, turning, t);
-                    if self.target(bench) == BRAKED * bench.w_r() {
-                        self.show(bench, turning, results)?;
+                    if self.brakes() {
                         return Ok(Level::Done);
                     }
                     self.integral = self.i_f(w);
@@ -177,6 +205,9 @@ impl Levels {
                     // Inertia or friction is greater than it seemed.
                     let most = self.most(bench, turning);
                     let stands = (w - self.from) * up < 0.01 * bench.w_r();
+                    if self.brakes() {
+                        return Ok(Level::Done);
+                    }
                     if (stands && self.i_a >= most) || w < 0.5 * BRAKED * bench.w_r() {
                         return Err(Fault::Lost);
                     }
@@ -190,7 +221,7 @@ impl Levels {
                 self.i_f(w) + up * self.i_a
             }
             Phase::Settle => {
-                let wait = (6.0 / self.bandwidth(bench, turning)).max(12.0 / target).max(0.3);
+                let wait = self.wait(bench, turning, target);
                 let off = (w / target - 1.0).abs();
                 if t > 3.0 * wait && off > 0.1 {
                     return Err(Fault::Lost);
@@ -203,9 +234,7 @@ impl Levels {
                 self.speed(bench, turning, target)
             }
             Phase::Measure => {
-                let T_a = 2.0 * self.inertia * bench.w_r() / bench.I;
-                let turns = 4.0 * std::f64::consts::TAU / target;
-                let whole = (300.0 * T_a / bench.w_r()).sqrt().min(3.5).max(turns).max(0.3);
+                let whole = self.measured(bench, target);
                 self.take(bench, turning, sample, whole / (whole / part(target, whole)).floor().max(1.0));
                 let [sum, samples] = &mut self.sums;
                 (*sum, *samples) = (*sum + turning.current(sample).q(), *samples + 1.0);
@@ -219,6 +248,12 @@ impl Levels {
                     self.part(bench);
                     self.follow(bench, turning);
                     self.at += 1;
+                    if !self.brakes() && left < self.needed(bench, turning) {
+                        self.at = ORDER.iter().fold(0, |n, _| n + 1);
+                    }
+                    if self.brakes() {
+                        self.show(bench, results)?;
+                    }
                     self.sweep(bench, turning);
                 }
                 self.speed(bench, turning, target)
@@ -287,7 +322,7 @@ impl Levels {
     }
 
     /// The results.
-    fn show(&self, bench: &Bench, turning: &Turning, results: &mut Results) -> Result<(), Fault> {
+    fn show(&self, bench: &Bench, results: &mut Results) -> Result<(), Fault> {
         let [low, _, high] = self.radii;
         if low.parts < 1.0 || high.parts < 1.0 {
             return Err(Fault::Flux);
@@ -306,7 +341,6 @@ impl Levels {
         results.show_flux(Identified { value: psi, u });
         let found = self.mechanics.solve(J, K * bench.I, w_f).ok_or(Fault::Mechanics)?;
         results.show_mechanics(found);
-        let _ = turning;
         Ok(())
     }
 }

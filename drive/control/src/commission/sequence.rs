@@ -202,6 +202,11 @@ impl Commission {
     }
 
     /// Scratch.
+    pub fn scratch(&self) -> [f64; 4] {
+        [self.axes.L_d, self.axes.L_q, self.axes.axis, self.bench.R]
+    }
+
+    /// Scratch.
     pub fn angle(&self) -> f64 {
         self.turning.theta
     }
@@ -346,7 +351,8 @@ impl Commission {
                 }
             },
             Stage::Levels => {
-                match self.levels.update(&self.bench, &mut self.turning, sample, &mut self.results)? {
+                let left = self.setup.t_max - self.time();
+                match self.levels.update(&self.bench, &mut self.turning, sample, left, &mut self.results)? {
                     Level::Voltage(u) => return Ok(u),
                     Level::Done => self.enter(Stage::Done),
                 }

@@ -1,7 +1,7 @@
 //! I-f start of the identified machine: a rotating current takes the aligned rotor to w_h, where its EMF shows it.
 //!
 //! ```text
-//! I_f     = 0.6 I, at most 0.5 psi_0 / (L_q - L_d)                  the active flux keeps its sign
+//! I_f     = 0.6 I, at most 0.3 psi_0 / (L_q - L_d)                  the active flux keeps its sign
 //! w_h     = 0.12 w_r;  a = min(0.2 w_0^2 I_f / (0.4 I), 4 w_h / s), at least w_h / 45 s; a / 5 at each new try
 //! e       = delta / T in the frame of the current, low-passed       j w eta
 //! i_q     = damping of the drive's start with w_0^2 I_f / (0.4 I), J / (n_p K) = 0.4 I / w_0^2
@@ -132,7 +132,7 @@ impl Starting {
         turning.observe(bench, sample);
         self.theta += T * self.w;
         let salient = (turning.motor.L_q - turning.motor.L_d).max(1e-3 * turning.motor.L_d);
-        let I_f = (CURRENT * I).min(0.5 * bench.psi_0 / salient);
+        let I_f = (CURRENT * I).min(0.3 * bench.psi_0 / salient);
         let inertia = ALIGNED * I / (bench.w_0 * bench.w_0);
         let w_0 = (I_f / inertia).sqrt();
         let fastest = (0.2 * I_f / inertia).min(4.0 * w_h);
@@ -147,7 +147,7 @@ impl Starting {
         let saliency = turning.motor.L_d - turning.motor.L_q;
         let i_d = (i.d() * self.e.q() - i.q() * self.e.d()) / size.max(1e-12);
         // Over the swings of the rotor on its current.
-        let slow = T / (3.0 / w_0).max(0.05);
+        let slow = T / (10.0 / w_0).max(0.05);
         self.i_d += slow * (i_d - self.i_d);
         if self.w > 0.3 * w_h {
             self.eta += slow * (size / self.w - self.eta);
@@ -186,7 +186,7 @@ impl Starting {
         }
         let grown = if self.phase == Phase::Ramp { ALIGNED * I + (I_f - ALIGNED * I) * (t / 0.1).min(1.0) } else { I_f };
         let slip = self.e.q() / self.eta.max(0.1 * bench.psi_r) - self.w;
-        let i_q = damping(w_0, inertia, 1.0, slip, I_f);
+        let i_q = damping(w_0, inertia, 1.0, slip, 0.5 * I_f);
         Ok(Started::Voltage(turning.in_any_frame(bench, sample, (self.theta, self.w), DqHat::new(grown, i_q))))
     }
 

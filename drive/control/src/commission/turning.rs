@@ -23,6 +23,9 @@ use serde::{Deserialize, Serialize};
 /// Rate of the observer over the rated speed, and the least one in 1/s.
 const RATE: (f64, f64) = (0.7, 10.0);
 
+/// Share of a sample in the mean current.
+const SMOOTH: f64 = 0.2;
+
 /// A turning machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Turning {
@@ -36,6 +39,8 @@ pub(super) struct Turning {
     /// Electrical angle in rad, not wrapped, and speed in rad/s.
     pub(super) theta: f64,
     pub(super) w: f64,
+    /// Mean current in the rotor's frame in A.
+    smooth: DqHat,
     /// Step of the active flux at this sample in Wb.
     pub(super) delta: AlphaBeta,
 }
@@ -54,6 +59,7 @@ impl Turning {
         let observed = Observed { i: sample.i, i_last: sample.i_last, ..Observed::default() };
         self.observer = GradientObserver::start(&context, &observed, theta, 0.0).0;
         (self.theta, self.w, self.controller) = (theta, 0.0, CurrentController::default());
+        self.smooth = self.current(sample);
     }
 
     fn parameters(&self, bench: &Bench) -> EstimatorParameters {
@@ -67,10 +73,15 @@ impl Turning {
 
     /// One sample: angle, speed and the step of the active flux.
     pub(super) fn observe(&mut self, bench: &Bench, sample: &Sample) {
-        let lost = self.between.lost(bench.R, &bench.curve, sample.i_last, sample.i);
-        self.delta = (sample.u - lost) * bench.T - (sample.i - sample.i_last) * self.motor.L_q;
         let resistive = (sample.i_last + sample.i) * (0.5 * bench.R);
-        let u = sample.u - lost + resistive;
+        let ahead = self.theta + bench.T * self.w;
+        let [last, now] = [self.theta, ahead].map(|theta| Axis::<Estimated>::at(theta));
+        self.smooth += (now.from_stator(sample.i) - self.smooth) * SMOOTH;
+        let turn = bench.T * self.w;
+        let bow = last.along(-turn * turn * self.motor.psi_M / (8.0 * self.motor.L_d));
+        let legs = self.between.legs(&bench.curve, last.to_stator(self.smooth), now.to_stator(self.smooth), bow);
+        let u = sample.u - legs;
+        self.delta = (u - resistive) * bench.T - (sample.i - sample.i_last) * self.motor.L_q;
         let observed = Observed { i: sample.i, i_last: sample.i_last, u, ..Observed::default() };
         let par = self.parameters(bench);
         let context = Context { par: &par, motor: &self.motor, J: 0.0, T_s: bench.T };
