@@ -132,7 +132,7 @@ impl Staircase {
         if found.x[2] < 0.0 || found.x[1] <= 0.0 { solve(0.0) } else { Some(found) }
     }
 
-    /// f(i) = u - R i in V at the current `i` (A), with this `R` (Ohm): linear in ln i between the points.
+    /// f(i) = u - R i in V at the current `i` (A), with this `R` (Ohm): cubic in ln i between the points.
     fn lost(&self, R: f64, i: f64) -> f64 {
         let f = |n: usize| self.points[n][0] - R * self.points[n][1];
         let last = STEPS - 1;
@@ -145,8 +145,20 @@ impl Staircase {
         if n == 0 {
             return f(0);
         }
-        let (below, above) = (self.points[n][1], self.points[n - 1][1]);
-        f(n) + (f(n - 1) - f(n)) * ln(i / below) / ln(above / below)
+        let x = |n: usize| ln(self.points[n][1] / i);
+        let (below, above) = (x(n), x(n - 1));
+        let (h, chord) = (above - below, (f(n - 1) - f(n)) / (above - below));
+        // Slopes at both ends are those of parabolas through three points.
+        let slope = |beyond: usize, end: f64| {
+            let (x, f_end) = (x(beyond), if end == below { f(n) } else { f(n - 1) });
+            let outer = (f(beyond) - f_end) / (x - end);
+            (outer * h + chord * (x - end).abs()) / (h + (x - end).abs())
+        };
+        let lower = if n < last { slope(n + 1, below) } else { chord };
+        let upper = if n > 1 { slope(n - 2, above) } else { chord };
+        let s = -below / h;
+        let hermite = s * (1.0 - s) * ((lower - chord) * (1.0 - s) - (upper - chord) * s);
+        f(n) + h * (chord * s + hermite)
     }
 
     /// Whether the points are in order, so that a curve goes through them.
@@ -172,13 +184,30 @@ pub(super) fn adopt(bench: &mut Bench, staircases: &[Staircase]) -> Result<(), F
     if !staircases.iter().all(Staircase::is_ordered) {
         return Err(Fault::Resistance);
     }
-    let (R, mut curve) = (bench.R, Curve::new(1.024 * bench.I));
+    let R = bench.R;
+    let f = |i: f64| staircases.iter().map(|s| s.lost(R, i)).sum::<f64>() * each;
+    let (mut up, mut down) = (Curve::new(1.024 * bench.I), Curve::new(1.024 * bench.I));
     for n in 0..POINTS {
-        let i = curve.current(n);
-        let f = |i: f64| staircases.iter().map(|s| s.lost(R, i)).sum::<f64>() * each;
+        let i = up.current(n);
         // Below the table, a leg is a resistance, and f = l.
-        let half = if n < OCTAVE { f(0.5 * i) } else { curve.at(n - OCTAVE) };
-        curve.set(n, 1.5 * f(i) - half);
+        let half = if n < OCTAVE { f(0.5 * i) } else { up.at(n - OCTAVE) };
+        up.set(n, 1.5 * f(i) - half);
+    }
+    for n in (0..POINTS).rev() {
+        let i = down.current(n);
+        let l = if n + OCTAVE < POINTS {
+            1.5 * f(2.0 * i) - down.at(n + OCTAVE)
+        } else {
+            bench.u_dead * (1.0 - 0.5 * bench.i_x / i)
+        };
+        down.set(n, l);
+    }
+    // An error of f returns with the other sign an octave further on, and is greatest about i_x, where f bends.
+    let mut curve = up.clone();
+    for n in 0..POINTS {
+        let octaves = ln(up.current(n) / bench.i_x) / std::f64::consts::LN_2;
+        let share = (0.5 * octaves + 0.25).clamp(0.0, 1.0);
+        curve.set(n, up.at(n) + share * (down.at(n) - up.at(n)));
     }
     bench.curve = curve;
     Ok(())

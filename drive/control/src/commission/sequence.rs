@@ -207,6 +207,11 @@ impl Commission {
     }
 
     /// Scratch.
+    pub fn leg(&self, i: f64) -> f64 {
+        self.bench.curve.leg(i).0
+    }
+
+    /// Scratch.
     pub fn angle(&self) -> f64 {
         self.turning.theta
     }

@@ -17,6 +17,7 @@ use crate::estimator::gradient::{GradientObserver, GradientParameters};
 use crate::estimator::tracker::{TrackerKind, TrackerParameters};
 use crate::estimator::{Context, Estimating, EstimatorParameters, Sample as Observed};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
+use drive_base::math::tanh;
 use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +79,9 @@ impl Turning {
         let [last, now] = [self.theta, ahead].map(|theta| Axis::<Estimated>::at(theta));
         self.smooth += (now.from_stator(sample.i) - self.smooth) * SMOOTH;
         let turn = bench.T * self.w;
-        let bow = last.along(-turn * turn * self.motor.psi_M / (8.0 * self.motor.L_d));
+        let slope = bench.curve.loss_along(last.along(1.0), last.to_stator(self.smooth)).1;
+        let x = 0.25 * bench.T * (bench.R + slope) / self.motor.L_d;
+        let bow = last.along(-turn * turn * self.motor.psi_M / (8.0 * self.motor.L_d) * tanh(x) / x);
         let legs = self.between.legs(&bench.curve, last.to_stator(self.smooth), now.to_stator(self.smooth), bow);
         let u = sample.u - legs;
         self.delta = (u - resistive) * bench.T - (sample.i - sample.i_last) * self.motor.L_q;

@@ -83,6 +83,12 @@ fn scratch() {
         print!("{index:3} {:?} {:?} {:.1} {:.1} s, i {:.2} {:.2}, w_r {:.0} T_a {:.3} Lq/Ld {:.2} psi {:.3}", c.state(), c.fault(), begun, c.time(), still_most / motor.I, spin_most / motor.I, motor.w_rated, x, motor.L_q / motor.L_d, motor.psi * motor.w_rated / motor.u_dc * 1.732);
         let [a, b, ax, r] = c.scratch();
         print!(" LL {:.3} {:.3} axis {ax:.3} R {:.3} x {:.3} {:.3} LqI/psi {:.2} u_d {:.3}", a / motor.L_d, b / motor.L_q, r / motor.R, motor.R * motor.T / motor.L_d, motor.R * motor.T / motor.L_q, motor.L_q * motor.I / motor.psi, motor.u_dead / motor.u_dc * 1.732);
+        if trace {
+            for x in [0.003, 0.005, 0.007, 0.01, 0.014, 0.02, 0.028, 0.04, 0.06, 0.1] {
+                println!("leg at {x} I: {:+.3} % of u_dead (true {:.3})", 100.0 * (c.leg(x * motor.I) - motor.leg(x * motor.I)) / motor.u_dead, motor.leg(x * motor.I) / motor.u_dead);
+            }
+            println!("sigma {:.4} I", motor.sigma / motor.I);
+        }
         for (name, found, truth) in spun(c.results(), &motor) {
             print!(", {name} {:+.3} ({:.3})", 100.0 * (found.value / truth - 1.0), 100.0 * found.u);
         }

@@ -64,7 +64,7 @@ pub(crate) struct Motor {
     pub(crate) u_th: f64,
     pub(crate) i_y: f64,
     range: f64,
-    sigma: f64,
+    pub(crate) sigma: f64,
     offset: [f64; 3],
     cogging: f64,
     pub(crate) theta_0: f64,
@@ -180,7 +180,7 @@ impl Motor {
         2.0 * (self.u_dead * self.i_x + 2.0 * self.u_th * self.i_y) / (self.u_dead + self.u_th)
     }
 
-    fn leg(&self, i: f64) -> f64 {
+    pub(crate) fn leg(&self, i: f64) -> f64 {
         let a = i.abs();
         let line = if a < self.i_x { 0.5 * a / self.i_x } else { 1.0 - 0.5 * self.i_x / a };
         (self.u_dead * line + self.u_th * a / (a + self.i_y + 1e-30)).copysign(i)
