@@ -75,8 +75,15 @@ impl Curve {
     /// Voltage in V that the legs take from the command at the currents `i` (A).
     #[inline]
     pub(super) fn loss(&self, i: AlphaBeta) -> AlphaBeta {
+        self.loss_and_slope(i).0
+    }
+
+    /// The same, and the mean slope of the legs in Ohm.
+    #[inline]
+    pub(super) fn loss_and_slope(&self, i: AlphaBeta) -> (AlphaBeta, f64) {
         let Phases { a, b, c } = Phases::from_stator(i);
-        Phases { a: self.leg(a).0, b: self.leg(b).0, c: self.leg(c).0 }.to_stator()
+        let (a, b, c) = (self.leg(a), self.leg(b), self.leg(c));
+        (Phases { a: a.0, b: b.0, c: c.0 }.to_stator(), (a.1 + b.1 + c.1) * (1.0 / 3.0))
     }
 
     /// Loss in V along the unit vector `along` at the currents `i` (A), and its slope in Ohm against the current along it.
@@ -118,19 +125,8 @@ impl Between {
     /// Voltage in V that the resistance `R` (Ohm) and the legs take on the average between the currents `from` and `to` (A).
     pub(super) fn lost(&self, R: f64, curve: &Curve, from: AlphaBeta, to: AlphaBeta) -> AlphaBeta {
         let step = to - from;
-        (from + step * self.mean) * R + self.legs(curve, from, to, AlphaBeta::ZERO)
-    }
-
-    /// Voltage in V that the legs take, where the current is off the way from `from` to `to` (A) by a parabola of the height
-    /// `bow` (A).
-    pub(super) fn legs(&self, curve: &Curve, from: AlphaBeta, to: AlphaBeta, bow: AlphaBeta) -> AlphaBeta {
-        let (step, mut middle) = (to - from, 0.0625);
-        let each = self.at.iter().fold(AlphaBeta::ZERO, |sum, &s| {
-            let off = bow * (4.0 * middle * (1.0 - middle));
-            middle += 0.125;
-            sum + curve.loss(from + step * s + off)
-        });
-        each * 0.125
+        let legs = self.at.iter().fold(AlphaBeta::ZERO, |sum, &s| sum + curve.loss(from + step * s));
+        (from + step * self.mean) * R + legs * 0.125
     }
 }
 

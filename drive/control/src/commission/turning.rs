@@ -11,19 +11,21 @@
 
 use super::align::VOLTAGE;
 use super::bench::{Bench, Sample};
-use super::curve::Between;
 use crate::current::{CurrentController, CurrentGains, CurrentLoop};
 use crate::estimator::gradient::{GradientObserver, GradientParameters};
 use crate::estimator::tracker::{TrackerKind, TrackerParameters};
 use crate::estimator::{Context, Estimating, EstimatorParameters, Sample as Observed};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
-use drive_base::math::tanh;
 use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
 /// Rate of the observer over the rated speed, and the least one in 1/s.
 const RATE: (f64, f64) = (0.7, 10.0);
 
+/// Steps of the model's current in a period.
+const STEPS: f64 = 8.0;
+/// Passes of the model's current until it ends where it began.
+const PASSES: usize = 3;
 /// Share of a sample in the mean current.
 const SMOOTH: f64 = 0.2;
 
@@ -34,7 +36,6 @@ pub(super) struct Turning {
     pub(super) motor: Motor,
     /// Bandwidth of the PLL in rad/s.
     pub(super) rho: f64,
-    between: Between,
     observer: GradientObserver,
     controller: CurrentController,
     /// Electrical angle in rad, not wrapped, and speed in rad/s.
@@ -50,7 +51,7 @@ impl Turning {
     /// A rotor at rest at 0 rad, with the flux linkage of the swing.
     pub(super) fn new(bench: &Bench, [L_d, L_q]: [f64; 2], rho: f64) -> Self {
         let motor = Motor { R_s: bench.R, L_d, L_q, psi_M: bench.psi_0, ..Motor::default() };
-        Self { motor, rho, between: Between::new(bench.R * bench.T / L_q), ..Self::default() }
+        Self { motor, rho, ..Self::default() }
     }
 
     /// The observer begins at the angle `theta` (rad), at rest.
@@ -75,14 +76,7 @@ impl Turning {
     /// One sample: angle, speed and the step of the active flux.
     pub(super) fn observe(&mut self, bench: &Bench, sample: &Sample) {
         let resistive = (sample.i_last + sample.i) * (0.5 * bench.R);
-        let ahead = self.theta + bench.T * self.w;
-        let [last, now] = [self.theta, ahead].map(|theta| Axis::<Estimated>::at(theta));
-        self.smooth += (now.from_stator(sample.i) - self.smooth) * SMOOTH;
-        let turn = bench.T * self.w;
-        let slope = bench.curve.loss_along(last.along(1.0), last.to_stator(self.smooth)).1;
-        let x = 0.25 * bench.T * (bench.R + slope) / self.motor.L_d;
-        let bow = last.along(-turn * turn * self.motor.psi_M / (8.0 * self.motor.L_d) * tanh(x) / x);
-        let legs = self.between.legs(&bench.curve, last.to_stator(self.smooth), now.to_stator(self.smooth), bow);
+        let legs = self.legs(bench, sample.u);
         let u = sample.u - legs;
         self.delta = (u - resistive) * bench.T - (sample.i - sample.i_last) * self.motor.L_q;
         let observed = Observed { i: sample.i, i_last: sample.i_last, u, ..Observed::default() };
@@ -90,6 +84,44 @@ impl Turning {
         let context = Context { par: &par, motor: &self.motor, J: 0.0, T_s: bench.T };
         let estimate = self.observer.update(&context, &observed);
         (self.theta, self.w) = (estimate.theta, estimate.w);
+        self.smooth += (self.current(sample) - self.smooth) * SMOOTH;
+    }
+
+    /// Mean voltage in V that the legs took since the last sample, where the command `u` (V) acted. Between samples the d-axis
+    /// current bows, because u stays while the EMF turns: the model's current from the mean measured one back to it.
+    fn legs(&self, bench: &Bench, u: AlphaBeta) -> AlphaBeta {
+        let Motor { R_s, L_d, L_q, psi_M, .. } = self.motor;
+        let h = bench.T / STEPS;
+        let start = Axis::<Estimated>::at(self.theta);
+        let first = bench.curve.loss_and_slope(start.to_stator(self.smooth));
+        let (mut missing, mut legs) = (DqHat::ZERO, AlphaBeta::ZERO);
+        for _ in 0..PASSES {
+            let (mut axis, mut i, mut sum) = (start, self.smooth, AlphaBeta::ZERO);
+            let (mut loss, mut slope) = first;
+            let (mut k, mut conductance) = (0.0, DqHat::ZERO);
+            while k < STEPS {
+                sum += loss;
+                let middle = axis.slightly_ahead(0.5 * h * self.w);
+                let v = middle.from_stator(u - loss) - i * R_s + missing;
+                let v = v - DqHat::new(-L_q * i.q(), L_d * i.d() + psi_M) * self.w;
+                // Implicit in what the legs and the resistance do to the current: stable where they are steep.
+                let half = 0.5 * h * (R_s + slope);
+                let damped = DqHat::new(h / (L_d + half), h / (L_q + half));
+                i += DqHat::new(damped.d() * v.d(), damped.q() * v.q());
+                let kept = |g: f64, damped: f64| g * (1.0 - damped * (R_s + slope)).max(0.0) + damped;
+                conductance = DqHat::new(
+                    kept(conductance.d(), damped.d()),
+                    kept(conductance.q(), damped.q()),
+                );
+                axis = axis.slightly_ahead(h * self.w);
+                (loss, slope) = bench.curve.loss_and_slope(axis.to_stator(i));
+                k += 1.0;
+            }
+            let off = self.smooth - i;
+            missing += DqHat::new(off.d() / conductance.d(), off.q() / conductance.q());
+            legs = (sum + (loss - first.0) * 0.5) * (1.0 / STEPS);
+        }
+        legs
     }
 
     /// Command in V for the current `i_ref` (A) in the rotor's frame.
