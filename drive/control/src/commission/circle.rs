@@ -31,14 +31,14 @@ const PASSES: usize = 3;
 /// The points of a part on their way.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Points {
-    /// At the end of a point, p (Wb) and the observer's angle (rad); over it, sums of p x i and i.
-    rows: Rows<6, POINTS>,
+    /// At the end of a point, p (Wb) and the observer's angle (rad); over it, sums of p x i, p . i and i.
+    rows: Rows<7, POINTS>,
     p: AlphaBeta,
     /// Samples of a point, and samples of the present one.
     every: f64,
     samples: f64,
-    /// Sums over the present point: p x i, and i.
-    torque: f64,
+    /// Sums over the present point: p x i, p . i, and i.
+    products: [f64; 2],
     i: AlphaBeta,
 }
 
@@ -54,6 +54,8 @@ pub(super) struct Part {
     /// Radius in Wb, and the root mean square deviation from it over the radius.
     pub(super) radius: f64,
     pub(super) deviation: f64,
+    /// Current along the radius in A.
+    pub(super) i_d: f64,
     /// Turns of the rotor.
     pub(super) turns: f64,
 }
@@ -62,14 +64,14 @@ impl Points {
     /// A new part.
     pub(super) fn begin(&mut self) {
         self.rows.clear();
-        (self.p, self.i, self.torque) = (AlphaBeta::ZERO, AlphaBeta::ZERO, 0.0);
+        (self.p, self.i, self.products) = (AlphaBeta::ZERO, AlphaBeta::ZERO, [0.0; 2]);
         (self.every, self.samples) = (1.0, 0.0);
     }
 
     /// Takes a sample: step `delta` (Wb) of the active flux, current `i` (A), the observer's angle `theta` (rad).
     pub(super) fn take(&mut self, delta: AlphaBeta, i: AlphaBeta, theta: f64) {
         self.p += delta;
-        self.torque += self.p.cross(i);
+        self.products = [self.products[0] + self.p.cross(i), self.products[1] + self.p.dot(i)];
         self.i += i;
         self.samples += 1.0;
         if self.samples < self.every {
@@ -77,11 +79,12 @@ impl Points {
         }
         if self.rows.len() == POINTS {
             self.every *= 2.0;
-            self.rows.halve(|a, b| [b[0], b[1], b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5]]);
+            self.rows.halve(|a, b| [b[0], b[1], b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5], a[6] + b[6]]);
             return;
         }
-        self.rows.push([self.p.alpha(), self.p.beta(), theta, self.torque, self.i.alpha(), self.i.beta()]);
-        (self.samples, self.torque, self.i) = (0.0, 0.0, AlphaBeta::ZERO);
+        let [cross, dot] = self.products;
+        self.rows.push([self.p.alpha(), self.p.beta(), theta, cross, dot, self.i.alpha(), self.i.beta()]);
+        (self.samples, self.products, self.i) = (0.0, [0.0; 2], AlphaBeta::ZERO);
     }
 
     /// Time of the part in s, for samples of `T` (s).
@@ -90,13 +93,13 @@ impl Points {
     }
 
     /// tau, p in Wb, the observer's angle in rad, and the sums of each point.
-    fn each(&self) -> impl Iterator<Item = (f64, AlphaBeta, f64, f64, AlphaBeta)> {
+    fn each(&self) -> impl Iterator<Item = (f64, AlphaBeta, f64, [f64; 2], AlphaBeta)> {
         let last = (1..self.rows.len()).fold(0.0, |sum, _| sum + 1.0);
         (0..self.rows.len()).scan(-1.0, move |tau, n| {
-            let [a, b, theta, torque, i_a, i_b] = self.rows.row(n);
+            let [a, b, theta, cross, dot, i_a, i_b] = self.rows.row(n);
             let now = *tau;
             *tau += 2.0 / last;
-            Some((now, AlphaBeta::new(a, b), theta, torque, AlphaBeta::new(i_a, i_b)))
+            Some((now, AlphaBeta::new(a, b), theta, [cross, dot], AlphaBeta::new(i_a, i_b)))
         })
     }
 
@@ -124,8 +127,8 @@ impl Points {
         }
         let (mut angle, mut squares) = (Normal::<4>::default(), 0.0);
         let mut first = None;
-        let (mut weights, mut torque, mut last) = (0.0, 0.0, -1.0);
-        for (tau, p, theta, sum, i) in self.each() {
+        let (mut weights, mut torque, mut along, mut last) = (0.0, 0.0, 0.0, -1.0);
+        for (tau, p, theta, [cross, dot], i) in self.each() {
             let eta = p - c - d * tau;
             squares += (eta.magnitude() - radius) * (eta.magnitude() - radius);
             let seen: DqHat = Axis::<Estimated>::at(theta).from_stator(eta);
@@ -137,7 +140,8 @@ impl Points {
             let weight = (1.0 - middle * middle) * (1.0 - middle * middle);
             if tau > last {
                 weights += weight;
-                torque += weight * (sum - (c + d * middle).cross(i)) / self.every;
+                torque += weight * (cross - (c + d * middle).cross(i)) / self.every;
+                along += weight * (dot - (c + d * middle).dot(i)) / self.every;
             }
             last = tau;
         }
@@ -149,6 +153,7 @@ impl Points {
             sigma: angle.half_width[2] / (half * half),
             w: (a_1 + a_3 * (3.0 / 7.0)) / half,
             torque: torque / weights,
+            i_d: along / weights / radius,
             radius,
             deviation: (squares * share).sqrt() / radius,
             turns: (a_1 + a_3).abs() / std::f64::consts::PI,

@@ -28,6 +28,8 @@ const BRAKED: f64 = 0.1;
 /// Currents over I: of a sweep, and of the speed control.
 const SWEEP: f64 = 0.6;
 const CONTROL: f64 = 0.8;
+/// Current along the d-axis over I: the legs carry more than noise, and what they lose turns the angle, not the radius.
+const ALONG: f64 = -0.06;
 /// Shortest part in turns, longest in s.
 const TURNS: f64 = 2.2;
 const LONGEST: f64 = 1.2;
@@ -245,7 +247,7 @@ impl Levels {
                     if (w / target - 1.0).abs() > 0.1 {
                         return Err(Fault::Lost);
                     }
-                    self.part(bench);
+                    self.part(bench, turning);
                     self.follow(bench, turning);
                     self.at += 1;
                     if !self.brakes() && left < self.needed(bench, turning) {
@@ -259,7 +261,8 @@ impl Levels {
                 self.speed(bench, turning, target)
             }
         };
-        let i_d = self.i_d * (1.0 - self.whole * T / FADE).max(0.0);
+        let i_d = ALONG * bench.I;
+        let i_d = i_d + (self.i_d - i_d) * (1.0 - self.whole * T / FADE).max(0.0);
         Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(i_d, i_q))))
     }
 
@@ -282,19 +285,21 @@ impl Levels {
     fn take(&mut self, bench: &Bench, turning: &Turning, sample: &Sample, longest: f64) {
         self.points.take(turning.delta, sample.i, turning.theta);
         if self.points.time(bench.T) >= longest {
-            self.part(bench);
+            self.part(bench, turning);
             self.points.begin();
         }
     }
 
     /// A part ends.
-    fn part(&mut self, bench: &Bench) {
+    fn part(&mut self, bench: &Bench, turning: &Turning) {
         let Some(part) = self.points.end(bench.T) else { return };
         self.last = part;
         if part.deviation > DEVIATION || part.turns < TURNS {
             return;
         }
-        let Part { acceleration, sigma, w, torque, radius, .. } = part;
+        let Part { acceleration, sigma, w, torque, radius, i_d, .. } = part;
+        // p - c is psi_M + (L_d - L_q) i_d.
+        let radius = radius + (turning.motor.L_q - turning.motor.L_d) * i_d;
         let each = 1.0 / bench.n_p;
         self.mechanics.add(acceleration * each, sigma * each, w * each, 1.5 * bench.n_p * torque);
         if self.phase == Phase::Measure {
@@ -307,7 +312,7 @@ impl Levels {
 
     /// A sweep of `t` (s) ends: the inertia.
     fn swept(&mut self, bench: &Bench, turning: &Turning, t: f64) {
-        self.part(bench);
+        self.part(bench, turning);
         let change = (turning.w - self.from).abs();
         let found = self.i_a * t / change.max(1e-9 * bench.w_r());
         self.inertia = found.clamp(0.3 * self.inertia, 2.0 * self.inertia);
