@@ -141,7 +141,7 @@ impl Levels {
 
     /// Time in s in which the speed control settles at `target` (rad/s).
     fn wait(&self, bench: &Bench, turning: &Turning, target: f64) -> f64 {
-        (6.0 / self.bandwidth(bench, turning)).max(12.0 / target).max(0.3)
+        (3.0 / self.bandwidth(bench, turning)).max(12.0 / target).max(0.3)
     }
 
     /// Time in s of the measurement at `target` (rad/s).
@@ -268,7 +268,7 @@ impl Levels {
 
     /// Bandwidth of the speed control in rad/s: noise of w makes little current.
     fn bandwidth(&self, bench: &Bench, turning: &Turning) -> f64 {
-        (turning.rho / 6.0).min(30.0).min(20.0 * bench.I / (self.inertia * bench.w_r()))
+        (turning.rho / 6.0).min(30.0).min(10.0 * bench.I / (self.inertia * bench.w_r()))
     }
 
     /// Current of the speed control in A.

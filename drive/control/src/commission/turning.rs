@@ -25,9 +25,7 @@ const RATE: (f64, f64) = (0.7, 10.0);
 /// Steps of the model's current in a period.
 const STEPS: f64 = 8.0;
 /// Passes of the model's current until it ends where it began.
-const PASSES: usize = 3;
-/// Share of a sample in the mean current.
-const SMOOTH: f64 = 0.2;
+const PASSES: usize = 2;
 
 /// A turning machine.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,8 +39,6 @@ pub(super) struct Turning {
     /// Electrical angle in rad, not wrapped, and speed in rad/s.
     pub(super) theta: f64,
     pub(super) w: f64,
-    /// Mean current in the rotor's frame in A.
-    smooth: DqHat,
     /// Step of the active flux at this sample in Wb.
     pub(super) delta: AlphaBeta,
 }
@@ -61,7 +57,6 @@ impl Turning {
         let observed = Observed { i: sample.i, i_last: sample.i_last, ..Observed::default() };
         self.observer = GradientObserver::start(&context, &observed, theta, 0.0).0;
         (self.theta, self.w, self.controller) = (theta, 0.0, CurrentController::default());
-        self.smooth = self.current(sample);
     }
 
     fn parameters(&self, bench: &Bench) -> EstimatorParameters {
@@ -76,7 +71,7 @@ impl Turning {
     /// One sample: angle, speed and the step of the active flux.
     pub(super) fn observe(&mut self, bench: &Bench, sample: &Sample) {
         let resistive = (sample.i_last + sample.i) * (0.5 * bench.R);
-        let legs = self.legs(bench, sample.u);
+        let legs = self.legs(bench, sample);
         let u = sample.u - legs;
         self.delta = (u - resistive) * bench.T - (sample.i - sample.i_last) * self.motor.L_q;
         let observed = Observed { i: sample.i, i_last: sample.i_last, u, ..Observed::default() };
@@ -84,25 +79,31 @@ impl Turning {
         let context = Context { par: &par, motor: &self.motor, J: 0.0, T_s: bench.T };
         let estimate = self.observer.update(&context, &observed);
         (self.theta, self.w) = (estimate.theta, estimate.w);
-        self.smooth += (self.current(sample) - self.smooth) * SMOOTH;
     }
 
-    /// Mean voltage in V that the legs took since the last sample, where the command `u` (V) acted. Between samples the d-axis
-    /// current bows, because u stays while the EMF turns: the model's current from the mean measured one back to it.
-    fn legs(&self, bench: &Bench, u: AlphaBeta) -> AlphaBeta {
+    /// Rotor's frame after `samples` from the last one.
+    fn ahead(&self, bench: &Bench, samples: f64) -> Axis<Estimated> {
+        Axis::at(self.theta + samples * bench.T * self.w)
+    }
+
+    /// Mean voltage in V that the legs took since the last sample: along the model's current from the last measured one, with
+    /// the constant voltage `missing` that makes it end at this one. Between samples the current bows, because u stays while
+    /// the EMF turns.
+    fn legs(&self, bench: &Bench, sample: &Sample) -> AlphaBeta {
         let Motor { R_s, L_d, L_q, psi_M, .. } = self.motor;
         let h = bench.T / STEPS;
-        let start = Axis::<Estimated>::at(self.theta);
-        let first = bench.curve.loss_and_slope(start.to_stator(self.smooth));
+        let start = self.ahead(bench, 0.0);
+        let (from, to) = (start.from_stator(sample.i_last), self.ahead(bench, 1.0).from_stator(sample.i));
+        let first = bench.curve.loss_and_slope(sample.i_last);
         let (mut missing, mut legs) = (DqHat::ZERO, AlphaBeta::ZERO);
         for _ in 0..PASSES {
-            let (mut axis, mut i, mut sum) = (start, self.smooth, AlphaBeta::ZERO);
+            let (mut axis, mut i, mut sum) = (start, from, AlphaBeta::ZERO);
             let (mut loss, mut slope) = first;
             let (mut k, mut conductance) = (0.0, DqHat::ZERO);
             while k < STEPS {
                 sum += loss;
                 let middle = axis.slightly_ahead(0.5 * h * self.w);
-                let v = middle.from_stator(u - loss) - i * R_s + missing;
+                let v = middle.from_stator(sample.u - loss) - i * R_s + missing;
                 let v = v - DqHat::new(-L_q * i.q(), L_d * i.d() + psi_M) * self.w;
                 // Implicit in what the legs and the resistance do to the current: stable where they are steep.
                 let half = 0.5 * h * (R_s + slope);
@@ -117,7 +118,7 @@ impl Turning {
                 (loss, slope) = bench.curve.loss_and_slope(axis.to_stator(i));
                 k += 1.0;
             }
-            let off = self.smooth - i;
+            let off = to - i;
             missing += DqHat::new(off.d() / conductance.d(), off.q() / conductance.q());
             legs = (sum + (loss - first.0) * 0.5) * (1.0 / STEPS);
         }
