@@ -4,13 +4,21 @@
 //! levels      0.15, 0.3, 0.45 w_r in the order 3 2 1 3 1 2 3 1 3
 //! sweep       constant i_q = i_f +- i_a, so that 0.15 w_r take T_b = max(0.06 s, 30 / w_r);
 //!             i_a at most 0.3 psi_M / L_q (beyond, an error of L_q turns the angle) and 0.6 I; i_f: friction
-//! level       speed PI of bandwidth b = min(rho / 6, 30 1/s); settles for max(0.3 s, 6 / b, 12 / w)
+//! level       speed PI of bandwidth b = min(rho / 6, 30 1/s, 20 / T_a); settles for max(0.3 s, 3 / b, 12 / w)
 //! measures    max(0.3 s, 4 turns, min(3.5 s, sqrt(300 T_a / w_r))), T_a = J w_r / (n_p K I / 2)
 //! rho         sqrt(0.3 w_r / (0.06 T_b)) of the PLL, 2 pi 15 at least, 0.08 / T at most
+//! flux        then max(0.2 s, 3 turns) with i_d = -0.06 I; i_d = 0 elsewhere
 //! ```
 //!
-//! J / (n_p K) of the speed control and of i_a follows the last sweep. psi_M is the mean radius at the highest level; at
-//! the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
+//! A machine without load needs so little current that noise and the dead zone of the legs would decide about u. With i_d,
+//! all legs carry current, and the error of what they lose points along d, where it turns the angle instead of changing the
+//! radius; the radius is psi_M + (L_d - L_q) i_d. At 0.06 I an error of 1 % of L_d changes psi_M by less than 0.1 %. The
+//! torque, however, is free of an error of the angle where i_d = 0.
+//!
+//! J / (n_p K) of the speed control and of i_a follows the last sweep, i_f the last two levels. psi_M is the mean radius
+//! at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is the
+//! error at 0.45 w_r and so part of the half-width. If time runs out after each level has been measured once, the rest is
+//! left out. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
 
 use super::bench::{Bench, Sample};
 use super::circle::{Part, Points};
@@ -19,6 +27,7 @@ use super::results::Identified;
 use super::turning::Turning;
 use crate::commission::{Fault, Results};
 use drive_base::frame::{AlphaBeta, DqHat};
+use drive_base::math::within;
 use serde::{Deserialize, Serialize};
 
 /// Speed of a level over the rated one, times the levels in their order; and where the braking ends.
@@ -28,15 +37,22 @@ const BRAKED: f64 = 0.1;
 /// Currents over I: of a sweep, and of the speed control.
 const SWEEP: f64 = 0.6;
 const CONTROL: f64 = 0.8;
-/// Current along the d-axis over I: the legs carry more than noise, and what they lose turns the angle, not the radius.
+/// Current along the d-axis over I.
 const ALONG: f64 = -0.06;
 /// Shortest part in turns, longest in s.
 const TURNS: f64 = 2.2;
 const LONGEST: f64 = 1.2;
 /// Greatest deviation of a part from a circle.
 const DEVIATION: f64 = 0.05;
-/// Time in s over which the d-axis current of the start ends.
-const FADE: f64 = 0.03;
+/// Least relative half-width of psi_M.
+const LEAST: f64 = 0.001;
+/// Speed off a level over that of the level: near enough to measure, and lost.
+const NEAR: f64 = 0.03;
+const FAR: f64 = 0.1;
+/// Time in s in which the d-axis current changes by I.
+const FADE: f64 = 0.05;
+/// Measurement of psi_M: s and turns, after the time in s in which the current changes.
+const FLUX: (f64, f64, f64) = (0.2, 3.0, 0.02);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Phase {
@@ -44,6 +60,7 @@ enum Phase {
     Sweep,
     Settle,
     Measure,
+    Flux,
 }
 
 /// Mean radius of a level.
@@ -61,9 +78,8 @@ pub(super) struct Levels {
     /// Place in the order.
     #[serde(with = "super::fixed_size")]
     at: u64,
-    /// Samples of this phase and of the whole.
+    /// Samples of this phase.
     k: f64,
-    whole: f64,
     /// J / (n_p K) in A.s2/rad.
     inertia: f64,
     /// Current of the friction at the last level in A, its slope in A.s/rad, and the speed of that level in rad/s.
@@ -73,14 +89,13 @@ pub(super) struct Levels {
     /// Current of the sweep in A, and its first speed in rad/s.
     i_a: f64,
     from: f64,
-    /// Current along the d-axis at the start in A.
+    /// Current along the d-axis in A.
     i_d: f64,
     /// Sum of i_q in A over the level, and samples.
     sums: [f64; 2],
     points: Points,
     mechanics: Mechanics,
     radii: [Radii; 3],
-    last: Part,
 }
 
 /// What a sample of the levels gives.
@@ -103,6 +118,11 @@ fn part(w: f64, whole: f64) -> f64 {
     LONGEST.min(40.0 * turn).max(2.5 * turn).max(0.1 * whole)
 }
 
+/// Greatest current of a sweep in A.
+fn most(bench: &Bench, turning: &Turning) -> f64 {
+    (0.3 * turning.motor.psi_M / turning.motor.L_q).min(SWEEP * bench.I)
+}
+
 /// Bandwidth of the PLL in rad/s.
 pub(super) fn rho(bench: &Bench) -> f64 {
     (0.3 * bench.w_r() / (0.06 * T_b(bench))).sqrt().max(94.0).min(0.08 / bench.T)
@@ -114,13 +134,10 @@ impl Levels {
         // A heavy rotor still swings: its friction is at most a tenth of I.
         let i_f = i_f.clamp(0.0, 0.1 * bench.I);
         let i_d = turning.current(sample).d();
-        let mut levels = Self { inertia: 0.4 * bench.I / (bench.w_0 * bench.w_0), friction: [i_f, 0.0, 0.0], i_d, ..Self::default() };
+        let inertia = 0.4 * bench.I / (bench.w_0 * bench.w_0);
+        let mut levels = Self { inertia, friction: [i_f, 0.0, 0.0], i_d, ..Self::default() };
         levels.sweep(bench, turning);
         levels
-    }
-
-    pub(super) fn debug(&self) -> String {
-        format!("{:?} at {} | m {:.3e} i_a {:.4} i_f {:.4} dev {:.4} sig {:.4} radii {:?}", self.phase, self.at, self.inertia, self.i_a, self.friction[0], self.last.deviation, self.last.sigma, self.radii.map(|r| r.sum / r.parts))
     }
 
     /// The levels are over: the control brakes.
@@ -135,8 +152,8 @@ impl Levels {
         }
         let target = self.target(bench);
         let way = (target - turning.w).abs() + target - BRAKED * bench.w_r();
-        let sweeps = way * self.inertia / self.most(bench, turning).min(self.inertia * LEVEL * bench.w_r() / T_b(bench));
-        1.3 * sweeps + 3.0 * self.wait(bench, turning, target) + self.measured(bench, target)
+        let sweeps = way * self.inertia / most(bench, turning).min(self.inertia * LEVEL * bench.w_r() / T_b(bench));
+        1.3 * sweeps + 3.0 * self.wait(bench, turning, target) + self.measured(bench, target) + FLUX.0
     }
 
     /// Time in s in which the speed control settles at `target` (rad/s).
@@ -166,13 +183,8 @@ impl Levels {
         i + slope * (w - at)
     }
 
-    /// Greatest current of a sweep in A.
-    fn most(&self, bench: &Bench, turning: &Turning) -> f64 {
-        (0.3 * turning.motor.psi_M / turning.motor.L_q).min(SWEEP * bench.I)
-    }
-
     fn sweep(&mut self, bench: &Bench, turning: &Turning) {
-        self.i_a = (self.inertia * LEVEL * bench.w_r() / T_b(bench)).min(self.most(bench, turning));
+        self.i_a = (self.inertia * LEVEL * bench.w_r() / T_b(bench)).min(most(bench, turning));
         self.from = turning.w;
         self.enter(Phase::Sweep);
         self.points.begin();
@@ -189,8 +201,10 @@ impl Levels {
     ) -> Result<Level, Fault> {
         turning.observe(bench, sample);
         self.k += 1.0;
-        self.whole += 1.0;
         let (T, w, target) = (bench.T, turning.w, self.target(bench));
+        if w < 0.5 * BRAKED * bench.w_r() {
+            return Err(Fault::Lost);
+        }
         let t = self.k * T;
         let i_q = match self.phase {
             Phase::Sweep => {
@@ -205,15 +219,14 @@ impl Levels {
                     self.enter(Phase::Settle);
                 } else if t > 2.0 * (target - self.from).abs() * self.inertia / self.i_a + 0.3 {
                     // Inertia or friction is greater than it seemed.
-                    let most = self.most(bench, turning);
                     let stands = (w - self.from) * up < 0.01 * bench.w_r();
                     if self.brakes() {
                         return Ok(Level::Done);
                     }
-                    if (stands && self.i_a >= most) || w < 0.5 * BRAKED * bench.w_r() {
+                    if stands && self.i_a >= most(bench, turning) {
                         return Err(Fault::Lost);
                     }
-                    self.i_a = (2.0 * self.i_a).min(most);
+                    self.i_a = (2.0 * self.i_a).min(most(bench, turning));
                     self.inertia *= if stands { 1.0 } else { 2.0 };
                     (self.from, self.k) = (w, 0.0);
                     self.points.begin();
@@ -225,10 +238,10 @@ impl Levels {
             Phase::Settle => {
                 let wait = self.wait(bench, turning, target);
                 let off = (w / target - 1.0).abs();
-                if t > 3.0 * wait && off > 0.1 {
+                if t > 3.0 * wait && off > FAR {
                     return Err(Fault::Lost);
                 }
-                if t > wait && off < 0.03 {
+                if t > wait && off < NEAR {
                     self.sums = [0.0; 2];
                     self.points.begin();
                     self.enter(Phase::Measure);
@@ -244,9 +257,22 @@ impl Levels {
                     let (i, [last, slope, w_last]) = (*sum / *samples, self.friction);
                     let slope = if w_last > 0.0 { ((i - last) / (target - w_last)).max(0.0) } else { slope };
                     self.friction = [i, slope, target];
-                    if (w / target - 1.0).abs() > 0.1 {
+                    if (w / target - 1.0).abs() > FAR {
                         return Err(Fault::Lost);
                     }
+                    self.part(bench, turning);
+                    self.points.begin();
+                    self.enter(Phase::Flux);
+                }
+                self.speed(bench, turning, target)
+            }
+            Phase::Flux => {
+                let (time, turns, wait) = FLUX;
+                let whole = time.max(turns * std::f64::consts::TAU / target);
+                if t > wait {
+                    self.take(bench, turning, sample, part(target, whole));
+                }
+                if t >= wait + whole {
                     self.part(bench, turning);
                     self.follow(bench, turning);
                     self.at += 1;
@@ -261,9 +287,9 @@ impl Levels {
                 self.speed(bench, turning, target)
             }
         };
-        let i_d = ALONG * bench.I;
-        let i_d = i_d + (self.i_d - i_d) * (1.0 - self.whole * T / FADE).max(0.0);
-        Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(i_d, i_q))))
+        let along = if self.phase == Phase::Flux { ALONG * bench.I } else { 0.0 };
+        self.i_d += within(along - self.i_d, bench.I * T / FADE);
+        Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(self.i_d, i_q))))
     }
 
     /// Bandwidth of the speed control in rad/s: noise of w makes little current.
@@ -276,7 +302,7 @@ impl Levels {
         let b = self.bandwidth(bench, turning);
         let (e, most) = (target - turning.w, CONTROL * bench.I);
         let asked = self.inertia * b * e + self.integral;
-        let i_q = drive_base::math::within(asked, most);
+        let i_q = within(asked, most);
         self.integral += self.inertia * b * b * 0.25 * bench.T * e + (i_q - asked);
         i_q
     }
@@ -293,21 +319,25 @@ impl Levels {
     /// A part ends.
     fn part(&mut self, bench: &Bench, turning: &Turning) {
         let Some(part) = self.points.end(bench.T) else { return };
-        self.last = part;
         if part.deviation > DEVIATION || part.turns < TURNS {
             return;
         }
         let Part { acceleration, sigma, w, torque, radius, i_d, .. } = part;
-        // p - c is psi_M + (L_d - L_q) i_d.
-        let radius = radius + (turning.motor.L_q - turning.motor.L_d) * i_d;
-        let each = 1.0 / bench.n_p;
-        self.mechanics.add(acceleration * each, sigma * each, w * each, 1.5 * bench.n_p * torque);
-        if self.phase == Phase::Measure {
-            let level = ORDER[usize::try_from(self.at).unwrap_or(0).min(ORDER.len() - 1)];
-            let n = if level < 1.5 { 0 } else if level < 2.5 { 1 } else { 2 };
-            let r = &mut self.radii[n];
-            (r.sum, r.squares, r.parts) = (r.sum + radius, r.squares + radius * radius, r.parts + 1.0);
+        if self.phase != Phase::Flux {
+            let each = 1.0 / bench.n_p;
+            self.mechanics.add(acceleration * each, sigma * each, w * each, 1.5 * bench.n_p * torque);
+            return;
         }
+        let level = ORDER[usize::try_from(self.at).unwrap_or(0).min(ORDER.len() - 1)];
+        let n = if level < 1.5 {
+            0
+        } else if level < 2.5 {
+            1
+        } else {
+            2
+        };
+        let (r, psi) = (&mut self.radii[n], radius + (turning.motor.L_q - turning.motor.L_d) * i_d);
+        (r.sum, r.squares, r.parts) = (r.sum + psi, r.squares + psi * psi, r.parts + 1.0);
     }
 
     /// A sweep of `t` (s) ends: the inertia.
@@ -336,10 +366,9 @@ impl Levels {
         if !(psi > 0.25 * bench.psi_r && psi < 1.15 * bench.psi_r) {
             return Err(Fault::Flux);
         }
-        // Errors of the voltage go by 1/w: half of the difference between 0.15 and 0.45 w_r is the error at 0.45 w_r.
         let error = 0.5 * (low.sum / low.parts / psi - 1.0);
         let variance = (high.squares / high.parts - psi * psi).max(0.0) / (psi * psi);
-        let u = (error * error + 4.0 * variance / high.parts + 0.001 * 0.001).sqrt();
+        let u = (error * error + 4.0 * variance / high.parts + LEAST * LEAST).sqrt();
         let K = 1.5 * bench.n_p * psi;
         let w_f = 0.3 * bench.w_r() / bench.n_p;
         let J = self.inertia * bench.n_p * K;

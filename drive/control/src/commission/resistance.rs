@@ -7,7 +7,10 @@
 //! ```
 //!
 //! gives R, u_dead and i_x by least squares over nine currents that the PI holds. Nine smaller ones follow at constant
-//! voltages; f(i) = u - R i of all eighteen, and l(i) = 1.5 f(i) - l(i/2) from the smallest current upward.
+//! voltages; f(i) = u - R i of all eighteen, and l(i) = 1.5 f(i) - l(i/2) from the smallest current upward. An error of f
+//! returns in each higher octave with the other sign, undiminished, and the bend of f about i_x makes one of some percent of
+//! u_dead. So the same equation also leads downward, from u_dead (1 - i_x / (2 i)) at the greatest currents, and the curve
+//! changes from the one to the other about i_x.
 
 use super::align::Dc;
 use super::bench::{Bench, Sample};
@@ -132,7 +135,7 @@ impl Staircase {
         if found.x[2] < 0.0 || found.x[1] <= 0.0 { solve(0.0) } else { Some(found) }
     }
 
-    /// f(i) = u - R i in V at the current `i` (A), with this `R` (Ohm): cubic in ln i between the points.
+    /// f(i) = u - R i in V at the current `i` (A), with this `R` (Ohm): linear in ln i between the points.
     fn lost(&self, R: f64, i: f64) -> f64 {
         let f = |n: usize| self.points[n][0] - R * self.points[n][1];
         let last = STEPS - 1;
@@ -145,20 +148,8 @@ impl Staircase {
         if n == 0 {
             return f(0);
         }
-        let x = |n: usize| ln(self.points[n][1] / i);
-        let (below, above) = (x(n), x(n - 1));
-        let (h, chord) = (above - below, (f(n - 1) - f(n)) / (above - below));
-        // Slopes at both ends are those of parabolas through three points.
-        let slope = |beyond: usize, end: f64| {
-            let (x, f_end) = (x(beyond), if end == below { f(n) } else { f(n - 1) });
-            let outer = (f(beyond) - f_end) / (x - end);
-            (outer * h + chord * (x - end).abs()) / (h + (x - end).abs())
-        };
-        let lower = if n < last { slope(n + 1, below) } else { chord };
-        let upper = if n > 1 { slope(n - 2, above) } else { chord };
-        let s = -below / h;
-        let hermite = s * (1.0 - s) * ((lower - chord) * (1.0 - s) - (upper - chord) * s);
-        f(n) + h * (chord * s + hermite)
+        let (below, above) = (self.points[n][1], self.points[n - 1][1]);
+        f(n) + (f(n - 1) - f(n)) * ln(i / below) / ln(above / below)
     }
 
     /// Whether the points are in order, so that a curve goes through them.
@@ -202,13 +193,12 @@ pub(super) fn adopt(bench: &mut Bench, staircases: &[Staircase]) -> Result<(), F
         };
         down.set(n, l);
     }
-    // An error of f returns with the other sign an octave further on, and is greatest about i_x, where f bends.
-    let mut curve = up.clone();
+    // From half an octave below i_x to one and a half above.
     for n in 0..POINTS {
         let octaves = ln(up.current(n) / bench.i_x) / std::f64::consts::LN_2;
         let share = (0.5 * octaves + 0.25).clamp(0.0, 1.0);
-        curve.set(n, up.at(n) + share * (down.at(n) - up.at(n)));
+        up.set(n, up.at(n) + share * (down.at(n) - up.at(n)));
     }
-    bench.curve = curve;
+    bench.curve = up;
     Ok(())
 }

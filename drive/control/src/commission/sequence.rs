@@ -201,27 +201,6 @@ impl Commission {
         &self.results
     }
 
-    /// Scratch.
-    pub fn scratch(&self) -> [f64; 4] {
-        [self.axes.L_d, self.axes.L_q, self.axes.axis, self.bench.R]
-    }
-
-    /// Scratch.
-    pub fn leg(&self, i: f64) -> f64 {
-        self.bench.curve.leg(i).0
-    }
-
-    /// Scratch.
-    pub fn angle(&self) -> f64 {
-        self.turning.theta
-    }
-
-    /// Scratch.
-    pub fn debug(&self) -> String {
-        let x = if self.stage == Stage::Levels { self.levels.debug() } else { self.starting.debug() };
-        format!("{x} psi^ {:.3} w^ {:.3} psi_0 {:.4}", self.turning.motor.psi_M / self.bench.psi_r, self.turning.w / self.setup.speed, self.bench.psi_0 / self.bench.psi_r)
-    }
-
     /// Time in s since the start.
     pub fn time(&self) -> f64 {
         self.samples * self.setup.T_s

@@ -184,18 +184,21 @@ impl Starting {
                 return Ok(Started::Off);
             }
         }
-        let grown = if self.phase == Phase::Ramp { ALIGNED * I + (I_f - ALIGNED * I) * (t / 0.1).min(1.0) } else { I_f };
+        let grown =
+            if self.phase == Phase::Ramp { ALIGNED * I + (I_f - ALIGNED * I) * (t / 0.1).min(1.0) } else { I_f };
         let slip = self.e.q() / self.eta.max(0.1 * bench.psi_r) - self.w;
         let i_q = damping(w_0, inertia, 1.0, slip, 0.5 * I_f);
         Ok(Started::Voltage(turning.in_any_frame(bench, sample, (self.theta, self.w), DqHat::new(grown, i_q))))
     }
 
     fn tried(&self) -> usize {
-        if self.tries < 0.5 { 0 } else if self.tries < 1.5 { 1 } else { 2 }
-    }
-
-    pub(super) fn debug(&self) -> String {
-        let s = self.sums; format!("{:?} {} | w_f {:.1} psi {:.5} w {:.1} i_q {:.4}", self.phase, self.tries, self.w, s[0]/s[3], s[1]/s[3], s[2]/s[3])
+        if self.tries < 0.5 {
+            0
+        } else if self.tries < 1.5 {
+            1
+        } else {
+            2
+        }
     }
 
     /// The gates are off.

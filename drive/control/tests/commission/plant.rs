@@ -64,7 +64,7 @@ pub(crate) struct Motor {
     pub(crate) u_th: f64,
     pub(crate) i_y: f64,
     range: f64,
-    pub(crate) sigma: f64,
+    sigma: f64,
     offset: [f64; 3],
     cogging: f64,
     pub(crate) theta_0: f64,
@@ -180,7 +180,7 @@ impl Motor {
         2.0 * (self.u_dead * self.i_x + 2.0 * self.u_th * self.i_y) / (self.u_dead + self.u_th)
     }
 
-    pub(crate) fn leg(&self, i: f64) -> f64 {
+    fn leg(&self, i: f64) -> f64 {
         let a = i.abs();
         let line = if a < self.i_x { 0.5 * a / self.i_x } else { 1.0 - 0.5 * self.i_x / a };
         (self.u_dead * line + self.u_th * a / (a + self.i_y + 1e-30)).copysign(i)
@@ -215,6 +215,10 @@ pub(crate) struct Bench {
     pub(crate) gates: bool,
     waiting: bool,
     steps: u32,
+    /// Torque of a load in N.m, against the positive direction.
+    pub(crate) load: f64,
+    /// Voltage over the command.
+    pub(crate) gain: f64,
     /// Greatest current so far in A.
     pub(crate) most: f64,
 }
@@ -235,7 +239,21 @@ impl Bench {
         let (psi, theta) = (AlphaBeta::new(cos, sin) * motor.psi, motor.theta_0 / motor.n_p);
         let (commands, gates) = ([AlphaBeta::ZERO; 3], false);
         let random = Random(seed);
-        Self { motor, random, psi, w: 0.0, theta, commands, delay: 1, gates, waiting: false, steps, most: 0.0 }
+        Self {
+            motor,
+            random,
+            psi,
+            w: 0.0,
+            theta,
+            commands,
+            delay: 1,
+            gates,
+            waiting: false,
+            steps,
+            load: 0.0,
+            gain: 1.0,
+            most: 0.0,
+        }
     }
 
     fn turned(v: AlphaBeta, cos: f64, sin: f64) -> AlphaBeta {
@@ -266,7 +284,7 @@ impl Bench {
     pub(crate) fn tick(&mut self, u: AlphaBeta, gates: bool) {
         let m = &self.motor;
         self.commands = [u, self.commands[0], self.commands[1]];
-        let command = self.commands[self.delay];
+        let command = self.commands[self.delay] * self.gain;
         let span = Phases::from_stator(command).span();
         let acting = if span > m.u_dc { command * (m.u_dc / span) } else { command };
         let h = m.T / f64::from(self.steps);
@@ -306,14 +324,8 @@ impl Bench {
         let tau = 1.5 * m.n_p * (own.alpha() * q - own.beta() * d);
         let (s_2, c_2) = (2.0 * sin * cos, cos * cos - sin * sin);
         let s_6 = s_2 * (4.0 * c_2 * c_2 - 1.0);
-        let friction = m.friction(w) + m.cogging * s_6;
+        let friction = m.friction(w) + m.cogging * s_6 + self.load;
         Rates { psi: dpsi, w: (tau - friction) / m.J, theta: w }
-    }
-
-    pub(crate) fn dq(&self) -> [f64; 2] {
-        let (sin, cos) = drive_base::math::sin_cos(self.motor.n_p * self.theta);
-        let psi = Self::turned(self.psi, cos, -sin);
-        self.motor.current(psi.alpha(), psi.beta())
     }
 
     /// Electrical angle in rad.
