@@ -121,7 +121,8 @@ pub struct Commission {
     loops: Loops,
     axes: Axes,
     fit: OutputError,
-    large: [Option<Magnetization>; 2],
+    /// Of the large loops; without an amplitude: not found.
+    large: [Magnetization; 2],
     starting: Starting,
     turning: Turning,
     levels: Levels,
@@ -163,7 +164,7 @@ impl Commission {
             loops: Loops::default(),
             axes: Axes::default(),
             fit: OutputError::default(),
-            large: [None; 2],
+            large: [Magnetization::default(); 2],
             starting: Starting::default(),
             turning: Turning::default(),
             levels: Levels::default(),
@@ -459,8 +460,8 @@ impl Commission {
     fn fitted(&mut self, found: Option<Magnetization>) -> Result<(), Fault> {
         let Axes { L_d, L_q, .. } = self.axes;
         match self.excited {
-            Excited::LargeD => self.large[0] = found,
-            Excited::LargeQ => self.large[1] = found,
+            Excited::LargeD => self.large[0] = found.unwrap_or_default(),
+            Excited::LargeQ => self.large[1] = found.unwrap_or_default(),
             Excited::SmallD => self.axes.L_d = found.map_or(L_d, |m| m.at_zero()),
             Excited::SmallQ => {
                 self.axes.L_q = found.filter(|m| m.residual < 0.015).map_or(L_q, |m| m.at_zero());
@@ -481,7 +482,8 @@ impl Commission {
             Excited::LargeD | Excited::SmallD => Excited::LargeQ,
             Excited::LargeQ if slow(self.axes.L_q) => Excited::SmallQ,
             Excited::LargeQ | Excited::SmallQ => {
-                self.results.show_inductances(&self.axes, self.large);
+                let large = self.large.map(|m| (m.A > 0.0).then_some(m));
+                self.results.show_inductances(&self.axes, large);
                 return self.stood();
             }
         };
