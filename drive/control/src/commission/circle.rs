@@ -26,7 +26,7 @@ const POINTS: usize = 256;
 /// Fewest points.
 const FEWEST: usize = 24;
 /// Fits of the center.
-const PASSES: usize = 3;
+const PASSES: usize = 4;
 
 /// The points of a part on their way.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -109,8 +109,12 @@ impl Points {
             return None;
         }
         let share = 1.0 / self.each().fold(0.0, |sum, _| sum + 1.0);
-        // Center and drift.
-        let (mut c, mut d) = (self.each().fold(AlphaBeta::ZERO, |sum, point| sum + point.1 * share), AlphaBeta::ZERO);
+        // Center and drift: first of the whole, whose turns are nearly a mean.
+        let (mut c, mut d, mut squares) = (AlphaBeta::ZERO, AlphaBeta::ZERO, 0.0);
+        for (tau, p, ..) in self.each() {
+            (c, d, squares) = (c + p * share, d + p * tau, squares + tau * tau);
+        }
+        d = d * (1.0 / squares);
         let mut radius = 0.0;
         for _ in 0..PASSES {
             let mut normal = Normal::<5>::default();
@@ -158,5 +162,82 @@ impl Points {
             deviation: (squares * share).sqrt() / radius,
             turns: (a_1 + a_3).abs() / std::f64::consts::PI,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const T: f64 = 1e-4;
+    const PSI: f64 = 0.15;
+
+    /// A part of `n` samples at the angle `angle(t)` with the currents `current(t)` along d and q; p drifts, and the
+    /// observer's angle lags.
+    fn part(n: u32, angle: impl Fn(f64) -> f64, current: impl Fn(f64) -> [f64; 2]) -> Part {
+        let mut points = Points::default();
+        points.begin();
+        let p = |k: f64| {
+            let v = Axis::<Estimated>::at(angle(k * T)).along(PSI);
+            v + AlphaBeta::new(0.07 + 0.9 * k * T, -0.04 - 0.6 * k * T)
+        };
+        for k in 1..=n {
+            let k = f64::from(k);
+            let [d, q] = current(k * T);
+            let theta = angle(k * T);
+            points.take(p(k) - p(k - 1.0), Axis::<Estimated>::at(theta).to_stator(DqHat::new(d, q)), theta - 0.1);
+        }
+        points.end(T).unwrap()
+    }
+
+    /// Radius, speed, acceleration, torque and i_d of a drifting circle, with more samples than points.
+    #[test]
+    fn an_exact_circle_comes_back() {
+        for n in [250, 255, 3000, 9000] {
+            let (w, a, end) = (200.0, 120.0, f64::from(n) * T);
+            let r = part(n, |t| 0.4 + w * t + 0.5 * a * t * t, |_| [-0.3, 2.0]);
+            let pairs = [
+                ("radius", r.radius, PSI),
+                ("speed", r.w, w + 0.5 * a * end),
+                ("acceleration", r.acceleration, a),
+                ("torque", r.torque, PSI * 2.0),
+                ("i_d", r.i_d, -0.3),
+                ("turns", r.turns, (w * end + 0.5 * a * end * end) / std::f64::consts::TAU),
+            ];
+            for (name, found, expected) in pairs {
+                // The last point is up to 64 samples before the end of the part.
+                let limit = match name {
+                    "speed" | "turns" => 0.02,
+                    "radius" | "acceleration" => 3e-4,
+                    _ => 1e-3,
+                };
+                assert!((found / expected - 1.0).abs() < limit, "{name} of {n}: {found}, not {expected}");
+            }
+            assert!(r.deviation < 1e-3, "{}", r.deviation);
+        }
+    }
+
+    /// J w' + B w = K i_q holds for the means, however speed and current oscillate in the part.
+    #[test]
+    fn the_means_fulfill_the_equation_of_motion() {
+        let (J, B) = (1e-3, 4e-4);
+        for (amplitude, rate) in [(3.0, 20.0), (10.0, 37.0), (40.0, 300.0)] {
+            let angle = |t: f64| 150.0 * t + 30.0 * t * t + amplitude / rate * (1.0 - (rate * t).cos());
+            let w = |t: f64| 150.0 + 60.0 * t + amplitude * (rate * t).sin();
+            let slope = |t: f64| 60.0 + amplitude * rate * (rate * t).cos();
+            let r = part(4000, angle, |t| [0.5, (J * slope(t) + B * w(t)) / PSI]);
+            let left = J * r.acceleration + B * r.w;
+            assert!((r.torque / left - 1.0).abs() < 2e-3, "{amplitude} {rate}: {} {left}", r.torque);
+        }
+    }
+
+    #[test]
+    fn few_points_are_no_part() {
+        let mut points = Points::default();
+        points.begin();
+        for _ in 0..FEWEST - 1 {
+            points.take(AlphaBeta::new(1e-3, 0.0), AlphaBeta::ZERO, 0.0);
+        }
+        assert_eq!(points.end(T), None);
     }
 }

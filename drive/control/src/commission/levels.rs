@@ -378,3 +378,36 @@ impl Levels {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    #[test]
+    fn a_part_has_enough_turns_and_is_short_enough() {
+        for (turns_a_second, whole, expected) in
+            [(1.0, 4.0, 2.5), (10.0, 3.0, 1.2), (200.0, 0.3, 0.2), (200.0, 4.0, 0.4)]
+        {
+            let found = part(TAU * turns_a_second, whole);
+            assert!((found - expected).abs() < 1e-12, "{turns_a_second} 1/s: {found} s, not {expected} s");
+        }
+    }
+
+    /// A third error of the voltage, psi (1 + x / w), is within the half-width.
+    #[test]
+    fn an_error_of_the_voltage_is_in_the_half_width() {
+        let bench = Bench { n_p: 2.0, U: 100.0, psi_r: 0.2, I: 10.0, ..Bench::default() };
+        let mut levels = Levels { inertia: 1.0, ..Levels::default() };
+        for (n, error) in [(0, 0.03), (1, 0.015), (2, 0.01)] {
+            let psi = 0.15 * (1.0 + error);
+            levels.radii[n] = Radii { sum: 4.0 * psi, squares: 4.0 * psi * psi, parts: 4.0 };
+        }
+        let mut results = Results::default();
+        assert_eq!(levels.show(&bench, &mut results), Err(Fault::Mechanics), "there are no parts");
+        let error = results.psi_M.value / 0.15 - 1.0;
+        assert!((error - 0.01).abs() < 1e-9 && results.psi_M.u > 0.0099 && results.psi_M.u < 0.0105, "{results:?}");
+        levels.radii[2].sum *= 0.1;
+        assert_eq!(levels.show(&bench, &mut results), Err(Fault::Flux), "0.015 Wb is not within 0.25 and 1.15 psi_r");
+    }
+}

@@ -90,3 +90,54 @@ impl Mechanics {
         last
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRUE: [f64; 3] = [2e-3, 5e-4, 0.08];
+
+    /// Levels at three speeds and sweeps between them, `change` added to the torque of the part `n`.
+    fn parts(change: impl Fn(u32) -> f64) -> Option<Found> {
+        let [J, B, tau_coulomb] = TRUE;
+        let mut mechanics = Mechanics::default();
+        for n in 0..40_u32 {
+            let w = [20.0, 40.0, 60.0][(n % 3) as usize];
+            let a = [0.0, 0.0, 150.0, 0.0, -150.0][(n % 5) as usize];
+            mechanics.add(a, 0.1, w, J * a + B * w + tau_coulomb + change(n));
+        }
+        mechanics.solve(1.3 * J, 20.0, 40.0)
+    }
+
+    #[test]
+    fn exact_parts_give_exact_values_and_one_outlier_is_left_out() {
+        for outlier in [0.0, 3.0] {
+            let Found { J, B, tau_coulomb, tau_friction } = parts(|n| if n == 17 { outlier } else { 0.0 }).unwrap();
+            let friction = TRUE[1] * 40.0 + TRUE[2];
+            for (x, expected) in [(J, TRUE[0]), (B, TRUE[1]), (tau_coulomb, TRUE[2]), (tau_friction, friction)] {
+                assert!((x.value / expected - 1.0).abs() < 1e-9 && x.u < 1.0, "{x:?}, not {expected}");
+            }
+            assert!(tau_friction.u < tau_coulomb.u && tau_friction.u < B.u, "the sum is known better");
+        }
+    }
+
+    /// A load in the second half: no value, or one so uncertain that it is refused.
+    #[test]
+    fn a_load_on_the_way_is_seen() {
+        let found = parts(|n| if n < 20 { 0.0 } else { 0.5 });
+        assert!(found.is_none_or(|found| found.tau_friction.u > 0.15), "{found:?}");
+    }
+
+    #[test]
+    fn too_few_parts_or_one_speed_give_no_value() {
+        let mut mechanics = Mechanics::default();
+        for _ in 0..7 {
+            mechanics.add(1.0, 0.1, 2.0, 3.0);
+        }
+        assert_eq!(mechanics.solve(1.0, 1.0, 1.0), None);
+        for _ in 0..7 {
+            mechanics.add(1.0, 0.1, 2.0, 3.0);
+        }
+        assert_eq!(mechanics.solve(1.0, 1.0, 1.0), None);
+    }
+}

@@ -206,3 +206,24 @@ impl Starting {
         self.phase == Phase::Coast
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// After coasting, the pulse of zero voltage tells a turning rotor, which coasts on, from one at rest.
+    #[test]
+    fn a_pulse_shows_a_turning_rotor() {
+        let bench = Bench { T: 1e-4, delay: 1.0, I: 10.0, ..Bench::default() };
+        for (i, next) in [(1.0, Phase::Coast), (0.1, Phase::Align)] {
+            let mut starting = Starting { phase: Phase::Coast, ..Starting::default() };
+            let (mut turning, sample) = (Turning::default(), Sample { i: AlphaBeta::new(i, 0.0), ..Sample::default() });
+            let mut pulse = 0;
+            for _ in 0..5000 + 4 {
+                let step = starting.update(&bench, &mut turning, &sample).ok().unwrap();
+                pulse += u32::from(matches!(step, Started::Voltage(u) if u.magnitude() == 0.0));
+            }
+            assert_eq!((starting.phase, pulse), (next, 3), "{i} A");
+        }
+    }
+}

@@ -188,3 +188,65 @@ impl Turning {
         Axis::<Estimated>::at(self.theta).from_stator(sample.i)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commission::curve::{Curve, POINTS};
+    use drive_base::math::{exp, wrap};
+
+    fn bench(resistive: f64) -> Bench {
+        let mut curve = Curve::new(10.0);
+        for n in 0..POINTS {
+            curve.set(n, resistive * curve.current(n));
+        }
+        Bench { T: 1e-4, delay: 1.0, I: 10.0, U: 100.0, psi_r: 0.2, psi_0: 0.12, R: 0.5, curve, ..Bench::default() }
+    }
+
+    /// The observer comes to the rotor of an exact EMF, with a psi_M that is 20 % off and from an angle that is 0.3 rad off.
+    #[test]
+    fn the_observer_follows_an_exact_emf() {
+        let bench = bench(0.0);
+        let mut turning = Turning::new(&bench, [2e-3, 3e-3], 200.0);
+        turning.motor.psi_M = 0.12;
+        turning.begin(&bench, &Sample::default(), 0.3);
+        let (w, psi) = (150.0, 0.12);
+        let flux = |k: f64| Axis::<Estimated>::at(w * k * bench.T).along(psi);
+        for k in 1..10_000_u32 {
+            let k = f64::from(k);
+            let delta = flux(k) - flux(k - 1.0);
+            turning.observe(&bench, &Sample { u: delta * (1.0 / bench.T), ..Sample::default() });
+            assert!((turning.delta - delta).magnitude() < 1e-12);
+        }
+        let off = wrap(turning.theta - 9_999.0 * w * bench.T);
+        assert!(off.abs() < 2e-3 && (turning.w / w - 1.0).abs() < 1e-3, "{off} rad, {} rad/s", turning.w);
+    }
+
+    /// At rest, with legs that are resistances, the current between two samples is an exponential.
+    #[test]
+    fn the_legs_lose_the_mean_of_an_exponential() {
+        let (legs, L) = (1.5, 1e-3);
+        let bench = bench(legs);
+        let turning = Turning::new(&bench, [L, L], 200.0);
+        let sample = Sample { i_last: AlphaBeta::new(1.0, -2.0), i: AlphaBeta::new(3.0, 0.5), ..Sample::default() };
+        let x = (bench.R + legs) * bench.T / L;
+        let mean = 1.0 / (1.0 - exp(-x)) - 1.0 / x;
+        let expected = (sample.i_last + (sample.i - sample.i_last) * mean) * legs;
+        let found = turning.legs(&bench, &sample);
+        assert!((found - expected).magnitude() < 1e-3 * expected.magnitude(), "{found:?}, not {expected:?}");
+    }
+
+    /// Where the current is the same in the rotor's frame at both samples, it bows along d by psi_M (w T)^2 / (8 L_d).
+    #[test]
+    fn the_current_bows_between_samples() {
+        let (legs, w) = (0.01, 400.0);
+        let bench = Bench { R: 0.0, ..bench(legs) };
+        let turning = Turning { w, ..Turning::new(&bench, [2e-3, 2e-3], 200.0) };
+        let middle = Axis::<Estimated>::at(0.5 * w * bench.T);
+        let u = middle.to_stator(DqHat::new(0.0, w * turning.motor.psi_M));
+        let found = middle.from_stator(turning.legs(&bench, &Sample { u, ..Sample::default() })).d();
+        let turn = w * bench.T;
+        let expected = -legs * (2.0 / 3.0) * turning.motor.psi_M * turn * turn / (8.0 * 2e-3);
+        assert!((found / expected - 1.0).abs() < 0.03, "{found} V, not {expected} V");
+    }
+}
