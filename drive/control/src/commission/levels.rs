@@ -17,7 +17,7 @@
 //!
 //! J / (n_p K) of the speed control and of i_a follows the last sweep, i_f the last two levels. psi_M is the mean radius
 //! at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is the
-//! error at 0.45 w_r and so part of the half-width. If time runs out after each level has been measured once, the rest is
+//! error at 0.45 w_r and so part of the half-width, as is that of L_d. If time runs out after each level has been measured once, the rest is
 //! left out. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
 
 use super::bench::{Bench, Sample};
@@ -44,6 +44,8 @@ const TURNS: f64 = 2.2;
 const LONGEST: f64 = 1.2;
 /// Greatest deviation of a part from a circle.
 const DEVIATION: f64 = 0.05;
+/// Relative half-width of an L_d that is refused.
+const UNKNOWN: f64 = 0.1;
 /// Least relative half-width of psi_M.
 const LEAST: f64 = 0.001;
 /// Speed off a level over that of the level: near enough to measure, and lost.
@@ -280,7 +282,7 @@ impl Levels {
                         self.at = ORDER.iter().fold(0, |n, _| n + 1);
                     }
                     if self.brakes() {
-                        self.show(bench, results)?;
+                        self.show(bench, turning.motor.L_d, results)?;
                     }
                     self.sweep(bench, turning);
                 }
@@ -356,8 +358,8 @@ impl Levels {
         }
     }
 
-    /// The results.
-    fn show(&self, bench: &Bench, results: &mut Results) -> Result<(), Fault> {
+    /// The results, where the radii are those of `L_d` (H).
+    fn show(&self, bench: &Bench, L_d: f64, results: &mut Results) -> Result<(), Fault> {
         let [low, _, high] = self.radii;
         if low.parts < 1.0 || high.parts < 1.0 {
             return Err(Fault::Flux);
@@ -368,7 +370,8 @@ impl Levels {
         }
         let error = 0.5 * (low.sum / low.parts / psi - 1.0);
         let variance = (high.squares / high.parts - psi * psi).max(0.0) / (psi * psi);
-        let u = (error * error + 4.0 * variance / high.parts + LEAST * LEAST).sqrt();
+        let inductance = results.L_d.u.min(UNKNOWN) * L_d * ALONG * bench.I / psi;
+        let u = (error * error + inductance * inductance + 4.0 * variance / high.parts + LEAST * LEAST).sqrt();
         let K = 1.5 * bench.n_p * psi;
         let w_f = 0.3 * bench.w_r() / bench.n_p;
         let J = self.inertia * bench.n_p * K;
@@ -404,10 +407,14 @@ mod tests {
             levels.radii[n] = Radii { sum: 4.0 * psi, squares: 4.0 * psi * psi, parts: 4.0 };
         }
         let mut results = Results::default();
-        assert_eq!(levels.show(&bench, &mut results), Err(Fault::Mechanics), "there are no parts");
+        assert_eq!(levels.show(&bench, 1e-3, &mut results), Err(Fault::Mechanics), "there are no parts");
         let error = results.psi_M.value / 0.15 - 1.0;
         assert!((error - 0.01).abs() < 1e-9 && results.psi_M.u > 0.0099 && results.psi_M.u < 0.0105, "{results:?}");
         levels.radii[2].sum *= 0.1;
-        assert_eq!(levels.show(&bench, &mut results), Err(Fault::Flux), "0.015 Wb is not within 0.25 and 1.15 psi_r");
+        assert_eq!(
+            levels.show(&bench, 1e-3, &mut results),
+            Err(Fault::Flux),
+            "0.015 Wb is not within 0.25 and 1.15 psi_r"
+        );
     }
 }
