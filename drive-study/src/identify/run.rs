@@ -15,22 +15,25 @@ const FILE: [(&str, &str, Option<f64>, &str); 9] = [
     ("R_s", "Ohm", Some(LIMIT_R), "commission with more current"),
     ("L_d", "H", Some(LIMIT_L), LOOPS),
     ("L_q", "H", Some(LIMIT_L), LOOPS),
-    ("psi_M", "Wb", None, "give it, --given psi_M=..., or a record of the running drive"),
-    ("J", "kg.m2", None, "give it, --given J=..., or a record of the running drive"),
-    ("B", "N.m.s/rad", None, "a record of the running drive tells it"),
-    ("tau_coulomb", "N.m", None, "a record of the running drive tells it"),
+    ("psi_M", "Wb", None, "commission.mode Spin, or --given psi_M=..., or a record of the running drive"),
+    ("J", "kg.m2", None, "commission.mode Spin, or --given J=..., or a record of the running drive"),
+    ("B", "N.m.s/rad", None, FRICTION),
+    ("tau_coulomb", "N.m", None, FRICTION),
     ("u_dead", "V", Some(LIMIT_DEAD), "an inverter without dead time has none"),
     ("i_zero", "A", Some(LIMIT_DEAD), "fmu tune has a rule for it"),
 ];
 
 /// The others: remarks of the file.
-const MORE: [(&str, &str, Option<f64>, &str); 5] = [
+const MORE: [(&str, &str, Option<f64>, &str); 6] = [
     ("L_d_plus", "H", Some(LIMIT_L), LOOPS),
     ("L_d_minus", "H", Some(LIMIT_L), LOOPS),
     ("L_q_chord", "H", Some(LIMIT_L), LOOPS),
     ("s_2", "A/Wb2", Some(LIMIT_DEAD), LOOPS),
     ("s_3", "A/Wb3", Some(LIMIT_DEAD), LOOPS),
+    ("tau_friction", "N.m", None, FRICTION),
 ];
+
+const FRICTION: &str = "commission.mode Spin tells at least the sum of both, tau_friction";
 
 const LOOPS: &str = "the loops of current do not fit or do not agree: block the rotor, or commission with less current";
 
@@ -97,7 +100,7 @@ pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commiss
     };
     let column = |name: &str| {
         find(name)?.with_context(|| {
-        format!("{file}: has no column {name}: record all outputs of a drive or controller with commission.mode Standstill")
+        format!("{file}: has no column {name}: record all outputs of a drive or controller whose commission.mode is Standstill or Spin")
     })
     };
     let Some((line, last)) = table.rows().last() else { bail!("{file}: has no row") };
@@ -187,8 +190,8 @@ impl Commissioned {
             Some(why) => format!("{} = ...  # refused: {why}", v.name),
         };
         let Self { notes, n_p, values, ratings, .. } = self;
-        let first = "flux linkage over current at 0.9 commission.i, and the saturation of the d-axis".to_owned();
-        let remarks = [first].into_iter().chain(self.more.iter().map(remark)).collect();
+        let first = "flux linkage over current at 0.9 commission.i, the saturation of the d-axis, and the friction at 0.3 commission.speed";
+        let remarks = [first.to_owned()].into_iter().chain(self.more.iter().map(remark)).collect();
         let from = "a commissioning";
         Content { from, notes, n_p: *n_p, values, ratings: *ratings, remarks }.text(name, source)
     }

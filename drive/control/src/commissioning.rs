@@ -10,22 +10,14 @@
 //!
 //! With `commission.mode` Off nothing of this exists: the sequence is on the heap, and made when the simulation starts.
 
+pub use crate::commission::CommissionMode;
 use crate::commission::{Commission, CommissionFault, CommissionSetup, CommissionState, Results, Voltage};
 use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::Phases;
 use drive_base::motor::{A_PER_WB2, A_PER_WB3};
-use fmu_core::unit::{AMPERE, HENRY, OHM, ONE, SECOND, SPEED, VOLT};
-use fmu_core::{Fault, Field, Row, Table, enumeration, table};
+use fmu_core::unit::{AMPERE, HENRY, KG_M2, NEWTON_METER, NM_S_PER_RAD, OHM, ONE, SECOND, SPEED, VOLT, WEBER};
+use fmu_core::{Fault, Field, Row, Table, table};
 use serde::{Deserialize, Serialize};
-
-enumeration! {
-    /// What the self-commissioning finds; values never change.
-    #[derive(Serialize, Deserialize)]
-    pub enum CommissionMode("Commissioning", "Self-commissioning") {
-        1 Off "None: commission_start has no effect";
-        2 Standstill "Offsets, R_s, the inverter's dead time, L_d, L_q and saturation, with a rotor that is free or blocked";
-    }
-}
 
 /// Time in s with the gates off before the sequence: the currents of the control before it are gone.
 const QUIET: f64 = 0.02;
@@ -164,6 +156,8 @@ impl Commissioning {
 /// What the sequence is given.
 fn setup(par: &ControllerParameters) -> CommissionSetup {
     CommissionSetup {
+        mode: par.commission.mode,
+        n_p: par.motor.n_p,
         T_s: par.T_s,
         delay: par.delay,
         i: par.commission.i,
@@ -227,6 +221,11 @@ pub const IDENTIFIED: &Table<Held> = identified! {
     L_d_plus HENRY "d-axis flux linkage over current, at 0.9 commission.i along the magnet";
     L_d_minus HENRY "d-axis flux linkage over current, at 0.9 commission.i against the magnet";
     L_q_chord HENRY "q-axis flux linkage over current, at 0.9 commission.i";
+    psi_M WEBER "Permanent-magnet flux linkage";
+    J KG_M2 "Moment of inertia of the rotor and all that turns with it";
+    B NM_S_PER_RAD "Viscous friction";
+    tau_coulomb NEWTON_METER "Coulomb friction torque";
+    tau_friction NEWTON_METER "Friction torque at 0.3 commission.speed, known better than B and tau_coulomb alone";
     u_dead VOLT "Dead-time voltage of an inverter leg, with the threshold of its devices";
     i_zero AMPERE "Current below which an inverter leg loses less";
     s_2 A_PER_WB2 "Second-order d-axis saturation coefficient";

@@ -168,14 +168,20 @@ impl CurrentFrequencyStart {
         let grown = if self.stage == Stage::Behind { (3.0 * t / par.t_align).min(1.0) } else { 1.0 };
         let K = motor.torque_constant();
         let w_0 = (n_p * K * par.i / J).sqrt();
-        let gain = 2.0 * ZETA * w_0 * J / (n_p * K);
-        let i_q = (-gain * (self.e.q() / motor.psi_M - self.w)).clamp(-par.i, par.i);
+        let i_q = damping(w_0, J, n_p * K, self.e.q() / motor.psi_M - self.w, par.i);
         StartStep::Current { theta: self.theta, w: self.w, i_ref: DqHat::new(par.i * grown, i_q * grown) }
     }
 
     fn enter(&mut self, stage: Stage) {
         (self.stage, self.n) = (stage, 0.0);
     }
+}
+
+/// Current in A that damps a rotor of the inertia `J` and the torque `n_p_K` (n_p K) per ampere, which oscillates with `w_0`
+/// (rad/s) and turns by `slip` (rad/s) faster than its current vector; at most `most` (A).
+pub(crate) fn damping(w_0: f64, J: f64, n_p_K: f64, slip: f64, most: f64) -> f64 {
+    let gain = 2.0 * ZETA * w_0 * J / n_p_K;
+    (-gain * slip).clamp(-most, most)
 }
 
 type P = Row<StartParameters>;

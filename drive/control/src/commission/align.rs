@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 pub(super) const ALIGNED: f64 = 0.4;
 /// Share of I of the current across that is left alone.
 const ACROSS: f64 = 0.35;
+/// Longest time in s of an alignment, of a swing and of coasting.
+pub(super) const LONGEST: f64 = 12.0;
 /// Share of U of all voltages.
 pub(super) const VOLTAGE: f64 = 0.95;
 

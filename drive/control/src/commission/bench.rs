@@ -46,12 +46,19 @@ pub(super) struct Bench {
     pub(super) w_0: f64,
     /// The rotor does not turn.
     pub(super) blocked: bool,
+    /// Number of pole pairs.
+    pub(super) n_p: f64,
 }
 
 impl Bench {
     /// Bandwidth of the dc current control in rad/s.
-    fn w_c(&self) -> f64 {
+    pub(super) fn w_c(&self) -> f64 {
         0.12 / self.T
+    }
+
+    /// Rated electrical speed in rad/s.
+    pub(super) fn w_r(&self) -> f64 {
+        self.U / self.psi_r
     }
 
     /// Proportional gain in Ohm.

@@ -75,8 +75,15 @@ impl Curve {
     /// Voltage in V that the legs take from the command at the currents `i` (A).
     #[inline]
     pub(super) fn loss(&self, i: AlphaBeta) -> AlphaBeta {
+        self.loss_and_slope(i).0
+    }
+
+    /// The same, and the mean slope of the legs in Ohm.
+    #[inline]
+    pub(super) fn loss_and_slope(&self, i: AlphaBeta) -> (AlphaBeta, f64) {
         let Phases { a, b, c } = Phases::from_stator(i);
-        Phases { a: self.leg(a).0, b: self.leg(b).0, c: self.leg(c).0 }.to_stator()
+        let (a, b, c) = (self.leg(a), self.leg(b), self.leg(c));
+        (Phases { a: a.0, b: b.0, c: c.0 }.to_stator(), (a.1 + b.1 + c.1) * (1.0 / 3.0))
     }
 
     /// Loss in V along the unit vector `along` at the currents `i` (A), and its slope in Ohm against the current along it.

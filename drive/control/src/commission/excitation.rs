@@ -28,38 +28,54 @@ const PEAKS: [f64; 12] = [-0.707, 1.0, -1.0, 1.0, -0.9, 0.8, -0.7, 0.6, -0.5, 0.
 /// Length of the way through the peaks, in amplitudes.
 const WAY: f64 = 15.814;
 
-/// Rows of four numbers.
+/// At most `N` rows of `C` numbers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Record {
-    rows: SMatrix<f64, 4, ROWS>,
+pub(super) struct Rows<const C: usize, const N: usize> {
+    rows: SMatrix<f64, C, N>,
     #[serde(with = "crate::commission::fixed_size")]
     length: u64,
 }
 
-impl Default for Record {
+/// The record of an excitation.
+pub(super) type Record = Rows<4, ROWS>;
+
+impl<const C: usize, const N: usize> Default for Rows<C, N> {
     fn default() -> Self {
         Self { rows: SMatrix::zeros(), length: 0 }
     }
 }
 
-impl Record {
+impl<const C: usize, const N: usize> Rows<C, N> {
     pub(super) fn len(&self) -> usize {
-        usize::try_from(self.length).unwrap_or(ROWS).min(ROWS)
+        usize::try_from(self.length).unwrap_or(N).min(N)
     }
 
-    pub(super) fn row(&self, n: usize) -> [f64; 4] {
+    pub(super) fn row(&self, n: usize) -> [f64; C] {
         std::array::from_fn(|k| self.rows[(k, n)])
     }
 
-    /// Adds a row; one more than [`ROWS`] is lost.
-    pub(super) fn push(&mut self, row: [f64; 4]) {
+    /// Adds a row; one more than `N` is lost.
+    pub(super) fn push(&mut self, row: [f64; C]) {
         let n = self.len();
-        if n < ROWS {
-            for (k, x) in row.into_iter().enumerate() {
-                self.rows[(k, n)] = x;
-            }
+        if n < N {
+            self.set(n, row);
             self.length += 1;
         }
+    }
+
+    fn set(&mut self, n: usize, row: [f64; C]) {
+        for (k, x) in row.into_iter().enumerate() {
+            self.rows[(k, n)] = x;
+        }
+    }
+
+    /// Two rows become one, as `pair` says.
+    pub(super) fn halve(&mut self, pair: impl Fn([f64; C], [f64; C]) -> [f64; C]) {
+        let half = self.len() / 2;
+        for n in 0..half {
+            self.set(n, pair(self.row(2 * n), self.row(2 * n + 1)));
+        }
+        self.length = u64::try_from(half).unwrap_or(0);
     }
 
     pub(super) fn clear(&mut self) {

@@ -26,6 +26,8 @@ impl<const P: usize> Default for Normal<P> {
 pub(super) struct Solution<const P: usize> {
     pub(super) x: [f64; P],
     pub(super) half_width: [f64; P],
+    /// Standard errors of the unknowns over that of the residual.
+    pub(super) spread: [f64; P],
     /// Variance of the residual.
     pub(super) variance: f64,
 }
@@ -81,11 +83,12 @@ impl<const P: usize> Normal<P> {
         let unknowns = scale.iter().map(|&s| if s > 0.0 { 1.0 } else { 0.0 }).sum::<f64>();
         let left = (self.y_2 - (0..P).map(|j| x[j] * self.b[j]).sum::<f64>()).max(0.0);
         let variance = left / (self.rows - unknowns).max(1.0);
-        let half_width = std::array::from_fn(|j| {
+        let spread: [f64; P] = std::array::from_fn(|j| {
             let column = solve(&|k| if k == j { 1.0 } else { 0.0 });
-            2.0 * (variance * column[j].max(0.0)).sqrt() * scale[j]
+            column[j].max(0.0).sqrt() * scale[j]
         });
-        Some(Solution { x, half_width, variance })
+        let half_width = spread.map(|spread| 2.0 * variance.sqrt() * spread);
+        Some(Solution { x, half_width, spread, variance })
     }
 }
 

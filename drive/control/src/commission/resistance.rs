@@ -7,7 +7,10 @@
 //! ```
 //!
 //! gives R, u_dead and i_x by least squares over nine currents that the PI holds. Nine smaller ones follow at constant
-//! voltages; f(i) = u - R i of all eighteen, and l(i) = 1.5 f(i) - l(i/2) from the smallest current upward.
+//! voltages; f(i) = u - R i of all eighteen, and l(i) = 1.5 f(i) - l(i/2) from the smallest current upward. An error of f
+//! returns in each higher octave with the other sign, undiminished, and the bend of f about i_x makes one of some percent of
+//! u_dead. So the same equation also leads downward, from u_dead (1 - i_x / (2 i)) at the greatest currents, and the curve
+//! changes from the one to the other about i_x.
 
 use super::align::Dc;
 use super::bench::{Bench, Sample};
@@ -172,14 +175,30 @@ pub(super) fn adopt(bench: &mut Bench, staircases: &[Staircase]) -> Result<(), F
     if !staircases.iter().all(Staircase::is_ordered) {
         return Err(Fault::Resistance);
     }
-    let (R, mut curve) = (bench.R, Curve::new(1.024 * bench.I));
+    let R = bench.R;
+    let f = |i: f64| staircases.iter().map(|s| s.lost(R, i)).sum::<f64>() * each;
+    let (mut up, mut down) = (Curve::new(1.024 * bench.I), Curve::new(1.024 * bench.I));
     for n in 0..POINTS {
-        let i = curve.current(n);
-        let f = |i: f64| staircases.iter().map(|s| s.lost(R, i)).sum::<f64>() * each;
+        let i = up.current(n);
         // Below the table, a leg is a resistance, and f = l.
-        let half = if n < OCTAVE { f(0.5 * i) } else { curve.at(n - OCTAVE) };
-        curve.set(n, 1.5 * f(i) - half);
+        let half = if n < OCTAVE { f(0.5 * i) } else { up.at(n - OCTAVE) };
+        up.set(n, 1.5 * f(i) - half);
     }
-    bench.curve = curve;
+    for n in (0..POINTS).rev() {
+        let i = down.current(n);
+        let l = if n + OCTAVE < POINTS {
+            1.5 * f(2.0 * i) - down.at(n + OCTAVE)
+        } else {
+            bench.u_dead * (1.0 - 0.5 * bench.i_x / i)
+        };
+        down.set(n, l);
+    }
+    // From half an octave below i_x to one and a half above.
+    for n in 0..POINTS {
+        let octaves = ln(up.current(n) / bench.i_x) / std::f64::consts::LN_2;
+        let share = (0.5 * octaves + 0.25).clamp(0.0, 1.0);
+        up.set(n, up.at(n) + share * (down.at(n) - up.at(n)));
+    }
+    bench.curve = up;
     Ok(())
 }

@@ -2,18 +2,25 @@
 
 use super::axes::Axes;
 use super::bench::Bench;
+use super::mechanics::Found;
 use super::output_error::Magnetization;
 use super::resistance::Line;
 use serde::{Deserialize, Serialize};
 
 /// Greatest residual of a loop over its amplitude, along d and q.
 const RESIDUAL: [f64; 2] = [0.02, 0.01];
-/// Greatest half-widths of R_s, of the inductances, and of the dead time.
+/// Greatest relative half-width of R_s.
 pub const LIMIT_R: f64 = 0.01;
-/// See [`LIMIT_R`].
+/// Greatest relative half-width of the inductances.
 pub const LIMIT_L: f64 = 0.05;
-/// See [`LIMIT_R`].
+/// Greatest relative half-width of the dead time's values.
 pub const LIMIT_DEAD: f64 = 0.5;
+/// Greatest relative half-width of psi_M.
+const LIMIT_PSI: f64 = 0.02;
+/// Greatest relative half-width of J.
+const LIMIT_J: f64 = 0.05;
+/// Greatest relative half-width of the friction's values.
+const LIMIT_FRICTION: f64 = 0.15;
 
 /// A value and the half-width of its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -60,6 +67,16 @@ pub struct Results {
     pub s_2: Identified,
     /// Third-order d-axis saturation coefficient in A/Wb3.
     pub s_3: Identified,
+    /// Permanent-magnet flux linkage in Wb.
+    pub psi_M: Identified,
+    /// Moment of inertia in kg.m2.
+    pub J: Identified,
+    /// Viscous friction in N.m.s/rad, and Coulomb friction in N.m.
+    pub B: Identified,
+    /// Coulomb friction in N.m.
+    pub tau_coulomb: Identified,
+    /// Both together at 0.3 of the rated speed in N.m, known better than each of them.
+    pub tau_friction: Identified,
     /// Currents in A of the chords.
     pub i_d: f64,
     /// Current in A of the q-axis chord.
@@ -86,6 +103,20 @@ impl Results {
         // The tails of dead time and threshold differ from 1/i: twice the half-width holds 95 % of the values.
         let double = |x: [f64; 2]| [2.0 * x[0], 4.0 * x[1]];
         self.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * bench.i_x, LIMIT_DEAD);
+    }
+
+    /// Flux linkage.
+    pub(super) fn show_flux(&mut self, psi_M: Identified) {
+        self.psi_M = Identified::within(psi_M.value, psi_M.u, LIMIT_PSI);
+    }
+
+    /// Inertia and friction.
+    pub(super) fn show_mechanics(&mut self, found: Found) {
+        let of = |x: Identified, limit: f64| Identified::within(x.value, x.u, limit);
+        self.J = of(found.J, LIMIT_J);
+        self.B = of(found.B, LIMIT_FRICTION);
+        self.tau_coulomb = of(found.tau_coulomb, LIMIT_FRICTION);
+        self.tau_friction = of(found.tau_friction, LIMIT_FRICTION);
     }
 
     /// Inductances, refused where the loops do not agree or do not fit; without the axis, neither chords nor saturation.

@@ -1,16 +1,20 @@
 //! The sequence of the commissioning, one sample at a time.
 
-use super::align::{ALIGNED, Dc, Rest};
+use super::align::{ALIGNED, Dc, LONGEST, Rest};
 use super::axes::{Axes, Loops};
 use super::bench::{Bench, Sample};
 use super::curve::Curve;
 use super::excitation::{Excitation, Plan, Record};
+use super::levels::{Level, Levels, rho};
 use super::offsets::Offsets;
 use super::output_error::{Along, Magnetization, OutputError, Progress};
 use super::probe::{Probe, Probed};
 use super::resistance::{Staircase, adopt};
+use super::setup::{CommissionSetup, Voltage};
+use super::starting::{Started, Starting};
 use super::swing::Swing;
-use super::{CommissionFault as Fault, CommissionState, Results};
+use super::turning::Turning;
+use super::{CommissionFault as Fault, CommissionMode, CommissionState, Results};
 use drive_base::frame::{AlphaBeta, Phases};
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +22,6 @@ use serde::{Deserialize, Serialize};
 const FIRST: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
 /// Current over I at which the gates go off.
 const TOO_MUCH: f64 = 1.35;
-/// Longest time in s of an alignment or a swing.
-const LONGEST: f64 = 12.0;
 /// Amplitudes of the loops over I: axes, small and large.
 const SMALL: [f64; 2] = [0.3, 0.35];
 const LARGE: f64 = 0.9;
@@ -27,29 +29,6 @@ const LARGE: f64 = 0.9;
 const MOTION: [f64; 2] = [0.004, 0.1];
 /// R T/L above which L(0) comes from a small loop's output error.
 const SLOW: f64 = 0.005;
-/// What the commissioning is given.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CommissionSetup {
-    /// Sample period in s, > 0.
-    pub T_s: f64,
-    /// Samples from taking the currents to the voltage acting: 0, 1 or 2.
-    pub delay: i32,
-    /// Greatest current of the commissioning in A, > 0: about the rated one to twice of it.
-    pub i: f64,
-    /// Rated electrical speed in rad/s, > 0.
-    pub speed: f64,
-    /// Longest time in s, > 0.
-    pub t_max: f64,
-}
-
-/// What the inverter shall do until the next sample.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Voltage {
-    /// Command in V.
-    pub u: AlphaBeta,
-    /// The gates are on.
-    pub gates: bool,
-}
 
 /// Parts of the sequence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,6 +46,8 @@ enum Stage {
     Down,
     Loop,
     Fit,
+    Start,
+    Levels,
     Done,
     Refused,
 }
@@ -114,7 +95,11 @@ pub struct Commission {
     loops: Loops,
     axes: Axes,
     fit: OutputError,
-    large: [Option<Magnetization>; 2],
+    /// Of the large loops; without an amplitude: not found.
+    large: [Magnetization; 2],
+    starting: Starting,
+    turning: Turning,
+    levels: Levels,
     results: Results,
 }
 
@@ -125,6 +110,7 @@ impl Commission {
             T: setup.T_s,
             delay: f64::from(setup.delay),
             I: setup.i,
+            n_p: f64::from(setup.n_p),
             curve: Curve::new(setup.i),
             ..Bench::default()
         };
@@ -152,7 +138,10 @@ impl Commission {
             loops: Loops::default(),
             axes: Axes::default(),
             fit: OutputError::default(),
-            large: [None; 2],
+            large: [Magnetization::default(); 2],
+            starting: Starting::default(),
+            turning: Turning::default(),
+            levels: Levels::default(),
             results: Results::default(),
         }
     }
@@ -160,6 +149,7 @@ impl Commission {
     /// What it does now.
     pub fn state(&self) -> CommissionState {
         match self.stage {
+            _ if self.setup.mode == CommissionMode::Off => CommissionState::Idle,
             Stage::Offsets => CommissionState::Offsets,
             Stage::Still | Stage::Probe => CommissionState::Probe,
             Stage::First | Stage::Return => CommissionState::Align,
@@ -169,6 +159,8 @@ impl Commission {
                 Excited::At0 | Excited::At45 | Excited::At90 | Excited::At135 => CommissionState::Axes,
                 Excited::LargeD | Excited::SmallD | Excited::LargeQ | Excited::SmallQ => CommissionState::Saturation,
             },
+            Stage::Start => CommissionState::Start,
+            Stage::Levels => CommissionState::Levels,
             Stage::Done => CommissionState::Done,
             Stage::Refused => CommissionState::Refused,
         }
@@ -202,7 +194,7 @@ impl Commission {
     }
 
     fn is_over(&self) -> bool {
-        matches!(self.stage, Stage::Done | Stage::Refused)
+        matches!(self.stage, Stage::Done | Stage::Refused) || self.setup.mode == CommissionMode::Off
     }
 
     fn refuse(&mut self, fault: Fault) {
@@ -254,7 +246,8 @@ impl Commission {
             }
         };
         self.commands = [u, self.commands[0], self.commands[1]];
-        Voltage { u, gates: !matches!(self.stage, Stage::Offsets | Stage::Done | Stage::Refused) }
+        let coasts = self.stage == Stage::Start && self.starting.coasts();
+        Voltage { u, gates: !(coasts || matches!(self.stage, Stage::Offsets | Stage::Done | Stage::Refused)) }
     }
 
     /// The gates are off.
@@ -310,9 +303,24 @@ impl Commission {
             }
             Stage::Fit => match self.fit.update(&self.bench, &self.excitation, &self.record) {
                 Progress::Continues => {}
-                Progress::Failed => self.fitted(None),
-                Progress::Found(magnetization) => self.fitted(Some(magnetization)),
+                Progress::Failed => self.fitted(None)?,
+                Progress::Found(magnetization) => self.fitted(Some(magnetization))?,
             },
+            Stage::Start => match self.starting.update(&self.bench, &mut self.turning, sample)? {
+                Started::Voltage(u) => return Ok(u),
+                Started::Off => {}
+                Started::Done(i_f) => {
+                    self.levels = Levels::new(&self.bench, &self.turning, sample, i_f);
+                    self.enter(Stage::Levels);
+                }
+            },
+            Stage::Levels => {
+                let left = self.setup.t_max - self.time();
+                match self.levels.update(&self.bench, &mut self.turning, sample, left, &mut self.results)? {
+                    Level::Voltage(u) => return Ok(u),
+                    Level::Done => self.enter(Stage::Done),
+                }
+            }
         }
         Ok(AlphaBeta::ZERO)
     }
@@ -412,8 +420,7 @@ impl Commission {
                     self.axes = self.loops.axes(self.bench.blocked).ok_or(Fault::Inductance)?;
                     self.results.axis = self.axes.axis;
                 }
-                self.next_loop();
-                return Ok(());
+                return self.next_loop();
             }
             Excited::LargeD | Excited::SmallD => (Along::D, self.axes.L_d),
             Excited::LargeQ | Excited::SmallQ => (Along::Q, self.axes.L_q),
@@ -423,27 +430,27 @@ impl Commission {
                 self.fit = fit;
                 self.enter(Stage::Fit);
             }
-            None => self.fitted(None),
+            None => self.fitted(None)?,
         }
         Ok(())
     }
 
     /// The fit of a loop is over.
-    fn fitted(&mut self, found: Option<Magnetization>) {
+    fn fitted(&mut self, found: Option<Magnetization>) -> Result<(), Fault> {
         let Axes { L_d, L_q, .. } = self.axes;
         match self.excited {
-            Excited::LargeD => self.large[0] = found,
-            Excited::LargeQ => self.large[1] = found,
+            Excited::LargeD => self.large[0] = found.unwrap_or_default(),
+            Excited::LargeQ => self.large[1] = found.unwrap_or_default(),
             Excited::SmallD => self.axes.L_d = found.map_or(L_d, |m| m.at_zero()),
             Excited::SmallQ => {
                 self.axes.L_q = found.filter(|m| m.residual < 0.015).map_or(L_q, |m| m.at_zero());
             }
             Excited::At0 | Excited::At45 | Excited::At90 | Excited::At135 => {}
         }
-        self.next_loop();
+        self.next_loop()
     }
 
-    fn next_loop(&mut self) {
+    fn next_loop(&mut self) -> Result<(), Fault> {
         let slow = |L: f64| self.bench.R * self.bench.T / L > SLOW;
         let next = match self.excited {
             Excited::At0 => Excited::At45,
@@ -454,13 +461,29 @@ impl Commission {
             Excited::LargeD | Excited::SmallD => Excited::LargeQ,
             Excited::LargeQ if slow(self.axes.L_q) => Excited::SmallQ,
             Excited::LargeQ | Excited::SmallQ => {
-                self.results.show_inductances(&self.axes, self.large);
-                self.enter(Stage::Done);
-                return;
+                let large = self.large.map(|m| (m.A > 0.0).then_some(m));
+                self.results.show_inductances(&self.axes, large);
+                return self.stood();
             }
         };
         self.excited = next;
         self.dc.u = 0.0;
         self.enter(if self.bench.blocked { Stage::Down } else { Stage::Ready });
+        Ok(())
+    }
+
+    /// The part at standstill is complete.
+    fn stood(&mut self) -> Result<(), Fault> {
+        if self.setup.mode == CommissionMode::Standstill {
+            self.enter(Stage::Done);
+            return Ok(());
+        }
+        if self.bench.blocked {
+            return Err(Fault::NotFollowing);
+        }
+        self.turning = Turning::new(&self.bench, [self.axes.L_d, self.axes.L_q], rho(&self.bench));
+        self.starting = Starting::default();
+        self.enter(Stage::Start);
+        Ok(())
     }
 }

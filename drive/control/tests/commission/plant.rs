@@ -43,8 +43,8 @@ pub(crate) struct Motor {
     pub(crate) L_q: f64,
     pub(crate) psi: f64,
     pub(crate) J: f64,
-    B: f64,
-    tau_coulomb: f64,
+    pub(crate) B: f64,
+    pub(crate) tau_coulomb: f64,
     w_coulomb: f64,
     pub(crate) u_dc: f64,
     /// Twice the rated current.
@@ -132,6 +132,16 @@ impl Motor {
         self.i_0 = (self.d_0 + self.d_4 * self.psi.powi(4)) * self.psi;
     }
 
+    /// Number of pole pairs.
+    pub(crate) fn pole_pairs(&self) -> i32 {
+        (1..1000).find(|&n| f64::from(n) >= self.n_p).unwrap()
+    }
+
+    /// Friction in N.m at the mechanical speed `w` (rad/s).
+    pub(crate) fn friction(&self, w: f64) -> f64 {
+        self.B * w + self.tau_coulomb * drive_base::math::tanh(w / self.w_coulomb)
+    }
+
     /// The rotor is blocked.
     pub(crate) fn held(mut self) -> Self {
         self.blocked = true;
@@ -205,6 +215,10 @@ pub(crate) struct Bench {
     pub(crate) gates: bool,
     waiting: bool,
     steps: u32,
+    /// Torque of a load in N.m, against the positive direction.
+    pub(crate) load: f64,
+    /// Voltage over the command.
+    pub(crate) gain: f64,
     /// Greatest current so far in A.
     pub(crate) most: f64,
 }
@@ -225,7 +239,21 @@ impl Bench {
         let (psi, theta) = (AlphaBeta::new(cos, sin) * motor.psi, motor.theta_0 / motor.n_p);
         let (commands, gates) = ([AlphaBeta::ZERO; 3], false);
         let random = Random(seed);
-        Self { motor, random, psi, w: 0.0, theta, commands, delay: 1, gates, waiting: false, steps, most: 0.0 }
+        Self {
+            motor,
+            random,
+            psi,
+            w: 0.0,
+            theta,
+            commands,
+            delay: 1,
+            gates,
+            waiting: false,
+            steps,
+            load: 0.0,
+            gain: 1.0,
+            most: 0.0,
+        }
     }
 
     fn turned(v: AlphaBeta, cos: f64, sin: f64) -> AlphaBeta {
@@ -256,7 +284,7 @@ impl Bench {
     pub(crate) fn tick(&mut self, u: AlphaBeta, gates: bool) {
         let m = &self.motor;
         self.commands = [u, self.commands[0], self.commands[1]];
-        let command = self.commands[self.delay];
+        let command = self.commands[self.delay] * self.gain;
         let span = Phases::from_stator(command).span();
         let acting = if span > m.u_dc { command * (m.u_dc / span) } else { command };
         let h = m.T / f64::from(self.steps);
@@ -272,7 +300,10 @@ impl Bench {
             }
         } else {
             // The current has ended, and the rotor coasts.
-            self.theta += if m.blocked { 0.0 } else { self.w * m.T };
+            self.w = if m.blocked { 0.0 } else { self.w * (-m.B / m.J * m.T).exp() };
+            let braked = m.tau_coulomb / m.J * m.T;
+            self.w -= self.w.clamp(-braked, braked);
+            self.theta += self.w * m.T;
             let (sin, cos) = (m.n_p * self.theta).sin_cos();
             self.psi = AlphaBeta::new(cos, sin) * m.psi;
         }
@@ -293,7 +324,7 @@ impl Bench {
         let tau = 1.5 * m.n_p * (own.alpha() * q - own.beta() * d);
         let (s_2, c_2) = (2.0 * sin * cos, cos * cos - sin * sin);
         let s_6 = s_2 * (4.0 * c_2 * c_2 - 1.0);
-        let friction = m.B * w + m.tau_coulomb * drive_base::math::tanh(w / m.w_coulomb) + m.cogging * s_6;
+        let friction = m.friction(w) + m.cogging * s_6 + self.load;
         Rates { psi: dpsi, w: (tau - friction) / m.J, theta: w }
     }
 

@@ -1,0 +1,33 @@
+//! What the commissioning is given, and what it gives to the inverter.
+
+use super::CommissionMode;
+use drive_base::frame::AlphaBeta;
+use serde::{Deserialize, Serialize};
+
+/// What the commissioning is given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CommissionSetup {
+    /// What is commissioned; with `Off`, nothing happens.
+    pub mode: CommissionMode,
+    /// Number of pole pairs, > 0.
+    pub n_p: i32,
+    /// Sample period in s, > 0.
+    pub T_s: f64,
+    /// Samples from taking the currents to the voltage acting: 0, 1 or 2.
+    pub delay: i32,
+    /// Greatest current of the commissioning in A, > 0: about the rated one to twice of it.
+    pub i: f64,
+    /// Rated electrical speed in rad/s, > 0.
+    pub speed: f64,
+    /// Longest time in s, > 0.
+    pub t_max: f64,
+}
+
+/// What the inverter shall do until the next sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Voltage {
+    /// Command in V.
+    pub u: AlphaBeta,
+    /// The gates are on.
+    pub gates: bool,
+}
