@@ -34,7 +34,12 @@ fn pair() -> Pair {
 }
 
 fn started() -> Pair {
+    started_in(CommissionMode::Standstill)
+}
+
+fn started_in(mode: CommissionMode) -> Pair {
     let mut pair = pair();
+    pair.controller.model.parameters.commission.mode = mode;
     pair.controller.model.inputs.commission_start = true;
     pair.start().unwrap();
     pair
@@ -69,8 +74,17 @@ fn until(pair: &mut Pair, state: State) {
     panic!("{state:?} does not come: {:?}", status(pair));
 }
 
-const STATES: [State; 7] =
-    [State::Offsets, State::Probe, State::Align, State::Resistance, State::Swing, State::Axes, State::Saturation];
+const STATES: [State; 9] = [
+    State::Offsets,
+    State::Probe,
+    State::Align,
+    State::Resistance,
+    State::Swing,
+    State::Axes,
+    State::Saturation,
+    State::Start,
+    State::Levels,
+];
 
 #[test]
 fn it_ends_with_results_that_stay_until_the_next_start() {
@@ -106,6 +120,45 @@ fn it_ends_with_results_that_stay_until_the_next_start() {
     assert!(said.contains("commission_fault = NotFollowing: The rotor turns at the start"), "{said}");
 }
 
+/// The rotor turns in the positive direction, at up to half of commission.speed, and the machine is known whole.
+#[test]
+fn a_turning_machine_tells_its_flux_linkage_inertia_and_friction() {
+    let mut pair = started_in(CommissionMode::Spin);
+    let mut fastest = 0.0_f64;
+    while status(&pair).0 != State::Done {
+        pair.step(T_S).unwrap();
+        assert!(status(&pair).1 == Fault::None && pair.now.seconds() < 60.0, "{:?}", status(&pair));
+        fastest = fastest.max(pair.plant.out.speed);
+    }
+    assert!((0.45..0.5).contains(&(fastest / 157.0)), "{fastest} rad/s");
+    let (r, mechanics) = (results(&mut pair), pair.plant.model.parameters.mechanics.clone());
+    let friction = mechanics.friction(0.3 * 157.0);
+    for (found, truth, limit) in
+        [(r.psi_M, Motor::IPMSM_2_2_KW.psi_M, 0.003), (r.J, mechanics.J, 0.01), (r.tau_friction, friction, 0.05)]
+    {
+        assert!(found.u < 1.0 && (found.value / truth - 1.0).abs() < limit, "{found:?} {truth}");
+    }
+    // It coasts to rest.
+    let w = pair.plant.out.speed;
+    steps(&mut pair, 100);
+    assert!(w < 0.12 * 157.0 && (0.0..=w).contains(&pair.plant.out.speed) && gates(&pair) == Gates::Off);
+}
+
+/// A blocked rotor cannot spin: it is refused, with the values of standstill.
+#[test]
+fn a_blocked_rotor_keeps_the_values_of_standstill() {
+    let mut pair = pair();
+    pair.controller.model.parameters.commission.mode = CommissionMode::Spin;
+    pair.controller.model.inputs.commission_start = true;
+    pair.plant.model.parameters.mechanics.imposed = true;
+    pair.start().unwrap();
+    until(&mut pair, State::Refused);
+    steps(&mut pair, 1);
+    let r = results(&mut pair);
+    assert_eq!((status(&pair).1, gates(&pair)), (Fault::NotFollowing, Gates::Off));
+    assert!(r.R_s.u < 0.01 && r.L_q.u < 0.05 && [r.psi_M, r.J, r.tau_friction].iter().all(|x| x.u >= 1.0), "{r:?}");
+}
+
 /// The current that the controller has held at rest does not count as an offset.
 #[test]
 fn the_current_before_the_start_is_no_offset() {
@@ -124,7 +177,7 @@ fn the_current_before_the_start_is_no_offset() {
 
 #[test]
 fn an_abort_opens_the_gates_at_once_in_every_state() {
-    let mut pair = started();
+    let mut pair = started_in(CommissionMode::Spin);
     for state in STATES {
         until(&mut pair, state);
         steps(&mut pair, 7);
@@ -162,16 +215,13 @@ fn an_abort_opens_the_gates_at_once_in_every_state() {
 
 #[test]
 fn a_link_that_falls_by_a_fifth_and_too_little_time_are_named() {
-    for state in STATES {
-        let mut pair = started();
+    for state in [State::Offsets, State::Probe, State::Align, State::Resistance, State::Levels] {
+        let mut pair = started_in(CommissionMode::Spin);
         until(&mut pair, state);
         steps(&mut pair, 300);
         pair.set_inputs(0.0, 0.0, 430.0);
         steps(&mut pair, 2);
         assert_eq!((status(&pair), gates(&pair)), ((State::Refused, Fault::Voltage), Gates::Off), "{state:?}");
-        if state == State::Resistance {
-            break;
-        }
     }
     let mut pair = started();
     pair.controller.model.parameters.commission.t_max = 0.5;
@@ -291,7 +341,7 @@ fn model_exchange_finds_the_same_resistance() {
 /// Stored in the middle of each state and restored, the drive has the same bits.
 #[test]
 fn a_restored_drive_is_the_same_drive() {
-    let (mut whole, mut restored) = (started(), started());
+    let (mut whole, mut restored) = (started_in(CommissionMode::Spin), started_in(CommissionMode::Spin));
     let (mut seen, mut last, mut since) = (vec![], State::Idle, 0);
     while status(&whole).0 != State::Done {
         since = if status(&whole).0 == last { since + 1 } else { 0 };

@@ -1,5 +1,5 @@
-"""The packed drive commissions itself at standstill: the bits of the native run in both standards, saved and restored in each state of
-the sequence; aborts; parameters that do not fit. `FMU_COMMISSIONING` names the values of the native run, as hexadecimal numbers."""
+"""The packed drive commissions itself at standstill, and turning: the bits of the native run in both standards, saved and restored in
+each state of the sequence; aborts; parameters that do not fit. `FMU_COMMISSIONING` names the values of the native run, as hexadecimal numbers."""
 
 import json
 import os
@@ -12,16 +12,17 @@ from pair import Unit
 STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
 H = 5e-3
 REAL = {"controller.commission.i": 7.5, "controller.commission.speed": 314.0, "plant.inverter.dead_time": 2e-6, "plant.initial.theta_e": 0.7}
-OFFSETS, RESISTANCE, DONE, REFUSED = 2, 5, 11, 12
+OFFSETS, RESISTANCE, START, LEVELS, DONE, REFUSED = 2, 5, 9, 10, 11, 12
+MODES = {"Standstill": 2, "Spin": 3}
 VOLTAGE, NOT_FOLLOWING, ABORTED = 3, 6, 11
 
 
 class Drive(Unit):
     """PmsmDrive, which begins a commissioning at once."""
 
-    def __init__(self, archives, standard, start=True, **parameters):
-        names = {"controller.commission.mode": 2}
-        super().__init__(archives / f"fmi{standard}" / "PmsmDrive.fmu", REAL | parameters, names, {"commission_start": start})
+    def __init__(self, archives, standard, mode="Standstill", **parameters):
+        names = {"controller.commission.mode": MODES[mode]}
+        super().__init__(archives / f"fmi{standard}" / "PmsmDrive.fmu", REAL | parameters, names, {"commission_start": True})
         self.k = 0
 
     def step(self, n=1):
@@ -41,7 +42,7 @@ class Drive(Unit):
 
     def until(self, state):
         while self.status()[0] != state:
-            assert self.k < 6000, self.status()
+            assert self.k < 10_000, self.status()
             self.step()
 
     def store(self):
@@ -55,10 +56,11 @@ class Drive(Unit):
 
 
 @STANDARDS
+@pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("restored", [False, True], ids=["straight", "restored"])
-def test_a_commissioning_has_the_bits_of_the_native_one(archives, standard, restored):
-    native = json.loads(Path(os.environ["FMU_COMMISSIONING"]).read_text())
-    drive, seen = Drive(archives, standard), {}
+def test_a_commissioning_has_the_bits_of_the_native_one(archives, standard, mode, restored):
+    native = json.loads(Path(os.environ["FMU_COMMISSIONING"]).read_text())[mode]
+    drive, seen = Drive(archives, standard, mode), {}
     while drive.status()[0] not in (DONE, REFUSED):
         drive.step()
         state = drive.status()[0]
@@ -71,20 +73,27 @@ def test_a_commissioning_has_the_bits_of_the_native_one(archives, standard, rest
             drive.restore(stored)
             drive.k = k
     assert drive.status() == (DONE, 1) and not drive.enabled()
-    assert set(range(OFFSETS, DONE - 2)) <= seen.keys()
+    spin = mode == "Spin"
+    assert set(range(OFFSETS, DONE if spin else START)) <= seen.keys()
     assert drive.k == native.pop("steps")
     found = drive.get_reals(drive.of(*native))
     assert {name: x.hex() for name, x in zip(native, found)} == {name: float.fromhex(x).hex() for name, x in native.items()}
     by_name = dict(zip(native, found))
     assert by_name["identified_R_s"] == pytest.approx(2.0, rel=1e-3) and by_name["identified_L_q"] == pytest.approx(6e-3, rel=0.01)
+    turning = {name: drive.get_reals(drive.of(f"plant.{name}"))[0] for name in ("motor.psi_M", "mechanics.J")}
+    for name, truth in turning.items():
+        name = f"identified_{name.split('.')[1]}"
+        assert by_name[name] == (pytest.approx(truth, rel=0.01) if spin else 0.0), name
+        assert by_name[f"{name}_u"] < 0.05 if spin else by_name[f"{name}_u"] == 1.0, name
     drive.close()
 
 
 @STANDARDS
 @pytest.mark.parametrize("name, value", [("commission_start", False), ("enable", False), ("asc", True)])
-def test_an_abort_opens_the_gates(archives, standard, name, value):
-    drive = Drive(archives, standard)
-    drive.until(RESISTANCE)
+@pytest.mark.parametrize("state", [RESISTANCE, LEVELS], ids=["standing", "turning"])
+def test_an_abort_opens_the_gates(archives, standard, name, value, state):
+    drive = Drive(archives, standard, "Spin")
+    drive.until(state)
     assert drive.enabled()
     drive.set(name, value)
     drive.slave.doStep(currentCommunicationPoint=drive.k * H, communicationStepSize=1e-4)

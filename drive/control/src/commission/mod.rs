@@ -1,6 +1,6 @@
 //! Self-commissioning without a shaft sensor and without a load machine. At standstill: offsets of the current sensors, R_s
 //! with the loss of the inverter, L_d, L_q and their saturation; the rotor may be free or blocked. Then, in mode Spin, psi_M,
-//! J, B and tau_coulomb of the turning machine, to 0.45 of its rated speed.
+//! J, B and tau_coulomb of the turning machine, at up to half of its rated speed.
 //!
 //! [`Commission`] is called once a sample with the currents and the link's voltage, and commands voltage and gates. It keeps
 //! no references and allocates nothing; a sample takes bounded time, at most one simulation of a record of 512 rows.
@@ -61,7 +61,7 @@ enumeration! {
     pub enum CommissionMode("Commissioning", "Self-commissioning") {
         1 Off "None: commission_start has no effect";
         2 Standstill "Offsets, R_s, the inverter's dead time, L_d, L_q and saturation, with a rotor that is free or blocked";
-        3 Spin "As Standstill, then psi_M, J and friction: the rotor turns to 0.45 commission.speed, without a load";
+        3 Spin "As Standstill, then psi_M, J and friction: the rotor, without a load, turns at up to half of commission.speed";
     }
 }
 

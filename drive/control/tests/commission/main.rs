@@ -99,7 +99,8 @@ fn machines_commission_themselves() {
         assert_eq!(commission.state(), State::Done, "machine {index}: {:?}", commission.fault());
         check(commission.results(), &motor, &[]);
         assert!(bench.most < 1.1 * motor.I && !commission.results().blocked, "machine {index}");
-        assert!(bench.w < 0.12 * motor.w_rated / motor.n_p, "machine {index}: {} rad/s", bench.w);
+        let rated = motor.w_rated / motor.n_p;
+        assert!(bench.w < 0.12 * rated && bench.fastest < 0.5 * rated, "machine {index}: {} rad/s", bench.fastest);
     }
     let motor = Motor::draw(2, 51).held();
     let (commission, bench) = run(&motor, 1);
@@ -396,7 +397,7 @@ fn population() {
         ("tau_friction", 4.65, 7.65, 20, 93),
     ];
     let mut errors: Vec<Errors> = limits.iter().map(|_| Errors::default()).collect();
-    let (mut times, mut peaks, mut faults) = (vec![], vec![], vec![]);
+    let (mut times, mut peaks, mut speeds, mut faults) = (vec![], vec![], vec![], vec![]);
     for index in number("FROM", 0)..n {
         let motor = Motor::draw(seed, index);
         let motor = if blocked { motor.held() } else { motor };
@@ -417,6 +418,7 @@ fn population() {
         }
         times.push(commission.time());
         peaks.push(bench.most / motor.I);
+        speeds.push(bench.fastest * motor.n_p / motor.w_rated);
     }
     let judged = n == 300 && seed == 1 && !blocked;
     let mut beyond = vec![];
@@ -432,7 +434,8 @@ fn population() {
             beyond.push(name);
         }
     }
-    for (name, x) in [("time in s", &mut times), ("greatest current over I", &mut peaks)] {
+    let shown = [("time in s", &mut times), ("greatest current over I", &mut peaks), ("greatest speed", &mut speeds)];
+    for (name, x) in shown {
         x.sort_by(f64::total_cmp);
         let at = |percent: usize| x[(x.len() * percent).div_ceil(100) - 1];
         println!("{name}: median {:.2}, 95 % {:.2}, 99 % {:.2}, worst {:.2}", at(50), at(95), at(99), at(100));
