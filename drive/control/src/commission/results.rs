@@ -105,18 +105,34 @@ impl Results {
         self.i_zero = of(double(a.i_x), double(b.i_x), 2.0 * bench.i_x, LIMIT_DEAD);
     }
 
-    /// Flux linkage.
-    pub(super) fn show_flux(&mut self, psi_M: Identified) {
-        self.psi_M = Identified::within(psi_M.value, psi_M.u, LIMIT_PSI);
+    /// psi(i)/i - without the magnet - in H at the d-axis current `i` (A), of i = x/L + s_2 x^2 + s_3 x^3 with `L` (H).
+    pub(super) fn chord_d(&self, L: f64, i: f64) -> f64 {
+        let (s_2, s_3, mut x) = (self.s_2.value, self.s_3.value, L * i);
+        for _ in 0..4 {
+            let slope = 1.0 / L + (2.0 * s_2 + 3.0 * s_3 * x) * x;
+            x -= (x / L + (s_2 + s_3 * x) * x * x - i) / slope.max(0.5 / L);
+        }
+        x / i
     }
 
-    /// Inertia and friction.
+    /// Flux linkage, refused where L_d is: the currents of iron loss turn the angle.
+    pub(super) fn show_flux(&mut self, psi_M: Identified) {
+        self.psi_M = Identified::within(psi_M.value, psi_M.u, self.with_l_d(LIMIT_PSI));
+    }
+
+    /// The limit, which nothing keeps where L_d is refused.
+    fn with_l_d(&self, limit: f64) -> f64 {
+        if self.L_d.u < 1.0 { limit } else { 0.0 }
+    }
+
+    /// Inertia and friction; the latter is refused where L_d is: the iron loss brakes as friction does.
     pub(super) fn show_mechanics(&mut self, found: Found) {
         let of = |x: Identified, limit: f64| Identified::within(x.value, x.u, limit);
         self.J = of(found.J, LIMIT_J);
-        self.B = of(found.B, LIMIT_FRICTION);
-        self.tau_coulomb = of(found.tau_coulomb, LIMIT_FRICTION);
-        self.tau_friction = of(found.tau_friction, LIMIT_FRICTION);
+        let friction = self.with_l_d(LIMIT_FRICTION);
+        self.B = of(found.B, friction);
+        self.tau_coulomb = of(found.tau_coulomb, friction);
+        self.tau_friction = of(found.tau_friction, friction);
     }
 
     /// Inductances, refused where the loops do not agree or do not fit; without the axis, neither chords nor saturation.
@@ -152,6 +168,45 @@ impl Results {
         if let Some((q, u)) = of(large[1], RESIDUAL[1], L_q) {
             (r.L_q, r.i_q) = (Identified { value: L_q, u }, q.A);
             r.L_q_chord = chord(&q, 1.0, u);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(value: f64, u: f64) -> Identified {
+        Identified { value, u }
+    }
+
+    #[test]
+    fn a_chord_has_the_saturation() {
+        let r = Results { s_2: known(40.0, 0.5), s_3: known(300.0, 0.5), ..Results::default() };
+        for i in [-3.0, -0.9, 0.9, 3.0] {
+            let x = i * r.chord_d(36e-3, i);
+            assert!((x / 36e-3 + 40.0 * x * x + 300.0 * x * x * x - i).abs() < 1e-6, "{i} A: {x} Wb");
+        }
+        assert!((Results::default().chord_d(36e-3, -0.9) - 36e-3).abs() < 1e-12);
+    }
+
+    /// Iron loss, which the loops of the d-axis show, brakes as friction does.
+    #[test]
+    fn without_l_d_no_flux_and_no_friction() {
+        let found = Found {
+            J: known(1e-3, 0.01),
+            B: known(1e-3, 0.1),
+            tau_coulomb: known(0.1, 0.1),
+            tau_friction: known(0.1, 0.05),
+        };
+        for u in [0.01, 1.0] {
+            let mut r = Results { L_d: known(1e-3, u), ..Results::default() };
+            r.show_flux(known(0.1, 0.001));
+            r.show_mechanics(found);
+            assert!(r.J.u < 1.0);
+            for x in [r.psi_M, r.B, r.tau_coulomb, r.tau_friction] {
+                assert_eq!(x.u < 1.0, u < 1.0, "{r:?}");
+            }
         }
     }
 }

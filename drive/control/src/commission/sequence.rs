@@ -310,7 +310,7 @@ impl Commission {
                 Started::Voltage(u) => return Ok(u),
                 Started::Off => {}
                 Started::Done(i_f) => {
-                    self.levels = Levels::new(&self.bench, &self.turning, sample, i_f);
+                    self.levels = Levels::new(&self.bench, &self.turning, sample, i_f, &self.results);
                     self.enter(Stage::Levels);
                 }
             },
