@@ -79,7 +79,7 @@ fn about<E: Enumerated>(value: E) -> &'static str {
 /// Reads the run `text` of `file`.
 ///
 /// # Errors
-/// An option is wrong, the file is no recording of a commissioning, or the commissioning has not ended in it.
+/// An option is wrong, the file does not hold a commissioning, or the commissioning has not ended in it.
 pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commissioned> {
     options.check()?;
     let Some(n_p) = options.n_p else {

@@ -2,6 +2,8 @@
 
 use super::{RATED, SLOW, T_S, U_DEAD, command, drive, imposed, off, run, turning};
 use drive::Pair;
+use drive::control::commission::CommissionState;
+use drive::control::commissioning::CommissionMode;
 use drive::control::reference::{max_torque, max_torque_per_ampere};
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters as Par;
@@ -60,6 +62,14 @@ fn over_voltage(mut pair: Pair) -> Figures {
     });
     let out = &pair.controller.out;
     [f64::from(u8::from(out.tripped == Cause::OverVoltage)), f64::from(u8::from(out.short_circuit))]
+}
+
+/// Whether `commission_start` starts something, and whether the gates switch 10 ms later.
+fn commissioned(mut pair: Pair) -> Figures {
+    pair.controller.model.inputs.commission_start = true;
+    run(&mut pair, 0.01, |_, _| ());
+    let out = &pair.controller.out;
+    [f64::from(u8::from(out.commission_state != CommissionState::Idle)), f64::from(u8::from(out.enabled))]
 }
 
 /// Whether these figures are yes (1) or no (0) as expected.
@@ -507,5 +517,12 @@ pub(super) const CASES: &[Case] = &[
         ask: |p| p.estimators.gradient.clamped = true,
         figures: after_load,
         acts: |_, [_, one], [error, other]| error < 15.0 && (one - other).abs() > 1e-9,
+    },
+    Case {
+        option: "commission.mode",
+        on: drive,
+        ask: |p| p.commission.mode = CommissionMode::Standstill,
+        figures: commissioned,
+        acts: |_, without, with| are(without, [false, true]) && are(with, [true, false]),
     },
 ];

@@ -133,8 +133,8 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
             let [low, high] = [sides[0][i], sides[1][i]];
             let (left, right) = ((middle[i] - low) / step, (high - middle[i]) / step);
             let difference = (high - low) / (2.0 * step);
-            // Rounding of the value, and of terms of its nominal size that cancel.
-            let rounding = 1e-13 * middle[i].abs().max(high.abs()) + 1e-15 * v.nominal.unwrap_or(1.0).abs();
+            // Rounding of the value, and of terms of some hundred times its nominal size that cancel.
+            let rounding = 1e-13 * middle[i].abs().max(high.abs()).max(v.nominal.unwrap_or(1.0).abs());
             let noise = rounding / step + 1e-9 * middle[i].abs();
             let scale = found[i].abs().max(difference.abs());
             if !difference.is_finite() || (left - right).abs() > 1e-2 * scale + 2.0 * noise {
