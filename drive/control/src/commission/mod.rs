@@ -61,7 +61,7 @@ enumeration! {
     pub enum CommissionMode("Commissioning", "Self-commissioning") {
         1 Off "None: commission_start has no effect";
         2 Standstill "Offsets, R_s, the inverter's dead time, L_d, L_q and saturation, with a rotor that is free or blocked";
-        3 Spin "As Standstill, then psi_M, J and friction: the rotor, without a load, turns at up to half of commission.speed";
+        3 Spin "Also psi_M, J and friction: the rotor, without a load, turns at up to half of commission.speed";
     }
 }
 
