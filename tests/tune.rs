@@ -296,9 +296,10 @@ fn a_motor_file_is_enough_outside_a_checkout() {
     assert!(refused.status.code() == Some(2) && said.lines().count() == 1 && said.contains("none.toml"), "{said}");
 }
 
-/// docs/identify.md: the commands from a record to a running drive, exactly as printed. `fmu build` has run: its archive is there.
+/// docs/identify.md: the commands from a record to a running drive, and from a motor on the table, exactly as printed. `fmu build` has
+/// run: its archive is there.
 #[test]
-fn a_record_becomes_a_running_drive() {
+fn a_record_and_a_commissioning_become_running_drives() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let dir = tempfile::tempdir().unwrap();
     let copy = |from: &Path, to: &str| {
@@ -309,29 +310,38 @@ fn a_record_becomes_a_running_drive() {
     copy(&root.join("examples/bench.csv"), "examples/bench.csv");
     copy(&common::archives().join("fmi3/PmsmDrive.fmu"), "target/fmu/fmi3/PmsmDrive.fmu");
     let page = std::fs::read_to_string(root.join("docs/identify.md")).unwrap();
-    let block = |language: &str| page.split_once(&format!("```{language}\n")).unwrap().1.split_once("\n```").unwrap().0;
-    let mut last = String::new();
-    for (k, line) in block("sh").lines().enumerate() {
-        let words: Vec<_> = line.split_whitespace().collect();
-        if words[..2] == ["fmu", "build"] {
-            assert_eq!(words[2..], ["PmsmDrive", "--fmi", "3"]);
-            continue;
+    let (record, table) = page.split_once("## A motor on the table").unwrap();
+    // A commissioning of the example does not tell B from the Coulomb friction.
+    for (section, name, status) in [(record, "bench", 0), (table, "table", 1)] {
+        let block =
+            |language: &str| section.split_once(&format!("```{language}\n")).unwrap().1.split_once("\n```").unwrap().0;
+        let mut last = String::new();
+        for line in block("sh").lines() {
+            let words: Vec<_> = line.split_whitespace().collect();
+            if words[..2] == ["fmu", "build"] {
+                assert_eq!(words[2..], ["PmsmDrive", "--fmi", "3"]);
+                continue;
+            }
+            let command =
+                Command::new(env!("CARGO_BIN_EXE_fmu")).args(&words[1..]).current_dir(dir.path()).output().unwrap();
+            let identifies = words[1] == "identify";
+            let expected = if identifies { status } else { 0 };
+            let said = String::from_utf8_lossy(&command.stderr);
+            assert_eq!(command.status.code(), Some(expected), "{line}: {said}");
+            last = String::from_utf8(command.stdout).unwrap();
+            if identifies {
+                let values: Vec<_> = last.lines().take_while(|line| !line.is_empty()).collect();
+                assert_eq!(values.join("\n"), block("text"), "docs/identify.md shows other values");
+            }
         }
-        let command =
-            Command::new(env!("CARGO_BIN_EXE_fmu")).args(&words[1..]).current_dir(dir.path()).output().unwrap();
-        assert!(command.status.success(), "{line}: {}", String::from_utf8_lossy(&command.stderr));
-        last = String::from_utf8(command.stdout).unwrap();
-        if k == 0 {
-            let values: Vec<_> = last.lines().take_while(|line| !line.is_empty()).collect();
-            assert_eq!(values.join("\n"), block("text"), "docs/identify.md shows other values");
+        // 78.5 rad/s are 749.6 rpm.
+        assert!(last.contains("speed_ref 749.6 rpm"), "{last}");
+        let speed = last.split_once("speed ").unwrap().1.split_once(" rpm").unwrap().0;
+        assert!((speed.parse::<f64>().unwrap() / 749.6 - 1.0).abs() < 0.005, "{last}");
+        let files = ["NAME.toml", "NAME.html", "tune/NAME.PmsmDrive.ssv", "run.html"];
+        for file in files.map(|file| file.replace("NAME", name)) {
+            assert!(dir.path().join("target").join(&file).metadata().unwrap().len() > 500, "{file}");
         }
-    }
-    // 78.5 rad/s are 749.6 rpm.
-    assert!(last.contains("speed_ref 749.6 rpm"), "{last}");
-    let speed = last.split_once("speed ").unwrap().1.split_once(" rpm").unwrap().0;
-    assert!((speed.parse::<f64>().unwrap() / 749.6 - 1.0).abs() < 0.005, "{last}");
-    for file in ["bench.toml", "bench.html", "tune/bench.PmsmDrive.ssv", "run.html"] {
-        assert!(dir.path().join("target").join(file).metadata().unwrap().len() > 500, "{file}");
     }
 }
 

@@ -34,6 +34,16 @@ fn period(commission: &mut Commission, bench: &mut Bench, gain: f64, u_dc: f64) 
     bench.tick(out.u, out.gates);
 }
 
+/// Runs to the end; and the greatest speed over the rated one, of the swings at standstill and of the turning machine.
+fn run_fast(motor: &Motor, seed: u64) -> (Commission, Bench, [f64; 2]) {
+    let mut fastest = [0.0_f64; 2];
+    let (commission, bench) = run_with(motor, seed, |commission, bench| {
+        let turns = usize::from(matches!(commission.state(), State::Start | State::Levels));
+        fastest[turns] = fastest[turns].max(bench.w.abs() * motor.n_p / motor.w_rated);
+    });
+    (commission, bench, fastest)
+}
+
 /// Runs to the end; `meddle` may change anything before each sample.
 fn run_with(motor: &Motor, seed: u64, mut meddle: impl FnMut(&mut Commission, &mut Bench)) -> (Commission, Bench) {
     let (mut commission, mut bench) = (Commission::new(setup(motor)), Bench::new(motor.clone(), seed));
@@ -95,12 +105,12 @@ const SPUN: [&str; 3] = ["psi_M", "J", "tau_friction"];
 fn machines_commission_themselves() {
     for index in [3, 6, 7, 9, 13, 24] {
         let motor = Motor::draw(1, index);
-        let (commission, bench) = run(&motor, index);
+        let (commission, bench, [_, turning]) = run_fast(&motor, index);
         assert_eq!(commission.state(), State::Done, "machine {index}: {:?}", commission.fault());
         check(commission.results(), &motor, &[]);
         assert!(bench.most < 1.1 * motor.I && !commission.results().blocked, "machine {index}");
         let rated = motor.w_rated / motor.n_p;
-        assert!(bench.w < 0.12 * rated && bench.fastest < 0.5 * rated, "machine {index}: {} rad/s", bench.fastest);
+        assert!(bench.w < 0.12 * rated && turning < 0.5, "machine {index}: {turning} of the rated speed");
     }
     let motor = Motor::draw(2, 51).held();
     let (commission, bench) = run(&motor, 1);
@@ -397,11 +407,11 @@ fn population() {
         ("tau_friction", 4.65, 7.65, 20, 93),
     ];
     let mut errors: Vec<Errors> = limits.iter().map(|_| Errors::default()).collect();
-    let (mut times, mut peaks, mut speeds, mut faults) = (vec![], vec![], vec![], vec![]);
+    let (mut times, mut peaks, mut speeds, mut swings, mut faults) = (vec![], vec![], vec![], vec![], vec![]);
     for index in number("FROM", 0)..n {
         let motor = Motor::draw(seed, index);
         let motor = if blocked { motor.held() } else { motor };
-        let (commission, bench) = run(&motor, seed * 31_337 + index);
+        let (commission, bench, [swing, turning]) = run_fast(&motor, seed * 31_337 + index);
         let r = commission.results();
         let mut line =
             format!("{index:3} {:?} {:?} {:.1} s", commission.state(), commission.fault(), commission.time());
@@ -418,7 +428,8 @@ fn population() {
         }
         times.push(commission.time());
         peaks.push(bench.most / motor.I);
-        speeds.push(bench.fastest * motor.n_p / motor.w_rated);
+        swings.push(swing);
+        speeds.push(turning);
     }
     let judged = n == 300 && seed == 1 && !blocked;
     let mut beyond = vec![];
@@ -434,8 +445,12 @@ fn population() {
             beyond.push(name);
         }
     }
-    let shown = [("time in s", &mut times), ("greatest current over I", &mut peaks), ("greatest speed", &mut speeds)];
-    for (name, x) in shown {
+    for (name, x) in [
+        ("time in s", &mut times),
+        ("greatest current over I", &mut peaks),
+        ("greatest speed of a swing over the rated one", &mut swings),
+        ("greatest speed of the turning machine", &mut speeds),
+    ] {
         x.sort_by(f64::total_cmp);
         let at = |percent: usize| x[(x.len() * percent).div_ceil(100) - 1];
         println!("{name}: median {:.2}, 95 % {:.2}, 99 % {:.2}, worst {:.2}", at(50), at(95), at(99), at(100));

@@ -219,9 +219,8 @@ pub(crate) struct Bench {
     pub(crate) load: f64,
     /// Voltage over the command.
     pub(crate) gain: f64,
-    /// Greatest current so far in A, and greatest speed in rad/s.
+    /// Greatest current so far in A.
     pub(crate) most: f64,
-    pub(crate) fastest: f64,
 }
 
 #[derive(Clone, Copy)]
@@ -254,7 +253,6 @@ impl Bench {
             load: 0.0,
             gain: 1.0,
             most: 0.0,
-            fastest: 0.0,
         }
     }
 
@@ -270,7 +268,6 @@ impl Bench {
         let [d, q] = m.current(psi.alpha(), psi.beta());
         let i = if self.gates { Self::turned(AlphaBeta::new(d, q), cos, sin) } else { AlphaBeta::ZERO };
         self.most = self.most.max(i.magnitude());
-        self.fastest = self.fastest.max(self.w.abs());
         let Phases { a, b, c } = Phases::from_stator(i);
         if m.exact {
             return Phases { a, b, c };
