@@ -52,3 +52,15 @@ fn starts_where_the_importer_wants() {
         assert_eq!(x, &wanted, "FMPy, {version:?}");
     }
 }
+
+/// The step of its solver is an attribute of FMI 3.0 alone.
+#[test]
+fn its_description_has_the_step_of_the_solver() {
+    for (version, expected) in [(V2, None), (V3, Some(" fixedInternalStepSize=\"0.1\""))] {
+        let (_, files) = fmu_import::contents(&archive("dahlquist", version)).unwrap();
+        let xml = String::from_utf8(files["modelDescription.xml"].clone()).unwrap();
+        let times = xml.matches("fixedInternalStepSize").count();
+        let found = expected.map_or(0, |attribute| xml.matches(attribute).count());
+        assert_eq!((times, found), (expected.iter().count(), times), "{xml}");
+    }
+}
