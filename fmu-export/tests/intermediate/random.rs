@@ -358,7 +358,9 @@ fn sequence(all: &Rc<Shared>) {
             _ => host.call(name),
         };
         if !good || all.below(4) == 0 {
-            hosts.iter().for_each(|host| host.look());
+            for host in &hosts {
+                host.look();
+            }
         }
     }
     unsafe { fmi3FreeFMUState(hosts[0].it.get(), &mut saved.0) };
