@@ -64,3 +64,11 @@ fn its_description_has_the_step_of_the_solver() {
         assert_eq!((times, found), (expected.iter().count(), times), "{xml}");
     }
 }
+
+/// Inside a step of 1 s, FMPy reads the rows of the original, and ends a step where it wants.
+#[test]
+fn fmpy_reads_it_inside_a_step() {
+    let said = script(include_str!("dahlquist.py"), &[&archive("dahlquist", V3)]);
+    let found: Vec<f64> = said.split_whitespace().map(hexadecimal).collect();
+    assert_eq!(found, expected(1.0, 1.0)[..=10]);
+}
