@@ -7,6 +7,7 @@ mod clocks;
 mod current_map;
 mod dahlquist;
 mod feedthrough;
+mod originals;
 mod prove;
 #[path = "../common/python.rs"]
 #[allow(dead_code, unreachable_pub, reason = "a module of several test programs")]

@@ -196,6 +196,15 @@ fn rounding_is_no_must() {
     assert_eq!(at(&report, Level::Should), ["T05"], "{}", told(&report));
 }
 
+/// What cannot be read between steps cannot be read after Terminate: a finding of G15, and none of L10.
+#[test]
+fn a_value_that_could_not_be_read_before_is_not_lost() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(report) = small(dir.path(), 2, "L10g", &["L10", "G15"]) else { return };
+    assert_eq!(violated(&report), ["G15"], "{}", told(&report));
+    assert!(matches!(verdict(&report, "L10"), Verdict::Pass(_)), "{:?}", verdict(&report, "L10"));
+}
+
 /// Logging without a callback is undefined (FMI 3.0.2, 2.3.1), and so is a step of -1: a crash there is hard.
 #[test]
 fn logging_to_nowhere_is_no_must() {

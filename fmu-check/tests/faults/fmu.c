@@ -346,6 +346,7 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
         double y = f->data.state == TERMINATED && FAULT(L10y) ? 0 : f->data.y;
         if (FAULT(G16) && f->data.state == INITIALIZATION) y = 7;
         if (FAULT(G15r) && vr[i] == 1 && f->data.state == STEP) return fail(f, "gain is no more");
+        if (FAULT(L10g) && vr[i] == 1 && (f->data.state == STEP || f->data.state == TERMINATED)) return fail(f, "gain is no more");
         if (FAULT(S04) && f->data.state == INITIALIZATION) y = f->data.gain;
         if (FAULT(S04h) && f->data.state == INITIALIZATION) y += f->data.bias * f->data.u;
         if (FAULT(T10t)) y += time(NULL) % 1000;

@@ -95,7 +95,7 @@ pub struct Commission {
     loops: Loops,
     axes: Axes,
     fit: OutputError,
-    /// Those of the large loops; without an amplitude: not found.
+    /// The large loops; one without an amplitude was not found.
     large: [Magnetization; 2],
     starting: Starting,
     turning: Turning,
