@@ -110,6 +110,25 @@ fn rows() -> Vec<Wrong> {
             "x: only a constant can be made an output",
             5,
         ),
+        row(
+            "unnamed_alias",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).aliases(&[fmu_core::Alias { name: "", description: "", display: None }])"#,
+            "x: an alias needs a name of its own",
+            5,
+        ),
+        row(
+            "own_alias",
+            r#"V::output("x", &VOLT, "", |m| &mut m.u).aliases(&[fmu_core::Alias { name: "x", description: "", display: None }])"#,
+            "x: an alias needs a name of its own",
+            5,
+        ),
+        row(
+            "shown_alias",
+            r#"V::boolean_output("x", "", |m| &mut m.on).aliases(&[
+            fmu_core::Alias { name: "x_rpm", description: "", display: Some(fmu_core::unit::RPM) }])"#,
+            "x_rpm: only a real variable with a unit can be shown in another one",
+            5,
+        ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two show in the table, whose start is in line 3.
@@ -169,6 +188,18 @@ fn models() -> Vec<Wrong> {
             "stops",
             ("Ball: ContinuousTime", "Ball: ContinuousTime + EventMode"),
             "`Ball` does not stop at its events",
+            EXPORT,
+        ),
+        model(
+            "eventless",
+            (
+                "Ball: ContinuousTime);",
+                "Ball: ContinuousTime + EventMode);\nimpl Events for Ball {\n    \
+                 fn event(&mut self, _: Elapsed) -> Result<Outcome, Fault> { Ok(Outcome::default()) }\n    \
+                 fn next(&self, _: Elapsed) -> Next { Next::Never }\n}\nimpl EventMode for Ball {\n    \
+                 fn to_event(&mut self, _: &Step) -> Result<Stop, Fault> { unreachable!() }\n}",
+            ),
+            "Ball: EventMode is for a model that is exported with ContinuousTime and Events",
             EXPORT,
         ),
         model(
@@ -242,6 +273,17 @@ fn sizes() -> Vec<Wrong> {
 /// Clocks.
 fn clocks() -> Vec<Wrong> {
     const EXPORT: usize = 26;
+    let unranked = model(
+        "unranked",
+        (r#"V::state("h","#, "V::clock(\"c\", \"\", Clock::triggered()),\n        V::state(\"h\","),
+        "c: a clock of Scheduled Execution needs a priority",
+        EXPORT + 1,
+    );
+    let export = (
+        "Ball: ContinuousTime);",
+        "Ball: ContinuousTime + Clocked + ScheduledExecution);\nimpl Clocked for Ball {\n    \
+         fn tick(&mut self, _: usize, _: Elapsed) -> Result<(), Fault> { Ok(()) }\n}",
+    );
     vec![
         row(
             "still",
@@ -268,6 +310,13 @@ fn clocks() -> Vec<Wrong> {
             "Ball: a row V::clock needs the capability Clocked",
             EXPORT + 1,
         ),
+        model(
+            "unscheduled",
+            ("Ball: ContinuousTime", "Ball: ContinuousTime + ScheduledExecution"),
+            "`Ball` has no clocks",
+            EXPORT,
+        ),
+        Wrong { source: unranked.source.replace(export.0, export.1), ..unranked },
         model(
             "adrift",
             (
@@ -299,13 +348,19 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
         fs::write(sources.join(format!("{}.rs", wrong.name)), &wrong.source).unwrap();
     }
     // The number of the states shows only where code is made.
-    let mut cargo = Command::new(env!("CARGO"));
-    cargo.args(["build", "--offline", "--keep-going", "--message-format", "short"]).current_dir(&folder);
-    let output = cargo.env("CARGO_TARGET_DIR", folder.join("target")).output().unwrap();
-    let said = String::from_utf8_lossy(&output.stderr);
+    let build = |arguments: &[&str]| {
+        let mut cargo = Command::new(env!("CARGO"));
+        cargo.args(["build", "--offline"]).args(arguments).current_dir(&folder);
+        let output = cargo.env("CARGO_TARGET_DIR", folder.join("target")).output().unwrap();
+        String::from_utf8_lossy(&output.stderr).into_owned()
+    };
+    let said = build(&["--keep-going", "--message-format", "short"]);
     assert!(said.contains("STATES of Ball has the length 1, and its integrator is made for 12"), "{said}");
     for Wrong { name, why, line, .. } in cases {
         let place = Path::new("src/bin").join(format!("{name}.rs:{line}:")).display().to_string();
         assert!(said.lines().any(|l| l.starts_with(&place) && l.contains(why)), "{place} {why}: {said}");
     }
+    // What the compiler adds in its long form suggests no other trait.
+    let said = build(&["--bin", "events"]);
+    assert!(said.contains("`Ball` has no events") && !said.contains("Sampled"), "{said}");
 }

@@ -326,6 +326,29 @@ fn pages_in_a_browser() {
     common::python::pytest("pages", "pages", &["test_browser.py"], &[("FMU_PAGES", &folder)]);
 }
 
+/// The lines of `docs/reference-fmus.md`, counted as the page says; each file has at most 60 % of the lines of its original.
+#[test]
+fn the_reference_fmus_have_the_lines_that_the_page_says() {
+    let page = std::fs::read_to_string(root().join("docs/reference-fmus.md")).unwrap();
+    let rows: Vec<Vec<&str>> = page
+        .lines()
+        .filter(|line| line.starts_with("| ["))
+        .map(|line| line.split('|').map(str::trim).skip(1).collect())
+        .collect();
+    let packages = std::fs::read_dir(root().join("examples/reference-fmus")).unwrap().count();
+    assert_eq!((rows.len(), packages), (9, 9));
+    for row in rows {
+        let (package, _) = row[0][1..].split_once(']').unwrap();
+        let file = format!("examples/reference-fmus/{package}/src/lib.rs");
+        let text = std::fs::read_to_string(root().join(&file)).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap().lines().map(str::trim);
+        let count = code.filter(|line| !line.is_empty() && !line.starts_with("//")).count();
+        let [original, told] = [row[2], row[3]].map(|cell| cell.parse::<usize>().unwrap());
+        assert_eq!(told, count, "docs/reference-fmus.md: the lines of {file}");
+        assert!(10 * count <= 6 * original, "{file}: {count} lines, more than 60 % of {original}");
+    }
+}
+
 /// Every relative link of README, the pages at the root, of `docs` and of the Python package leads to a file.
 #[test]
 fn links_lead_somewhere() {

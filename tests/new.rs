@@ -121,6 +121,21 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     }
     let binary = files.iter().find(|(name, _)| name.starts_with("binaries/")).unwrap().1;
     assert!(!binary.windows(root.len()).any(|w| w == root.as_bytes()), "the binary names a folder of this machine");
+
+    // A mistake of the model that shows while `fmu build` tries its parameters is told in the model's own words.
+    let source = folder.join("src/lib.rs");
+    let right = fs::read_to_string(&source).unwrap();
+    let mistake =
+        "assert!(self.conductance < 3.0, \"{} W/K is too much\", self.conductance);\n        *out = Outputs {";
+    let wrong = right.replacen("*out = Outputs {", mistake, 1);
+    assert_ne!(wrong, right);
+    fs::write(&source, wrong).unwrap();
+    let output = command("fmu", &folder).arg("build").output().unwrap();
+    let said = text(&output);
+    assert!(!output.status.success(), "{said}");
+    let line = said.lines().find(|line| line.starts_with("error: ")).unwrap();
+    assert!(line.contains("a fault in the model's code (panic): ") && line.contains(" W/K is too much"), "{said}");
+    println!("{line}");
 }
 
 fn walk(folder: &Path) -> Vec<PathBuf> {

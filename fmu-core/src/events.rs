@@ -169,8 +169,7 @@ pub struct Indicator {
 /// ```
 #[diagnostic::on_unimplemented(
     message = "`{Self}` has no events: it lacks the capability `Events`",
-    note = "write `impl Events for {Self}`, or remove `Events` from the line that exports the model",
-    note = "a model that acts only at multiples of a period implements `Sampled` instead"
+    note = "write `impl Events for {Self}`, or remove `Events` from the line that exports the model"
 )]
 pub trait Events: Model {
     /// The event indicators, in the order of all calls.

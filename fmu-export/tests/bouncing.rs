@@ -18,7 +18,8 @@ use fmu_core::{
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use solver::*;
-use std::ptr::null_mut;
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
 
 enumeration! {
     enum Ground("Ground", "What it falls on") {
@@ -65,6 +66,12 @@ impl Model for Ball {
         V::enumeration_constant::<Ground>("ground", "Stone", Ground::Stone as i32),
         V::array_constant("levels", &METER, "Heights", &[1.0, 0.49]),
         V::text_constant("made", "By whom", "here"),
+        V::int8_constant("int8", "Least of 8 bits", i8::MIN),
+        V::uint8_constant("uint8", "Greatest of 8 bits", u8::MAX),
+        V::int16_constant("int16", "Least of 16 bits", i16::MIN),
+        V::uint16_constant("uint16", "Greatest of 16 bits", u16::MAX),
+        V::uint32_constant("uint32", "More than an Int32 has", 4_000_000_000),
+        V::int64_constant("int64", "Of 64 bits", -3_000_000_000),
     ];
 
     fn initialize(&mut self) {}
@@ -223,7 +230,7 @@ fn constants_have_their_values_and_cannot_be_set() {
     let names = Description::exported::<fmi::This>().unwrap();
     let vr = |name: &str| names.variable(name).unwrap().value_reference;
     for kind in EVERY {
-        let fmu = Fmu::entered(kind, 0.0);
+        let (fmu, mut made) = (Fmu::entered(kind, 0.0), null());
         assert_eq!((fmu.get(vr("v_min")), fmu.get_integer(vr("int32"))), (0.1, -7));
         if kind.version() == 3 {
             let (mut single, mut wide, mut item, mut yes) = (0.0, 0, 0, Fmi3Boolean(7));
@@ -234,12 +241,32 @@ fn constants_have_their_values_and_cannot_be_set() {
             assert_eq!(unsafe { fmi3GetBoolean(fmu.it, &vr("yes"), 1, &mut yes, 1) }, OK);
             assert_eq!(fmu.try_get(&[vr("levels")], &mut levels), OK);
             assert_eq!((single, wide, item, yes.0, levels), (0.1, 9, 2, 1, [1.0, 0.49]));
+            macro_rules! reads {
+                ($($get:ident $name:literal $value:expr;)*) => { $(
+                    let (mut value, expected) = (0, $value);
+                    assert_eq!(unsafe { $get(fmu.it, &vr($name), 1, &mut value, 1) }, OK, $name);
+                    assert_eq!(value, expected, $name);
+                )* };
+            }
+            reads! {
+                fmi3GetInt8 "int8" i8::MIN;
+                fmi3GetUInt8 "uint8" u8::MAX;
+                fmi3GetInt16 "int16" i16::MIN;
+                fmi3GetUInt16 "uint16" u16::MAX;
+                fmi3GetUInt32 "uint32" 4_000_000_000_u32;
+                fmi3GetInt64 "int64" -3_000_000_000_i64;
+            }
+            assert_eq!(unsafe { fmi3GetString(fmu.it, &vr("made"), 1, &mut made, 1) }, OK);
         } else {
             let mut yes = Fmi2Boolean(7);
             assert_eq!(unsafe { fmi2GetBoolean(fmu.it, &vr("yes"), 1, &mut yes) }, OK);
             assert_eq!((fmu.get_integer(vr("uint64")), fmu.get_integer(vr("ground")), yes.0), (9, 2, 1));
             assert_eq!((fmu.get(vr("single")), fmu.get(vr("levels") + 1)), (f64::from(0.1_f32), 0.49));
+            let small = ["int8", "uint8", "int16", "uint16"].map(|name| fmu.get_integer(vr(name)));
+            assert_eq!(small, [-128, 255, -32768, 65535]);
+            assert_eq!(unsafe { fmi2GetString(fmu.it, &vr("made"), 1, &mut made) }, OK);
         }
+        assert_eq!(unsafe { CStr::from_ptr(made) }, c"here");
         assert_eq!(fmu.set(&[vr("v_min")], &[0.1]), ERROR);
         assert!(fmu.error().contains("v_min is a constant and cannot be set"));
     }

@@ -171,6 +171,36 @@ fn the_pair_runs_alike_in_both_standards() {
     assert_ne!(run("fmi3", &["--sequential"]), three, "one step less on the way from plant to controller");
 }
 
+/// The controller with a clock in place of the one with a grid: in whatever way it is run, the plant moves as before.
+#[test]
+fn clocks_tick() {
+    let run = |controller: &str, more: &[&str]| {
+        let (p, c) = (archive("fmi3", "PmsmPlant"), archive("fmi3", controller));
+        let (p, c) = (format!("p={}", p.display()), format!("c={}", c.display()));
+        let arguments = ["simulate", &p, &c, "--auto-connect", "--input", "c.speed_ref=0:0,0.01:80", "--stop", "0.1"];
+        let output = fmu(&[&arguments[..], &["--record", "p.i_a,p.speed", "--csv", "-"], more].concat());
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        text(&output.stdout)
+    };
+    let (plain, clocked) = ("SensorlessController", "SensorlessControllerClocked");
+    for method in [&[][..], &["--event-mode"], &["--me", "--solver", "rk4"]] {
+        let (grid, clock) = (run(plain, method), run(clocked, method));
+        assert_eq!(grid.lines().count(), 1002, "{method:?}");
+        assert!(grid == clock, "{method:?}");
+        let speed: f64 = grid.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
+        assert!(speed > 30.0, "{method:?}: {speed}");
+    }
+    // A communication step of ten ticks.
+    let fine = run(clocked, &["--step", "1e-4"]);
+    let coarse = run(clocked, &["--step", "1e-3"]);
+    assert_eq!(coarse.lines().count(), 102);
+    for (k, row) in coarse.lines().skip(1).enumerate() {
+        let numbers = |row: &str| row.split(',').map(|cell| cell.parse::<f64>().unwrap()).collect::<Vec<_>>();
+        let (coarse, fine) = (numbers(row), numbers(fine.lines().nth(1 + 10 * k).unwrap()));
+        assert!(coarse.iter().zip(&fine).all(|(a, b)| (a - b).abs() < 1e-9), "{coarse:?} {fine:?}");
+    }
+}
+
 /// What no FMU refuses and yet may make a result wrong is told after the run, whose exit status stays 0.
 #[test]
 fn inputs_left_alone_and_long_steps_are_told() {

@@ -205,6 +205,18 @@ def test_archives_that_must_exist(archives):
             assert (archives / f"fmi{standard}" / f"{name}.fmu").is_file()
 
 
+def test_the_clocked_controller(archives):
+    """FMI 3.0 alone: FMPy finds no problem, and what the controller exchanges is on its one clock."""
+    archive = archives / "fmi3/SensorlessControllerClocked.fmu"
+    assert validate_fmu(archive) == []
+    description = read_model_description(archive)
+    assert description.scheduledExecution is not None
+    (clock,) = (v for v in description.modelVariables if v.type == "Clock")
+    assert (clock.name, clock.causality, clock.intervalVariability) == ("sample", "input", "fixed")
+    exchanged = [v for v in description.modelVariables if v.causality in ("input", "output") and v is not clock]
+    assert exchanged and all(v.clocks == [clock] for v in exchanged)
+
+
 GOLDEN = Path(__file__).parents[2] / "modelDescription/tests/golden"
 
 

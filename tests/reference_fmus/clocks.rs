@@ -1,7 +1,8 @@
 //! `clocks`: an importer that makes its ticks.
 
-use super::open;
+use super::{archive, open, script};
 use fmu_import::{Instance, Kind, Values};
+use model_description::FmiVersion::V3;
 
 /// `inClock1` ticks by itself, `inClock3` when it asks for it, `inClock2` when the test does; the output clock at totals of 5.
 #[test]
@@ -51,4 +52,17 @@ fn clocks_tick_by_their_kinds() {
         let expected = expected.iter().chain(&[(13, false), (15, true)]).map(|&(n, trips)| (f64::from(n), trips));
         assert_eq!(rows, expected.collect::<Vec<_>>(), "{kind:?}");
     }
+}
+
+#[test]
+fn fmpy_validates_the_clocks() {
+    let said = script(
+        "import sys, fmpy\n\
+         from fmpy.validation import validate_fmu\n\
+         assert validate_fmu(sys.argv[1]) == []\n\
+         variables = fmpy.read_model_description(sys.argv[1]).modelVariables\n\
+         print(*(f'{v.name} {v.intervalVariability}' for v in variables if v.type == 'Clock'))\n",
+        &[&archive("clocks", V3)],
+    );
+    assert_eq!(said.trim(), "inClock1 constant inClock2 triggered inClock3 countdown outClock triggered");
 }

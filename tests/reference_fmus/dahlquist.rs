@@ -52,3 +52,23 @@ fn starts_where_the_importer_wants() {
         assert_eq!(x, &wanted, "FMPy, {version:?}");
     }
 }
+
+/// The step of its solver is an attribute of FMI 3.0 alone.
+#[test]
+fn its_description_has_the_step_of_the_solver() {
+    for (version, expected) in [(V2, None), (V3, Some(" fixedInternalStepSize=\"0.1\""))] {
+        let (_, files) = fmu_import::contents(&archive("dahlquist", version)).unwrap();
+        let xml = String::from_utf8(files["modelDescription.xml"].clone()).unwrap();
+        let times = xml.matches("fixedInternalStepSize").count();
+        let found = expected.map_or(0, |attribute| xml.matches(attribute).count());
+        assert_eq!((times, found), (expected.iter().count(), times), "{xml}");
+    }
+}
+
+/// Inside a step of 1 s, FMPy reads the rows of the original, and ends a step where it wants.
+#[test]
+fn fmpy_reads_it_inside_a_step() {
+    let said = script(include_str!("dahlquist.py"), &[&archive("dahlquist", V3)]);
+    let found: Vec<f64> = said.split_whitespace().map(hexadecimal).collect();
+    assert_eq!(found, expected(1.0, 1.0)[..=10]);
+}

@@ -2,6 +2,9 @@
 #![allow(missing_docs, clippy::float_cmp, clippy::borrow_as_ptr)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
+mod arguments;
+#[path = "../counting/mod.rs"]
+mod counting;
 #[path = "../common/draw.rs"]
 #[allow(unreachable_pub, reason = "a module of several test programs")]
 mod draw;
@@ -466,22 +469,28 @@ fn a_clock_ticks_once_at_an_instant() {
     }
     // Two clocks, in both orders, at one instant and in one update.
     for pair in [[FIXED, TRIGGERED], [TRIGGERED, FIXED]] {
-        let host = Host::started(Kind::Cs);
-        let yes = [Fmi3Boolean(1); 2];
-        assert_eq!(unsafe { fmi3SetClock(host.it.get(), pair.as_ptr(), 2, yes.as_ptr()) }, OK);
-        assert_eq!((host.set(U, 5.0), host.update(), host.ticks(), host.get(FREE)), (OK, OK, 2, Some(5.0)));
-        // All or none.
-        let bad = [pair[0], TRIP];
-        let host = Host::started(Kind::Cs);
-        assert_eq!(unsafe { fmi3SetClock(host.it.get(), bad.as_ptr(), 2, yes.as_ptr()) }, ERROR);
-        assert!(host.errors()[0].contains("trip is an output clock"));
+        for kind in [Kind::Cs, Kind::Me] {
+            let host = Host::started(kind);
+            let yes = [Fmi3Boolean(1); 2];
+            assert_eq!(unsafe { fmi3SetClock(host.it.get(), pair.as_ptr(), 2, yes.as_ptr()) }, OK);
+            assert_eq!((host.set(U, 5.0), host.update(), host.ticks(), host.get(FREE)), (OK, OK, 2, Some(5.0)));
+            // All or none.
+            let bad = [pair[0], TRIP];
+            let host = Host::started(kind);
+            assert_eq!(unsafe { fmi3SetClock(host.it.get(), bad.as_ptr(), 2, yes.as_ptr()) }, ERROR);
+            assert!(host.errors()[0].contains("trip is an output clock"));
+        }
+        // In Scheduled Execution, one activation after the other.
+        let host = Host::started(Kind::Se);
+        assert_eq!((host.set(U, 5.0), host.activate(pair[0], 1.0), host.activate(pair[1], 1.0)), (OK, OK, OK));
+        assert_eq!((host.ticks(), host.get(FREE), host.updates.get() > 0), (2, Some(5.0), true));
     }
 }
 
 /// Qualifiers: 0 not yet known, 1 unchanged, 2 changed.
 #[test]
 fn intervals_and_qualifiers() {
-    for kind in [Kind::Cs, Kind::Me] {
+    for kind in [Kind::Cs, Kind::Me, Kind::Se] {
         let host = Host::entered(kind);
         for (vr, interval) in [(CONSTANT, 0.1), (FRACTION, 1.0 / 3.0), (FIXED, 0.2), (TUNABLE, 0.3), (CHANGING, 0.1)] {
             assert_eq!((host.interval(vr), host.interval(vr)), (Some((interval, 2)), Some((interval, 1))), "{vr}");
@@ -490,6 +499,10 @@ fn intervals_and_qualifiers() {
         assert_eq!((host.set_interval(FIXED, 0.25), host.interval(FIXED)), (OK, Some((0.25, 2))));
         assert_eq!(host.get(14), Some(0.25), "T_fixed");
         assert_eq!(host.exit(), OK);
+        if kind == Kind::Se {
+            // Afterwards, as `scheduled` has it.
+            continue;
+        }
         // A changing clock tells its interval where it ticked.
         assert_eq!((host.set_clock(CHANGING, true), host.update()), (OK, OK));
         assert_eq!((host.interval(CHANGING), host.interval(CHANGING)), (Some((0.2, 2)), Some((0.2, 1))));

@@ -74,7 +74,7 @@ fn what_a_callback_may_not_call() {
 
 #[test]
 fn a_panic_in_a_tick_ends_one_instance() {
-    for kind in [Kind::Cs, Kind::Se] {
+    for kind in [Kind::Cs, Kind::Me, Kind::Se] {
         let (host, other) = (Host::started(kind), Host::started(kind));
         assert_eq!(unsafe { fmi3SetBoolean(host.it.get(), &PANICS, 1, &Fmi3Boolean(1), 1) }, OK);
         let tick = |host: &Host| {

@@ -1,4 +1,4 @@
-//! An allocator that counts the calls of each thread: what the test runner's own thread does is not counted.
+//! An allocator that counts the calls of each thread, and knows the largest: what the test runner's own thread does is not counted.
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an allocator that counts and passes on")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -12,6 +12,7 @@ struct Counting;
 thread_local! {
     /// Neither this start value nor dropping a number allocates.
     static CALLS: Cell<u64> = const { Cell::new(0) };
+    static LARGEST: Cell<usize> = const { Cell::new(0) };
 }
 
 /// Counts one call; a thread that ends may have no counter anymore.
@@ -22,6 +23,7 @@ fn count() {
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         count();
+        let _ = LARGEST.try_with(|largest| largest.set(largest.get().max(layout.size())));
         unsafe { System.alloc(layout) }
     }
 
@@ -37,6 +39,12 @@ static ALLOCATOR: Counting = Counting;
 /// How often this thread asked for memory or gave some back.
 pub(crate) fn calls() -> u64 {
     CALLS.get()
+}
+
+/// The largest number of bytes that this thread asked for at once since the last call.
+#[allow(dead_code, reason = "a module of several test programs, one of which asks")]
+pub(crate) fn largest() -> usize {
+    LARGEST.take()
 }
 
 /// Another thread that allocates until this is dropped, as the test runner's thread may at any time.

@@ -40,6 +40,11 @@ struct Kinds {
     counts: [i32; 3],
     small: [u8; 2],
     large: [u64; 2],
+    tiny: [i8; 2],
+    short: [i16; 2],
+    half: [u16; 2],
+    word: [u32; 2],
+    long: [i64; 2],
     flags: [bool; 2],
     colors: [Color; 2],
     singles: [f32; 2],
@@ -72,6 +77,11 @@ impl Model for Kinds {
         V::text_output("title_out", "Text", |m| &m.model.title),
         V::binary_output("tx", "Frame", JSON, 3, |m| &mut m.out.tx),
         V::binary_parameter("key", "Frame", JSON, MOST, |m| &mut m.model.rx),
+        V::list_input("tiny", "Of 8 bits", 2, &Items(|m| &mut m.model.tiny)),
+        V::list_input("short", "Of 16 bits", 2, &Items(|m| &mut m.model.short)),
+        V::list_input("half", "Of 16 bits, not negative", 2, &Items(|m| &mut m.model.half)),
+        V::list_input("word", "Of 32 bits, not negative", 2, &Items(|m| &mut m.model.word)),
+        V::list_input("long", "Of 64 bits, with a sign", 2, &Items(|m| &mut m.model.long)),
     ];
     fn initialize(&mut self) {}
     fn output(&self, _: Elapsed, out: &mut Outputs) {
@@ -99,6 +109,11 @@ const COUNTS_OUT: u32 = 18;
 const TITLE_OUT: u32 = 21;
 const TX: u32 = 22;
 const KEY: u32 = 23;
+const TINY: u32 = 24;
+const SHORT: u32 = 26;
+const HALF: u32 = 28;
+const WORD: u32 = 30;
+const LONG: u32 = 32;
 
 const OK: c_int = 0;
 const ERROR: c_int = 3;
@@ -179,6 +194,11 @@ fn lists_of_every_type_cross_the_interface() {
         fmi3GetBoolean fmi3SetBoolean Fmi3Boolean: FLAGS, [Fmi3Boolean(1), Fmi3Boolean(0)];
         fmi3GetInt64 fmi3SetInt64 i64: COLORS, [5, 1];
         fmi3GetFloat32 fmi3SetFloat32 f32: SINGLES, [0.1, -3.5];
+        fmi3GetInt8 fmi3SetInt8 i8: TINY, [i8::MIN, i8::MAX];
+        fmi3GetInt16 fmi3SetInt16 i16: SHORT, [i16::MIN, i16::MAX];
+        fmi3GetUInt16 fmi3SetUInt16 u16: HALF, [0, u16::MAX];
+        fmi3GetUInt32 fmi3SetUInt32 u32: WORD, [0, u32::MAX];
+        fmi3GetInt64 fmi3SetInt64 i64: LONG, [i64::MIN, i64::MAX];
     }
 }
 

@@ -7,6 +7,9 @@
     reason = "an importer calls C functions, rightly or not"
 )]
 
+#[path = "../counting/mod.rs"]
+#[allow(dead_code, reason = "a module of several test programs, each of which uses a part")]
+mod counting;
 #[path = "../common/draw.rs"]
 #[allow(unreachable_pub, reason = "a module of several test programs")]
 mod draw;
@@ -311,16 +314,22 @@ fn arrays_have_the_sizes_that_were_set() {
     }
 }
 
-/// A size above its bound is refused before anything is made of it.
+/// A size above its bound is refused before memory is asked for: all that is asked for is the message.
 #[test]
 fn sizes_are_judged() {
+    let it = It::new(false);
+    assert_eq!((it.enter(), it.set_sizes(&[N, ROWS], &[5, 200]), counting::largest() > 0), (OK, OK, true));
+    assert_eq!((it.exit(), counting::largest()), (OK, 200 * 8));
     for (reference, size) in [(N, 6), (N, 1 << 32), (N, u64::MAX), (K, 5), (ROWS, 0), (ROWS, 201)] {
         for configuration in [true, false] {
             let it = It::new(false);
             if configuration {
                 assert_eq!(it.enter(), OK);
             }
+            counting::largest();
             assert_eq!(it.set_sizes(&[reference], &[size]), ERROR, "{reference} = {size}");
+            let asked = counting::largest();
+            assert!(asked < 256, "{reference} = {size}: {asked} bytes");
         }
     }
     // What no bound says, the model refuses; then nothing has changed.

@@ -29,6 +29,9 @@ impl Model for Clocks {
     const INFO: Info = Info {
         name: "Clocks",
         description: "This model demonstrates clocks and Scheduled Execution",
+        author: env!("CARGO_PKG_AUTHORS"),
+        license: env!("CARGO_PKG_LICENSE"),
+        copyright: "The sensorless-drive developers; after the Reference-FMUs of the Modelica Association",
         experiment: Experiment { stop: 10.0, step: 1.0, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };

@@ -2,7 +2,8 @@
 
 use fmu_core::unit::{Exponents, ONE, Quantity, Unit};
 use fmu_core::{
-    Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Model, Row, State, Step, Table, integrate, table,
+    Block, ContinuousTime, Elapsed, Experiment, Fault, Info, Intermediate, Model, Row, State, Step, Table, integrate,
+    table,
 };
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +37,7 @@ impl Model for Dahlquist {
         ..Info::DEFAULT
     };
     const TABLE: &'static Table<Block<Self>> = table![
-        V::output("x", &ONE, "the only state", |m| &mut m.out).exact(),
+        V::output("x", &ONE, "the only state", |m| &mut m.out).exact().intermediate(),
         V::parameter("k", &PER_S, "Rate of the decay", |m| &mut m.model.k),
     ];
 
@@ -60,4 +61,10 @@ impl ContinuousTime for Dahlquist {
     }
 }
 
-fmu_export::export!(Dahlquist: ContinuousTime);
+impl Intermediate for Dahlquist {
+    fn longest(&self) -> f64 {
+        STEP
+    }
+}
+
+fmu_export::export!(Dahlquist: ContinuousTime + Intermediate);

@@ -1,7 +1,10 @@
 //! The state machine of FMI, written down once more by hand, with the model run natively.
 
 use super::super::*;
-use fmu_core::{Block, Capabilities, Causality, Elapsed, Meta, Model, Next, SampleGrid, Slot, Step, Variability};
+use fmu_core::{
+    Block, Capabilities, Causality, Elapsed, Meta, Model, Next, SampleGrid, Slot, Step, Variability,
+    capability::ToEvent,
+};
 
 /// What the driver must know of a model, besides its capabilities.
 pub trait Twin: Model + PartialEq {
@@ -181,6 +184,9 @@ impl<M: Twin> Snapshot<M> {
             Kind::Cs3 { event, early } if M::CAN.event_mode() => (event, early),
             _ => (false, false),
         };
+        if let (true, Some(to_event)) = (event || early, M::CAN.to_event) {
+            return self.stop(to_event, (event, early), t, h);
+        }
         let mut stepped = Stepped { end: t + h, ..Stepped::default() };
         self.end = t + h;
         let mut reached = end;
@@ -223,13 +229,40 @@ impl<M: Twin> Snapshot<M> {
         Ok(stepped)
     }
 
+    /// The step of a model with states: the first event inside it ends it if it may, and otherwise the step goes on from there. Who
+    /// handles no events leaves those at the end to the model.
+    fn stop(&mut self, to_event: ToEvent<M>, (event, early): (bool, bool), t: f64, h: f64) -> Result<Stepped, c_int> {
+        let (events, end) = (M::CAN.events.as_ref().unwrap(), self.elapsed.plus(h));
+        let model = &mut self.block.model;
+        let mut step = Step { start: self.elapsed, h };
+        let (stop, inside) = loop {
+            let stop = to_event(model, &step).map_err(|_| ERROR)?;
+            let inside = stop.event && end.since(stop.at) > f64::EPSILON * h;
+            if early || !inside {
+                break (stop, inside);
+            }
+            step = Step { start: stop.at, h: end.since(stop.at) };
+        };
+        if !event {
+            (events.begin)(model, stop.at);
+            while stop.settles && !inside && (events.event)(model, stop.at).map_err(|_| ERROR)?.again {}
+        }
+        (self.elapsed, self.end) = (end, t + h);
+        if inside {
+            (self.elapsed, self.end) = (stop.at, self.start.unwrap() + stop.at.seconds());
+        }
+        self.output();
+        Ok(Stepped { event: stop.event && event, early: inside, end: self.end })
+    }
+
     /// The status of setting one value, without setting it.
     fn judge(&mut self, index: usize, value: f64) -> c_int {
         let (state, exchanges) = (self.state, self.kind.exchanges());
         let row = M::CAN.rows().unwrap().contains(&index);
         let Some((meta, Slot::Real(x))) = M::TABLE.entry(&mut self.block, index) else { return ERROR };
-        let Meta { causality, variability, range, .. } = *meta;
+        let Meta { causality, variability, range, exact, .. } = *meta;
         let may = match (causality, variability) {
+            _ if exact && "in".contains(state) => true,
             (Causality::Input, Variability::Continuous) => "invcs".contains(state),
             (Causality::Input, _) => "invs".contains(state) || (exchanges && state == 'c' && *x == value),
             (Causality::Parameter, Variability::Tunable) => "invs".contains(state),

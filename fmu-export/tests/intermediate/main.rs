@@ -3,9 +3,13 @@
 #![allow(missing_docs, clippy::float_cmp, clippy::borrow_as_ptr, clippy::type_complexity)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
-#[path = "common/journal.rs"]
+#[path = "../common/draw.rs"]
+#[allow(unreachable_pub, reason = "a module of several test programs")]
+mod draw;
+#[path = "../common/journal.rs"]
 #[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
 mod journal;
+mod random;
 
 use fmu_core::unit::{METER, METER_PER_S, ONE};
 use fmu_core::*;
