@@ -270,7 +270,7 @@ async function show(place) {
   const panels = make(place, "div", { class: "panels", style: `--columns:${data.columns}` });
   for (const panel of data.panels) {
     const box = make(panels, "div", { class: "panel" });
-    const title = panel.title ? `${panel.title} [${panel.unit}]` : panel.unit;
+    const title = panel.title && panel.unit ? `${panel.title} [${panel.unit}]` : panel.title || panel.unit;
     make(box, "h3", {}, title);
     if (!together) readings.push(...legend(box, panel.curves.map((curve) => [curve]), of(panel), redraw));
     panel.drawn = new Panel(box, panel, of(panel), `${title}: ${panel.curves.map((curve) => curve.name).join(", ")}`);
