@@ -2,6 +2,7 @@
 
 use super::exchange::moved;
 use super::instances::only_once;
+use super::values::is_rounded;
 use crate::check::Level;
 use crate::encoding::{same, show};
 use crate::exchange::{Importer, deviation, differ};
@@ -289,7 +290,8 @@ pub(super) fn inputs_read_back(session: &Session) -> Result<(), NotDetermined> {
                 break;
             }
             let (status, back) = instance.get(v)?;
-            if !status.is_ok() || !same(v, version, &values, &back) {
+            let kept = same(v, version, &values, &back) || is_rounded(v, version, &values, &back);
+            if !status.is_ok() || !kept {
                 let [set, got] = [&values, &back].map(|bits| show(v, version, bits));
                 let text =
                     format!("{} was set to {set} in {state:?}, and Get({}) returned {status}, {got}", v.name, v.name);

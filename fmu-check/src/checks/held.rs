@@ -1,5 +1,6 @@
 //! Values that a run must keep or return as they are: several in one call, inputs, parameters, Booleans, numbers.
 
+use super::values::is_rounded;
 use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
@@ -232,12 +233,7 @@ pub(super) fn inputs_keep(session: &Session) -> Result<(), NotDetermined> {
                 if !status.is_ok() {
                     break;
                 }
-                #[expect(clippy::cast_possible_truncation, reason = "rounds")]
-                let rounded = |b: &u64| f64::from(f64::from_bits(*b) as f32).to_bits();
-                let single = version == FmiVersion::V2
-                    && v.base == BaseType::Float64
-                    && values.iter().map(rounded).eq(back.iter().copied());
-                if !single && !same(v, version, &values, &back) {
+                if !is_rounded(v, version, &values, &back) && !same(v, version, &values, &back) {
                     let [set, got] = [&values, &back].map(|bits| show(v, version, bits));
                     session.violated(format!("line {}: {}: set to {set}, after {k} steps it is {got}", v.line, v.name));
                     return Ok(());

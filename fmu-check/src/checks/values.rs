@@ -7,7 +7,7 @@ use crate::session::{NotDetermined, Session};
 use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Simple;
-use model_description::{BaseType, Causality, ModelVariable, Variability};
+use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
 use std::ffi::CString;
 
 pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
@@ -45,7 +45,7 @@ pub(super) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
             kept.push((v, values));
             continue;
         }
-        if session.is_v2() && is_rounded(v, &values, &back) {
+        if is_rounded(v, session.description.version, &values, &back) {
             session.note(format!("{} is in single precision: what is set is rounded", v.name));
         } else {
             let [set, got] = [&values, &back].map(|bits| show(v, session.description.version, bits));
@@ -90,10 +90,10 @@ fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64
 }
 
 /// Whether a real variable has the values in single precision, which FMI 2.0 cannot say: it has one type of real numbers.
-fn is_rounded(v: &ModelVariable, set: &[u64], got: &[u64]) -> bool {
+pub(super) fn is_rounded(v: &ModelVariable, version: FmiVersion, set: &[u64], got: &[u64]) -> bool {
     #[expect(clippy::cast_possible_truncation, reason = "rounds")]
     let rounded = |bits: &u64| f64::from(f64::from_bits(*bits) as f32).to_bits();
-    v.base == BaseType::Float64 && set.iter().map(rounded).eq(got.iter().copied())
+    version == FmiVersion::V2 && v.base == BaseType::Float64 && set.iter().map(rounded).eq(got.iter().copied())
 }
 
 /// A text longer than this in bytes is beyond use.
