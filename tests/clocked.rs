@@ -3,106 +3,21 @@
 #![allow(missing_docs, non_snake_case, clippy::float_cmp, clippy::borrow_as_ptr)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions")]
 
+#[path = "common/controller.rs"]
+mod controller;
+
+use controller::{Controller, Kind, OK, reference};
 use drive::{Pair, PmsmPlant, SensorlessControllerClocked};
-use fmu_core::{Block, Elapsed, Exported, Model, Step};
+use fmu_core::{Block, Elapsed, Step};
 use fmu_export::abi::types::*;
-use std::ffi::CString;
-use std::ptr::{null, null_mut};
+use std::ptr::null_mut;
 
 fmu_export::export!(SensorlessControllerClocked: Clocked + ScheduledExecution + Warns);
 
 use fmi::*;
 
-const OK: c_int = 0;
 const ERROR: c_int = 3;
 const SAMPLE: u32 = 1;
-
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Kind {
-    Cs,
-    Me,
-    Se,
-}
-
-/// The value reference of a variable.
-fn reference(name: &str) -> u32 {
-    let table = SensorlessControllerClocked::TABLE;
-    let index = (0..table.len()).position(|i| table.locate(i).is_some_and(|(other, ..)| other == name));
-    u32::try_from(index.unwrap_or_else(|| panic!("{name}"))).unwrap() + 1
-}
-
-struct Controller {
-    kind: Kind,
-    it: InstancePointer,
-}
-
-impl Controller {
-    /// In Initialization Mode.
-    fn new(kind: Kind) -> Self {
-        let token = CString::new(fmi::This::TOKEN.as_str()).unwrap();
-        let (name, token, no, yes) = (c"c".as_ptr(), token.as_ptr(), Fmi3Boolean(0), Fmi3Boolean(1));
-        let it = unsafe {
-            match kind {
-                Kind::Cs => {
-                    fmi3InstantiateCoSimulation(name, token, null(), no, no, yes, no, null(), 0, null_mut(), None, None)
-                }
-                Kind::Me => fmi3InstantiateModelExchange(name, token, null(), no, no, null_mut(), None),
-                Kind::Se => {
-                    fmi3InstantiateScheduledExecution(name, token, null(), no, no, null_mut(), None, None, None, None)
-                }
-            }
-        };
-        assert!(!it.is_null());
-        assert_eq!(unsafe { fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0) }, OK);
-        Self { kind, it }
-    }
-
-    fn exit(&self) -> c_int {
-        unsafe { fmi3ExitInitializationMode(self.it) }
-    }
-
-    fn update(&self) {
-        let ([mut a, mut b, mut c, mut d, mut e], mut next) = ([Fmi3Boolean(9); 5], 0.0);
-        let status = unsafe { fmi3UpdateDiscreteStates(self.it, &mut a, &mut b, &mut c, &mut d, &mut e, &mut next) };
-        assert_eq!((status, a.0, e.0), (OK, 0, 0));
-    }
-
-    /// From Event Mode at `t` to Event Mode at `end`.
-    fn proceed(&self, t: f64, h: f64, end: f64) {
-        let ([mut a, mut b, mut c], mut last) = ([Fmi3Boolean(9); 3], 0.0);
-        unsafe {
-            if self.kind == Kind::Cs {
-                assert_eq!(fmi3EnterStepMode(self.it), OK);
-                assert_eq!(fmi3DoStep(self.it, t, h, Fmi3Boolean(1), &mut a, &mut b, &mut c, &mut last), OK);
-            } else {
-                assert_eq!((fmi3EnterContinuousTimeMode(self.it), fmi3SetTime(self.it, end)), (OK, OK));
-            }
-            assert_eq!(fmi3EnterEventMode(self.it), OK);
-        }
-    }
-
-    fn set(&self, vr: &[u32], values: &[f64]) {
-        assert_eq!(unsafe { fmi3SetFloat64(self.it, vr.as_ptr(), vr.len(), values.as_ptr(), values.len()) }, OK);
-    }
-
-    fn get(&self, vr: &[u32]) -> Vec<f64> {
-        let mut values = vec![f64::NAN; vr.len()];
-        assert_eq!(unsafe { fmi3GetFloat64(self.it, vr.as_ptr(), vr.len(), values.as_mut_ptr(), vr.len()) }, OK);
-        values
-    }
-
-    fn get_booleans<const N: usize>(&self, vr: [u32; N]) -> [bool; N] {
-        let mut values = [Fmi3Boolean(9); N];
-        assert_eq!(unsafe { fmi3GetBoolean(self.it, vr.as_ptr(), N, values.as_mut_ptr(), N) }, OK);
-        values.map(|value| value.0 != 0)
-    }
-}
-
-impl Drop for Controller {
-    fn drop(&mut self) {
-        unsafe { fmi3FreeInstance(self.it) }
-    }
-}
 
 /// What the importer sets at sample k: a start, a reversal, load steps.
 fn inputs(k: u32) -> (f64, f64) {
@@ -129,7 +44,7 @@ fn jacobi(T_s: f64) -> Vec<[u64; 6]> {
 }
 
 fn clocked(kind: Kind, T_s: f64) -> Vec<[u64; 6]> {
-    let controller = Controller::new(kind);
+    let controller = Controller::new(kind, 0.0, None, null_mut());
     if T_s != 1e-4 {
         assert_eq!(unsafe { fmi3SetIntervalDecimal(controller.it, &SAMPLE, 1, &T_s) }, OK);
         assert_eq!(controller.get(&[reference("T_s")]), [T_s]);
@@ -198,7 +113,7 @@ fn the_clocked_controller_gives_the_bits_of_the_pair() {
 #[test]
 fn a_delay_of_0_is_refused() {
     for kind in [Kind::Cs, Kind::Me, Kind::Se] {
-        let controller = Controller::new(kind);
+        let controller = Controller::new(kind, 0.0, None, null_mut());
         let (vr, zero) = (reference("timing.delay"), 0);
         assert_eq!(unsafe { fmi3SetInt32(controller.it, &vr, 1, &zero, 1) }, OK);
         assert_eq!(controller.exit(), ERROR);

@@ -1,8 +1,9 @@
 //! FMUs with clocks in our importer, which makes their ticks: Co-Simulation with Event Mode and Model Exchange.
 #![allow(missing_docs, clippy::float_cmp)]
 
-use fmu_import::Fmu;
+use fmu::commands::build::{self, Build};
 use fmu_import::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
+use fmu_import::{Fmu, Values};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -56,5 +57,71 @@ fn the_clocked_pair_is_the_pair() {
     let (ours, jacobi) = (pair(Method::default(), &clocked, 1e-4), pair(Method::default(), &plain, 1e-4));
     for name in ["p.i_a", "p.speed"] {
         assert_eq!(bits(&ours, name), bits(&jacobi, name), "{name}");
+    }
+}
+
+/// Runs two instances of an FMU with a clock of every kind, of which `a` triggers `b`, in this order; for each clock of both, the
+/// times (s) of its ticks from the start.
+fn ticks(fmu: &Fmu, method: &Method, order: [&str; 2], step: f64) -> [Vec<Vec<f64>>; 2] {
+    let mut system = System::new(method.clone());
+    for name in order {
+        system.add(name, fmu, false).unwrap();
+    }
+    system.connect("a.trip", "b.triggered").unwrap();
+    let mut times = [(); 2].map(|()| Vec::new());
+    let settings = Settings { start: 2.0, stop: 3.15, step, sequential: false };
+    let _ = system
+        .run(&settings, |point| {
+            for (name, times) in ["a", "b"].into_iter().zip(&mut times) {
+                let Values::Reals(all) = point.instance(name).unwrap().get("times")? else { unreachable!() };
+                let of = |row: &[f64]| row.iter().copied().take_while(|t| *t >= 0.0).collect();
+                *times = all.chunks(8).map(of).collect();
+            }
+            Ok(ControlFlow::Continue(()))
+        })
+        .unwrap();
+    times
+}
+
+/// Clocks with a period and a shift, changing clocks, countdowns, and an output clock of one FMU that ticks the triggered clock of
+/// another. At 0.3 s five clocks tick, whose times are rounded differently.
+#[test]
+fn every_kind_ticks_at_its_times() {
+    let out = common::python::scratch().join("ticks");
+    let files = build::run(&Build { package: vec!["ticks-fmu".into()], out: Some(out), ..Build::default() }).unwrap();
+    // The fraction alone says when its clock ticks.
+    let file = files[0].with_file_name("fractions.fmu");
+    let decimals = r#" intervalDecimal="0.3333333333333333" shiftDecimal="0.3333333333333333""#;
+    common::rewrite(&files[0], &file, |name, bytes| {
+        if name != "modelDescription.xml" {
+            return Some(bytes);
+        }
+        let text = String::from_utf8(bytes).unwrap();
+        assert_eq!(text.matches(decimals).count(), 1, "{text}");
+        Some(text.replace(decimals, "").into_bytes())
+    });
+    let fmu = Fmu::open(&file).unwrap();
+    let names = ["constant", "fraction", "fixed", "tunable", "changing", "countdown", "triggered"];
+    let own: [&[f64]; 5] = [
+        &[0.05, 0.3, 0.55, 0.8, 1.05],
+        &[1.0 / 3.0, 2.0 / 3.0, 1.0],
+        &[0.1, 0.3, 0.5, 0.7, 0.9, 1.1],
+        &[0.0, 0.3, 0.6, 0.9],
+        &[0.1, 0.3, 0.6, 1.0],
+    ];
+    let triggered: [[&[f64]; 2]; 2] = [[&[], &[]], [&[0.325, 0.825], &[0.3, 0.8]]];
+    for method in [EVENTS, exchange()] {
+        for (order, step) in [(["a", "b"], 0.1), (["b", "a"], 0.07)] {
+            let (found, mut most) = (ticks(&fmu, &method, order, step), 0.0);
+            for ((instance, found), last) in ["a", "b"].iter().zip(&found).zip(triggered) {
+                for ((name, found), expected) in names.iter().zip(found).zip(own.into_iter().chain(last)) {
+                    let off = found.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+                    let place = format!("{instance}.{name}, {method:?}, step {step} s");
+                    assert!(found.len() == expected.len() && off < 1e-12, "{place}: {found:?}, not {expected:?}");
+                    most = off.max(most);
+                }
+            }
+            println!("{order:?}, step {step} s: off by {most:e} s");
+        }
     }
 }
