@@ -7,7 +7,7 @@ use crate::session::{NotDetermined, Session};
 use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{Buffer, take_events};
-use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable, Variability};
 use std::ffi::CString;
 
 /// Steps of a run that looks at values.
