@@ -63,17 +63,17 @@ fn compared(pair: &Pair, r: &Results) -> [(&'static str, Identified, f64, f64); 
     let R_s = motor.R_s + 0.5 * (devices.r_transistor + devices.r_diode);
     let u_dead = par.inverter.u_dead(pair.plant.model.inputs.u_dc) + 0.5 * (devices.u_transistor + devices.u_diode);
     [
-        ("R_s", r.R_s, R_s, 0.02),
-        ("L_d", r.L_d, motor.L_d, 0.05),
-        ("L_q", r.L_q, motor.L_q, 0.05),
-        ("u_dead", r.u_dead, u_dead, 0.05),
-        ("psi_M", r.psi_M, motor.psi_M, 0.05),
-        ("J", r.J, par.mechanics.J, 0.05),
+        ("R_s", r.R_s, R_s, 0.002),
+        ("L_d", r.L_d, motor.L_d, 0.01),
+        ("L_q", r.L_q, motor.L_q, 0.01),
+        ("u_dead", r.u_dead, u_dead, 0.025),
+        ("psi_M", r.psi_M, motor.psi_M, 0.001),
+        ("J", r.J, par.mechanics.J, 0.005),
         (
             "tau_friction",
             r.tau_friction,
             par.mechanics.friction(0.3 * pair.controller.model.parameters.commission.speed),
-            0.15,
+            0.05,
         ),
     ]
 }
