@@ -371,6 +371,23 @@ mod tests {
         assert!(more > 6.5 && more < 6.5 * 4.0 / 3.0 + 1e-9, "{more} V");
     }
 
+    /// The legs lose at the currents where the command acts: at 2000 rad/s, 1.5 samples of 0.1 ms turn them by 0.3 rad, and with
+    /// a delay of 2 by 0.5 rad.
+    #[test]
+    fn the_compensation_knows_the_currents_where_it_acts() {
+        for (w, delay, turned) in [(2000.0, 0, 0.1), (2000.0, 1, 0.3), (-2000.0, 1, -0.3), (2000.0, 2, 0.5)] {
+            let (mut controller, frame) = turning(w, |c| {
+                (c.parameters.compensation.u_dead, c.parameters.compensation.i_zero) = (6.5, 10.0);
+                (c.parameters.delay, c.inputs.u_dc) = (delay, 325.0);
+            });
+            // Inside +-i_zero the legs are resistances: what they lose has the angle of the current.
+            let i_ref = DqHat::new(-1.0, 4.0);
+            let (u, ..) = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
+            let lost = Axis::<Estimated>::at(0.7 + turned).from_stator(u.to_stator() - controller.state.commands[0].u);
+            assert!((lost - i_ref * 0.65).magnitude() < 1e-9, "{lost:?} V at {w} rad/s, delay {delay}");
+        }
+    }
+
     /// The next sample reads what the PI gave, and the torque of the references.
     #[test]
     fn the_next_sample_reads_references_and_output() {

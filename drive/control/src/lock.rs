@@ -347,4 +347,14 @@ mod tests {
             assert!((gain / expected - 1.0).abs() < 1e-9, "{gain}, not {expected}");
         }
     }
+
+    /// Where the speed is right again, S decays with 8 lock.time = 0.4 s.
+    #[test]
+    fn what_has_been_seen_is_forgotten_in_eight_times_the_time() {
+        let mut watch = Following { S: 1.0, ..Following::default() };
+        for expected in [(-1.0_f64).exp(), (-2.0_f64).exp()] {
+            let S = followed(&mut watch, 0.0, 0.0, 0.4, false);
+            assert!((S - expected).abs() < 1e-3, "{S}, not {expected}");
+        }
+    }
 }

@@ -229,4 +229,25 @@ mod tests {
         par.flux_observer.magnet = 5.0;
         assert!(angle(&par).abs() < 0.02, "{} deg", angle(&par));
     }
+
+    /// The feedback, and that of the resistance's effect, acts in the frame of the middle of the interval, in both directions.
+    #[test]
+    fn the_feedback_acts_half_way() {
+        let (mut par, motor, T_s) = (EstimatorParameters::default(), salient(), 1e-4);
+        par.adaptation.resistance = true;
+        for w in [900.0, -900.0] {
+            let context = Context { par: &par, motor: &motor, J: 15e-3, T_s };
+            let (mut observer, _) = FluxObserver::start(&context, &Sample::default(), 0.4, w);
+            (observer.v, observer.v_h) = (DqHat::new(3.0, -2.0), DqHat::new(0.5, 1.5));
+            let FluxObserver { psi, v, v_h, .. } = observer;
+            // No error: what the feedback adds is taken from the voltage, and the new flux linkage is that of the magnet.
+            let middle = Axis::<Estimated>::at(0.4 + 0.5 * T_s * w);
+            let end = Axis::<Estimated>::at(0.4 + T_s * w).along(motor.psi_M);
+            let u = (end - psi) * (1.0 / T_s) - middle.to_stator(v);
+            observer.update(&context, &Sample { u, ..Sample::default() });
+            assert!((observer.psi - end).magnitude() < 1e-12, "{:?}, not {end:?} at {w} rad/s", observer.psi);
+            let expected = middle.to_stator(v_h) * T_s;
+            assert!((observer.h - expected).magnitude() < 1e-15, "{:?}, not {expected:?} at {w} rad/s", observer.h);
+        }
+    }
 }

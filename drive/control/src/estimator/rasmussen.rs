@@ -321,4 +321,22 @@ mod tests {
         let speed = 2.0 * 0.6 * 200.0 / motor.psi_M * psi_rq + observer.w_i;
         assert!((speed - observer.w).abs() < 1e-9, "{speed} rad/s, not {} rad/s", observer.w);
     }
+
+    /// Eq (21): v = -c_1 (psi_rd^ - psi_M) - j c_2 psi_rq^, in the frame half a sample ahead.
+    #[test]
+    fn the_feedback_has_the_signs_of_eq_21() {
+        let motor = Motor::default();
+        let rasmussen = RasmussenParameters { c_1: 40.0, c_2: 7.0, ..RasmussenParameters::default() };
+        let par = EstimatorParameters { rasmussen, ..EstimatorParameters::default() };
+        for (w, u) in [(500.0, DqHat::new(30.0, 20.0)), (-500.0, DqHat::new(-10.0, 25.0))] {
+            let (mut observer, _) = Rasmussen::start(&context(&par, &motor), &Sample::default(), 0.7, w);
+            let sample = Sample { u: Axis::<Estimated>::at(0.7).to_stator(u), ..Sample::default() };
+            let estimate = observer.update(&context(&par, &motor), &sample);
+            let psi_r = observer.psi_r(&motor, estimate.axis);
+            assert!((psi_r.d() - motor.psi_M).abs() > 1e-4 && psi_r.q().abs() > 1e-4, "{psi_r:?}");
+            let v = Axis::<Estimated>::at(estimate.theta + 0.5 * T_S * estimate.w).from_stator(observer.v);
+            let expected = DqHat::new(-40.0 * (psi_r.d() - motor.psi_M), -7.0 * psi_r.q());
+            assert!((v - expected).magnitude() < 1e-12, "{v:?}, not {expected:?} at {w} rad/s");
+        }
+    }
 }

@@ -169,4 +169,40 @@ mod tests {
         let (angle, speed) = behind(TrackerKind::MechanicalObserver, 1000.0, 0.0, 10_000);
         assert!(angle.abs() < 1e-9 && speed.abs() < 0.2, "the unknown load becomes tau_load: {angle}, {speed}");
     }
+
+    /// Both trackers have the poles of their equations: with E s the response to an angle error of 1 rad, 1/(s + rho)^n gives
+    /// e^{-x} (1 - x) and e^{-x} (1 - 2 x + x^2 / 2), x = rho t. The observed load follows a step with rho^3/(s + rho)^3.
+    #[test]
+    fn an_angle_error_decays_with_the_double_and_the_triple_pole() {
+        let (motor, J, T_s, rho) = (Motor { n_p: 5, ..Motor::default() }, 4e-3, 1e-6, 100.0);
+        for (kind, load) in
+            [(TrackerKind::Pll, 0.0), (TrackerKind::MechanicalObserver, 0.0), (TrackerKind::MechanicalObserver, 2.0)]
+        {
+            let par = EstimatorParameters {
+                tracker: TrackerParameters { kind, bandwidth: rho },
+                ..EstimatorParameters::default()
+            };
+            let context = Context { par: &par, motor: &motor, J, T_s };
+            let (start, a) = (if load > 0.0 { 0.0 } else { 1.0 }, -5.0 * load / J);
+            let (mut tracker, mut theta, mut w) = (Tracker::at(0.0, 70.0, T_s), start, 70.0);
+            for k in 1..=50_000_u32 {
+                tracker.advance(T_s);
+                theta += T_s * w;
+                w += T_s * a;
+                tracker.correct(&context, rho, theta - tracker.theta, &Sample::default());
+                let x = rho * T_s * f64::from(k);
+                if k % 10_000 != 0 {
+                    continue;
+                }
+                let (seen, expected) = match kind {
+                    _ if load > 0.0 => (tracker.tau_load / load, 1.0 - (-x).exp() * (1.0 + x + 0.5 * x * x)),
+                    TrackerKind::Pll => (theta - tracker.theta, (-x).exp() * (1.0 - x)),
+                    TrackerKind::MechanicalObserver => {
+                        (theta - tracker.theta, (-x).exp() * (1.0 - 2.0 * x + 0.5 * x * x))
+                    }
+                };
+                assert!((seen - expected).abs() < 1e-3, "{kind:?} at {x} / rho: {seen}, not {expected}");
+            }
+        }
+    }
 }
