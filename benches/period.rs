@@ -1,7 +1,7 @@
 //! One 10 kHz period of plant and controller: natively, through the C interface of both standards with its gets and sets,
 //! and 1 s of PmsmDrive; as a ratio to a loop that is written by hand in C (`c_period.c`), if a C compiler `cc` is there.
 //!
-//! The candidates take turns in one run, so that whatever else the computer does affects all of them; the figures are
+//! The candidates take turns in one run, so that other load on the computer affects all of them; the figures are
 //! medians. `PERIOD_BASELINE=DIR` adds the FMUs of another build from `DIR/fmi2` and `DIR/fmi3`. Then PmsmDrive with each effect of the
 //! plant, as a ratio to the default drive.
 #![allow(missing_docs)]

@@ -1,5 +1,5 @@
-//! A step of plant and controller does not allocate, whatever the estimator, nor does saving and restoring the FMU state
-//! with a handle that is used again. A test program of its own: it replaces the allocator.
+//! A step of plant and controller does not allocate, regardless of the estimator, nor does saving and restoring the FMU state
+//! with a handle that is used again. A separate test program: it replaces the allocator.
 #![allow(missing_docs)]
 
 #[path = "../fmu-export/tests/counting/mod.rs"]

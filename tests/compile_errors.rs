@@ -1,4 +1,4 @@
-//! What the compiler says of rows and models that contradict themselves: a crate of its own, built by Cargo.
+//! What the compiler says of rows and models that contradict themselves: Cargo builds a separate crate for each.
 #![allow(missing_docs)]
 
 use std::fs;
@@ -113,13 +113,13 @@ fn rows() -> Vec<Wrong> {
         row(
             "unnamed_alias",
             r#"V::output("x", &VOLT, "", |m| &mut m.u).aliases(&[fmu_core::Alias { name: "", description: "", display: None }])"#,
-            "x: an alias needs a name of its own",
+            "x: an alias needs its own name",
             5,
         ),
         row(
             "own_alias",
             r#"V::output("x", &VOLT, "", |m| &mut m.u).aliases(&[fmu_core::Alias { name: "x", description: "", display: None }])"#,
-            "x: an alias needs a name of its own",
+            "x: an alias needs its own name",
             5,
         ),
         row(

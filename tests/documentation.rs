@@ -343,8 +343,8 @@ fn the_reference_fmus_have_the_lines_that_the_page_says() {
         let text = std::fs::read_to_string(root().join(&file)).unwrap();
         let code = text.split("#[cfg(test)]").next().unwrap().lines().map(str::trim);
         let count = code.filter(|line| !line.is_empty() && !line.starts_with("//")).count();
-        let [original, told] = [row[2], row[3]].map(|cell| cell.parse::<usize>().unwrap());
-        assert_eq!(told, count, "docs/reference-fmus.md: the lines of {file}");
+        let [original, printed] = [row[2], row[3]].map(|cell| cell.parse::<usize>().unwrap());
+        assert_eq!(printed, count, "docs/reference-fmus.md: the lines of {file}");
         assert!(10 * count <= 6 * original, "{file}: {count} lines, more than 60 % of {original}");
     }
 }

@@ -1,5 +1,5 @@
 //! A thousand times loaded, lived in and unloaded, by eight threads with a hundred instances at once: nothing is left
-//! behind. A test program of its own: it measures the whole process.
+//! behind. A separate test program: it measures the whole process.
 #![cfg(target_os = "linux")]
 #![allow(missing_docs)]
 
@@ -26,7 +26,7 @@ fn resident() -> u64 {
 
 /// One loading with `instances` lives at once.
 fn cycle(path: &Path, instances: u32) {
-    // Each opening unpacks a copy of its own, so that this loads and unloads a library whatever the other threads do.
+    // Each opening unpacks its own copy, so that this loads and unloads a library regardless of the other threads.
     let fmu = Fmu::open(path).unwrap();
     let mut all: Vec<_> = (0..instances)
         .map(|k| {

@@ -77,7 +77,7 @@ fn two_platforms_become_one_archive() {
         elsewhere(standard, version, &other);
         merged(&[&here, &other], &one).unwrap();
         merged(&[&other, &here, &here], &two).unwrap();
-        assert!(fs::read(&one).unwrap() == fs::read(&two).unwrap(), "the order tells");
+        assert!(fs::read(&one).unwrap() == fs::read(&two).unwrap(), "the order makes no difference");
 
         let (md, files) = contents(&one).unwrap();
         let (before, mut expected) = contents(&here).unwrap();
@@ -96,7 +96,7 @@ fn two_platforms_become_one_archive() {
     }
 }
 
-/// What must not be merged is told in one line with both files, what and where, and what to do; nothing is written.
+/// What must not be merged is refused in one line with both files, what and where, and what to do; nothing is written.
 #[test]
 fn what_does_not_fit_is_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -166,7 +166,7 @@ fn what_does_not_fit_is_refused() {
     assert!(error.contains("other.fmu: not a ZIP archive") && !out.exists(), "{error}");
 }
 
-/// The headers of a shared library of macOS, with a text behind them that tells two builds apart.
+/// The headers of a shared library of macOS, with a text behind them that distinguishes two builds.
 fn dylib(platform: Platform, build: &str) -> Vec<u8> {
     let cpu: u32 = if platform == Platform::ArmDarwin { 0x0100_000c } else { 0x0100_0007 };
     let words = [0xfeed_facf, cpu, 3, 6, 0, 0, 0, 0];
@@ -278,8 +278,8 @@ fn linux64_is_for_one_processor() {
         assert!(report.text(false).contains("3 checks: 3 passed"), "{}", report.text(false));
         with_libraries("fmi2", FmiVersion::V2, &out, &libraries[..1]);
         let error = Fmu::open(&out).err().expect("it is not for this machine").to_string();
-        let told = "binaries/linux64/PmsmPlant.so is for aarch64-linux, not for this platform (x86_64-linux)";
-        assert!(error.contains(told), "{error}");
+        let printed = "binaries/linux64/PmsmPlant.so is for aarch64-linux, not for this platform (x86_64-linux)";
+        assert!(error.contains(printed), "{error}");
     }
 }
 

@@ -1,5 +1,5 @@
 //! The packed motor FMUs in our own importer, in Model Exchange and with Event Mode, against co-simulation at T_s: the judge of
-//! the events, whatever else happens around them.
+//! the events, regardless of what else happens around them.
 #![allow(missing_docs)]
 
 mod common;

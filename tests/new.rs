@@ -65,7 +65,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
         let step = step.replace("fmpy ", &format!("{} -m fmpy ", python.display()));
         let mut words = step.split(' ');
         let said = succeeds(command(words.next().unwrap(), &folder).args(words));
-        let told = match step.as_str() {
+        let printed = match step.as_str() {
             "cargo test" => "1 passed",
             "fmu build" => "target/fmu/fmi3/MyModel.fmu",
             check if check.starts_with("fmu check") => {
@@ -73,7 +73,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
             }
             _ => "",
         };
-        assert!(said.contains(told) && !said.contains("warning"), "{step}: {said}");
+        assert!(said.contains(printed) && !said.contains("warning"), "{step}: {said}");
     }
     let archives = ["target/fmu/fmi2/MyModel.fmu", "target/fmu/fmi3/MyModel.fmu"];
     let said = succeeds(command(python.to_str().unwrap(), &folder).args(["-c", IN_FMPY]).args(archives));
@@ -122,7 +122,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let binary = files.iter().find(|(name, _)| name.starts_with("binaries/")).unwrap().1;
     assert!(!binary.windows(root.len()).any(|w| w == root.as_bytes()), "the binary names a folder of this machine");
 
-    // A mistake of the model that shows while `fmu build` tries its parameters is told in the model's own words.
+    // A mistake of the model that shows while `fmu build` tries its parameters is reported in the model's own words.
     let source = folder.join("src/lib.rs");
     let right = fs::read_to_string(&source).unwrap();
     let mistake =

@@ -54,7 +54,7 @@ fn it_has_model_exchange_besides() {
     }
 }
 
-/// A value comes through a chain of FMUs within initialization, whatever their order.
+/// A value comes through a chain of FMUs within initialization, in any order.
 #[test]
 fn a_chain_is_consistent_at_the_start() {
     for file in archives() {

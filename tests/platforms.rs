@@ -1,5 +1,5 @@
 //! One archive for three platforms, run on all of them from one Linux machine on x86_64: Windows through Wine, 64-bit ARM
-//! through QEMU. What it needs is in CONTRIBUTING.md; what is missing is told, a line each.
+//! through QEMU. What it needs is in CONTRIBUTING.md; what is missing is printed, a line each.
 #![allow(missing_docs)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -83,7 +83,7 @@ impl Machines {
         if platform != Platform::X64Linux {
             command.arg(loader);
         }
-        // A Windows of its own, kept for the next time.
+        // A separate Windows prefix, kept for the next run.
         command.env("WINEPREFIX", Path::new(env!("CARGO_TARGET_TMPDIR")).join("wine"));
         command.env("WINEDEBUG", "-all").env("WINEDLLOVERRIDES", "mscoree,mshtml=");
         command.args(arguments).current_dir(loader.parent().unwrap());
@@ -156,7 +156,7 @@ fn the_drive_has_the_same_states_on_three_platforms() {
     let [first, rest @ ..] = &all[..] else { panic!("no archive") };
     let last = first.rsplit("t = ").next().unwrap();
     println!("x86_64-linux at t = {last}");
-    // The hash of the state is of a state that moves, and the drive does what it was told.
+    // The hash of the state is of a state that moves, and the drive follows its reference.
     let states: Vec<&str> = first.lines().filter(|line| line.contains("state of")).collect();
     assert!(states.len() == 10 && states.windows(2).all(|w| w[0] != w[1]), "{first}");
     let speed: f64 = last.lines().nth(1).and_then(|l| l.split_whitespace().nth(1)).unwrap().parse().unwrap();
@@ -183,12 +183,12 @@ fn an_error_and_a_panic_are_a_status_on_three_platforms() {
         println!("{}", answers[0]);
         for answer in &answers {
             assert_eq!(answer, &answers[0]);
-            let told: Vec<&str> = answer.lines().filter(|line| !line.starts_with("  ")).collect();
+            let printed: Vec<&str> = answer.lines().filter(|line| !line.starts_with("  ")).collect();
             let mode = |value, status| {
                 let first = format!("mode {value}: DoStep returned {status}");
                 [first, "again: DoStep returned 3".into(), "after Reset: DoStep returned 0".into()]
             };
-            assert_eq!(told, [&mode(2, 3)[..], &mode(4, 3), &["end".into()]].concat());
+            assert_eq!(printed, [&mode(2, 3)[..], &mode(4, 3), &["end".into()]].concat());
         }
     }
 }

@@ -253,7 +253,7 @@ fn refusals(path: &str) -> Vec<String> {
             }
         }
     }
-    // Both annotations are there, of its own type and with its own element.
+    // Both annotations are there, one of its type and one with its element.
     let own = |parent: &'_ Element| {
         let annotation = parent.child("ssd:Annotations")?.child("ssc:Annotation")?.clone();
         let is_own = annotation.get("type") == Some("org.openmodelica");
@@ -433,7 +433,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     std::fs::write(&motor, text.replacen("R_s", "R", 1)).unwrap();
     fails(&["ssp", "--motor", motor.to_str().unwrap(), "--out", out], 2, &["m.toml:7:1: unknown field `R`", "R_s"]);
     assert!(!Path::new(out).exists());
-    // In an SSP a value for a name that is not there is ignored (SSP 1.0), and that is told; a value that is wrong is an error.
+    // In an SSP a value for a name that is not there is ignored (SSP 1.0) with a note; a value that is wrong is an error.
     let (_dir, path) = changed(&ssp("motor.ssp"), "resources/plant.ssv", "motor.R_s", "motor.R");
     let output = fmu(&["simulate", &path, "--stop", "0.001"]);
     let said = String::from_utf8(output.stderr).unwrap();
@@ -451,7 +451,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     );
 }
 
-/// Without sources: a folder with the FMUs is enough, and one line tells what is expected where.
+/// Without sources: a folder with the FMUs is enough, and one line names what is expected and where.
 #[test]
 fn packed_fmus_are_enough_outside_a_checkout() {
     let dir = tempfile::tempdir().unwrap();

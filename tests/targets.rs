@@ -1,4 +1,4 @@
-//! `fmu build --target`: what is missing is told before anything is compiled, in one line with what to do.
+//! `fmu build --target`: what is missing is reported before anything is compiled, in one line with what to do.
 #![allow(missing_docs)]
 
 use std::ffi::OsStr;
@@ -59,7 +59,7 @@ fn tools_that_are_missing() {
     fails("x86_64-pc-windows-msvc", "", &[], &["on Windows only", "take x86_64-pc-windows-gnu"]);
     // Nothing is compiled for the first when something is missing for the second.
     fails(&format!("{}-unknown-linux-gnu,x86_64-pc-windows-gnu", std::env::consts::ARCH), "", &[], &mingw);
-    // A target that has no linker of its own to be missing, and hardly ever a standard library here.
+    // A target without a separate linker that could be missing, and hardly ever a standard library here.
     let rare = "aarch64-pc-windows-gnullvm";
     fails(rare, "", &[], &["standard library for it is missing", "rustup target add aarch64-pc-windows-gnullvm"]);
 }
@@ -76,7 +76,7 @@ fn a_cargo_zigbuild_without_zig() {
     fails("x86_64-apple-darwin", path, &[], &["cargo-zigbuild finds none", "pip install cargo-zigbuild ziglang"]);
 }
 
-/// Without zig the C library that a build needs is told, and it is what the checks find.
+/// Without zig the C library that a build needs is named, and it is what the checks find.
 #[test]
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 fn a_plain_build_tells_what_it_needs() {
@@ -84,11 +84,11 @@ fn a_plain_build_tells_what_it_needs() {
     let plain = std::env::split_paths(&path).filter(|folder| !folder.join("cargo-zigbuild").is_file());
     let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
     let output = build(&target, std::env::join_paths(plain).unwrap(), &[]);
-    let [files, told] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
-    assert!(output.status.success(), "{told}");
+    let [files, printed] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
+    assert!(output.status.success(), "{printed}");
     let platform = format!("{}-linux", std::env::consts::ARCH);
     let start = format!("note: PmsmPlant for {platform} needs ");
-    let note = told.lines().find_map(|line| line.strip_prefix(&start));
+    let note = printed.lines().find_map(|line| line.strip_prefix(&start));
     for file in files.lines() {
         let check =
             Command::new(env!("CARGO_BIN_EXE_fmu")).args(["check", file, "--only", "B03,B04"]).output().unwrap();
@@ -96,9 +96,9 @@ fn a_plain_build_tells_what_it_needs() {
         let needs = found.lines().filter_map(|line| line.rsplit_once(": needs ")).map(|(_, what)| what);
         let needs: Vec<&str> = needs.collect();
         let note = note.map(|n| n.split_once(" where it runs; built with cargo-zigbuild (pip install ").unwrap().0);
-        assert_eq!(note.is_some(), !needs.is_empty(), "{told}{found}");
+        assert_eq!(note.is_some(), !needs.is_empty(), "{printed}{found}");
         for what in needs {
-            assert!(note.is_some_and(|n| n.contains(what)), "{told}{found}");
+            assert!(note.is_some_and(|n| n.contains(what)), "{printed}{found}");
         }
     }
     assert_eq!(files.lines().count(), 2);

@@ -42,7 +42,7 @@ fn bits(recording: &Recording, name: &str) -> Vec<u64> {
     recording.column(name).unwrap().values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// The plant sees the same commands at the same instants, whether the controller has a grid of its own or a clock.
+/// The plant sees the same commands at the same instants, whether the controller has its own grid or a clock.
 #[test]
 fn the_clocked_pair_is_the_pair() {
     let (plain, clocked) = (archive("SensorlessController"), archive("SensorlessControllerClocked"));

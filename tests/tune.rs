@@ -234,14 +234,14 @@ fn the_check_prints_what_holds_and_what_was_announced() {
     let text = checked(&motor, "deg   holds");
     assert!(!text.contains("will not hold") && text.contains("K = 1.5 n_p psi_M = 2.4525 N.m/A"), "{text}");
     let text = checked(&light, "does not hold, as announced");
-    for told in
+    for printed in
         ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise in 0.083 s or more"]
     {
-        assert!(text.contains(told), "{told:?} is not in {text}");
+        assert!(text.contains(printed), "{printed:?} is not in {text}");
     }
     // Without --check the notes are the same.
-    let told = fmu(&["tune", light.to_str().unwrap(), "--out", out]);
-    let plain = String::from_utf8(told.stdout).unwrap();
+    let printed = fmu(&["tune", light.to_str().unwrap(), "--out", out]);
+    let plain = String::from_utf8(printed.stdout).unwrap();
     let notes =
         |text: &str| text.lines().filter(|line| line.starts_with("note:")).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(notes(&plain), notes(&text));

@@ -1,4 +1,4 @@
-//! An FMU with a variable of every type and causality, and with a file of its own, packed for both standards: tests/types.
+//! An FMU with a variable of every type and causality, and with its own file, packed for both standards: tests/types.
 #![allow(missing_docs)]
 
 mod common;
@@ -69,9 +69,9 @@ fn integers_of_every_type_travel_to_the_end_of_their_range() {
             let (least, most) = (i128::from(i32::MIN), i128::from(i32::MAX));
             let (low, high) = if version == V2 { (low.max(least), high.min(most)) } else { (low, high) };
             if version == V2 {
-                let told = |x: i128, none: i128| (x != none).then(|| x.to_string());
+                let printed = |x: i128, none: i128| (x != none).then(|| x.to_string());
                 let said = (v.min.map(|x| x.to_string()), v.max.map(|x| x.to_string()));
-                assert_eq!(said, (told(low, least), told(high, most)), "{input}");
+                assert_eq!(said, (printed(low, least), printed(high, most)), "{input}");
             }
             for value in [low, high] {
                 instance.set(&input, &integer(value)).unwrap();

@@ -213,7 +213,7 @@ fn the_drive_shows_the_means_of_its_last_sample_period() {
 
 #[test]
 fn a_steady_state_by_hand() {
-    // i_q = 4 A held at 200 rad/s, nothing else: p_in = copper + torque times speed, whatever the voltage's turn in the step.
+    // i_q = 4 A held at 200 rad/s, nothing else: p_in = copper + torque times speed, regardless of the voltage's turn in the step.
     let mut plant = SteppedPlant::new(|par| par.mechanics.imposed = true);
     plant.block.model.inputs.speed_shaft = 200.0;
     for _ in 0..2000 {

@@ -168,7 +168,7 @@ fn the_energy_of_the_cycle_is_that_of_the_drive() {
     }
 }
 
-/// The torque follows its reference with 1 / current.bandwidth, whatever the step is; a request beyond the limit is clipped to it.
+/// The torque follows its reference with 1 / current.bandwidth, regardless of the step; a request beyond the limit is clipped to it.
 #[test]
 fn the_lag_is_exact_at_any_step() {
     let (mut plant, controller) = traction();

@@ -134,7 +134,7 @@ fn the_bound_of_the_speed_loop_separates_held_from_oscillating() {
     }
 }
 
-/// So does that of the mechanical observer, whatever the speed loop does.
+/// So does that of the mechanical observer, regardless of the speed loop.
 #[test]
 fn the_bound_of_the_mechanical_observer_separates_held_from_oscillating() {
     let [.., machine] = machines();

@@ -54,7 +54,7 @@ fn the_start_values_hold_4500_rpm() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Hybrid has a bandwidth of its own above the injection's speeds.
+/// Hybrid has its own bandwidth above the injection's speeds.
 #[test]
 fn hybrid_holds_a_light_rotor() {
     let mut pair = Pair::default();

@@ -1,6 +1,6 @@
 //! What a model can do beyond co-simulation: a table of its functions, made while compiling.
 //!
-//! A capability is a trait of its own, named in the line that exports the model. What a model does not name costs it
+//! A capability is a separate trait, named in the line that exports the model. What a model does not name costs it
 //! nothing: its entry is `None`, known to the compiler.
 
 use crate::clock::Clocked;
@@ -269,7 +269,7 @@ impl<M: Model> Capabilities<M> {
     }
 
     /// Co-simulation with Event Mode (FMI 3.0): for a model with clocks, and with early return for a sampled model without states
-    /// of its own and for one with [`EventMode`].
+    /// and for one with [`EventMode`].
     pub const fn event_mode(&self) -> bool {
         let sampled = self.samples.is_some() && self.continuous.is_none();
         self.to_event.is_some() || sampled || self.clocked.is_some()

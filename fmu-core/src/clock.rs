@@ -272,7 +272,7 @@ pub trait Clocked: Model {
     /// are what [`activate`](Self::activate) shows.
     const FEEDTHROUGH: bool = false;
 
-    /// The clock becomes active: shows what holds from now on, whatever the inputs are.
+    /// The clock becomes active: shows what holds from now on, regardless of the inputs.
     fn activate(&mut self, _clock: usize, _now: Elapsed) {}
 
     /// The clock ticks: acts on the inputs of this instant. Called once at each.

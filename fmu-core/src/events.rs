@@ -69,7 +69,7 @@ pub struct Indicator {
 }
 
 /// A model with events. The importer enters Event Mode at the time that [`next`](Self::next) gave, where an indicator
-/// changes its sign, or for reasons of its own; there it exchanges inputs and outputs.
+/// changes its sign, or for other reasons; there it exchanges inputs and outputs.
 ///
 /// A ball that bounces until it rests, a whole model:
 ///
@@ -221,7 +221,7 @@ pub trait EventMode: ContinuousTime + Events {
 
 /// A model that acts at the instants k T only, like a digital controller: it reads its inputs at an instant, and shows
 /// what it computed from them at the next one. An importer that handles events gives it the inputs of every instant,
-/// whatever its communication step is.
+/// regardless of its communication step.
 pub trait Sampled: Model {
     /// The sample period T in s.
     fn period(&self) -> f64;

@@ -10,7 +10,7 @@
 //! | [`sampled`] | nothing | samples |
 //!
 //! The classical Runge-Kutta method with equal substeps; an indicator's change of sign is located by regula
-//! falsi and bisection in turn, each trial being a substep of its own, as exact as the integration itself.
+//! falsi and bisection in turn, each trial being a substep as exact as the integration itself.
 
 mod euler;
 

@@ -29,7 +29,7 @@ pub const OWN: usize = 32 - CATEGORIES.len();
 /// What a model has to say: the category, a key that identifies the message, and a closure that formats it.
 pub type Said<'a> = (&'static str, &'static str, &'a dyn Fn() -> String);
 
-/// Where a model puts its warnings, and messages of its own categories.
+/// Where a model puts its warnings, and messages in the categories that it declares.
 pub struct Warnings<'a>(&'a mut dyn FnMut(Said<'_>));
 
 impl<'a> Warnings<'a> {

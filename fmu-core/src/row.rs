@@ -198,7 +198,7 @@ pub(crate) enum Access<W: 'static> {
 /// # impl Clone for Model { fn clone(&self) -> Self { Self { ..*self } } }
 /// ```
 ///
-/// A part has a table of its own, which the whole sees under a prefix:
+/// A part has its own table, which the whole sees under a prefix:
 ///
 /// ```
 /// # use fmu_core::unit::OHM;

@@ -58,7 +58,7 @@ const fn check_info(info: &Info) {
             demand(!same_text(name, taken), name, "two log categories have this name");
             other += 1;
         }
-        demand(!name.is_empty() && !same_text(name, log::ALL), name, "a log category needs a name of its own");
+        demand(!name.is_empty() && !same_text(name, log::ALL), name, "a log category needs its own name");
         i += 1;
     }
 }

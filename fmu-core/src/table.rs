@@ -1,7 +1,7 @@
 //! The variable table of a type, composed of variables and of other types' tables.
 //!
 //! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table. A wide
-//! array, of more than [`DENSE`] elements, has indices of its own, from [`WIDE`] on, and is found by a scan.
+//! array, of more than [`DENSE`] elements, has separate indices, from [`WIDE`] on, and is found by a scan.
 //! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
 
 use crate::clock::Ticks;
@@ -442,7 +442,7 @@ const fn check(meta: &Meta) {
 const fn check_unique<W>(rows: &[Row<W>], last: usize) {
     let mut row = 0;
     while row < last {
-        // A part without a prefix has no name of its own; its variables are checked by the description.
+        // A part without a prefix has no name; its variables are checked by the description.
         let same = !rows[row].meta.name.is_empty() && same_text(rows[row].meta.name, rows[last].meta.name);
         demand(!same, rows[last].meta.name, "two rows of the table have this name");
         row += 1;

@@ -210,8 +210,8 @@ mod tests {
             for now in [at, near, at.plus(side * f64::EPSILON), at.plus(-at.high * f64::EPSILON), at.plus(at.low)] {
                 let exact = now.minus_periods(k, period);
                 let (reached, passed) = (exact >= -grid.width(), exact > grid.width());
-                let told = format!("{k} {period} {now:?}: {exact}");
-                assert_eq!((grid.reached(k, now), grid.passed(k, now)), (reached, passed), "{told}");
+                let case = format!("{k} {period} {now:?}: {exact}");
+                assert_eq!((grid.reached(k, now), grid.passed(k, now)), (reached, passed), "{case}");
                 exactly += u32::from(grid.past(k, now).to_bits() == exact.to_bits());
             }
         }

@@ -33,7 +33,7 @@ impl Hash {
         self.bytes(text.as_bytes()).count(text.len())
     }
 
-    /// Hash of this and a number of bytes, elements or extents, in 64 bits whatever the platform's `usize` has.
+    /// Hash of this and a number of bytes, elements or extents, in 64 bits regardless of the platform's `usize`.
     const fn count(self, n: usize) -> Self {
         self.bytes(&(n as u64).to_le_bytes())
     }

@@ -103,7 +103,7 @@ impl Quantity {
         Self { display: Some(display), ..self }
     }
 
-    /// The quantity of a difference of two such values, under a name of its own: a band of 1 K is shown as 1 degC, and not as
+    /// The quantity of a difference of two such values, under its own name: a band of 1 K is shown as 1 degC, and not as
     /// -272.15 degC.
     ///
     /// ```

@@ -85,9 +85,9 @@ fn descriptions_name_the_parameter_as_users_see_it() {
 
 #[test]
 fn a_parameter_that_does_not_exist_is_a_fault() {
-    let told = [words::<2>(), words::<3>(), words::<4>()].map(Result::unwrap_err);
+    let errors = [words::<2>(), words::<3>(), words::<4>()].map(Result::unwrap_err);
     assert_eq!(
-        told,
+        errors,
         [
             "T is read with thermal, of which there are 0",
             "T is read with u, of which there are 0",

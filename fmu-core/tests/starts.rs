@@ -93,8 +93,8 @@ fn a_model_that_contradicts_itself_is_told_why() {
     }
     assert_eq!((why::<Kept>(), why::<Sized>(), why::<Named>()), (None, None, None));
     for (name, why) in [("x", why::<Overwritten>()), ("y", why::<Elsewhere>())] {
-        let told = format!("{name} is exact, and does not keep the value that the importer sets: ");
-        assert!(why.as_ref().is_some_and(|why| why.starts_with(&told)), "{why:?}");
+        let reason = format!("{name} is exact, and does not keep the value that the importer sets: ");
+        assert!(why.as_ref().is_some_and(|why| why.starts_with(&reason)), "{why:?}");
     }
     assert_eq!(why::<Longer>().unwrap(), "a has 2 elements, and n is 3");
     assert_eq!(why::<Nothing>().unwrap(), "n must be greater than 0 at the start");

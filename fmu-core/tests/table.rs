@@ -119,7 +119,7 @@ fn description_says_what_depends_on_what() {
     assert_eq!(d.token, Small::HASH.guid().as_str());
 }
 
-/// A terminal's variables are looked up in the table; a wrong one is told when the model is described.
+/// A terminal's variables are looked up in the table; a wrong one is refused when the model is described.
 mod terminals {
     use super::*;
     use fmu_core::terminal::MemberKind;

@@ -1,4 +1,4 @@
-//! Calls during a simulation do not allocate. A test program of its own: it replaces the allocator.
+//! Calls during a simulation do not allocate. A separate test program: it replaces the allocator.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,

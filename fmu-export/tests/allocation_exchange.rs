@@ -1,4 +1,4 @@
-//! The calls of a solver do not allocate. A test program of its own: it replaces the allocator.
+//! The calls of a solver do not allocate. A separate test program: it replaces the allocator.
 #![allow(missing_docs)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 

@@ -1,4 +1,4 @@
-//! No control sample is lost or doubled, whatever the communication step and however the importer adds up its time.
+//! No control sample is lost or doubled, regardless of the communication step and however the importer adds up its time.
 //!
 //! A model that counts its samples, through the C functions; what must come out is counted in integers. 1e7 steps of every
 //! step size: from every start with optimization, from one of them without, and a tenth from the others.

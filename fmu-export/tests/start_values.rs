@@ -48,7 +48,7 @@ impl Sink for Deaf {
     }
 }
 
-/// A start value that no importer could set is refused in every run that leaves it, whatever the runs before have set.
+/// A start value that no importer could set is refused in every run that leaves it, regardless of the runs before have set.
 #[test]
 fn a_start_value_out_of_range_is_refused_after_each_reset() {
     let (log, fresh) = (Log::new(Box::new(Deaf), false), Snapshot::new(Interface::CoSimulation));

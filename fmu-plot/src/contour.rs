@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(hill(5, |x, _| x).above(2.0), Above::default());
     }
 
-    /// A hole has an outline of its own; a missing value takes the quadrilaterals about it.
+    /// A hole has its own outline; a missing value takes the quadrilaterals about it.
     #[test]
     fn holes_and_missing_values() {
         let ring = hill(41, |x, y| -(x.hypot(y) - 0.5).abs()).above(-0.2);

@@ -226,7 +226,7 @@ fn answer(writer: &mut Writer<'_>, rows: Range<u64>) -> Result<(), Error> {
     say("done")
 }
 
-/// Written in one piece on a line of its own, even if the FMU has printed half a line before.
+/// Written in one piece on its own line, even if the FMU has printed half a line before.
 fn say(text: &str) -> Result<(), Error> {
     let mut out = io::stdout().lock();
     let all = out.write_all(format!("\n{MARK}{text}\n").as_bytes()).and_then(|()| out.flush());

@@ -14,7 +14,7 @@ pub fn threads_here() -> usize {
     std::thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// Calls `work` for each of `blocks` on up to `threads` threads, each with a state of its own that `begin` makes. With one
+/// Calls `work` for each of `blocks` on up to `threads` threads, each with its own state that `begin` makes. With one
 /// thread it is the caller's. Ends at the first error.
 pub(crate) fn run<S>(
     blocks: u64,

@@ -211,7 +211,7 @@ fn errors_say_where_and_what() {
     assert_eq!(read(b"<a>\n\xff</a>").unwrap_err().to_string(), "line 2: not well-formed XML: not UTF-8");
 }
 
-/// No panic, whatever the bytes: every prefix of a file, and every byte of it replaced.
+/// No panic, regardless of the bytes: every prefix of a file, and every byte of it replaced.
 #[test]
 fn broken_files_are_answered_by_an_error() {
     for version in VERSIONS {

@@ -52,7 +52,7 @@ fn header() {
     }
 }
 
-/// What users see has a name of its own; the binary keeps its name.
+/// What users see has its own name; the binary keeps its name.
 #[test]
 fn a_title_is_the_name_of_the_model() {
     for version in VERSIONS {

@@ -42,8 +42,8 @@ def _open(filename):
 def read_model_description(filename, validate=True, validate_variable_names=False, validate_model_structure=False):
     """Read the description of an FMU, from its archive or from the folder that it was extracted to.
 
-    The reader refuses what it cannot understand. It does not check the file against the schema of the standard, whatever
-    `validate` says: `fmu check` does.
+    The reader refuses what it cannot understand. It does not check the file against the schema of the standard, even
+    with `validate`: `fmu check` does.
     """
     return _build(_open(filename).describe())
 
@@ -102,7 +102,7 @@ class _Instance(_core.Instance):
             self._set_debug_logging(True)
 
     def setDebugLogging(self, loggingOn, categories=()):
-        """Switch logging of all categories on or off, whatever `categories` says."""
+        """Switch logging of all categories on or off, regardless of `categories`."""
         self._set_debug_logging(bool(loggingOn))
 
     def messages(self):

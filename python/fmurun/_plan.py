@@ -193,8 +193,8 @@ class Plan:
         runs = first_run + np.arange(n) if runs is None else np.asarray(runs, dtype=np.int64)
         if threads is not None and threads < 1:
             raise ValueError(f"threads must be at least 1, not {threads}")
-        with _bar(progress, n) as told:
-            measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, told)
+        with _bar(progress, n) as advance:
+            measures, end, errors = self._core.run_many([self._name(name) for name in columns], values, threads or 0, advance)
         results = [*self._named(dict(zip(columns, values))).values(), *map(_named, self._core.measure_items, measures)]
         return dict(zip(self._columns(columns), [runs, *results, end, np.array(errors, dtype=object)]))
 

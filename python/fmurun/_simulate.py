@@ -418,7 +418,7 @@ def _samples(description, variables, signals):
         if v.variability in ("discrete", "tunable") and t.size > 1:
             events |= set(t[1:][(np.diff(table) != 0).any(axis=0)])
         continuous = v.type in _FLOATS and v.variability not in ("discrete", "tunable")
-        # An array is a group of its own.
+        # An array is a separate group.
         key = (not continuous, _base(v, description), v.valueReference if v.shape else None)
         groups.setdefault(key, []).append((v.valueReference, table))
     # A stable order: continuous variables before discrete ones, types in the order of the description.

@@ -39,7 +39,7 @@ def sweep(plan, rows, out, client, chunk=None):
         chunk: rows of a part; by default about 7 s of work, timed on the first row
 
     Parts get their names when they are complete, so that a killed worker leaves none half written, and at most loses the chunk
-    it was at. A chunk that kills its worker again and again is run here row by row, each row in a process of its own kind:
+    it was at. A chunk that kills its worker again and again is run here row by row, each row in a process:
     the row that kills it ends with `error = "killed by SIGSEGV"`.
 
     Returns:

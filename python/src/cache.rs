@@ -48,7 +48,7 @@ pub(crate) fn opened(path: &Path, bytes: Vec<u8>) -> Result<Arc<Opened>, Error> 
     Ok(opened)
 }
 
-/// After a fatal error no instance of the library can be used (FMI 3.0.2, 2.2.4): the next one gets a library of its own.
+/// After a fatal error no instance of the library can be used (FMI 3.0.2, 2.2.4): the next one gets its own library.
 pub(crate) fn forget(opened: &Arc<Opened>) {
     OPENED.lock().unwrap_or_else(PoisonError::into_inner).retain(|o| !Arc::ptr_eq(o, opened));
 }

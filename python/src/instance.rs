@@ -174,7 +174,7 @@ impl Instance {
         &self.name
     }
 
-    /// Read double-precision numbers by their value references: all elements of arrays, whatever `nValues` is.
+    /// Read double-precision numbers by their value references: all elements of arrays, regardless of `nValues`.
     #[pyo3(name = "_get_reals", signature = (vr, nValues = None))]
     #[allow(non_snake_case, unused_variables, reason = "FMPy's name")]
     fn get_reals(&self, py: Python<'_>, vr: &Bound<'_, PyAny>, nValues: Option<usize>) -> PyResult<Vec<f64>> {
@@ -263,11 +263,7 @@ impl Instance {
 
     /// Step from a time by a step size (s). FMI 3.0 returns (event encountered, end asked for, early return, time reached).
     #[pyo3(name = "doStep", signature = (currentCommunicationPoint, communicationStepSize, noSetFMUStatePriorToCurrentPoint = true))]
-    #[allow(
-        non_snake_case,
-        unused_variables,
-        reason = "FMPy's names; a state may be set at any time, whatever is promised"
-    )]
+    #[allow(non_snake_case, unused_variables, reason = "FMPy's names; a state may be set at any time, promised or not")]
     fn do_step<'py>(
         &self,
         py: Python<'py>,

@@ -32,15 +32,15 @@ def test_the_wheel_has_what_the_build_made(archives):
 
 
 def test_the_command_gives_the_same():
-    def told(*arguments, motor="ipmsm-2.2kw"):
+    def tuned(*arguments, motor="ipmsm-2.2kw"):
         command = [os.environ["FMU_COMMAND"], "tune", drives.machines[motor], "--json", *arguments]
         return json.loads(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
-    values = told()
+    values = tuned()
     for fmu in ("PmsmDrive", "PmsmPlant", "SensorlessController"):
         assert values[fmu] == drives.tune("ipmsm-2.2kw", fmu=fmu)
     other = drives.tune("servo-6.6kw", estimator="ExtendedEmf")
-    assert told("--estimator", "ExtendedEmf", motor="servo-6.6kw")["PmsmDrive"] == other != drives.tune("servo-6.6kw")
+    assert tuned("--estimator", "ExtendedEmf", motor="servo-6.6kw")["PmsmDrive"] == other != drives.tune("servo-6.6kw")
     assert other["controller.estimator"] == 4
     pair = fmurun.Plan({"p": drives.PmsmPlant, "c": drives.SensorlessController}, stop_time=0.01, step_size=1e-4, start_values={
         f"{x}.{name}": value for x, fmu in (("p", "PmsmPlant"), ("c", "SensorlessController"))

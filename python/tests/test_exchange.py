@@ -207,11 +207,11 @@ def test_cvode_warns_once(reference):
     from fmurun import _simulate
 
     _simulate._told.clear()
-    with warnings.catch_warnings(record=True) as told:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         results = [simulate_fmu(reference / "fmi3" / "VanDerPol.fmu", fmi_type="ModelExchange", solver=s, stop_time=1.0).tobytes()
                    for s in ("CVode", "CVode", "Dopri", None)]  # fmt: skip
-    assert [str(w.message)[:14] for w in told] == ["solver='CVode'"]
+    assert [str(w.message)[:14] for w in caught] == ["solver='CVode'"]
     assert len(set(results)) == 1
 
 

@@ -123,7 +123,7 @@ def test_enumerations_keep_their_names(standard):
 
 
 def test_a_measure_may_be_called_error(standard):
-    """It keeps its name, and the column of all results steps aside; a row that fails is told there."""
+    """It keeps its name, and the column of all results is renamed; a row that fails is reported there."""
     plan, plain = pair(standard, measures={"error": MEASURES["angle"]}), pair(standard)
     runs, expected = (p.run_many({"p.motor.R_s": [2.9, -1.0]}) for p in (plan, plain))
     assert list(runs) == ["run", "p.motor.R_s", "error", "end", "run.error"]
@@ -167,7 +167,7 @@ def test_embedded_archives(standard, tmp_path):
 
 
 def test_the_pair_in_model_exchange_is_the_drive(standard):
-    """Coupled, with each sample at its instant, whatever the communication step: the FMU that has both inside."""
+    """Coupled, with each sample at its instant, regardless of the communication step: the FMU that has both inside."""
     more = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-11, "step_size": 1e-3, "stop_time": 0.1}
     apart = pair(standard, output=["p.speed", "p.i_a", "c.theta_est"], **more).simulate()
     whole = Plan(standard / "PmsmDrive.fmu", input={"speed_ref": SPEED}, output=["speed", "i_a", "theta_est"], **more).simulate()

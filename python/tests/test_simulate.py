@@ -1,4 +1,4 @@
-"""`simulate_fmu` against FMPy 0.3.32: equal to the last bit, and better told what goes wrong."""
+"""`simulate_fmu` against FMPy 0.3.32: equal to the last bit, with better error messages."""
 
 import fmpy
 import fmurun.fmpy

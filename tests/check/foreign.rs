@@ -1,6 +1,6 @@
 //! FMUs of other tools, which come from PyPI: no false alarm.
 
-use crate::{check, check_within, common, told, violated};
+use crate::{check, check_within, common, listed, violated};
 use std::path::Path;
 use std::process::Command;
 
@@ -66,7 +66,7 @@ fn pythonfmu() {
     run(tool("pythonfmu").args(["build", "-f", "counter.py"]).current_dir(dir.path()));
     let report = check(&dir.path().join("Counter.fmu"), &[]);
     let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
-    assert_eq!(must, ["S02a"], "{}", told(&report));
+    assert_eq!(must, ["S02a"], "{}", listed(&report));
 }
 
 /// Nor does it describe the Python that it needs, which FMI 3.0 demands (3.0.2, 2.5.1.1).
@@ -77,7 +77,7 @@ fn pythonfmu3() {
     run(tool("pythonfmu3").args(["build", "-f", "counter3.py"]).current_dir(dir.path()));
     let report = check(&dir.path().join("Counter3.fmu"), &[]);
     let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
-    assert_eq!(must, ["Z04c"], "{}", told(&report));
+    assert_eq!(must, ["Z04c"], "{}", listed(&report));
 }
 
 /// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a call has 20 s only. It steps beyond the stop
@@ -94,6 +94,6 @@ fn fmucontainer() {
     run(container.args(["-container", "pair.csv:0.0001", "-no-auto-link", "-fmu-directory"]).arg(dir.path()));
     let report = check_within(&dir.path().join("pair.fmu"), &[], 20);
     let must: Vec<_> = report.violated().filter(|f| f.level == fmu_check::Level::Must).map(|f| f.id).collect();
-    assert_eq!(must, ["L12", "G02", "V12"], "{}", told(&report));
+    assert_eq!(must, ["L12", "G02", "V12"], "{}", listed(&report));
     assert!(violated(&report).contains(&"L08n") && report.fatal().contains(&"G02"));
 }

@@ -1,4 +1,4 @@
-//! `fmu check` on our own archives, on those of other tools, and on whatever is no FMU. `fmu-check/tests/faults/` has a fault for each check.
+//! `fmu check` on our own archives, on those of other tools, and on files that are no FMUs. `fmu-check/tests/faults/` has a fault for each check.
 #![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
 #[path = "../common/mod.rs"]
@@ -13,14 +13,14 @@ mod terminals;
 #[path = "../../fmu-check/tests/faults/zip.rs"]
 mod zip;
 
-use findings::{check, check_within, told, violated};
+use findings::{check, check_within, listed, violated};
 use fmu_check::Verdict;
 use std::path::Path;
 
 /// What runs the probes.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_fmu");
 
-/// Our own archives pass whatever is not the packer's platform.
+/// Our own archives pass every check that does not depend on the packer's platform.
 #[test]
 fn our_own_archives_violate_nothing() {
     for standard in ["fmi2", "fmi3"] {
@@ -28,7 +28,7 @@ fn our_own_archives_violate_nothing() {
             let report = check(&common::archives().join(standard).join(name).with_extension("fmu"), &[]);
             // B03 and B04: a plain build of this machine needs its C library and libgcc_s.
             let more: Vec<_> = violated(&report).into_iter().filter(|id| !["B03", "B04"].contains(id)).collect();
-            assert!(more.is_empty(), "{standard} {name}: {}", told(&report));
+            assert!(more.is_empty(), "{standard} {name}: {}", listed(&report));
             let open = report.findings.iter().find(|f| matches!(f.verdict, Verdict::NotDetermined(_)));
             assert!(open.is_none(), "{standard} {name}: {open:?}");
         }

@@ -1,13 +1,13 @@
 //! Faults of the description of our own plant, of FMI 3.0.
 
 use crate::zip::{Entry, write};
-use crate::{check, common, told, violated};
+use crate::{check, common, listed, violated};
 use std::io::Read;
 
 fn found(path: &std::path::Path, xml: &str) -> (Vec<&'static str>, String) {
     write(path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/fmu.c", b"x")]);
     let report = check(path, &["xml", "variables", "structure"]);
-    (violated(&report), told(&report))
+    (violated(&report), listed(&report))
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! It survives whatever file it is given.
+//! It survives any file.
 
 use crate::zip::{Entry, write};
 use crate::{check, common};

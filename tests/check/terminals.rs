@@ -1,7 +1,7 @@
 //! Faults of terminalsAndIcons.xml, in the terminals of our own plant.
 
 use crate::zip::{Entry, write};
-use crate::{check, common, told, violated};
+use crate::{check, common, listed, violated};
 use std::fs::File;
 use std::io::Read;
 
@@ -56,12 +56,12 @@ fn each_fault_is_found_by_its_check() {
             write(&path, &faulty);
             let report = check(&path, &["I01", "I01n", "I01k", "I01p"]);
             // A file that cannot be read or names no color is the matter of the first check alone.
-            assert_eq!(violated(&report), *expected, "{standard}: {from} -> {to}: {}", told(&report));
+            assert_eq!(violated(&report), *expected, "{standard}: {from} -> {to}: {}", listed(&report));
         }
         let mut faulty = good.clone();
         faulty.iter_mut().find(|e| e.name.ends_with("shaft.png")).unwrap().bytes = b"no picture".into();
         write(&path, &faulty);
         let report = check(&path, &["terminals"]);
-        assert_eq!(violated(&report), ["I01p"], "{standard}: {}", told(&report));
+        assert_eq!(violated(&report), ["I01p"], "{standard}: {}", listed(&report));
     }
 }

@@ -59,7 +59,7 @@ fn archive(standard: &str, name: &str) -> PathBuf {
 fn info_tells_what_an_fmu_is() {
     for (standard, version) in [("fmi2", "FMI 2.0"), ("fmi3", "FMI 3.0")] {
         let drive = archive(standard, "PmsmDrive");
-        let told = text(&fmu(&["info", drive.to_str().unwrap()]).stdout);
+        let printed = text(&fmu(&["info", drive.to_str().unwrap()]).stdout);
         for part in [
             version,
             "Co-Simulation and Model Exchange",
@@ -69,7 +69,7 @@ fn info_tells_what_an_fmu_is() {
             "0 rad/s",
             "Rasmussen",
         ] {
-            assert!(told.contains(part), "{part}: {told}");
+            assert!(printed.contains(part), "{part}: {printed}");
         }
         let limits = text(&fmu(&["info", drive.to_str().unwrap(), "limit"]).stdout);
         assert!(limits.contains("controller.limit.i ") && !limits.contains("speed_ref"), "{limits}");
@@ -78,7 +78,7 @@ fn info_tells_what_an_fmu_is() {
     assert!(text(&fmu(&["completions", "bash"]).stdout).contains("--auto-connect"));
 }
 
-/// Two builds agree byte for byte, and nothing in them tells where they were made.
+/// Two builds agree byte for byte, and nothing in them shows where they were made.
 #[test]
 fn builds_are_reproducible() {
     let dir = tempfile::tempdir().unwrap();

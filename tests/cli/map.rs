@@ -15,10 +15,10 @@ fn a_map_is_written_whole_or_not_at_all() {
     let arguments =
         ["map", &traction, "--u-dc", "350,400", "--T", "20", "--grid", "11x11", "--out", out.to_str().unwrap()];
     let output = fmu(&arguments);
-    let told = text(&output.stdout);
+    let printed = text(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     for part in ["Best point of the motor", "Driving cycle", "10 points agree with PmsmDrive within", "map.npz"] {
-        assert!(told.contains(part), "{part}: {told}");
+        assert!(printed.contains(part), "{part}: {printed}");
     }
     let names = ["envelope.csv", "map.csv", "map.html", "map.npz", "map.svg"];
     let written = |folder: &Path| -> Vec<String> {
@@ -41,8 +41,8 @@ fn a_map_is_written_whole_or_not_at_all() {
     std::fs::write(&cycle, "t,v\n0,0\n10,0\n").unwrap();
     let with = [&arguments[..], &["--verify", "0", "--cycle", cycle.to_str().unwrap()]].concat();
     let resting = text(&fmu(&with).stdout);
-    let energy = |told: &str| told.split_once("Driving cycle").unwrap().1.to_owned();
-    assert!(energy(&resting) != energy(&told) && resting.contains("0.00000"), "{resting}");
+    let energy = |printed: &str| printed.split_once("Driving cycle").unwrap().1.to_owned();
+    assert!(energy(&resting) != energy(&printed) && resting.contains("0.00000"), "{resting}");
     std::fs::write(&cycle, "t,v\n0,0\n0,50\n").unwrap();
     fails(&with, 2, &["rest.csv", "the time 0 s does not increase"]);
     // A request that fails leaves nothing.

@@ -1,4 +1,4 @@
-//! `fmu simulate`: what it runs, writes, tells and refuses.
+//! `fmu simulate`: what it runs, writes, reports and refuses.
 
 use super::{archive, common, fails, fmu, text};
 use std::fs::File;
@@ -171,7 +171,7 @@ fn the_pair_runs_alike_in_both_standards() {
     assert_ne!(run("fmi3", &["--sequential"]), three, "one step less on the way from plant to controller");
 }
 
-/// The controller with a clock in place of the one with a grid: in whatever way it is run, the plant moves as before.
+/// The controller with a clock in place of the one with a grid: the plant moves as before in every interface.
 #[test]
 fn clocks_tick() {
     let run = |controller: &str, more: &[&str]| {
@@ -201,7 +201,7 @@ fn clocks_tick() {
     }
 }
 
-/// What no FMU refuses and yet may make a result wrong is told after the run, whose exit status stays 0.
+/// What no FMU refuses and yet may make a result wrong is reported after the run, whose exit status stays 0.
 #[test]
 fn inputs_left_alone_and_long_steps_are_told() {
     let warned = |more: &[&str]| {
@@ -210,31 +210,31 @@ fn inputs_left_alone_and_long_steps_are_told() {
         assert_eq!(output.status.code(), Some(0), "{more:?}");
         text(&output.stderr)
     };
-    let told = warned(&["--step", "0.002"]);
-    let lines: Vec<_> = told.lines().collect();
-    assert_eq!(lines.len(), 2, "{told}");
-    assert!(lines[0].starts_with("warning: d: inputs left at their start values: "), "{told}");
+    let printed = warned(&["--step", "0.002"]);
+    let lines: Vec<_> = printed.lines().collect();
+    assert_eq!(lines.len(), 2, "{printed}");
+    assert!(lines[0].starts_with("warning: d: inputs left at their start values: "), "{printed}");
     for value in ["speed_ref = 0 rad/s", "tau_load = 0 N.m", "u_dc = 325 V", "--set"] {
-        assert!(lines[0].contains(value), "{value}: {told}");
+        assert!(lines[0].contains(value), "{value}: {printed}");
     }
     assert_eq!(
         lines[1],
         "warning: d: the step of 0.002 s is longer than the stepSize of its DefaultExperiment, 0.001 s; --step 0.001 shows \
          whether the results depend on it"
     );
-    // What the description calls optional is told only while it is read, with a parameter that is set or a start value.
+    // What the description calls optional is reported only while it is read, with a parameter that is set or a start value.
     for optional in ["enable", "speed_shaft", "angle_shaft", "tau_ref", "T_coolant", "T_winding_imposed"] {
-        assert!(!told.contains(optional), "{optional}: {told}");
+        assert!(!printed.contains(optional), "{optional}: {printed}");
     }
-    let told = warned(&["--set", "d.plant.mechanics.imposed=true", "--set", "d.plant.thermal.mode=Imposed"]);
+    let printed = warned(&["--set", "d.plant.mechanics.imposed=true", "--set", "d.plant.thermal.mode=Imposed"]);
     for read in ["speed_shaft = 0 rad/s", "angle_shaft", "T_winding_imposed = 293.15 K"] {
-        assert!(told.contains(read), "{read}: {told}");
+        assert!(printed.contains(read), "{read}: {printed}");
     }
-    assert!(!told.contains("tau_ref") && !told.contains("T_coolant"), "{told}");
-    // What is fed or set is no surprise, whatever its value; a step up to stepSize is none either.
-    let told = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
-    assert!(told.lines().count() == 1 && told.contains("u_dc") && !told.contains("speed_ref ="), "{told}");
-    assert!(!told.contains("tau_load"), "{told}");
+    assert!(!printed.contains("tau_ref") && !printed.contains("T_coolant"), "{printed}");
+    // An input that is fed or set is not reported, even at its start value; a step up to stepSize is none either.
+    let printed = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
+    assert!(printed.lines().count() == 1 && printed.contains("u_dc") && !printed.contains("speed_ref ="), "{printed}");
+    assert!(!printed.contains("tau_load"), "{printed}");
 }
 
 /// The README's first run ends with what a person wants: the speed that was reached, and the page with a way to open it.
@@ -248,8 +248,8 @@ fn the_first_run_of_the_readme() {
     let dir = tempfile::tempdir().unwrap();
     let mut run = Command::new(env!("CARGO_BIN_EXE_fmu"));
     let output = run.arg("simulate").args(arguments).current_dir(dir.path()).output().unwrap();
-    let (said, told) = (text(&output.stdout), text(&output.stderr));
-    assert!(output.status.success() && told.is_empty(), "{told}");
+    let (said, printed) = (text(&output.stdout), text(&output.stderr));
+    assert!(output.status.success() && printed.is_empty(), "{printed}");
     let lines: Vec<&str> = said.lines().collect();
     assert_eq!(lines[..2], ["at 1 s:", "  speed 1000 rpm, speed_ref 1000 rpm, speed_est 1000 rpm"], "{said}");
     let [.., page, open, address] = &lines[..] else { panic!("{said}") };
@@ -395,9 +395,12 @@ fn an_interrupted_run_keeps_its_results() {
         std::thread::sleep(std::time::Duration::from_secs(2));
         assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
         let output = child.wait_with_output().unwrap();
-        let told = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{told}");
-        assert!(told.contains("error: interrupted at ") && told.contains(" s, where the results end"), "{told}");
+        let printed = text(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{printed}");
+        assert!(
+            printed.contains("error: interrupted at ") && printed.contains(" s, where the results end"),
+            "{printed}"
+        );
         assert!(std::fs::read_to_string(&csv).unwrap().lines().count() > 10);
         let left: Vec<_> = std::fs::read_dir(&temporary).unwrap().collect();
         assert!(left.is_empty(), "{how:?}: {left:?}");

@@ -1,4 +1,4 @@
-//! A start and a load step for every estimator, run natively and told to fmpy: parameters, inputs and what must come out.
+//! A start and a load step for every estimator, run natively and passed to FMPy: parameters, inputs and what must come out.
 
 use drive::control::start::StartMode;
 use drive::estimator::{Class, Kind};

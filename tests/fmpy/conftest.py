@@ -13,7 +13,7 @@ from contract import CONTRACT
 FOLDER = os.environ.get("FMU_ARCHIVES")
 if FOLDER is None:
     pytest.exit("set FMU_ARCHIVES to the folder that `cargo run --release -- build` wrote, target/fmu by default", 2)
-# Whatever else was built into that folder has tests of its own.
+# Other archives in that folder have separate tests.
 NAMES = (*CONTRACT, "PmsmDrive")
 ARCHIVES = sorted(path for path in Path(FOLDER).absolute().glob("fmi[23]/*.fmu") if path.stem in NAMES)
 if not ARCHIVES:

@@ -16,7 +16,7 @@ from misuse import cases  # noqa: F401  (fills CASES)
 from misuse.case import CASES
 
 ASAN = os.environ.get("FMU_ASAN")
-# A hang, whatever else the machine does: a case takes seconds, under the sanitizer minutes.
+# A hang, even on a busy machine: a case takes seconds, under the sanitizer minutes.
 SECONDS = 600
 # Python's own allocator hides what the sanitizer looks for; Python leaks at its end.
 SANITIZED = {"LD_PRELOAD": ASAN, "ASAN_OPTIONS": "detect_leaks=0:exitcode=99", "PYTHONMALLOC": "malloc"}

@@ -102,7 +102,7 @@ def test_plant(archives, standard, solver):
     assert np.abs(reference["i_q"]).max() > 1.0
     for name in ("speed", "angle", *CURRENTS):
         assert np.abs(result[name] - reference[name]).max() < bound, name
-    # A completed step of FMPy is an output interval, whatever CVode does in it: 1 ms here.
+    # A completed step of FMPy is an output interval, however CVode divides it: 1 ms here.
     for name in ENERGIES:
         passed = np.abs(reference[name]).max()
         assert passed > 1e-4 and np.abs(result[name] - reference[name]).max() < max(1e-5, bound) * passed, name

@@ -110,14 +110,14 @@ def test_the_battery_gives_no_more_than_its_limit(archives, standard, interface)
 
 @STANDARDS
 @pytest.mark.parametrize(
-    ("start", "told"),
+    ("start", "refusal"),
     [
         ({"dc_link.use": True, "dc_link.C": 0.0}, "dc_link.C = 0 F"),
         ({**LINK, "chopper.use": True, "chopper.u_off": 395.0, "chopper.u_on": 390.0}, "chopper.u_off = 395 V"),
         ({"controller.trip.use": True, "controller.trip.i": 200.0}, "controller.trip.i = 200 A"),
     ],
 )
-def test_what_cannot_be_is_refused(archives, standard, start, told):
+def test_what_cannot_be_is_refused(archives, standard, start, refusal):
     log = []
     with pytest.raises(Exception):
         simulate_fmu(
@@ -127,4 +127,4 @@ def test_what_cannot_be_is_refused(archives, standard, start, told):
             debug_logging=True,
             logger=lambda *arguments: log.append(arguments[-1].decode()),
         )
-    assert any(told in message for message in log), log
+    assert any(refusal in message for message in log), log

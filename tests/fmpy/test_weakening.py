@@ -70,10 +70,10 @@ def test_a_clipped_request_is_told_once_a_second(archives, standard, tau_ref, li
     result = drive(archives, standard, 4500.0, tau_ref, stop=3.5, log=log)
     assert result["current_limited"][100:].all()
     assert result["tau_max" if tau_ref > 0.0 else "tau_min"][-1] == pytest.approx(limit, rel=1e-3)
-    told = [message for message in log if "clipped" in message]
+    messages = [message for message in log if "clipped" in message]
     # After 1, 2 and 3 s, each with the request and what the drive gives.
-    assert len(told) == 3, log
-    for message in told:
+    assert len(messages) == 3, log
+    for message in messages:
         assert f"tau_ref = {tau_ref:.0f} N.m" in message and "(tau_min, tau_max)" in message
         given = [float(word) for word in message.split("gives ")[1].split(" N.m")[0].split(" to ")]
         assert given == pytest.approx([-4.5584, 3.0945], rel=1e-3)

@@ -48,15 +48,15 @@ fn simulate_says_what_happened() {
         return;
     }
     let mut all = Vec::new();
-    for (place, told) in &PLACES {
+    for (place, expected) in &PLACES {
         // Every act where it is most likely, and the shortest everywhere.
         let rare = |act: &str| ["exit", "crash", "fork", "hang", "close", "kill-guard"].contains(&act);
         // What is closed in the end no longer matters.
         let matters = |act: &str| (*place, act) != ("free", "close");
         let acts = ACTS.iter().filter(|(act, ..)| (*place == "step" || rare(act)) && matters(act));
-        all.extend(acts.map(|act| (*place, *told, *act)));
+        all.extend(acts.map(|act| (*place, *expected, *act)));
     }
-    each(&all, |(place, told, (act, status, part))| {
+    each(&all, |(place, expected, (act, status, part))| {
         let fmu = described(XML);
         let seconds = if part.contains("2 s") { "2" } else { "90" };
         let how = format!("{place} {act}");
@@ -69,12 +69,12 @@ fn simulate_says_what_happened() {
         let error: Vec<_> = ended.errors.lines().filter(|l| l.starts_with("error: ")).collect();
         assert_eq!(error.len(), usize::from(*status == 2), "{how}: {ended:?}");
         if *status == 2 && !["close", "files"].contains(act) {
-            assert!(error[0].contains(told), "{how}: {ended:?}");
+            assert!(error[0].contains(expected), "{how}: {ended:?}");
         }
     });
 }
 
-/// Whatever an FMU writes to descriptors that are not its own: the recording on standard output is the command's alone.
+/// An FMU writes to descriptors that are not its own: the recording on standard output is the command's alone.
 #[test]
 fn standard_output_is_the_recording() {
     if library().is_none() {
@@ -123,7 +123,7 @@ fn check_survives() {
     });
 }
 
-/// Nothing but the FMU stops the process of a probe: it has a session of its own.
+/// Nothing but the FMU stops the process of a probe: it has its own session.
 #[test]
 fn a_library_that_stops_itself_is_found() {
     if library().is_none() {

@@ -103,9 +103,9 @@ impl Place {
         let statuses: &[i32] = &[0, 1, 2];
         assert!(statuses.contains(&ended.status), "{ended:?}");
         if ended.status == 2 {
-            let told = ended.errors.lines().filter(|line| line.starts_with("error: ")).count();
+            let count = ended.errors.lines().filter(|line| line.starts_with("error: ")).count();
             assert_eq!(
-                (told, ended.errors.lines().last().map(|l| l.starts_with("error: "))),
+                (count, ended.errors.lines().last().map(|l| l.starts_with("error: "))),
                 (1, Some(true)),
                 "{ended:?}"
             );

@@ -1,7 +1,7 @@
 """PathSim integrates the template of an FMU of one's own, RcCircuit, in Model Exchange; the motor FMUs do not run there.
 
 pathsim-fmi passes every port as a real number, and PmsmPlant and PmsmDrive have Boolean ports; it reads the first time event
-before it updates the discrete states, when the FMU has not told it yet, so a sampled FMU would stand still.
+before it updates the discrete states, before the FMU has returned it, so a sampled FMU would stand still.
 `FMU_OWN` is the folder with RcCircuit.fmu of both standards.
 """
 

@@ -1,7 +1,7 @@
 /* Loads the binary of an FMU and drives it, with nothing but C: for platforms that the tests themselves do not run on.
 
      loader LIBRARY 2|3 TOKEN run SPEED_REF TAU_LOAD OUTPUT...   a start, a speed step and a load step of PmsmDrive
-     loader LIBRARY 2|3 TOKEN fault MODE FAULTY PANICKY          a model that is told to fail: the statuses it returns
+     loader LIBRARY 2|3 TOKEN fault MODE FAULTY PANICKY          a model that is made to fail: the statuses it returns
 
    Numbers are value references, but for the two values of MODE. Doubles are printed with their bits. */
 #define __USE_MINGW_ANSI_STDIO 1

@@ -141,7 +141,7 @@ fn wrong_names_and_values_are_told_and_nothing_is_written() {
     ] {
         let said = preset(of(V3), &new, &["voltage=2", set]).unwrap_err();
         assert!(said.contains(why) && said.starts_with("Some(2) "), "{set}: {said}");
-        assert!(!said.contains("/resources/"), "the place of the unpacked archive tells nothing: {said}");
+        assert!(!said.contains("/resources/"), "the path of the unpacked archive must not appear: {said}");
         assert!(!new.exists(), "{set}");
     }
     let none = fmu(&["preset", text(of(V3)), "--out", text(&new)]).unwrap_err();

@@ -59,7 +59,7 @@ fn its_terminal_is_a_map() {
     assert_eq!(text(&old, "terminalsAndIcons/terminalsAndIcons.xml"), None);
 }
 
-/// A map of another size takes the place of its own.
+/// A map of another size replaces the built-in one.
 #[test]
 fn the_map_can_be_replaced() {
     let mut it = open("current-map").instantiate("it", false).unwrap();

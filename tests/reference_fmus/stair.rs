@@ -11,7 +11,7 @@ fn has_the_bits_of_the_original_and_ends_at_9_s() {
         let recording = run(Method::default(), &fmu, &[], 10.0, 0.2);
         assert_eq!(column(&recording, "counter"), wanted, "{version:?}");
         assert_eq!((recording.time[45], recording.ended_by.as_deref()), (9.0, Some("it")));
-        // The event is inside the last step: FMI 2.0 tells its time, FMI 3.0 without early return the end of the step.
+        // The event is inside the last step: FMI 2.0 returns its time, FMI 3.0 without early return the end of the step.
         let recording = run(Method::default(), &fmu, &[], 10.0, 0.7);
         let last = if version == V2 { 9.0 } else { 9.1 };
         assert!((recording.time.last().unwrap() - last).abs() < 1e-9, "{:?}", recording.time);

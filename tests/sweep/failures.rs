@@ -155,7 +155,7 @@ fn a_full_disk_names_the_file_and_loses_no_part() {
     ends(&mut folder.sweep(&file, "whole"), 0);
     let sweep =
         |out: &Path| format!("'{}' sweep '{}' --out '{}'", env!("CARGO_BIN_EXE_fmu"), file.display(), out.display());
-    // A disk of 64 KiB, where a process may have one of its own.
+    // A disk of 64 KiB, where a process may have a separate one.
     let (disk, copy) = (folder.path("disk"), folder.path("copy"));
     fs::create_dir(&disk).unwrap();
     fs::create_dir(&copy).unwrap();

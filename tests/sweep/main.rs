@@ -1,4 +1,4 @@
-//! `fmu sweep`: the same bytes whatever happens, and one clear line for what is wrong.
+//! `fmu sweep`: the same bytes in every case, and one clear line for what is wrong.
 #![allow(missing_docs)]
 #![cfg(unix)]
 

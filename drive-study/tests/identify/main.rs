@@ -1,4 +1,4 @@
-//! `fmu identify` against a bench of its own: a machine and a controller that share no formula with the drive's plant.
+//! `fmu identify` against its own bench: a machine and a controller that share no formula with the drive's plant.
 
 #![allow(
     non_snake_case,

@@ -141,7 +141,7 @@ pub(super) const CASES: &[Case] = &[
         on: slow,
         ask: |p| p.current.active_resistance = true,
         figures: current_error,
-        // The error over w_c, whatever the resistance is; without it, 1.5 times as much by the wrong one.
+        // The error over w_c, regardless of the resistance; without it, 1.5 times as much by the wrong one.
         acts: |_, [without, _], [with, _]| {
             let expected = 7.0 / Motor::IPMSM_2_2_KW.torque_constant() / (TAU * 200.0);
             (with / expected - 1.0).abs() < 0.1 && without > 1.4 * expected
@@ -262,7 +262,7 @@ pub(super) const CASES: &[Case] = &[
             });
             [sum / n, 0.0]
         },
-        // A carrier that crosses zero within a sample leaves an error of its own.
+        // A carrier that crosses zero within a sample leaves its own error.
         acts: |kind, [without, _], [with, _]| {
             with < without || kind.class().injects() && with < 0.2 && (with - without).abs() > 0.0
         },

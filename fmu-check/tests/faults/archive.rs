@@ -1,7 +1,7 @@
 //! Faults of the archive, by its raw headers.
 
 use crate::zip::{Entry, write};
-use crate::{check, told, violated};
+use crate::{check, listed, violated};
 use fmu_check::Verdict;
 use std::fmt::Write;
 
@@ -56,7 +56,7 @@ fn each_fault_is_found_by_its_check() {
         write(&path, &entries);
         let report = check(&path, &["archive", "xml"]);
         let expected: Vec<_> = ids.iter().filter(|id| **id != "B10").copied().collect();
-        assert_eq!(violated(&report), expected, "{what}: {}", told(&report));
+        assert_eq!(violated(&report), expected, "{what}: {}", listed(&report));
     }
     let other = dir.path().join("x.zip");
     write(&other, &good());
@@ -89,7 +89,7 @@ fn faults_of_the_build_description() {
             let build = Entry::new("sources/buildDescription.xml", build.as_bytes());
             write(&path, &[description, build, Entry::new("sources/fmu.c", b"text")]);
             let report = check(&path, &["Z07", "Z08"]);
-            assert_eq!(violated(&report), *expected, "{}", told(&report));
+            assert_eq!(violated(&report), *expected, "{}", listed(&report));
         }
     }
     let other = good.replace("fmiVersion=\"3.0\"", "fmiVersion=\"2.0\"");
@@ -129,5 +129,5 @@ fn a_hundred_thousand_variables() {
     let open = |v: &Verdict| matches!(v, Verdict::NotDetermined(why) if why.contains("take more than"));
     let open = report.findings.iter().find(|f| open(&f.verdict));
     assert!(open.is_none(), "{open:?}");
-    assert!(report.violated().all(|f| ["Z04a", "Z07", "V01b"].contains(&f.id)), "{}", told(&report));
+    assert!(report.violated().all(|f| ["Z04a", "Z07", "V01b"].contains(&f.id)), "{}", listed(&report));
 }

@@ -1,7 +1,7 @@
 //! Faults of the binary: a small C FMU that breaks no rule, with one fault at a time.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::{check, check_within, each, library, pack_with, told, violated};
+use crate::{check, check_within, each, library, listed, pack_with, violated};
 use fmu_check::Verdict;
 use std::path::{Path, PathBuf};
 
@@ -240,7 +240,7 @@ fn all_of(version: u8, faults: &[(&str, &[&str])], only: &[&str]) {
         let seconds = if *fault == "HANG" { 4 } else { 120 };
         let binary = compile(version, fault).unwrap();
         let report = check_within(&pack(dir.path(), version, fault, &binary), only, seconds);
-        if violated(&report) == *ids { Ok(()) } else { Err(format!("{fault}: {}", told(&report))) }
+        if violated(&report) == *ids { Ok(()) } else { Err(format!("{fault}: {}", listed(&report))) }
     });
 }
 
@@ -273,7 +273,7 @@ fn a_second_instance_that_hangs() {
         let Some(binary) = compile(version, "SECOND") else { return };
         let path = pack(dir.path(), version, "SECOND", &binary);
         let report = check_within(&path, &["L04a", "T10", "G-L4"], 2);
-        assert_eq!((violated(&report), report.fatal()), (vec!["L04a"], vec!["L04a"]), "{}", told(&report));
+        assert_eq!((violated(&report), report.fatal()), (vec!["L04a"], vec!["L04a"]), "{}", listed(&report));
         let Verdict::NotDetermined(why) = &report.finding("T10").unwrap().verdict else { panic!("{report:?}") };
         assert!(why.starts_with("[2] ") && why.ends_with("and that of the first instance did: see L04a"), "{why}");
     }
@@ -288,14 +288,14 @@ fn derivatives_of_outputs() {
     for (fault, ids) in [("NONE", &[][..]), ("T09e", &["T09"]), ("T09o", &["T09s"]), ("T09v", &["T09s"])] {
         let Some(binary) = compile(2, &format!("DERIVATIVES {fault}")) else { return };
         let report = check(&pack_with(dir.path(), fault, &xml, &binary), &["time", "lifecycle"]);
-        assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
+        assert_eq!(violated(&report), ids, "{fault}: {}", listed(&report));
     }
     // A mean over the step has no value at its beginning; and an FMU that interpolates inputs takes their derivatives.
     let claims = xml.replace(flag, &format!("{flag} canInterpolateInputs=\"true\""));
     for (fault, xml, ids) in [("MEAN", &xml, &[][..]), ("NONE", &claims, &["T11"])] {
         let Some(binary) = compile(2, &format!("DERIVATIVES {fault}")) else { return };
         let report = check(&pack_with(dir.path(), fault, xml, &binary), &["time"]);
-        assert_eq!(violated(&report), ids, "{fault}: {}", told(&report));
+        assert_eq!(violated(&report), ids, "{fault}: {}", listed(&report));
     }
 }
 
@@ -316,7 +316,7 @@ fn faults_of_the_file() {
     ] {
         let binary = library("fmu.c", more, "NONE").unwrap();
         let report = check(&pack(dir.path(), 2, "flags", &binary), &["binary", "instances"]);
-        assert_eq!(violated(&report), ids, "{more:?}: {}", told(&report));
+        assert_eq!(violated(&report), ids, "{more:?}: {}", listed(&report));
     }
     let xml = include_str!("fmu.xml");
     for (start, ids) in
@@ -324,10 +324,10 @@ fn faults_of_the_file() {
     {
         let xml = xml.replace("<String start=\"a\"/>", &format!("<String start=\"{start}\"/>"));
         let report = check(&pack_with(dir.path(), "start", &xml, b"no library"), &["B12"]);
-        assert_eq!(violated(&report), ids, "{start}: {}", told(&report));
+        assert_eq!(violated(&report), ids, "{start}: {}", listed(&report));
     }
     let report = check(&pack(dir.path(), 2, "text", b"no library"), &[]);
-    assert_eq!(violated(&report), ["B00", "B10"], "{}", told(&report));
+    assert_eq!(violated(&report), ["B00", "B10"], "{}", listed(&report));
     let open = report.findings.iter().filter(|f| matches!(f.verdict, Verdict::NotDetermined(_))).count();
     assert!(open > 40, "what cannot be looked at is not passed");
 }

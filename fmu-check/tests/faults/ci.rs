@@ -174,7 +174,7 @@ fn several_files_have_one_summary() {
     assert_eq!((html.matches("<h1>").count(), html.matches("<html").count()), (3, 1));
 }
 
-/// A reason that many checks share is told once.
+/// A reason that many checks share is printed once.
 #[test]
 fn a_common_reason_has_one_line() {
     let dir = tempfile::tempdir().unwrap();
@@ -196,8 +196,8 @@ fn a_second_hang_is_not_waited_for() {
     assert_eq!(report.fatal(), ["T02b"]);
     // One call has 1 s, because the arguments are wild; a busy machine may double that, and more.
     assert!(began.elapsed() < Duration::from_secs(18), "{:?}", began.elapsed());
-    let told = format!("{:?}", report.finding("T02b").unwrap().verdict);
-    assert_eq!(told.matches("did not return").count(), 1, "{told}");
+    let printed = format!("{:?}", report.finding("T02b").unwrap().verdict);
+    assert_eq!(printed.matches("did not return").count(), 1, "{printed}");
 }
 
 #[test]

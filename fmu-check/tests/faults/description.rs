@@ -1,13 +1,13 @@
 //! Faults of the description, in small ones of both standards.
 
 use crate::zip::{Entry, write};
-use crate::{check, told, violated};
+use crate::{check, listed, violated};
 
 fn found(dir: &std::path::Path, xml: &str) -> (Vec<&'static str>, String) {
     let path = dir.join("x.fmu");
     write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/fmu.c", b"x")]);
     let report = check(&path, &["xml", "variables", "structure"]);
-    (violated(&report), told(&report))
+    (violated(&report), listed(&report))
 }
 
 fn each(xml: &str, faults: &[(&[&str], &str, &str)]) {
@@ -216,7 +216,7 @@ fn faults_of_types_and_lists() {
         let path = dir.path().join("x.fmu");
         write(&path, &[Entry::new("modelDescription.xml", xml.as_bytes()), Entry::new("sources/fmu.c", b"x")]);
         let report = check(&path, &only);
-        (violated(&report), told(&report))
+        (violated(&report), listed(&report))
     };
     let derivative = "<ContinuousStateDerivative valueReference=\"4\" dependencies=\"1 2 3\"/>";
     let faults: [(&[&str], &str, &str, &str); 8] = [

@@ -2,7 +2,7 @@
 //! at a time.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::{check, each, library, pack_with, told, violated};
+use crate::{check, each, library, listed, pack_with, violated};
 use fmu_check::Verdict;
 
 const GROUPS: [&str; 9] = ["exchange", "events", "derivatives", "event-mode", "T13", "B07a", "B08", "B08f", "B08g"];
@@ -119,7 +119,7 @@ fn all(version: u8, faults: &[(&str, &[&str])]) {
         let report =
             check(&pack_with(dir.path(), fault, xml, &library("exchange.c", standard, fault).unwrap()), &GROUPS);
         if violated(&report) != *ids {
-            return Err(format!("{fault}: {}", told(&report)));
+            return Err(format!("{fault}: {}", listed(&report)));
         }
         // What the fault does not hide is determined.
         match report.findings.iter().find(|f| matches!(f.verdict, Verdict::NotDetermined(_))) {
@@ -148,9 +148,9 @@ fn an_fmu_without_co_simulation_is_run() {
         let without: Vec<_> = xml.lines().filter(|line| !line.contains("<CoSimulation")).collect();
         let report = check(&pack_with(dir.path(), "exchange-only", &without.join("\n"), &binary), &[]);
         let verdict = |id: &str| report.finding(id).map(|f| f.verdict.clone()).unwrap();
-        assert!(matches!(verdict("E00"), Verdict::Pass(_)), "{}", told(&report));
-        assert!(matches!(verdict("E13"), Verdict::Pass(_)), "{}", told(&report));
-        assert!(matches!(verdict("B00"), Verdict::Pass(_)), "{}", told(&report));
+        assert!(matches!(verdict("E00"), Verdict::Pass(_)), "{}", listed(&report));
+        assert!(matches!(verdict("E13"), Verdict::Pass(_)), "{}", listed(&report));
+        assert!(matches!(verdict("B00"), Verdict::Pass(_)), "{}", listed(&report));
         for id in ["L00", "L07", "T01a", "F02a", "D05"] {
             assert!(matches!(verdict(id), Verdict::NotApplicable(_)), "{id}: {:?}", verdict(id));
         }

@@ -27,6 +27,6 @@ pub fn violated(report: &Report) -> Vec<&'static str> {
 }
 
 /// What a check that should have failed said.
-pub fn told(report: &Report) -> String {
+pub fn listed(report: &Report) -> String {
     report.violated().map(|f| format!("{}: {:?}", f.id, f.verdict)).collect::<Vec<_>>().join("\n")
 }

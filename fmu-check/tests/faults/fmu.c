@@ -378,7 +378,7 @@ EXPORT int fmi2GetInteger(void *c, const unsigned vr[], size_t n, int values[]) 
     return OK;
 }
 
-/* The output that tells whether y is above 0. */
+/* The output that is true while y is above 0. */
 #ifdef FMI3
 #define HIGH 3
 #else

@@ -13,7 +13,7 @@ mod starts;
 mod ticks;
 mod zip;
 
-use findings::{check, check_within, told, violated};
+use findings::{check, check_within, listed, violated};
 use fmu_check::{Verdict, report::Report};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

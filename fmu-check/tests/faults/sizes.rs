@@ -1,7 +1,7 @@
 //! Structural parameters: faults of a small C FMU with two sizes.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::{check, each, library, pack_with, told, violated};
+use crate::{check, each, library, listed, pack_with, violated};
 use fmu_check::Verdict;
 
 const FAULTS: &[(&str, &[&str])] = &[
@@ -32,7 +32,7 @@ fn sizes_are_followed() {
         let report = report(fault);
         let open = report.findings.iter().find(|f| *fault == "NONE" && !matches!(f.verdict, Verdict::Pass(_)));
         let good = violated(&report) == *ids && open.is_none();
-        if good { Ok(()) } else { Err(format!("{fault}: {} {open:?}", told(&report))) }
+        if good { Ok(()) } else { Err(format!("{fault}: {} {open:?}", listed(&report))) }
     });
     let said = format!("{:?}", report("C08f").finding("C08"));
     assert!(said.contains("Set(k), a fixed one, in Reconfiguration Mode returned OK"), "{said}");

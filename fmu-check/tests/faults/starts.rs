@@ -2,7 +2,7 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use crate::binary::{compile, pack};
-use crate::{check, each, pack_with, told, violated};
+use crate::{check, each, listed, pack_with, violated};
 use fmu_check::Verdict;
 
 /// The descriptions with an output that starts exactly.
@@ -38,7 +38,7 @@ fn starts_stand() {
             let binary = compile(version, &format!("STARTS {fault}")).unwrap();
             let report = check(&pack_with(dir.path(), fault, &xml, &binary), &[]);
             let same = violated(&report) == *ids;
-            if same { Ok(()) } else { Err(format!("FMI {version}, {fault}: {}", told(&report))) }
+            if same { Ok(()) } else { Err(format!("FMI {version}, {fault}: {}", listed(&report))) }
         });
         let report = check(&pack(dir.path(), version, "NONE", &without), &["G09"]);
         assert!(matches!(report.finding("G09").unwrap().verdict, Verdict::NotApplicable(_)));
@@ -56,7 +56,7 @@ fn the_end_is_told_and_no_step_follows() {
             }
             let Some(binary) = compile(version, fault) else { return };
             let report = check(&pack(dir.path(), version, fault, &binary), &["time", "lifecycle"]);
-            assert_eq!(violated(&report), ids, "FMI {version}, {fault}: {}", told(&report));
+            assert_eq!(violated(&report), ids, "FMI {version}, {fault}: {}", listed(&report));
         }
     }
 }

@@ -98,8 +98,8 @@ EXPORT int fmi3UpdateDiscreteStates(void *c, bool *again, bool *terminate, bool 
     return OK;
 }
 EXPORT int fmi3GetIntervalDecimal(void *c, Refs vr, size_t n, double x[], int qualifiers[]) {
-    bool told = ((Fmu *)c)->state == INITIALIZATION;
-    IN(n == 1 && (vr[0] == SAMPLE && told || vr[0] == WAKE && (told || f->state == EVENT || f->state == CLOCK_UPDATE)));
+    bool known = ((Fmu *)c)->state == INITIALIZATION;
+    IN(n == 1 && (vr[0] == SAMPLE && known || vr[0] == WAKE && (known || f->state == EVENT || f->state == CLOCK_UPDATE)));
     x[0] = vr[0] == SAMPLE ? FAULT(K03) ? 0.2 : 0.1 : FAULT(K05) ? -0.01 : 0.03;
     qualifiers[0] = vr[0] == SAMPLE ? 2 : f->qualifier;
     if (vr[0] == WAKE && f->qualifier == 2 && !FAULT(K04)) f->qualifier = 1;

@@ -1,7 +1,7 @@
 //! Clocks, intermediate updates and Scheduled Execution: faults of a small C FMU with a clock of each kind.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::{check, each, library, pack_with, told, violated};
+use crate::{check, each, library, listed, pack_with, violated};
 use fmu_check::Verdict;
 
 const GROUPS: [&str; 3] = ["clocks", "intermediate-update", "scheduled-execution"];
@@ -55,12 +55,12 @@ fn clocks_tick_and_callbacks_come_as_they_should() {
         let open = |v: &Verdict| matches!(v, Verdict::NotDetermined(_) | Verdict::NotApplicable(_));
         let open = report.findings.iter().find(|f| *fault == "NONE" && f.id != "U04" && open(&f.verdict));
         let good = violated(&report) == *ids && open.is_none();
-        if good { Ok(()) } else { Err(format!("{fault}: {} {open:?}", told(&report))) }
+        if good { Ok(()) } else { Err(format!("{fault}: {} {open:?}", listed(&report))) }
     });
     // The callback of an FMU that does not announce it.
     let silent = xml.replace("providesIntermediateUpdate=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\"", "");
     let report = check(&pack_with(dir.path(), "U04", &silent, &library("ticks.c", &[], "NONE").unwrap()), &GROUPS);
-    assert_eq!(violated(&report), ["U04"], "{}", told(&report));
+    assert_eq!(violated(&report), ["U04"], "{}", listed(&report));
 }
 
 /// An FMU of Scheduled Execution alone is checked as that.

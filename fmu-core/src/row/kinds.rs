@@ -167,7 +167,7 @@ impl<W: 'static> Row<W> {
         Self::new(name, description, Kind::Text, Access::Said(say)).with(Causality::Output, Variability::Discrete)
     }
 
-    /// A real output that changes at sample instants and has no place of its own: `compute` reads it from the state, without an
+    /// A real output that changes at sample instants and is not stored: `compute` reads it from the state, without an
     /// allocation.
     pub const fn computed_output(
         name: &'static str,

@@ -246,7 +246,7 @@ impl<W: 'static> Row<W> {
         let mut i = 0;
         while i < aliases.len() {
             let named = !aliases[i].name.is_empty() && !same_text(aliases[i].name, self.meta.name);
-            demand(named, self.meta.name, "an alias needs a name of its own");
+            demand(named, self.meta.name, "an alias needs its own name");
             let with_unit = matches!(self.meta.kind, Kind::Real(of) | Kind::Float32(of) if !of.unit.name.is_empty());
             let fits = with_unit || aliases[i].display.is_none();
             demand(fits, aliases[i].name, "only a real variable with a unit can be shown in another one");

@@ -1,4 +1,4 @@
-//! The functions that this exporter does not offer: refused in every state, whatever the arguments.
+//! The functions that this exporter does not offer: refused in every state, regardless of the arguments.
 
 use super::model::X;
 use super::*;

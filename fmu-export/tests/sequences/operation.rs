@@ -32,7 +32,7 @@ pub(crate) enum Door {
 pub(crate) enum Kind {
     Real,
     Integer,
-    /// In FMI 3.0 a type of its own, `Int64`.
+    /// In FMI 3.0 its own type, `Int64`.
     Enumeration,
     Boolean,
     /// One of the types that no variable of this model has.

@@ -29,7 +29,7 @@ pub fn swatch(ink: Ink) -> String {
     format!("<span class=\"swatch\" style=\"background:{ink}\"></span>")
 }
 
-/// A document with the common style and a `style` of its own; `head` stands before it, and `body` is the content of the element of
+/// A document with the common style and an additional `style`; `head` precedes it, and `body` is the content of the element of
 /// this name.
 pub fn document(title: &str, head: &str, style: &str, body: &str) -> String {
     let title = escape(title);

@@ -21,7 +21,11 @@ fn parse(
     let (_, header) = lines.next().ok_or("is empty, expected a header with the names of variables")?;
     let names = cells(header.trim_start_matches('\u{feff}'));
     if let Some(k) = (0..names.len()).find(|&k| names[k].is_empty() || names[..k].contains(&names[k])) {
-        return Err(format!("line 1: column {} has the name {:?}, expected one of its own", k + 1, names[k]));
+        return Err(format!(
+            "line 1: column {} has the name {:?}, expected a name that no other column has",
+            k + 1,
+            names[k]
+        ));
     }
     let mut rows = Vec::new();
     for (index, line) in lines {
@@ -47,7 +51,7 @@ mod tests {
         assert_eq!((names, rows), (vec!["p.R".into(), "p.J".into()], vec![vec![3.0, 1e-3], vec![4.0, 2e-3]]));
         for (text, expected) in [
             ("", "is empty, expected a header with the names of variables"),
-            ("a,a\n1,2", "line 1: column 2 has the name \"a\", expected one of its own"),
+            ("a,a\n1,2", "line 1: column 2 has the name \"a\", expected a name that no other column has"),
             ("a,b\n1,2\n3", "line 3: 1 values, expected 2"),
             ("a,b\n1,x", "line 2: b = x is not a number"),
         ] {

@@ -23,7 +23,7 @@ pub struct Rows {
     count: u64,
     kind: Kind,
     seed: u64,
-    /// Direction numbers of a Sobol design, for each column with a dimension of its own.
+    /// Direction numbers of a Sobol design, for each column with its own dimension.
     dimensions: Vec<Dimension>,
     /// Rows of a list.
     list: Vec<Vec<f64>>,
@@ -31,7 +31,7 @@ pub struct Rows {
 
 #[derive(Clone, Debug, PartialEq)]
 enum Column {
-    /// The n-th column with a dimension of its own.
+    /// The n-th column with its own dimension.
     Free { dimension: usize, source: Source },
     /// The n-th column of a list.
     Listed(usize),
@@ -182,7 +182,7 @@ impl Rows {
         }
     }
 
-    /// A number between 0 and 1 for a column that has a dimension of its own.
+    /// A number between 0 and 1 for a column that has its own dimension.
     fn unit(&self, dimension: usize, index: u64) -> f64 {
         let of_column = u64::try_from(dimension).unwrap_or(u64::MAX);
         let random = random::bits(self.seed, of_column, index);

@@ -126,7 +126,7 @@ fn timing(element: &Element) -> Option<ClockTiming> {
     })
 }
 
-/// FMI 2.0.5, 2.2.7: continuous, whatever the type; FMI 3.0.2, 2.4.7.4: what fits.
+/// FMI 2.0.5, 2.2.7: continuous, regardless of the type; FMI 3.0.2, 2.4.7.4: what fits.
 fn default_variability(version: FmiVersion, causality: Causality, base: BaseType) -> Variability {
     match (version, causality) {
         (FmiVersion::V2, _) => Variability::Continuous,

@@ -96,7 +96,7 @@ impl<'a> Numbering<'a> {
                     known.insert(reference, number);
                 }
             }
-            numbers.dedup(); // FMI 3.0 has one variable, whatever its size
+            numbers.dedup(); // FMI 3.0 has one variable of any size
             variables.push((v, numbers));
         }
         let steps_only = description.model_exchange.is_none();

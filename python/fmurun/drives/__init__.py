@@ -43,7 +43,7 @@ def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
         motor: a motor file, or the name of one of `machines`
         fmu: "PmsmDrive", "PmsmDriveMean", "PmsmPlant" or "SensorlessController"
         estimator: instead of that of the file: "Rasmussen" or "ExtendedEmf"
-        fmi: 2 or 3: in FMI 2.0 each element of an array has a name of its own
+        fmi: 2 or 3: in FMI 2.0 each element of an array has its own name
 
     Raises:
         FmuError: the file cannot be read or makes no sense; the message names file, line and value

@@ -1,1 +1,1 @@
-"""Host sins against the C interface, each in a process of its own: crashes and hangs are results, not lost runs."""
+"""Host sins against the C interface, each in its own process: crashes and hangs are results, not lost runs."""

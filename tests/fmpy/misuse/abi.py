@@ -62,7 +62,7 @@ class Variable(NamedTuple):
 
 
 class Message(NamedTuple):
-    """What the logger was told."""
+    """What the logger received."""
 
     status: int
     category: str

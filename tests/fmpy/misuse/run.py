@@ -43,7 +43,7 @@ def refused(it, status, *words):
 
 
 def recovers(it, trace):
-    """After whatever happened, a reset leads to the first run again, bit for bit."""
+    """After any misuse, a reset leads to the first run again, bit for bit."""
     assert it.call("Reset") == OK, it.messages
     it.messages.clear()
     assert run(it.begin(), len(trace) // (8 * len(it.fmu.of("output")))) == trace, "the run after a reset differs"

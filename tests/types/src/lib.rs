@@ -1,4 +1,4 @@
-//! A model with a variable of every type and causality, and with a file of its own: every constructor of the table.
+//! A model with a variable of every type and causality, and with its own file: every constructor of the table.
 
 use fmu_core::unit::{KELVIN, ONE, PER_SECOND, Quantity, SECOND, VOLT};
 use fmu_core::{

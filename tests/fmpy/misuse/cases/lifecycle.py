@@ -200,7 +200,7 @@ def skipped_steps_of_life(fmu):
 
 @case
 def reset_from_every_state(fmu):
-    """The first run again, whatever was set, at whatever start time."""
+    """The first run again, regardless of what was set and of the start time."""
     trace = alone(fmu)
     for state in STATES:
         it = reach(fmu, state)

@@ -139,7 +139,7 @@ def every_error_is_said_once(fmu):
 
 @case
 def logger_that_calls_back(fmu):
-    """A logger that sins: it steps, sets, resets and frees the instance it is told about. Refused, no crash."""
+    """A logger that sins: it steps, sets, resets and frees the instance that logs. Refused, no crash."""
     it = fmu.instance()
     run(it.begin(), 5)
     found, remember = [], it.messages.append

@@ -111,7 +111,7 @@ def experiments(fmu):
 
 @case
 def tolerances(fmu):
-    """A fixed-step FMU has no use for one: whatever it is, nothing changes."""
+    """A fixed-step FMU has no use for one: no value changes anything."""
     trace = alone(fmu, 10)
     for defined, tolerance in ((0, math.nan), (1, 1e-6), (0, -1.0)):
         it = fmu.instance()

@@ -211,7 +211,7 @@ def set_and_get_again(fmu):
 
 @case
 def set_does_not_recompute(fmu):
-    """Between steps the outputs are those of the last step, whatever the inputs have become."""
+    """Between steps the outputs are those of the last step, even if the inputs have changed."""
     it = fmu.instance().begin()
     run(it, 10)
     before = it.reals("Get", fmu.of("output"))
