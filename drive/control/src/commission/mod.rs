@@ -29,6 +29,7 @@
 //! voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
 
 mod align;
+mod alignment;
 mod axes;
 mod bench;
 mod circle;
@@ -48,7 +49,7 @@ mod starting;
 mod swing;
 mod turning;
 
-pub use results::{Identified, LIMIT_DEAD, LIMIT_L, LIMIT_R, Results};
+pub use results::{Identified, LIMIT_DEAD, LIMIT_L, LIMIT_R, LIMIT_SATURATION, Results};
 pub use sequence::Commission;
 pub use setup::{CommissionSetup, Voltage};
 
@@ -95,10 +96,11 @@ enumeration! {
         5 Inductance "The pulses or loops give no inductance";
         6 NotFollowing "The rotor turns at the start, does not come to rest, is blocked in mode Spin or does not follow the start";
         7 Lost "The observer has lost the turning rotor";
-        8 Flux "The levels of speed give no flux linkage";
+        8 Flux "The turning rotor shows no flux linkage within 0.25 and 1.15 of u_dc / (sqrt(3) n_p commission.speed)";
         9 Mechanics "The levels and sweeps do not fit inertia and friction";
         10 Time "commission.t_max is over";
         11 Aborted "commission_start or enable became false";
+        12 Axis "The rest of the rotor does not show along which inductance its magnet lies";
     }
 }
 
