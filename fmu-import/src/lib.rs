@@ -238,7 +238,7 @@ impl Fmu {
         let functions = self.functions(kind, name)?;
         let c_name = text(name, name)?;
         let token = text(name, &self.description.token)?;
-        let log = Arc::<Log>::default();
+        let log = Log::new();
         let resources = match self.description.version {
             FmiVersion::V2 => file_uri(&self.resources),
             // FMI 3.0 wants a path of this system with a separator at its end (FMI 3.0.2, 2.3.1).

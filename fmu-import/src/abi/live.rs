@@ -3,7 +3,8 @@
 use super::arguments::Given;
 use super::calls::{Request, Updates};
 use super::functions::{CType, Calls, Way};
-use super::log::{Log, Status, copy_text};
+use super::log::{Log, Message, Status, copy_text};
+use super::logger::{Called, Listener, logger};
 use super::raw::{Buffer, Count, Interface, Sensitivity, Simple, StepResults, StepStatus, Vector, type_name, width};
 use super::signatures::v2::{Callbacks, calloc, free};
 use crate::instance::{CompletedStep, Stepped, Update};
@@ -21,23 +22,16 @@ const LAST_SUCCESSFUL_TIME: i32 = 2;
 /// `fmi2Terminated`, a status kind.
 const TERMINATED: i32 = 3;
 
-/// A [`Logger`](super::signatures::v2::Logger). Keeps the message unformatted except for the two forms that need no
-/// formatter: `%%`, and `%s` alone with its text.
-unsafe extern "C" fn logger(
-    environment: *mut c_void,
-    _instance: *const c_char,
-    status: Status,
-    category: *const c_char,
-    format: *const c_char,
-    first: *const c_char,
-) {
-    let with_text = cfg!(not(target_vendor = "apple"));
-    // SAFETY: the FMU passes the environment that it got in the callbacks, and C strings; a format "%s" comes with a text.
-    unsafe {
-        let format = copy_text(format);
-        let message = if with_text && format == "%s" { copy_text(first) } else { format.replace("%%", "%") };
-        Log::receive(environment, status, copy_text(category), message);
-    };
+/// Receives the messages of FMI 2.0.
+struct Facade;
+
+impl Listener for Facade {
+    unsafe fn hear(called: Called) {
+        let text = String::from_utf8_lossy(&called.text.unwrap_or_default()).into_owned();
+        // SAFETY: the FMU passes C strings.
+        let category = unsafe { copy_text(called.category) };
+        Log::receive(called.environment, Message { status: called.status, category, text });
+    }
 }
 
 unsafe extern "C" fn log_message(
@@ -46,8 +40,9 @@ unsafe extern "C" fn log_message(
     category: *const c_char,
     message: *const c_char,
 ) {
-    // SAFETY: the FMU passes the environment that it was instantiated with, and C strings.
-    unsafe { Log::receive(environment, status, copy_text(category), copy_text(message)) };
+    // SAFETY: the FMU passes C strings.
+    let (category, text) = unsafe { (copy_text(category), copy_text(message)) };
+    Log::receive(environment, Message { status, category, text });
 }
 
 /// A pointer that an FMU gave out, to an instance or to a saved state. Only the FMU follows it.
@@ -87,7 +82,7 @@ impl Live {
         };
         let environment = log.environment();
         let callbacks = Arc::new(Callbacks {
-            logger: Some(logger),
+            logger: Some(logger::<Facade>),
             allocate: Some(calloc),
             free: Some(free),
             step_finished: None,
@@ -105,7 +100,7 @@ impl Live {
             environment,
             updates: Updates::default(),
         };
-        // SAFETY: callbacks and log outlive the instance.
+        // SAFETY: the callbacks outlive the instance; the environment is a number that no one follows.
         let (name, pointer) = unsafe { calls.instantiate(&request) };
         let missing = || Refusal::Impossible(format!("the function {name} is missing"));
         trace::note(name, || if pointer.is_some_and(|p| !p.is_null()) { "an instance" } else { "no instance" }.into());

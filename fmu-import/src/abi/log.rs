@@ -1,9 +1,10 @@
 //! Log messages of an FMU.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ffi::{CStr, c_char, c_void};
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::ptr;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
 /// Maximum number of stored messages, so that logging does not fill the memory.
 const KEPT: usize = 10_000;
@@ -15,7 +16,7 @@ pub struct Message {
     pub status: Status,
     /// Log category.
     pub category: String,
-    /// The text; in FMI 2.0 it is not formatted, see `live`.
+    /// The text.
     pub text: String,
 }
 
@@ -63,7 +64,8 @@ impl fmt::Debug for Status {
     }
 }
 
-/// The messages of one instance. Its address is the instance environment of the callbacks, so it is shared.
+/// The messages of one instance. The callbacks receive a number as the instance environment and look the log up by it: an FMU
+/// may pass another pointer, or call back after its instance has gone, so that pointer is never followed.
 #[derive(Debug, Default)]
 pub(crate) struct Log(Mutex<Messages>);
 
@@ -74,20 +76,40 @@ struct Messages {
     fresh: usize,
 }
 
+/// The logs that are alive, by the number that their FMU received.
+static LOGS: Mutex<BTreeMap<usize, Weak<Log>>> = Mutex::new(BTreeMap::new());
+
+/// A callback never panics while it holds a lock; if it did, the content would still be intact.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 impl Log {
+    /// A new log, known to the callbacks as long as it lives.
+    pub(crate) fn new() -> Arc<Self> {
+        let log = Arc::<Self>::default();
+        locked(&LOGS).insert(log.number(), Arc::downgrade(&log));
+        log
+    }
+
+    /// Its address, which no other living log has.
+    fn number(&self) -> usize {
+        ptr::from_ref(self).addr()
+    }
+
     /// First argument of the callbacks.
-    pub(crate) fn environment(self: &Arc<Self>) -> *mut c_void {
-        Arc::as_ptr(self).cast_mut().cast()
+    pub(crate) fn environment(&self) -> *mut c_void {
+        ptr::without_provenance_mut(self.number())
     }
 
     /// Takes all messages.
     pub(crate) fn take(&self) -> Vec<Message> {
-        self.messages().all.drain(..).collect()
+        locked(&self.0).all.drain(..).collect()
     }
 
     /// Message for an error: the last serious one since the previous error, otherwise the last of any status.
     pub(crate) fn reason(&self) -> Option<String> {
-        let mut messages = self.messages();
+        let mut messages = locked(&self.0);
         let fresh = std::mem::take(&mut messages.fresh);
         let mut fresh = messages.all.iter().rev().take(fresh).peekable();
         let last = fresh.peek().copied();
@@ -95,24 +117,27 @@ impl Log {
         serious.or(last).map(|m| m.text.clone())
     }
 
-    fn messages(&self) -> std::sync::MutexGuard<'_, Messages> {
-        // A callback never panics while it holds the lock; if it did, the messages would still be intact.
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Receives a message from an FMU.
-    ///
-    /// # Safety
-    /// `environment` is null or came from [`Log::environment`] of a log that is alive.
-    pub(crate) unsafe fn receive(environment: *mut c_void, status: Status, category: String, text: String) {
-        // SAFETY: the caller promises that the pointer is null or a living log; a log is only used by shared reference.
-        let Some(log) = (unsafe { environment.cast::<Self>().as_ref() }) else { return };
-        let mut messages = log.messages();
+    /// Receives a message from an FMU. An environment that no living log has belongs to the only log alive, if there is one;
+    /// otherwise nobody can say whose message it is, and it is dropped.
+    pub(crate) fn receive(environment: *mut c_void, message: Message) {
+        let log = {
+            let logs = locked(&LOGS);
+            let only = || logs.values().next().filter(|_| logs.len() == 1);
+            logs.get(&environment.addr()).or_else(only).and_then(Weak::upgrade)
+        };
+        let Some(log) = log else { return };
+        let mut messages = locked(&log.0);
         if messages.all.len() == KEPT {
             messages.all.pop_front();
         }
         messages.fresh += 1;
-        messages.all.push_back(Message { status, category, text });
+        messages.all.push_back(message);
+    }
+}
+
+impl Drop for Log {
+    fn drop(&mut self) {
+        locked(&LOGS).remove(&self.number());
     }
 }
 
@@ -132,21 +157,35 @@ pub(crate) unsafe fn copy_text(text: *const c_char) -> String {
 mod tests {
     use super::*;
 
+    fn message(status: Status, text: &str) -> Message {
+        Message { status, category: String::new(), text: text.into() }
+    }
+
+    /// One test, because the logs of a process are counted.
     #[test]
-    fn the_last_serious_message_counts() {
-        let log = Arc::<Log>::default();
+    fn messages_find_their_log_by_value() {
+        let log = Log::new();
         for (status, text) in [(Status::OK, "hello"), (Status::ERROR, "h is negative"), (Status::OK, "bye")] {
-            // SAFETY: the log is alive.
-            unsafe { Log::receive(log.environment(), status, String::new(), text.into()) };
+            Log::receive(log.environment(), message(status, text));
         }
         assert_eq!(log.reason().as_deref(), Some("h is negative"));
         assert_eq!(log.reason(), None, "reported once");
         assert_eq!(log.take().len(), 3);
-    }
 
-    #[test]
-    fn an_fmu_that_forgets_its_environment_does_no_harm() {
-        // SAFETY: null is allowed.
-        unsafe { Log::receive(std::ptr::null_mut(), Status::OK, String::new(), String::new()) };
+        let strange = [ptr::null_mut(), ptr::without_provenance_mut(3), ptr::without_provenance_mut(usize::MAX)];
+        for environment in strange {
+            Log::receive(environment, message(Status::OK, "whose?"));
+        }
+        assert_eq!(log.take().len(), 3, "there is no other log");
+
+        let other = Log::new();
+        Log::receive(strange[1], message(Status::OK, "whose?"));
+        Log::receive(other.environment(), message(Status::OK, "mine"));
+        assert_eq!((log.take().len(), other.take().len()), (0, 1), "nobody can say whose");
+
+        let gone = log.environment();
+        drop(log);
+        Log::receive(gone, message(Status::OK, "late"));
+        assert_eq!(other.take().len(), 1, "an instance that has gone is like any other number");
     }
 }

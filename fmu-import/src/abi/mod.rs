@@ -3,11 +3,13 @@
 pub(crate) mod arguments;
 mod binary;
 pub(crate) mod calls;
+mod format;
 pub(crate) mod functions;
 pub mod journal;
 pub(crate) mod library;
 pub(crate) mod live;
 pub(crate) mod log;
+mod logger;
 pub mod raw;
 #[cfg(unix)]
 pub(crate) mod sandbox;

@@ -29,6 +29,7 @@ pub(super) type SetVector = unsafe extern "C" fn(InstancePointer, *const f64, us
 
 /// FMI 2.0.
 pub(super) mod v2 {
+    use super::super::logger::Logger;
     use super::{InstancePointer, Status, c_char, c_int, c_void};
     use std::sync::atomic::AtomicPtr;
 
@@ -71,13 +72,6 @@ pub(super) mod v2 {
         pub(in crate::abi) next_event_time_defined: c_int,
         pub(in crate::abi) next_event_time: f64,
     }
-
-    /// `fmi2CallbackLogger`. In C it is variadic, which a Rust function cannot be. On x86_64 and 64-bit ARM, Linux and Windows,
-    /// a variadic call passes its arguments where any call passes them and the caller cleans up, so the first six can be
-    /// received as fixed ones; nothing beyond them is read. (Apple's ARM passes variadic arguments elsewhere: there only five
-    /// are.)
-    pub(in crate::abi) type Logger =
-        unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, *const c_char);
 
     /// `fmi2CallbackFunctions`.
     #[repr(C)]

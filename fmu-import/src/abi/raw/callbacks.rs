@@ -1,6 +1,7 @@
 //! Callbacks for the FMU that record their calls.
 
 use super::super::log::Status;
+use super::super::logger::{Called, Listener};
 use super::super::signatures::v2::{calloc, free};
 use std::ffi::{CStr, c_char, c_int, c_void};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -53,22 +54,17 @@ pub(super) unsafe fn optional(text: *const c_char) -> Option<String> {
     unsafe { CStr::from_ptr(text) }.to_str().ok().map(str::to_owned)
 }
 
-/// See [`v2::Logger`](super::super::signatures::v2::Logger): a variadic function, received as far as its arguments are in registers.
-pub(super) unsafe extern "C" fn logger2<const LATE: bool>(
-    environment: *mut c_void,
-    instance: *const c_char,
-    status: Status,
-    category: *const c_char,
-    format: *const c_char,
-    first: *const c_char,
-) {
-    // SAFETY: the FMU passes C strings; a format "%s" comes with a text.
-    let (instance, category, text) = unsafe {
-        let format = optional(format);
-        let plain = cfg!(target_vendor = "apple") || format.as_deref() != Some("%s");
-        (optional(instance), optional(category), if plain { format } else { optional(first) })
-    };
-    push(LogCall { environment: environment.addr(), instance, status: status.0, category, text, late: LATE });
+/// Records the messages of FMI 2.0; `LATE`: through callbacks that are no longer valid.
+pub(super) struct Recorder<const LATE: bool>;
+
+impl<const LATE: bool> Listener for Recorder<LATE> {
+    unsafe fn hear(called: Called) {
+        // SAFETY: the FMU passes C strings.
+        let (instance, category) = unsafe { (optional(called.instance), optional(called.category)) };
+        let text = called.text.and_then(|text| String::from_utf8(text).ok());
+        let (environment, status) = (called.environment.addr(), called.status.0);
+        push(LogCall { environment, instance, status, category, text, late: LATE });
+    }
 }
 
 pub(super) unsafe extern "C" fn logger3(

@@ -1,8 +1,9 @@
 //! Instantiation with arbitrary arguments.
 
 use super::super::calls::{Request, Updates};
+use super::super::logger::logger;
 use super::super::signatures::v2::Callbacks;
-use super::callbacks::{allocate, logger2, logger3, release};
+use super::callbacks::{Recorder, allocate, logger3, release};
 use super::updates::{clock_update, intermediate_update, lock_preemption, unlock_preemption};
 use super::{Handle, Raw};
 use std::ffi::{CString, c_void};
@@ -63,7 +64,7 @@ impl Raw {
         let environment: *mut c_void = ptr::without_provenance_mut(a.environment);
         // Leaked on purpose: an FMU made before FMI 2.0.5 may keep the pointer.
         let callbacks = Box::leak(Box::new(Callbacks {
-            logger: a.logger.then_some(logger2::<false>),
+            logger: a.logger.then_some(logger::<Recorder<false>>),
             allocate: a.memory.then_some(allocate),
             free: a.memory.then_some(release),
             step_finished: None,
@@ -92,7 +93,7 @@ impl Raw {
         if !a.lasting {
             // The struct still has valid functions: an FMU that reads it again is detected and does not crash.
             // SAFETY: ours, and not in use, since no call is in progress.
-            unsafe { (*lasting).logger = Some(logger2::<true>) };
+            unsafe { (*lasting).logger = Some(logger::<Recorder<true>>) };
         }
         let made = made.ok_or_else(|| format!("the function {name} is missing"))?;
         Ok(self.owned().take_instance(made))
