@@ -8,7 +8,8 @@
 //! ```text
 //! Offsets      gates off: means of the phases                                        offsets
 //! Probe        0 V: a turning rotor shows; then short pulses in six directions       probe
-//! Align        direct current along 120 degrees until the rotor rests                align
+//! Align        direct current along 120 degrees until the rotor rests, less of it
+//!              where the magnet rests beside it                                      align, alignment
 //! Resistance   a staircase of currents, there and again at 0                         resistance, curve
 //! Swing        the current turns to 0: the rotor swings, unless it is blocked        swing
 //! Axes         small triangles of current at 0, 45, 90 and 135 degrees               excitation, axes
@@ -21,6 +22,8 @@
 //! Each result has the relative half-width of its 95 % interval; 1 means refused. Faults end with the gates off, and what is
 //! known by then stays shown: a blocked rotor in mode Spin ends in Refused with NotFollowing, because psi_M and J are what
 //! its user has asked for, and shows what standstill tells.
+//!
+//! A free rotor shows which inductance is the magnet's (`alignment`); of a blocked one, the smaller inductance is taken as L_d.
 //!
 //! Limits: a load that is there from the first level to the last counts as friction; friction and inertia are those of the
 //! whole shaft. B and tau_coulomb are told apart by 0.15 to 0.45 of the rated speed only, so that often just their sum is
