@@ -7,7 +7,7 @@ use super::verdict::Quantity;
 use super::{Options, Ratings, SCALE};
 use crate::csv::Columns;
 use anyhow::{Context, Result, bail, ensure};
-use drive::control::commission::{CommissionFault, CommissionState, LIMIT_DEAD, LIMIT_L, LIMIT_R};
+use drive::control::commission::{CommissionFault, CommissionState, LIMIT_DEAD, LIMIT_L, LIMIT_R, LIMIT_SATURATION};
 use fmu_core::Enumerated;
 
 /// The quantities of a machine file with their units, greatest half-widths, and what helps where one is refused.
@@ -28,14 +28,16 @@ const MORE: [(&str, &str, Option<f64>, &str); 6] = [
     ("L_d_plus", "H", Some(LIMIT_L), LOOPS),
     ("L_d_minus", "H", Some(LIMIT_L), LOOPS),
     ("L_q_chord", "H", Some(LIMIT_L), LOOPS),
-    ("s_2", "A/Wb2", Some(LIMIT_DEAD), LOOPS),
-    ("s_3", "A/Wb3", Some(LIMIT_DEAD), LOOPS),
+    ("s_2", "A/Wb2", Some(LIMIT_SATURATION), SATURATION),
+    ("s_3", "A/Wb3", Some(LIMIT_SATURATION), SATURATION),
     ("tau_friction", "N.m", None, FRICTION),
 ];
 
 const FRICTION: &str = "commission.mode Spin tells at least the sum of both, tau_friction";
 
 const LOOPS: &str = "the loops of current do not fit or do not agree: block the rotor, or commission with less current";
+
+const SATURATION: &str = "up to commission.i the machine saturates too little to measure it, or the loops do not fit";
 
 /// Currents, voltages and motion that a page shows, with their units.
 const SHOWN: [(&str, &str); 8] = [

@@ -12,8 +12,6 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::within;
 use serde::{Deserialize, Serialize};
 
-/// Share of I of the alignment.
-pub(super) const ALIGNED: f64 = 0.4;
 /// Share of I of the current across that is left alone.
 const ACROSS: f64 = 0.35;
 /// Longest time in s of an alignment, of a swing and of coasting.
@@ -58,6 +56,11 @@ impl Dc {
     }
 }
 
+/// Whether the mean of `samples` whose sum is `sum` (A) is that of a rotor at rest.
+pub(super) fn is_still(bench: &Bench, sum: f64, samples: f64) -> bool {
+    (sum / samples).abs() < 0.002 * bench.I + 4.0 * bench.sigma / samples.sqrt()
+}
+
 /// Whether the rotor is at rest, from the current across phi.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Rest {
@@ -72,7 +75,7 @@ impl Rest {
         self.sum += i_q;
         self.samples += 1.0;
         if self.samples * bench.T >= 0.01 && self.samples >= 10.0 {
-            let still = (self.sum / self.samples).abs() < 0.002 * bench.I + 4.0 * bench.sigma / self.samples.sqrt();
+            let still = is_still(bench, self.sum, self.samples);
             self.quiet = if still { self.quiet + 1.0 } else { 0.0 };
             (self.sum, self.samples) = (0.0, 0.0);
         }

@@ -9,11 +9,15 @@
 use super::bench::Bench;
 use super::excitation::{Excitation, Record};
 use super::least_squares::Normal;
+use crate::commission::Fault;
 use drive_base::math::atan2;
 use serde::{Deserialize, Serialize};
 
 /// Least ratio of the inductances that shows the axis of a free rotor, whose alignment shows it too, and of a blocked one.
 const SALIENT: [f64; 2] = [1.15, 1.03];
+
+/// Ratio of the inductances above which the angle of the rest has shown which of them is the magnet's.
+const LOOKED: f64 = 1.5;
 
 /// The loops so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -65,27 +69,34 @@ impl Loops {
         });
     }
 
-    /// The axes; `None`: not separable, or a negative inductance.
-    pub(super) fn axes(&self, blocked: bool) -> Option<Axes> {
-        let [aa, ab, bb] = self.normal.solve(0.0)?.x;
+    /// The axes, of an `inverse` machine with L_d > L_q.
+    ///
+    /// # Errors
+    /// They are not separable, an inductance is negative, or the magnet lies along the other one than it did.
+    pub(super) fn axes(&self, blocked: bool, inverse: bool) -> Result<Axes, Fault> {
+        let [aa, ab, bb] = self.normal.solve(0.0).ok_or(Fault::Inductance)?.x;
         let (g_0, g_c, g_s) = (0.5 * (aa + bb), 0.5 * (aa - bb), ab);
         let g_2 = (g_c * g_c + g_s * g_s).sqrt();
         if g_2 >= g_0 {
-            return None;
+            return Err(Fault::Inductance);
         }
         if g_0 + g_2 > SALIENT[usize::from(blocked)] * (g_0 - g_2) {
             let axis = 0.5 * atan2(g_s, g_c);
             let (L_d, L_q) = (1.0 / (g_0 + g_2), 1.0 / (g_0 - g_2));
-            // A free rotor's magnet lies near 0, whichever inductance is there.
-            if !blocked && axis.abs() > std::f64::consts::FRAC_PI_4 {
-                let axis = axis - std::f64::consts::FRAC_PI_2.copysign(axis);
-                return Some(Axes { axis, L_d: L_q, L_q: L_d, known: true, spread: 0.0 });
+            // A free rotor's magnet lies near 0.
+            let beside = axis.abs() > std::f64::consts::FRAC_PI_4;
+            if !blocked && beside != inverse && L_q > LOOKED * L_d {
+                return Err(Fault::Axis);
             }
-            return Some(Axes { axis, L_d, L_q, known: true, spread: 0.0 });
+            if !blocked && beside {
+                let axis = axis - std::f64::consts::FRAC_PI_2.copysign(axis);
+                return Ok(Axes { axis, L_d: L_q, L_q: L_d, known: true, spread: 0.0 });
+            }
+            return Ok(Axes { axis, L_d, L_q, known: true, spread: 0.0 });
         }
         if blocked {
-            return Some(Axes { axis: 0.0, L_d: 1.0 / g_0, L_q: 1.0 / g_0, known: false, spread: g_2 / g_0 });
+            return Ok(Axes { axis: 0.0, L_d: 1.0 / g_0, L_q: 1.0 / g_0, known: false, spread: g_2 / g_0 });
         }
-        Some(Axes { axis: 0.0, L_d: 1.0 / (g_0 + g_c), L_q: 1.0 / (g_0 - g_c), known: true, spread: 0.0 })
+        Ok(Axes { axis: 0.0, L_d: 1.0 / (g_0 + g_c), L_q: 1.0 / (g_0 - g_c), known: true, spread: 0.0 })
     }
 }

@@ -5,6 +5,9 @@ use super::probe::Tensor;
 use drive_base::frame::AlphaBeta;
 use serde::{Deserialize, Serialize};
 
+/// Share of I of the alignment.
+const ALIGNED: f64 = 0.4;
+
 /// A sample: currents, and the voltage that acted since the last one.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sample {
@@ -44,6 +47,10 @@ pub(super) struct Bench {
     /// Start values: flux linkage in Wb, and rad/s of a swing about 0.4 I.
     pub(super) psi_0: f64,
     pub(super) w_0: f64,
+    /// Current in A of an alignment where 0.4 I turns the magnet away from it, and about the flux linkage in Wb by that; 0: it
+    /// does not.
+    pub(super) i_0: f64,
+    pub(super) psi_1: f64,
     /// The rotor does not turn.
     pub(super) blocked: bool,
     /// Number of pole pairs.
@@ -54,6 +61,28 @@ impl Bench {
     /// Bandwidth of the dc current control in rad/s.
     pub(super) fn w_c(&self) -> f64 {
         0.12 / self.T
+    }
+
+    /// Current of an alignment in A.
+    pub(super) fn aligned(&self) -> f64 {
+        if self.i_0 > 0.0 { self.i_0 } else { ALIGNED * self.I }
+    }
+
+    /// Smallest flux linkage in Wb of the magnet.
+    pub(super) fn psi_least(&self) -> f64 {
+        let least = 0.25 * self.psi_r;
+        if self.psi_1 > 0.0 { least.min(0.4 * self.psi_1) } else { least }
+    }
+
+    /// J / (n_p K) in A.s2/rad by the swing.
+    pub(super) fn inertia(&self) -> f64 {
+        self.aligned() / (self.w_0 * self.w_0)
+    }
+
+    /// Square of the rate in 1/s at which the reluctance turns the rotor away from the current of a loop, over that of its
+    /// amplitude: a fifth of it is the mean square.
+    pub(super) fn reluctance(&self) -> f64 {
+        0.2 * self.tensor.saliency() / (self.psi_0 * self.inertia())
     }
 
     /// Rated electrical speed in rad/s.

@@ -96,8 +96,9 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    /// For the amplitude `A` (A) along an axis of inductance `L` (H); the moving rotor adds at most the share `motion`.
-    pub(super) fn new(bench: &Bench, A: f64, L: f64, motion: f64) -> Self {
+    /// For the amplitude `A` (A) along an axis of inductance `L` (H); the moving rotor adds at most the share `motion`, and the
+    /// square of time times rate of a turn by reluctance is at most `grown` where that exceeds the magnet's.
+    pub(super) fn new(bench: &Bench, A: f64, L: f64, motion: f64, grown: f64) -> Self {
         let legs = (4.0 / 3.0) * bench.u_dead;
         let mut A = A.min(0.45 * bench.U / bench.R);
         let volts = (0.72 * bench.U - legs - 0.7 * bench.R * A).max(0.1 * bench.U);
@@ -112,7 +113,11 @@ impl Plan {
         let mut n = over(volts).ceil().max(fewest);
         if !bench.blocked {
             let turn = bench.w_0 * bench.T / std::f64::consts::PI;
-            let most = (motion * 0.4 * bench.I * L / bench.psi_0).sqrt() / turn;
+            let mut most = (motion * bench.aligned() * L / bench.psi_0).sqrt() / turn;
+            if bench.i_0 > 0.0 {
+                let growth = bench.reluctance() * A * A * (0.5 * WAY * n * bench.T).powi(2);
+                most = most.min(n * (grown / growth).sqrt().sqrt());
+            }
             if n > most {
                 let fewer = most.floor().max(4.0).min(n);
                 (A, n) = (A * fewer / n, fewer);

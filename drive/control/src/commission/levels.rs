@@ -137,7 +137,7 @@ impl Levels {
         // A heavy rotor still swings: its friction is at most a tenth of I.
         let i_f = i_f.clamp(0.0, 0.1 * bench.I);
         let i_d = turning.current(sample).d();
-        let inertia = 0.4 * bench.I / (bench.w_0 * bench.w_0);
+        let inertia = bench.inertia();
         let L_d = results.chord_d(turning.motor.L_d, ALONG * bench.I);
         let mut levels = Self { inertia, friction: [i_f, 0.0, 0.0], i_d, L_d, ..Self::default() };
         levels.sweep(bench, turning);
@@ -356,7 +356,7 @@ impl Levels {
     fn follow(&self, bench: &Bench, turning: &mut Turning) {
         let best = self.radii.iter().rev().find(|r| r.parts > 0.0);
         if let Some(r) = best {
-            turning.motor.psi_M = (r.sum / r.parts).clamp(0.25 * bench.psi_r, 1.15 * bench.psi_r);
+            turning.motor.psi_M = (r.sum / r.parts).clamp(bench.psi_least(), 1.15 * bench.psi_r);
         }
     }
 
@@ -367,12 +367,12 @@ impl Levels {
             return Err(Fault::Flux);
         }
         let psi = high.sum / high.parts;
-        if !(psi > 0.25 * bench.psi_r && psi < 1.15 * bench.psi_r) {
+        if !(psi > bench.psi_least() && psi < 1.15 * bench.psi_r) {
             return Err(Fault::Flux);
         }
         let error = 0.5 * (low.sum / low.parts / psi - 1.0);
         let variance = (high.squares / high.parts - psi * psi).max(0.0) / (psi * psi);
-        let saturated = results.s_2.u * (self.L_d / L_d - 1.0);
+        let saturated = results.saturation[2] * L_d * ALONG * bench.I * L_d;
         let inductance = (results.L_d.u.min(UNKNOWN) + saturated.abs()) * L_d * ALONG * bench.I / psi;
         let u = (error * error + inductance * inductance + 4.0 * variance / high.parts + LEAST * LEAST).sqrt();
         let K = 1.5 * bench.n_p * psi;

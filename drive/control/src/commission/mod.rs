@@ -8,7 +8,8 @@
 //! ```text
 //! Offsets      gates off: means of the phases                                        offsets
 //! Probe        0 V: a turning rotor shows; then short pulses in six directions       probe
-//! Align        direct current along 120 degrees until the rotor rests                align
+//! Align        direct current along 120 degrees until the rotor rests, less of it
+//!              where the magnet rests beside it                                      align, alignment
 //! Resistance   a staircase of currents, there and again at 0                         resistance, curve
 //! Swing        the current turns to 0: the rotor swings, unless it is blocked        swing
 //! Axes         small triangles of current at 0, 45, 90 and 135 degrees               excitation, axes
@@ -22,6 +23,8 @@
 //! known by then stays shown: a blocked rotor in mode Spin ends in Refused with NotFollowing, because psi_M and J are what
 //! its user has asked for, and shows what standstill tells.
 //!
+//! A free rotor shows which inductance is the magnet's (`alignment`); of a blocked one, the smaller inductance is taken as L_d.
+//!
 //! Limits: a load that is there from the first level to the last counts as friction; friction and inertia are those of the
 //! whole shaft. B and tau_coulomb are told apart by 0.15 to 0.45 of the rated speed only, so that often just their sum is
 //! accepted. J needs two turns in a sweep: a rotor that reaches its rated speed within some 10 ms gets none if it is slow.
@@ -29,6 +32,7 @@
 //! voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
 
 mod align;
+mod alignment;
 mod axes;
 mod bench;
 mod circle;
@@ -48,7 +52,7 @@ mod starting;
 mod swing;
 mod turning;
 
-pub use results::{Identified, LIMIT_DEAD, LIMIT_L, LIMIT_R, Results};
+pub use results::{Identified, LIMIT_DEAD, LIMIT_L, LIMIT_R, LIMIT_SATURATION, Results};
 pub use sequence::Commission;
 pub use setup::{CommissionSetup, Voltage};
 
@@ -95,10 +99,11 @@ enumeration! {
         5 Inductance "The pulses or loops give no inductance";
         6 NotFollowing "The rotor turns at the start, does not come to rest, is blocked in mode Spin or does not follow the start";
         7 Lost "The observer has lost the turning rotor";
-        8 Flux "The levels of speed give no flux linkage";
+        8 Flux "The turning rotor shows no flux linkage within 0.25 and 1.15 of u_dc / (sqrt(3) n_p commission.speed)";
         9 Mechanics "The levels and sweeps do not fit inertia and friction";
         10 Time "commission.t_max is over";
         11 Aborted "commission_start or enable became false";
+        12 Axis "The rest of the rotor does not show along which inductance its magnet lies";
     }
 }
 

@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 
 /// Unknowns: four g, start, u_0, c_1, c_2.
 const UNKNOWNS: usize = 8;
+/// Error of a coefficient over the residual.
+const LEFT: f64 = 3.0;
 /// Evaluations at most.
 const MOST: f64 = 25.0;
 
@@ -61,6 +63,8 @@ pub(super) enum Progress {
 pub(super) struct Magnetization {
     along: Along,
     g: [f64; 4],
+    /// Half-widths of the g.
+    half: [f64; 4],
     psi: f64,
     /// Amplitude of the loop in A.
     pub(super) A: f64,
@@ -125,7 +129,8 @@ impl OutputError {
         let noise = bench.sigma / self.A;
         let residual = (self.cost / rows - noise * noise).max(0.0).sqrt();
         let [a, b, c, d, ..] = self.best;
-        let found = Magnetization { along: self.along, g: [a, b, c, d], psi: self.psi, A: self.A, residual };
+        let half = self.normal.solve(0.0).map_or([1.0; 4], |s| std::array::from_fn(|k| s.half_width[k]));
+        let found = Magnetization { along: self.along, g: [a, b, c, d], half, psi: self.psi, A: self.A, residual };
         (self.cost < f64::MAX && a > 0.0).then_some(found)
     }
 
@@ -225,17 +230,17 @@ impl Magnetization {
         (reached && z * sign > 0.2 && z * sign < 3.0).then_some(self.psi * z * sign / self.A)
     }
 
-    /// s_2 in A/Wb2 and s_3 in A/Wb3 of i = x/L + s_2 x^2 + s_3 x^3, by least squares over +-psi(A) with `L` (H) given.
-    pub(super) fn saturation(&self, L: f64) -> [f64; 2] {
-        let [a, b, c, d] = match self.along {
-            Along::D => self.g,
-            Along::Q => [self.g[0], 0.0, self.g[1], 0.0],
-        };
-        // Over z in +-1: means of z^4, z^6 and z^8 are 1/5, 1/7 and 1/9.
-        let fifth = if self.along == Along::Q { self.g[2] } else { 0.0 };
+    /// s_2 in A/Wb2 and s_3 in A/Wb3 of i = x/L + s_2 x^2 + s_3 x^3 along d, each with its half-width, by least squares over
+    /// +-psi(A) with `L` (H) given, whose relative half-width is `u`. An error of L bends the line as s_3 does; what the fit
+    /// leaves may have any form.
+    pub(super) fn saturation(&self, L: f64, u: f64) -> [[f64; 2]; 2] {
+        let ([a, b, c, d], half) = (self.g, self.half);
+        // Over z in +-1: means of z^4 and z^6 are 1/5 and 1/7.
         let slope = a - self.psi / (self.A * L);
-        let s_2 = b + d * (5.0 / 7.0);
-        let s_3 = c + slope * (7.0 / 5.0) + fifth * (7.0 / 9.0);
-        [s_2 * self.A / (self.psi * self.psi), s_3 * self.A / (self.psi * self.psi * self.psi)]
+        let of = |x: [f64; 3]| LEFT * self.residual + x.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let s_2 = [b + d * (5.0 / 7.0), of([half[1], half[3] * (5.0 / 7.0), 0.0])];
+        let s_3 = [c + slope * (7.0 / 5.0), of([half[2], half[0] * (7.0 / 5.0), u * a * (7.0 / 5.0)])];
+        let by = self.A / (self.psi * self.psi);
+        [s_2.map(|s| s * by), s_3.map(|s| s * by / self.psi)]
     }
 }

@@ -45,6 +45,12 @@ impl Tensor {
         Self { mean, cos: cos * share, sin: sin * share }
     }
 
+    /// Of a machine with the inductances `L_d` and `L_q` (H), L_d at 0 rad.
+    #[cfg(test)]
+    pub(super) fn of(L_d: f64, L_q: f64) -> Self {
+        Self { mean: 0.5 * (1.0 / L_d + 1.0 / L_q), cos: 0.5 * (1.0 / L_d - 1.0 / L_q), sin: 0.0 }
+    }
+
     /// L in H at the angle `phi` (rad).
     pub(super) fn inductance(&self, phi: f64) -> f64 {
         let (s, c) = sin_cos(2.0 * phi);
@@ -52,15 +58,28 @@ impl Tensor {
     }
 
     /// Angle of the smallest inductance in rad.
-    fn axis(&self) -> f64 {
+    pub(super) fn axis(&self) -> f64 {
         0.5 * atan2(self.sin, self.cos)
     }
 
-    /// This machine with its smallest inductance at 0 rad.
-    pub(super) fn aligned(&self) -> Self {
-        let axis = self.axis();
-        let size = 1.0 / self.inductance(axis) - self.mean;
-        Self { mean: self.mean, cos: size, sin: 0.0 }
+    /// Half of the difference of the two values of 1/L in 1/H.
+    fn size(&self) -> f64 {
+        (self.cos * self.cos + self.sin * self.sin).sqrt()
+    }
+
+    /// Greatest inductance over the smallest one.
+    pub(super) fn ratio(&self) -> f64 {
+        (self.mean + self.size()) / (self.mean - self.size())
+    }
+
+    /// Greatest inductance less the smallest one in H.
+    pub(super) fn saliency(&self) -> f64 {
+        1.0 / (self.mean - self.size()) - 1.0 / (self.mean + self.size())
+    }
+
+    /// This machine with its smallest inductance at 0 rad, or where it is `inverse` its greatest one.
+    pub(super) fn aligned(&self, inverse: bool) -> Self {
+        Self { mean: self.mean, cos: if inverse { -self.size() } else { self.size() }, sin: 0.0 }
     }
 }
 
@@ -100,6 +119,12 @@ pub(super) enum Probed {
 }
 
 impl Probe {
+    /// The six directions again, once the current has ended.
+    pub(super) fn again(&self, bench: &Bench) -> Self {
+        let Self { V, n, .. } = *self;
+        Self { V, n, direction: 2, reached: bench.I, k: 2.0 * n + bench.delay, ..Self::default() }
+    }
+
     pub(super) fn update(&mut self, bench: &Bench, sample: &Sample) -> Probed {
         if self.V == 0.0 {
             (self.V, self.n) = (LEVELS.0 * sample.u_dc, 1.0);

@@ -12,7 +12,7 @@
 //! u_dead. So the same equation also leads downward, from u_dead (1 - i_x / (2 i)) at the greatest currents, and the curve
 //! changes from the one to the other about i_x.
 
-use super::align::Dc;
+use super::align::{Dc, is_still};
 use super::bench::{Bench, Sample};
 use super::curve::{Curve, OCTAVE, POINTS};
 use super::least_squares::{Normal, Solution};
@@ -47,7 +47,7 @@ pub(super) struct Staircase {
     /// Samples of this step, windows of it, and the sums of the current window.
     k: f64,
     windows: f64,
-    sums: [f64; 3],
+    sums: [f64; 4],
     u_last: f64,
     pub(super) line: Line,
 }
@@ -79,15 +79,18 @@ impl Staircase {
         if self.k * bench.T <= wait {
             return Ok(Some(command));
         }
-        let [sum_u, sum_i, samples] = &mut self.sums;
+        let [sum_u, sum_i, sum_q, samples] = &mut self.sums;
+        *sum_q += dc.axis.from_stator(sample.i).q();
         (*sum_u, *sum_i, *samples) = (*sum_u + u, *sum_i + i, *samples + 1.0);
         if *samples * bench.T < window {
             return Ok(Some(command));
         }
         let (u, i) = (*sum_u / *samples, *sum_i / *samples);
-        self.sums = [0.0; 3];
+        // Beyond psi_M / (L_q - L_d) the rotor turns with each step.
+        let rests = is_still(bench, *sum_q, *samples);
+        self.sums = [0.0; 4];
         self.windows += 1.0;
-        let settled = self.windows >= 2.0 && (u - self.u_last).abs() < 0.0005 * u.abs();
+        let settled = self.windows >= 2.0 && (u - self.u_last).abs() < 0.0005 * u.abs() && rests;
         self.u_last = u;
         if held && !settled && self.windows < 30.0 {
             return Ok(Some(command));

@@ -15,6 +15,8 @@ pub const LIMIT_R: f64 = 0.01;
 pub const LIMIT_L: f64 = 0.05;
 /// Greatest relative half-width of the dead time's values.
 pub const LIMIT_DEAD: f64 = 0.5;
+/// Greatest relative half-width of s_2 and s_3.
+pub const LIMIT_SATURATION: f64 = 0.5;
 /// Greatest relative half-width of psi_M.
 const LIMIT_PSI: f64 = 0.02;
 /// Greatest relative half-width of J.
@@ -67,6 +69,8 @@ pub struct Results {
     pub s_2: Identified,
     /// Third-order d-axis saturation coefficient in A/Wb3.
     pub s_3: Identified,
+    /// Both, however uncertain, and the half-width of s_2.
+    pub(super) saturation: [f64; 3],
     /// Permanent-magnet flux linkage in Wb.
     pub psi_M: Identified,
     /// Moment of inertia in kg.m2.
@@ -107,7 +111,7 @@ impl Results {
 
     /// psi(i)/i - without the magnet - in H at the d-axis current `i` (A), of i = x/L + s_2 x^2 + s_3 x^3 with `L` (H).
     pub(super) fn chord_d(&self, L: f64, i: f64) -> f64 {
-        let (s_2, s_3, mut x) = (self.s_2.value, self.s_3.value, L * i);
+        let (s_2, s_3, mut x) = (self.saturation[0], self.saturation[1], L * i);
         for _ in 0..4 {
             let slope = 1.0 / L + (2.0 * s_2 + 3.0 * s_3 * x) * x;
             x -= (x / L + (s_2 + s_3 * x) * x * x - i) / slope.max(0.5 / L);
@@ -152,8 +156,10 @@ impl Results {
             (r.L_d, r.i_d) = (Identified { value: L_d, u }, d.A);
             (r.L_d_plus, r.L_d_minus) = (chord(&d, 1.0, u), chord(&d, -1.0, u));
             if known {
-                let [s_2, s_3] = d.saturation(L_d);
-                (r.s_2, r.s_3) = (Identified { value: s_2, u: 0.5 }, Identified { value: s_3, u: 0.5 });
+                let [s_2, s_3] = d.saturation(L_d, u);
+                // An interval with 0 in it shows no saturation.
+                let shown = |[s, half]: [f64; 2]| Identified::within(s, half / s.abs(), LIMIT_SATURATION);
+                (r.s_2, r.s_3, r.saturation) = (shown(s_2), shown(s_3), [s_2[0], s_3[0], s_2[1]]);
             }
             let difference = r.L_d_minus.value - r.L_d_plus.value;
             if known && r.blocked && difference.abs() > 0.005 * L_d {
@@ -161,7 +167,7 @@ impl Results {
                 if difference < 0.0 {
                     std::mem::swap(&mut r.L_d_plus, &mut r.L_d_minus);
                     r.axis = drive_base::math::wrap(r.axis + std::f64::consts::PI);
-                    r.s_2.value = -r.s_2.value;
+                    (r.s_2.value, r.saturation[0]) = (-r.s_2.value, -r.saturation[0]);
                 }
             }
         }
@@ -182,7 +188,7 @@ mod tests {
 
     #[test]
     fn a_chord_has_the_saturation() {
-        let r = Results { s_2: known(40.0, 0.5), s_3: known(300.0, 0.5), ..Results::default() };
+        let r = Results { saturation: [40.0, 300.0, 1.0], ..Results::default() };
         for i in [-3.0, -0.9, 0.9, 3.0] {
             let x = i * r.chord_d(36e-3, i);
             assert!((x / 36e-3 + 40.0 * x * x + 300.0 * x * x * x - i).abs() < 1e-6, "{i} A: {x} Wb");

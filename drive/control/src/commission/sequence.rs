@@ -1,6 +1,7 @@
 //! The sequence of the commissioning, one sample at a time.
 
-use super::align::{ALIGNED, Dc, LONGEST, Rest};
+use super::align::{Dc, LONGEST, Rest};
+use super::alignment::{Alignment, Looked};
 use super::axes::{Axes, Loops};
 use super::bench::{Bench, Sample};
 use super::curve::Curve;
@@ -27,6 +28,10 @@ const SMALL: [f64; 2] = [0.3, 0.35];
 const LARGE: f64 = 0.9;
 /// Share of the flux linkage that the moving rotor may add: in small loops, and in loops whose fit knows about it.
 const MOTION: [f64; 2] = [0.004, 0.1];
+/// Square of time times rate of a turn by reluctance: in small loops, and in large ones.
+const GROWN: [f64; 2] = [0.1, 1.0];
+/// Ratio of the probe's inductances above which the rest of the rotor is looked at.
+const SALIENT: f64 = 1.3;
 /// R T/L above which L(0) comes from a small loop's output error.
 const SLOW: f64 = 0.005;
 
@@ -38,6 +43,7 @@ enum Stage {
     Still,
     Probe,
     First,
+    Look,
     FirstStaircase,
     Return,
     Swing,
@@ -87,6 +93,7 @@ pub struct Commission {
     probe: Probe,
     dc: Dc,
     rest: Rest,
+    alignment: Alignment,
     quiet: f64,
     staircases: [Staircase; 2],
     swing: Swing,
@@ -130,6 +137,7 @@ impl Commission {
             probe: Probe::default(),
             dc: Dc::default(),
             rest: Rest::default(),
+            alignment: Alignment::default(),
             quiet: 0.0,
             staircases: [Staircase::default(), Staircase::default()],
             swing: Swing::default(),
@@ -152,7 +160,7 @@ impl Commission {
             _ if self.setup.mode == CommissionMode::Off => CommissionState::Idle,
             Stage::Offsets => CommissionState::Offsets,
             Stage::Still | Stage::Probe => CommissionState::Probe,
-            Stage::First | Stage::Return => CommissionState::Align,
+            Stage::First | Stage::Look | Stage::Return => CommissionState::Align,
             Stage::FirstStaircase | Stage::SecondStaircase => CommissionState::Resistance,
             Stage::Swing => CommissionState::Swing,
             Stage::Ready | Stage::Down | Stage::Loop | Stage::Fit => match self.excited {
@@ -288,7 +296,21 @@ impl Commission {
                     self.enter(Stage::First);
                 }
             },
-            Stage::First => return self.align(sample, 0.6, Stage::FirstStaircase),
+            Stage::First => {
+                let looks = self.bench.tensor.ratio() > SALIENT && !self.alignment.over;
+                let next = if looks { Stage::Look } else { Stage::FirstStaircase };
+                return self.align(sample, 0.6, next);
+            }
+            Stage::Look => match self.probe.update(&self.bench, sample) {
+                Probed::Voltage(u) => return Ok(u),
+                Probed::Refused(fault) => return Err(fault),
+                Probed::Done(_, tensor) => {
+                    self.dc.u = 0.0;
+                    self.bench.tensor = tensor;
+                    let again = self.alignment.look(&mut self.bench, tensor.axis() - FIRST) == Looked::Lower;
+                    self.enter(if again { Stage::First } else { Stage::FirstStaircase });
+                }
+            },
             Stage::Return => return self.align(sample, 0.1, Stage::Swing),
             Stage::Ready => return self.align(sample, 0.1, Stage::Down),
             Stage::FirstStaircase => return self.staircase(0, sample),
@@ -328,12 +350,14 @@ impl Commission {
     /// Direct current of 0.4 I after a ramp of `rise` (s), until the rotor rests.
     fn align(&mut self, sample: &Sample, rise: f64, next: Stage) -> Result<AlphaBeta, Fault> {
         let t = self.k * self.bench.T;
-        let i_ref = ALIGNED * self.bench.I * (t / rise).min(1.0);
+        let i_ref = self.bench.aligned() * (t / rise).min(1.0);
         let u = self.dc.command(&self.bench, sample, i_ref);
         let still = t > rise && self.rest.update(&self.bench, self.dc.axis.from_stator(sample.i).q());
         if still {
             self.enter(next);
-            if next == Stage::Swing {
+            if next == Stage::Look {
+                self.probe = self.probe.again(&self.bench);
+            } else if next == Stage::Swing {
                 self.dc.turn(0.0);
                 self.swing = Swing::start(&self.bench, sample);
                 self.record.clear();
@@ -361,12 +385,16 @@ impl Commission {
 
     fn swing(&mut self, sample: &Sample) -> Result<AlphaBeta, Fault> {
         self.swing.update(&self.bench, sample, &mut self.record);
-        let u = self.dc.command(&self.bench, sample, ALIGNED * self.bench.I);
+        let u = self.dc.command(&self.bench, sample, self.bench.aligned());
         if self.rest.update(&self.bench, self.dc.axis.from_stator(sample.i).q()) {
-            self.swing.finish(&mut self.bench, sample, &self.record);
+            let inverse = self.alignment.inverse;
+            let magnet = self.swing.finish(&mut self.bench, sample, &self.record, inverse);
             self.results.blocked = self.bench.blocked;
             if !self.bench.blocked {
-                self.bench.tensor = self.bench.tensor.aligned();
+                if self.alignment.stuck || inverse && !magnet {
+                    return Err(Fault::Axis);
+                }
+                self.bench.tensor = self.bench.tensor.aligned(inverse);
             }
             self.enter(Stage::SecondStaircase);
         } else if self.k * self.bench.T > LONGEST {
@@ -377,7 +405,7 @@ impl Commission {
 
     /// The current ends; then the loop begins.
     fn down(&mut self, sample: &Sample) -> Result<AlphaBeta, Fault> {
-        let i_ref = if self.bench.blocked { 0.0 } else { ALIGNED * self.bench.I * (1.0 - self.k / 40.0).max(0.0) };
+        let i_ref = if self.bench.blocked { 0.0 } else { self.bench.aligned() * (1.0 - self.k / 40.0).max(0.0) };
         let gone = sample.i.magnitude() < 0.01 * self.bench.I + 4.0 * self.bench.sigma;
         self.quiet = if gone { self.quiet + 1.0 } else { 0.0 };
         if self.k >= 100.0 && self.quiet >= 5.0 {
@@ -398,16 +426,16 @@ impl Commission {
         use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
         let (bench, axes) = (&self.bench, &self.axes);
         let I = bench.I;
-        let small = |phi: f64| (Plan::new(bench, SMALL[0] * I, bench.tensor.inductance(phi), MOTION[0]), phi);
+        let small = |phi: f64| (Plan::new(bench, SMALL[0] * I, bench.tensor.inductance(phi), MOTION[0], GROWN[0]), phi);
         match self.excited {
             Excited::At0 => small(0.0),
             Excited::At45 => small(FRAC_PI_4),
             Excited::At90 => small(FRAC_PI_2),
             Excited::At135 => small(3.0 * FRAC_PI_4),
-            Excited::LargeD => (Plan::new(bench, LARGE * I, axes.L_d, f64::INFINITY), axes.axis),
-            Excited::SmallD => (Plan::new(bench, SMALL[1] * I, axes.L_d, f64::INFINITY), axes.axis),
-            Excited::LargeQ => (Plan::new(bench, LARGE * I, axes.L_q, MOTION[1]), axes.axis + FRAC_PI_2),
-            Excited::SmallQ => (Plan::new(bench, SMALL[1] * I, axes.L_q, MOTION[0]), axes.axis + FRAC_PI_2),
+            Excited::LargeD => (Plan::new(bench, LARGE * I, axes.L_d, f64::INFINITY, GROWN[1]), axes.axis),
+            Excited::SmallD => (Plan::new(bench, SMALL[1] * I, axes.L_d, f64::INFINITY, GROWN[0]), axes.axis),
+            Excited::LargeQ => (Plan::new(bench, LARGE * I, axes.L_q, MOTION[1], GROWN[1]), axes.axis + FRAC_PI_2),
+            Excited::SmallQ => (Plan::new(bench, SMALL[1] * I, axes.L_q, MOTION[0], GROWN[0]), axes.axis + FRAC_PI_2),
         }
     }
 
@@ -417,7 +445,7 @@ impl Commission {
             Excited::At0 | Excited::At45 | Excited::At90 | Excited::At135 => {
                 self.loops.add(&self.bench, &self.excitation, &self.record);
                 if self.excited == Excited::At135 {
-                    self.axes = self.loops.axes(self.bench.blocked).ok_or(Fault::Inductance)?;
+                    self.axes = self.loops.axes(self.bench.blocked, self.alignment.inverse)?;
                     self.results.axis = self.axes.axis;
                 }
                 return self.next_loop();

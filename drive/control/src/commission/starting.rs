@@ -13,7 +13,7 @@
 //! it, as long as the delay, shows by its current whether the rotor still turns. Then it is aligned again, three times at
 //! most. Derived here, except for the damping of [`start`](crate::start).
 
-use super::align::{ALIGNED, Dc, LONGEST, Rest};
+use super::align::{Dc, LONGEST, Rest};
 use super::bench::{Bench, Sample};
 use super::turning::Turning;
 use crate::commission::Fault;
@@ -88,12 +88,12 @@ impl Starting {
         let t = self.k * bench.T;
         match self.phase {
             Phase::Align => {
-                let u = self.dc.command(bench, sample, ALIGNED * bench.I * (t / 0.1).min(1.0));
+                let u = self.dc.command(bench, sample, bench.aligned() * (t / 0.1).min(1.0));
                 if t > 0.1 && self.rest.update(bench, self.dc.axis.from_stator(sample.i).q()) {
                     turning.begin(bench, sample, 0.0);
                     turning.motor.psi_M = bench.psi_0;
                     (self.theta, self.w, self.e, self.sums) = (0.0, 0.0, DqHat::ZERO, [0.0; 4]);
-                    self.i_d = ALIGNED * bench.I;
+                    self.i_d = bench.aligned();
                     self.eta = bench.psi_0 + (turning.motor.L_d - turning.motor.L_q) * self.i_d;
                     self.enter(Phase::Ramp);
                 } else if t > LONGEST {
@@ -133,7 +133,7 @@ impl Starting {
         self.theta += T * self.w;
         let salient = (turning.motor.L_q - turning.motor.L_d).max(1e-3 * turning.motor.L_d);
         let I_f = (CURRENT * I).min(0.3 * bench.psi_0 / salient);
-        let inertia = ALIGNED * I / (bench.w_0 * bench.w_0);
+        let inertia = bench.inertia();
         let w_0 = (I_f / inertia).sqrt();
         let fastest = (0.2 * I_f / inertia).min(4.0 * w_h);
         let a = if w_h > 45.0 * fastest { w_h / 15.0 } else { fastest } * [1.0, 0.2, 0.04][self.tried()];
@@ -152,7 +152,7 @@ impl Starting {
         if self.w > 0.3 * w_h {
             self.eta += slow * (size / self.w - self.eta);
             let psi = self.eta - saliency * self.i_d;
-            turning.motor.psi_M = psi.clamp(0.25 * bench.psi_r, 1.15 * bench.psi_r);
+            turning.motor.psi_M = psi.clamp(bench.psi_least(), 1.15 * bench.psi_r);
         }
         let t = self.k * T;
         if self.phase == Phase::Ramp {
@@ -171,22 +171,26 @@ impl Starting {
             }
             if t > hold {
                 let [psi, w, i_q, _] = self.sums.map(|sum| sum / self.sums[3]);
-                if psi > 0.3 * bench.psi_r && psi < 1.3 * bench.psi_r && (w / w_h - 1.0).abs() < 0.1 {
+                let follows = (w / w_h - 1.0).abs() < 0.1;
+                if psi > 1.2 * bench.psi_least() && psi < 1.3 * bench.psi_r && follows {
                     turning.hand_over();
                     return Ok(Started::Done(i_q));
                 }
                 self.tries += 1.0;
                 if self.tries >= TRIES {
-                    return Err(Fault::NotFollowing);
+                    return Err(if follows { Fault::Flux } else { Fault::NotFollowing });
                 }
                 self.coasted = 0.0;
                 self.enter(Phase::Coast);
                 return Ok(Started::Off);
             }
         }
-        let grown =
-            if self.phase == Phase::Ramp { ALIGNED * I + (I_f - ALIGNED * I) * (t / 0.1).min(1.0) } else { I_f };
-        let slip = self.e.q() / self.eta.max(0.1 * bench.psi_r) - self.w;
+        let grown = if self.phase == Phase::Ramp {
+            bench.aligned() + (I_f - bench.aligned()) * (t / 0.1).min(1.0)
+        } else {
+            I_f
+        };
+        let slip = self.e.q() / self.eta.max(0.4 * bench.psi_least()) - self.w;
         let i_q = damping(w_0, inertia, 1.0, slip, 0.5 * I_f);
         Ok(Started::Voltage(turning.in_any_frame(bench, sample, (self.theta, self.w), DqHat::new(grown, i_q))))
     }

@@ -58,8 +58,9 @@ impl Swing {
         }
     }
 
-    /// At rest again: psi_0, w_0 and whether the rotor is blocked.
-    pub(super) fn finish(&self, bench: &mut Bench, sample: &Sample, record: &Record) {
+    /// At rest again: psi_0, w_0 and whether the rotor is blocked; returns whether that flux linkage is one of a magnet.
+    /// The magnet lies along the greater inductance if it is `inverse`.
+    pub(super) fn finish(&self, bench: &mut Bench, sample: &Sample, record: &Record, inverse: bool) -> bool {
         let t = self.k * bench.T;
         let [from, alpha, beta] = self.marks[0];
         let slope = (self.p - AlphaBeta::new(alpha, beta)) * (1.0 / (t - from).max(bench.T));
@@ -67,11 +68,14 @@ impl Swing {
         let share = |p: AlphaBeta, t: f64| (p - slope * t).dot(way) / 3.0;
         let moved = self.p - slope * t - (sample.i - self.i_start) * bench.L_c;
         bench.blocked = unexplained(bench.T, record) < BLOCKED * bench.psi_r;
-        let psi = moved.dot(way) / 3.0;
-        let plausible = psi > 0.25 * bench.psi_r && psi < 1.15 * bench.psi_r;
-        bench.psi_0 = if plausible { psi } else { 0.6 * bench.psi_r };
+        let i = (sample.i - self.i_start).dot(way) / 3.0;
+        let beyond = if inverse { bench.tensor.saliency() * i } else { 0.0 };
+        let psi = moved.dot(way) / 3.0 - beyond;
+        let plausible = psi > bench.psi_least() && psi < 1.15 * bench.psi_r;
+        let other = if bench.psi_1 > 0.0 { bench.psi_1 } else { 0.6 * bench.psi_r };
+        bench.psi_0 = if plausible && (bench.psi_1 == 0.0 || psi < 2.5 * bench.psi_1) { psi } else { other };
         // The current has turned long before the rotor has: its own flux linkage counts from the start.
-        let own = (sample.i - self.i_start).dot(way) * (bench.L_c / 3.0);
+        let own = i * bench.L_c + beyond;
         let half = 0.5 * psi;
         let mut k = 1.0;
         let mut t_50 = t;
@@ -84,6 +88,7 @@ impl Swing {
             k = after(k);
         }
         bench.w_0 = 1.48 / t_50;
+        plausible
     }
 }
 

@@ -73,9 +73,31 @@ pub(crate) struct Motor {
     pub(crate) exact: bool,
 }
 
+/// Classes of machines.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Class {
+    /// The EMF at the rated speed is near the voltage, and L_q >= L_d.
+    Usual,
+    /// PM-assisted reluctance machines: psi_M < (L_q - L_d) I.
+    Assisted,
+    /// L_d > L_q.
+    Inverse,
+    /// Cogging and friction of up to a fifth of the rated torque.
+    Rough,
+    /// Differential inductances that fall to a quarter at I.
+    Saturated,
+    /// 0.5 ms to 5 ms, or 20 s to 200 s, to the rated speed.
+    Extreme,
+}
+
 impl Motor {
     /// The machine `index` of the population `seed`.
     pub(crate) fn draw(seed: u64, index: u64) -> Self {
+        Self::of(Class::Usual, seed, index)
+    }
+
+    /// The machine `index` of the population `seed` of a class.
+    pub(crate) fn of(class: Class, seed: u64, index: u64) -> Self {
         let mut r = Random(seed * 1_000_003 + index);
         loop {
             let mut m = Self { u_dc: r.logarithmic(12.0, 700.0), ..Self::default() };
@@ -87,21 +109,37 @@ impl Motor {
             let w = TAU * f;
             let speed = w / m.n_p;
             m.w_rated = w;
-            m.psi = r.within(0.45, 0.85) * U / w;
+            m.psi = if class == Class::Assisted { r.within(0.03, 0.45) } else { r.within(0.45, 0.85) } * U / w;
             let rated = 0.5 * m.I;
             let Z = U / rated;
             m.R = r.logarithmic(0.008, 0.25) * Z;
             m.L_d = r.logarithmic(0.04, 0.5) * Z / w;
-            let ratio = if r.next() < 0.35 { r.within(1.0, 1.05) } else { r.logarithmic(1.05, 6.0) };
+            let ratio = match class {
+                Class::Assisted => r.logarithmic(2.0, 8.0),
+                Class::Inverse => r.logarithmic(0.3, 0.95),
+                _ if r.next() < 0.35 => r.within(1.0, 1.05),
+                _ => r.logarithmic(1.05, 6.0),
+            };
             m.L_q = m.L_d * ratio;
-            let tau = 1.5 * m.n_p * m.psi * rated;
-            m.J = r.logarithmic(0.005, 20.0) * tau / speed;
-            m.tau_coulomb = r.logarithmic(0.002, 0.05) * tau;
+            // At 45 degrees, the reluctance adds its torque.
+            let reluctance = if class == Class::Assisted { 0.5 * (m.L_q - m.L_d) * rated } else { 0.0 };
+            let tau = 1.5 * m.n_p * (m.psi + reluctance) * rated;
+            m.J = match class {
+                Class::Extreme if r.next() < 0.5 => r.logarithmic(0.0005, 0.005),
+                Class::Extreme => r.logarithmic(20.0, 200.0),
+                _ => r.logarithmic(0.005, 20.0),
+            } * tau
+                / speed;
+            let rough = class == Class::Rough;
+            m.tau_coulomb = if rough { r.logarithmic(0.02, 0.2) } else { r.logarithmic(0.002, 0.05) } * tau;
             m.B = r.logarithmic(0.002, 0.05) * tau / speed;
             m.w_coulomb = 0.001 * speed;
-            m.cogging = r.within(0.0, 0.01) * tau;
-            let (k_d, k_q, k_x) = (r.within(0.0, 0.15), r.within(0.0, 0.15), r.within(0.0, 0.1));
-            m.saturate(k_d, k_q, k_x);
+            m.cogging = r.within(0.0, if rough { 0.2 } else { 0.01 }) * tau;
+            let most = if class == Class::Saturated { 0.6 } else { 0.15 };
+            let (k_d, k_q, k_x) = (r.within(0.0, most), r.within(0.0, most), r.within(0.0, 0.1));
+            // At the magnet alone, the differential inductance is still positive.
+            let monotonic = 0.18 * (1.0 + m.L_d * m.I / m.psi).powi(4);
+            m.saturate(if most > 0.15 { k_d.min(monotonic) } else { k_d }, k_q, k_x);
             m.T = 1e-4;
             while m.T * f * 12.0 > 1.000_000_1 && m.T > 1.3e-5 {
                 m.T *= 0.5;
@@ -117,8 +155,22 @@ impl Motor {
             if m.R < 5e-3 || m.R > 20.0 || m.L_d < 20e-6 || m.L_q > 0.2 || m.L_q * rated * w / U > 1.2 {
                 continue;
             }
+            let share = m.psi / ((m.L_q - m.L_d) * m.I);
+            if class == Class::Assisted && !(0.03..1.0).contains(&share) {
+                continue;
+            }
             return m;
         }
+    }
+
+    /// A PM-assisted reluctance machine of 10/30 mH and 0.25 Wb: with more than 12.5 A, its magnet rests beside the current.
+    pub(crate) fn reluctance(I: f64) -> Self {
+        let mut m = Self { n_p: 2.0, R: 0.42, L_d: 10e-3, L_q: 30e-3, psi: 0.25, J: 0.055, ..Self::default() };
+        (m.B, m.tau_coulomb, m.w_coulomb) = (1e-3, 0.3, 0.16);
+        (m.u_dc, m.I, m.w_rated, m.T) = (560.0, I, 314.0, 1e-4);
+        (m.u_dead, m.i_x, m.i_y, m.range, m.sigma, m.theta_0) = (11.2, 0.2, 0.1, 102.4, 0.05, 1.0);
+        m.saturate(0.0, 0.0, 0.0);
+        m
     }
 
     /// Saturation by the shares `k_d`, `k_q` and across by `k_x`.
@@ -167,6 +219,19 @@ impl Motor {
     pub(crate) fn chord_d(&self, i: f64) -> f64 {
         let at = |x: f64| self.current(self.psi + x, 0.0)[0];
         bisect(&at, i, 3.0 * self.L_d * i.abs()) / i
+    }
+
+    /// s_2 and s_3 of i = x/L_d + s_2 x^2 + s_3 x^3, by least squares over the flux linkages that +-`i` (A) give on L_d.
+    pub(crate) fn saturation(&self, i: f64) -> [f64; 2] {
+        let psi = self.L_d * i;
+        let (mut even, mut odd) = ([0.0; 2], [0.0; 2]);
+        for k in -500..=500 {
+            let z = f64::from(k) / 500.0;
+            let y = self.current(self.psi + psi * z, 0.0)[0] / i - z;
+            even = [even[0] + y * z * z, even[1] + z.powi(4)];
+            odd = [odd[0] + y * z.powi(3), odd[1] + z.powi(6)];
+        }
+        [even[0] / even[1] * i / (psi * psi), odd[0] / odd[1] * i / (psi * psi * psi)]
     }
 
     /// psi(i)/i along q, where the current along d is 0: the flux linkage there follows.

@@ -1,0 +1,123 @@
+//! How much current aligns the rotor of a machine with saliency.
+//!
+//! ```text
+//! torque of a current i at beta from the magnet       1.5 n_p i sin(beta) (psi_M - (L_q - L_d) i cos(beta))
+//! the rotor rests                                      at beta = 0 up to i_1 = psi_M / (L_q - L_d),
+//!                                                      beyond at cos(beta) = i_1 / i, on either side
+//! ```
+//!
+//! A current far beyond i_1 therefore rests on the q-axis, as the magnet of a machine with L_d > L_q rests on its greater
+//! inductance. Less current separates the two: where the smaller inductance comes to the current, the magnet lies along it. The
+//! angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change is that of a blocked
+//! rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the swing must
+//! also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
+
+use super::bench::Bench;
+use drive_base::math::{sin_cos, wrap};
+use serde::{Deserialize, Serialize};
+
+/// Angles in rad up to which the smaller inductance is at the current, and from which on it is across.
+const ALONG: f64 = 0.26;
+const ACROSS: f64 = 1.31;
+/// Change of the angle in rad that shows a rotor that follows.
+const FOLLOWS: f64 = 0.05;
+/// Smallest current over I, and the next one over the present one where the angle does not show i_1.
+const FEWEST: f64 = 0.03;
+const NEXT: f64 = 0.25;
+/// Share of i_1.
+const STIFF: f64 = 0.6;
+
+/// What the angles at rest have shown.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Alignment {
+    /// Angle in rad of the smaller inductance from the current, of the last look.
+    off: f64,
+    looks: f64,
+    /// No further look is needed.
+    pub(super) over: bool,
+    /// The magnet seems to lie along the greater inductance.
+    pub(super) inverse: bool,
+    /// The rotor rests between the two: it is blocked, or nothing is known.
+    pub(super) stuck: bool,
+}
+
+/// What a look asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Looked {
+    /// An alignment with less current.
+    Lower,
+    /// The current is right.
+    Over,
+}
+
+impl Alignment {
+    /// The rotor rests with its smaller inductance `angle` (rad) from the current.
+    pub(super) fn look(&mut self, bench: &mut Bench, angle: f64) -> Looked {
+        let (i, before) = (bench.aligned(), self.off);
+        // Half of a turn is the same axis.
+        self.off = 0.5 * wrap(2.0 * angle).abs();
+        self.looks += 1.0;
+        let salient = bench.tensor.saliency();
+        if self.off <= ALONG {
+            if bench.i_0 > 0.0 {
+                bench.psi_1 = bench.psi_1.max(salient * i);
+                bench.i_0 = i.min(STIFF * bench.psi_1 / salient);
+            }
+            self.over = true;
+            return Looked::Over;
+        }
+        let follows = self.looks < 1.5 || (self.off - before).abs() > FOLLOWS;
+        if follows && i > FEWEST * bench.I {
+            let cos = sin_cos(self.off).1;
+            bench.psi_1 = salient * i * cos;
+            bench.i_0 = i * if self.off > ACROSS { NEXT } else { STIFF * cos };
+            return Looked::Lower;
+        }
+        (bench.i_0, bench.psi_1) = (0.0, 0.0);
+        (self.over, self.inverse) = (true, self.off > ACROSS);
+        self.stuck = !self.inverse && self.off > std::f64::consts::FRAC_PI_4;
+        Looked::Over
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::probe::Tensor;
+    use super::*;
+
+    /// Looks at a rotor that rests `off(i)` (rad) from the current i (A), until no look follows.
+    fn looked(off: impl Fn(f64) -> f64) -> (Alignment, Bench) {
+        let mut bench = Bench { I: 50.0, tensor: Tensor::of(10e-3, 30e-3), ..Bench::default() };
+        let mut alignment = Alignment::default();
+        for side in [1.0, -1.0].into_iter().cycle().take(20) {
+            // An axis has two directions.
+            let angle = side * off(bench.aligned()) + if side > 0.0 { std::f64::consts::PI } else { 0.0 };
+            if alignment.look(&mut bench, angle) == Looked::Over {
+                return (alignment, bench);
+            }
+        }
+        panic!("no end: {alignment:?}");
+    }
+
+    /// cos(beta) = i_1 / i beyond i_1: the alignment comes to 0.6 i_1, and knows psi_M.
+    #[test]
+    fn a_magnet_beside_the_current_gets_less_current() {
+        for i_1 in [15.0_f64, 8.0, 3.0] {
+            let (found, bench) = looked(|i| (i_1 / i).min(1.0).acos());
+            assert!(found.over && !found.inverse && !found.stuck, "{found:?}");
+            assert!(bench.aligned() <= i_1 && bench.aligned() > 0.25 * i_1, "{} A of {i_1} A", bench.aligned());
+            assert!((bench.psi_1 / (20e-3 * i_1) - 1.0).abs() < 0.1, "{} Wb of {i_1} A", bench.psi_1);
+        }
+        let (found, bench) = looked(|_| 0.1);
+        assert!(found.over && bench.i_0 == 0.0 && bench.psi_1 == 0.0, "0.4 I is little enough: {bench:?}");
+    }
+
+    /// An angle that stays: L_d > L_q, or a rotor that does not follow.
+    #[test]
+    fn an_angle_that_stays_is_no_magnet_beside_the_current() {
+        for (off, inverse, stuck) in [(1.55, true, false), (1.0, false, true), (0.5, false, false)] {
+            let (found, bench) = looked(|_| off);
+            assert_eq!((found.inverse, found.stuck, bench.i_0), (inverse, stuck, 0.0), "{off} rad");
+        }
+    }
+}
