@@ -283,7 +283,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 15;
+    const STATE_VERSION: u16 = 16;
 
     fn derive(&mut self) {
         if !self.tuned {
