@@ -203,7 +203,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 18;
+    const STATE_VERSION: u16 = 19;
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();

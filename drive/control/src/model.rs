@@ -1,6 +1,6 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
-use crate::battery;
+use crate::battery::{self, DcLimits};
 use crate::commission::{CommissionFault, CommissionState};
 use crate::commissioning::{self, CommissionMode, Held, IDENTIFIED, Turn};
 use crate::current;
@@ -283,7 +283,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 15;
+    const STATE_VERSION: u16 = 16;
 
     fn derive(&mut self) {
         if !self.tuned {
@@ -387,6 +387,10 @@ impl Warns for SensorlessController {
                     about.map_or("", |item| item.description)
                 )
             });
+        }
+        // Where the low-speed law acts.
+        if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && DcLimits::lowers(par, self.inputs.u_dc) {
+            log.warn("limit.i_dc_max", || DcLimits::lowered(par, self.inputs.u_dc));
         }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
