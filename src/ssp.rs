@@ -6,11 +6,11 @@ use crate::pack::{Entry, Moment, TOOL};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;
-use fmu_import::cosimulation::{Settings, System};
-use fmu_import::ssp::ssv::{Parameter, read};
-use fmu_import::ssp::values::{self, Given};
-use fmu_import::ssp::{DESCRIPTION, FMU_TYPE};
 use fmu_import::{Fmu, Values as Read};
+use fmu_system::cosimulation::{Settings, System};
+use fmu_system::ssp::ssv::{Parameter, read};
+use fmu_system::ssp::values::{self, Given};
+use fmu_system::ssp::{DESCRIPTION, FMU_TYPE};
 use model_description::{
     BaseType, BaseUnit, Causality, Element, ModelDescription, ModelVariable, Unit, format_number, parse_number,
 };

@@ -46,7 +46,7 @@ pub fn text_of<'a>(name: &str, values: impl IntoIterator<Item = (&'a str, &'a Va
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fmu_import::ssp::ssv::read;
+    use fmu_system::ssp::ssv::read;
 
     #[test]
     fn what_is_written_reads_back() {

@@ -14,7 +14,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-export", &["fmu-core"]),
     ("model-description", &["fmu-core"]),
     ("fmu-import", &["fmu-core", "model-description"]),
-    ("fmu-sweep", &["fmu-import", "model-description"]),
+    ("fmu-system", &["fmu-core", "fmu-import", "model-description"]),
+    ("fmu-sweep", &["fmu-import", "fmu-system", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
     ("fmu-plot", &[]),
     ("drive-base", &["fmu-core"]),
@@ -27,10 +28,20 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sensorless-controller-clocked", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("pmsm-drive-mean", &["drive", "fmu-export"]),
-    ("fmurun", &["drive-study", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"]),
+    ("fmurun", &["drive-study", "fmu-import", "fmu-plot", "fmu-sweep", "fmu-system", "model-description"]),
     (
         "fmu",
-        &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"],
+        &[
+            "drive",
+            "drive-study",
+            "fmu-check",
+            "fmu-core",
+            "fmu-import",
+            "fmu-plot",
+            "fmu-sweep",
+            "fmu-system",
+            "model-description",
+        ],
     ),
 ];
 
@@ -89,10 +100,10 @@ fn known_to(name: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_checker_knows_no_motor_and_no_plotter() {
+fn the_checker_knows_no_motor_no_plotter_and_no_system() {
     let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
-    for foreign in ["drive", "drive-study", "fmu-plot", "nalgebra", "resvg", "libm"] {
+    for foreign in ["drive", "drive-study", "fmu-plot", "fmu-system", "nalgebra", "resvg", "libm", "anyhow"] {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
     }
 }
@@ -101,7 +112,7 @@ fn the_checker_knows_no_motor_and_no_plotter() {
 #[test]
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     let known = known_to("fmu-sweep");
-    assert!(known.contains("fmu-import") && known.contains("libm"), "{known:?}");
+    assert!(known.contains("fmu-system") && known.contains("libm"), "{known:?}");
     for foreign in ["drive", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
@@ -458,7 +469,7 @@ const CIRCLES: &[(&str, &[&str])] = &[
         ],
     ),
     (
-        "fmu-import",
+        "fmu-system",
         &[
             "cosimulation/continuous.rs",
             "cosimulation/events.rs",
@@ -467,10 +478,10 @@ const CIRCLES: &[(&str, &[&str])] = &[
             "cosimulation/run.rs",
         ],
     ),
-    ("fmu-import", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
-    ("fmu-import", &["cosimulation/schedule.rs", "cosimulation/sequence.rs"]),
+    ("fmu-system", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
+    ("fmu-system", &["cosimulation/schedule.rs", "cosimulation/sequence.rs"]),
     (
-        "fmu-import",
+        "fmu-system",
         &[
             "integration/dopri.rs",
             "integration/driver.rs",

@@ -11,6 +11,7 @@ mod check;
 mod checks;
 pub mod command;
 mod encoding;
+mod error;
 mod evidence;
 mod exchange;
 mod fmu_file;
@@ -30,6 +31,7 @@ mod zip_headers;
 
 pub use check::{Check, Finding, Group, Level, Levels, Options, Verdict};
 pub use checks::GROUPS;
+pub use error::Error;
 pub use fmu_file::{FmuFile, Unusable};
 
 use std::path::Path;

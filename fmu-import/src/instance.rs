@@ -329,12 +329,12 @@ impl Instance {
     }
 
     /// Whether a call has returned the status Fatal.
-    pub(super) fn is_dead(&self) -> bool {
+    pub fn is_dead(&self) -> bool {
         self.dead
     }
 
     /// Forgets the instance without freeing it: another one of its binary has returned the status Fatal.
-    pub(super) fn abandon(&mut self) {
+    pub fn abandon(&mut self) {
         self.live.abandon();
         self.dead = true;
     }

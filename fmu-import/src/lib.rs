@@ -2,10 +2,11 @@
 //! both standards.
 //!
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
-//! - [`cosimulation`]: several FMUs connected; [`ssp`]: systems of FMUs from files.
-//! - [`integration`]: integrators with events, for Model Exchange.
+//! - [`quantity`]: numbers with units, as a user writes them.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
-//! - [`guard`]: processes of their own for FMUs of unknown origin.
+//! - [`guard`]: processes of their own for FMUs of unknown origin; [`limits`]: what they and a file may ask for.
+//!
+//! Several FMUs together are the subject of the crate `fmu-system`.
 //!
 //! `abi` is the only module with `unsafe` code: every pointer that goes to an FMU points to memory of the size that the standard
 //! asks for. What no importer can check is the FMU itself: its code runs in this process with all of its rights.
@@ -27,17 +28,15 @@
 #[allow(unsafe_code)]
 mod abi;
 mod archive;
-pub mod cosimulation;
 pub mod elf;
 mod error;
 mod folder;
 pub mod guard;
 mod instance;
-pub mod integration;
+pub mod limits;
 pub mod machine;
 pub mod platform;
-mod quantity;
-pub mod ssp;
+pub mod quantity;
 mod standard;
 mod text;
 pub mod trace;
@@ -47,6 +46,7 @@ pub use abi::journal;
 pub use abi::library::describe;
 pub use abi::log::{Message, Status};
 pub use abi::raw;
+pub use archive::{check_entries, document};
 pub use error::Error;
 pub use folder::Folder;
 pub use instance::{CompletedStep, FmuState, Instance, Stepped, Update};

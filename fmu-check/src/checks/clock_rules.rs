@@ -199,7 +199,7 @@ pub(super) fn lists(fmu: &FmuFile) -> Verdict {
 pub(super) fn build_description(fmu: &FmuFile) -> Verdict {
     const FILE: &str = "sources/buildDescription.xml";
     let Some(entry) = fmu.zip.find(FILE) else { return Verdict::NotApplicable(format!("there is no {FILE}")) };
-    let text = crate::zip_headers::contents(&fmu.source, entry, model_description::limits::XML.most);
+    let text = crate::zip_headers::contents(&fmu.source, entry, fmu_import::limits::XML.most);
     let root =
         match text.and_then(|t| model_description::decode(&t).and_then(Element::parse).map_err(|e| e.to_string())) {
             Ok(root) => root,

@@ -3,7 +3,8 @@
 use crate::check::Verdict;
 use crate::fmu_file::FmuFile;
 use crate::zip_headers::contents;
-use model_description::{Element, limits};
+use fmu_import::limits;
+use model_description::Element;
 
 /// Namespace of the attributes of a manifest.
 const NAMESPACE: &str = "http://fmi-standard.org/fmi-ls-manifest";

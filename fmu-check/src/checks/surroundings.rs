@@ -2,9 +2,8 @@
 
 use super::host::{failed, second_binary};
 use crate::session::{NotDetermined, Session};
-use fmu_import::guard;
 use fmu_import::raw::{armed_timers, locale};
-use model_description::limits;
+use fmu_import::{guard, limits};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -7,8 +7,9 @@ use crate::fmu_file::FmuFile;
 use crate::session::{NotDetermined, Session};
 use crate::trajectory::trajectory;
 use crate::zip_headers;
+use fmu_import::limits;
 use fmu_import::raw::Raw;
-use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, limits, read_terminals};
+use model_description::{Causality, Element, FmiVersion, Terminal, TerminalsAndIcons, read_terminals};
 
 const TERMINALS: &str = "2.0.5, 2.3.2; 3.0.2, 2.4.9.2";
 const FOLDER: &str = "terminalsAndIcons";

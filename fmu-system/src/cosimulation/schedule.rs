@@ -1,7 +1,7 @@
 //! Inputs over time.
 
 use super::sequence::Sequence;
-use crate::quantity::{convert, split};
+use fmu_import::quantity::{convert, split};
 use model_description::{ModelDescription, ModelVariable};
 use std::fmt;
 use std::path::Path;

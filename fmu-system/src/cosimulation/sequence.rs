@@ -1,7 +1,7 @@
 //! Values over time as a user writes them: of an input of any type, each held from its time on.
 
 use super::schedule::{SAME, Schedule, last_before};
-use crate::Values;
+use fmu_import::Values;
 use model_description::{ModelDescription, ModelVariable};
 use std::path::Path;
 use std::sync::Arc;

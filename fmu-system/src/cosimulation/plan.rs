@@ -5,8 +5,8 @@
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
-//! # let system = fmu_import::cosimulation::System::default();
-//! # let settings = fmu_import::cosimulation::Settings { start: 0.0, stop: 1.0, step: 1e-3, sequential: false };
+//! # let system = fmu_system::cosimulation::System::default();
+//! # let settings = fmu_system::cosimulation::Settings { start: 0.0, stop: 1.0, step: 1e-3, sequential: false };
 //! let plan = std::sync::Arc::new(system.into_plan(&settings)?);
 //! let resistance = plan.target("plant.motor.R_s")?;
 //! let mut worker = plan.worker()?;
@@ -27,7 +27,7 @@ use super::method::Method;
 use super::parts::{Part, Parts, Port};
 use super::run::{Ended, simulate};
 use super::{Column, Recording, Settings, System};
-use crate::{Error, Fmu, Instance, Kind, Values};
+use fmu_import::{Error, Fmu, Instance, Kind, Values};
 use model_description::{BaseType, Interface};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};

@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::method::Integration;
 use super::run::{Ended, Point, end};
 use crate::integration::{Driver, Trial};
-use crate::{Error, Instance, Kind};
+use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;
 
 impl Feed for Exchange {

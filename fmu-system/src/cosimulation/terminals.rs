@@ -5,7 +5,7 @@
 
 use super::System;
 use super::parts::Part;
-use crate::Error;
+use fmu_import::Error;
 use model_description::{Causality, Member, Terminal};
 
 impl System {

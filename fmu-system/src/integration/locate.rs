@@ -1,6 +1,6 @@
 //! Location of a state event: the first instant in a step at which an event indicator has another sign than at its beginning.
 
-use crate::Error;
+use fmu_import::Error;
 
 /// Whether an indicator is on the other side: the domains are z > 0 and z <= 0 (FMI 2.0.5, 3.1; FMI 3.0.2, 3.1.1).
 pub(super) fn crossed(before: &[f64], after: &[f64]) -> bool {

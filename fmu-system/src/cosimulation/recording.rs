@@ -1,6 +1,6 @@
 //! Recordings: sampled variables.
 
-use crate::text::printable;
+use fmu_import::printable;
 use model_description::DisplayUnit;
 use std::io::{self, Write};
 

@@ -4,8 +4,8 @@
 
 mod workshop;
 
-use fmu_import::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use fmu_import::{Fmu, Kind};
+use fmu_system::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use model_description::FmiVersion;
 use std::f64::consts::LN_2;
 use std::ops::ControlFlow;

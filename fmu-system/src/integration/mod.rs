@@ -18,7 +18,7 @@ mod tests;
 
 pub use driver::{Driver, Stop};
 
-use crate::{CompletedStep, Error, Update};
+use fmu_import::{CompletedStep, Error, Update};
 
 /// How states are integrated.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Communication points, counted in integers.
 
-use model_description::limits::STEPS;
+use fmu_import::limits::STEPS;
 
 /// When to start and stop, and how to step.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,9 +1,9 @@
 //! The FMUs of a system with their names, and what is found in them by `instance.variable`.
 
 use super::Column;
-use crate::quantity::suggest;
-use crate::{Error, Fmu, Instance, Kind, Values};
 use fmu_core::variable::position;
+use fmu_import::quantity::suggest;
+use fmu_import::{Error, Fmu, Instance, Kind, Values};
 use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
 
 /// A variable of one of the instances.

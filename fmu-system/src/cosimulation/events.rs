@@ -11,7 +11,7 @@ use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
 use super::run::{Ended, Point, end};
-use crate::{Error, FmuState, Instance, Kind, Stepped};
+use fmu_import::{Error, FmuState, Instance, Kind, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
 

@@ -1,6 +1,6 @@
 //! Event iteration: updates the discrete states of several FMUs in event mode until none needs another update.
 
-use crate::{Error, Instance};
+use fmu_import::{Error, Instance};
 
 /// Largest number of updates of one event.
 const UPDATES: usize = 100;

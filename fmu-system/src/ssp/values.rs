@@ -1,8 +1,8 @@
 //! Parameter values of SSV files, set on the instances of a system.
 
+use super::error::{Error, invalid};
 use super::ssv::Parameter;
 use crate::cosimulation::System;
-use anyhow::{Context, Result, bail};
 use model_description::{ModelDescription, ModelVariable};
 
 /// A value of an SSV file for an instance.
@@ -33,29 +33,30 @@ impl Given {
 ///
 /// # Errors
 /// Names file and line: the variable does not exist, has another unit or type, or the FMU refuses the value.
-pub fn set(system: &mut System, given: &[Given]) -> Result<()> {
+pub fn set(system: &mut System, given: &[Given]) -> Result<(), Error> {
     let (sizes, others): (Vec<_>, Vec<_>) =
         given.iter().partition(|value| system.is_size(&value.port()).unwrap_or(false));
     let ports: Vec<_> = sizes.iter().map(|size| (size.port(), size.parameter.value.as_str())).collect();
     let mut files: Vec<_> = sizes.iter().map(|size| size.file.as_str()).collect();
     files.dedup();
-    system.configure(ports.iter().map(|(port, value)| (port.as_str(), *value))).with_context(|| files.join(", "))?;
+    let configured = system.configure(ports.iter().map(|(port, value)| (port.as_str(), *value)));
+    configured.map_err(|error| Error::from(error).at(files.join(", ")))?;
     for Given { instance, file, parameter } in others {
-        one(system, instance, parameter).with_context(|| format!("{file}: line {}", parameter.line))?;
+        one(system, instance, parameter).map_err(|error| error.at(format!("{file}: line {}", parameter.line)))?;
     }
     Ok(())
 }
 
-fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<()> {
+fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<(), Error> {
     let name = &p.name;
     if let Some(i) = system.instances().iter().find(|i| i.name() == instance) {
         let model = &i.description().model_name;
         let Some(variable) = find(i.description(), name) else {
-            bail!("{model} has no variable {name}: correct the name, or remove the parameter");
+            return invalid(format!("{model} has no variable {name}: correct the name, or remove the parameter"));
         };
         let unit = variable.unit.as_deref().unwrap_or("1");
         if let Some(given) = p.unit.as_deref().filter(|given| *given != unit) {
-            bail!("{name} is given in {given}, and {model} has it in {unit}: convert the value");
+            return invalid(format!("{name} is given in {given}, and {model} has it in {unit}: convert the value"));
         }
     }
     Ok(system.set(&format!("{instance}.{name}"), &p.value)?)

@@ -1,13 +1,13 @@
 //! An SSP as a system of our co-simulation.
 
 use super::DESCRIPTION;
+use super::error::{Error, invalid};
 use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
 use super::values::{self, Given};
 use crate::cosimulation::{Method, Schedule, Sequence, Settings, System};
-use crate::{Fmu, archive};
-use anyhow::{Context, Result, anyhow, bail};
-use model_description::{Experiment, decode, limits};
+use fmu_import::{Fmu, check_entries, document, limits};
+use model_description::{Experiment, decode};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -40,14 +40,14 @@ impl Connectors {
     ///
     /// # Errors
     /// The system has no input of this name, which has no dot.
-    pub fn ports(&self, name: &str) -> Result<Vec<String>> {
+    pub fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
         if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
             return Ok(targets.clone());
         }
         let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
         if of_system && !name.contains('.') {
             let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
-            bail!("{name}: is not an input of the system; it has {}", names.join(", "));
+            return invalid(format!("{name}: is not an input of the system; it has {}", names.join(", ")));
         }
         Ok(vec![name.to_owned()])
     }
@@ -57,7 +57,7 @@ impl Connectors {
     ///
     /// # Errors
     /// As for [`ports`](Self::ports).
-    pub fn source(&self, name: &str) -> Result<String> {
+    pub fn source(&self, name: &str) -> Result<String, Error> {
         match self.outputs.iter().find(|(n, _)| n == name) {
             Some((_, source)) => Ok(source.clone()),
             None => Ok(self.ports(name)?.swap_remove(0)),
@@ -72,21 +72,24 @@ struct Package<'a> {
 }
 
 impl Package<'_> {
-    fn bytes(&mut self, name: &str) -> Result<Vec<u8>> {
-        let of = || self.path.display().to_string();
+    fn bytes(&mut self, name: &str) -> Result<Vec<u8>, Error> {
+        let of = || self.path.display();
         let mut bytes = Vec::new();
         // What the headers claim is within the limits: see `check_entries`.
         match self.zip.by_name(name) {
-            Ok(entry) => entry.take(limits::UNPACKED.most).read_to_end(&mut bytes).with_context(of)?,
-            Err(zip::result::ZipError::FileNotFound) => bail!("{}: has no {name}", of()),
-            Err(e) => bail!("{}: {name}: {e}", of()),
+            Ok(entry) => {
+                let read = entry.take(limits::UNPACKED.most).read_to_end(&mut bytes);
+                read.map_err(|e| Error::Invalid(format!("{}: {e}", of())))?
+            }
+            Err(zip::result::ZipError::FileNotFound) => return invalid(format!("{}: has no {name}", of())),
+            Err(e) => return invalid(format!("{}: {name}: {e}", of())),
         };
         Ok(bytes)
     }
 
-    fn text(&mut self, name: &str) -> Result<String> {
-        let of = |cause: String| anyhow!("{}: {cause}", self.path.display());
-        let bytes = archive::document(&mut self.zip, name).map_err(of)?;
+    fn text(&mut self, name: &str) -> Result<String, Error> {
+        let of = |cause: String| Error::Invalid(format!("{}: {cause}", self.path.display()));
+        let bytes = document(&mut self.zip, name).map_err(of)?;
         let bytes = bytes.ok_or_else(|| of(format!("has no {name}")))?;
         let text = decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?;
         Ok(text.to_owned())
@@ -98,7 +101,7 @@ impl Loaded {
     ///
     /// # Errors
     /// As [`open`](Self::open), or an SSP file is not alone.
-    pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self> {
+    pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self, Error> {
         Self::open_files_with(files, folder, logging, |_| Method::default())
     }
 
@@ -111,13 +114,13 @@ impl Loaded {
         folder: &Path,
         logging: bool,
         method: impl FnOnce(&[(String, Fmu)]) -> Method,
-    ) -> Result<Self> {
+    ) -> Result<Self, Error> {
         let mut fmus = Vec::new();
         for text in files {
             let (name, path) = name_and_path(text)?;
             if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
                 if files.len() > 1 {
-                    bail!("{}: an SSP is simulated alone: its FMUs are inside", path.display());
+                    return invalid(format!("{}: an SSP is simulated alone: its FMUs are inside", path.display()));
                 }
                 return Self::open_with(&folder.join(path), logging, method);
             }
@@ -145,28 +148,30 @@ impl Loaded {
     ///
     /// # Errors
     /// Names the file, the place in it, what is wrong and what to do.
-    pub fn open(path: &Path, logging: bool) -> Result<Self> {
+    pub fn open(path: &Path, logging: bool) -> Result<Self, Error> {
         Self::open_with(path, logging, |_| Method::default())
     }
 
     /// Like [`open`](Self::open), run by the method that suits the FMUs.
-    fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self> {
-        let of = || path.display().to_string();
-        let file = File::open(path).with_context(of)?;
-        let within = |cause: String| anyhow!("{}: {cause}", of());
-        limits::ARCHIVE.check(file.metadata().with_context(of)?.len()).map_err(within)?;
-        let mut zip = ZipArchive::new(file).map_err(|e| anyhow!("{}: not a ZIP archive, or cut short: {e}", of()))?;
-        archive::check_entries(&mut zip).map_err(within)?;
+    fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self, Error> {
+        let of = || path.display();
+        let within = |cause: String| Error::Invalid(format!("{}: {cause}", of()));
+        let unreadable = |e: std::io::Error| within(e.to_string());
+        let file = File::open(path).map_err(unreadable)?;
+        limits::ARCHIVE.check(file.metadata().map_err(unreadable)?.len()).map_err(within)?;
+        let mut zip = ZipArchive::new(file).map_err(|e| within(format!("not a ZIP archive, or cut short: {e}")))?;
+        check_entries(&mut zip).map_err(within)?;
         let mut package = Package { path, zip };
         let text = package.text(DESCRIPTION)?;
-        let in_description = |cause: String| anyhow!("{}: {DESCRIPTION}: {cause}", of());
+        let in_description = |cause: String| within(format!("{DESCRIPTION}: {cause}"));
         let structure = Structure::read(&text).map_err(in_description)?;
         let mut fmus = Vec::new();
-        let dir = tempfile::tempdir()?;
+        let temporary = |e: std::io::Error| within(format!("no temporary folder: {e}"));
+        let dir = tempfile::tempdir().map_err(temporary)?;
         for (index, component) in structure.components.iter().enumerate() {
             let fmu = dir.path().join(format!("{index}.fmu"));
-            std::fs::write(&fmu, package.bytes(&component.source)?)?;
-            let fmu = Fmu::open(&fmu).map_err(|e| anyhow!("{}: {}: {}", of(), component.source, e.cause()))?;
+            std::fs::write(&fmu, package.bytes(&component.source)?).map_err(temporary)?;
+            let fmu = Fmu::open(&fmu).map_err(|e| within(format!("{}: {}", component.source, e.cause())))?;
             fmus.push((component.name.clone(), fmu));
         }
         let method = method(&fmus);
@@ -211,7 +216,7 @@ impl Loaded {
     ///
     /// # Errors
     /// There is none of this name, or it is fed already.
-    pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<()> {
+    pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
         }
@@ -222,7 +227,7 @@ impl Loaded {
     ///
     /// # Errors
     /// There is none of this name, it is fed already, or a text is not a value of its type.
-    pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<()> {
+    pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.sequence(&port, texts)?;
         }
@@ -234,9 +239,9 @@ impl Loaded {
     ///
     /// # Errors
     /// As [`input`](Self::input), or the text has another form.
-    pub fn points(&mut self, name: &str, text: &str) -> Result<()> {
+    pub fn points(&mut self, name: &str, text: &str) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
-            let wrong = anyhow::Error::msg::<String>;
+            let wrong = Error::Invalid;
             if self.system.is_text(&port)? {
                 self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
             } else {
@@ -250,7 +255,7 @@ impl Loaded {
     ///
     /// # Errors
     /// There is none of this name, or the FMU refuses the value.
-    pub fn set(&mut self, name: &str, value: &str) -> Result<()> {
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.set(&port, value)?;
         }
@@ -261,7 +266,7 @@ impl Loaded {
     ///
     /// # Errors
     /// The variable does not exist, or is neither a number nor a text.
-    pub fn record(&mut self, name: &str) -> Result<()> {
+    pub fn record(&mut self, name: &str) -> Result<(), Error> {
         let port = self.connectors.source(name)?;
         if self.system.is_text(&port)? {
             return Ok(self.system.record_text_as(&port, name)?);
@@ -273,7 +278,7 @@ impl Loaded {
     ///
     /// # Errors
     /// As [`record`](Self::record).
-    pub fn record_outputs(&mut self) -> Result<()> {
+    pub fn record_outputs(&mut self) -> Result<(), Error> {
         if self.connectors.outputs.is_empty() {
             return Ok(self.system.record_outputs()?);
         }
@@ -375,7 +380,7 @@ impl Loaded {
                 None => vec![full],
             };
             for port in ports {
-                let has = |i: &crate::Instance| {
+                let has = |i: &fmu_import::Instance| {
                     let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
                     values::find(i.description(), variable).map(|_| (i.name().to_owned(), variable.to_owned()))
                 };
@@ -398,16 +403,16 @@ impl Loaded {
 ///
 /// # Errors
 /// The name is empty, or there is no file name.
-pub fn name_and_path(text: &str) -> Result<(String, &Path)> {
+pub fn name_and_path(text: &str) -> Result<(String, &Path), Error> {
     // A path may have an equals sign; a name has no separator.
     if let Some((name, path)) = text.split_once('=').filter(|(name, _)| !name.contains(['/', '\\'])) {
         if name.is_empty() {
-            bail!("{text}: the name before = is empty");
+            return invalid(format!("{text}: the name before = is empty"));
         }
         return Ok((name.into(), Path::new(path)));
     }
     let path = Path::new(text);
-    let stem = path.file_stem().ok_or_else(|| anyhow!("{text}: is not a file"))?;
+    let stem = path.file_stem().ok_or_else(|| Error::Invalid(format!("{text}: is not a file")))?;
     Ok((stem.to_string_lossy().into_owned(), path))
 }
 
@@ -428,13 +433,13 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
 
 impl Package<'_> {
     /// The values of a binding, its prefix before every name, with what to call their file.
-    fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>)> {
+    fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
         let path = self.path.display().to_string();
         let (file, parameters) = match &binding.values {
             ParameterValues::Inline(parameters) => (format!("{path}: {DESCRIPTION}"), parameters.clone()),
             ParameterValues::File(name) => {
                 let file = format!("{path}: {name}");
-                let read = ssv::read(&self.text(name)?).map_err(|cause| anyhow!("{file}: {cause}"))?;
+                let read = ssv::read(&self.text(name)?).map_err(|cause| Error::Invalid(format!("{file}: {cause}")))?;
                 (file, read)
             }
         };

@@ -3,7 +3,7 @@
 use super::parts::Port;
 use super::sequence::Held;
 use super::{Schedule, loops};
-use crate::{Error, Instance, Kind, Values};
+use fmu_import::{Error, Instance, Kind, Values};
 
 /// Source of an input.
 #[derive(Clone)]

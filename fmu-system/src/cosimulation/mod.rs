@@ -9,7 +9,8 @@
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
-//! use fmu_import::{Fmu, cosimulation::{Schedule, Settings, System}};
+//! use fmu_import::Fmu;
+//! use fmu_system::cosimulation::{Schedule, Settings, System};
 //!
 //! let mut system = System::default();
 //! system.add("plant", &Fmu::open("target/fmu/fmi3/PmsmPlant.fmu")?, false)?;
@@ -53,9 +54,9 @@ pub use run::{Ended, Point};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
 
-use crate::{Error, Fmu, Instance, Message, Values};
 use exchange::{Source, Wiring};
 use fmu_core::Need;
+use fmu_import::{Error, Fmu, Instance, Message, Values};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 use parts::{Part, Parts, Port, kind};
 

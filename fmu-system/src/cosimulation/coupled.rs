@@ -8,7 +8,7 @@ use super::exchange::Inputs;
 use super::iteration::{Iterated, iterate};
 use super::method::Integration;
 use crate::integration::{Hybrid, Trial};
-use crate::{CompletedStep, Error, Instance, Kind, Update};
+use fmu_import::{CompletedStep, Error, Instance, Kind, Update};
 use std::ops::Range;
 
 /// What sets the inputs of FMUs for Model Exchange.

@@ -4,7 +4,7 @@
 //! FMUs, or from differences where an FMU has none.
 
 use super::exchange::{Exchange, Unsettled};
-use crate::{Error, Instance};
+use fmu_import::{Error, Instance};
 use model_description::Interface;
 
 /// Most iterations.

@@ -3,7 +3,7 @@
 use super::locate::{crossed, first_crossing};
 use super::steps::Step;
 use super::{Hybrid, Solver, Trial, dopri, rk4};
-use crate::Error;
+use fmu_import::Error;
 use std::ops::ControlFlow;
 
 /// Most events at one instant.

@@ -4,7 +4,7 @@ use super::exchange::Exchange;
 use super::grid::Grid;
 use super::method::Method;
 use super::{Recording, Settings, System, TextColumn, continuous, events, take_messages};
-use crate::{Error, Instance, Kind, Message};
+use fmu_import::{Error, Instance, Kind, Message};
 use std::ops::ControlFlow;
 
 /// A communication point, as a hook sees it: outputs are read, inputs are set, the step is to come.

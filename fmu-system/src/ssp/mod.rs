@@ -3,10 +3,13 @@
 //! [`structure`]: the structure of any system; [`load`]: a system made ready for co-simulation; [`values`] and [`ssv`]:
 //! parameter values from SSV files.
 
+mod error;
 pub mod load;
 pub mod ssv;
 pub mod structure;
 pub mod values;
+
+pub use error::Error;
 
 /// Name of the description in the archive.
 pub const DESCRIPTION: &str = "SystemStructure.ssd";

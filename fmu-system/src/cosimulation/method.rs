@@ -1,7 +1,7 @@
 //! How the FMUs of a system are run.
 
 use crate::integration::Solver;
-use crate::{Error, Fmu, Kind};
+use fmu_import::{Error, Fmu, Kind};
 use model_description::{FmiVersion, Interface};
 
 /// How the FMUs of a system are run.
