@@ -1,6 +1,6 @@
 //! Opens the archive of an FMU: reads its description and extracts what is needed to run it.
 
-use super::Error;
+use crate::error::Error;
 use crate::folder::Folder;
 use crate::limits::{self, UNPACKED, XML};
 use crate::machine;

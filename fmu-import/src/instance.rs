@@ -4,14 +4,13 @@ mod clocks;
 mod configuration;
 mod equations;
 
-pub use equations::{CompletedStep, Stepped, Update};
-
-use super::standard::{Experiment, Kind, Outcome, Refusal};
-use super::{Error, Values, explain};
 use crate::abi::journal::{self, Call};
 use crate::abi::live::{Live, Pointer};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::raw::Simple;
+use crate::error::Error;
+use crate::standard::{Experiment, Kind, Outcome, Refusal, explain};
+use crate::value::Values;
 use clocks::Clocks;
 use model_description::{BaseType, Causality, ModelDescription, ModelVariable};
 use std::collections::BTreeMap;

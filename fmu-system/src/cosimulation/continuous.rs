@@ -8,7 +8,7 @@ use super::coupled::{Equations, Feed};
 use super::exchange::{Exchange, Inputs};
 use super::grid::Grid;
 use super::method::Integration;
-use super::run::{Ended, Point, end};
+use super::point::{Ended, Point, end};
 use crate::integration::{Driver, Trial};
 use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;

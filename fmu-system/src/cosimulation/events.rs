@@ -10,7 +10,7 @@
 use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
-use super::run::{Ended, Point, end};
+use super::point::{Ended, Point, end};
 use fmu_import::{Error, FmuState, Instance, Kind, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;

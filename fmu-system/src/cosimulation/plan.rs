@@ -22,11 +22,13 @@
 //! ```
 
 use super::exchange::{Exchange, Wiring};
-use super::grid::Grid;
+use super::grid::{Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port};
-use super::run::{Ended, simulate};
-use super::{Column, Recording, Settings, System};
+use super::point::Ended;
+use super::recording::{Column, Recording};
+use super::run::simulate;
+use super::system::System;
 use fmu_import::{Error, Fmu, Instance, Kind, Values};
 use model_description::{BaseType, Interface};
 use std::ops::ControlFlow;

@@ -1,10 +1,8 @@
 //! Inputs over time.
 
-use super::sequence::Sequence;
 use fmu_import::quantity::{convert, split};
 use model_description::{ModelDescription, ModelVariable};
 use std::fmt;
-use std::path::Path;
 
 /// Values of one input over time.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,20 +99,6 @@ impl Schedule {
         Ok(Self::new(points, linear)?.with_units(units))
     }
 
-    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
-    /// `speed_ref [rpm]`. Lines connect the points.
-    ///
-    /// # Errors
-    /// The file cannot be read, has no header, or a row does not have as many numbers as the header.
-    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
-    }
-
-    fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
-        Sequence::parse_csv(text)?.into_iter().map(|(name, texts)| Ok((name, texts.lines()?))).collect()
-    }
-
     /// Value at time `t` (s).
     pub fn at(&self, t: f64) -> f64 {
         let after = last_before(&self.points, t);
@@ -188,21 +172,6 @@ mod tests {
             ("0:NaN", "0:NaN is not finite"),
         ] {
             assert_eq!(Schedule::parse(text).unwrap_err(), cause, "{text:?}");
-        }
-    }
-
-    #[test]
-    fn a_table_has_a_column_for_each_input() {
-        let columns = Schedule::parse_csv("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
-        assert_eq!(columns[0].0, "c.speed_ref");
-        assert_eq!((columns[0].1.at(0.5), columns[1].1.at(0.5)), (5.0, 1.0));
-        for (text, cause) in [
-            ("time,a\n0\n", "line 2: expected 2 numbers, found 1"),
-            ("time,a\n0,1,5\n", "line 2: expected 2 numbers, found 3; commas separate columns: write a decimal point"),
-            ("time,a\n0,x\n", "line 2: \"x\" is not a number"),
-            ("time;a\n0;1,5\n", "line 1: has semicolons; write commas between columns and a decimal point"),
-        ] {
-            assert_eq!(Schedule::parse_csv(text).unwrap_err(), cause, "{text:?}");
         }
     }
 }

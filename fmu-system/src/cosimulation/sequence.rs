@@ -133,6 +133,22 @@ impl Sequence {
     }
 }
 
+impl Schedule {
+    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
+    /// `speed_ref [rpm]`. Lines connect the points.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no header, or a row does not have as many numbers as the header.
+    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
+    }
+
+    fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
+        Sequence::parse_csv(text)?.into_iter().map(|(name, texts)| Ok((name, texts.lines()?))).collect()
+    }
+}
+
 /// Values over time, each held until the next one.
 #[derive(Clone, Debug)]
 pub(super) struct Held(Arc<[(f64, Values)]>);
@@ -175,6 +191,7 @@ fn cells(line: &str) -> Vec<String> {
 }
 
 #[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
 mod tests {
     use super::*;
 
@@ -197,5 +214,20 @@ mod tests {
         let texts: Vec<&str> = columns[0].1.points.iter().map(|(_, x, _)| x.as_str()).collect();
         assert_eq!(texts, ["x, \"y\"", ""]);
         assert_eq!(columns[0].1.lines().unwrap_err(), "line 2: \"x, \\\"y\\\"\" is not a number");
+    }
+
+    #[test]
+    fn a_table_has_a_column_for_each_input() {
+        let columns = Schedule::parse_csv("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
+        assert_eq!(columns[0].0, "c.speed_ref");
+        assert_eq!((columns[0].1.at(0.5), columns[1].1.at(0.5)), (5.0, 1.0));
+        for (text, cause) in [
+            ("time,a\n0\n", "line 2: expected 2 numbers, found 1"),
+            ("time,a\n0,1,5\n", "line 2: expected 2 numbers, found 3; commas separate columns: write a decimal point"),
+            ("time,a\n0,x\n", "line 2: \"x\" is not a number"),
+            ("time;a\n0;1,5\n", "line 1: has semicolons; write commas between columns and a decimal point"),
+        ] {
+            assert_eq!(Schedule::parse_csv(text).unwrap_err(), cause, "{text:?}");
+        }
     }
 }

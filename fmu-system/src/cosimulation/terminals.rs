@@ -3,8 +3,8 @@
 //! Each side's matching rule must be content. A signal belongs to a signal, an inflow to an outflow: then both sides have the
 //! same value, and one output to one input is all that it takes. Two inflows would need the opposite sign and are refused.
 
-use super::System;
 use super::parts::Part;
+use super::system::System;
 use fmu_import::Error;
 use model_description::{Causality, Member, Terminal};
 

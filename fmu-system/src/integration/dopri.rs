@@ -4,8 +4,8 @@
 //! output and step control: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer
 //! 1993, II.4 to II.6. The last stage is the derivative at the end, with which the next step begins.
 
+use super::hybrid::{Hybrid, Trial};
 use super::steps::Step;
-use super::{Hybrid, Trial};
 
 /// Weights of the result.
 const B: [f64; 6] = [35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];

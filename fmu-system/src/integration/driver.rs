@@ -1,8 +1,9 @@
 //! Steps a system to communication points and handles its events.
 
+use super::hybrid::{Hybrid, Trial};
 use super::locate::{crossed, first_crossing};
 use super::steps::Step;
-use super::{Hybrid, Solver, Trial, dopri, rk4};
+use super::{dopri, rk4};
 use fmu_import::Error;
 use std::ops::ControlFlow;
 
@@ -10,6 +11,26 @@ use std::ops::ControlFlow;
 const EVENTS: u32 = 100;
 /// Width of the interval that a state event is located in, relative to the step.
 const WIDTH: f64 = 1e-10;
+
+/// How states are integrated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Solver {
+    /// The classical Runge-Kutta method of order 4, with the communication step as its step; a step that an event, an input or
+    /// a communication point cuts is shorter.
+    Rk4,
+    /// The method of Dormand and Prince of order 5, with an adaptive step.
+    Dopri {
+        /// Relative tolerance of a step; the absolute one is this times the nominal value of each state.
+        rtol: f64,
+    },
+}
+
+impl Default for Solver {
+    /// Adaptive, with a relative tolerance of 1e-6.
+    fn default() -> Self {
+        Self::Dopri { rtol: 1e-6 }
+    }
+}
 
 /// Why the driver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

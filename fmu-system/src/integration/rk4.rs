@@ -3,8 +3,8 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer 1993, table II.1.2.
 //! Between the ends of a step, the cubic Hermite polynomial of states and derivatives interpolates with order 3 (II.6).
 
+use super::hybrid::{Hybrid, Trial};
 use super::steps::Step;
-use super::{Hybrid, Trial};
 
 /// Steps from `step.t` to `step.t_end`.
 pub(super) fn step<H: Hybrid>(system: &mut H, step: &mut Step) -> Result<(), Trial> {

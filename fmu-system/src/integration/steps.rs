@@ -1,6 +1,6 @@
 //! One step of an integrator: what both share.
 
-use super::{Hybrid, Trial};
+use super::hybrid::{Hybrid, Trial};
 
 /// A step from `x` at `t`, where the derivative is `f`, to `x_end` at `t_end`, where it is `f_end`.
 pub(super) struct Step {

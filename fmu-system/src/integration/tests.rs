@@ -1,6 +1,7 @@
 //! Systems in plain Rust through the trait that the adapter of FMUs implements.
 
 use super::*;
+use fmu_import::{CompletedStep, Error, Update};
 use std::f64::consts::{LN_2, PI};
 
 /// A system of closures; `event` handles an event at a time and a state.
