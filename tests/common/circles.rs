@@ -25,7 +25,7 @@ struct Modules {
 }
 
 /// The circles of a crate, the files of each in order, from `lib.rs` (or `main.rs`) in its folder `src`.
-pub fn circles(src: &Path, root: &str) -> Vec<Vec<String>> {
+pub(crate) fn circles(src: &Path, root: &str) -> Vec<Vec<String>> {
     let mut modules = Modules { files: Vec::new(), all: Vec::new() };
     modules.file(&src.join(root), None, src);
     let known = modules.known();
@@ -114,6 +114,8 @@ impl Modules {
             };
             let next = word(tokens.get(at + 1));
             match (first.as_str(), next) {
+                // `pub(in crate::abi)` says who may name an item.
+                ("pub", _) => at += 1 + usize::from(group(tokens.get(at + 1), Delimiter::Parenthesis).is_some()),
                 ("use", _) => at = self.tree(&tokens, at + 1, &[], module),
                 ("mod", Some(name)) => {
                     let below = folder.join(&name);
