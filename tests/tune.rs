@@ -215,6 +215,34 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
 }
 
+/// The estimator of the command line is that of the files, with `--json` too; another name is refused before anything is written.
+#[test]
+fn the_estimator_of_the_command_line_counts() {
+    let motor = Path::new(env!("CARGO_MANIFEST_DIR")).join("motors/reference.toml");
+    let (motor, dir) = (motor.to_str().unwrap(), tempfile::tempdir().unwrap());
+    let out = dir.path().join("out");
+    let folder = ["--out", out.to_str().unwrap()];
+    for (name, by) in [("ExtendedEmf", &folder[..]), ("Rasmussen", &folder), ("ExtendedEmf", &["--json"])] {
+        let tuned = fmu(&[&["tune", motor, "--estimator", name], by].concat());
+        assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
+        let written = std::fs::read_to_string(out.join("reference.SensorlessController.ssv")).unwrap_or_default();
+        let json = String::from_utf8(tuned.stdout).unwrap();
+        let start = if by == folder { written.contains("start.mode") } else { json.contains("\"start.mode\"") };
+        assert_eq!(start, name == "ExtendedEmf", "{name} {by:?}");
+    }
+    std::fs::remove_dir_all(&out).unwrap();
+    for by in [&folder[..], &["--json"]] {
+        let refused = fmu(&[&["tune", motor, "--estimator", "Luenberger"], by].concat());
+        let said = String::from_utf8(refused.stderr).unwrap();
+        assert_eq!(refused.status.code(), Some(2), "{said}");
+        assert!(
+            said.contains("estimator Luenberger: fmu tune has no rules for it; choose Rasmussen or ExtendedEmf"),
+            "{said}"
+        );
+        assert!(!out.exists() && refused.stdout.is_empty());
+    }
+}
+
 #[test]
 fn the_check_prints_what_holds_and_what_was_announced() {
     let motor = motors().into_iter().find(|p| p.ends_with("ipmsm-2.2kw.toml")).unwrap();
@@ -233,7 +261,7 @@ fn the_check_prints_what_holds_and_what_was_announced() {
     };
     let text = checked(&motor, "deg   holds");
     assert!(!text.contains("will not hold") && text.contains("K = 1.5 n_p psi_M = 2.4525 N.m/A"), "{text}");
-    let text = checked(&light, "does not hold, as announced");
+    let text = checked(&light, "does not hold: see the note");
     for printed in
         ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise in 0.083 s or more"]
     {

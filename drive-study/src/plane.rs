@@ -16,7 +16,7 @@
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
 use crate::map::{self, picture};
-use crate::runner;
+use crate::runner::{self, REFERENCE_SPEED, REFERENCE_TORQUE};
 use anyhow::{Result, anyhow};
 use drive::Pair;
 use drive::control::envelope::{Envelope, Limit};
@@ -293,6 +293,6 @@ pub fn map() -> Chart {
     let drive = Reference::lossy();
     let (plant, controller) = (&drive.pair.plant.model, &drive.pair.controller.model);
     let steady = Steady::new(plant.parameters.clone(), controller.parameters.clone()).sampled();
-    let rated = [3000.0 * RPM, 2.5];
+    let rated = [REFERENCE_SPEED, REFERENCE_TORQUE];
     picture::chart(&map::of_drive("reference motor", steady, plant.inputs.u_dc, 5300.0 * RPM, rated), 0)
 }

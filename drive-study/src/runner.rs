@@ -13,9 +13,15 @@ use drive::pair::Pair;
 use fmu_core::{Elapsed, Fault, Step};
 use std::f64::consts::TAU;
 
-/// Rated mechanical speed in rad/s: 1500 rpm.
+/// Rated mechanical speed of the reference motor in rad/s, 3000 rpm, as in `motors/reference.toml`.
+pub const REFERENCE_SPEED: f64 = TAU * 50.0;
+/// Rated torque of the reference motor in N.m, as in `motors/reference.toml`.
+pub const REFERENCE_TORQUE: f64 = 2.5;
+/// Load step of the paper in N.m: 1 pu of torque of the reference motor in `fmu compare` and `fmu atlas`.
+pub const PAPER_LOAD: f64 = 2.0;
+/// Rated mechanical speed of the 2.2 kW machine in rad/s: 1500 rpm.
 pub const RATED_SPEED: f64 = TAU * 25.0;
-/// Rated torque in N.m.
+/// Rated torque of the 2.2 kW machine in N.m.
 pub const RATED_TORQUE: f64 = 14.0;
 
 /// The 2.2 kW machine with interior magnets.

@@ -97,6 +97,15 @@ fn without_a_bump(kind: Kind, name: &str, change: impl Fn(f64) -> f64, set: impl
     assert!(later > 1e-5, "{name}, {}: no effect, {later}", kind.name());
 }
 
+/// The ratings of the reference motor stand in its file; the constants that the studies use are the same.
+#[test]
+fn the_reference_motor_has_one_rating() {
+    let motor = MotorFile::read("../motors/reference.toml".as_ref()).unwrap();
+    let rating = &motor.data.rating;
+    assert!((rating.speed.get_ref() / runner::REFERENCE_SPEED - 1.0).abs() < 1e-8);
+    assert!((rating.torque.get_ref() / runner::REFERENCE_TORQUE - 1.0).abs() < 1e-8);
+}
+
 #[test]
 fn loops_and_estimators_change_without_a_bump() {
     let nothing = |_: &mut Pair| {};

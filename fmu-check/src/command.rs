@@ -68,13 +68,13 @@ pub struct CheckArguments {
     #[arg(long)]
     pub strict: bool,
     /// List all checks and exit
-    #[arg(long)]
+    #[arg(long, exclusive = true)]
     pub list: bool,
     /// Explain a check: what is required and where, how it is tried, the usual fix
-    #[arg(long, value_name = "ID")]
+    #[arg(long, value_name = "ID", exclusive = true)]
     pub explain: Option<String>,
     /// Repeat one check of the binary and print its calls with what they return; ID#N for its case N alone
-    #[arg(long, value_name = "ID[#N]")]
+    #[arg(long, value_name = "ID[#N]", conflicts_with_all = ["format", "only", "allow", "baseline", "write_baseline", "verbose", "strict", "timeout"])]
     pub replay: Option<String>,
 }
 
@@ -130,6 +130,9 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     }
     if let Some(name) = args.allow.iter().find(|name| !is_check(name)) {
         return Err(Error(format!("--allow {name}: there is no such check; --list shows them")));
+    }
+    if args.verbose && args.format != Format::Text {
+        bail!("--verbose: is for --format text; the other formats have every check");
     }
     let options = Options {
         only: args.only.clone(),

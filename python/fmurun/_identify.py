@@ -35,11 +35,11 @@ def identify(frame, *, n_p, current=None, speed=None, torque=None, u_dc=None, de
         raise ValueError("frame: expected a DataFrame, a dictionary of arrays, or a structured array")
     renamed = {} if map is None else dict(map)
     if load is not None and load not in ("none", "tau_load", "tau_shaft"):
-        renamed["tau_load"] = load
+        renamed["tau_load"], load = load, "tau_load"
     options = {
         "naming": {"map": list(renamed.items()), "units": list((units or {}).items())},
         "n_p": n_p, "current": current, "speed": speed, "torque": torque, "u_dc": u_dc, "delay": delay, "every": every,
-        "rate": rate, "zero": zero, "no_load": load == "none",
+        "rate": rate, "zero": zero, "load": load,
     }  # fmt: skip
     columns = []
     for name in names:

@@ -15,9 +15,9 @@ use std::thread;
 
 /// Runs drives with wrong estimates of resistance and magnet flux at low speed under load, and maps where they are lost.
 ///
-/// Without MOTOR.toml, an estimator runs on the drive of `fmu compare`: flux observers on the reference motor (rated 3000 rpm
-/// and 2 N.m), all others on the 2.2 kW machine. With it, they run on the drive that `fmu tune` gives for the machine. The cells
-/// are all combinations of the values on the axes; shares are of the true or the rated value.
+/// Without MOTOR.toml, an estimator runs on the drive of `fmu compare`: flux observers on the reference motor (1 pu is 3000 rpm
+/// and the 2 N.m of the paper's load steps), all others on the 2.2 kW machine. With it, they run on the drive that `fmu tune`
+/// gives for the machine. The cells are all combinations of the values on the axes; shares are of the true or the rated value.
 ///
 /// Writes a map per estimator (atlas-NAME.svg, red where the drive is lost), atlas.csv, atlas.md and atlas.html, which needs no
 /// network. The files have the same bytes for any number of jobs.

@@ -62,7 +62,7 @@ use std::process::{Command, Stdio};
 #[command(verbatim_doc_comment)]
 pub struct Build {
     /// FMUs to build, by package or FMU name
-    #[arg(value_name = "FMU", conflicts_with_all = ["package", "library"])]
+    #[arg(value_name = "FMU", conflicts_with_all = ["package", "library", "resources"])]
     pub fmus: Vec<String>,
     /// FMI version: 2 or 3 [default: both]
     #[arg(long, value_name = "VERSION", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
@@ -71,7 +71,7 @@ pub struct Build {
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Package of this workspace with a cdylib (repeatable)
-    #[arg(long, value_name = "NAME", conflicts_with = "library")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["library", "resources"])]
     pub package: Vec<String>,
     /// Library that is already built; PLATFORM= names another platform than this computer's
     #[arg(long, value_name = "[PLATFORM=]FILE")]
@@ -80,13 +80,13 @@ pub struct Build {
     #[arg(long, value_name = "DIR", requires = "library")]
     pub resources: Option<PathBuf>,
     /// Target to build for instead of this computer; separate several with commas or repeat the option
-    #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with = "library")]
+    #[arg(long, value_name = "TRIPLE", value_delimiter = ',', conflicts_with_all = ["library", "resources"])]
     pub target: Vec<String>,
     /// Processor of the library in the folder linux64 of FMI 2.0: x86_64 or aarch64 [default: x86_64]
     #[arg(long, value_name = "PROCESSOR")]
     pub linux64: Option<Linux64>,
     /// Write all files of a release to this folder
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["package", "library", "out"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["package", "library", "resources", "out"])]
     pub release_dir: Option<PathBuf>,
 }
 
@@ -150,6 +150,9 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
         None => vec![FmiVersion::V2, FmiVersion::V3],
         Some(version) => vec![version.parse()?],
     };
+    if args.linux64.is_some() && !versions.contains(&FmiVersion::V2) {
+        bail!("--linux64: is for FMI 2.0; the folders of FMI 3.0 name the processor: leave it out, or --fmi 3");
+    }
     let (models, out) = if args.library.is_empty() {
         let workspace = Workspace::find()?;
         let out = args.out.clone().unwrap_or_else(|| workspace.target.join("fmu"));
@@ -259,7 +262,11 @@ fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
 /// `PmsmDrive` with the start values of each machine of the workspace: presets/MACHINE.PmsmDrive.fmu.
 fn presets(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
     let (motors, drive) = (workspace.root.join("motors"), folder.join("fmi3/PmsmDrive.fmu"));
-    if !motors.is_dir() || !drive.is_file() {
+    if !motors.is_dir() {
+        return Ok(Vec::new());
+    }
+    if !drive.is_file() {
+        message::note("left out: presets for the machines of motors/: they need PmsmDrive of FMI 3.0");
         return Ok(Vec::new());
     }
     let entries = fs::read_dir(&motors).with_context(|| motors.display().to_string())?;

@@ -25,7 +25,7 @@ pub struct Compare {
     #[arg(long, value_name = "SCENARIO,...", value_delimiter = ',')]
     pub scenario: Vec<String>,
     /// List estimators and scenarios and exit
-    #[arg(long)]
+    #[arg(long, exclusive = true)]
     pub list: bool,
     /// Output folder [default: compare in Cargo's target folder]
     #[arg(long, value_name = "DIR")]

@@ -29,7 +29,7 @@ use std::path::PathBuf;
 #[command(verbatim_doc_comment)]
 pub struct Identify {
     /// Record of a running drive
-    #[arg(value_name = "RECORD.csv", required_unless_present = "run", conflicts_with = "run")]
+    #[arg(value_name = "RECORD.csv", required_unless_present = "run", conflicts_with_all = ["run", "given"])]
     pub record: Option<PathBuf>,
     /// Recording of a self-commissioning instead: its last row has the values
     #[arg(long, value_name = "RUN.csv", conflicts_with_all = ["delay", "every", "rate", "map", "unit", "zero", "load"])]
@@ -173,9 +173,11 @@ fn options(args: &Identify) -> Result<Options> {
         Ok((name, number))
     });
     let mut map = pairs("--map", &args.map)?;
-    let no_load = args.load.as_deref() == Some("none");
-    if let Some(column) = args.load.as_deref().filter(|load| !["none", "tau_load", "tau_shaft"].contains(load)) {
-        map.push(("tau_load".into(), column.into()));
+    let mut load = args.load.clone();
+    if let Some(column) = &mut load
+        && !["none", "tau_load", "tau_shaft"].contains(&column.as_str())
+    {
+        map.push(("tau_load".into(), std::mem::replace(column, "tau_load".into())));
     }
     Ok(Options {
         naming: Naming { map, units: pairs("--unit", &args.unit)? },
@@ -188,7 +190,7 @@ fn options(args: &Identify) -> Result<Options> {
         every: args.every,
         rate: args.rate,
         zero: zero.transpose()?,
-        no_load,
+        load,
         given: given.collect::<Result<_>>()?,
     })
 }

@@ -57,10 +57,26 @@ pub fn run(args: &Merge) -> Result<()> {
         let executable = name.starts_with(BINARIES);
         (name, Entry { bytes, executable })
     };
+    if let Some(linux64) = args.linux64 {
+        has_linux64(&parts, linux64.platform())?;
+    }
     let files = merge(parts, args.linux64.unwrap_or_default().platform())?.into_iter().map(entry).collect();
     pack::write(&args.out, &pack::archive(&files, moment)?)?;
     println!("{}", args.out.display());
     Ok(())
+}
+
+/// Requires a library that `--linux64` moves or keeps in the folder linux64.
+fn has_linux64(parts: &[Part], platform: Platform) -> Result<()> {
+    if parts.iter().any(|part| part.description.version != FmiVersion::V2) {
+        bail!("--linux64: is for FMI 2.0; the folders of FMI 3.0 name the processor: leave it out");
+    }
+    for part in parts {
+        if libraries(part)?.iter().any(|library| library.platform == platform) {
+            return Ok(());
+        }
+    }
+    bail!("--linux64: none of the FMUs has a library for {platform}")
 }
 
 /// The files of all parts.

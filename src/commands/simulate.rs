@@ -113,8 +113,8 @@ pub struct Simulate {
     /// Write the same plot as a page with zoom, legend switches and values at the cursor, which needs no network
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
-    /// Plot all that is recorded, with --plot or --html
-    #[arg(long)]
+    /// Plot all outputs, with --plot or --html; with --record, all that is recorded is plotted anyway
+    #[arg(long, conflicts_with = "record")]
     pub all: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
@@ -147,7 +147,7 @@ pub struct Simulate {
     #[arg(long)]
     pub sandbox: bool,
     /// Run the FMUs in this process, without limits: for FMUs that you trust
-    #[arg(long, conflicts_with = "sandbox")]
+    #[arg(long, conflicts_with_all = ["sandbox", "timeout", "memory"])]
     pub in_process: bool,
     /// Run as the process of the FMUs
     #[arg(long, hide = true)]
@@ -347,9 +347,16 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
         }
     }
     if args.auto_connect {
-        for (from, to) in loaded.system.connect_by_name()? {
-            eprintln!("connected {} -> {}", printable(&from), printable(&to));
+        let connected = loaded.system.connect_by_name()?;
+        for (from, to) in &connected {
+            eprintln!("connected {} -> {}", printable(from), printable(to));
         }
+        if connected.is_empty() {
+            message::warning("--auto-connect connects nothing: no free input has the name of an output of another FMU");
+        }
+    }
+    if args.sequential && loaded.system.instances().len() == 1 {
+        message::warning("--sequential has no effect: there is one FMU");
     }
     let mut parameters = Vec::new();
     for text in &args.parameters {

@@ -7,6 +7,7 @@ use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use drive_study::tune;
+use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
 /// Packs plant and controller, connected and with the values of a motor, into one SSP file (SSP 1.0).
@@ -25,9 +26,9 @@ use std::path::{Path, PathBuf};
 #[command(verbatim_doc_comment)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Ssp {
-    /// FMI version of the FMUs: 2 or 3
-    #[arg(long, value_name = "VERSION", default_value = "2", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
-    pub fmi: String,
+    /// FMI version of the FMUs: 2 or 3 [default: 2, or that of the FMUs in --fmus]
+    #[arg(long, value_name = "VERSION", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
+    pub fmi: Option<String>,
     /// Folder with PmsmPlant.fmu and SensorlessController.fmu, or with the folders of `fmu build` [default: they are built from
     /// the sources around the current folder]
     #[arg(long, value_name = "DIR")]
@@ -65,13 +66,21 @@ pub fn run(args: &Ssp) -> Result<()> {
     let moment = Moment::of_environment()?;
     let values = values(args)?;
     let dir = tempfile::tempdir()?;
-    let standard = format!("fmi{}", args.fmi);
+    if values.is_empty() && args.names {
+        bail!("--names: there are no values to write: add --motor or --parameters");
+    }
+    let fmi = args.fmi.as_deref().unwrap_or("2");
+    let standard = format!("fmi{fmi}");
     let folder = if let Some(given) = &args.fmus {
-        packed(given, &standard)?
+        let folder = packed(given, &standard)?;
+        if args.fmi.is_some() {
+            is_of(&folder, fmi.parse()?)?;
+        }
+        folder
     } else {
         let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
         let out = Some(dir.path().into());
-        build::run(&Build { fmus, fmi: Some(args.fmi.clone()), out, ..Build::default() })
+        build::run(&Build { fmus, fmi: Some(fmi.to_owned()), out, ..Build::default() })
             .context("the FMUs of the drive cannot be built here; --fmus DIR takes those of a folder")?;
         dir.path().join(standard)
     };
@@ -93,6 +102,18 @@ fn packed(given: &Path, standard: &str) -> Result<PathBuf> {
             given.display()
         )
     })
+}
+
+/// Requires FMUs of the version that `--fmi` names.
+fn is_of(folder: &Path, version: FmiVersion) -> Result<()> {
+    for (_, fmu, _) in COMPONENTS {
+        let file = folder.join(fmu).with_extension("fmu");
+        let found = fmu_import::outline(&file)?.description.version;
+        if found != version {
+            bail!("{}: is of FMI {found}, but --fmi asks for {version}", file.display());
+        }
+    }
+    Ok(())
 }
 
 /// The values, each with its file.

@@ -47,7 +47,7 @@ pub struct Sweep {
     #[arg(long)]
     pub isolate: bool,
     /// Check the file and list what is missing in DIR
-    #[arg(long)]
+    #[arg(long, conflicts_with_all = ["jobs", "part", "limit", "restart", "isolate", "csv"])]
     pub dry_run: bool,
     /// Write all results as CSV once they are complete; - for standard output
     #[arg(long, value_name = "FILE|-")]

@@ -54,8 +54,8 @@ pub struct Tune {
     /// Print the values as JSON, a dictionary for each FMU, and nothing else; enumerations are integers, as FMPy takes them
     #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
     pub json: bool,
-    /// Estimator to tune for, instead of that of the motor file
-    #[arg(long, value_name = "NAME", requires = "json")]
+    /// Estimator to tune for, instead of that of the motor file: Rasmussen or ExtendedEmf
+    #[arg(long, value_name = "NAME")]
     pub estimator: Option<String>,
     /// Print the trial: starts from 24 angles at each speed, loads held, least speed, greatest angle error
     #[arg(long)]
@@ -81,7 +81,10 @@ pub fn run(args: &Tune) -> Result<()> {
         println!("{:#}", tune::values(motor, args.estimator.as_deref())?);
         return Ok(());
     }
-    let motor = MotorFile::read(motor)?;
+    let mut motor = MotorFile::read(motor)?;
+    if let Some(estimator) = &args.estimator {
+        motor.choose(estimator)?;
+    }
     let tuned = rules::tune(&motor)?;
     let out = args.out.clone().map_or_else(|| output_folder("tune"), Ok)?;
     let files = match &args.fmu {
@@ -125,7 +128,11 @@ fn table(trials: &[Trial]) {
         let Trial { task, angles, started, held, least, error, .. } = trial;
         let least = if *started > 0 { format!("{least:8.3} pu") } else { format!("{:>11}", "-") };
         let error = if *held > 0 { format!("{error:.1} deg") } else { "-".into() };
-        let verdict = if trial.starts() && trial.holds() { "holds" } else { "does not hold, as announced" };
+        let verdict = match (trial.starts() && trial.holds(), trial.slips()) {
+            (true, false) => "holds",
+            (true, true) => "slipped, recovered",
+            (false, _) => "does not hold: see the note",
+        };
         let level = format!("{:.2}", task.level);
         let level = level.trim_end_matches('0').trim_end_matches('.');
         println!(

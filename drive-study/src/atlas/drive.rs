@@ -2,7 +2,7 @@
 
 use super::run::Approach;
 use crate::compare::candidate::{Candidate, Class, Entry};
-use crate::runner::Bench;
+use crate::runner::{Bench, REFERENCE_SPEED};
 use crate::tune::motor::MotorFile;
 use crate::tune::rules;
 use anyhow::{Context, Result, anyhow, bail};
@@ -34,7 +34,9 @@ impl Drive {
     pub fn compared(entry: Entry) -> Self {
         let Candidate { class, mut bench, .. } = Candidate::new(entry);
         let rest = class == Class::FluxObserver;
-        bench.speed *= if rest { 2.0 } else { 1.0 };
+        if rest {
+            bench.speed = REFERENCE_SPEED;
+        }
         Self {
             name: entry.name.into(),
             machine: entry.machine().into(),

@@ -106,7 +106,7 @@ impl Candidate {
     pub fn new(entry: Entry) -> Self {
         let class = entry.kind.class();
         let (mut pair, torque) = match entry.kind {
-            Kind::Rasmussen => (Pair::default(), 2.0),
+            Kind::Rasmussen => (Pair::default(), runner::PAPER_LOAD),
             _ => (runner::drive(entry.kind), runner::RATED_TORQUE),
         };
         pair.controller.model.parameters.estimator = entry.kind;

@@ -171,6 +171,12 @@ impl Signals {
                 "{file}: --map {name}={header}: the record has no column {header}"
             );
         }
+        for (name, unit) in &naming.units {
+            ensure!(
+                columns.iter().any(|(n, _)| n == name),
+                "{file}: --unit {name}={unit}: the record has no column {name}"
+            );
+        }
         Ok(Self { file: file.into(), lines: table.rows().iter().map(|(line, _)| *line).collect(), columns })
     }
 

@@ -65,8 +65,8 @@ pub struct Options {
     pub rate: Option<f64>,
     /// Times in s between which there is no current.
     pub zero: Option<(f64, f64)>,
-    /// There is no load.
-    pub no_load: bool,
+    /// Column of the load torque, `tau_load` or `tau_shaft`; `none` for a free shaft; the column that there is if `None`.
+    pub load: Option<String>,
     /// Values that a commissioning does not tell, by their names in a motor file.
     pub given: Vec<(String, f64)>,
 }

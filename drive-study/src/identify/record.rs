@@ -3,7 +3,7 @@
 
 use super::columns::Signals;
 use super::{Complex, Options};
-use anyhow::{Result, bail, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -138,10 +138,13 @@ impl BenchRecord {
         } else {
             notes.push("no row is without voltage at the start: the currents are taken without an offset (--zero 0:0.05 names a time without current)".into());
         }
-        let load = match (options.no_load, signals.get("tau_load").or_else(|| signals.get("tau_shaft"))) {
-            (false, Some(load)) => Some(load.to_vec()),
-            (true, _) => Some(vec![0.0; rows]),
-            (false, None) => None,
+        let load = match options.load.as_deref() {
+            Some("none") => Some(vec![0.0; rows]),
+            Some(column) => {
+                let missing = || format!("{}: --load {column}: the record has no such column", signals.file);
+                Some(signals.get(column).with_context(missing)?.to_vec())
+            }
+            None => signals.get("tau_load").or_else(|| signals.get("tau_shaft")).map(<[f64]>::to_vec),
         };
         Ok(Self { file: signals.file.clone(), t, step, u, rotor_voltage, i, theta, load, u_dc, runs, sigma, notes })
     }

@@ -95,8 +95,19 @@ impl Bandwidths {
             })
         });
         let calm = if rasmussen { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
-        let rule = "dips by 0.05 pu under a step of the rated torque; at most a third of the observer";
-        let speed = Chosen::new(given.speed.as_ref(), rule, || wanted.min(observer.value / 3.0).min(calm));
+        let chosen = wanted.min(observer.value / 3.0).min(calm);
+        let why = if chosen < wanted.min(observer.value / 3.0) {
+            "what the gain through the change of i_q allows"
+        } else if chosen < wanted {
+            "a third of the observer"
+        } else if chosen > needed {
+            "the minimum"
+        } else {
+            "for this dip"
+        };
+        let dip: f64 = format!("{:.1e}", DIP * needed / chosen).parse().unwrap_or(DIP);
+        let rule = format!("{why}: with an exact estimate, a step of the rated torque takes {dip} pu off the speed");
+        let speed = Chosen::new(given.speed.as_ref(), &rule, || chosen);
         let current = if rasmussen {
             Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
         } else {

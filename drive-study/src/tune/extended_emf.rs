@@ -59,12 +59,12 @@ pub fn settings(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
     let decay = 0.5 * swing(data, lead) * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
     vec![
         set("current.active_resistance", Value::Boolean(true), "K_i = w_c^2 L"),
-        set("current.mtpa", Value::Boolean(true), "salient: least current for a torque"),
+        set("current.mtpa", Value::Boolean(true), "salient: minimum current for a torque"),
         real("speed_loop.b", 1.0, "proportional part on the whole error"),
         real("limit.i_q", limit, "the maximum current"),
         real("limit.tau", GREATEST_TORQUE * torque, "1.6 times the rated torque"),
         real("tracker.bandwidth", rho, "bandwidth.observer"),
-        real("emf.bandwidth", EMF_PER_TRACKER * rho, "7.5 times the tracker's; 3 times is the least"),
+        real("emf.bandwidth", EMF_PER_TRACKER * rho, "7.5 times the tracker's; at least 3 times is needed"),
         real("emf.w_sign", 0.01 * n_p * rating.speed.get_ref(), "0.01 of the rated electrical speed"),
         set("emf.hold_reversal", Value::Boolean(true), "a load step at low speed passes zero"),
         real("emf.w_hold", 0.08 * n_p * rating.speed.get_ref(), "0.08 of the rated electrical speed"),

@@ -87,6 +87,15 @@ pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Ve
         }
         if !trial.holds() {
             tell(What::Load, of_load(&motor.data, par, trial));
+        } else if trial.slips() {
+            notes.push(format!(
+                "at {} pu, the drive slips under {} and recovers: the estimate is up to {:.0} deg off, and the speed comes down to \
+                 {:.2} pu",
+                short(level),
+                step(trial),
+                trial.error,
+                trial.least
+            ));
         } else if trial.least <= 0.0 {
             notes.push(format!(
                 "at {} pu, {} takes the speed to {:.2} pu, through zero, where the estimate depends on R_s",

@@ -1,9 +1,13 @@
 //! The file of a machine: its data, its supply, and the bandwidths of its loops.
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, bail};
+use drive::estimator::Kind;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
+
+/// Estimators that the rules tune.
+pub const RULED: [Kind; 2] = [Kind::Rasmussen, Kind::ExtendedEmf];
 
 /// A number of the file with its position.
 pub type Number = Spanned<f64>;
@@ -234,6 +238,19 @@ impl MotorFile {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
         Self::parse(&text, path)
+    }
+
+    /// Tunes for this estimator instead of the file's.
+    ///
+    /// # Errors
+    /// There are no rules for it.
+    pub fn choose(&mut self, estimator: &str) -> Result<()> {
+        if !RULED.iter().any(|kind| kind.name() == estimator) {
+            let known = RULED.map(Kind::name).join(" or ");
+            bail!("estimator {estimator}: fmu tune has no rules for it; choose {known}");
+        }
+        self.data.control.estimator = Some(Spanned::new(0..0, estimator.to_owned()));
+        Ok(())
     }
 
     /// A file named in this one, relative to its folder.

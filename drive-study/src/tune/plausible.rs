@@ -18,6 +18,10 @@ struct Check<'a> {
     per_unit: f64,
     what: &'static str,
     range: (f64, f64),
+    /// The range of usual machines, which another unit must reach.
+    usual: (f64, f64),
+    /// What to write instead where no other unit fits.
+    remedy: String,
     units: &'static [(&'static str, f64)],
 }
 
@@ -30,14 +34,14 @@ pub fn check(motor: &MotorFile) -> Result<()> {
 }
 
 fn one(motor: &MotorFile, check: &Check<'_>) -> Result<()> {
-    let &Check { name, value, unit, per_unit, what, range: (low, high), units } = check;
+    let &Check { name, value, unit, per_unit, what, range: (low, high), usual, ref remedy, units } = check;
     let x = *value.get_ref();
-    let fits = |x: f64| (low..=high).contains(&(x * per_unit));
-    if fits(x) {
+    if (low..=high).contains(&(x * per_unit)) {
         return Ok(());
     }
+    let fits = |x: f64| (usual.0..=usual.1).contains(&(x * per_unit));
     let suggestion = units.iter().find(|(_, size)| fits(x * size)).map_or_else(
-        || "correct it, or the values it is compared with".to_owned(),
+        || remedy.clone(),
         |(other, size)| format!("{x} {other} would fit: write {} {unit}", short(x * size)),
     );
     bail!(
@@ -54,6 +58,8 @@ fn short(x: f64) -> f64 {
 
 const SPEED: &[(&str, f64)] = &[("rpm", std::f64::consts::PI / 30.0), ("deg/s", std::f64::consts::PI / 180.0)];
 
+const CORRECT: &str = "correct it, or the values it is compared with";
+
 const INDUCTANCE: &[(&str, f64)] = &[("mH", 1e-3), ("uH", 1e-6)];
 
 fn checks(data: &Data) -> Vec<Check<'_>> {
@@ -62,6 +68,23 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
     let (n_p, psi_M, i, u_dc) =
         (f64::from(*machine.n_p.get_ref()), of(&machine.psi_M), of(&rating.current), of(&data.dc_link.u_dc));
     let (speed, torque) = (of(&rating.speed), of(&rating.torque));
+    let of_kv = format!(
+        "it is the peak value of a phase: from KV in rpm/V, 60 / (2 pi sqrt(3) n_p KV) with n_p = {n_p} pole pairs; for the EMF \
+         to reach u_dc / sqrt(3) at rating.speed, psi_M is {} Wb",
+        short(u_dc / (3.0_f64.sqrt() * n_p * speed))
+    );
+    let (R_s, highest) = (of(&machine.R_s), u_dc / 3.0_f64.sqrt());
+    let of_current = if i * R_s > highest {
+        format!(
+            "rating.current = {i} A takes {} V of R_s, and a phase has u_dc / sqrt(3) = {} V at most: lower rating.current, a peak \
+             value, below {} A, or correct R_s, which is that of one phase",
+            short(i * R_s),
+            short(highest),
+            short(0.6 * u_dc / R_s)
+        )
+    } else {
+        CORRECT.into()
+    };
     let saliency = (of(&machine.L_q) - of(&machine.L_d)).abs();
     let inductance = |name, value| Check {
         name,
@@ -70,6 +93,8 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
         per_unit: i / psi_M,
         what: "L i / psi_M at rating.current",
         range: (0.003, 30.0),
+        usual: (0.003, 30.0),
+        remedy: CORRECT.into(),
         units: INDUCTANCE,
     };
     let top = rating.speed_max.as_ref().map(|value| Check {
@@ -79,24 +104,32 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
         per_unit: 1.0 / speed,
         what: "its multiple of rating.speed",
         range: (1.0, 10.0),
+        usual: (1.0, 10.0),
+        remedy: CORRECT.into(),
         units: SPEED,
     });
     #[rustfmt::skip]
     let mut all = vec![
         Check { name: "dc_link.u_dc", value: &data.dc_link.u_dc, unit: "V", per_unit: 1.0,
-            what: "a DC link, in V,", range: (1.0, 1e4), units: &[("kV", 1e3)] },
+            what: "a DC link, in V,", range: (1.0, 1e4), usual: (1.0, 1e4),
+            remedy: CORRECT.into(), units: &[("kV", 1e3)] },
         Check { name: "machine.psi_M", value: &machine.psi_M, unit: "Wb", per_unit: n_p * speed * 3.0_f64.sqrt() / u_dc,
-            what: "the EMF at rating.speed over u_dc / sqrt(3)", range: (0.02, 50.0), units: &[("mWb", 1e-3), ("uWb", 1e-6)] },
+            what: "the EMF at rating.speed over u_dc / sqrt(3)", range: (0.02, 50.0), usual: (0.1, 3.0),
+            remedy: of_kv, units: &[("mWb", 1e-3), ("uWb", 1e-6)] },
         Check { name: "rating.speed", value: &rating.speed, unit: "rad/s", per_unit: n_p * psi_M * 3.0_f64.sqrt() / u_dc,
-            what: "the EMF over dc_link.u_dc / sqrt(3)", range: (0.02, 5.0), units: SPEED },
+            what: "the EMF over dc_link.u_dc / sqrt(3)", range: (0.02, 5.0), usual: (0.02, 5.0),
+            remedy: CORRECT.into(), units: SPEED },
         inductance("machine.L_d", &machine.L_d),
         inductance("machine.L_q", &machine.L_q),
         Check { name: "machine.R_s", value: &machine.R_s, unit: "Ohm", per_unit: i / u_dc,
-            what: "R_s i over u_dc at rating.current", range: (1e-4, 0.6), units: &[("mOhm", 1e-3), ("uOhm", 1e-6)] },
+            what: "R_s i over u_dc at rating.current", range: (1e-4, 0.6), usual: (2e-3, 0.3),
+            remedy: of_current, units: &[("mOhm", 1e-3), ("uOhm", 1e-6)] },
         Check { name: "rating.torque", value: &rating.torque, unit: "N.m", per_unit: 1.0 / (1.5 * n_p * (psi_M + saliency * i) * i),
-            what: "its share of the torque that rating.current can give", range: (0.005, 1.5), units: &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)] },
+            what: "its share of the torque that rating.current can give", range: (0.005, 1.5), usual: (0.005, 1.5),
+            remedy: CORRECT.into(), units: &[("mN.m", 1e-3), ("N.cm", 1e-2), ("kN.m", 1e3)] },
         Check { name: "mechanics.J", value: &data.mechanics.J, unit: "kg.m2", per_unit: speed / torque,
-            what: "the time in s to rating.speed with rating.torque", range: (1e-4, 1e3), units: &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)] },
+            what: "the time in s to rating.speed with rating.torque", range: (1e-4, 1e3), usual: (1e-4, 1e3),
+            remedy: CORRECT.into(), units: &[("kg.cm2", 1e-4), ("g.cm2", 1e-7), ("g.m2", 1e-3)] },
     ];
     all.extend(top);
     all
@@ -113,6 +146,18 @@ mod tests {
         assert!(TEXT.contains(from), "{from}");
         let motor = MotorFile::parse(&TEXT.replacen(from, to, 1), Path::new("m.toml")).unwrap();
         check(&motor).unwrap_err().to_string()
+    }
+
+    /// Data of public reports: the flux from another rule than that of KV, and a current that the voltage cannot drive.
+    #[test]
+    fn a_unit_that_is_far_off_is_not_named() {
+        let flux = refused("psi_M = 0.545", "psi_M = 12000.0");
+        assert!(flux.contains("60 / (2 pi sqrt(3) n_p KV) with n_p = 3") && !flux.contains("would fit"), "{flux}");
+        assert!(flux.contains("psi_M is 0.6616 Wb"), "{flux}");
+        let current = refused("R_s = 3.6", "R_s = 22.0");
+        for part in ["rating.current = 15 A takes 330 V of R_s", "u_dc / sqrt(3) = 311.8 V at most", "below 14.73 A"] {
+            assert!(current.contains(part) && !current.contains("would fit"), "{current}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@
 use super::bandwidth::Bandwidths;
 use super::check::check;
 use super::iron;
-use super::motor::{Data, MotorFile, Number};
+use super::motor::{Data, MotorFile, Number, RULED};
 use super::voltage::{self, Voltage};
 use super::{extended_emf, flux_map, losses, plausible, rasmussen, saturation};
 use anyhow::{Result, anyhow, bail};
@@ -159,7 +159,7 @@ fn estimator(motor: &MotorFile) -> Result<Kind> {
     let Some(given) = &motor.data.control.estimator else {
         return Ok(if salient { Kind::ExtendedEmf } else { Kind::Rasmussen });
     };
-    let known = [Kind::ExtendedEmf, Kind::Rasmussen].into_iter().find(|kind| kind.name() == given.get_ref());
+    let known = RULED.into_iter().find(|kind| kind.name() == given.get_ref());
     known.ok_or_else(|| {
         let (place, name) = (motor.place(given), given.get_ref());
         anyhow!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out")
@@ -195,8 +195,8 @@ fn plant(data: &Data) -> Vec<Setting> {
 /// Values for every estimator.
 fn common(data: &Data, bandwidths: &Bandwidths, estimator: Kind) -> Vec<Setting> {
     let Data { machine, mechanics, .. } = data;
-    let mut all =
-        vec![set("estimator", Value::Item(estimator.name().into()), "by the saliency, or as given"), lock(data)];
+    let rule = if data.control.estimator.is_some() { "as given" } else { "by the saliency" };
+    let mut all = vec![set("estimator", Value::Item(estimator.name().into()), rule), lock(data)];
     all.push(bandwidths.T_s.setting("T_s"));
     all.extend([
         set("motor.n_p", Value::Integer(*machine.n_p.get_ref()), "as given"),

@@ -82,6 +82,11 @@ impl Trial {
         self.started == self.angles
     }
 
+    /// Whether the estimate left the rotor on the way to a load that is held in the end: beyond 90 deg, i_q turns the other way.
+    pub fn slips(&self) -> bool {
+        self.error > 90.0
+    }
+
     /// Whether it held the load wherever it started.
     pub fn holds(&self) -> bool {
         self.held == self.started

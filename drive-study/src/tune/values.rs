@@ -5,7 +5,6 @@ use super::{MotorFile, needed, of_drive};
 use anyhow::Result;
 use serde_json::{Map, Value as Json, json};
 use std::path::Path;
-use toml::Spanned;
 
 /// Name, source and notes of a machine, and for each FMU the start values by their names, in SI units, enumerations as integers.
 ///
@@ -14,7 +13,7 @@ use toml::Spanned;
 pub fn values(path: &Path, estimator: Option<&str>) -> Result<Json> {
     let mut motor = MotorFile::read(path)?;
     if let Some(estimator) = estimator {
-        motor.data.control.estimator = Some(Spanned::new(0..0, estimator.to_owned()));
+        motor.choose(estimator)?;
     }
     let tuned = rules::tune(&motor)?;
     let (plant, controller) = needed(&tuned, true)?;

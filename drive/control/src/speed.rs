@@ -141,7 +141,14 @@ type P = Row<SpeedLoop>;
 
 /// Variables of the speed loop; their owner supplies the prefix `speed_loop.`.
 pub const SPEED_LOOP: &Table<SpeedLoop> = table![
-    P::parameter("bandwidth", &RAD_PER_S, "Bandwidth of the speed loop", |p| &mut p.bandwidth).above(0.0).tunable(),
+    P::parameter(
+        "bandwidth",
+        &RAD_PER_S,
+        "Crossover frequency of the speed loop; from speed_ref to speed, the -3 dB bandwidth is half of it at b = 0.5",
+        |p| &mut p.bandwidth,
+    )
+    .above(0.0)
+    .tunable(),
     P::parameter("t_is", &ONE, "Integral time constant in units of 1/bandwidth", |p| &mut p.t_is).above(0.0).tunable(),
     P::parameter("b", &ONE, "Set-point weight of the proportional part", |p| &mut p.b)
         .at_least(0.0)

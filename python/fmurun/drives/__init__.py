@@ -56,6 +56,8 @@ def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
     models = ("PmsmDrive", "PmsmDriveMean", "PmsmPlant", "SensorlessController")
     if fmu not in models:
         raise ValueError(f"fmu must be one of {', '.join(models)}, not {fmu!r}")
+    if estimator is not None and fmu == "PmsmPlant":
+        raise ValueError(f"estimator = {estimator!r}: PmsmPlant has no estimator; leave it out")
     if fmi not in (2, 3):
         raise ValueError(f"fmi must be 2 or 3, not {fmi!r}")
     path = machines.get(motor, os.fspath(motor))
