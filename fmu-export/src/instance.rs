@@ -9,6 +9,7 @@ use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::capability::{Eventful, ToEvent};
+use fmu_core::idle::Watch;
 use fmu_core::log::WARNING;
 use fmu_core::log::{Said, Warnings};
 use fmu_core::resource::Shelf;
@@ -81,6 +82,8 @@ pub struct Instance<E: Exported> {
     pub(crate) forgiven: u8,
     /// The first step, or continuous time, has begun.
     pub(crate) begun: bool,
+    /// What was set and has no effect.
+    watch: Watch,
     starts: Starts,
 }
 
@@ -124,6 +127,7 @@ impl<E: Exported> Instance<E> {
             warned: Vec::new(),
             forgiven: 0,
             begun: false,
+            watch: Watch::default(),
             starts: Starts::default(),
         }
     }
@@ -185,6 +189,7 @@ impl<E: Exported> Instance<E> {
         }
         self.warned.clear();
         self.begun = false;
+        self.watch = Watch::default();
         self.log.event(|| format!("{}: reset", self.name));
     }
 
@@ -364,8 +369,11 @@ impl<E: Exported> Instance<E> {
         if !self.log.hears_model(own) {
             return;
         }
-        let Self { current, log, warned, name, .. } = self;
-        let now = current.elapsed.seconds();
+        let Self { current, log, warned, watch, name, .. } = self;
+        let (now, end) = (current.elapsed.seconds(), current.end);
+        if log.hears(WARNING, own) {
+            watch.look(&mut current.block, |said| log.said(WARNING, own, &format!("{name}: at {end} s: {said}")));
+        }
         warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
         let mut sink = |(category, key, message): Said<'_>| {
             if log.hears(category, own) && !warned.iter().any(|&(other, _)| other == key) {
