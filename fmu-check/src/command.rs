@@ -132,7 +132,7 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
         return Err(Error(format!("--allow {name}: there is no such check; --list shows them")));
     }
     if args.verbose && args.format != Format::Text {
-        bail!("--verbose: is for --format text; the other formats have every check");
+        return Err(Error("--verbose: is for --format text; the other formats have every check".into()));
     }
     let options = Options {
         only: args.only.clone(),
