@@ -31,6 +31,9 @@ pub mod target;
 pub mod vendor;
 pub mod workspace;
 
+/// The tool, as `generationTool` names it.
+pub const TOOL: &str = concat!("fmu ", env!("CARGO_PKG_VERSION"));
+
 /// The work failed although the command and its files were valid: exit status 1 instead of 2.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]

@@ -2,7 +2,8 @@
 //! remaining variables become connectors of the system, named as in `PmsmDrive`. Features that some importers do not
 //! support are optional.
 
-use crate::pack::{Entry, Moment, TOOL};
+use crate::TOOL;
+use crate::pack::{Entry, Moment};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;

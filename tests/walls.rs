@@ -239,12 +239,67 @@ fn no_line_is_longer_than_160_characters() {
     }
 }
 
-/// The circles of files that stand: a crate, and the files of one circle. A circle may become smaller, and none may be new.
+/// Circles of files that stay, though large.
 ///
-/// Two stay. In fmu-core, a table is an array of rows, a row has a table within, and a capability is a trait that asks for a
-/// table: one recursive type in many files. In fmu-export, the files of the calls are `impl` blocks of `Instance`, which its own
-/// calls use.
-const CIRCLES: &[(&str, &[&str])] = &[
+/// In fmu-core, a table is an array of rows, a row has a table within, and a capability is a trait that asks for a table: one
+/// recursive type in many files. In fmu-export, the files of the calls are `impl` blocks of `Instance`, which its own calls use.
+const STAYING: &[(&str, &[&str])] = &[
+    (
+        "fmu-core",
+        &[
+            "capability.rs",
+            "clock.rs",
+            "continuous.rs",
+            "enumeration.rs",
+            "events.rs",
+            "integer.rs",
+            "intermediate.rs",
+            "kinds.rs",
+            "list.rs",
+            "model.rs",
+            "reals.rs",
+            "row.rs",
+            "row/slot.rs",
+            "rules.rs",
+            "sizes.rs",
+            "table.rs",
+            "terminal.rs",
+            "token.rs",
+            "variable.rs",
+        ],
+    ),
+    (
+        "fmu-export",
+        &[
+            "access.rs",
+            "binary.rs",
+            "blob.rs",
+            "clocks.rs",
+            "exchange.rs",
+            "inside.rs",
+            "instance.rs",
+            "message.rs",
+            "registry.rs",
+            "sensitivity.rs",
+            "snapshot.rs",
+        ],
+    ),
+];
+
+/// Small circles: a type in two files, or a function that calls its parts, which call it.
+const SMALL: &[(&str, &[&str])] = &[
+    ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
+    ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
+    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs", "commands/simulate/worker.rs"]),
+    ("fmu-core", &["description.rs", "description/sizes.rs", "description/terminals.rs"]),
+    ("fmu-core", &["integrate.rs", "integrate/euler.rs"]),
+    ("fmu-export", &["abi/fault.rs", "abi/gate.rs", "abi/mod.rs", "abi/types.rs"]),
+    ("fmu-import", &["instance.rs", "instance/clocks.rs"]),
+    ("fmu-system", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
+];
+
+/// Circles of the drive that are still to be opened: the list may only become shorter.
+const OF_THE_DRIVE: &[(&str, &[&str])] = &[
     ("drive", &["lib.rs", "pair.rs", "pmsm_drive.rs", "pmsm_drive_mean/mod.rs", "pmsm_drive_mean/motion.rs"]),
     ("drive", &["dc_link/circuit.rs", "dc_link/mod.rs"]),
     ("drive", &["steady/mod.rs", "steady/operating.rs"]),
@@ -390,81 +445,28 @@ const CIRCLES: &[(&str, &[&str])] = &[
         ],
     ),
     ("drive-study", &["tune/limits.rs", "tune/remedy.rs"]),
-    ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
-    ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
-    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs", "commands/simulate/worker.rs"]),
-    ("fmu", &["documentation.rs", "documentation/preset.rs"]),
-    ("fmu", &["licenses.rs", "pack.rs"]),
-    ("fmu-check", &["check.rs", "session.rs"]),
-    ("fmu-check", &["checks/access.rs", "checks/held.rs", "checks/values.rs"]),
-    ("fmu-check", &["checks/author.rs", "checks/binary.rs"]),
-    ("fmu-check", &["checks/exchange.rs", "checks/exchange_held.rs"]),
-    ("fmu-check", &["checks/host.rs", "checks/surroundings.rs"]),
-    ("fmu-check", &["exchange.rs", "instance.rs", "states.rs"]),
-    (
-        "fmu-core",
-        &[
-            "capability.rs",
-            "clock.rs",
-            "continuous.rs",
-            "enumeration.rs",
-            "events.rs",
-            "integer.rs",
-            "intermediate.rs",
-            "kinds.rs",
-            "list.rs",
-            "model.rs",
-            "reals.rs",
-            "row.rs",
-            "row/slot.rs",
-            "rules.rs",
-            "sizes.rs",
-            "table.rs",
-            "terminal.rs",
-            "token.rs",
-            "variable.rs",
-        ],
-    ),
-    ("fmu-core", &["description.rs", "description/sizes.rs", "description/terminals.rs"]),
-    ("fmu-core", &["integrate.rs", "integrate/euler.rs"]),
-    ("fmu-export", &["abi/fault.rs", "abi/gate.rs", "abi/mod.rs", "abi/types.rs"]),
-    (
-        "fmu-export",
-        &[
-            "access.rs",
-            "binary.rs",
-            "blob.rs",
-            "clocks.rs",
-            "exchange.rs",
-            "inside.rs",
-            "instance.rs",
-            "message.rs",
-            "registry.rs",
-            "sensitivity.rs",
-            "snapshot.rs",
-        ],
-    ),
-    ("fmu-import", &["instance.rs", "instance/clocks.rs"]),
-    ("fmu-system", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
 ];
 
 /// A file that can be read alone names others that do not name it.
 #[test]
 fn no_circle_of_files_is_new() {
-    let (mut new, mut all) = (String::new(), Vec::new());
+    assert!(STAYING.len() <= 2 && STAYING.len() + SMALL.len() <= 10, "too many circles of files");
+    assert!(SMALL.iter().all(|(_, files)| files.len() <= 5), "a circle of more than 5 files is not small");
+    let (mut new, mut all) = (Vec::new(), Vec::new());
     for (name, (folder, _)) in &crates() {
         let src = folder.join("src");
         let root = if src.join("lib.rs").is_file() { "lib.rs" } else { "main.rs" };
         let found = if src.join(root).is_file() { circles::circles(&src, root) } else { Vec::new() };
         for files in found {
             let is_in = |listed: &&[&str]| files.iter().all(|file| listed.contains(&file.as_str()));
-            if !CIRCLES.iter().any(|(of, listed)| of == name && is_in(listed)) {
-                new += &format!("    (\"{name}\", &{files:?}),\n");
+            let listed = [STAYING, SMALL, OF_THE_DRIVE].concat();
+            if !listed.iter().any(|(of, listed)| of == name && is_in(listed)) {
+                new.push(format!("    (\"{name}\", &{files:?}),"));
             }
             all.push(files);
         }
     }
     let has_table = |files: &Vec<String>| ["row.rs", "table.rs"].iter().all(|&file| files.iter().any(|f| f == file));
     assert!(all.iter().any(has_table), "the circle of tables and rows is not found: {all:?}");
-    assert!(new.is_empty(), "files that name each other in a circle:\n{new}");
+    assert!(new.is_empty(), "files that name each other in a circle:\n{}", new.join("\n"));
 }

@@ -6,8 +6,8 @@
 //! hard = ["G01b", "L08n"]
 //! ```
 
-use crate::check::Level;
 use crate::error::Error;
+use crate::level::Level;
 use crate::report::{Report, level};
 use serde::Deserialize;
 use std::collections::BTreeMap;

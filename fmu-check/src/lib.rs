@@ -17,11 +17,13 @@ mod exchange;
 mod fmu_file;
 mod formats;
 mod instance;
+mod level;
 pub mod probe;
 mod replay;
 pub mod report;
 mod runner;
 mod session;
+mod state;
 mod states;
 mod subjects;
 mod ticking;
@@ -29,10 +31,11 @@ mod trajectory;
 mod watch;
 mod zip_headers;
 
-pub use check::{Check, Finding, Group, Level, Levels, Options, Verdict};
+pub use check::{Check, Finding, Group, Levels, Options, Verdict};
 pub use checks::GROUPS;
 pub use error::Error;
 pub use fmu_file::{FmuFile, Unusable};
+pub use level::Level;
 
 use std::path::Path;
 use std::sync::Arc;

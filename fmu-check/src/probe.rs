@@ -1,8 +1,9 @@
 //! One probe: runs one check of the binary in this process and writes its findings to a file for the parent.
 
-use crate::check::{Level, Run};
+use crate::check::Run;
 use crate::checks::GROUPS;
 use crate::error::Error;
+use crate::level::Level;
 pub use crate::session::ProbeArguments;
 use crate::session::{Line, NotDetermined, NotOpened, Session};
 use fmu_import::guard;

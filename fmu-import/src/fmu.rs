@@ -45,7 +45,7 @@ pub fn outline(path: &Path) -> Result<Outline, Error> {
     Ok(Outline { description: Arc::unwrap_or_clone(archive.description), terminals, files })
 }
 
-/// An archive in a folder of its own, for [`describe`].
+/// An archive in a folder of its own, for [`describe`](crate::describe).
 pub struct Unpacked {
     folder: Folder,
     /// The library for this platform.

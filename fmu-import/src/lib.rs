@@ -2,7 +2,7 @@
 //! both standards.
 //!
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
-//! - [`quantity`]: numbers with units, as a user writes them.
+//! - [`quantity`]: numbers with units, as a user writes them; [`threads`]: work for several threads.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
 //! - [`guard`]: processes of their own for FMUs of unknown origin; [`limits`]: what they and a file may ask for.
 //!
@@ -40,6 +40,7 @@ pub mod platform;
 pub mod quantity;
 mod standard;
 mod text;
+pub mod threads;
 pub mod trace;
 mod value;
 

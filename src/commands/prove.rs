@@ -1,8 +1,9 @@
 //! `fmu prove`: the folders of examples that the FMI tools page asks for, and the importers that replayed them.
 
 use super::build::{self, Build};
+use crate::TOOL;
 use crate::message;
-use crate::pack::{self, TOOL};
+use crate::pack;
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
