@@ -1,8 +1,6 @@
 //! `documentation/index.html`: a self-contained page generated from the description.
 
-mod preset;
-
-pub use preset::preset;
+pub mod preset;
 
 use fmu_core::description::{Description, MemberDescription, Value, Variable, VariableKind};
 use fmu_core::terminal::MemberKind;

@@ -31,6 +31,9 @@ pub mod target;
 pub mod vendor;
 pub mod workspace;
 
+/// The tool, as `generationTool` names it.
+pub const TOOL: &str = concat!("fmu ", env!("CARGO_PKG_VERSION"));
+
 /// The work failed although the command and its files were valid: exit status 1 instead of 2.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
@@ -39,7 +42,9 @@ pub struct Failed(pub String);
 /// Exit status of an error: 1 if a simulation or a compiler failed, 2 for wrong usage and unusable files.
 pub fn exit_status(error: &anyhow::Error) -> u8 {
     let failed = |cause: &(dyn std::error::Error + 'static)| {
-        cause.is::<Failed>() || cause.downcast_ref::<fmu_import::Error>().is_some_and(fmu_import::Error::is_of_the_run)
+        let of_system = || cause.downcast_ref::<fmu_system::ssp::Error>().and_then(fmu_system::ssp::Error::of_fmu);
+        let of_fmu = cause.downcast_ref::<fmu_import::Error>().or_else(of_system);
+        cause.is::<Failed>() || of_fmu.is_some_and(fmu_import::Error::is_of_the_run)
     };
     if error.chain().any(failed) { 1 } else { 2 }
 }

@@ -71,7 +71,7 @@ impl Licenses {
         let mut out = format!(
             "SPDXVersion: SPDX-2.3\nDataLicense: CC0-1.0\nSPDXID: SPDXRef-DOCUMENT\nDocumentName: {name}\n\
              DocumentNamespace: https://spdx.org/spdxdocs/{name}-{version}-{id}\nCreator: Tool: {}\nCreated: {date}\n\n",
-            crate::pack::TOOL.replace(' ', "-"),
+            crate::TOOL.replace(' ', "-"),
         );
         let mut package = |id: &str, name: &str, version: &str, license: &str, source: &str, copyright: &str| {
             // Writing to a String does not fail.

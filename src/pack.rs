@@ -1,5 +1,6 @@
 //! The archive of an FMU: its contents, and a writer that gives the same bytes for the same contents.
 
+use crate::TOOL;
 use crate::documentation;
 use crate::licenses::Licenses;
 use anyhow::{Context, Result, anyhow, ensure};
@@ -14,9 +15,6 @@ use std::path::Path;
 use std::time::{SystemTime, UNIX_EPOCH};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
-
-/// The tool, as `generationTool` names it.
-pub const TOOL: &str = concat!("fmu ", env!("CARGO_PKG_VERSION"));
 
 /// A file of an archive.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,9 +1,10 @@
 //! An FMU with other start values, made from its archive: the same binaries with a [`preset`] among their
 //! resources, and a description that says so.
 
+use crate::TOOL;
 use crate::documentation;
 use crate::message;
-use crate::pack::{self, Entry, Moment, TOOL};
+use crate::pack::{self, Entry, Moment};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmu_core::description::{Value, Variable, VariableKind};
@@ -178,7 +179,7 @@ impl PresetFmu {
         let mut put = |name: &str, text: String| files.insert(name.into(), entry(name, text.into_bytes()));
         put(DESCRIPTION, model_description::write(&description, version, &generation(moment)));
         put(&format!("resources/{FILE}"), self.text());
-        let documentation = documentation::preset(&description, &self.own);
+        let documentation = documentation::preset::preset(&description, &self.own);
         put(PAGE, documentation::page(&Description { documentation, ..description.clone() }, version));
         let dir = tempfile::tempdir()?;
         let archive = dir.path().join("preset.fmu");

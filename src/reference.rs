@@ -9,7 +9,7 @@ use crate::pack::Entry;
 use anyhow::{Context, Result, bail};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
-use fmu_import::cosimulation::{Recording, Schedule, Sequence, Settings, System, cell};
+use fmu_system::cosimulation::{Recording, Schedule, Sequence, Settings, System, cell};
 use model_description::{BaseType, Causality};
 use std::collections::BTreeMap;
 use std::fmt::Write;

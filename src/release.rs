@@ -1,6 +1,7 @@
 //! Checksums and bill of materials of a release.
 
-use crate::pack::{self, Moment, TOOL};
+use crate::TOOL;
+use crate::pack::{self, Moment};
 use crate::workspace::{Package, Workspace};
 use anyhow::{Context, Result};
 use serde_json::{Value, json};

@@ -2,15 +2,16 @@
 //! remaining variables become connectors of the system, named as in `PmsmDrive`. Features that some importers do not
 //! support are optional.
 
-use crate::pack::{Entry, Moment, TOOL};
+use crate::TOOL;
+use crate::pack::{Entry, Moment};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;
-use fmu_import::cosimulation::{Settings, System};
-use fmu_import::ssp::ssv::{Parameter, read};
-use fmu_import::ssp::values::{self, Given};
-use fmu_import::ssp::{DESCRIPTION, FMU_TYPE};
 use fmu_import::{Fmu, Values as Read};
+use fmu_system::cosimulation::{Settings, System};
+use fmu_system::ssp::ssv::{Parameter, read};
+use fmu_system::ssp::values::{self, Given};
+use fmu_system::ssp::{DESCRIPTION, FMU_TYPE};
 use model_description::{
     BaseType, BaseUnit, Causality, Element, ModelDescription, ModelVariable, Unit, format_number, parse_number,
 };

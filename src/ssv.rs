@@ -2,18 +2,15 @@
 //!
 //! Numbers are in the units of the variables (SI), so no unit is named; an enumeration's value is the name of its item.
 
-use crate::pack::TOOL;
+use crate::TOOL;
 use drive_study::tune::rules::{Setting, Value};
 use fmu_core::variable::position;
+use fmu_plot::page::escape;
 use std::fmt::Write as _;
 
 const HEAD: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet \
      xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\" \
      xmlns:ssc=\"http://ssp-standard.org/SSP1/SystemStructureCommon\" version=\"1.0\"";
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-}
 
 /// The text of the file with these settings.
 pub fn text(name: &str, settings: &[Setting]) -> String {
@@ -46,7 +43,7 @@ pub fn text_of<'a>(name: &str, values: impl IntoIterator<Item = (&'a str, &'a Va
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fmu_import::ssp::ssv::read;
+    use fmu_system::ssp::ssv::read;
 
     #[test]
     fn what_is_written_reads_back() {

@@ -5,7 +5,7 @@
 mod common;
 
 use fmu_import::Fmu;
-use fmu_import::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
+use fmu_system::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 

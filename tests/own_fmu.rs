@@ -4,7 +4,7 @@
 use fmu::commands::build::{self, Build};
 use fmu_check::Level;
 use fmu_import::Fmu;
-use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
+use fmu_system::cosimulation::{Recording, Schedule, Settings, System};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::OnceLock;

@@ -90,7 +90,7 @@ fn the_manifest_names_what_is_there() {
             let source = experiment.split_once(part).unwrap().1.split('"').next().unwrap();
             assert!(files.contains_key(&format!("{FOLDER}{source}")), "{experiment}");
         }
-        let values = fmu_import::ssp::ssv::read(&text("ipmsm-2.2kw.ssv")).unwrap();
+        let values = fmu_system::ssp::ssv::read(&text("ipmsm-2.2kw.ssv")).unwrap();
         assert!(values.len() > 5 && values.iter().all(|p| md.variable(&p.name).is_some()), "{}", archive.display());
     }
 }

@@ -4,7 +4,7 @@
 mod common;
 
 use fmu_import::Fmu;
-use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
+use fmu_system::cosimulation::{Recording, Schedule, Settings, System};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;

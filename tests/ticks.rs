@@ -2,8 +2,8 @@
 #![allow(missing_docs, clippy::float_cmp)]
 
 use fmu::commands::build::{self, Build};
-use fmu_import::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use fmu_import::{Fmu, Values};
+use fmu_system::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 

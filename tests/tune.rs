@@ -5,7 +5,7 @@ mod common;
 
 use drive_study::tune::{self, motor::MotorFile, rules};
 use fmu::ssv;
-use fmu_import::ssp::ssv::{Parameter, read};
+use fmu_system::ssp::ssv::{Parameter, read};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 

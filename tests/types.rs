@@ -4,9 +4,9 @@
 mod common;
 
 use fmu::commands::build::{self, Build};
-use fmu_import::cosimulation::{Settings, System};
-use fmu_import::ssp::{ssv, values};
 use fmu_import::{Fmu, Instance, Kind, Values};
+use fmu_system::cosimulation::{Settings, System};
+use fmu_system::ssp::{ssv, values};
 use model_description::FmiVersion::{self, V2, V3};
 use model_description::{BaseType, Causality};
 use std::ops::ControlFlow;

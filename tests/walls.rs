@@ -14,7 +14,8 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-export", &["fmu-core"]),
     ("model-description", &["fmu-core"]),
     ("fmu-import", &["fmu-core", "model-description"]),
-    ("fmu-sweep", &["fmu-import", "model-description"]),
+    ("fmu-system", &["fmu-core", "fmu-import", "model-description"]),
+    ("fmu-sweep", &["fmu-import", "fmu-system", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
     ("fmu-plot", &[]),
     ("drive-base", &["fmu-core"]),
@@ -27,10 +28,20 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sensorless-controller-clocked", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("pmsm-drive-mean", &["drive", "fmu-export"]),
-    ("fmurun", &["drive-study", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"]),
+    ("fmurun", &["drive-study", "fmu-import", "fmu-plot", "fmu-sweep", "fmu-system", "model-description"]),
     (
         "fmu",
-        &["drive", "drive-study", "fmu-check", "fmu-core", "fmu-import", "fmu-plot", "fmu-sweep", "model-description"],
+        &[
+            "drive",
+            "drive-study",
+            "fmu-check",
+            "fmu-core",
+            "fmu-import",
+            "fmu-plot",
+            "fmu-sweep",
+            "fmu-system",
+            "model-description",
+        ],
     ),
 ];
 
@@ -89,10 +100,10 @@ fn known_to(name: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_checker_knows_no_motor_and_no_plotter() {
+fn the_checker_knows_no_motor_no_plotter_and_no_system() {
     let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
-    for foreign in ["drive", "drive-study", "fmu-plot", "nalgebra", "resvg", "libm"] {
+    for foreign in ["drive", "drive-study", "fmu-plot", "fmu-system", "nalgebra", "resvg", "libm", "anyhow"] {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
     }
 }
@@ -101,7 +112,7 @@ fn the_checker_knows_no_motor_and_no_plotter() {
 #[test]
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     let known = known_to("fmu-sweep");
-    assert!(known.contains("fmu-import") && known.contains("libm"), "{known:?}");
+    assert!(known.contains("fmu-system") && known.contains("libm"), "{known:?}");
     for foreign in ["drive", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
@@ -228,12 +239,67 @@ fn no_line_is_longer_than_160_characters() {
     }
 }
 
-/// The circles of files that stand: a crate, and the files of one circle. A circle may become smaller, and none may be new.
+/// Circles of files that stay, though large.
 ///
-/// Two stay. In fmu-core, a table is an array of rows, a row has a table within, and a capability is a trait that asks for a
-/// table: one recursive type in many files. In fmu-export, the files of the calls are `impl` blocks of `Instance`, which its own
-/// calls use.
-const CIRCLES: &[(&str, &[&str])] = &[
+/// In fmu-core, a table is an array of rows, a row has a table within, and a capability is a trait that asks for a table: one
+/// recursive type in many files. In fmu-export, the files of the calls are `impl` blocks of `Instance`, which its own calls use.
+const STAYING: &[(&str, &[&str])] = &[
+    (
+        "fmu-core",
+        &[
+            "capability.rs",
+            "clock.rs",
+            "continuous.rs",
+            "enumeration.rs",
+            "events.rs",
+            "integer.rs",
+            "intermediate.rs",
+            "kinds.rs",
+            "list.rs",
+            "model.rs",
+            "reals.rs",
+            "row.rs",
+            "row/slot.rs",
+            "rules.rs",
+            "sizes.rs",
+            "table.rs",
+            "terminal.rs",
+            "token.rs",
+            "variable.rs",
+        ],
+    ),
+    (
+        "fmu-export",
+        &[
+            "access.rs",
+            "binary.rs",
+            "blob.rs",
+            "clocks.rs",
+            "exchange.rs",
+            "inside.rs",
+            "instance.rs",
+            "message.rs",
+            "registry.rs",
+            "sensitivity.rs",
+            "snapshot.rs",
+        ],
+    ),
+];
+
+/// Small circles: a type in two files, or a function that calls its parts, which call it.
+const SMALL: &[(&str, &[&str])] = &[
+    ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
+    ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
+    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs", "commands/simulate/worker.rs"]),
+    ("fmu-core", &["description.rs", "description/sizes.rs", "description/terminals.rs"]),
+    ("fmu-core", &["integrate.rs", "integrate/euler.rs"]),
+    ("fmu-export", &["abi/fault.rs", "abi/gate.rs", "abi/mod.rs", "abi/types.rs"]),
+    ("fmu-import", &["instance.rs", "instance/clocks.rs"]),
+    ("fmu-system", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
+];
+
+/// Circles of the drive that are still to be opened: the list may only become shorter.
+const OF_THE_DRIVE: &[(&str, &[&str])] = &[
     ("drive", &["lib.rs", "pair.rs", "pmsm_drive.rs", "pmsm_drive_mean/mod.rs", "pmsm_drive_mean/motion.rs"]),
     ("drive", &["dc_link/circuit.rs", "dc_link/mod.rs"]),
     ("drive", &["steady/mod.rs", "steady/operating.rs"]),
@@ -379,127 +445,28 @@ const CIRCLES: &[(&str, &[&str])] = &[
         ],
     ),
     ("drive-study", &["tune/limits.rs", "tune/remedy.rs"]),
-    ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
-    ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
-    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs", "commands/simulate/worker.rs"]),
-    ("fmu", &["documentation.rs", "documentation/preset.rs"]),
-    ("fmu", &["licenses.rs", "pack.rs"]),
-    ("fmu-check", &["check.rs", "session.rs"]),
-    ("fmu-check", &["checks/access.rs", "checks/held.rs", "checks/values.rs"]),
-    ("fmu-check", &["checks/author.rs", "checks/binary.rs"]),
-    ("fmu-check", &["checks/exchange.rs", "checks/exchange_held.rs"]),
-    ("fmu-check", &["checks/host.rs", "checks/surroundings.rs"]),
-    ("fmu-check", &["exchange.rs", "instance.rs", "states.rs"]),
-    (
-        "fmu-core",
-        &[
-            "capability.rs",
-            "clock.rs",
-            "continuous.rs",
-            "enumeration.rs",
-            "events.rs",
-            "integer.rs",
-            "intermediate.rs",
-            "kinds.rs",
-            "list.rs",
-            "model.rs",
-            "reals.rs",
-            "row.rs",
-            "row/slot.rs",
-            "rules.rs",
-            "sizes.rs",
-            "table.rs",
-            "terminal.rs",
-            "token.rs",
-            "variable.rs",
-        ],
-    ),
-    ("fmu-core", &["description.rs", "description/sizes.rs", "description/terminals.rs"]),
-    ("fmu-core", &["integrate.rs", "integrate/euler.rs"]),
-    ("fmu-export", &["abi/fault.rs", "abi/gate.rs", "abi/mod.rs", "abi/types.rs"]),
-    (
-        "fmu-export",
-        &[
-            "access.rs",
-            "binary.rs",
-            "blob.rs",
-            "clocks.rs",
-            "exchange.rs",
-            "inside.rs",
-            "instance.rs",
-            "message.rs",
-            "registry.rs",
-            "sensitivity.rs",
-            "snapshot.rs",
-        ],
-    ),
-    (
-        "fmu-import",
-        &[
-            "abi/calls.rs",
-            "abi/functions.rs",
-            "abi/library.rs",
-            "abi/live.rs",
-            "abi/mod.rs",
-            "abi/raw/buffer.rs",
-            "abi/raw/callbacks.rs",
-            "abi/raw/equations.rs",
-            "abi/raw/instantiate.rs",
-            "abi/raw/mod.rs",
-            "abi/raw/names.rs",
-            "abi/raw/owned.rs",
-            "abi/raw/processor.rs",
-            "abi/raw/updates.rs",
-            "abi/signatures.rs",
-            "instance.rs",
-            "instance/clocks.rs",
-            "instance/equations.rs",
-            "lib.rs",
-        ],
-    ),
-    (
-        "fmu-import",
-        &[
-            "cosimulation/continuous.rs",
-            "cosimulation/events.rs",
-            "cosimulation/mod.rs",
-            "cosimulation/plan.rs",
-            "cosimulation/run.rs",
-        ],
-    ),
-    ("fmu-import", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
-    ("fmu-import", &["cosimulation/schedule.rs", "cosimulation/sequence.rs"]),
-    (
-        "fmu-import",
-        &[
-            "integration/dopri.rs",
-            "integration/driver.rs",
-            "integration/mod.rs",
-            "integration/rk4.rs",
-            "integration/steps.rs",
-        ],
-    ),
-    ("model-description", &["read.rs", "read/terminals.rs"]),
-    ("model-description", &["xml.rs", "xml/parse.rs", "xml/print.rs"]),
 ];
 
 /// A file that can be read alone names others that do not name it.
 #[test]
 fn no_circle_of_files_is_new() {
-    let (mut new, mut all) = (String::new(), Vec::new());
+    assert!(STAYING.len() <= 2 && STAYING.len() + SMALL.len() <= 10, "too many circles of files");
+    assert!(SMALL.iter().all(|(_, files)| files.len() <= 5), "a circle of more than 5 files is not small");
+    let (mut new, mut all) = (Vec::new(), Vec::new());
     for (name, (folder, _)) in &crates() {
         let src = folder.join("src");
         let root = if src.join("lib.rs").is_file() { "lib.rs" } else { "main.rs" };
         let found = if src.join(root).is_file() { circles::circles(&src, root) } else { Vec::new() };
         for files in found {
             let is_in = |listed: &&[&str]| files.iter().all(|file| listed.contains(&file.as_str()));
-            if !CIRCLES.iter().any(|(of, listed)| of == name && is_in(listed)) {
-                new += &format!("    (\"{name}\", &{files:?}),\n");
+            let listed = [STAYING, SMALL, OF_THE_DRIVE].concat();
+            if !listed.iter().any(|(of, listed)| of == name && is_in(listed)) {
+                new.push(format!("    (\"{name}\", &{files:?}),"));
             }
             all.push(files);
         }
     }
     let has_table = |files: &Vec<String>| ["row.rs", "table.rs"].iter().all(|&file| files.iter().any(|f| f == file));
     assert!(all.iter().any(has_table), "the circle of tables and rows is not found: {all:?}");
-    assert!(new.is_empty(), "files that name each other in a circle:\n{new}");
+    assert!(new.is_empty(), "files that name each other in a circle:\n{}", new.join("\n"));
 }

@@ -1,23 +1,22 @@
 //! A work queue: every thread takes the next job when it is free; results are returned in the order of the jobs.
 
-use std::num::NonZero;
+use fmu_import::threads;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
-use std::thread;
 
 /// Runs `work` on every job, on all cores.
 ///
 /// # Panics
 /// If `work` panics.
 pub fn map<J: Sync, R: Send>(jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
-    map_on(thread::available_parallelism().map_or(1, NonZero::get), jobs, work)
+    map_on(threads::available(), jobs, work)
 }
 
-/// Runs `work` on every job, on this many threads.
+/// Runs `work` on every job, on up to `count` threads.
 ///
 /// # Panics
 /// If `work` panics.
-pub fn map_on<J: Sync, R: Send>(threads: usize, jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
+pub fn map_on<J: Sync, R: Send>(count: usize, jobs: &[J], work: impl Fn(&J) -> R + Sync) -> Vec<R> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::with_capacity(jobs.len())));
     let worker = || {
         while let index = next.fetch_add(1, Ordering::Relaxed)
@@ -27,13 +26,7 @@ pub fn map_on<J: Sync, R: Send>(threads: usize, jobs: &[J], work: impl Fn(&J) ->
             done.lock().unwrap_or_else(PoisonError::into_inner).push((index, result));
         }
     };
-    thread::scope(|scope| {
-        // This thread works too: a busy system may have no room for another.
-        for _ in 1..threads.min(jobs.len()) {
-            let _ = thread::Builder::new().spawn_scoped(scope, worker);
-        }
-        worker();
-    });
+    threads::share(count.min(jobs.len()), |_| worker());
     let mut all = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     all.sort_unstable_by_key(|(index, _)| *index);
     all.into_iter().map(|(_, result)| result).collect()

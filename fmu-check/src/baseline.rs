@@ -6,7 +6,8 @@
 //! hard = ["G01b", "L08n"]
 //! ```
 
-use crate::check::Level;
+use crate::error::Error;
+use crate::level::Level;
 use crate::report::{Report, level};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -47,9 +48,9 @@ impl Baseline {
     ///
     /// # Errors
     /// The file cannot be read or is not a baseline.
-    pub fn read(path: &Path) -> anyhow::Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
-        toml::from_str(&text).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))
+    pub fn read(path: &Path) -> Result<Self, Error> {
+        let text = std::fs::read_to_string(path).map_err(|e| Error(format!("{}: {e}", path.display())))?;
+        toml::from_str(&text).map_err(|e| Error(format!("{}: {e}", path.display())))
     }
 
     /// Marks what is known. A finding that is more binding than it was is new.

@@ -1,24 +1,13 @@
 //! The vocabulary of the checker: levels, checks, groups, verdicts and options.
 
 use super::fmu_file::FmuFile;
+use super::level::Level;
 use super::session::{NotDetermined, Session};
 use fmu_import::guard::Allowance;
 use model_description::FmiVersion;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-
-/// How binding a requirement is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// The standard requires it.
-    Must,
-    /// The standard or its guides recommend it.
-    Should,
-    /// The standard leaves it open, but a robust FMU does it.
-    Hard,
-}
 
 /// The levels in FMI 2.0 and in FMI 3.0; `None` if the standard has no such requirement.
 #[derive(Clone, Copy, Debug)]

@@ -1,9 +1,9 @@
 //! The command `fmu check`: checks whether an FMU conforms to its standard.
 
 use crate::baseline::Baseline;
+use crate::error::Error;
 use crate::report::Report;
 use crate::{self as check, Options, formats, replay, report};
-use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::{guard, printable_lines};
 use std::fmt::Write;
@@ -99,8 +99,8 @@ fn is_check(name: &str) -> bool {
     check::GROUPS.iter().any(|g| g.checks.iter().any(|c| c.id.eq_ignore_ascii_case(name)))
 }
 
-fn seconds(name: &str, s: Option<f64>) -> Result<Option<Duration>> {
-    let duration = |s| Duration::try_from_secs_f64(s).map_err(|e| anyhow::anyhow!("{name} {s}: {e}"));
+fn seconds(name: &str, s: Option<f64>) -> Result<Option<Duration>, Error> {
+    let duration = |s| Duration::try_from_secs_f64(s).map_err(|e| Error(format!("{name} {s}: {e}")));
     s.map(duration).transpose()
 }
 
@@ -108,14 +108,14 @@ fn seconds(name: &str, s: Option<f64>) -> Result<Option<Duration>> {
 ///
 /// # Errors
 /// A file is not an FMU, or an id does not exist.
-pub fn run(args: &CheckArguments) -> Result<bool> {
+pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     if args.list {
         print!("{}", report::list());
         return Ok(true);
     }
     if let Some(id) = &args.explain {
         let Some(text) = report::explain(id) else {
-            bail!("--explain {id}: there is no such check; --list shows them")
+            return Err(Error(format!("--explain {id}: there is no such check; --list shows them")));
         };
         print!("{text}");
         return Ok(true);
@@ -123,10 +123,13 @@ pub fn run(args: &CheckArguments) -> Result<bool> {
     let group = |name: &str| check::GROUPS.iter().any(|g| g.name.eq_ignore_ascii_case(name));
     if let Some(name) = args.only.iter().find(|name| !is_check(name) && !group(name)) {
         let groups: Vec<_> = check::GROUPS.iter().map(|g| g.name).collect();
-        bail!("--only {name}: is neither a check (--list shows them) nor a group: {}", groups.join(", "));
+        return Err(Error(format!(
+            "--only {name}: is neither a check (--list shows them) nor a group: {}",
+            groups.join(", ")
+        )));
     }
     if let Some(name) = args.allow.iter().find(|name| !is_check(name)) {
-        bail!("--allow {name}: there is no such check; --list shows them");
+        return Err(Error(format!("--allow {name}: there is no such check; --list shows them")));
     }
     let options = Options {
         only: args.only.clone(),
@@ -136,7 +139,7 @@ pub fn run(args: &CheckArguments) -> Result<bool> {
         allowance: guard::Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Default::default() },
     };
     if let Some(what) = &args.replay {
-        let [file] = args.files.as_slice() else { bail!("--replay takes one file") };
+        let [file] = args.files.as_slice() else { return Err(Error("--replay takes one file".into())) };
         return replay::run(file, what, &options);
     }
     let baseline = args.baseline.as_deref().map(Baseline::read).transpose()?;
@@ -163,7 +166,7 @@ pub fn run(args: &CheckArguments) -> Result<bool> {
         (Format::Sarif, reports) => println!("{}", serde_json::to_string_pretty(&formats::sarif(reports))?),
     }
     if let Some(path) = &args.write_baseline {
-        std::fs::write(path, Baseline::text(&reports)).map_err(|e| anyhow::anyhow!("{}: {e}", path.display()))?;
+        std::fs::write(path, Baseline::text(&reports)).map_err(|e| Error(format!("{}: {e}", path.display())))?;
     }
     let holds = |report: &Report| match (args.strict, &baseline) {
         (true, _) => report.is_clean(),

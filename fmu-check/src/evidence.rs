@@ -1,6 +1,7 @@
 //! What a probe has left: its findings, its calls, its console, and the verdict from them.
 
-use crate::check::{Judgement, Level, Verdict};
+use crate::check::{Judgement, Verdict};
+use crate::level::Level;
 use crate::session::{FOUND, Line};
 use fmu_import::guard::End;
 use std::fs::{self, File};

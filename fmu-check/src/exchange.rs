@@ -5,7 +5,7 @@
 
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use crate::states::State;
+use crate::state::State;
 use fmu_import::Status;
 use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, UpdateResults, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
@@ -389,6 +389,36 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
         let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
         (largest > 1e-9).then_some((k + 1, largest))
     })
+}
+
+impl Session {
+    /// A complete run of each interface that this binary has, which nobody judges.
+    pub(super) fn complete_run(&self) -> Result<(), NotDetermined> {
+        let d = &self.description;
+        if d.co_simulation.is_some() {
+            let instance = self.stepping()?;
+            for k in 0..20 {
+                instance.change_inputs(k)?;
+                let _ = instance.step(self.h())?;
+                let _ = instance.snapshot(&self.watched())?;
+            }
+            let _ = instance.simple(Simple::Terminate)?;
+            instance.free()?;
+        }
+        let own = self.binary.file_stem().unwrap_or_default();
+        if d.model_exchange.as_ref().is_some_and(|i| own == i.model_identifier.as_str()) {
+            let instance = self.exchange(State::Event)?;
+            let run = Importer::start(&instance).and_then(|mut importer| {
+                importer.run(20, &mut |instance| instance.snapshot(&self.watched()).map(|_| ()))?;
+                Ok(importer.over)
+            });
+            if run.is_ok_and(|over| !over) {
+                let _ = instance.simple(Simple::Terminate)?;
+            }
+            instance.free()?;
+        }
+        Ok(())
+    }
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use crate::zip_headers::{Archive, contents, copy, is_inside};
 use fmu_import::platform::Platform;
-use fmu_import::{Folder, machine};
-use model_description::{Element, Error, FmiVersion, Interface, ModelDescription, ModelVariable, limits};
+use fmu_import::{Folder, limits, machine};
+use model_description::{Element, Error, FmiVersion, Interface, ModelDescription, ModelVariable};
 use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::{self, Read};

@@ -1,7 +1,8 @@
 //! Reports for other programs: JUnit's XML, which every CI shows, and SARIF 2.1.0, which code hosts show.
 
-use crate::check::{Finding, Level, Verdict};
+use crate::check::{Finding, Verdict};
 use crate::checks::GROUPS;
+use crate::level::Level;
 use crate::report::{Report, escape, level};
 use serde_json::{Value, json};
 use std::fmt::Write;

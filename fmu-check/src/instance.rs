@@ -1,10 +1,8 @@
 //! An instance under test.
 
-use crate::check::Level;
 use crate::encoding::show;
-use crate::exchange::Importer;
+use crate::level::Level;
 use crate::session::{ENDED, NotDetermined, Session};
-use crate::states::State;
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Simple, StepStatus};
 use model_description::{FmiVersion, ModelVariable};
@@ -82,36 +80,6 @@ impl Session {
         let instance = self.initializing()?;
         self.prepare(|| instance.exit())?;
         Ok(instance)
-    }
-}
-
-impl Session {
-    /// A complete run of each interface that this binary has, which nobody judges.
-    pub(super) fn complete_run(&self) -> Result<(), NotDetermined> {
-        let d = &self.description;
-        if d.co_simulation.is_some() {
-            let instance = self.stepping()?;
-            for k in 0..20 {
-                instance.change_inputs(k)?;
-                let _ = instance.step(self.h())?;
-                let _ = instance.snapshot(&self.watched())?;
-            }
-            let _ = instance.simple(Simple::Terminate)?;
-            instance.free()?;
-        }
-        let own = self.binary.file_stem().unwrap_or_default();
-        if d.model_exchange.as_ref().is_some_and(|i| own == i.model_identifier.as_str()) {
-            let instance = self.exchange(State::Event)?;
-            let run = Importer::start(&instance).and_then(|mut importer| {
-                importer.run(20, &mut |instance| instance.snapshot(&self.watched()).map(|_| ()))?;
-                Ok(importer.over)
-            });
-            if run.is_ok_and(|over| !over) {
-                let _ = instance.simple(Simple::Terminate)?;
-            }
-            instance.free()?;
-        }
-        Ok(())
     }
 }
 

@@ -32,7 +32,7 @@ fn main() -> ExitCode {
         None => command::run(&check).map(|holds| ExitCode::from(u8::from(!holds))),
     };
     outcome.unwrap_or_else(|error| {
-        let text = format!("{error:#}\n");
+        let text = format!("{error}\n");
         let _ = Error::raw(ErrorKind::Io, fmu_import::printable_lines(&text)).print();
         ExitCode::from(2)
     })

@@ -1,7 +1,9 @@
 //! One probe: runs one check of the binary in this process and writes its findings to a file for the parent.
 
-use crate::check::{Level, Run};
+use crate::check::Run;
 use crate::checks::GROUPS;
+use crate::error::Error;
+use crate::level::Level;
 pub use crate::session::ProbeArguments;
 use crate::session::{Line, NotDetermined, NotOpened, Session};
 use fmu_import::guard;
@@ -15,11 +17,13 @@ const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
 ///
 /// # Errors
 /// There is no such check, or the folder is not readable.
-pub fn run(args: &ProbeArguments) -> anyhow::Result<()> {
+pub fn run(args: &ProbeArguments) -> Result<(), Error> {
     guard::end_with_parent();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
     let probe = match check.map(|c| c.run) {
-        None | Some(Run::File(_)) => anyhow::bail!("there is no probe {}: --list names the checks", args.id),
+        None | Some(Run::File(_)) => {
+            return Err(Error(format!("there is no probe {}: --list names the checks", args.id)));
+        }
         Some(Run::Probe(probe) | Run::Any(probe) | Run::Silent(probe) | Run::Twice(probe)) => probe,
         Some(Run::Exchange(probe) | Run::Scheduled(probe)) => probe,
     };

@@ -1,8 +1,10 @@
 //! The report of `fmu check` as text, JSON and HTML.
 
-use crate::check::{Finding, Level, Verdict};
-use crate::checks::{GROUPS, calls};
+use crate::check::{Finding, Verdict};
+use crate::checks::GROUPS;
+use crate::checks::life::shared::calls;
 use crate::fmu_file::FmuFile;
+use crate::level::Level;
 use serde::Serialize;
 use std::fmt::Write;
 

@@ -11,7 +11,8 @@ use crate::fmu_file::FmuFile;
 use crate::session::Line;
 use crate::watch::{Pace, Watch};
 use fmu_import::guard::{self, Allowance, End, Guarded};
-use model_description::{Interface, limits};
+use fmu_import::{limits, threads};
+use model_description::Interface;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io;
@@ -57,7 +58,6 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
         checks.next().and_then(|_| why_no_run_succeeds(&runner, if exchange { "E00" } else { "L00" }))
     });
     let queue = Mutex::new(queue);
-    let workers = std::thread::available_parallelism().map_or(2, usize::from);
     let work = || {
         while let Some((check, verdict)) = take(&queue) {
             let why = match check.run {
@@ -84,13 +84,7 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     if let Ok(mut queue) = queue.lock() {
         queue.make_contiguous().sort_by_key(|(check, _)| !matches!(check.run, Run::Twice(_)));
     }
-    std::thread::scope(|scope| {
-        // This thread works too: on a busy machine the system may have no other.
-        for _ in 1..workers {
-            let _ = std::thread::Builder::new().spawn_scoped(scope, work);
-        }
-        work();
-    });
+    threads::share(threads::available(), |_| work());
     let lost = || Verdict::NotDetermined("the probe did not report a result".into()).into();
     let mut found: Vec<_> = verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
     if let Ok(runner) = &runner {

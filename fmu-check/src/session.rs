@@ -3,7 +3,7 @@
 //! Every finding is written at once and every call is written before it is made, so that nothing is lost if the FMU crashes the
 //! process. `Err(NotDetermined)` ends a probe that cannot decide.
 
-use crate::check::Level;
+use crate::level::Level;
 use clap::Args;
 use fmu_import::raw::{Arguments, Interface, Raw};
 use fmu_import::{file_uri, printable_lines};
@@ -143,32 +143,48 @@ impl Session {
         let _ = journal.write_all(b"P loading the binary");
         let raw = Raw::open(&args.binary, description.version)
             .map_err(|e| NotOpened::Load(format!("the binary does not load: {e}")))?;
-        Ok(Self {
+        let paths = [args.binary.clone(), args.dir.clone(), home, calls];
+        let timeout = Duration::from_secs_f64(args.seconds);
+        let session = Self::new(raw, description, paths, [lines, journal, log], timeout);
+        let integrator = Cell::new(args.integrator);
+        Ok(Self { integrator, trace: args.trace, from: args.from, one: args.one, ..session })
+    }
+
+    /// A session at its start that runs every case and prints nothing; the paths are those of the binary, of the unpacked folder, of
+    /// the working directory and of the journal, the files are those of the findings, the journal and the log.
+    fn new(
+        raw: Raw,
+        description: ModelDescription,
+        [binary, dir, home, calls]: [PathBuf; 4],
+        [lines, journal, log]: [File; 3],
+        timeout: Duration,
+    ) -> Self {
+        Self {
             raw,
             description,
-            binary: args.binary.clone(),
-            dir: args.dir.clone(),
+            binary,
+            dir,
             lines: RefCell::new(lines),
             journal: RefCell::new(journal),
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(false),
             unwritten: Cell::new(false),
-            integrator: Cell::new(args.integrator),
+            integrator: Cell::new(None),
             log: RefCell::new(log),
-            trace: args.trace,
-            from: args.from,
-            one: args.one,
+            trace: false,
+            from: 0,
+            one: false,
             next: Cell::new(0),
             violations: Cell::new(0),
             instances_made: Cell::new(0),
             of_case: Cell::new(0),
             began: Instant::now(),
             shown: Cell::new(Instant::now()),
+            timeout,
             home,
             calls,
-            timeout: Duration::from_secs_f64(args.seconds),
-        })
+        }
     }
 
     /// Loads the FMU once more, from this copy of its binary: for another thread, or under another path.
@@ -187,32 +203,13 @@ impl Session {
         let lost = |e: std::io::Error| NotDetermined(e.to_string());
         // It writes nothing but progress there.
         let journal = File::options().append(true).open(&self.calls).map_err(lost)?;
-        Ok(Self {
-            raw,
-            description: self.description.clone(),
-            binary: self.binary.clone(),
-            dir: dir.into(),
-            lines: RefCell::new(tempfile::tempfile().map_err(lost)?),
-            journal: RefCell::new(journal),
-            preparing: Cell::new(false),
-            lower: Cell::new(None),
-            silent: Cell::new(true),
-            unwritten: Cell::new(false),
-            integrator: self.integrator.clone(),
-            log: RefCell::new(tempfile::tempfile().map_err(lost)?),
-            trace: false,
-            from: 0,
-            one: false,
-            next: Cell::new(0),
-            violations: Cell::new(0),
-            instances_made: Cell::new(1000 * (number + 1)),
-            of_case: Cell::new(0),
-            began: self.began,
-            shown: Cell::new(Instant::now()),
-            home: self.home.clone(),
-            calls: self.calls.clone(),
-            timeout: self.timeout,
-        })
+        let paths = [self.binary.clone(), dir.into(), self.home.clone(), self.calls.clone()];
+        let discarded = || tempfile::tempfile().map_err(lost);
+        let files = [discarded()?, journal, discarded()?];
+        let session = Self::new(raw, self.description.clone(), paths, files, self.timeout);
+        let instances_made = Cell::new(1000 * (number + 1));
+        let (silent, integrator) = (Cell::new(true), self.integrator.clone());
+        Ok(Self { silent, integrator, instances_made, began: self.began, ..session })
     }
 
     /// Where the FMU's resources are, if it has any.

@@ -1,45 +1,11 @@
-//! States of the life cycle, and bringing an instance to one of them.
+//! Bringing an instance to a state of the life cycle.
 
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use State::{Continuous, Error, Event, Initialization, Instantiated, Step, Terminated};
+use crate::state::Life;
+use crate::state::State::{self, Continuous, Error, Event, Initialization, Instantiated, Terminated};
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Interface, Simple};
-
-/// States of both interfaces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum State {
-    Instantiated,
-    Initialization,
-    /// Step Mode.
-    Step,
-    /// Event Mode; its first update is still to come.
-    Event,
-    /// Continuous-Time Mode.
-    Continuous,
-    Terminated,
-    Error,
-}
-
-/// What an instance is made for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Life {
-    CoSimulation,
-    ModelExchange,
-    /// Co-Simulation with Event Mode (FMI 3.0).
-    EventMode,
-}
-
-impl Life {
-    /// The states that a call can be tried in.
-    pub(super) fn states(self) -> &'static [State] {
-        match self {
-            Self::CoSimulation => &[Instantiated, Initialization, Step, Terminated],
-            Self::ModelExchange => &[Instantiated, Initialization, Event, Continuous, Terminated],
-            Self::EventMode => &[Step, Event],
-        }
-    }
-}
 
 impl Session {
     /// A new instance in this state.

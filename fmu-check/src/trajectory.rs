@@ -1,7 +1,7 @@
 //! Trajectories: the watched variables after each step, and how far two of them are apart.
 
-use crate::check::Level;
 use crate::instance::Instance;
+use crate::level::Level;
 use crate::session::{NotDetermined, Session};
 use model_description::{BaseType, ModelVariable};
 

@@ -1,7 +1,7 @@
 //! The raw headers of a ZIP archive, without the corrections of a tolerant reader (APPNOTE 6.3).
 
 use flate2::bufread::DeflateDecoder;
-use model_description::limits;
+use fmu_import::limits;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
 

@@ -1,10 +1,10 @@
 //! Opens the archive of an FMU: reads its description and extracts what is needed to run it.
 
-use super::Error;
+use crate::error::Error;
 use crate::folder::Folder;
+use crate::limits::{self, UNPACKED, XML};
 use crate::machine;
 use crate::platform::Platform;
-use model_description::limits::{self, UNPACKED, XML};
 use model_description::{FmiVersion, Interface, ModelDescription, TerminalsAndIcons};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -212,7 +212,10 @@ impl Archive {
 }
 
 /// The contents of an entry with an XML document; `None` if no entry has this name.
-pub(crate) fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<Option<Vec<u8>>, String> {
+///
+/// # Errors
+/// The entry cannot be read, or is larger than [`limits::XML`].
+pub fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<Option<Vec<u8>>, String> {
     let mut bytes = Vec::new();
     match zip.by_name(name) {
         Ok(entry) => entry.take(XML.most + 1).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
@@ -225,8 +228,11 @@ pub(crate) fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> R
     Ok(Some(bytes))
 }
 
-/// The names of the entries; refuses names that lead outside, links, and sizes that no FMU has.
-pub(crate) fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<String>, String> {
+/// The names of the entries of an archive.
+///
+/// # Errors
+/// A name leads outside, an entry is a link, or there are more entries or bytes than [`limits`] allow.
+pub fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<String>, String> {
     limits::ENTRIES.check(zip.len() as u64)?;
     let (mut names, mut size) = (Vec::new(), 0_u64);
     for index in 0..zip.len() {

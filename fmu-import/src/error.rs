@@ -37,16 +37,18 @@ pub enum Error {
 }
 
 impl Error {
-    pub(crate) fn file(path: &Path, cause: impl std::fmt::Display) -> Self {
+    /// A file that cannot be used; the cause becomes one line.
+    pub fn file(path: &Path, cause: impl std::fmt::Display) -> Self {
         Self::File { path: path.into(), cause: one_line(&cause.to_string()) }
     }
 
-    pub(crate) fn usage(instance: &str, cause: impl std::fmt::Display) -> Self {
+    /// What cannot be done with an instance; the cause becomes one line.
+    pub fn usage(instance: &str, cause: impl std::fmt::Display) -> Self {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
     /// Adds to the error what was tried when it happened.
-    pub(crate) fn during(self, what: &str) -> Self {
+    pub fn during(self, what: &str) -> Self {
         match self {
             Self::Call { instance, function, status, message } => {
                 let message = Some(message.map_or_else(|| what.to_owned(), |said| format!("{what}: {said}")));
@@ -58,7 +60,7 @@ impl Error {
     }
 
     /// The cause without file, instance or function.
-    pub(crate) fn cause(&self) -> String {
+    pub fn cause(&self) -> String {
         match self {
             Self::File { cause, .. } | Self::Usage { cause, .. } => cause.clone(),
             Self::Call { .. } => self.to_string(),

@@ -7,7 +7,7 @@
 //! temporary files. Other systems end the child alone.
 
 use crate::folder::Folder;
-use model_description::limits;
+use crate::limits;
 use std::ffi::OsString;
 use std::io;
 use std::path::Path;
@@ -291,8 +291,8 @@ pub fn serve() -> Option<ExitCode> {
 #[cfg(unix)]
 mod unix {
     use super::{Allowance, End, ExitCode, GRACE, GUARD, OsString, Report, io, patiently};
+    use crate::limits;
     use crate::text::printable;
-    use model_description::limits;
     use rustix::io::Errno;
     use rustix::process::{Pid, Resource, Rlimit, Signal, WaitId, WaitIdOptions, WaitOptions};
     use rustix::process::{getppid, getrlimit, kill_process, kill_process_group, setrlimit, setsid, wait, waitid};

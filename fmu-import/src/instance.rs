@@ -4,14 +4,13 @@ mod clocks;
 mod configuration;
 mod equations;
 
-pub use equations::{CompletedStep, Stepped, Update};
-
-use super::standard::{Experiment, Kind, Outcome, Refusal};
-use super::{Error, Values, explain};
 use crate::abi::journal::{self, Call};
 use crate::abi::live::{Live, Pointer};
 use crate::abi::log::{Log, Message, Status};
 use crate::abi::raw::Simple;
+use crate::error::Error;
+use crate::standard::{Experiment, Kind, Outcome, Refusal, explain};
+use crate::value::Values;
 use clocks::Clocks;
 use model_description::{BaseType, Causality, ModelDescription, ModelVariable};
 use std::collections::BTreeMap;
@@ -329,12 +328,12 @@ impl Instance {
     }
 
     /// Whether a call has returned the status Fatal.
-    pub(super) fn is_dead(&self) -> bool {
+    pub fn is_dead(&self) -> bool {
         self.dead
     }
 
     /// Forgets the instance without freeing it: another one of its binary has returned the status Fatal.
-    pub(super) fn abandon(&mut self) {
+    pub fn abandon(&mut self) {
         self.live.abandon();
         self.dead = true;
     }

@@ -3,7 +3,7 @@
 use model_description::{ModelDescription, ModelVariable};
 
 /// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a number alone.
-pub(crate) fn split(text: &str) -> Option<(f64, &str)> {
+pub fn split(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     if let Ok(number) = text.parse() {
         return Some((number, ""));
@@ -17,7 +17,7 @@ pub(crate) fn split(text: &str) -> Option<(f64, &str)> {
 ///
 /// # Errors
 /// Names the units that the variable has.
-pub(crate) fn convert(
+pub fn convert(
     number: f64,
     unit: &str,
     variable: &ModelVariable,

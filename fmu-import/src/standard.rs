@@ -1,7 +1,8 @@
 //! What calls take and how they end, in the words of the facade.
 
-use super::value::Values;
 use crate::abi::log::Status;
+use crate::error::Error;
+use crate::value::Values;
 use model_description::BaseType;
 
 /// A call that did not succeed.
@@ -60,6 +61,44 @@ pub(super) struct Directions<'a> {
     pub(super) seed: &'a [f64],
 }
 
+/// What `DoStep` returned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepped {
+    /// The FMU asks to end the simulation.
+    pub terminate: bool,
+    /// The FMU is to enter event mode before the next step (FMI 3.0 only).
+    pub event: bool,
+    /// The step ended before its end (FMI 3.0 only).
+    pub early: bool,
+    /// Time (s) that the step reached.
+    pub last: f64,
+}
+
+/// What an update of the discrete states returned.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "the results of the standards")]
+pub struct Update {
+    /// The FMU needs another update.
+    pub again: bool,
+    /// The FMU asks to end the simulation.
+    pub terminate: bool,
+    /// Nominal values of states have changed.
+    pub nominals_changed: bool,
+    /// States have jumped.
+    pub states_changed: bool,
+    /// Time (s) of the next time event, if one is known. Every update tells it anew.
+    pub next_event_time: Option<f64>,
+}
+
+/// What the end of an integrator step returned.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompletedStep {
+    /// There is a step event.
+    pub enter_event_mode: bool,
+    /// The FMU asks to end the simulation.
+    pub terminate: bool,
+}
+
 /// Refuses arrays that do not have one element each.
 pub(super) fn same_length(what: &str, lengths: &[usize]) -> Outcome {
     if lengths.windows(2).all(|pair| pair[0] == pair[1]) {
@@ -72,4 +111,14 @@ pub(super) fn same_length(what: &str, lengths: &[usize]) -> Outcome {
 /// A value that does not fit the type that crosses the interface.
 pub(super) fn misfit(base: BaseType, values: &Values) -> Refusal {
     Refusal::Impossible(format!("{values} is not a value of the type {base}"))
+}
+
+/// Combines a refusal and the FMU's log message into an error.
+pub(super) fn explain(instance: &str, refusal: Refusal, message: Option<String>) -> Error {
+    let instance = instance.to_owned();
+    match refusal {
+        Refusal::Status(function, status) => Error::Call { instance, function, status: status.to_string(), message },
+        Refusal::Null(function) => Error::Call { instance, function, status: "no instance".into(), message },
+        Refusal::Impossible(cause) => Error::Usage { instance, cause },
+    }
 }

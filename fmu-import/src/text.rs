@@ -1,7 +1,8 @@
-//! Text of others, for a terminal.
+//! Text of others, for a terminal, and paths as URIs, for others.
 
 use std::borrow::Cow;
 use std::fmt::Write;
+use std::path::Path;
 
 /// The text with its control characters escaped, `\u{1b}` for ESC: what an FMU says must not command a terminal.
 pub fn printable(text: &str) -> Cow<'_, str> {
@@ -32,6 +33,17 @@ fn commands(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
+/// `file:///` and the path, other characters than those of RFC 3986 percent-encoded.
+pub fn file_uri(path: &Path) -> String {
+    let path = path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
+    let root = if path.starts_with('/') { "file://" } else { "file:///" };
+    let encode = |byte: u8| {
+        let plain = byte.is_ascii_alphanumeric() || b"-._~/:".contains(&byte);
+        if plain { char::from(byte).to_string() } else { format!("%{byte:02X}") }
+    };
+    root.chars().map(String::from).chain(path.bytes().map(encode)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,5 +54,11 @@ mod tests {
         assert_eq!(printable("a\nb \u{202e}c"), "a\\u{a}b \\u{202e}c");
         assert_eq!(printable_lines("a\u{1b}\nb\u{e9}\u{4e2d}\n"), "a\\u{1b}\nb\u{e9}\u{4e2d}\n");
         assert!(matches!(printable("plain \u{e9}"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn uris_are_encoded() {
+        assert_eq!(file_uri(Path::new("/tmp/a b#ü")), "file:///tmp/a%20b%23%C3%BC");
     }
 }

@@ -5,9 +5,9 @@
 //! pixels) and `data-window` (what they show).
 
 use crate::contour::{Field, Place};
+use crate::error::Error;
 use crate::ink::Ink;
 use crate::svg::{Area, STYLE, count, seen, text};
-use anyhow::{Result, bail};
 use std::fmt::Write as _;
 
 /// Width and height in pixels, and the space for the legend.
@@ -75,9 +75,9 @@ pub struct Line {
 ///
 /// # Errors
 /// There is nothing to draw.
-pub fn draw(chart: &Chart) -> Result<String> {
+pub fn draw(chart: &Chart) -> Result<String, Error> {
     if chart.fields.iter().all(|field| field.values.iter().all(|x| !x.is_finite())) {
-        bail!("{}", crate::EMPTY);
+        return Err(Error::Empty);
     }
     let (width, height) = SIZE;
     let (window, (low, high)) = (chart.window, chart.range);

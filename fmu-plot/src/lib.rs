@@ -10,10 +10,10 @@
 
 pub mod chart;
 pub mod contour;
+mod error;
 pub mod figure;
 pub mod ink;
 pub mod page;
 pub mod svg;
 
-/// The error of a figure without a point.
-const EMPTY: &str = "nothing was recorded, so there is nothing to plot";
+pub use error::Error;

@@ -1,8 +1,8 @@
 //! Draws a [`Figure`] as SVG, on light or dark paper as the reader's system prefers.
 
+use crate::error::Error;
 use crate::figure::{Curve, Figure, Panel, ticks};
 use crate::ink::REFERENCE;
-use anyhow::{Result, bail};
 use std::fmt::Write as _;
 
 /// Width and height of a panel in pixels: of one column, of several.
@@ -25,9 +25,9 @@ pub(crate) const STYLE: &str = "<style>@media (prefers-color-scheme:dark){.plot 
 ///
 /// # Errors
 /// There is nothing to draw.
-pub fn draw(figure: &Figure) -> Result<String> {
+pub fn draw(figure: &Figure) -> Result<String, Error> {
     if figure.is_empty() {
-        bail!("{}", crate::EMPTY);
+        return Err(Error::Empty);
     }
     let (width, height) = SIZE[usize::from(figure.columns > 1)];
     let beside = figure.columns == 1;

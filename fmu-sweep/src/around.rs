@@ -2,7 +2,7 @@
 //!
 //! Two runs that the master integrates (Model Exchange) differ by more than their values: the solver chooses other steps, and that
 //! difference, of the size of its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
-//! ([`with_copy`](fmu_import::cosimulation::Plan::with_copy)), which is integrated in common steps. What is differentiated is then the
+//! ([`with_copy`](fmu_system::cosimulation::Plan::with_copy)), which is integrated in common steps. What is differentiated is then the
 //! computed solution, and its derivative is as exact as the solution itself, at any tolerance. Events and samples are each run's own.
 //!
 //! Source: H. G. Bock, Numerical treatment of inverse problems in chemical reaction kinetics, in: Modelling of Chemical Reaction
@@ -10,7 +10,7 @@
 
 use crate::plan::{Outcome, Outcomes, Plan, Variable};
 use crate::{Error, measure::Measure, pool};
-use fmu_import::cosimulation::{Target, Worker};
+use fmu_system::cosimulation::{Target, Worker};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -30,11 +30,11 @@ impl Error {
     }
 }
 
-impl From<anyhow::Error> for Error {
-    fn from(error: anyhow::Error) -> Self {
-        match error.downcast_ref::<fmu_import::Error>() {
-            Some(of_fmu) if error.chain().len() == 1 => Self::Fmu(of_fmu.clone()),
-            _ => Self::Invalid(format!("{error:#}")),
+impl From<fmu_system::ssp::Error> for Error {
+    fn from(error: fmu_system::ssp::Error) -> Self {
+        match error {
+            fmu_system::ssp::Error::Fmu(error) => Self::Fmu(error),
+            other => Self::Invalid(other.to_string()),
         }
     }
 }

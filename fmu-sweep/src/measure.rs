@@ -4,7 +4,7 @@
 
 use crate::definition::{Function, MeasureDefinition};
 use crate::signal::Signal;
-use fmu_import::cosimulation::Settings;
+use fmu_system::cosimulation::Settings;
 
 /// Instants closer than this (s) are the same: communication points are `start + k h`, rounded.
 const SAME: f64 = 1e-9;

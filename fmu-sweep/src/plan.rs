@@ -6,11 +6,11 @@ use crate::error::invalid;
 use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
-use fmu_import::cosimulation::{
+use fmu_import::{Fmu, Kind};
+use fmu_system::cosimulation::{
     self, Integration, Method, Recording, Schedule, Settings, Solver, Target, Worker, item,
 };
-use fmu_import::ssp::load::{Connectors, Loaded};
-use fmu_import::{Fmu, Kind};
+use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,18 +1,13 @@
 //! Blocks of work for threads: scoped threads and one counter. No pool outlives the call, so a process may fork before and after.
 
 use crate::Error;
-use std::num::NonZero;
+use fmu_import::threads;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Rows that a thread takes at once.
 pub(crate) const BLOCK: u64 = 8;
-
-/// Number of threads that the machine runs at once.
-pub fn threads_here() -> usize {
-    std::thread::available_parallelism().map_or(1, NonZero::get)
-}
 
 /// Calls `work` for each of `blocks` on up to `threads` threads, each with a state of its own that `begin` makes. With one
 /// thread it is the caller's. Ends at the first error.
@@ -40,19 +35,7 @@ pub(crate) fn run<S>(
             failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
         }
     };
-    let threads = threads.min(usize::try_from(blocks).unwrap_or(usize::MAX));
-    if threads <= 1 {
-        thread(0);
-    } else {
-        std::thread::scope(|scope| {
-            let thread = &thread;
-            // This thread works too: on a busy machine the system may have no other.
-            for index in 1..threads {
-                let _ = std::thread::Builder::new().spawn_scoped(scope, move || thread(index));
-            }
-            thread(0);
-        });
-    }
+    threads::share(threads.min(usize::try_from(blocks).unwrap_or(usize::MAX)), thread);
     failed.into_inner().unwrap_or_else(PoisonError::into_inner).map_or(Ok(()), Err)
 }
 

@@ -5,6 +5,7 @@ use crate::output::{Cut, Failures, Output, restart};
 use crate::pool::{self, BLOCK};
 use crate::sweep::Writer;
 use crate::{Error, Sweep, files};
+use fmu_import::threads;
 use std::collections::HashMap;
 use std::fs::{self, File};
 use std::io::Write;
@@ -101,7 +102,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     let threads = if isolate.is_none() && sweep.plan().only_one_instance().is_some() {
         1
     } else {
-        options.jobs.unwrap_or_else(pool::threads_here).max(1)
+        options.jobs.unwrap_or_else(threads::available).max(1)
     };
     let log = Log::new(folder)?;
     log.write(&format!("{rows} rows in {} parts on {threads} jobs", jobs.len()))?;

@@ -4,7 +4,7 @@ use crate::definition::{Runs, Trace, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
 use crate::{Column, Definition, Error, Outcome, Outcomes, Plan, Rows, Runner, Variable};
-use fmu_import::cosimulation::item;
+use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 use std::fs::File;
@@ -143,7 +143,7 @@ impl Sweep {
     /// Everything that an FMU or another file of the sweep is read from, with the SHA-256 of its bytes.
     pub(crate) fn files(&self) -> Result<Vec<(String, String)>, Error> {
         let list = self.definition.design.iter().filter_map(|design| design.file.as_deref());
-        let fmus = self.definition.fmus.iter().map(|text| fmu_import::ssp::load::name_and_path(text));
+        let fmus = self.definition.fmus.iter().map(|text| fmu_system::ssp::load::name_and_path(text));
         let fmus: Vec<_> = fmus.map(|found| Ok(found?.1)).collect::<Result<_, Error>>()?;
         fmus.into_iter()
             .chain(list.map(Path::new))

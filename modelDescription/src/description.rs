@@ -96,11 +96,6 @@ impl ModelDescription {
         Some((variable, element(&self.shape_with(variable, size)?, &name[array.len()..])?))
     }
 
-    /// The variable of this name, or the array of which it names an element.
-    pub fn variable_or_array(&self, name: &str) -> Option<&ModelVariable> {
-        self.variable(name).or_else(|| Some(self.element(name)?.0))
-    }
-
     /// The variable that a number in the model structure refers to: its position in the list, from 1, in FMI 2.0
     /// (2.0.5, 2.2.8); its value reference in FMI 3.0 (3.0.2, 2.4.8).
     pub fn referenced(&self, reference: u32) -> Option<&ModelVariable> {

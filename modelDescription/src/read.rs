@@ -5,6 +5,7 @@
 //! checker to find. It ignores unknown elements and attributes.
 
 mod attributes;
+mod document;
 mod structure;
 mod terminals;
 mod types;
@@ -14,9 +15,11 @@ use crate::description::{Experiment, Interface, LogCategory, ModelDescription};
 use crate::error::Error;
 use crate::version::FmiVersion;
 use crate::xml::{Element, parse};
+pub use document::decode;
 pub use terminals::read_terminals;
 
 use attributes::{boolean, integer, number, owned, required};
+use document::of_kind;
 
 /// Reads modelDescription.xml; the bytes must be UTF-8, as both standards require.
 ///
@@ -69,32 +72,6 @@ pub fn read_element(root: &Element) -> Result<ModelDescription, Error> {
             FmiVersion::V3 => structure::unknowns(structure, version, "", "EventIndicator")?,
         },
     })
-}
-
-/// The text of a document, which both standards want in UTF-8.
-///
-/// # Errors
-/// It is in another encoding: names UTF-16 and UTF-32, which have a byte order mark or null bytes.
-pub fn decode(bytes: &[u8]) -> Result<&str, Error> {
-    let other = match bytes {
-        [0xff, 0xfe, 0, 0, ..] | [0, 0, 0xfe, 0xff, ..] => Some("UTF-32"),
-        [0xff, 0xfe, ..] | [0xfe, 0xff, ..] | [b'<', 0, ..] | [0, b'<', ..] => Some("UTF-16"),
-        _ => None,
-    };
-    if let Some(other) = other {
-        return Err(Error::NotXml { line: 1, reason: format!("the encoding is {other}, expected UTF-8") });
-    }
-    std::str::from_utf8(bytes).map_err(|e| {
-        let line = bytes[..e.valid_up_to()].split(|&b| b == b'\n').count();
-        Error::NotXml { line, reason: "not UTF-8".into() }
-    })
-}
-
-fn of_kind(root: &Element, expected: &'static str) -> Result<(), Error> {
-    if root.name == expected {
-        return Ok(());
-    }
-    Err(Error::OtherRoot { line: root.line, found: root.name.clone(), expected })
 }
 
 /// The version, before anything else: FMI 1.0 has the same root element and other attributes.

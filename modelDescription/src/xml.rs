@@ -1,83 +1,12 @@
 //! A small element tree: names, attributes, children. Neither standard keeps anything in text content, so there is none.
 
+mod element;
 mod parse;
 mod print;
 
+pub use element::Element;
 pub(crate) use parse::parse;
 pub(crate) use print::print;
-
-/// An element of an XML document, as the file has it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Element {
-    /// Name, with its namespace prefix where it has one.
-    pub name: String,
-    /// Attributes in the order of the file, values unescaped.
-    pub attributes: Vec<(String, String)>,
-    /// Child elements in the order of the file.
-    pub children: Vec<Element>,
-    /// Line of the start tag, from 1; 0 for one that was not read.
-    pub line: usize,
-}
-
-impl Element {
-    /// An empty element.
-    pub fn new(name: &str) -> Self {
-        Self { name: name.into(), ..Self::default() }
-    }
-
-    /// Adds an attribute.
-    pub fn with(mut self, name: &str, value: impl Into<String>) -> Self {
-        self.attributes.push((name.into(), value.into()));
-        self
-    }
-
-    /// Adds an attribute if there is a value for it.
-    pub fn with_some(self, name: &str, value: Option<impl Into<String>>) -> Self {
-        match value {
-            Some(value) => self.with(name, value),
-            None => self,
-        }
-    }
-
-    /// Adds an attribute unless the text is empty.
-    pub fn with_text(self, name: &str, value: &str) -> Self {
-        self.with_some(name, Some(value).filter(|text| !text.is_empty()))
-    }
-
-    /// Adds children.
-    pub fn children(mut self, children: impl IntoIterator<Item = Element>) -> Self {
-        self.children.extend(children);
-        self
-    }
-
-    /// The XML document whose root this is, in UTF-8.
-    pub fn to_xml(&self) -> String {
-        print(self)
-    }
-
-    /// The root element of an XML document.
-    ///
-    /// # Errors
-    /// The document is not well-formed or is nested too deeply.
-    pub fn parse(text: &str) -> Result<Self, crate::Error> {
-        parse(text)
-    }
-
-    /// The value of an attribute.
-    pub fn get(&self, name: &str) -> Option<&str> {
-        self.attributes.iter().find(|(n, _)| n == name).map(|(_, value)| value.as_str())
-    }
-
-    /// The first child with this name.
-    pub fn child(&self, name: &str) -> Option<&Element> {
-        self.children.iter().find(|c| c.name == name)
-    }
-
-    /// All children with this name.
-    pub fn all<'a>(&'a self, name: &'a str) -> impl Iterator<Item = &'a Element> {
-        self.children.iter().filter(move |c| c.name == name)
-    }
-}
 
 #[cfg(test)]
 mod tests {

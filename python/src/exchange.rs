@@ -4,9 +4,9 @@ use crate::course::{Course, cut};
 use crate::input::{Input, is_close};
 use crate::record::Record;
 use crate::stepping::update;
-use fmu_import::cosimulation::{Equations, Feed, Inputs, Integration, Solver};
-use fmu_import::integration::{Driver, Stop, Trial};
 use fmu_import::{Error, Instance};
+use fmu_system::cosimulation::{Equations, Feed, Inputs, Integration, Solver};
+use fmu_system::integration::{Driver, Stop, Trial};
 use std::slice;
 
 /// FMPy's forward Euler: one step from point to point; events are not located.

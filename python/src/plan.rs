@@ -42,7 +42,7 @@ pub(crate) fn read_definition(path: PathBuf) -> PyResult<String> {
 pub(crate) fn paths(definition: &str) -> PyResult<Vec<String>> {
     gate(|| {
         let definition = parsed(definition)?;
-        let path = |text: &String| Ok(fmu_import::ssp::load::name_and_path(text)?.1.to_string_lossy().into_owned());
+        let path = |text: &String| Ok(fmu_system::ssp::load::name_and_path(text)?.1.to_string_lossy().into_owned());
         let fmus: Result<Vec<String>, fmu_sweep::Error> = definition.fmus.iter().map(path).collect();
         let mut all = fmus.map_err(failed)?;
         all.extend(definition.design.and_then(|design| design.file));

@@ -8,7 +8,7 @@ use crate::instance::Instance;
 use crate::record::{self, Record};
 use crate::stepping::Stepping;
 use fmu_import::Error;
-use fmu_import::cosimulation::Solver;
+use fmu_system::cosimulation::Solver;
 use model_description::BaseType;
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::exceptions::PyValueError;

@@ -6,9 +6,9 @@ use crate::preset::{Course, PresetFmu};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, rules::Tuned};
-use fmu_import::cosimulation::Schedule;
 use fmu_import::printable;
-use fmu_import::ssp::ssv;
+use fmu_system::cosimulation::Schedule;
+use fmu_system::ssp::ssv;
 use std::path::{Path, PathBuf};
 
 /// Writes an FMU with other start values, from an FMU of this program.

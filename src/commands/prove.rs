@@ -1,15 +1,16 @@
 //! `fmu prove`: the folders of examples that the FMI tools page asks for, and the importers that replayed them.
 
 use super::build::{self, Build};
+use crate::TOOL;
 use crate::message;
-use crate::pack::{self, TOOL};
+use crate::pack;
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use fmu_core::Experiment;
-use fmu_import::cosimulation::{Recording, Sequence};
 use fmu_import::platform::Platform;
 use fmu_import::printable;
+use fmu_system::cosimulation::{Recording, Sequence};
 use model_description::{BaseType, Causality, FmiVersion, Interface, ModelDescription, ModelVariable};
 use serde::Deserialize;
 use std::fs;
@@ -216,7 +217,7 @@ fn own(example: &Example) -> Result<f64> {
 
 /// The values of a column as CSV has them.
 fn cells(recording: &Recording, name: &str) -> Option<Vec<String>> {
-    let numbers = |column: &fmu_import::cosimulation::Column| column.values.iter().map(f64::to_string).collect();
+    let numbers = |column: &fmu_system::cosimulation::Column| column.values.iter().map(f64::to_string).collect();
     let texts = || Some(recording.texts.iter().find(|column| column.name == name)?.values.clone());
     recording.column(name).map(numbers).or_else(texts)
 }

@@ -78,7 +78,7 @@ fn a_bad_binary_gives_one_line_and_status_2() {
 fn model_exchange_is_integrated() {
     let dir = tempfile::tempdir().unwrap();
     let (library, path) = (dir.path().join("x.so"), dir.path().join("p.fmu"));
-    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("fmu-import/tests/model_exchange/fmu.c");
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("fmu-system/tests/model_exchange/fmu.c");
     let mut cc = Command::new("cc");
     cc.args(["-std=c11", "-D_GNU_SOURCE", "-shared", "-fPIC", "-w", "-DSTATES=1"]).arg(source);
     assert!(cc.arg("-o").arg(&library).arg("-lm").status().unwrap().success());

@@ -25,7 +25,7 @@ struct Modules {
 }
 
 /// The circles of a crate, the files of each in order, from `lib.rs` (or `main.rs`) in its folder `src`.
-pub fn circles(src: &Path, root: &str) -> Vec<Vec<String>> {
+pub(crate) fn circles(src: &Path, root: &str) -> Vec<Vec<String>> {
     let mut modules = Modules { files: Vec::new(), all: Vec::new() };
     modules.file(&src.join(root), None, src);
     let known = modules.known();
@@ -114,22 +114,23 @@ impl Modules {
             };
             let next = word(tokens.get(at + 1));
             match (first.as_str(), next) {
+                // `pub(in crate::abi)` says who may name an item.
+                ("pub", _) => at += 1 + usize::from(group(tokens.get(at + 1), Delimiter::Parenthesis).is_some()),
                 ("use", _) => at = self.tree(&tokens, at + 1, &[], module),
                 ("mod", Some(name)) => {
                     let below = folder.join(&name);
-                    let inner = match group(tokens.get(at + 2), Delimiter::Brace) {
-                        Some(body) => self.module(body, self.all[module].file, Some(module), &below),
-                        None => {
-                            let beside =
-                                named_path.take().map(|path| self.files[self.all[module].file].with_file_name(path));
-                            let usual = [folder.join(format!("{name}.rs")), below.join("mod.rs")];
-                            let path = beside.into_iter().chain(usual).find(|path| path.is_file());
-                            self.file(
-                                &path.unwrap_or_else(|| panic!("{name} in {}", folder.display())),
-                                Some(module),
-                                &below,
-                            )
-                        }
+                    let inner = if let Some(body) = group(tokens.get(at + 2), Delimiter::Brace) {
+                        self.module(body, self.all[module].file, Some(module), &below)
+                    } else {
+                        let beside =
+                            named_path.take().map(|path| self.files[self.all[module].file].with_file_name(path));
+                        let usual = [folder.join(format!("{name}.rs")), below.join("mod.rs")];
+                        let path = beside.into_iter().chain(usual).find(|path| path.is_file());
+                        self.file(
+                            &path.unwrap_or_else(|| panic!("{name} in {}", folder.display())),
+                            Some(module),
+                            &below,
+                        )
                     };
                     self.all[module].inner.insert(name, inner);
                     at += 3;

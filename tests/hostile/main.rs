@@ -208,7 +208,7 @@ fn the_page_has_the_limits() {
     let page = fs::read_to_string(&path).unwrap();
     let (before, after) = page.split_once("<!-- limits -->\n").unwrap();
     let (_, after) = after.split_once("<!-- end of limits -->").unwrap();
-    let list = model_description::limits::list();
+    let list = fmu_import::limits::list();
     let expected = format!("{before}<!-- limits -->\n{list}<!-- end of limits -->{after}");
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         fs::write(&path, expected).unwrap();

@@ -1,8 +1,8 @@
 //! The values of a machine: `fmu preset --motor` and `fmu tune --fmu`.
 
 use super::{REFERENCE, bits, built, contents, entered, fmu, run, text};
-use fmu_import::ssp::ssv;
 use fmu_import::{Kind, Values};
+use fmu_system::ssp::ssv;
 use std::fs;
 
 const MOTORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/");

@@ -10,8 +10,8 @@ mod types;
 
 use fmu_check::Level;
 use fmu_core::preset::FILE;
-use fmu_import::cosimulation::{Recording, Schedule, Settings, System};
 use fmu_import::{Fmu, Instance, Kind, Values, contents};
+use fmu_system::cosimulation::{Recording, Schedule, Settings, System};
 use model_description::FmiVersion::{V2, V3};
 use std::fs;
 use std::ops::ControlFlow;

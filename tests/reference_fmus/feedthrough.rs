@@ -2,7 +2,7 @@
 
 use super::{archive, open, script};
 use fmu_import::Values;
-use fmu_import::cosimulation::{Recording, Sequence, Settings, System};
+use fmu_system::cosimulation::{Recording, Sequence, Settings, System};
 use model_description::BaseType;
 use model_description::FmiVersion::V3;
 use std::fs;

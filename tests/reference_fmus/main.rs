@@ -19,8 +19,8 @@ mod state_space;
 mod van_der_pol;
 
 use fmu::commands::build::{self, Build};
-use fmu_import::cosimulation::{Integration, Method, Recording, Settings, Solver, System};
 use fmu_import::{Fmu, Kind};
+use fmu_system::cosimulation::{Integration, Method, Recording, Settings, Solver, System};
 use model_description::FmiVersion::{self, V2, V3};
 use std::collections::BTreeMap;
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};

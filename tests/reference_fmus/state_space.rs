@@ -1,9 +1,9 @@
 //! A linear system whose sizes the importer chooses.
 
 use super::{BOTH, archive, exchange, open, run, script};
-use fmu_import::cosimulation::{Method, Recording, Schedule, Settings, System};
-use fmu_import::ssp::load::Loaded;
 use fmu_import::{Instance, Kind, Values};
+use fmu_system::cosimulation::{Method, Recording, Schedule, Settings, System};
+use fmu_system::ssp::load::Loaded;
 use model_description::FmiVersion::{V2, V3};
 use model_description::{Causality, Dimension};
 use std::io::Write;

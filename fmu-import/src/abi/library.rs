@@ -1,6 +1,7 @@
 //! Shared libraries: loading one, and finding its functions.
 
-use crate::Error;
+use crate::error::Error;
+use crate::text::file_uri;
 use libloading::Library;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::Path;
@@ -36,7 +37,7 @@ pub fn describe(path: &Path, resources: Option<&Path>) -> Result<fmu_core::Descr
         text.extend_from_slice(bytes);
     }
     let library = load(path)?;
-    let resources = resources.map(|folder| CString::new(crate::file_uri(folder)).unwrap_or_default());
+    let resources = resources.map(|folder| CString::new(file_uri(folder)).unwrap_or_default());
     let resources = resources.as_ref().map_or(std::ptr::null(), |uri| uri.as_ptr());
     let mut json: Vec<u8> = Vec::new();
     // SAFETY: the symbol belongs to this exporter, which gives it this type.

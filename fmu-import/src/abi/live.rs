@@ -7,8 +7,9 @@ use super::log::{Log, Message, Status, copy_text};
 use super::logger::{Called, Listener, logger};
 use super::raw::{Buffer, Count, Interface, Sensitivity, Simple, StepResults, StepStatus, Vector, type_name, width};
 use super::signatures::v2::{Callbacks, calloc, free};
-use crate::instance::{CompletedStep, Stepped, Update};
-use crate::standard::{Directions, Experiment, Kind, Outcome, Refusal, misfit, same_length};
+use crate::standard::{
+    CompletedStep, Directions, Experiment, Kind, Outcome, Refusal, Stepped, Update, misfit, same_length,
+};
 use crate::trace;
 use crate::value::Values;
 use model_description::{BaseType, FmiVersion};

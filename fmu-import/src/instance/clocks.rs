@@ -1,9 +1,11 @@
 //! Clocks of an instance (FMI 3.0.2, 2.2.8): the facade makes their ticks, so that whoever runs the instance sees time events. What
 //! is on a clock is read and set while the clock is active; before and after, reading gives the last value, and what is set waits.
 
-use super::{Instance, Update};
+use super::Instance;
 use crate::abi::journal::Call;
-use crate::{Error, Values};
+use crate::error::Error;
+use crate::standard::Update;
+use crate::value::Values;
 use model_description::IntervalVariability::{Changing, Countdown, Triggered};
 use model_description::{BaseType, Causality, ClockTiming, ModelDescription};
 use std::collections::BTreeMap;

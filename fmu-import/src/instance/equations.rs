@@ -5,45 +5,7 @@ use crate::Error;
 use crate::abi::journal::Call;
 use crate::abi::live::Live;
 use crate::abi::raw::{Sensitivity, Simple, Vector};
-use crate::standard::Directions;
-
-/// What `DoStep` returned.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Stepped {
-    /// The FMU asks to end the simulation.
-    pub terminate: bool,
-    /// The FMU is to enter event mode before the next step (FMI 3.0 only).
-    pub event: bool,
-    /// The step ended before its end (FMI 3.0 only).
-    pub early: bool,
-    /// Time (s) that the step reached.
-    pub last: f64,
-}
-
-/// What an update of the discrete states returned.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[expect(clippy::struct_excessive_bools, reason = "the results of the standards")]
-pub struct Update {
-    /// The FMU needs another update.
-    pub again: bool,
-    /// The FMU asks to end the simulation.
-    pub terminate: bool,
-    /// Nominal values of states have changed.
-    pub nominals_changed: bool,
-    /// States have jumped.
-    pub states_changed: bool,
-    /// Time (s) of the next time event, if one is known. Every update tells it anew.
-    pub next_event_time: Option<f64>,
-}
-
-/// What the end of an integrator step returned.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct CompletedStep {
-    /// There is a step event.
-    pub enter_event_mode: bool,
-    /// The FMU asks to end the simulation.
-    pub terminate: bool,
-}
+use crate::standard::{CompletedStep, Directions, Stepped, Update};
 
 impl Instance {
     /// Steps from `t` to `t + h`, or less far if the FMU was allowed to return early.

@@ -1,8 +1,8 @@
 //! Pages that need no network: one style for all, and [`Figure`]s with zoom, legend switches and readings at the cursor.
 
+use crate::error::Error;
 use crate::figure::{Curve, Figure, Panel};
 use crate::ink::Ink;
-use anyhow::{Result, bail};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
@@ -52,9 +52,9 @@ pub fn page(title: &str, body: &str) -> String {
 ///
 /// # Errors
 /// There is nothing to draw.
-pub fn figure(figure: &Figure, instead: &str) -> Result<String> {
+pub fn figure(figure: &Figure, instead: &str) -> Result<String, Error> {
     if figure.is_empty() {
-        bail!("{}", crate::EMPTY);
+        return Err(Error::Empty);
     }
     let mut data = Data::default();
     let panels: Vec<Value> = figure.panels.iter().map(|panel| data.panel(panel)).collect();

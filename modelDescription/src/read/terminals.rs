@@ -1,7 +1,7 @@
 //! terminalsAndIcons.xml.
 
 use super::attributes::{number, owned, required, wrong};
-use super::{decode, of_kind};
+use super::document::{decode, of_kind};
 use crate::error::Error;
 use crate::terminals::{Area, CoordinateSystem, Member, StreamMember, Terminal, TerminalPicture, TerminalsAndIcons};
 use crate::xml::{Element, parse};

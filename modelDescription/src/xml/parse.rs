@@ -1,7 +1,7 @@
 //! Reads an element tree. Any input gives a tree or an error: no panic, no unbounded recursion, no entity expansion, no
 //! external file.
 
-use super::Element;
+use super::element::Element;
 use crate::error::Error;
 use crate::limits;
 use quick_xml::events::{BytesStart, Event};
@@ -62,6 +62,16 @@ pub(crate) fn parse(text: &str) -> Result<Element, Error> {
         (Some(element), _) => Err(Error::NotXml { line, reason: format!("<{}> is not closed", element.name) }),
         (None, None) => Err(Error::NotXml { line, reason: "no root element".into() }),
         (None, Some(root)) => Ok(root),
+    }
+}
+
+impl Element {
+    /// The root element of an XML document.
+    ///
+    /// # Errors
+    /// The document is not well-formed or is nested too deeply.
+    pub fn parse(text: &str) -> Result<Self, Error> {
+        parse(text)
     }
 }
 

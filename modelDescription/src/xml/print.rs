@@ -1,6 +1,6 @@
 //! Prints an element tree: declaration, one element per line, two blanks per level.
 
-use super::Element;
+use super::element::Element;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
@@ -16,6 +16,13 @@ pub(crate) fn print(root: &Element) -> String {
     let mut bytes = writer.into_inner();
     bytes.push(b'\n');
     String::from_utf8_lossy(&bytes).into_owned()
+}
+
+impl Element {
+    /// The XML document whose root this is, in UTF-8.
+    pub fn to_xml(&self) -> String {
+        print(self)
+    }
 }
 
 fn collect<'a>(element: &'a Element, events: &mut Vec<Event<'a>>) {

@@ -1,9 +1,9 @@
 //! The figure of a run: a panel for each display unit, time on the horizontal axis.
 
 use super::overview;
-use fmu_import::cosimulation::Recording;
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, Ink, REFERENCE};
+use fmu_system::cosimulation::Recording;
 use std::rc::Rc;
 
 /// Colors before they repeat in a paler tone; gray is for references that have no curve of their own.
@@ -53,7 +53,7 @@ fn color(curves: &mut [Curve]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fmu_import::cosimulation::Column;
+    use fmu_system::cosimulation::Column;
 
     #[test]
     fn a_panel_for_each_unit_and_a_reference_in_the_color_of_its_curve() {

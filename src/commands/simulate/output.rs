@@ -3,8 +3,8 @@
 use super::{Simulate, curves, overview};
 use crate::{pack, picture};
 use anyhow::{Context, Result};
-use fmu_import::cosimulation::Recording;
 use fmu_plot::{page, svg};
+use fmu_system::cosimulation::Recording;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 

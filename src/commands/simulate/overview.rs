@@ -1,8 +1,8 @@
 //! The first plot of a run: speed, torque, currents, angle error and power of any drive with these names.
 
 use drive::math::wrap;
-use fmu_import::cosimulation::{Column, Recording};
 use fmu_plot::figure::{Curve, Figure};
+use fmu_system::cosimulation::{Column, Recording};
 use std::fmt::Write as _;
 
 /// Panels, each with its variables, without the names of their instances.

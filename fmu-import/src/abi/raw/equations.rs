@@ -1,26 +1,12 @@
 //! Calls of Model Exchange, event mode and derivatives with any arguments.
 
-use super::super::arguments::{Array, ArrayMut};
-use super::super::log::Status;
-use super::{Count, Handle, Raw, Sensitivity, UNTOUCHED, Vector};
+use super::library::Raw;
+use super::names::{Count, Sensitivity, Vector};
+use super::owned::Handle;
+use super::results::{UNTOUCHED, UpdateResults};
+use crate::abi::arguments::{Array, ArrayMut};
+use crate::abi::log::Status;
 use std::ffi::c_int;
-
-/// The results of an update of the discrete states; the flags as the FMU wrote them, 0xc5 where it did not.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct UpdateResults {
-    /// `newDiscreteStatesNeeded`, `discreteStatesNeedUpdate`.
-    pub again: i32,
-    /// `terminateSimulation`.
-    pub terminate: i32,
-    /// `nominalsOfContinuousStatesChanged`.
-    pub nominals_changed: i32,
-    /// `valuesOfContinuousStatesChanged`.
-    pub states_changed: i32,
-    /// `nextEventTimeDefined`.
-    pub next_event_time_defined: i32,
-    /// `nextEventTime`, NaN where the FMU did not write it.
-    pub next_event_time: f64,
-}
 
 /// Arguments of a directional or adjoint derivative. An array may be NULL; its count may be less than its length.
 #[derive(Clone, Copy, Debug, Default)]

@@ -4,21 +4,12 @@ use super::super::calls::{Request, Updates};
 use super::super::logger::logger;
 use super::super::signatures::v2::Callbacks;
 use super::callbacks::{Recorder, allocate, logger3, release};
+use super::library::Raw;
+use super::names::Interface;
+use super::owned::Handle;
 use super::updates::{clock_update, intermediate_update, lock_preemption, unlock_preemption};
-use super::{Handle, Raw};
 use std::ffi::{CString, c_void};
 use std::ptr;
-
-/// Interface type of an instance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Interface {
-    /// Co-simulation.
-    CoSimulation,
-    /// Model exchange.
-    ModelExchange,
-    /// Scheduled execution (FMI 3.0 only).
-    ScheduledExecution,
-}
 
 /// The arguments of an instantiation.
 #[derive(Clone, Debug)]

@@ -81,3 +81,14 @@ names! {
         GetNumberOfEventIndicators GetNumberOfContinuousStates ActivateModelPartition
     }
 }
+
+/// Interface type of an instance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// Co-simulation.
+    CoSimulation,
+    /// Model exchange.
+    ModelExchange,
+    /// Scheduled execution (FMI 3.0 only).
+    ScheduledExecution,
+}

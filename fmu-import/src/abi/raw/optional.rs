@@ -2,7 +2,10 @@
 
 use super::super::log::Status;
 use super::super::signatures::v2;
-use super::{Count, Handle, Optional, Raw, Sensitivity, SensitivityArguments, Vector};
+use super::equations::SensitivityArguments;
+use super::library::Raw;
+use super::names::{Count, Optional, Sensitivity, Vector};
+use super::owned::Handle;
 use std::ffi::c_void;
 
 impl Raw {

@@ -2,14 +2,12 @@
 //!
 //! Safe code holds no address, so it cannot pass one to the FMU that is wild, freed, or of another binary.
 
-use super::Raw;
 use crate::abi::arguments::Given;
 use std::ffi::c_void;
 use std::ptr;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{MutexGuard, PoisonError};
 
-/// A place in the table of one [`Raw`].
+/// A place in the table of one [`Raw`](super::Raw).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
     /// Number of the `Raw`.
@@ -17,7 +15,7 @@ struct Place {
     index: usize,
 }
 
-/// An instance of a [`Raw`], or NULL.
+/// An instance of a [`Raw`](super::Raw), or NULL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Handle(Option<Place>);
 
@@ -26,7 +24,7 @@ impl Handle {
     pub const NULL: Self = Self(None);
 }
 
-/// An FMU state of a [`Raw`], or NULL.
+/// An FMU state of a [`Raw`](super::Raw), or NULL.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SavedState(Option<Place>);
 
@@ -44,7 +42,7 @@ struct Held {
     instance: Option<usize>,
 }
 
-/// Instances and states of one [`Raw`].
+/// Instances and states of one [`Raw`](super::Raw).
 #[derive(Debug)]
 pub(super) struct Owned {
     /// Number of the `Raw`, unlike that of every other.
@@ -138,13 +136,5 @@ impl Owned {
             self.states[index].address = 0;
         }
         pointer
-    }
-}
-
-impl Raw {
-    /// The table, for one call: the calls of a `Raw` follow one another, whatever thread they come from.
-    pub(super) fn owned(&self) -> MutexGuard<'_, Owned> {
-        // A refusal changes nothing, so the table is good after it.
-        self.owned.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

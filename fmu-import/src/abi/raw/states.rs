@@ -3,7 +3,8 @@
 use super::super::arguments::{Array, ArrayMut};
 use super::super::live::{FILL, room};
 use super::super::log::Status;
-use super::{Handle, Raw, SavedState};
+use super::library::Raw;
+use super::owned::{Handle, SavedState};
 
 /// Bytes past a buffer that show whether the FMU writes there.
 const GUARD: usize = 256;

@@ -6,7 +6,10 @@
 
 use super::super::functions::{CType, Calls, Way};
 use super::super::log::Status;
-use super::{Handle, Raw, Simple, StepResults, UNTOUCHED};
+use super::library::Raw;
+use super::names::Simple;
+use super::owned::Handle;
+use super::results::{StepResults, UNTOUCHED};
 use crate::abi::arguments::Given;
 use std::ffi::c_void;
 use std::ptr;

@@ -1,0 +1,246 @@
+//! Events of Model Exchange (FMI 2.0.5, 3.1 and 3.2.2; FMI 3.0.2, 2.3.5 and 3.1.1).
+
+use crate::check::{Check, Levels, Run};
+use crate::exchange::Importer;
+use crate::level::Level;
+use crate::session::{NotDetermined, Session};
+use fmu_import::raw::Vector;
+use model_description::{Causality, ModelVariable, Variability};
+use std::cell::{Cell, RefCell};
+
+const UPDATE: &str = "2.0.5, 3.2.2; 3.0.2, 2.3.5";
+
+#[rustfmt::skip]
+pub(crate) const CHECKS: &[Check] = &[
+    Check { id: "E20", clause: UPDATE, levels: Levels::MUST, run: Run::Exchange(update_results),
+        requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a time where it defines a next event (should: a finite one).",
+        tried: "Looks at the results of every update.", fix: "Write all results before returning OK." },
+    Check { id: "E21", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(next_event_time),
+        requirement: "The next time event, from the first update after initialization on, is an absolute time after now.",
+        tried: "Looks at nextEventTime of every update.", fix: "Return an absolute time after now, from the first update on." },
+    Check { id: "E22", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(renewed),
+        requirement: "An event before the next time event does not lose it: the update defines it anew.",
+        tried: "Makes an event before the next time event and looks at nextEventTime.", fix: "Compute the next time event in every update." },
+    Check { id: "E23", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(ends),
+        requirement: "The iteration of an event comes to an end within 100 updates.",
+        tried: "Updates until no further update is needed.", fix: "End the iteration: newDiscreteStatesNeeded only if something has changed." },
+    Check { id: "E24a", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(told_changes),
+        requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.",
+        tried: "Compares states before and after every update.", fix: "Set valuesOfContinuousStatesChanged whenever a state is reinitialized." },
+    Check { id: "E24b", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), run: Run::Exchange(true_changes),
+        requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.",
+        tried: "Compares states before and after every update.", fix: "Clear the flag where no state is reinitialized." },
+    Check { id: "E24n", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(true_nominals),
+        requirement: "nominalsOfContinuousStatesChanged is true only if a nominal has changed.",
+        tried: "Reads the nominals after every update that says so.", fix: "Clear the flag where no nominal changes." },
+    Check { id: "E25", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, run: Run::Exchange(indicators),
+        requirement: "After Event Mode no event indicator is 0.",
+        tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis." },
+    Check { id: "E26", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::Exchange(discrete),
+        requirement: "Discrete variables do not change in Continuous-Time Mode.",
+        tried: "Reads discrete variables between events, and before each event.", fix: "Assign discrete variables in updates only." },
+];
+
+/// Steps of the integrator in a probe of events.
+const STEPS: usize = 1000;
+
+/// Looks at every event of a run; reports its count.
+fn each_event(
+    session: &Session,
+    rule: &dyn Fn(f64, &crate::exchange::Event) -> Option<String>,
+) -> Result<(), NotDetermined> {
+    let (mut events, mut found) = (0, 0);
+    let instance = session.excited()?;
+    let result = Importer::survey(
+        &instance,
+        STEPS,
+        &mut |instance, event| {
+            events += 1;
+            // One finding of a kind is enough, but the first event is unlike the others.
+            if found < 3
+                && let Some(text) = rule(instance.time.get(), event)
+            {
+                found += 1;
+                session.violated(format!("event {events}, t = {:?}: {text}", instance.time.get()));
+            }
+        },
+        &mut |_, _| Ok(()),
+    );
+    session.note(format!("{events} events"));
+    if found > 0 { Ok(()) } else { result }
+}
+
+fn update_results(session: &Session) -> Result<(), NotDetermined> {
+    let infinite = Cell::new(false);
+    each_event(session, &|_, event| {
+        event.updates.iter().find_map(|(u, _)| {
+            let flags = [u.again, u.terminate, u.nominals_changed, u.states_changed, u.next_event_time_defined];
+            let good = flags.iter().all(|f| matches!(f, 0 | 1));
+            let time = u.next_event_time_defined == 0 || !u.next_event_time.is_nan();
+            // An event that never comes is odd, but an importer can integrate at most until then.
+            if u.next_event_time_defined == 1 && u.next_event_time.is_infinite() && !infinite.replace(true) {
+                session.lesser(Level::Should, format!("{u:?}: the time of the next event is infinite"));
+            }
+            (!good || !time).then(|| format!("{u:?}: a Boolean is not 0 or 1, or a result was not written"))
+        })
+    })
+}
+
+fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|t, event| {
+        let next = event.next().filter(|_| event.ended() && !event.terminates())?;
+        (next <= t).then(|| format!("nextEventTime is {next:?}"))
+    })
+}
+
+fn ends(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        (!event.ended() && !event.terminates())
+            .then(|| format!("{} updates, and it needs another", event.updates.len()))
+    })
+}
+
+fn told_changes(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        let silent = event.updates.iter().any(|(u, changed)| *changed && u.states_changed == 0);
+        silent.then(|| "a state changed, and valuesOfContinuousStatesChanged is false".into())
+    })
+}
+
+fn true_changes(session: &Session) -> Result<(), NotDetermined> {
+    each_event(session, &|_, event| {
+        let idle = event.updates.iter().any(|(u, changed)| !changed && u.states_changed == 1);
+        idle.then(|| "valuesOfContinuousStatesChanged is true, and no state changed".into())
+    })
+}
+
+fn true_nominals(session: &Session) -> Result<(), NotDetermined> {
+    let n = session.states();
+    if n == 0 {
+        return session.not_applicable("there are no continuous states");
+    }
+    let instance = session.excited()?;
+    let nominals = |instance: &crate::instance::Instance<'_>| instance.vector(Vector::GetNominalsOfContinuousStates, n);
+    let last = RefCell::new(nominals(&instance)?.1);
+    let mut idle = 0;
+    Importer::survey(
+        &instance,
+        STEPS,
+        &mut |instance, event| {
+            let Ok((status, now, _)) = nominals(instance) else { return };
+            let told = event.updates.iter().any(|(u, _)| u.nominals_changed == 1);
+            if told && status.is_ok() && *last.borrow() == now {
+                idle += 1;
+                if idle == 3 {
+                    session.violated(format!(
+                        "t = {:?}: nominalsOfContinuousStatesChanged is true for the third time, and the nominals are still {now:?}",
+                        instance.time.get()
+                    ));
+                }
+            }
+            *last.borrow_mut() = now;
+        },
+        &mut |_, _| Ok(()),
+    )
+}
+
+fn indicators(session: &Session) -> Result<(), NotDetermined> {
+    if session.indicators() == 0 {
+        return session.not_applicable("there are no event indicators");
+    }
+    let instance = session.excited()?;
+    Importer::survey(&instance, STEPS, &mut |_, _| (), &mut |importer, event| {
+        session.require(!event || importer.z.iter().all(|z| *z != 0.0), || {
+            format!(
+                "after the event at t = {:?} the event indicators are {:?}",
+                importer.instance.time.get(),
+                importer.z
+            )
+        });
+        Ok(())
+    })
+}
+
+fn discrete(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| {
+        v.variability == Variability::Discrete
+            && v.clocks.is_empty()
+            && matches!(v.causality, Causality::Output | Causality::Local)
+    };
+    let variables: Vec<_> = session.numeric().filter(fits).take(60).collect();
+    if variables.is_empty() {
+        return session.not_applicable("there are no discrete outputs or local variables");
+    }
+    let instance = session.excited()?;
+    let mut importer = Importer::start(&instance)?;
+    importer.watched.clone_from(&variables);
+    let dt = session.integrator_step();
+    let mut found = 0;
+    session.record_calls(&format!("200 integrator steps of {dt} s with events"), || {
+        let mut held = instance.snapshot(&variables)?;
+        for _ in 0..200 {
+            if importer.over {
+                break;
+            }
+            let event = importer.step(dt, &mut |_, _| ())?;
+            let now = instance.snapshot(&variables)?;
+            let end = if event { &importer.before } else { &now };
+            for (v, _) in variables.iter().zip(held.iter().zip(end)).filter(|(_, (old, new))| old != new) {
+                found += 1;
+                if found <= 10 {
+                    let t = instance.time.get();
+                    session.violated(format!("{}, discrete, changed in Continuous-Time Mode before t = {t:?}", v.name));
+                }
+            }
+            held = now;
+        }
+        Ok(())
+    })
+}
+
+fn renewed(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.excited()?;
+    let mut importer = Importer::start(&instance)?;
+    let mut tried = 0;
+    for _ in 0..10 {
+        let (Some(next), t) = (importer.next, instance.time.get()) else { break };
+        if importer.over || next <= t {
+            break;
+        }
+        // To a time halfway, in short steps; a state event on the way may change what comes next.
+        let half = t + 0.5 * (next - t);
+        let steps = ((half - t) / session.integrator_step()).ceil().clamp(1.0, 200.0);
+        let mut disturbed = false;
+        for _ in 0..200 {
+            if importer.over || disturbed || instance.time.get() + (half - t) / steps > half * (1.0 + 1e-15) {
+                break;
+            }
+            disturbed = importer.step((half - t) / steps, &mut |_, _| ())?;
+        }
+        if importer.over {
+            break;
+        }
+        if !disturbed {
+            let event = importer.event(&mut |_, _| ())?;
+            let (now, kept) = (instance.time.get(), importer.next);
+            tried += 1;
+            let lost = kept.is_none_or(|kept| kept > next + 1e-6 * (next - t));
+            if lost && !event.jumped() && !event.terminates() {
+                session.violated(format!(
+                    "the next event was at {next:?}; after an event at {now:?} that nothing asked for, it is at {kept:?}"
+                ));
+                return Ok(());
+            }
+        }
+        // On to the time event itself.
+        if let Some(next) = importer.next {
+            let rest = next - instance.time.get();
+            for _ in 0..60 {
+                if importer.over || importer.step(rest / 50.0, &mut |_, _| ())? {
+                    break;
+                }
+            }
+        }
+    }
+    if tried == 0 { session.not_applicable("no time event was announced") } else { Ok(()) }
+}

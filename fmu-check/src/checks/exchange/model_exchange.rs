@@ -1,0 +1,479 @@
+//! Model Exchange: life cycle, states and their derivatives (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
+
+use crate::check::{Check, Levels, Run};
+use crate::checks::exchange::shared::dependencies::exchange_dependencies;
+use crate::checks::exchange::shared::evaluation::{
+    completed_step, independent, inputs_read_back, interleaved, mode_alone, moved, pure, same_bits, start_times,
+};
+use crate::checks::life::shared::calls::attempt;
+use crate::checks::life::shared::kept::set_all;
+use crate::checks::life::state::in_initialization;
+use crate::exchange::{Importer, UNSTABLE, deviation, differ};
+use crate::instance::Instance;
+use crate::level::Level;
+use crate::session::{Line, NotDetermined, Session};
+use crate::state::{Life, State};
+use fmu_import::Status;
+use fmu_import::raw::{Count, Simple, Vector};
+use model_description::{BaseType, Causality, ModelVariable};
+use std::cell::Cell;
+
+const TABLE: &str = "2.0.5, 3.2.3; 3.0.2, 3.2";
+
+#[rustfmt::skip]
+pub(crate) const CHECKS: &[Check] = &[
+    Check { id: "E00", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(minimal_run),
+        requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.",
+        tried: "Initializes, iterates events, integrates with Euler's method, terminates.",
+        fix: "Look at the call that is named; the other checks of Model Exchange rest on this run." },
+    Check { id: "E01", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(allowed),
+        requirement: "Every call that the state of a Model Exchange instance allows succeeds.",
+        tried: "Makes every allowed call in every state of Model Exchange.", fix: "Extend the table of allowed states by the call that is named." },
+    Check { id: "E01i", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(allowed_early),
+        requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.",
+        tried: "Reads the vectors in Initialization Mode.", fix: "Compute them when they are read." },
+    Check { id: "E02", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused),
+        requirement: "Every call that the state of a Model Exchange instance does not allow returns Error, or Discard where it sets a variable \
+            in Continuous-Time Mode.",
+        tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error." },
+    Check { id: "E03", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts),
+        requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.",
+        tried: "Reads the vectors with guards behind them, and in FMI 3.0 the numbers.",
+        fix: "Take the sizes from ModelStructure and numberOfEventIndicators." },
+    Check { id: "E04a", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Exchange(positive_nominals),
+        requirement: "The nominals of the continuous states are above 0.",
+        tried: "Reads the nominals.", fix: "Return 1 where nothing is known." },
+    Check { id: "E04b", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(declared_nominals),
+        requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.",
+        tried: "Compares the nominals with the description.", fix: "Generate both from one table." },
+    Check { id: "E05", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip),
+        requirement: "Continuous states that are set can be read back, as a vector and as variables (should: inputs too, in both modes).",
+        tried: "Sets states and inputs and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
+    Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
+        requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of \
+            the Set calls (should: event indicators, and a time that goes back to the last completed step).",
+        tried: "Evaluates both in other orders, repeatedly and in another instance, and compares.",
+        fix: "Mark cached results as old in every Set function." },
+    Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
+        requirement: "Equal time, states and inputs give equal derivatives, bit for bit.",
+        tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory." },
+    Check { id: "E07", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step),
+        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states, derivatives, inputs, \
+            parameters nor the time.",
+        tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing." },
+    Check { id: "E08", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent),
+        requirement: "The independent variable is the time that SetTime set.",
+        tried: "Sets the time and reads the independent variable.", fix: "Assign the argument of SetTime to it." },
+    Check { id: "E09", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wild_states),
+        requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are \
+            those of before.",
+        tried: "Sets states of NaN, infinity and 1e300, reads derivatives, then sets good ones.",
+        fix: "Return Discard, and keep nothing of the bad evaluation." },
+    Check { id: "E10", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wrong_length),
+        requirement: "A vector of the wrong length is refused with Error.",
+        tried: "Passes vectors that are too long by one.", fix: "Compare the length with the number of states or indicators." },
+    Check { id: "E11", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(exchange_dependencies),
+        requirement: "An output or derivative changes only with the states and inputs among its dependencies.",
+        tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.",
+        fix: "Add them to dependencies, or leave dependencies out." },
+    Check { id: "E15", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(both_ways),
+        requirement: "The vectors of states and derivatives have the values of the variables that are the states and derivatives.",
+        tried: "Reads both at several points and after events.", fix: "Let both functions read one value." },
+    Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input or parameter, nor the time, and updates of an \
+            event no input or parameter.",
+        tried: "Reads them before and after each change of the mode, and before and after the updates.",
+        fix: "Reinitialize states in the update of the discrete states only." },
+    Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
+        requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
+        tried: "Runs 3 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+    Check { id: "E18", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(start_times),
+        requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are after them.",
+        tried: "Integrates 20 steps from each.", fix: "Take the start time from its argument, and count time events from it." },
+    Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
+        requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
+        tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },
+    Check { id: "E13", clause: "2.0.5, 2.1.8; 3.0.2, 2.2.7.4", levels: Levels::MUST, run: Run::Exchange(saved_states),
+        requirement: "An FMU state saved in Event Mode or in Continuous-Time Mode restores the run from there.",
+        tried: "Saves in Event Mode and Continuous-Time Mode, restores, runs, and compares.",
+        fix: "Save event counters, next event times and the mode too." },
+    Check { id: "E14", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(foreign_states),
+        requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.",
+        tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error." },
+];
+
+/// Ten steps of the integrator; `None` where they run away from the start, as Euler's method does if they are too long.
+fn first_steps(session: &Session) -> Result<Option<(Instance<'_>, bool)>, NotDetermined> {
+    let instance = session.exchange(State::Event)?;
+    let mut importer = Importer::start(&instance)?;
+    let nominals =
+        session.description.states().into_iter().flat_map(|v| vec![v.nominal.unwrap_or(1.0); session.elements(v)]);
+    let limits: Vec<f64> =
+        instance.states()?.iter().zip(nominals).map(|(x, nominal)| 1e3 * x.abs().max(nominal.abs())).collect();
+    let away = Cell::new(false);
+    let result = importer.run(10, &mut |instance| {
+        away.set(away.get() || instance.states()?.iter().zip(&limits).any(|(x, limit)| x.abs() > *limit));
+        Ok(())
+    });
+    let over = importer.over;
+    match result {
+        // A model may refuse states that no trajectory has.
+        Err(_) | Ok(()) if away.get() => instance.free().map(|()| None),
+        Err(NotDetermined(why)) if why == UNSTABLE => instance.free().map(|()| None),
+        Err(why) => Err(why),
+        Ok(()) => Ok(Some((instance, over))),
+    }
+}
+
+fn minimal_run(session: &Session) -> Result<(), NotDetermined> {
+    let usual = session.integrator_step();
+    let mut found = first_steps(session)?;
+    // Stiff equations need steps of the size of their shortest time constant.
+    for tenth in 1..=12 {
+        if found.is_some() {
+            break;
+        }
+        session.integrator.set(Some(usual / 10.0_f64.powi(tenth)));
+        found = first_steps(session)?;
+    }
+    let Some((instance, over)) = found else {
+        session.write(&Line::NotDetermined(UNSTABLE.into()));
+        return Ok(());
+    };
+    if let Some(step) = session.integrator.get() {
+        session.write(&Line::Integrator(step));
+        session.note(format!("the equations are stiff: steps of {step:e} s instead of {usual:e} s"));
+    }
+    let _ = instance.snapshot(&session.watched())?;
+    if !over {
+        let status = instance.simple(Simple::Terminate)?;
+        session.require(status.is_ok(), || format!("{} returned {status}", session.raw.name("Terminate")));
+    }
+    Ok(())
+}
+
+fn allowed(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, '+');
+    Ok(())
+}
+
+fn allowed_early(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, 's');
+    Ok(())
+}
+
+fn refused(session: &Session) -> Result<(), NotDetermined> {
+    attempt(session, Life::ModelExchange, '-');
+    Ok(())
+}
+
+fn counts(session: &Session) -> Result<(), NotDetermined> {
+    let instance = session.exchange(State::Event)?;
+    let (states, indicators) = (session.states(), session.indicators());
+    if !session.is_v2() {
+        let counts = [(Count::GetNumberOfContinuousStates, states), (Count::GetNumberOfEventIndicators, indicators)];
+        for (name, expected) in counts {
+            let (status, found) = instance.call_for(name.as_str(), |raw| raw.count(name, instance.handle, false))?;
+            session.require(status.is_ok() && found == expected, || {
+                format!("fmi3{} returned {status}, {found}; the description has {expected}", name.as_str())
+            });
+        }
+    }
+    let untouched = 0xc5c5_c5c5_c5c5_c5c5;
+    for (name, n) in [
+        (Vector::GetContinuousStates, states),
+        (instance.derivatives_name(), states),
+        (Vector::GetNominalsOfContinuousStates, states),
+        (Vector::GetEventIndicators, indicators),
+    ] {
+        if n == 0 {
+            continue;
+        }
+        let (status, values, intact) = instance.vector(name, n)?;
+        session.require(intact, || format!("{} wrote past the {n} values", name.as_str()));
+        session.require(!status.is_ok() || values.iter().all(|v| v.to_bits() != untouched), || {
+            format!("{} did not write all of the {n} values", name.as_str())
+        });
+    }
+    session.note(format!("{states} states, {indicators} event indicators"));
+    Ok(())
+}
+
+/// Ends a probe of an FMU without continuous states.
+macro_rules! needs_states {
+    ($session:ident) => {
+        if $session.states() == 0 {
+            return $session.not_applicable("there are no continuous states");
+        }
+    };
+}
+
+fn nominals(session: &Session) -> Result<Vec<f64>, NotDetermined> {
+    let instance = session.exchange(State::Continuous)?;
+    let (status, values, _) = instance.vector(Vector::GetNominalsOfContinuousStates, session.states())?;
+    instance.must("GetNominalsOfContinuousStates", status)?;
+    Ok(values)
+}
+
+fn positive_nominals(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let found = nominals(session)?;
+    let bad = found.iter().any(|n| !(n.is_finite() && *n > 0.0));
+    session.require(!bad, || format!("the nominals are {found:?}"));
+    Ok(())
+}
+
+fn declared_nominals(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let states = session.description.states();
+    let declared = states.iter().flat_map(|v| vec![(v, v.nominal.unwrap_or(1.0)); session.elements(v)]);
+    for ((v, declared), found) in declared.zip(nominals(session)?) {
+        session.require((found - declared).abs() <= 1e-12 * declared.abs(), || {
+            format!("line {}: {} has the nominal {declared}, but the binary returned {found}", v.line, v.name)
+        });
+    }
+    Ok(())
+}
+
+fn round_trip(session: &Session) -> Result<(), NotDetermined> {
+    inputs_read_back(session)?;
+    needs_states!(session);
+    let instance = session.exchange(State::Continuous)?;
+    let x = moved(session, &instance.states()?, usize::MAX);
+    let status = instance.set_states(&x)?;
+    if !status.is_ok() {
+        return Err(NotDetermined(format!("SetContinuousStates({x:?}) returned {status}")));
+    }
+    let found = instance.states()?;
+    session.require(found == x, || format!("the states were set to {x:?}, and read as {found:?}"));
+    let mut rest = &x[..];
+    for v in session.description.states() {
+        let (one, more) = rest.split_at(session.elements(v).min(rest.len()));
+        rest = more;
+        let (status, found) = instance.get(v)?;
+        let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
+        session.require(status.is_ok() && found == one, || {
+            format!("the state {} was set to {one:?}, but getting it returned {status}, {found:?}", v.name)
+        });
+    }
+    Ok(())
+}
+
+fn both_ways(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    let d = &session.description;
+    let derivatives: Vec<&ModelVariable> = d.derivatives.iter().filter_map(|u| d.referenced(u.reference)).collect();
+    let instance = session.excited()?;
+    let mut importer = Importer::start(&instance)?;
+    // At the start, after some steps, and after events.
+    let mut looked = 0;
+    for k in 0..400 {
+        let event = importer.step(session.integrator_step(), &mut |_, _| ())?;
+        if importer.over || looked == 8 {
+            break;
+        }
+        if !event && k % 50 != 0 {
+            continue;
+        }
+        looked += 1;
+        let mut vector = instance.states()?;
+        vector.extend(instance.derivatives()?);
+        let mut rest = &vector[..];
+        for v in d.states().iter().chain(&derivatives) {
+            let (of_vector, more) = rest.split_at(session.elements(v).min(rest.len()));
+            rest = more;
+            let (status, found) = instance.get(v)?;
+            let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
+            if !status.is_ok() || v.base != BaseType::Float64 {
+                continue;
+            }
+            if let Some((_, largest)) = deviation(&[of_vector.to_vec()], std::slice::from_ref(&found)) {
+                session.deviates(
+                    largest,
+                    &format!("line {}: {} is {found:?}, and {of_vector:?} in the vector", v.line, v.name),
+                );
+                return Ok(());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn wild_states(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    session.cases([f64::NAN, f64::INFINITY, 1e300], |wild| {
+        let instance = session.exchange(State::Continuous)?;
+        let (x, f) = (instance.states()?, instance.derivatives()?);
+        let set = instance.set_states(&vec![wild; x.len()])?;
+        let mut told = vec![("SetContinuousStates", set)];
+        if set.is_ok() {
+            told.push((instance.derivatives_name().as_str(), instance.vector(instance.derivatives_name(), x.len())?.0));
+            if session.indicators() > 0 {
+                let (status, ..) = instance.vector(Vector::GetEventIndicators, session.indicators())?;
+                told.push(("GetEventIndicators", status));
+            }
+        }
+        for (name, status) in told {
+            session.require(status.is_ok() || status == Status::DISCARD, || {
+                format!("{name} with states of {wild:e} returned {status}, which ends the simulation")
+            });
+            if !status.is_ok() && status != Status::DISCARD {
+                return Ok(());
+            }
+        }
+        let status = instance.set_states(&x)?;
+        let again = if status.is_ok() { instance.derivatives()? } else { Vec::new() };
+        session.require(!differ(&again, &f), || {
+            format!(
+                "the derivatives were {f:?}; after states of {wild:e} and the old ones ({status}) they are {again:?}"
+            )
+        });
+        Ok(())
+    })
+}
+
+fn wrong_length(session: &Session) -> Result<(), NotDetermined> {
+    needs_states!(session);
+    for (name, n) in [
+        (Vector::GetContinuousStates, session.states() + 1),
+        (Vector::SetContinuousStates, session.states() + 1),
+        (Vector::GetNominalsOfContinuousStates, session.states() + 1),
+        (Vector::GetEventIndicators, session.indicators() + 1),
+    ] {
+        session.case(|| {
+            let instance = session.exchange(State::Continuous)?;
+            let mut room = vec![0.0; n + 8];
+            let call = format!("{}(n={n})", name.as_str());
+            let status = instance.call(&call, |raw| raw.vector(name, instance.handle, Some(&mut room), n))?;
+            session.require(status == Status::ERROR, || format!("{call} returned {status}"));
+            Ok(())
+        });
+    }
+    Ok(())
+}
+
+fn reset(session: &Session) -> Result<(), NotDetermined> {
+    let run = |instance: &Instance<'_>| Importer::start(instance)?.trajectory(100);
+    let first = run(&session.exchange(State::Event)?)?;
+    session.cases(Life::ModelExchange.states(), |&state| {
+        let running = state == State::Continuous;
+        let instance = session.exchange(if running { State::Initialization } else { state })?;
+        if running {
+            // This check does not judge refusals.
+            if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
+                session.note(why);
+            }
+            let _ = instance
+                .perform(Simple::ExitInitializationMode)
+                .and_then(|()| Importer::start(&instance)?.run(20, &mut |_| Ok(())));
+        }
+        let status = instance.simple(Simple::Reset)?;
+        if !status.is_ok() {
+            session.violated(format!("Reset after {state:?} returned {status}"));
+            return Ok(());
+        }
+        instance.experiment(session.start(), None);
+        if let Err(why) = instance.bring_to(State::Event) {
+            session.failed(&format!("after Reset after {state:?}"), why);
+            return Ok(());
+        }
+        if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
+            let text = format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
+            session.deviates(largest, &text);
+        }
+        Ok(())
+    })
+}
+
+fn saved_states(session: &Session) -> Result<(), NotDetermined> {
+    if !session.exchange_saves() {
+        return session.not_applicable("canGetAndSetFMUState is false for Model Exchange");
+    }
+    let comparable = |v: &&ModelVariable| v.clocks.is_empty() && v.causality != Causality::Independent;
+    let all: Vec<&ModelVariable> = session.numeric().filter(comparable).collect();
+    session.case(|| in_initialization(session, &|| session.exchange(State::Initialization), &all));
+    let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
+        if let Some((k, largest)) = deviation(first, second) {
+            session.deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
+        }
+    };
+    session.case(|| {
+        let instance = session.excited()?;
+        let (saved, t) = (instance.save()?, instance.time.get());
+        let first = Importer::start(&instance)?.trajectory(100)?;
+        instance.restore(saved, t)?;
+        compare("Event Mode", &first, &Importer::start(&instance)?.trajectory(100)?);
+        Ok(())
+    });
+    session.case(|| {
+        let instance = session.excited()?;
+        let mut importer = Importer::start(&instance)?;
+        importer.run(50, &mut |_| Ok(()))?;
+        let (saved, t, next) = (instance.save()?, instance.time.get(), importer.next);
+        let before = instance.snapshot(&all)?;
+        let mut first = importer.trajectory(100)?;
+        for _ in 0..2 {
+            instance.restore(saved, t)?;
+            for (v, (old, new)) in all.iter().zip(before.iter().zip(instance.snapshot(&all)?)) {
+                session.compare_variables(
+                    &[*v],
+                    "restored in Continuous-Time Mode",
+                    &[vec![old.clone()]],
+                    &[vec![new]],
+                );
+            }
+            let second = Importer::resume(&instance, next)?.trajectory(100)?;
+            compare("Continuous-Time Mode", &first, &second);
+            first = second;
+        }
+        Ok(())
+    });
+    // In the middle of an event: the update that follows is the same.
+    session.case(|| {
+        let instance = session.excited()?;
+        let mut importer = Importer::start(&instance)?;
+        importer.run(50, &mut |_| Ok(()))?;
+        if importer.over {
+            return Ok(());
+        }
+        instance.perform(Simple::EnterEventMode)?;
+        let (saved, t) = (instance.save()?, instance.time.get());
+        let first = Importer::start(&instance)?.trajectory(100)?;
+        instance.restore(saved, t)?;
+        compare("Event Mode", &first, &Importer::start(&instance)?.trajectory(100)?);
+        Ok(())
+    });
+    Ok(())
+}
+
+fn foreign_states(session: &Session) -> Result<(), NotDetermined> {
+    let d = &session.description;
+    let both = d.model_exchange.as_ref().zip(d.co_simulation.as_ref());
+    let Some((exchange, simulation)) = both else { return session.not_applicable("the FMU has one interface only") };
+    if exchange.model_identifier != simulation.model_identifier {
+        return session.not_applicable("the interfaces have binaries of their own");
+    }
+    if !exchange.can_get_and_set_state() || !simulation.can_get_and_set_state() {
+        return session.not_applicable("canGetAndSetFMUState is false");
+    }
+    session.cases([true, false], |to_simulation| {
+        let (exchange, simulation) = (session.exchange(State::Continuous)?, session.stepping()?);
+        let (from, to) = if to_simulation { (&exchange, &simulation) } else { (&simulation, &exchange) };
+        let saved = from.save()?;
+        let status = to.call("SetFMUState of the other interface", |raw| raw.set_state(to.handle, saved))?;
+        session.note(format!("SetFMUState returned {status}"));
+        if status == Status::FATAL {
+            return Ok(());
+        }
+        // Whatever it answered, the next calls and a reset must not crash.
+        if to_simulation {
+            let _ = to.step(session.h())?;
+        } else {
+            let _ = to.set_time(to.time.get() + session.integrator_step())?;
+            let _ = to.vector(to.derivatives_name(), session.states())?;
+        }
+        let status = to.simple(Simple::Reset)?;
+        session.require(status.is_ok(), || format!("Reset after a state of the other interface returned {status}"));
+        Ok(())
+    })
+}

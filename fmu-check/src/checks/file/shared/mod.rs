@@ -1,0 +1,11 @@
+//! What the groups of this subject share.
+
+pub(crate) mod clock_rules;
+pub(crate) mod clocked;
+pub(crate) mod layered;
+pub(crate) mod libraries;
+pub(crate) mod names;
+pub(crate) mod paths;
+pub(crate) mod schema;
+pub(crate) mod schema_rules;
+pub(crate) mod units;

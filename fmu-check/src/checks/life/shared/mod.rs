@@ -1,0 +1,7 @@
+//! What the groups of this subject share.
+
+pub(crate) mod by_name;
+pub(crate) mod calls;
+pub(crate) mod kept;
+pub(crate) mod starts;
+pub(crate) mod values;

@@ -1,0 +1,277 @@
+//! Several instances, threads, copies, loading and unloading.
+
+use crate::check::{Check, Levels, Run};
+use crate::checks::life::shared::kept::{set_all, texts};
+use crate::checks::process::shared::copies::{failed, second_binary};
+use crate::instance::Instance;
+use crate::session::{NotDetermined, Session};
+use crate::state::State;
+use crate::trajectory::trajectory;
+use fmu_import::guard::patiently;
+use fmu_import::raw::{Arguments, Interface, Raw};
+use std::sync::{Mutex, PoisonError};
+use std::thread::Builder;
+use std::time::{Duration, Instant};
+
+#[rustfmt::skip]
+pub(crate) const CHECKS: &[Check] = &[
+    Check { id: "L04a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(interleaved),
+        requirement: "Interleaved instances give the same results as each alone.",
+        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one alone.",
+        fix: "Keep all data in the instance; no globals and statics." },
+    Check { id: "L04b", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, run: Run::Probe(threads),
+        requirement: "Instances in several threads give the same results as each alone.",
+        tried: "Runs 4 instances in 4 threads and compares each with one alone.", fix: "Keep all data in the instance; protect what instances share." },
+    Check { id: "L04c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(moving_between_threads),
+        requirement: "An instance can be created in one thread, used in another and freed in a third.",
+        tried: "Steps in a second thread, frees in a third.", fix: "Use no thread-local data." },
+    Check { id: "B05d", clause: "hardening", levels: Levels::HARD, run: Run::Probe(copies),
+        requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.",
+        tried: "Loads two copies with their symbols visible to each other and compares.",
+        fix: "Hide all symbols but those of the standard, or link with -Bsymbolic." },
+    Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Any(leaks),
+        requirement: "Creating and freeing instances leaks no memory.",
+        tried: "Creates, runs, reads and frees some thousand instances and measures memory.",
+        fix: "Free in FreeInstance what Instantiate allocated; a sanitizer finds it." },
+    Check { id: "B07b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(reloads),
+        requirement: "The binary can be loaded and unloaded repeatedly and does not stay loaded.",
+        tried: "Loads and unloads 20 times.", fix: "End threads and unregister handlers when the library is unloaded." },
+];
+
+pub(crate) fn only_once(session: &Session) -> bool {
+    session.flag("canBeInstantiatedOnlyOncePerProcess")
+}
+
+const ONLY_ONCE: &str = "canBeInstantiatedOnlyOncePerProcess is true";
+
+fn interleaved(session: &Session) -> Result<(), NotDetermined> {
+    if only_once(session) {
+        return session.not_applicable(ONLY_ONCE);
+    }
+    let alone = session.stepping()?;
+    let mut expected = vec![(trajectory(&alone, 20)?, texts(&alone)?)];
+    let own: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+    let before = alone.snapshot(&own)?;
+    // Every other instance has parameters of its own, where the FMU takes these values.
+    let trial = session.initializing()?;
+    if set_all(&trial, 1.0).is_ok() && trial.exit().is_ok() {
+        expected.push((trajectory(&trial, 20)?, texts(&trial)?));
+    }
+    let kinds = expected.len();
+    // Creating them is part of the requirement.
+    let mut all = Vec::new();
+    for k in 0..8 {
+        let Some(instance) = session.instantiate(&session.arguments(&format!("probe {k}")))? else {
+            session.violated(format!("instance {} could not be created beside {} others", all.len() + 1, k + kinds));
+            return Ok(());
+        };
+        instance.enter()?;
+        if k % kinds == 1 {
+            set_all(&instance, 1.0)?;
+        }
+        instance.exit()?;
+        all.push((instance, Vec::new()));
+    }
+    for k in 0..20 {
+        for (instance, rows) in &mut all {
+            instance.change_inputs(k)?;
+            instance.steps(1, session.h())?;
+            rows.push(instance.snapshot(&session.watched())?);
+        }
+    }
+    for (v, (old, new)) in own.iter().zip(before.into_iter().zip(alone.snapshot(&own)?)) {
+        if !old.is_empty() && !new.is_empty() {
+            session.compare_variables(&[*v], "an instance that nobody called meanwhile", &[vec![old]], &[vec![new]]);
+        }
+    }
+    for (k, (instance, rows)) in all.into_iter().enumerate() {
+        let (alone, words) = &expected[k % kinds];
+        session.compare(&format!("instance {k}"), alone, &rows);
+        for (old, new) in words.iter().zip(&texts(&instance)?).filter(|(old, new)| old != new) {
+            session.violated(format!("instance {k}: {} is {:?}, and {:?} alone", old.0, new.1, old.1));
+        }
+        instance.free()?;
+    }
+    Ok(())
+}
+
+/// Only one thread may write the files of a session, so each thread gets its own loaded binary and a duplicate without journal.
+fn threads(session: &Session) -> Result<(), NotDetermined> {
+    if only_once(session) {
+        return session.not_applicable(ONLY_ONCE);
+    }
+    let alone = trajectory(&session.stepping()?, 40)?;
+    let duplicates = (0..4).map(|k| session.duplicate(&session.binary, k)).collect::<Result<Vec<_>, _>>()?;
+    session.record_call("4 threads, each with an instance, 40 steps");
+    let duplicates: Vec<_> = duplicates.into_iter().map(|duplicate| Mutex::new(Some(duplicate))).collect();
+    let results: Vec<Result<Vec<Vec<Vec<u64>>>, NotDetermined>> = std::thread::scope(|scope| {
+        let run = |duplicate: &Mutex<Option<Session>>| {
+            let duplicate = duplicate.lock().unwrap_or_else(PoisonError::into_inner).take();
+            let duplicate = duplicate.ok_or_else(|| NotDetermined("the thread has no instance".into()))?;
+            trajectory(&duplicate.stepping()?, 40)
+        };
+        let start = |duplicate| patiently(|| Builder::new().spawn_scoped(scope, move || run(duplicate)));
+        let workers = duplicates.iter().map(start).collect::<Result<Vec<_>, _>>().map_err(|e| failed(&e))?;
+        let panicked = || Err(NotDetermined("the thread panicked".into()));
+        Ok::<_, NotDetermined>(workers.into_iter().map(|w| w.join().unwrap_or_else(|_| panicked())).collect())
+    })?;
+    for (k, rows) in results.into_iter().enumerate() {
+        match rows {
+            Err(why) => session.failed(&format!("thread {k}"), why),
+            Ok(rows) => session.compare(&format!("thread {k}"), &alone, &rows),
+        }
+    }
+    Ok(())
+}
+
+fn moving_between_threads(session: &Session) -> Result<(), NotDetermined> {
+    let handle = session.stepping()?.handle;
+    let (start, h, raw) = (session.start(), session.h(), &session.raw);
+    session.record_call("DoStep in another thread");
+    let stepped = std::thread::scope(|scope| {
+        let step = move || raw.do_step(handle, start, h, false, [true; 4]).map(|(s, _)| s);
+        patiently(|| Builder::new().spawn_scoped(scope, step)).map(std::thread::ScopedJoinHandle::join)
+    });
+    let status = stepped.map_err(|e| failed(&e))?.ok().flatten();
+    session.require(status.is_some_and(fmu_import::Status::is_ok), || {
+        format!("DoStep in another thread returned {status:?}")
+    });
+    session.record_call("FreeInstance in a third thread");
+    let freed = std::thread::scope(|scope| {
+        patiently(|| Builder::new().spawn_scoped(scope, move || raw.free(handle)))
+            .map(std::thread::ScopedJoinHandle::join)
+    });
+    freed.map(|_| ()).map_err(|e| failed(&e))
+}
+
+#[cfg(not(unix))]
+fn copies(session: &Session) -> Result<(), NotDetermined> {
+    session.not_applicable("libraries do not share symbols on this system")
+}
+
+#[cfg(unix)]
+fn copies(session: &Session) -> Result<(), NotDetermined> {
+    if only_once(session) {
+        return session.not_applicable(ONLY_ONCE);
+    }
+    let alone = trajectory(&session.stepping()?, 20)?;
+    let mut duplicates = Vec::new();
+    for k in 0..2 {
+        let binary = second_binary(session, &format!("copy {k} %23 \u{e4}"))?;
+        session.record_call("dlopen(RTLD_NOW | RTLD_GLOBAL)");
+        let raw = Raw::open_global(&binary, session.description.version).map_err(NotDetermined)?;
+        duplicates.push(session.duplicate_with(raw, 10 + k)?);
+    }
+    let instances: Vec<Instance<'_>> = duplicates.iter().map(Session::stepping).collect::<Result<_, _>>()?;
+    let mut rows = vec![Vec::new(); instances.len()];
+    for k in 0..20 {
+        for (instance, rows) in instances.iter().zip(&mut rows) {
+            instance.change_inputs(k)?;
+            instance.steps(1, session.h())?;
+            rows.push(instance.snapshot(&session.watched())?);
+        }
+    }
+    for rows in rows {
+        session.compare("a copy", &alone, &rows);
+    }
+    drop(instances);
+    // Two copies stay loaded until the process ends.
+    duplicates.into_iter().for_each(std::mem::forget);
+    Ok(())
+}
+
+/// Memory of this process in bytes: what is resident, and what is reserved for data.
+fn memory() -> Option<[u64; 2]> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let of = |name: &str| {
+        let line = status.lines().find(|l| l.starts_with(name))?;
+        line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
+    };
+    Some([of("VmRSS:")?, of("VmData:")?])
+}
+
+/// Bytes that one of many may leave: the struct of callbacks that we keep for FMI 2.0, and our own tables.
+const LEFT: u64 = 300;
+/// Bytes that all may leave: pages that the allocator keeps.
+const LEAST: u64 = 300_000;
+
+/// Does the same many times and looks at what memory grows by.
+pub(crate) fn leak(
+    session: &Session,
+    what: &str,
+    once: &dyn Fn() -> Result<(), NotDetermined>,
+) -> Result<(), NotDetermined> {
+    if memory().is_none() {
+        return Err(NotDetermined("this system does not report the memory of a process".into()));
+    }
+    let rounds = |most: u64| {
+        let began = Instant::now();
+        session.record_calls(&format!("up to {most} {what}"), || {
+            for k in 0..most {
+                once()?;
+                if session.half_time_used() || (k >= 300 && began.elapsed() > Duration::from_secs(1)) {
+                    return Ok(k + 1);
+                }
+            }
+            Ok(most)
+        })
+    };
+    rounds(200)?;
+    let before = memory().unwrap_or_default();
+    let n = rounds(3000)?;
+    let growth =
+        memory().unwrap_or_default().iter().zip(before).map(|(after, before)| after.saturating_sub(before)).max();
+    let growth = growth.unwrap_or(0);
+    session.require(growth < (LEFT * n).max(LEAST), || format!("{n} {what} leaked {} kB", growth / 1000));
+    session.note(format!("{} kB more after {n} {what}", growth / 1000));
+    Ok(())
+}
+
+fn leaks(session: &Session) -> Result<(), NotDetermined> {
+    let watched = session.watched();
+    if session.description.model_exchange.is_some() {
+        let arguments = || Arguments { interface: Interface::ModelExchange, ..session.arguments("probe") };
+        leak(session, "instances for Model Exchange", &|| {
+            let instance = session.made(&arguments())?;
+            instance.bring_to(State::Continuous)?;
+            instance.free()
+        })?;
+    }
+    if session.description.co_simulation.is_none() {
+        return Ok(());
+    }
+    leak(session, "instances", &|| {
+        let arguments = session.arguments("probe");
+        let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
+        instance.initialize()?;
+        instance.steps(2, session.h())?;
+        let _ = (instance.snapshot(&watched)?, texts(&instance)?);
+        instance.free()
+    })
+}
+
+fn reloads(session: &Session) -> Result<(), NotDetermined> {
+    // Another path, so that the session's own copy does not keep it loaded.
+    let binary = second_binary(session, "reloaded")?;
+    for k in 0..20 {
+        session.record_call(&format!("loading the binary, round {}", k + 1));
+        let duplicate = session.duplicate(&binary, 20 + k)?;
+        {
+            let instance = duplicate.stepping()?;
+            instance.steps(3, session.h())?;
+            instance.free()?;
+        }
+        session.record_call(&format!("unloading the binary, round {}", k + 1));
+        duplicate.raw.close().map_err(NotDetermined)?;
+        if session.half_time_used() {
+            break;
+        }
+    }
+    if let Ok(maps) = std::fs::read_to_string("/proc/self/maps") {
+        let text = binary.to_string_lossy();
+        session.require(!maps.lines().any(|l| l.ends_with(&*text)), || {
+            "the binary is still loaded after unloading".into()
+        });
+    }
+    Ok(())
+}

@@ -1,0 +1,3 @@
+//! What the groups of this subject share.
+
+pub(crate) mod derivatives;

@@ -1,0 +1,120 @@
+//! Communication points, counted in integers.
+
+use fmu_import::limits::STEPS;
+
+/// When to start and stop, and how to step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Start time in s.
+    pub start: f64,
+    /// Stop time in s.
+    pub stop: f64,
+    /// Communication step in s. When it does not divide the time, the last step is shorter.
+    pub step: f64,
+    /// Step the FMUs one after another; each receives the new outputs of those before it.
+    pub sequential: bool,
+}
+
+/// The communication points of a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Grid {
+    settings: Settings,
+    steps: u32,
+}
+
+impl Settings {
+    pub(super) fn grid(&self) -> Result<Grid, String> {
+        let Self { start, stop, step, .. } = *self;
+        if ![start, stop, step].iter().all(|x| x.is_finite()) {
+            return Err(format!("start {start}, stop {stop} and step {step} must be finite"));
+        }
+        if stop <= start || step <= 0.0 {
+            return Err(format!("stop {stop} must be after start {start}, and step {step} be positive"));
+        }
+        let count = (stop - start) / step;
+        // A millionth of a step is rounding, more is a shorter last step.
+        let whole = if (count - count.round()).abs() < 1e-6 * count.max(1.0) { count.round() } else { count.ceil() };
+        if whole < 1.0 {
+            let duration = stop - start;
+            return Err(format!(
+                "the step {step:e} s is longer than the simulation of {duration} s; give a shorter one"
+            ));
+        }
+        if whole > f64::from(u32::try_from(STEPS.most).unwrap_or(u32::MAX)) {
+            return Err(format!(
+                "a step of {step} s from {start} s to {stop} s {}",
+                STEPS.exceeded(format!("{whole:e}"))
+            ));
+        }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "an integer in the range, see above"
+        )]
+        let steps = whole as u32;
+        Ok(Grid { settings: *self, steps })
+    }
+}
+
+impl Grid {
+    pub(super) fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    pub(super) fn steps(&self) -> u32 {
+        self.steps
+    }
+
+    /// Time of point `k`; never summed up.
+    pub(super) fn time(&self, k: u32) -> f64 {
+        let Settings { start, stop, step, .. } = self.settings;
+        if k == self.steps { stop } else { start + f64::from(k) * step }
+    }
+
+    /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, but for a short last one.
+    pub(super) fn size(&self, k: u32) -> f64 {
+        let rest = self.settings.stop - self.time(k);
+        if k + 1 == self.steps && (rest - self.settings.step).abs() > 1e-3 * self.settings.step {
+            rest
+        } else {
+            self.settings.step
+        }
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
+mod tests {
+    use super::*;
+
+    fn grid(start: f64, stop: f64, step: f64) -> Result<Grid, String> {
+        Settings { start, stop, step, sequential: false }.grid()
+    }
+
+    #[test]
+    fn points_are_not_summed() {
+        let g = grid(0.0, 1.0, 1e-4).unwrap();
+        assert_eq!((g.steps(), g.time(3), g.time(10_000)), (10_000, 3.0 * 1e-4, 1.0));
+        assert!((0..g.steps()).all(|k| g.size(k) == 1e-4));
+    }
+
+    #[test]
+    fn the_last_step_may_be_short() {
+        let g = grid(1.0, 2.0, 0.3).unwrap();
+        assert_eq!((g.steps(), g.time(4)), (4, 2.0));
+        assert!((g.size(3) - 0.1).abs() < 1e-12, "{}", g.size(3));
+        assert_eq!(grid(0.0, 0.1, 0.3).unwrap().size(0), 0.1);
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for (start, stop, step) in
+            [(0.0, 0.0, 0.1), (0.0, 1.0, 0.0), (0.0, 1.0, -1.0), (0.0, f64::NAN, 0.1), (0.0, 1e9, 1e-9)]
+        {
+            assert!(grid(start, stop, step).is_err(), "{start} {stop} {step}");
+        }
+        let told = |step| grid(0.0, 1.0, step).unwrap_err();
+        assert_eq!(told(1e308), "the step 1e308 s is longer than the simulation of 1 s; give a shorter one");
+        assert!(told(1e-10).ends_with("takes 1e10 steps; the limit is 2147483648"), "{}", told(1e-10));
+    }
+}

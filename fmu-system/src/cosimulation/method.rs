@@ -1,0 +1,93 @@
+//! How the FMUs of a system are run.
+
+use crate::integration::Solver;
+use fmu_import::{Error, Fmu, Kind};
+use model_description::{FmiVersion, Interface};
+
+/// How the FMUs of a system are run.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Method {
+    /// Co-Simulation: the FMUs step themselves.
+    CoSimulation {
+        /// FMUs that have event mode use it: their events are handled at their time, between steps.
+        event_mode: bool,
+        /// FMUs may return early from a step.
+        early_return: bool,
+    },
+    /// Model Exchange: the master integrates all FMUs together.
+    ModelExchange(Integration),
+}
+
+impl Default for Method {
+    /// Co-Simulation without event mode and early return.
+    fn default() -> Self {
+        Self::CoSimulation { event_mode: false, early_return: false }
+    }
+}
+
+/// Settings of Model Exchange. The settings after the solver are for tests of FMUs: if the FMUs are right, results do not
+/// depend on them beyond the solver's tolerance.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Integration {
+    /// How states are integrated.
+    pub solver: Solver,
+    /// Names of the FMUs that step themselves all the same (Co-Simulation), from communication point to communication point.
+    pub stepping: Vec<String>,
+    /// At an event, the FMUs are updated from the last one added to the first.
+    pub reversed: bool,
+    /// Event mode is entered this time (s) after the time event of an FMU.
+    pub late: f64,
+    /// Times (s) of events that no FMU asked for, rising.
+    pub extra_events: Vec<f64>,
+}
+
+impl Method {
+    /// What an instance of this FMU is made for.
+    pub(super) fn kind(&self, name: &str, fmu: &Fmu) -> Kind {
+        let description = fmu.description();
+        let can = |flag: fn(&Interface) -> bool| {
+            description.version == FmiVersion::V3 && description.co_simulation.as_ref().is_some_and(flag)
+        };
+        match self {
+            Self::ModelExchange(integration) if integration.stepping.iter().any(|other| other == name) => {
+                Kind::default()
+            }
+            Self::ModelExchange(_) => Kind::ModelExchange,
+            Self::CoSimulation { event_mode, early_return } => Kind::CoSimulation {
+                event_mode: *event_mode && can(Interface::has_event_mode),
+                early_return: *early_return && can(Interface::may_return_early),
+            },
+        }
+    }
+
+    /// Refuses a method that none of the instances can follow, and settings that make no sense.
+    pub(super) fn check(&self, kinds: &[Kind], sequential: bool) -> Result<(), Error> {
+        let wrong = |cause: String| Err(Error::usage("settings", cause));
+        let any = |used: fn(&Kind) -> bool| kinds.iter().any(used);
+        match self {
+            Self::CoSimulation { event_mode: false, early_return: false } => return Ok(()),
+            Self::CoSimulation { event_mode, early_return } => {
+                if *event_mode && !any(|k| matches!(k, Kind::CoSimulation { event_mode: true, .. })) {
+                    return wrong("no FMU has event mode (hasEventMode, FMI 3.0 Co-Simulation)".into());
+                }
+                if *early_return && !any(|k| matches!(k, Kind::CoSimulation { early_return: true, .. })) {
+                    return wrong("no FMU returns early (mightReturnEarlyFromDoStep, FMI 3.0 Co-Simulation)".into());
+                }
+            }
+            Self::ModelExchange(integration) => {
+                if let Solver::Dopri { rtol } = integration.solver
+                    && !(1e-14..=0.1).contains(&rtol)
+                {
+                    return wrong(format!("the relative tolerance {rtol} must be between 1e-14 and 0.1"));
+                }
+                if !(integration.late >= 0.0 && integration.late.is_finite()) {
+                    return wrong(format!("events cannot be late by {} s", integration.late));
+                }
+            }
+        }
+        if sequential {
+            return wrong("FMUs are stepped one after the other in plain Co-Simulation alone".into());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,362 @@
+//! A system made ready for many runs.
+//!
+//! A [`Plan`] is what all runs share, and threads share it. A [`Worker`] has instances of its own and runs one setting after
+//! another: it resets its instances where that works and makes new ones after an error.
+//!
+//! ```no_run
+//! # fn main() -> Result<(), fmu_import::Error> {
+//! # let system = fmu_system::cosimulation::System::default();
+//! # let settings = fmu_system::cosimulation::Settings { start: 0.0, stop: 1.0, step: 1e-3, sequential: false };
+//! let plan = std::sync::Arc::new(system.into_plan(&settings)?);
+//! let resistance = plan.target("plant.motor.R_s")?;
+//! let mut worker = plan.worker()?;
+//! for r in [2.9, 3.0, 3.1] {
+//!     let mut peak = 0.0_f64;
+//!     worker.run([(&resistance, r)], |_, values| {
+//!         peak = peak.max(values[0]);
+//!         std::ops::ControlFlow::Continue(())
+//!     })?;
+//!     println!("{r}: {peak}");
+//! }
+//! # Ok(()) }
+//! ```
+
+use super::exchange::{Exchange, Wiring};
+use super::grid::{Grid, Settings};
+use super::method::Method;
+use super::parts::{Part, Parts, Port};
+use super::point::Ended;
+use super::recording::{Column, Recording};
+use super::run::simulate;
+use super::system::System;
+use fmu_import::{Error, Fmu, Instance, Kind, Values};
+use model_description::{BaseType, Interface};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// What all runs of a system share: FMUs, connections, recorded variables, times, and the values that were set.
+pub struct Plan {
+    method: Method,
+    parts: Parts,
+    /// The FMU of each part to make instances of.
+    live: Vec<Arc<Live>>,
+    wiring: Wiring,
+    set: Vec<(Port, Values)>,
+    records: Vec<Port>,
+    exchange: Exchange,
+    grid: Grid,
+    columns: Vec<Column>,
+}
+
+/// An FMU that is opened again after the status Fatal.
+struct Live {
+    fmu: Mutex<Fmu>,
+    /// How often it was opened again.
+    generation: AtomicU32,
+}
+
+impl Live {
+    fn fmu(&self) -> MutexGuard<'_, Fmu> {
+        self.fmu.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn generation(&self) -> u32 {
+        self.generation.load(Ordering::Acquire)
+    }
+}
+
+/// A variable of a plan that each run sets.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Target {
+    port: Port,
+    written: String,
+}
+
+impl Target {
+    /// `instance.variable`.
+    pub fn name(&self) -> &str {
+        &self.written
+    }
+}
+
+impl System {
+    /// Makes the system ready for many runs from start to stop.
+    ///
+    /// # Errors
+    /// The settings make no sense.
+    pub fn into_plan(self, settings: &Settings) -> Result<Plan, Error> {
+        let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
+        let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
+        let columns = self.columns().collect();
+        let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });
+        let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
+        Ok(Plan {
+            live,
+            exchange,
+            grid,
+            columns,
+            method: self.method,
+            parts: self.parts,
+            wiring: self.wiring,
+            set: self.set,
+            records: self.records,
+        })
+    }
+
+    /// The recorded columns, without values.
+    pub(super) fn columns(&self) -> impl Iterator<Item = Column> {
+        self.records.iter().zip(&self.columns).map(|(port, name)| self.parts.column(port, name))
+    }
+}
+
+impl Plan {
+    /// A variable to set in runs, written `instance.variable`.
+    ///
+    /// # Errors
+    /// The variable does not exist, is not a number, cannot be set, or is fed.
+    pub fn target(&self, written: &str) -> Result<Target, Error> {
+        let port = self.parts.settable(written)?;
+        if self.wiring.feeds(port.instance, &port.name) {
+            return Err(Error::usage(written, "is fed by a connection or a schedule: remove that, or do not vary it"));
+        }
+        Ok(Target { port, written: written.into() })
+    }
+
+    /// Units and, of an enumeration, names of the values of a target.
+    pub fn column(&self, target: &Target) -> Column {
+        self.parts.column(&target.port, target.name())
+    }
+
+    /// What a user writes for a target as the number that stands for it: `3.3`, `true`, or a name of an enumeration.
+    ///
+    /// # Errors
+    /// The text is not a value of the target's type.
+    pub fn number(&self, target: &Target, text: &str) -> Result<f64, Error> {
+        let Port { instance, name, .. } = &target.port;
+        let part = &self.parts.0[*instance];
+        let values = Values::read(text, self.parts.variable(*instance, name)?, part.description());
+        let values = values.map_err(|cause| Error::usage(&part.name, cause))?;
+        values.number().ok_or_else(|| Error::usage(target.name(), "takes a number"))
+    }
+
+    /// The recorded variables, without values.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
+    /// A plan for this system and these times that records other variables, each a pair of `instance.variable` and the name of its column.
+    ///
+    /// # Errors
+    /// The variable does not exist or is not a number.
+    pub fn recording(&self, variables: &[(String, String)]) -> Result<Self, Error> {
+        let ports = variables.iter().map(|(port, _)| self.parts.scalar(port)).collect::<Result<Vec<_>, _>>()?;
+        let columns = ports.iter().zip(variables).map(|(port, (_, name))| self.parts.column(port, name)).collect();
+        Ok(Self {
+            method: self.method.clone(),
+            parts: self.parts.clone(),
+            live: self.live.clone(),
+            wiring: self.wiring.clone(),
+            set: self.set.clone(),
+            exchange: Exchange::new(self.parts.0.len(), &self.wiring, &ports),
+            records: ports,
+            grid: self.grid,
+            columns,
+        })
+    }
+
+    /// The system and a copy of it beside it: neither feeds the other, the columns are those of the system, then those of the copy.
+    /// FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by these values
+    /// alone and not by the solver's choice of steps.
+    #[must_use]
+    pub fn with_copy(&self) -> Self {
+        let count = self.parts.0.len();
+        let both =
+            |ports: &[Port]| ports.iter().cloned().chain(ports.iter().map(|p| p.shifted(count))).collect::<Vec<_>>();
+        let twice = |columns: &[Column]| columns.iter().chain(columns).cloned().collect();
+        let (wiring, records) = (self.wiring.with_copy(count), both(&self.records));
+        let set = self.set.iter().map(|(port, values)| (port.shifted(count), values.clone()));
+        Self {
+            method: self.method.clone(),
+            parts: Parts(self.parts.0.iter().chain(&self.parts.0).cloned().collect()),
+            live: self.live.iter().chain(&self.live).cloned().collect(),
+            set: self.set.iter().cloned().chain(set).collect(),
+            exchange: Exchange::new(2 * count, &wiring, &records),
+            wiring,
+            records,
+            grid: self.grid,
+            columns: twice(&self.columns),
+        }
+    }
+
+    /// The variable of the copy in [`with_copy`](Self::with_copy) that a target of this plan is.
+    #[must_use]
+    pub fn in_copy(&self, target: &Target) -> Target {
+        Target { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
+    }
+
+    /// Whether the master integrates an FMU (Model Exchange).
+    pub fn integrates(&self) -> bool {
+        self.parts.0.iter().any(|part| part.kind == Kind::ModelExchange)
+    }
+
+    /// Start, stop and step.
+    pub fn settings(&self) -> &Settings {
+        self.grid.settings()
+    }
+
+    /// The name of an FMU of which a process can have one instance only, if there is one: then there is one worker.
+    pub fn only_one_instance(&self) -> Option<&str> {
+        let flag = |interface: &Interface| interface.flag("canBeInstantiatedOnlyOncePerProcess");
+        let interface = |part: &Part| match part.kind {
+            Kind::CoSimulation { .. } => part.description().co_simulation.clone(),
+            Kind::ModelExchange => part.description().model_exchange.clone(),
+        };
+        let only_one = |part: &&Part| interface(part).iter().any(flag);
+        self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
+    }
+
+    /// Makes a worker that runs this plan on one thread.
+    ///
+    /// # Errors
+    /// An FMU refuses to make an instance.
+    pub fn worker(self: &Arc<Self>) -> Result<Worker, Error> {
+        let mut worker = Worker {
+            plan: self.clone(),
+            instances: Vec::new(),
+            generations: Vec::new(),
+            exchange: self.exchange.clone(),
+            row: Vec::new(),
+            used: false,
+        };
+        worker.renew()?;
+        Ok(worker)
+    }
+}
+
+/// Runs a plan again and again.
+pub struct Worker {
+    plan: Arc<Plan>,
+    /// Empty after an error.
+    instances: Vec<Instance>,
+    /// Generation of the FMU of each instance.
+    generations: Vec<u32>,
+    exchange: Exchange,
+    row: Vec<f64>,
+    used: bool,
+}
+
+impl Worker {
+    /// The plan that this runs.
+    pub fn plan(&self) -> &Arc<Plan> {
+        &self.plan
+    }
+
+    /// Runs from start to stop with these values in addition to those that were set in the system. `hook` sees the time and the
+    /// recorded values of every communication point, and may end the run. A run does not depend on those before it.
+    ///
+    /// # Errors
+    /// An FMU refuses a value or a call. The next run has new instances.
+    pub fn run<'a>(
+        &mut self,
+        values: impl IntoIterator<Item = (&'a Target, f64)>,
+        mut hook: impl FnMut(f64, &[f64]) -> ControlFlow<()>,
+    ) -> Result<Ended, Error> {
+        self.refresh()?;
+        self.used = true;
+        let outcome = self.set(values).and_then(|()| {
+            let Self { instances, exchange, row, plan, .. } = self;
+            simulate(&plan.method, instances, exchange, &plan.grid, row, |point| Ok(hook(point.time, point.values)))
+        });
+        if outcome.is_err() {
+            self.give_up();
+        }
+        outcome
+    }
+
+    /// Runs as [`run`](Self::run), and returns all recorded values.
+    ///
+    /// # Errors
+    /// As for [`run`](Self::run).
+    pub fn record<'a>(&mut self, values: impl IntoIterator<Item = (&'a Target, f64)>) -> Result<Recording, Error> {
+        let mut recording = Recording::new(self.plan.columns.iter().cloned());
+        let ended = self.run(values, |time, values| {
+            recording.push(time, values);
+            ControlFlow::Continue(())
+        })?;
+        recording.ended_by = ended.by;
+        Ok(recording)
+    }
+
+    /// Makes new instances, for an FMU whose reset leaves something behind.
+    ///
+    /// # Errors
+    /// An FMU refuses.
+    pub fn renew(&mut self) -> Result<(), Error> {
+        // Before the new ones: of some FMUs there can be one at a time.
+        self.instances.clear();
+        self.generations.clear();
+        for (part, live) in self.plan.parts.0.iter().zip(self.plan.live.iter()) {
+            let fmu = live.fmu();
+            self.generations.push(live.generation());
+            self.instances.push(fmu.instantiate_as(part.kind, &part.name, part.logging)?);
+        }
+        self.used = false;
+        Ok(())
+    }
+
+    /// Instances as after instantiation, with the values of the system.
+    fn refresh(&mut self) -> Result<(), Error> {
+        let Self { plan, instances, generations, .. } = self;
+        let mut lost = instances.len() < plan.parts.0.len();
+        for ((live, generation), instance) in plan.live.iter().zip(generations.iter()).zip(instances.iter_mut()) {
+            if live.generation() != *generation {
+                instance.abandon();
+                lost = true;
+            }
+            // Drops the messages of earlier runs.
+            drop(instance.take_messages());
+        }
+        // An FMU that cannot be reset runs all the same.
+        if lost || (self.used && instances.iter_mut().any(|instance| instance.reset().is_err())) {
+            self.renew()?;
+        }
+        for (part, instance) in self.plan.parts.0.iter().zip(&mut self.instances) {
+            part.configure(instance)?;
+        }
+        for (port, values) in &self.plan.set {
+            self.instances[port.instance].set_at(port.base, port.reference, values)?;
+        }
+        Ok(())
+    }
+
+    fn set<'a>(&mut self, values: impl IntoIterator<Item = (&'a Target, f64)>) -> Result<(), Error> {
+        for (Target { port, written }, value) in values {
+            let instance = &mut self.instances[port.instance];
+            let outcome = if port.base == BaseType::Float64 {
+                instance.set_reals(&[port.reference], &[value])
+            } else {
+                let values = Values::from_number(value, port.base);
+                let values = values.map_err(|cause| Error::usage(instance.name(), cause));
+                values.and_then(|values| instance.set_at(port.base, port.reference, &values))
+            };
+            outcome.map_err(|error| error.during(&format!("{written} = {value}")))?;
+        }
+        Ok(())
+    }
+
+    /// After an error, no instance is used again; after the status Fatal, no instance of that binary in any worker.
+    fn give_up(&mut self) {
+        for ((live, generation), instance) in self.plan.live.iter().zip(&self.generations).zip(&self.instances) {
+            let mut fmu = live.fmu();
+            if instance.is_dead() && live.generation() == *generation {
+                // If that fails, new instances of the old binary will tell what is wrong.
+                if let Ok(again) = fmu.open_again() {
+                    *fmu = again;
+                    live.generation.fetch_add(1, Ordering::Release);
+                }
+            }
+        }
+        self.instances.clear();
+    }
+}

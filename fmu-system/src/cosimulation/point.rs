@@ -1,0 +1,65 @@
+//! A communication point of a run, and the last one.
+
+use super::exchange::Exchange;
+use fmu_import::{Error, Instance, Message};
+use std::ops::ControlFlow;
+
+/// A communication point, as a hook sees it: outputs are read, inputs are set, the step is to come.
+pub struct Point<'a> {
+    /// Number of the point, from 0.
+    pub index: u32,
+    /// Time in s.
+    pub time: f64,
+    /// The recorded values, in the order of [`System::record`](super::System::record).
+    pub values: &'a [f64],
+    pub(super) instances: &'a mut [Instance],
+    /// The hook has used an instance.
+    pub(super) touched: bool,
+}
+
+impl Point<'_> {
+    /// An instance by its name: to read more, or to set what is not connected.
+    pub fn instance(&mut self, name: &str) -> Option<&mut Instance> {
+        self.touched = true;
+        self.instances.iter_mut().find(|i| i.name() == name)
+    }
+
+    /// Log messages since the last call, with the names of the instances.
+    pub fn take_messages(&self) -> Vec<(String, Message)> {
+        take_messages(self.instances)
+    }
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ended {
+    /// Time of the last communication point in s.
+    pub time: f64,
+    /// The instance that asked to end the simulation, if one did.
+    pub by: Option<String>,
+}
+
+/// The last point of a run that an instance has ended after the point `ended`: outputs are read, nothing is set.
+pub(super) fn end(
+    instances: &mut [Instance],
+    exchange: &mut Exchange,
+    row: &mut Vec<f64>,
+    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    (index, time): (u32, f64),
+    ended: &mut Ended,
+) -> Result<(), Error> {
+    if time > ended.time {
+        ended.time = time;
+        exchange.read_all(instances)?;
+        exchange.row(time, row);
+        // The run is over, whatever the hook says.
+        hook(&mut Point { index, time, values: row, instances, touched: false }).map(drop)?;
+    }
+    Ok(())
+}
+
+/// Log messages since the last call, with the names of the instances.
+pub(super) fn take_messages(instances: &[Instance]) -> Vec<(String, Message)> {
+    let of = |i: &Instance| i.take_messages().into_iter().map(|m| (i.name().to_owned(), m)).collect::<Vec<_>>();
+    instances.iter().flat_map(of).collect()
+}

@@ -1,0 +1,232 @@
+//! Values over time as a user writes them: of an input of any type, each held from its time on.
+
+use super::schedule::{SAME, Schedule, last_before};
+use fmu_import::Values;
+use model_description::{ModelDescription, ModelVariable};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Texts over time: values of a variable whose type is not known yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sequence {
+    /// Time (s), text, and where it stands.
+    points: Vec<(f64, String, String)>,
+    /// Unit of all values; empty is that of the variable.
+    unit: String,
+}
+
+impl Sequence {
+    /// `0:off,0.5:on`, with spaces between the elements of an array; a text without a time is a constant. A comma begins a point
+    /// only if a time and a colon follow it.
+    ///
+    /// # Errors
+    /// Names what is not a point; times that do not rise.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let time = |part: &str| part.split_once(':').and_then(|(t, _)| t.trim().parse::<f64>().ok());
+        if time(text).is_none() {
+            return Self::new(vec![(0.0, text.to_owned(), String::new())], String::new());
+        }
+        let mut points: Vec<(f64, String, String)> = Vec::new();
+        for part in text.split(',') {
+            match (time(part), points.last_mut()) {
+                (Some(t), _) => {
+                    points.push((t, part.split_once(':').map_or("", |(_, x)| x).to_owned(), String::new()));
+                }
+                (None, Some((_, last, _))) => *last = format!("{last},{part}"),
+                (None, None) => {}
+            }
+        }
+        Self::new(points, String::new())
+    }
+
+    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
+    /// `speed_ref [rpm]`. A cell may be in quotation marks (RFC 4180).
+    ///
+    /// # Errors
+    /// The file cannot be read, has no header, or a row does not have as many cells as the header.
+    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
+    }
+
+    /// [`read_csv`](Self::read_csv) of the content of a file.
+    pub(super) fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
+        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+        let (first, header) = lines.next().ok_or("is empty")?;
+        if header.contains(';') {
+            return Err(format!(
+                "line {}: has semicolons; write commas between columns and a decimal point",
+                first + 1
+            ));
+        }
+        let names: Vec<String> = cells(header).into_iter().skip(1).collect();
+        if names.is_empty() {
+            return Err("has no column but time".into());
+        }
+        let mut columns: Vec<Vec<(f64, String, String)>> = vec![Vec::new(); names.len()];
+        for (index, line) in lines {
+            let at = format!("line {}: ", index + 1);
+            let row = cells(line);
+            if row.len() != names.len() + 1 {
+                let (expected, found) = (names.len() + 1, row.len());
+                let commas = if found > expected { "; commas separate columns: write a decimal point" } else { "" };
+                return Err(format!("{at}expected {expected} numbers, found {found}{commas}"));
+            }
+            let mut row = row.into_iter();
+            let time = row.next().unwrap_or_default();
+            let t = time.parse::<f64>().map_err(|_| format!("{at}{time:?} is not a number"))?;
+            columns.iter_mut().zip(row).for_each(|(column, cell)| column.push((t, cell, at.clone())));
+        }
+        let column = |(name, points): (String, Vec<_>)| {
+            let (name, unit) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
+                Some((name, unit)) if unit.trim().parse::<f64>().is_err() && !unit.contains(',') => {
+                    (name.trim_end().to_owned(), unit.trim().to_owned())
+                }
+                _ => (name, String::new()),
+            };
+            Ok((name, Self::new(points, unit)?))
+        };
+        names.into_iter().zip(columns).map(column).collect()
+    }
+
+    fn new(points: Vec<(f64, String, String)>, unit: String) -> Result<Self, String> {
+        if points.is_empty() {
+            return Err("has no point".into());
+        }
+        if let Some((t, x, _)) = points.iter().find(|(t, ..)| !t.is_finite()) {
+            return Err(format!("{t}:{x} is not finite"));
+        }
+        match points.windows(2).find(|pair| pair[1].0 < pair[0].0) {
+            Some(pair) => Err(format!("the time {} does not follow {}", pair[1].0, pair[0].0)),
+            None => Ok(Self { points, unit }),
+        }
+    }
+
+    /// The texts as numbers, which lines connect; a time that comes twice is a jump.
+    ///
+    /// # Errors
+    /// Names the first text that is not a number, and its line.
+    pub fn lines(&self) -> Result<Schedule, String> {
+        let number = |(t, text, at): &(f64, String, String)| {
+            text.parse().map(|x| (*t, x)).map_err(|_| format!("{at}{text:?} is not a number"))
+        };
+        let points = self.points.iter().map(number).collect::<Result<Vec<_>, _>>()?;
+        Schedule::jumping(points, &self.unit)
+    }
+
+    /// The text at time `t` (s); before the first, the first.
+    pub fn at(&self, t: f64) -> &str {
+        let until = self.points.partition_point(|(time, ..)| *time <= t + SAME);
+        &self.points[until.saturating_sub(1)].1
+    }
+
+    /// The texts as values of this variable.
+    pub(super) fn values(&self, variable: &ModelVariable, description: &ModelDescription) -> Result<Held, String> {
+        let value = |(t, text, at): &(f64, String, String)| {
+            let number = |_: &String| Values::from_number(text.trim().parse().ok()?, variable.base).ok();
+            let read = Values::read(text, variable, description);
+            // Tools write integers and truth values as 1.0 too.
+            let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));
+            values.map(|values| (*t, values))
+        };
+        Ok(Held(self.points.iter().map(value).collect::<Result<_, _>>()?))
+    }
+}
+
+impl Schedule {
+    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
+    /// `speed_ref [rpm]`. Lines connect the points.
+    ///
+    /// # Errors
+    /// The file cannot be read, has no header, or a row does not have as many numbers as the header.
+    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
+        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
+    }
+
+    fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
+        Sequence::parse_csv(text)?.into_iter().map(|(name, texts)| Ok((name, texts.lines()?))).collect()
+    }
+}
+
+/// Values over time, each held until the next one.
+#[derive(Clone, Debug)]
+pub(super) struct Held(Arc<[(f64, Values)]>);
+
+impl Held {
+    /// Number of the value at time `t` (s); before the first, the first holds.
+    pub(super) fn index(&self, t: f64) -> usize {
+        last_before(&self.0, t).saturating_sub(1)
+    }
+
+    pub(super) fn value(&self, index: usize) -> &Values {
+        &self.0[index].1
+    }
+
+    /// Time (s) of the first value after `t`.
+    pub(super) fn next_point(&self, t: f64) -> Option<f64> {
+        self.0.get(last_before(&self.0, t)).map(|(time, _)| *time)
+    }
+
+    /// Whether every value has this many elements.
+    pub(super) fn fits(&self, count: usize) -> bool {
+        self.0.iter().all(|(_, values)| values.len() == count)
+    }
+}
+
+/// The cells of a line of CSV, without the quotation marks around them.
+fn cells(line: &str) -> Vec<String> {
+    let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
+    let mut chars = line.trim().chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '"' if quoted && chars.peek() == Some(&'"') => cell.extend(chars.next()),
+            '"' => quoted = !quoted,
+            ',' if !quoted => cells.push(std::mem::take(&mut cell).trim().to_owned()),
+            c => cell.push(c),
+        }
+    }
+    cells.push(cell.trim().to_owned());
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points(text: &str) -> Vec<(f64, String)> {
+        Sequence::parse(text).unwrap().points.into_iter().map(|(t, x, _)| (t, x)).collect()
+    }
+
+    #[test]
+    fn a_comma_begins_a_point_only_before_a_time() {
+        assert_eq!(points("off"), [(0.0, "off".into())]);
+        assert_eq!(points("0:off, and on,0.5:on: now"), [(0.0, "off, and on".into()), (0.5, "on: now".into())]);
+        assert_eq!(points("1: 1 2 3"), [(1.0, " 1 2 3".into())]);
+        assert!(Sequence::parse("1:a,0:b").unwrap_err().contains("does not follow"));
+    }
+
+    #[test]
+    fn cells_may_be_quoted() {
+        let columns = Sequence::parse_csv("time,\"a\",P[1]\n0,\"x, \"\"y\"\"\",1 2\n1,,3\n").unwrap();
+        assert_eq!((columns[0].0.as_str(), columns[1].0.as_str()), ("a", "P[1]"));
+        let texts: Vec<&str> = columns[0].1.points.iter().map(|(_, x, _)| x.as_str()).collect();
+        assert_eq!(texts, ["x, \"y\"", ""]);
+        assert_eq!(columns[0].1.lines().unwrap_err(), "line 2: \"x, \\\"y\\\"\" is not a number");
+    }
+
+    #[test]
+    fn a_table_has_a_column_for_each_input() {
+        let columns = Schedule::parse_csv("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
+        assert_eq!(columns[0].0, "c.speed_ref");
+        assert_eq!((columns[0].1.at(0.5), columns[1].1.at(0.5)), (5.0, 1.0));
+        for (text, cause) in [
+            ("time,a\n0\n", "line 2: expected 2 numbers, found 1"),
+            ("time,a\n0,1,5\n", "line 2: expected 2 numbers, found 3; commas separate columns: write a decimal point"),
+            ("time,a\n0,x\n", "line 2: \"x\" is not a number"),
+            ("time;a\n0;1,5\n", "line 1: has semicolons; write commas between columns and a decimal point"),
+        ] {
+            assert_eq!(Schedule::parse_csv(text).unwrap_err(), cause, "{text:?}");
+        }
+    }
+}

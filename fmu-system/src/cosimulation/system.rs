@@ -1,0 +1,373 @@
+//! FMUs and their connections, before a run.
+
+use super::exchange::{Source, Wiring};
+use super::method::Method;
+use super::parts::{Part, Parts, Port, kind};
+use super::point::take_messages;
+use super::schedule::Schedule;
+use super::sequence::Sequence;
+use fmu_core::Need;
+use fmu_import::{Error, Fmu, Instance, Message, Values};
+use model_description::{BaseType, Causality, ModelVariable, Variability};
+
+/// FMUs and their connections.
+#[derive(Default)]
+pub struct System {
+    pub(super) method: Method,
+    pub(super) parts: Parts,
+    /// One of each part.
+    pub(super) instances: Vec<Instance>,
+    pub(super) wiring: Wiring,
+    /// Values that were set from outside.
+    pub(super) set: Vec<(Port, Values)>,
+    pub(super) records: Vec<Port>,
+    /// Names of the recorded columns.
+    pub(super) columns: Vec<String>,
+    /// Texts that a single run records, with the names of their columns.
+    pub(super) texts: Vec<(Port, String)>,
+}
+
+impl System {
+    /// A system that is run by this method.
+    pub fn new(method: Method) -> Self {
+        Self { method, ..Self::default() }
+    }
+
+    /// Adds an instance of an FMU.
+    ///
+    /// # Errors
+    /// The name is taken, or the FMU refuses.
+    pub fn add(&mut self, name: &str, fmu: &Fmu, logging: bool) -> Result<(), Error> {
+        if self.instances.iter().any(|i| i.name() == name) {
+            return Err(Error::usage(name, "two instances have this name; NAME=FILE gives another"));
+        }
+        // An FMU with clocks needs event mode.
+        let clocked = fmu.description().variables.iter().any(|v| v.base == BaseType::Clock);
+        if let Method::CoSimulation { event_mode, .. } = &mut self.method {
+            *event_mode |= clocked;
+        }
+        let kind = self.method.kind(name, fmu);
+        self.instances.push(fmu.instantiate_as(kind, name, logging)?);
+        self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind, sizes: Vec::new() });
+        Ok(())
+    }
+
+    /// The instances, in the order they were added.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// Log messages since the last call, with the names of the instances.
+    pub fn take_messages(&self) -> Vec<(String, Message)> {
+        take_messages(&self.instances)
+    }
+
+    /// Whether a variable, written `instance.variable`, is a structural parameter.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_size(&self, port: &str) -> Result<bool, Error> {
+        Ok(self.parts.causality(&self.parts.port(port)?) == Causality::StructuralParameter)
+    }
+
+    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode. Arrays
+    /// have other sizes then, so this comes before everything that names variables; values that were set are set again.
+    ///
+    /// # Errors
+    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, an array that was set has
+    /// another size now, or the FMU refuses.
+    pub fn configure<'a>(&mut self, sizes: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<(), Error> {
+        let mut changed = vec![false; self.instances.len()];
+        for (written, text) in sizes {
+            if !self.is_size(written)? {
+                return Err(Error::usage(written, "is not a structural parameter"));
+            }
+            let port = self.parts.port(written)?;
+            let values = self.instances[port.instance].parse(&port.name, text)?;
+            changed[port.instance] = true;
+            self.parts.0[port.instance].sizes.retain(|(other, _)| *other != port);
+            self.parts.0[port.instance].sizes.push((port, values));
+        }
+        for (index, instance) in self.instances.iter_mut().enumerate().filter(|(index, _)| changed[*index]) {
+            self.parts.0[index].configure(instance)?;
+            let mut set = self.set.iter().filter(|(port, _)| port.instance == index);
+            set.try_for_each(|(port, values)| instance.set(&port.name, values))?;
+        }
+        Ok(())
+    }
+
+    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. An element of an array
+    /// leaves the others as they were set, or as they start. [`configure`](Self::configure) sets several structural parameters.
+    ///
+    /// # Errors
+    /// The variable does not exist, the text is not a value of its type, or the FMU refuses.
+    pub fn set(&mut self, port: &str, text: &str) -> Result<(), Error> {
+        if self.is_size(port)? {
+            return self.configure([(port, text)]);
+        }
+        let port = self.parts.port(port)?;
+        let present = self.present(&port)?;
+        let (index, description) = (port.instance, self.parts.0[port.instance].description());
+        let variable = self.parts.variable(index, &port.name)?;
+        let wrong = |cause: String| Error::usage(self.instances[index].name(), cause);
+        let read = |text: &str| Values::read(text, variable, description).map_err(wrong);
+        let mut values = read(text)?;
+        let mut whole = port;
+        if let Some((element, count)) = whole.element.take() {
+            let one = values;
+            let name = std::mem::replace(&mut whole.name, variable.name.clone());
+            let before = self.value_set(index, &whole.name).cloned().or(present);
+            values = before.map_or_else(|| Values::start(variable, description).map_err(wrong), Ok)?;
+            if values.len() != count || !values.replace(element, &one) {
+                return Err(wrong(format!("{name} = {text} is not one value, or the start values are not known")));
+            }
+        }
+        self.instances[index].set(&whole.name, &values)?;
+        self.set.pop_if(|(last, _)| *last == whole);
+        self.set.push((whole, values));
+        Ok(())
+    }
+
+    /// Connects an output to an input, both written `instance.variable`.
+    ///
+    /// # Errors
+    /// A variable does not exist, causalities or types do not fit, or the input is fed already.
+    pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
+        let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
+        if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
+            return Err(Error::usage(from, "is not an output"));
+        }
+        if kind(source.base) != kind(target.base) {
+            return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
+        }
+        self.feed(target, to, Source::Port(source))
+    }
+
+    /// Connects every input that nothing feeds to the output of the same name of another FMU; returns the connections.
+    ///
+    /// # Errors
+    /// Several FMUs have the output.
+    pub fn connect_by_name(&mut self) -> Result<Vec<(String, String)>, Error> {
+        let mut found = Vec::new();
+        let names = |i: &Instance, causality| -> Vec<String> {
+            i.description().variables.iter().filter(|v| v.causality == causality).map(|v| v.name.clone()).collect()
+        };
+        for (index, target) in self.instances.iter().enumerate() {
+            for input in names(target, Causality::Input) {
+                if self.wiring.feeds(index, &input) {
+                    continue;
+                }
+                let others = self.instances.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, other)| other);
+                let sources: Vec<_> = others.filter(|o| names(o, Causality::Output).contains(&input)).collect();
+                let to = format!("{}.{input}", target.name());
+                match sources.as_slice() {
+                    [] => {}
+                    [one] => found.push((format!("{}.{input}", one.name()), to)),
+                    [one, two, ..] => {
+                        let cause = format!("both {} and {} have an output of this name", one.name(), two.name());
+                        return Err(Error::usage(&to, cause));
+                    }
+                }
+            }
+        }
+        for (from, to) in &found {
+            self.connect(from, to)?;
+        }
+        Ok(found)
+    }
+
+    /// Feeds an input or a tunable parameter over time.
+    ///
+    /// # Errors
+    /// The variable does not exist, is not a number, has other units, or is fed already.
+    pub fn input(&mut self, port: &str, schedule: Schedule) -> Result<(), Error> {
+        let target = self.parts.scalar(port)?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let schedule = schedule.in_unit_of(variable, self.instances[target.instance].description());
+        let schedule = schedule.map_err(|cause| Error::usage(self.instances[target.instance].name(), cause))?;
+        self.feed(target, port, Source::Schedule(schedule))
+    }
+
+    /// Records a variable at every communication point. A connected input is recorded as what it is connected to.
+    ///
+    /// # Errors
+    /// The variable does not exist or is not a number.
+    pub fn record(&mut self, port: &str) -> Result<(), Error> {
+        self.record_as(port, port)
+    }
+
+    /// Records a variable under another name.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub fn record_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
+        let port = self.parts.scalar(port)?;
+        self.records.push(port);
+        self.columns.push(name.into());
+        Ok(())
+    }
+
+    /// Feeds an input or a tunable parameter of any type over time; the values of one that is not a real number are held.
+    ///
+    /// # Errors
+    /// The variable does not exist, a text is not a value of its type, or it is fed already.
+    pub fn sequence(&mut self, port: &str, texts: &Sequence) -> Result<(), Error> {
+        if self.is_real(port)? {
+            return self.input(port, texts.lines().map_err(|cause| Error::usage(port, cause))?);
+        }
+        let target = self.parts.port(port)?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let (instance, wrong) = (&self.instances[target.instance], |cause: String| Error::usage(port, cause));
+        if target.element.is_some() {
+            return Err(wrong("is an element of an array: feed the array, with spaces between its elements".into()));
+        }
+        self.check_fed(&target, port, true)?;
+        let values = texts.values(variable, instance.description()).map_err(wrong)?;
+        let count = instance.elements(variable)?;
+        if !values.fits(count) {
+            return Err(wrong(format!("has {count} elements, and a value has another number")));
+        }
+        self.wiring.hold(target, values);
+        Ok(())
+    }
+
+    /// Records a variable under this name in a column of texts, in a single run: a text, bytes in hexadecimal digits, or an array
+    /// with spaces between its elements.
+    ///
+    /// # Errors
+    /// The variable does not exist, is one number, or is a clock.
+    pub fn record_text_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
+        let mut found = self.parts.port(port)?;
+        let variable = self.parts.variable(found.instance, &found.name)?;
+        if !self.is_text(port)? || found.base == BaseType::Clock {
+            return Err(Error::usage(port, "is one number, or a clock"));
+        }
+        if variable.is_array() {
+            found.element = Some((0, self.instances[found.instance].elements(variable)?));
+        }
+        self.texts.push((found, name.into()));
+        Ok(())
+    }
+
+    /// Whether a variable, written `instance.variable`, is recorded as text: it is not one number.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_text(&self, port: &str) -> Result<bool, Error> {
+        let port = self.parts.port(port)?;
+        let whole = self.parts.variable(port.instance, &port.name)?.is_array() && port.element.is_none();
+        Ok(whole || matches!(port.base, BaseType::String | BaseType::Binary))
+    }
+
+    /// Whether a variable, written `instance.variable`, is one real number.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_real(&self, port: &str) -> Result<bool, Error> {
+        Ok(!self.is_text(port)? && self.parts.port(port)?.base.is_float())
+    }
+
+    /// Whether a connection or a schedule feeds an input, written `instance.variable`.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn is_fed(&self, port: &str) -> Result<bool, Error> {
+        let port = self.parts.port(port)?;
+        Ok(self.wiring.feeds(port.instance, &port.name))
+    }
+
+    /// The inputs of an instance that must be fed and are neither fed nor set: they keep their start values.
+    pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
+        let reference = |name: &str| self.parts.variable(instance, name).map(|v| v.value_reference).ok();
+        let touched =
+            |name: &str| self.wiring.feeds_any(instance, reference(name)) || self.value_set(instance, name).is_some();
+        let is_free =
+            |v: &&ModelVariable| v.causality == Causality::Input && v.base != BaseType::Clock && !touched(&v.name);
+        let needed = |v: &&ModelVariable| match Need::of(v.description.as_deref().unwrap_or_default()) {
+            Need::Always => true,
+            Need::Never => false,
+            Need::With { parameter, value } => self.has_value(instance, parameter, value),
+        };
+        self.instances[instance].description().variables.iter().filter(is_free).filter(needed).collect()
+    }
+
+    /// The elements of an array of which `port` is one, if sizes were set: its start values are gone.
+    fn present(&mut self, port: &Port) -> Result<Option<Values>, Error> {
+        let part = &self.parts.0[port.instance];
+        if part.sizes.is_empty() || port.element.is_none() {
+            return Ok(None);
+        }
+        let name = &self.parts.variable(port.instance, &port.name)?.name;
+        self.instances[port.instance].get(name).map(Some)
+    }
+
+    /// The value that was set last.
+    fn value_set(&self, instance: usize, name: &str) -> Option<&Values> {
+        let of = |(port, _): &&(Port, Values)| port.instance == instance && port.name == name;
+        self.set.iter().rev().find(of).map(|(_, values)| values)
+    }
+
+    /// Whether a variable was set to this value, or else starts at it.
+    fn has_value(&self, instance: usize, name: &str, value: &str) -> bool {
+        let description = self.instances[instance].description();
+        let Some(variable) = description.variable(name) else { return false };
+        let read = |text: &str| Values::read(text, variable, description).ok();
+        let now = self.value_set(instance, name).cloned().or_else(|| Values::start(variable, description).ok());
+        now.is_some() && now == read(value)
+    }
+
+    /// The inputs of these names that a connection or a schedule feeds, written `instance.variable`.
+    pub fn fed_inputs(&self, names: &[&str]) -> Vec<String> {
+        let all =
+            self.instances.iter().enumerate().flat_map(|(index, i)| names.iter().map(move |name| (index, i, *name)));
+        all.filter(|(index, _, name)| self.wiring.feeds(*index, name))
+            .map(|(_, i, name)| format!("{}.{name}", i.name()))
+            .collect()
+    }
+
+    /// Records all outputs of all instances.
+    ///
+    /// # Errors
+    /// The variables come from the descriptions, so no error is known.
+    pub fn record_outputs(&mut self) -> Result<(), Error> {
+        self.outputs().iter().try_for_each(|port| self.record(port))?;
+        let texts = self.outputs_of(|v| v.base != BaseType::Clock && (v.is_array() || kind(v.base).is_none()));
+        texts.iter().try_for_each(|port| self.record_text_as(port, port))
+    }
+
+    /// All numeric outputs of all instances, written `instance.variable`.
+    pub fn outputs(&self) -> Vec<String> {
+        self.outputs_of(|v| !v.is_array() && kind(v.base).is_some())
+    }
+
+    fn outputs_of(&self, of: impl Fn(&ModelVariable) -> bool) -> Vec<String> {
+        let outputs = |i: &Instance| {
+            let is_one = |v: &&ModelVariable| v.causality == Causality::Output && v.base != BaseType::Clock && of(v);
+            let name = |v: &ModelVariable| format!("{}.{}", i.name(), v.name);
+            i.description().variables.iter().filter(is_one).map(name).collect::<Vec<_>>()
+        };
+        self.instances.iter().flat_map(outputs).collect()
+    }
+
+    fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
+        self.check_fed(&target, written, matches!(source, Source::Schedule(_)))?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let continuous = variable.variability == Variability::Continuous && variable.base.is_float();
+        self.wiring.add(target, source, continuous);
+        Ok(())
+    }
+
+    /// Whether the variable takes values, over time or from a connection, and nothing feeds it yet.
+    fn check_fed(&self, target: &Port, written: &str, over_time: bool) -> Result<(), Error> {
+        if self.wiring.feeds(target.instance, &target.name) {
+            return Err(Error::usage(written, "is fed twice"));
+        }
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let tunable = variable.causality == Causality::Parameter && variable.variability == Variability::Tunable;
+        if variable.causality != Causality::Input && !(tunable && over_time) {
+            let also = if over_time { " or a tunable parameter" } else { "" };
+            return Err(Error::usage(written, format!("is not an input{also}")));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,475 @@
+//! An SSP as a system of our co-simulation.
+
+use super::DESCRIPTION;
+use super::error::{Error, invalid};
+use super::ssv::{self, Parameter};
+use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
+use super::values::{self, Given};
+use crate::cosimulation::{Method, Schedule, Sequence, Settings, System};
+use fmu_import::{Fmu, check_entries, document, limits};
+use model_description::{Experiment, decode};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use zip::ZipArchive;
+
+/// A system from files, ready to run.
+#[derive(Default)]
+pub struct Loaded {
+    /// Its FMUs, connected and with their values.
+    pub system: System,
+    /// Default experiments: its own times, the FMUs' steps.
+    pub experiments: Vec<Experiment>,
+    /// The connectors of an SSP's system.
+    pub connectors: Connectors,
+    /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
+    pub notes: Vec<String>,
+}
+
+/// Connectors of a system, none for FMUs without an SSP.
+#[derive(Clone, Debug, Default)]
+pub struct Connectors {
+    /// Names of the inputs, each with the inputs `component.variable` that it feeds.
+    pub inputs: Vec<(String, Vec<String>)>,
+    /// Names of the outputs, each with the output `component.variable` that it is.
+    pub outputs: Vec<(String, String)>,
+}
+
+impl Connectors {
+    /// The ports that a name to set stands for: the inputs that one of the system feeds, or the name itself.
+    ///
+    /// # Errors
+    /// The system has no input of this name, which has no dot.
+    pub fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
+        if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
+            return Ok(targets.clone());
+        }
+        let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
+        if of_system && !name.contains('.') {
+            let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
+            return invalid(format!("{name}: is not an input of the system; it has {}", names.join(", ")));
+        }
+        Ok(vec![name.to_owned()])
+    }
+
+    /// The port that a name to record stands for: an output of the system, one of the inputs that one of the system feeds, or
+    /// the name itself.
+    ///
+    /// # Errors
+    /// As for [`ports`](Self::ports).
+    pub fn source(&self, name: &str) -> Result<String, Error> {
+        match self.outputs.iter().find(|(n, _)| n == name) {
+            Some((_, source)) => Ok(source.clone()),
+            None => Ok(self.ports(name)?.swap_remove(0)),
+        }
+    }
+}
+
+/// The archive, with its path for errors.
+struct Package<'a> {
+    path: &'a Path,
+    zip: ZipArchive<File>,
+}
+
+impl Package<'_> {
+    fn bytes(&mut self, name: &str) -> Result<Vec<u8>, Error> {
+        let of = || self.path.display();
+        let mut bytes = Vec::new();
+        // What the headers claim is within the limits: see `check_entries`.
+        match self.zip.by_name(name) {
+            Ok(entry) => {
+                let read = entry.take(limits::UNPACKED.most).read_to_end(&mut bytes);
+                read.map_err(|e| Error::Invalid(format!("{}: {e}", of())))?
+            }
+            Err(zip::result::ZipError::FileNotFound) => return invalid(format!("{}: has no {name}", of())),
+            Err(e) => return invalid(format!("{}: {name}: {e}", of())),
+        };
+        Ok(bytes)
+    }
+
+    fn text(&mut self, name: &str) -> Result<String, Error> {
+        let of = |cause: String| Error::Invalid(format!("{}: {cause}", self.path.display()));
+        let bytes = document(&mut self.zip, name).map_err(of)?;
+        let bytes = bytes.ok_or_else(|| of(format!("has no {name}")))?;
+        let text = decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?;
+        Ok(text.to_owned())
+    }
+}
+
+impl Loaded {
+    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Paths that are relative begin in `folder`.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), or an SSP file is not alone.
+    pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self, Error> {
+        Self::open_files_with(files, folder, logging, |_| Method::default())
+    }
+
+    /// Like [`open_files`](Self::open_files), run by the method that suits the FMUs.
+    ///
+    /// # Errors
+    /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
+    pub fn open_files_with(
+        files: &[String],
+        folder: &Path,
+        logging: bool,
+        method: impl FnOnce(&[(String, Fmu)]) -> Method,
+    ) -> Result<Self, Error> {
+        let mut fmus = Vec::new();
+        for text in files {
+            let (name, path) = name_and_path(text)?;
+            if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
+                if files.len() > 1 {
+                    return invalid(format!("{}: an SSP is simulated alone: its FMUs are inside", path.display()));
+                }
+                return Self::open_with(&folder.join(path), logging, method);
+            }
+            fmus.push((name, Fmu::open(folder.join(path))?));
+        }
+        let mut loaded = Self { system: System::new(method(&fmus)), ..Self::default() };
+        for (name, fmu) in &fmus {
+            loaded.experiments.push(fmu.description().default_experiment);
+            loaded.system.add(name, fmu, logging)?;
+        }
+        Ok(loaded)
+    }
+
+    /// Times that are not given come from the files: the latest stop, the shortest step.
+    pub fn settings(&self, start: Option<f64>, stop: Option<f64>, step: Option<f64>, sequential: bool) -> Settings {
+        let start = start.or_else(|| self.experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
+        let latest = self.experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
+        let stop = stop.or(latest).unwrap_or(start + 1.0);
+        let shortest = self.experiments.iter().filter_map(|x| x.step).reduce(f64::min);
+        let step = step.or(shortest).unwrap_or((stop - start) / 1000.0);
+        Settings { start, stop, step, sequential }
+    }
+
+    /// Opens an SSP file.
+    ///
+    /// # Errors
+    /// Names the file, the place in it, what is wrong and what to do.
+    pub fn open(path: &Path, logging: bool) -> Result<Self, Error> {
+        Self::open_with(path, logging, |_| Method::default())
+    }
+
+    /// Like [`open`](Self::open), run by the method that suits the FMUs.
+    fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self, Error> {
+        let of = || path.display();
+        let within = |cause: String| Error::Invalid(format!("{}: {cause}", of()));
+        let unreadable = |e: std::io::Error| within(e.to_string());
+        let file = File::open(path).map_err(unreadable)?;
+        limits::ARCHIVE.check(file.metadata().map_err(unreadable)?.len()).map_err(within)?;
+        let mut zip = ZipArchive::new(file).map_err(|e| within(format!("not a ZIP archive, or cut short: {e}")))?;
+        check_entries(&mut zip).map_err(within)?;
+        let mut package = Package { path, zip };
+        let text = package.text(DESCRIPTION)?;
+        let in_description = |cause: String| within(format!("{DESCRIPTION}: {cause}"));
+        let structure = Structure::read(&text).map_err(in_description)?;
+        let mut fmus = Vec::new();
+        let temporary = |e: std::io::Error| within(format!("no temporary folder: {e}"));
+        let dir = tempfile::tempdir().map_err(temporary)?;
+        for (index, component) in structure.components.iter().enumerate() {
+            let fmu = dir.path().join(format!("{index}.fmu"));
+            std::fs::write(&fmu, package.bytes(&component.source)?).map_err(temporary)?;
+            let fmu = Fmu::open(&fmu).map_err(|e| within(format!("{}: {}", component.source, e.cause())))?;
+            fmus.push((component.name.clone(), fmu));
+        }
+        let method = method(&fmus);
+        if let (Method::CoSimulation { .. }, Some(component)) =
+            (&method, structure.components.iter().find(|component| component.model_exchange))
+        {
+            let cause = "implementation=\"ModelExchange\" is not Co-Simulation: simulate it with --me";
+            return Err(in_description(format!("line {}: {cause}", component.line)));
+        }
+        let mut loaded = Self { system: System::new(method), ..Self::default() };
+        loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
+        for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
+            let experiment = fmu.description().default_experiment;
+            // The system's times go before those of its parts.
+            let times = structure.start.or(structure.stop).is_some();
+            let part = Experiment { step: experiment.step, ..Experiment::default() };
+            loaded.experiments.push(if times { part } else { experiment });
+            loaded.system.add(name, fmu, logging)?;
+            loaded.check_connectors(&component.connectors, &component.name).map_err(in_description)?;
+        }
+        for connection in &structure.connections {
+            let wrong = |cause: String| in_description(format!("line {}: {cause}", connection.line));
+            loaded.connect(&structure, connection).map_err(wrong)?;
+        }
+        // Inner values first: those of the system replace them.
+        let mut given = Vec::new();
+        for component in &structure.components {
+            for binding in &component.bindings {
+                let (file, parameters) = package.parameters(binding)?;
+                given.extend(loaded.bound(&file, &parameters, &format!("{}.", component.name)));
+            }
+        }
+        for binding in &structure.bindings {
+            let (file, parameters) = package.parameters(binding)?;
+            given.extend(loaded.bound(&file, &parameters, ""));
+        }
+        values::set(&mut loaded.system, &given)?;
+        Ok(loaded)
+    }
+
+    /// Feeds an input over time: one of the system's, or `component.variable`.
+    ///
+    /// # Errors
+    /// There is none of this name, or it is fed already.
+    pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
+        for port in self.connectors.ports(name)? {
+            self.system.input(&port, schedule.clone())?;
+        }
+        Ok(())
+    }
+
+    /// Feeds an input of any type over time, as [`input`](Self::input), from the texts that a user or a file has.
+    ///
+    /// # Errors
+    /// There is none of this name, it is fed already, or a text is not a value of its type.
+    pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
+        for port in self.connectors.ports(name)? {
+            self.system.sequence(&port, texts)?;
+        }
+        Ok(())
+    }
+
+    /// Feeds an input over time from what a user writes: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input
+    /// of another type.
+    ///
+    /// # Errors
+    /// As [`input`](Self::input), or the text has another form.
+    pub fn points(&mut self, name: &str, text: &str) -> Result<(), Error> {
+        for port in self.connectors.ports(name)? {
+            let wrong = Error::Invalid;
+            if self.system.is_text(&port)? {
+                self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
+            } else {
+                self.system.input(&port, Schedule::parse(text).map_err(wrong)?)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Sets a value: of an input of the system, or of `component.variable`.
+    ///
+    /// # Errors
+    /// There is none of this name, or the FMU refuses the value.
+    pub fn set(&mut self, name: &str, value: &str) -> Result<(), Error> {
+        for port in self.connectors.ports(name)? {
+            self.system.set(&port, value)?;
+        }
+        Ok(())
+    }
+
+    /// Records a connector of the system, or `component.variable`.
+    ///
+    /// # Errors
+    /// The variable does not exist, or is neither a number nor a text.
+    pub fn record(&mut self, name: &str) -> Result<(), Error> {
+        let port = self.connectors.source(name)?;
+        if self.system.is_text(&port)? {
+            return Ok(self.system.record_text_as(&port, name)?);
+        }
+        Ok(self.system.record_as(&port, name)?)
+    }
+
+    /// Records all outputs of the system, or those of all FMUs where it has none.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record).
+    pub fn record_outputs(&mut self) -> Result<(), Error> {
+        if self.connectors.outputs.is_empty() {
+            return Ok(self.system.record_outputs()?);
+        }
+        self.connectors.outputs.clone().iter().try_for_each(|(name, _)| self.record(name))
+    }
+
+    /// Every connector of a component is a variable of its FMU, of that causality.
+    fn check_connectors(&self, connectors: &[Connector], component: &str) -> Result<(), String> {
+        let Some(instance) = self.system.instances().iter().find(|i| i.name() == component) else { return Ok(()) };
+        let md = instance.description();
+        for Connector { name, kind, line, .. } in connectors {
+            match md.variable(name) {
+                None => {
+                    let of_kind: Vec<&str> =
+                        md.variables.iter().filter(|v| v.causality.as_str() == kind).map(|v| v.name.as_str()).collect();
+                    let known = format!("its variables of kind {kind} are {}", of_kind.join(", "));
+                    return Err(format!(
+                        "line {line}: {component} ({}) has no variable {name}; {known}",
+                        md.model_name
+                    ));
+                }
+                Some(v) if v.causality.as_str() != kind => {
+                    return Err(format!(
+                        "line {line}: {component}.{name} is {} and not {kind}: correct kind",
+                        v.causality
+                    ));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+
+    fn connect(&mut self, structure: &Structure, c: &Connection) -> Result<(), String> {
+        let (start, end) = (find(structure, &c.start)?, find(structure, &c.end)?);
+        let kind = |end: &ConnectionEnd, connector: &Connector| (end.element.is_some(), connector.kind.clone());
+        let (one, other) = (kind(&c.start, start), kind(&c.end, end));
+        // What comes out of an element or into the system sends; start and end say nothing of direction.
+        let sends = |(element, kind): &(bool, String)| kind == if *element { "output" } else { "input" };
+        let takes = |(element, kind): &(bool, String)| kind == if *element { "input" } else { "output" };
+        let (from, to) = match (sends(&one) && takes(&other), sends(&other) && takes(&one)) {
+            (true, _) => (&c.start, &c.end),
+            (_, true) => (&c.end, &c.start),
+            _ => {
+                return Err(format!(
+                    "connects {} ({}) with {} ({}): expected an output and an input of components, or one of them and the \
+                     same kind of the system",
+                    c.start, start.kind, c.end, end.kind
+                ));
+            }
+        };
+        if let (Some(a), Some(b), false) = (&start.unit, &end.unit, c.no_conversion)
+            && a != b
+        {
+            return Err(format!(
+                "connects {} in {a} with {} in {b}: units are not converted, give both in one",
+                c.start, c.end
+            ));
+        }
+        let port = |end: &ConnectionEnd| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
+        match (port(from), port(to)) {
+            (_, Some(target)) if self.is_fed(&target)? => {
+                Err(format!("{target} is fed twice: remove one of the connections"))
+            }
+            (Some(source), Some(target)) => self.system.connect(&source, &target).map_err(|e| e.to_string()),
+            (None, Some(target)) => {
+                match self.connectors.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
+                    Some((_, targets)) => targets.push(target),
+                    None => self.connectors.inputs.push((from.connector.clone(), vec![target])),
+                }
+                Ok(())
+            }
+            (Some(source), None) => {
+                if self.connectors.outputs.iter().any(|(name, _)| *name == to.connector) {
+                    return Err(format!(
+                        "the output {} is connected twice: remove one of the connections",
+                        to.connector
+                    ));
+                }
+                self.connectors.outputs.push((to.connector.clone(), source));
+                Ok(())
+            }
+            (None, None) => Err("connects the system with itself, which is not supported: remove it".into()),
+        }
+    }
+
+    fn is_fed(&self, target: &str) -> Result<bool, String> {
+        let outside = self.connectors.inputs.iter().any(|(_, targets)| targets.iter().any(|t| t == target));
+        Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
+    }
+
+    /// The values of a binding; names begin with `prefix` and those of the system's connectors stand for themselves.
+    fn bound(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Vec<Given> {
+        let mut given = Vec::new();
+        for p in parameters {
+            let full = format!("{prefix}{}", p.name);
+            let ports = match self.connectors.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name) {
+                Some((_, targets)) => targets.clone(),
+                None => vec![full],
+            };
+            for port in ports {
+                let has = |i: &fmu_import::Instance| {
+                    let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
+                    values::find(i.description(), variable).map(|_| (i.name().to_owned(), variable.to_owned()))
+                };
+                match self.system.instances().iter().find_map(has) {
+                    Some((instance, name)) => {
+                        let parameter = Parameter { name, ..p.clone() };
+                        given.push(Given { instance, file: file.into(), parameter });
+                    }
+                    None => {
+                        self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line));
+                    }
+                }
+            }
+        }
+        given
+    }
+}
+
+/// `plant=a/b.fmu`, or `a/b.fmu` with the name `b`.
+///
+/// # Errors
+/// The name is empty, or there is no file name.
+pub fn name_and_path(text: &str) -> Result<(String, &Path), Error> {
+    // A path may have an equals sign; a name has no separator.
+    if let Some((name, path)) = text.split_once('=').filter(|(name, _)| !name.contains(['/', '\\'])) {
+        if name.is_empty() {
+            return invalid(format!("{text}: the name before = is empty"));
+        }
+        return Ok((name.into(), Path::new(path)));
+    }
+    let path = Path::new(text);
+    let stem = path.file_stem().ok_or_else(|| Error::Invalid(format!("{text}: is not a file")))?;
+    Ok((stem.to_string_lossy().into_owned(), path))
+}
+
+/// The connector at an end of a connection.
+fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connector, String> {
+    let (of, connectors) = match &end.element {
+        None => (format!("the system {}", structure.name), &structure.connectors),
+        Some(element) => {
+            let names: Vec<&str> = structure.components.iter().map(|c| c.name.as_str()).collect();
+            let none = || format!("there is no component {element}; there are {}", names.join(", "));
+            (element.clone(), &structure.component(element).ok_or_else(none)?.connectors)
+        }
+    };
+    let names = || connectors.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
+    let found = connectors.iter().find(|c| c.name == end.connector);
+    found.ok_or_else(|| format!("{of} has no connector {}; it has {}", end.connector, names()))
+}
+
+impl Package<'_> {
+    /// The values of a binding, its prefix before every name, with what to call their file.
+    fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
+        let path = self.path.display().to_string();
+        let (file, parameters) = match &binding.values {
+            ParameterValues::Inline(parameters) => (format!("{path}: {DESCRIPTION}"), parameters.clone()),
+            ParameterValues::File(name) => {
+                let file = format!("{path}: {name}");
+                let read = ssv::read(&self.text(name)?).map_err(|cause| Error::Invalid(format!("{file}: {cause}")))?;
+                (file, read)
+            }
+        };
+        let named = |p: Parameter| Parameter { name: format!("{}{}", binding.prefix, p.name), ..p };
+        Ok((file, parameters.into_iter().map(named).collect()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_instances() {
+        let name = |text| name_and_path(text).map(|(name, path)| (name, path.to_owned())).unwrap();
+        assert_eq!(name("a/PmsmPlant.fmu"), ("PmsmPlant".into(), "a/PmsmPlant.fmu".into()));
+        assert_eq!(name("p=a/x=y.fmu"), ("p".into(), "a/x=y.fmu".into()));
+        assert_eq!(name("a=b/c.fmu"), ("a".into(), "b/c.fmu".into()));
+        assert_eq!(name("./a=b/c.fmu"), ("c".into(), "./a=b/c.fmu".into()));
+        assert!(name_and_path("=x.fmu").is_err());
+    }
+
+    #[test]
+    fn what_is_not_said_comes_from_the_fmus() {
+        let experiment = |stop, step| Experiment { start: None, stop, step, tolerance: None };
+        let of = |experiments: &[Experiment]| Loaded { experiments: experiments.to_vec(), ..Loaded::default() };
+        let two = of(&[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
+        let s = two.settings(None, None, None, true);
+        assert_eq!((s.start, s.stop, s.step, s.sequential), (0.0, 3.0, 1e-4, true));
+        let s = of(&[experiment(None, None)]).settings(None, Some(4.0), None, false);
+        assert_eq!((s.stop, s.step), (4.0, 0.004));
+    }
+}

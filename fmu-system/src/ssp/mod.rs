@@ -1,0 +1,18 @@
+//! Systems of FMUs as one file: System Structure and Parameterization, SSP 1.0.
+//!
+//! [`structure`]: the structure of any system; [`load`]: a system made ready for co-simulation; [`values`] and [`ssv`]:
+//! parameter values from SSV files.
+
+mod error;
+pub mod load;
+pub mod ssv;
+pub mod structure;
+pub mod values;
+
+pub use error::Error;
+
+/// Name of the description in the archive.
+pub const DESCRIPTION: &str = "SystemStructure.ssd";
+
+/// MIME type of a component that is an FMU, the default.
+pub const FMU_TYPE: &str = "application/x-fmu-sharedlibrary";
