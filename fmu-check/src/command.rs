@@ -142,7 +142,7 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
         allowance: guard::Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Default::default() },
     };
     if let Some(what) = &args.replay {
-        let [file] = args.files.as_slice() else { return Err(Error(format!("--replay takes one file"))) };
+        let [file] = args.files.as_slice() else { return Err(Error("--replay takes one file".into())) };
         return replay::run(file, what, &options);
     }
     let baseline = args.baseline.as_deref().map(Baseline::read).transpose()?;

@@ -119,19 +119,18 @@ impl Modules {
                 ("use", _) => at = self.tree(&tokens, at + 1, &[], module),
                 ("mod", Some(name)) => {
                     let below = folder.join(&name);
-                    let inner = match group(tokens.get(at + 2), Delimiter::Brace) {
-                        Some(body) => self.module(body, self.all[module].file, Some(module), &below),
-                        None => {
-                            let beside =
-                                named_path.take().map(|path| self.files[self.all[module].file].with_file_name(path));
-                            let usual = [folder.join(format!("{name}.rs")), below.join("mod.rs")];
-                            let path = beside.into_iter().chain(usual).find(|path| path.is_file());
-                            self.file(
-                                &path.unwrap_or_else(|| panic!("{name} in {}", folder.display())),
-                                Some(module),
-                                &below,
-                            )
-                        }
+                    let inner = if let Some(body) = group(tokens.get(at + 2), Delimiter::Brace) {
+                        self.module(body, self.all[module].file, Some(module), &below)
+                    } else {
+                        let beside =
+                            named_path.take().map(|path| self.files[self.all[module].file].with_file_name(path));
+                        let usual = [folder.join(format!("{name}.rs")), below.join("mod.rs")];
+                        let path = beside.into_iter().chain(usual).find(|path| path.is_file());
+                        self.file(
+                            &path.unwrap_or_else(|| panic!("{name} in {}", folder.display())),
+                            Some(module),
+                            &below,
+                        )
                     };
                     self.all[module].inner.insert(name, inner);
                     at += 3;

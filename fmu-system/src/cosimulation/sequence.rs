@@ -191,7 +191,6 @@ fn cells(line: &str) -> Vec<String> {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
 mod tests {
     use super::*;
 
