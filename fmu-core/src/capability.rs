@@ -14,7 +14,7 @@ use crate::rules::can_be_state;
 use crate::sizes::Resizable;
 use crate::table::WIDE;
 use crate::variable::Meta;
-use crate::{Elapsed, Fault, Hash, Model, Step};
+use crate::{Account, Elapsed, Fault, Hash, Model, Step};
 use std::marker::PhantomData;
 
 /// A model with warnings for the importer's log.
@@ -83,8 +83,13 @@ pub struct ClockFunctions<M: Model> {
 /// [`Differentiable::tangent`].
 pub type Tangent<M> = fn(&M, Elapsed, &M, &mut [f64], &mut <M as Model>::Outputs) -> Result<(), Fault>;
 
-/// [`CompletedSteps::complete`].
-pub type Complete<M> = fn(&mut M, Elapsed) -> Result<(), Fault>;
+/// The functions of [`CompletedSteps`].
+pub struct Completing<M: Model> {
+    /// [`CompletedSteps::complete`].
+    pub complete: fn(&mut M, Elapsed) -> Result<(), Fault>,
+    /// [`CompletedSteps::account`].
+    pub account: fn(&mut M, Account),
+}
 
 /// [`Resizable::resize`].
 pub type Resize<M> = fn(&mut M) -> Result<(), Fault>;
@@ -105,8 +110,8 @@ pub struct Capabilities<M: Model> {
     pub to_event: Option<ToEvent<M>>,
     /// Functions of a [`Differentiable`] model.
     pub tangent: Option<Tangent<M>>,
-    /// Function of a model that follows [`CompletedSteps`].
-    pub complete: Option<Complete<M>>,
+    /// Functions of a model that follows [`CompletedSteps`].
+    pub complete: Option<Completing<M>>,
     /// Functions of a [`Clocked`] model.
     pub clocked: Option<ClockFunctions<M>>,
     /// The partitions of a [`Clocked`] model can be scheduled one by one (Scheduled Execution).
@@ -205,7 +210,7 @@ impl<M: Model> Capabilities<M> {
     where
         M: CompletedSteps,
     {
-        Self { complete: Some(M::complete), ..self }
+        Self { complete: Some(Completing { complete: M::complete, account: M::account }), ..self }
     }
 
     /// Adds [`Clocked`].

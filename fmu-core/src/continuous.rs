@@ -1,6 +1,6 @@
 //! Capabilities of a model with differential equations: its states and derivatives, and their tangent.
 
-use crate::{Elapsed, Fault, Model, unit::Quantity};
+use crate::{Account, Elapsed, Fault, Model, unit::Quantity};
 use std::slice;
 
 /// Where the model `M` keeps a state.
@@ -125,12 +125,17 @@ pub trait ContinuousTime: Model {
 /// [`Model::advance`] knows the solution, and nothing here is called.
 pub trait CompletedSteps: ContinuousTime {
     /// The solution passes through the present states, inputs and time: a step of the importer's solver is complete, or Event
-    /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time stands still or goes on from call to call.
+    /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time stands still or goes on from call to call,
+    /// unless [`account`](Self::account) takes back what was counted.
     /// An importer that ignores the request for completed steps calls at events only.
     ///
     /// # Errors
     /// Gives the reason why the model cannot go on.
     fn complete(&mut self, now: Elapsed) -> Result<(), Fault>;
+
+    /// Keeps a copy of all that [`complete`](Self::complete) changes, after it, or takes back what was counted after a time: some
+    /// importers complete steps that their solver gives up. [`Kept`](crate::Kept) does both.
+    fn account(&mut self, account: Account);
 }
 
 /// A continuous model that knows its own tangent, for example with [`Dual`](crate::Dual) numbers. For a model that

@@ -1,6 +1,7 @@
 //! Getting and setting variables by value reference: 0 is `time` in FMI 3.0 and nothing in FMI 2.0, `i + 1` the variable `i` of the table, of the states'
 //! derivatives after it, or of the event indicators after them.
 
+use crate::habit::Habit;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Standard, State};
 use crate::message;
@@ -48,6 +49,14 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
         },
         _ => meta.exact && matches!(state, State::Instantiated | State::Initialization),
     }
+}
+
+/// Whether a variable cannot change in this state, where tunable parameters can, or would be in Event Mode: setting the value that it
+/// has is [`Habit::Fixed`].
+pub(crate) fn keeps(meta: &Meta, state: State) -> bool {
+    matches!(state, State::Event | State::Continuous | State::Step)
+        && (meta.causality == Causality::Parameter || meta.exact)
+        && !open(meta, state)
 }
 
 /// The table of the model.
@@ -251,8 +260,9 @@ impl<E: Exported> Instance<E> {
         let found = table::<E>().entry(&mut self.current.block, index);
         let mut possible = None;
         if let Some((meta, slot)) = found {
-            let held = meta.causality == Causality::Input
-                && !matches!(state, State::Configuration | State::Reconfiguration)
+            let held = (keeps(meta, state)
+                || meta.causality == Causality::Input
+                    && !matches!(state, State::Configuration | State::Reconfiguration))
                 && T::read(meta, &slot, self.standard) == Some(value);
             possible = value.judge(meta, self.standard);
             if possible == Some(true) && (self.opens(meta, state) || held || self.sets_state(index)) {
@@ -274,9 +284,18 @@ impl<E: Exported> Instance<E> {
             && self.states.contains(&index)
     }
 
+    /// Whether the variable [keeps](keeps) its value now: one that was judged is the same.
+    pub(crate) fn stays(&mut self, index: usize) -> bool {
+        let (state, sets) = (self.current.life.state(), self.sets_state(index));
+        let found = table::<E>().entry(&mut self.current.block, index);
+        !sets && found.is_some_and(|(meta, _)| keeps(meta, state))
+    }
+
     /// Writes a value that was judged before.
     fn write<T: Value>(&mut self, index: usize, value: T) {
-        if let (Some(i), Some(x)) = (self.states.iter().position(|&row| row == index), value.real()) {
+        if self.stays(index) {
+            self.forgive(Habit::Fixed);
+        } else if let (Some(i), Some(x)) = (self.states.iter().position(|&row| row == index), value.real()) {
             self.set_state(i, x);
         } else if let Some((meta, slot)) = table::<E>().entry(&mut self.current.block, index) {
             value.write(slot);
@@ -309,6 +328,8 @@ impl<E: Exported> Instance<E> {
         let settable = self.opens(meta, state) || self.sets_state(index);
         let fault = if settable {
             message::range(&mut self.current.block, index, meta, value)
+        } else if keeps(meta, state) {
+            message::kept(&mut self.current.block, index, meta, state, value)
         } else {
             message::fixed::<E::Model>(index, meta, state)
         };

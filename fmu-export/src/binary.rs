@@ -2,6 +2,7 @@
 //! with the instance.
 
 use crate::access::index;
+use crate::habit::Habit;
 use crate::instance::{Instance, Refusal};
 use crate::message;
 use fmu_core::{Block, Exported, Fault, Kind, Kinds, Model, Slot};
@@ -74,11 +75,13 @@ impl<E: Exported> Instance<E> {
                 _ => {}
             }
         }
-        for i in 0..references.len() {
-            read(i)?;
+        for (i, &reference) in references.iter().enumerate() {
+            self.check_kept(index::<E>(reference), read(i)?)?;
         }
         for (i, &reference) in references.iter().enumerate() {
-            if let Some((_, Slot::Binary(bytes))) =
+            if self.stays(index::<E>(reference)) {
+                self.forgive(Habit::Fixed);
+            } else if let Some((_, Slot::Binary(bytes))) =
                 E::Model::TABLE.entry(&mut self.current.block, index::<E>(reference))
             {
                 bytes.set(read(i)?);

@@ -2,10 +2,11 @@
 //! FMI 3.0.2, 2.3.5, 3.1 and 3.2).
 
 use crate::clocks::Tick;
+use crate::habit::Habit;
 use crate::instance::{Instance, Refusal};
-use crate::lifecycle::State;
+use crate::lifecycle::{Standard, State};
 use crate::message;
-use fmu_core::{Elapsed, Exported, Fault, Model, Next, Outcome, SampleGrid};
+use fmu_core::{Account, Elapsed, Exported, Fault, Interface, Model, Next, Outcome, SampleGrid};
 
 /// Maximum number of updates of one event that an instance does by itself.
 pub(crate) const MAX_ITERATIONS: usize = 100;
@@ -25,9 +26,16 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The model reports an error.
     pub fn enter_event(&mut self) -> Result<(), Fault> {
-        self.complete()?;
+        let again = self.standard == Standard::Fmi3 && self.current.life.state() == State::Event;
+        if again {
+            self.forgive(Habit::Event);
+            if self.current.end <= self.current.settled {
+                return Ok(());
+            }
+        }
+        self.complete(true)?;
         let current = &mut self.current;
-        current.settled = current.settled.max(current.end);
+        current.settled = current.completed;
         current.pending = true;
         if const { E::CAN.clocked.is_some() } {
             current.ticks.iter_mut().flatten().for_each(Tick::begin);
@@ -39,11 +47,24 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// In Model Exchange, tells the model that the solution passes through the present point.
-    fn complete(&mut self) -> Result<(), Fault> {
-        let Some(complete) = E::CAN.complete.filter(|_| self.exchanges()) else { return Ok(()) };
-        complete(&mut self.current.block.model, self.current.elapsed)?;
-        self.stale = true;
+    /// In Model Exchange, tells the model that the solution passes through the present point, where an `event` begins or ends, or
+    /// a step is complete.
+    fn complete(&mut self, event: bool) -> Result<(), Fault> {
+        let current = &mut self.current;
+        // Some solvers complete every iteration at a point; the last one counts.
+        let again = !event && current.end <= current.completed && current.completed > current.settled;
+        current.completed = current.completed.max(current.end);
+        if let Some(completing) = &E::CAN.complete
+            && current.life.interface() == Interface::ModelExchange
+        {
+            let (model, now) = (&mut current.block.model, current.elapsed);
+            if again {
+                (completing.account)(model, Account::Again(now));
+            }
+            (completing.complete)(model, now)?;
+            (completing.account)(model, if event { Account::Event(now) } else { Account::Step(now) });
+            self.stale = true;
+        }
         Ok(())
     }
 
@@ -91,9 +112,13 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// As [`update_discrete`](Self::update_discrete); an event that does not settle.
     pub fn leave_event(&mut self) -> Result<(), Fault> {
+        if !self.begun {
+            self.warn_of_unfed();
+        }
         for _ in 0..MAX_ITERATIONS {
             if !self.current.pending && !self.current.dirty {
-                return self.complete();
+                // The importer may have gone on since the event began, and can go back to it.
+                return self.complete(self.current.end <= self.current.settled);
             }
             self.update_discrete()?;
         }
@@ -113,28 +138,42 @@ impl<E: Exported> Instance<E> {
     /// Sets the time (s).
     ///
     /// # Errors
-    /// Not a finite number, or before the last event or completed step. There is no check against the stop time: solvers
-    /// try times beyond it.
+    /// Not a finite number, or before the last event. There is no check against the stop time: solvers try times beyond it.
     pub fn set_time(&mut self, t: f64) -> Result<(), Fault> {
         let current = &mut self.current;
-        let rounding = 4.0 * f64::EPSILON * current.settled.abs();
-        if !(t.is_finite() && t >= current.settled - rounding) {
-            let allowed = format_args!("finite and not before {}, the last event or completed step", current.settled);
+        if !(t.is_finite() && t >= current.settled - rounding(current.settled)) {
+            let allowed = format_args!("finite and not before {}, the last event", current.settled);
             return Err(Fault::value("time", t, allowed));
         }
         let start = current.experiment.map_or(0.0, |e| e.start);
         (current.elapsed, current.end) = (Elapsed::between(start, t.max(start)), t.max(start));
         self.stale = true;
+        if t < self.current.completed - rounding(self.current.completed) {
+            self.go_back();
+        }
+        if self.standard == Standard::Fmi3 && self.current.life.state() == State::Event {
+            self.forgive(Habit::Time);
+        }
         Ok(())
     }
 
-    /// An integrator step is complete: no earlier time will be set.
+    /// Takes back what was counted after the present time.
+    #[cold]
+    fn go_back(&mut self) {
+        self.forgive(Habit::Back);
+        let current = &mut self.current;
+        current.completed = current.end.max(current.settled);
+        if let Some(completing) = &E::CAN.complete {
+            (completing.account)(&mut current.block.model, Account::Back(current.elapsed));
+        }
+    }
+
+    /// An integrator step is complete.
     ///
     /// # Errors
     /// The model reports an error.
     pub fn completed_step(&mut self) -> Result<(), Fault> {
-        self.complete()?;
-        self.current.settled = self.current.settled.max(self.current.end);
+        self.complete(false)?;
         self.warn();
         Ok(())
     }
@@ -151,6 +190,9 @@ impl<E: Exported> Instance<E> {
             let name = E::CAN.state_of(number).map_or("a state", |(state, _)| state.name);
             return Err(Refusal::Discard(Fault::value(name, x[i], self.ranges[number])));
         }
+        if self.current.life.state() != State::Continuous && self.keeps_states(x) {
+            return Ok(());
+        }
         let mut values = x.iter();
         E::CAN.each_state(&mut self.current.block.model, |_, place| {
             if let Some(x) = values.next() {
@@ -160,6 +202,17 @@ impl<E: Exported> Instance<E> {
         self.settle();
         self.stale = true;
         Ok(())
+    }
+
+    /// Outside of Continuous-Time Mode: whether the states have these values, so that nothing changes.
+    #[cold]
+    fn keeps_states(&mut self, x: &[f64]) -> bool {
+        self.forgive(Habit::States);
+        self.refresh_initial();
+        let (mut values, mut equal) = (x.iter(), true);
+        E::CAN.each_state(&mut self.current.block.model, |_, held| equal &= values.next() == Some(&*held));
+        self.current.stated |= !equal && self.current.life.state() == State::Initialization;
+        equal
     }
 
     /// The first value that is not in the range of its state, with the number of that state.
@@ -265,6 +318,11 @@ impl<E: Exported> Instance<E> {
         }
         Ok(())
     }
+}
+
+/// Times closer than this to `t` are the same time.
+fn rounding(t: f64) -> f64 {
+    4.0 * f64::EPSILON * t.abs()
 }
 
 fn count(name: &str, given: usize, needed: usize) -> Result<(), Fault> {

@@ -77,6 +77,10 @@ pub struct Instance<E: Exported> {
     pub(crate) inside: Option<Box<Inside<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
+    /// The habits of the importer that were heard, a bit for each.
+    pub(crate) forgiven: u8,
+    /// The first step, or continuous time, has begun.
+    pub(crate) begun: bool,
     starts: Starts,
 }
 
@@ -118,6 +122,8 @@ impl<E: Exported> Instance<E> {
             inside: None,
             clocks: Clocks::of::<E>(),
             warned: Vec::new(),
+            forgiven: 0,
+            begun: false,
             starts: Starts::default(),
         }
     }
@@ -128,7 +134,7 @@ impl<E: Exported> Instance<E> {
     /// As [`Experiment::new`].
     pub fn set_up(&mut self, start: f64, stop: Option<f64>) -> Result<(), Fault> {
         self.current.experiment = Some(Experiment::new(start, stop)?);
-        (self.current.end, self.current.settled) = (start, start);
+        (self.current.end, self.current.settled, self.current.completed) = (start, start, start);
         Ok(())
     }
 
@@ -152,8 +158,9 @@ impl<E: Exported> Instance<E> {
             self.current.check()?;
         }
         self.current.judged()?;
-        self.current.block.initialize();
-        self.current.dirty = false;
+        if self.current.dirty || !self.current.stated {
+            self.current.initialize();
+        }
         self.log.event(|| message::start(&self.name, &mut self.current, self.made.as_deref()));
         if const { E::CAN.clocked.is_some() } {
             self.plan_ticks(true)?;
@@ -177,6 +184,7 @@ impl<E: Exported> Instance<E> {
             self.refresh();
         }
         self.warned.clear();
+        self.begun = false;
         self.log.event(|| format!("{}: reset", self.name));
     }
 
@@ -202,6 +210,9 @@ impl<E: Exported> Instance<E> {
         if current.dirty {
             current.block.model = current.judged()?;
             current.dirty = false;
+        }
+        if !self.begun {
+            self.warn_of_unfed();
         }
         Ok(next)
     }
@@ -370,8 +381,7 @@ impl<E: Exported> Instance<E> {
     #[inline]
     pub(crate) fn refresh(&mut self) {
         if self.current.dirty && matches!(self.current.life.state(), State::Instantiated | State::Initialization) {
-            self.current.block.initialize();
-            self.current.dirty = false;
+            self.current.initialize();
         }
         self.observe();
     }

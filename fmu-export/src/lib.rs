@@ -87,6 +87,7 @@ pub mod blob;
 pub mod clocks;
 mod configuration;
 pub mod exchange;
+mod habit;
 pub mod inside;
 pub mod instance;
 pub mod lifecycle;
@@ -99,6 +100,7 @@ pub mod sensitivity;
 pub mod snapshot;
 mod step;
 mod text;
+mod unfed;
 pub mod value;
 
 #[doc(hidden)]

@@ -187,8 +187,10 @@ pub enum Call {
     EnterStep,
     /// `SetTime`.
     SetTime,
-    /// `SetContinuousStates` and `CompletedIntegratorStep`.
-    Integrate,
+    /// `SetContinuousStates`.
+    SetStates,
+    /// `CompletedIntegratorStep`.
+    CompletedStep,
     /// `GetContinuousStates`, `fmi2GetDerivatives`, `fmi3GetContinuousStateDerivatives`, `GetEventIndicators`.
     GetContinuous,
     /// `GetNominalsOfContinuousStates`.
@@ -349,16 +351,19 @@ impl Call {
                 any(each(saved, also), Stay)
             }
             Self::Status => stepping(each(&[Step, Ended, Terminated], &[]), Stay),
-            // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3).
+            // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3). FMI 3.0: `Habit::Event`.
             Self::EnterEvent => {
-                Row { event: States::of(&[Step]), ..exchange(each(&[Event, Continuous], &[Continuous]), To(Event)) }
+                Row { event: States::of(&[Step]), ..exchange(both(&[Event, Continuous]), To(Event)) }
             }
             Self::UpdateDiscrete => Row { event: States::of(&[Event]), ..exchange(both(&[Event]), Stay) },
             Self::EvaluateDiscrete => Row { event: States::of(&[Event]), ..exchange(each(&[], &[Event]), Stay) },
             Self::EnterContinuous => exchange(both(&[Event]), To(Continuous)),
             Self::EnterStep => Row { event: States::of(&[Event]), ..exchange(NONE, To(Step)) },
-            Self::SetTime => exchange(each(&[Event, Continuous], &[Continuous]), Stay),
-            Self::Integrate => exchange(both(&[Continuous]), Stay),
+            // In Event Mode of FMI 3.0: `Habit::Time`.
+            Self::SetTime => exchange(both(&[Event, Continuous]), Stay),
+            // Outside of Continuous-Time Mode: `Habit::States`.
+            Self::SetStates => exchange(each(&[Initialization, Event, Continuous], &[Event, Continuous]), Stay),
+            Self::CompletedStep => exchange(both(&[Continuous]), Stay),
             Self::GetContinuous => exchange(
                 each(
                     &[Initialization, Event, Continuous, Terminated, Error],

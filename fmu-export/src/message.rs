@@ -131,6 +131,19 @@ pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State
     })
 }
 
+/// The variable cannot be set now to another value than its own.
+#[cold]
+pub(crate) fn kept<M: Model>(
+    block: &mut Block<M>,
+    index: usize,
+    meta: &Meta,
+    state: lifecycle::State,
+    value: impl Display,
+) -> Fault {
+    let held = M::TABLE.entry(block, index).map_or_else(String::new, |(_, slot)| slot.to_string());
+    Fault::new(format!("{}; it is {held}, and the call sets {value}", fixed::<M>(index, meta, state)))
+}
+
 /// The value is of the right type, and out of range.
 #[cold]
 pub(crate) fn range<M: Model>(block: &mut Block<M>, index: usize, meta: &Meta, value: impl Display) -> Fault {

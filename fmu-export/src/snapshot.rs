@@ -54,8 +54,12 @@ pub struct Snapshot<M: Model> {
     /// Time as the importer computes it: the end of the last step, `t + h`, or what it set in Model Exchange; before
     /// the first step the start time.
     pub end: f64,
-    /// In Model Exchange, time of the last event or completed step: no earlier time can be set.
+    /// In Model Exchange, time of the last event: no earlier time can be set.
     pub settled: f64,
+    /// In Model Exchange, time of the last event or completed step: counts after an earlier time would be taken back.
+    pub completed: f64,
+    /// In Initialization Mode, the importer has set the continuous states: they count unless a start value is set after them.
+    pub stated: bool,
     /// Event Mode was entered, and the event has not been done.
     pub pending: bool,
     /// Derivatives of inputs, by index in the table: they hold for the next step (FMI 2.0).
@@ -89,6 +93,8 @@ impl<M: Model> Snapshot<M> {
             elapsed: Elapsed::ZERO,
             end: M::INFO.experiment.start,
             settled: M::INFO.experiment.start,
+            completed: M::INFO.experiment.start,
+            stated: false,
             pending: false,
             slopes: Vec::new(),
             dirty: true,
@@ -105,9 +111,12 @@ impl<M: Model> Clone for Snapshot<M> {
 
     /// Reuses what `self` holds: for a plain model, and one with a `clone_from` of its own, nothing is allocated.
     fn clone_from(&mut self, source: &Self) {
-        let Self { life, experiment, elapsed, end, settled, pending, slopes, dirty, ticks, block } = source;
+        let Self {
+            life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks, block
+        } = source;
         (self.life, self.experiment, self.elapsed) = (*life, *experiment, *elapsed);
-        (self.end, self.settled, self.pending, self.dirty) = (*end, *settled, *pending, *dirty);
+        (self.end, self.settled, self.completed, self.stated) = (*end, *settled, *completed, *stated);
+        (self.pending, self.dirty) = (*pending, *dirty);
         self.slopes.clone_from(slopes);
         self.ticks.clone_from(ticks);
         self.block.model.clone_from(&block.model);
@@ -155,6 +164,12 @@ impl<M: Model> Snapshot<M> {
             slope.is_finite() && entry.is_some_and(|(meta, _)| ramps(meta))
         };
         if self.slopes.iter().all(ramps) { Ok(()) } else { Err(Fault::new("derivatives of inputs")) }
+    }
+
+    /// State and outputs at the start, from what is set so far.
+    pub(crate) fn initialize(&mut self) {
+        self.block.initialize();
+        (self.dirty, self.stated) = (false, false);
     }
 
     /// The model with its calculated parameters, if its parameters fit together; this one stays as it is.
@@ -210,7 +225,8 @@ impl<M: Model> Snapshot<M> {
                     Some(_),
                 ) => {
                     self.end.is_finite()
-                        && (start..=self.end + rounding).contains(&self.settled)
+                        && (start..=self.end + rounding).contains(&self.completed)
+                        && (start..=self.completed).contains(&self.settled)
                         && elapsed >= 0.0
                         && elapsed <= 2.0 * since + rounding
                         && since <= 2.0 * elapsed + rounding

@@ -1,6 +1,7 @@
 //! Getting and setting texts. The texts of a getter are kept until the next getter of texts.
 
-use crate::access::{index, is_time, open};
+use crate::access::{index, is_time, keeps, open};
+use crate::habit::Habit;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
 use crate::message;
@@ -66,10 +67,14 @@ impl<E: Exported> Instance<E> {
                 let long = format!("a text of {} bytes", value.count_bytes());
                 return Err(Fault::value(&name, long, format_args!("at most {MOST} bytes")).into());
             }
-            texts.push(value.to_str().map_err(|_| Fault::new(format!("the new value of {name} is not UTF-8")))?);
+            let text = value.to_str().map_err(|_| Fault::new(format!("the new value of {name} is not UTF-8")))?;
+            self.check_kept(index, text.as_bytes())?;
+            texts.push(text);
         }
         for (&index, text) in indices.iter().zip(texts) {
-            if let Some((_, Slot::Text(place))) = E::Model::TABLE.entry(&mut self.current.block, index) {
+            if self.stays(index) {
+                self.forgive(Habit::Fixed);
+            } else if let Some((_, Slot::Text(place))) = E::Model::TABLE.entry(&mut self.current.block, index) {
                 text.clone_into(place);
             }
         }
@@ -106,17 +111,33 @@ impl<E: Exported> Instance<E> {
         references.first().map_or(Ok(()), |&first| self.index_of(first, carries, |_| false).map(|_| ()))
     }
 
-    /// Whether a variable, a text or bytes, can be set in this state. In Continuous-Time Mode an input is discarded as other
-    /// discrete inputs are.
+    /// Whether a variable, a text or bytes, can be set in this state, or [kept](keeps). In Continuous-Time Mode an input is discarded
+    /// as other discrete inputs are.
     pub(crate) fn check_open(&mut self, index: usize) -> Result<(), Refusal> {
         let state = self.current.life.state();
         let Some((meta, slot)) = E::Model::TABLE.entry(&mut self.current.block, index) else { return Ok(()) };
-        if open(meta, state) && !matches!(slot, Slot::Said(_)) {
+        if (open(meta, state) || keeps(meta, state)) && !matches!(slot, Slot::Said(_)) {
             return Ok(());
         }
         let fault = message::fixed::<E::Model>(index, meta, state);
         let tried = state == State::Continuous && meta.causality == Causality::Input;
         Err(if tried { Refusal::Discard(fault) } else { Refusal::Error(fault) })
+    }
+
+    /// Whether a text or bytes that cannot change now would have another value.
+    pub(crate) fn check_kept(&mut self, index: usize, value: &[u8]) -> Result<(), Refusal> {
+        let state = self.current.life.state();
+        match E::Model::TABLE.entry(&mut self.current.block, index) {
+            Some((meta, slot)) if keeps(meta, state) => {
+                let same = match &slot {
+                    Slot::Text(text) => text.as_bytes() == value,
+                    Slot::Binary(bytes) => ***bytes == *value,
+                    _ => false,
+                };
+                if same { Ok(()) } else { Err(message::fixed::<E::Model>(index, meta, state).into()) }
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Some texts or bytes have new values.

@@ -6,11 +6,11 @@ mod solver;
 
 use fmu_core::unit::{Exponents, Quantity, SECOND, Unit};
 use fmu_core::{
-    Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Model, Next, Outcome, Row, State,
+    Account, Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Kept, Model, Next, Outcome, Row, State,
     Step, Table, integrate, table,
 };
 use serde::{Deserialize, Serialize};
-use solver::{CS, ERROR, Fmu, ME, OK};
+use solver::{CS, ERROR, Fmu, ME, OK, has_logger};
 use std::ptr::null_mut;
 
 const ONE_PER_S: Quantity = Quantity::new("Rate", Unit::si("1/s", Exponents::mechanical(0, 0, -1, 0)));
@@ -23,6 +23,7 @@ struct Meter {
     area: f64,
     points: i32,
     last: (Elapsed, f64),
+    kept: Kept<(f64, i32, (Elapsed, f64))>,
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -80,6 +81,12 @@ impl CompletedSteps for Meter {
         (self.points, self.last) = (self.points + 1, (now, self.x));
         Ok(())
     }
+
+    fn account(&mut self, account: Account) {
+        let mut counts = (self.area, self.points, self.last);
+        self.kept.follow(account, &mut counts);
+        (self.area, self.points, self.last) = counts;
+    }
 }
 
 impl Events for Meter {
@@ -119,16 +126,73 @@ fn completed_steps_and_events_are_told_and_trials_are_not() {
         }
         point(&fmu, 2.5, 4.0);
         assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)));
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 4)), "no time has passed");
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)), "no time has passed: counted again");
+        point(&fmu, 2.5, 6.0);
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.5, 3)), "another iteration at the same time");
+        point(&fmu, 2.5, 4.0);
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)));
         // An event inside of the next step: beyond it, then back to it.
         point(&fmu, 3.5, 6.0);
         point(&fmu, 3.0, 5.0);
-        assert_eq!((fmu.event(), told(&fmu)), (OK, (3.25, 5)));
+        assert_eq!((fmu.event(), told(&fmu)), (OK, (3.25, 4)));
         fmu.settle();
-        assert_eq!((fmu.leave(), fmu.get(X), told(&fmu)), (OK, 2.5, (3.25, 6)));
+        assert_eq!((fmu.leave(), fmu.get(X), told(&fmu)), (OK, 2.5, (3.25, 5)));
         // From the height after the event on.
         point(&fmu, 4.0, 3.5);
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (6.25, 7)));
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (6.25, 6)));
+    }
+}
+
+/// A step that was completed and is given up leaves nothing behind.
+#[test]
+fn what_completed_steps_counted_is_taken_back() {
+    for kind in ME {
+        let fmu = Fmu::with(kind, true, true);
+        assert_eq!((fmu.enter(0.0, None), fmu.exit(), fmu.leave()), (OK, OK, OK));
+        fmu.messages();
+        for (t, x) in [(1.0, 4.0), (2.0, 8.0), (3.0, 9.0), (3.0, 11.0)] {
+            point(&fmu, t, x);
+            assert_eq!(fmu.completed(), OK);
+        }
+        assert_eq!(told(&fmu), (2.0 + 6.0 + 9.5, 5));
+        assert!(fmu.messages().is_empty());
+        // Back between two points, and on from the one before.
+        point(&fmu, 1.5, 6.0);
+        assert_eq!(told(&fmu), (2.0, 3));
+        let warned = fmu.messages();
+        assert!(warned.len() == usize::from(has_logger(kind.version())), "{warned:?}");
+        assert!(warned.iter().all(|m| m.status == 1 && m.text.contains("a time before the last completed step")));
+        assert_eq!((fmu.completed(), told(&fmu)), (OK, (4.5, 4)));
+        point(&fmu, 1.0, 5.0);
+        assert_eq!((fmu.completed(), told(&fmu), fmu.messages().len()), (OK, (2.5, 3), 0), "counted again");
+        // As far as the last event, and no further.
+        point(&fmu, 2.0, 5.0);
+        assert_eq!((fmu.event(), fmu.set_time(1.9)), (OK, ERROR));
+        assert!(fmu.error().contains("time = 1.9 is not allowed: finite and not before 2, the last event"));
+    }
+}
+
+/// From one call to the next, with any number of steps to give up, what counts is the solution alone.
+#[test]
+fn any_number_of_steps_is_given_up() {
+    for kind in ME {
+        // With more than are kept, counted anew from the event, which is exact on this line.
+        for tries in 1..30_u32 {
+            let (fmu, strict) = (Fmu::running(kind, 0.0), Fmu::running(kind, 0.0));
+            for k in 0..5_u32 {
+                let (t, end) = (f64::from(k), f64::from(k + 1));
+                for i in 1..=tries {
+                    let tried = t + 2.0 * f64::from(i) / f64::from(tries);
+                    point(&fmu, tried, if tried < end { 3.0 * tried } else { 100.0 });
+                    assert_eq!(fmu.completed(), OK);
+                }
+                for fmu in [&fmu, &strict] {
+                    point(fmu, end, 3.0 * end);
+                    assert_eq!(fmu.completed(), OK);
+                }
+            }
+            assert!((fmu.get(AREA) - strict.get(AREA)).abs() < 1e-12, "{tries}");
+        }
     }
 }
 

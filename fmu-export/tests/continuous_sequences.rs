@@ -16,7 +16,7 @@ impl Twin for Ball {
     const KINDS: &'static [Kind] =
         &[Kind::Me2, Kind::Me3, Kind::Me2, Kind::Me3, Kind::Cs2, Kind::Cs3 { event: false, early: true }];
     const REALS: &'static [u32] = &[TIME, U, K, H, E, A, HELD, V, C, M, H_START, C_M, MAP, V_MEAN, DER_H, DER_V];
-    const SET: &'static [u32] = &[U, U, U, K, C, V];
+    const SET: &'static [u32] = &[U, U, U, K, C, V, M];
     const VALUES: &'static [f64] = &[0.5, 1.0, 0.0, 2.0, 0.1, 0.7, 3.0, 5.0];
 
     fn is_healthy(&self) -> bool {

@@ -23,7 +23,7 @@ impl Twin for Sampler {
         Kind::Cs3 { event: true, early: true },
     ];
     const REALS: &'static [u32] = &[TIME, X, D, Y, GAIN, PERIOD, FIXED, PRODUCT];
-    const SET: &'static [u32] = &[X, D, X, D, GAIN];
+    const SET: &'static [u32] = &[X, D, X, D, GAIN, FIXED];
     const VALUES: &'static [f64] = &[0.5, 1.0, 0.0, 2.0, 0.1, 0.7, 3.0, 5.0];
 
     fn is_healthy(&self) -> bool {

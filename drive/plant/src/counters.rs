@@ -22,7 +22,7 @@ use crate::state::{Instant, State, axis_at};
 use drive_base::frame::AlphaBeta;
 use drive_base::integrate::rk4;
 use drive_base::math::all_finite;
-use fmu_core::{Elapsed, Fault};
+use fmu_core::{Account, Elapsed, Fault};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
@@ -61,6 +61,13 @@ impl PmsmPlant {
         }
         self.point = Point { time: now, inputs: inputs.clone(), state: self.state, impulse: self.point.impulse };
         Ok(())
+    }
+
+    /// [`CompletedSteps::account`](fmu_core::CompletedSteps::account).
+    pub fn account(&mut self, account: Account) {
+        let mut counts = (self.energy, self.point.clone());
+        self.kept.follow(account, &mut counts);
+        (self.energy, self.point) = counts;
     }
 
     /// What has passed until the last point.

@@ -28,7 +28,7 @@ use drive_base::frame::{Axis, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{
-    CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
+    Account, CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
     State,
 };
 
@@ -213,6 +213,10 @@ impl CompletedSteps for PmsmPlant {
     fn complete(&mut self, now: Elapsed) -> Result<(), Fault> {
         let inputs = self.inputs.clone();
         self.complete_under(&inputs, now)
+    }
+
+    fn account(&mut self, account: Account) {
+        PmsmPlant::account(self, account);
     }
 }
 

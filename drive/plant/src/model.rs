@@ -17,7 +17,7 @@ use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
 use fmu_core::log::Warnings;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal, Warns};
+use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Kept, Model, Scalar, Step, Table, Terminal, Warns};
 use serde::{Deserialize, Serialize};
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
@@ -35,8 +35,9 @@ pub struct PmsmPlant {
     pub(super) powers: Powers,
     /// Since the start.
     pub(super) energy: Energy,
-    /// In Model Exchange, the last point of the importer's solution.
+    /// In Model Exchange, the last point of the importer's solution, and the counts of earlier ones.
     pub(super) point: Point,
+    pub(super) kept: Kept<(Energy, Point)>,
     /// Temperatures and the machine at them, held over a step.
     pub(super) warm: Warm,
     /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
@@ -216,7 +217,7 @@ impl Model for PmsmPlant {
         };
         let psi = if self.inputs.is_off() { self.idle_flux(motor, speed) } else { machine::flux(motor, Dq::ZERO) };
         self.state = State::new(motor, psi, speed, angle);
-        (self.energy, self.point) = (Energy::default(), Point::default());
+        (self.energy, self.point, self.kept) = (Energy::default(), Point::default(), Kept::default());
         self.blocked = self.blocks(&self.inputs);
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.

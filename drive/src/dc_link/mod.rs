@@ -19,7 +19,7 @@ pub mod ripple;
 
 use circuit::{Circuit, Piece};
 use fmu_core::unit::{AMPERE, JOULE, VOLT, WATT};
-use fmu_core::{Dual, Elapsed, Row, Scalar, Table, table};
+use fmu_core::{Account, Dual, Elapsed, Kept, Row, Scalar, Table, table};
 pub use parameters::{Chopper, DcLink, LINK, LinkParameters};
 use serde::{Deserialize, Serialize};
 
@@ -77,8 +77,9 @@ pub struct Link {
     chopped: f64,
     /// Energy in J that the inverter took from an empty capacitor.
     owed: f64,
-    /// Model Exchange: the last point of the solution.
+    /// Model Exchange: the last point of the solution, and the counts of earlier ones.
     point: Point,
+    kept: Kept<(LinkEnergy, Point)>,
 }
 
 /// A point of the importer's solution.
@@ -208,6 +209,13 @@ impl Link {
             self.energy.add(&LinkEnergy { source: resistor + chopper + taken - before + stored, resistor, chopper });
         }
         self.point = Point { time: now, u: self.u, source: U, taken };
+    }
+
+    /// Model Exchange: what was counted at the points of the solution is kept, or taken back.
+    pub fn account(&mut self, account: Account) {
+        let mut counts = (self.energy, self.point);
+        self.kept.follow(account, &mut counts);
+        (self.energy, self.point) = counts;
     }
 
     /// Derivative of the voltage `u` (V) in V/s, on a source of `U` (V), with the current `i_dc` (A) of the inverter. The diodes of

@@ -12,7 +12,7 @@ use drive_plant::signals::{PlantInputs, PlantOutputs};
 use fmu_core::events::{bounded, grid};
 use fmu_core::unit::VOLT_PER_S;
 use fmu_core::{
-    CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Model, Next, Outcome,
+    Account, CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Model, Next, Outcome,
     Sampled, Scalar, State,
 };
 
@@ -97,6 +97,11 @@ impl CompletedSteps for PmsmDrive {
             self.link.complete(&self.link_parameters, now, self.inputs.u_dc, plant.total().energy.r#in);
         }
         Ok(())
+    }
+
+    fn account(&mut self, account: Account) {
+        self.pair.plant.model.account(account);
+        self.link.account(account);
     }
 }
 

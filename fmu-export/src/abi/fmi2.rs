@@ -204,9 +204,9 @@ macro_rules! export_fmi2 {
             fmi2NewDiscreteStates(info: *mut Fmi2EventInfo) => UpdateDiscrete: fmi2_new_discrete_states(info);
             fmi2EnterContinuousTimeMode() => EnterContinuous: leave_event();
             fmi2CompletedIntegratorStep(_no_set_state_prior: Fmi2Boolean, event: *mut Fmi2Boolean, end: *mut Fmi2Boolean)
-                => Integrate: completed_step(event, end);
+                => CompletedStep: completed_step(event, end);
             fmi2SetTime(time: f64) => SetTime: set_time(time);
-            fmi2SetContinuousStates(x: *const f64, n: usize) => Integrate: set_states(x, n);
+            fmi2SetContinuousStates(x: *const f64, n: usize) => SetStates: set_states(x, n);
             fmi2GetDerivatives(dx: *mut f64, n: usize) => GetContinuous: derivatives(dx, n);
             fmi2GetEventIndicators(z: *mut f64, n: usize) => GetContinuous: indicators(z, n);
             fmi2GetContinuousStates(x: *mut f64, n: usize) => GetContinuous: get_states(x, n);

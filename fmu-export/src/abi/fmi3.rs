@@ -540,9 +540,9 @@ macro_rules! export_fmi3 {
 
             fmi3EnterContinuousTimeMode() => EnterContinuous: leave_event();
             fmi3CompletedIntegratorStep(_no_set_state_prior: Fmi3Boolean, event: *mut Fmi3Boolean, end: *mut Fmi3Boolean)
-                => Integrate: completed_step(event, end);
+                => CompletedStep: completed_step(event, end);
             fmi3SetTime(time: f64) => SetTime: set_time(time);
-            fmi3SetContinuousStates(x: *const f64, n: usize) => Integrate: set_states(x, n);
+            fmi3SetContinuousStates(x: *const f64, n: usize) => SetStates: set_states(x, n);
             fmi3GetContinuousStateDerivatives(dx: *mut f64, n: usize) => GetContinuous: derivatives(dx, n);
             fmi3GetEventIndicators(z: *mut f64, n: usize) => GetContinuous: indicators(z, n);
             fmi3GetContinuousStates(x: *mut f64, n: usize) => GetContinuous: get_states(x, n);

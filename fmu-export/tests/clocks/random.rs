@@ -21,13 +21,15 @@ struct Twin {
     /// Scheduled Execution: the last tick of each clock, and whether `trip` has ticked unseen.
     last: [f64; 7],
     trips: bool,
+    /// Time of the last event.
+    event: f64,
 }
 
 impl Twin {
     fn new(kind: Kind) -> Self {
         let no = [false; 7];
         let model = Kinds::default();
-        Self { kind, state: 'i', time: 0.0, model, active: no, done: no, last: [-1.0; 7], trips: false }
+        Self { kind, state: 'i', time: 0.0, model, active: no, done: no, last: [-1.0; 7], trips: false, event: 0.0 }
     }
 
     fn is(&self, states: &str) -> bool {
@@ -258,7 +260,8 @@ impl World {
             "advance" => {
                 let h = f64::from(u8::try_from(draw.below(5) + 1).unwrap()) * 0.0625;
                 let right = draw.of(&["sx", "sx", "sx", "sx", "sxa"]);
-                may = twin.is(right) && !scheduled;
+                // FMI 3.0 does not allow SetTime in Event Mode; importers call it.
+                may = (twin.is(right) || twin.is("v") && twin.kind == Kind::Me) && !scheduled;
                 let to = twin.time + h;
                 twin.time = to;
                 if before.kind == Kind::Me {
@@ -269,8 +272,12 @@ impl World {
                 }
             }
             "event" => {
-                may = twin.is("sx");
-                (twin.active, twin.done) = ([false; 7], [false; 7]);
+                // Nor EnterEventMode, which does nothing where no time has passed.
+                let again = twin.is("v") && twin.kind == Kind::Me;
+                may = twin.is("sx") || again;
+                if !again || twin.time > twin.event {
+                    (twin.active, twin.done, twin.event) = ([false; 7], [false; 7], twin.time);
+                }
                 twin.state = 'v';
                 unsafe { fmi3EnterEventMode(it) }
             }

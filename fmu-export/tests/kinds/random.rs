@@ -271,7 +271,9 @@ fn set_some_bytes(it: InstancePointer, twin: &mut Twin, draw: &mut Draw, trace: 
                 (size, CONTENT[draw.below(1 + MOST - size)..].as_ptr())
             }
         };
-        fits &= [RX, KEY].contains(&reference) && twin.open(reference == KEY);
+        // A fixed parameter may be set to what it is.
+        let kept = reference == KEY && twin.is(&[State::Step]) && size <= MOST && *twin.model.rx == CONTENT[..size];
+        fits &= [RX, KEY].contains(&reference) && (twin.open(reference == KEY) || kept);
         fits &= size <= MOST && (size == 0 || !value.is_null());
         references.push(reference);
         sizes.push(size);
@@ -280,9 +282,10 @@ fn set_some_bytes(it: InstancePointer, twin: &mut Twin, draw: &mut Draw, trace: 
     let n = draw.count(values.len()).min(values.len());
     let _ = write!(trace, " {references:?} {sizes:?} {n}");
     fits &= n == values.len();
-    if let Some(size) = sizes.last().filter(|_| fits) {
+    let written = |i: &usize| !(references[*i] == KEY && twin.is(&[State::Step]));
+    if let Some(size) = (0..sizes.len()).rev().find(written).map(|i| sizes[i]).filter(|_| fits) {
         twin.model.rx.clear();
-        twin.model.rx.extend(&CONTENT[..*size]);
+        twin.model.rx.extend(&CONTENT[..size]);
         twin.changed();
     }
     let status =

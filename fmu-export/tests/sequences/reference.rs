@@ -77,6 +77,18 @@ impl Snapshot {
         self.slot(reference, |slot| if let Slot::Boolean(x) = slot { *x } else { unreachable!() })
     }
 
+    /// The value is that of a fixed parameter: in Step Mode such a set is taken and changes nothing.
+    fn is_kept(&self, version: u8, kind: Kind, reference: u32, value: Mixed) -> bool {
+        match (kind, reference) {
+            (Kind::Real, R | 8..=10) => self.real(reference) == value.real,
+            (Kind::Integer, N) => i64::from(self.integer(reference)) == value.integer,
+            (Kind::Integer, MODE) if version == 2 => i64::from(self.integer(reference)) == value.integer,
+            (Kind::Enumeration, MODE) => i64::from(self.integer(reference)) == value.integer,
+            (Kind::Boolean, FLAG) => self.truth(reference) == (value.truth != 0),
+            _ => false,
+        }
+    }
+
     fn put(&mut self, reference: u32, value: Mixed) {
         match Probe::TABLE.entry(&mut self.block, reference as usize - 1).unwrap().1 {
             Slot::Real(x) => *x = value.real,
@@ -152,6 +164,11 @@ pub(crate) struct Reference {
     pub(crate) now: Snapshot,
     /// Categories that are heard: events, warning, discard, error, fatal.
     pub(crate) heard: [bool; 5],
+    /// The last call is taken with a warning, which is told once.
+    pub(crate) warns: bool,
+    pub(crate) warned: bool,
+    /// The first step has begun.
+    pub(crate) begun: bool,
 }
 
 /// The names of the categories, in the order of [`Reference::heard`].
@@ -160,7 +177,7 @@ const CATEGORIES: [&[u8]; 5] =
 
 impl Reference {
     pub(crate) fn new(version: u8, logging: bool) -> Self {
-        Self { version, now: Snapshot::new(), heard: [logging; 5] }
+        Self { version, now: Snapshot::new(), heard: [logging; 5], warns: false, warned: false, begun: false }
     }
 
     /// The status of a call that needs one of these states, and the state afterwards if it failed.
@@ -238,7 +255,7 @@ impl Reference {
     }
 
     pub(crate) fn reset(&mut self) -> c_int {
-        self.now = Snapshot::new();
+        (self.now, self.begun) = (Snapshot::new(), false);
         OK
     }
 
@@ -284,11 +301,15 @@ impl Reference {
         self.call(SET, |it| {
             it.arrays(kind, references, arrays)?;
             let mut values = values.iter();
-            let mut after = it.now.clone();
+            let (mut after, mut kept) = (it.now.clone(), false);
             for &reference in references {
                 for offset in 0..elements(it.version, reference).unwrap_or(1) {
                     let reference = reference.wrapping_add(u32::try_from(offset).unwrap());
                     let value = *values.next().unwrap();
+                    if it.now.state == 's' && it.now.is_kept(it.version, kind, reference, value) {
+                        kept = true;
+                        continue;
+                    }
                     if !settable(it.version, kind, it.now.state, reference, value) {
                         return Err(());
                     }
@@ -297,6 +318,8 @@ impl Reference {
                 }
             }
             it.now = after;
+            it.warns = kept && !it.warned && it.heard[1];
+            it.warned |= it.warns;
             Ok(OK)
         })
     }
@@ -323,6 +346,9 @@ impl Reference {
                 return Err(());
             }
             let step = Step { start: now.elapsed, h };
+            // Two inputs do not start at 0.
+            it.warns = !it.begun && it.heard[1] && (now.real(U) == 0.0 || !now.truth(ON));
+            it.begun = true;
             now.guarded(|now| {
                 if now.fresh {
                     now.block.model.derive();

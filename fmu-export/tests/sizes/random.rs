@@ -241,7 +241,9 @@ impl World {
                 let _ = write!(self.trace, " {n}");
                 let open = twin.is(if name == "map" { "in" } else { "insv" });
                 let fits = n == twin.values(reference).len() && values.iter().all(|x| x.is_finite());
-                wanted = verdict(open && fits || n == 0 && twin.values(reference).is_empty() && twin.is("icnsvxr"));
+                // A fixed parameter, and in Continuous-Time Mode a tunable one, may be set to what it is.
+                let kept = twin.is("svx") && n > 0 && values == twin.values(reference);
+                wanted = verdict((open || kept) && fits || n == 0 && twin.values(reference).is_empty() && twin.is("icnsvxr"));
                 if wanted == OK {
                     let model = &mut twin.block.model;
                     let place = if name == "map" { &mut model.map.values } else { &mut model.gains };
@@ -254,7 +256,8 @@ impl World {
                 let n = draw.count(twin.block.model.marks.len());
                 let marks: Vec<i32> = (1..).take(n).collect();
                 let fits = n == twin.block.model.marks.len();
-                wanted = verdict(fits && (twin.is("in") || n == 0 && twin.is("csvxr")));
+                let kept = n > 0 && marks == twin.block.model.marks;
+                wanted = verdict(fits && (twin.is("in") || kept && twin.is("svx") || n == 0 && twin.is("csvxr")));
                 if wanted == OK {
                     twin.block.model.marks.clone_from(&marks);
                     twin.set |= twin.is("in");
@@ -286,7 +289,7 @@ impl World {
                 it.step(if wrong { t + 1.0 } else { t }, h)
             }
             "event" => {
-                wanted = verdict(admits(twin, "x"));
+                wanted = verdict(admits(twin, "xv"));
                 twin.state = 'v';
                 unsafe { fmi3EnterEventMode(it.0) }
             }
@@ -305,7 +308,7 @@ impl World {
                 let n = draw.count(twin.number() + 1);
                 let x: Vec<f64> = (0..n).map(|_| draw.of(&[0.0, 1.0, -3.0, 0.1, 7.0, -2e3])).collect();
                 let wild = x.iter().take(twin.number()).any(|x| *x < -1e3);
-                wanted = match (admits(twin, "x") && n == twin.number() + 1, wild) {
+                wanted = match (admits(twin, "xv") && n == twin.number() + 1, wild) {
                     (false, _) => ERROR,
                     (true, true) => DISCARD,
                     (true, false) => OK,

@@ -141,6 +141,8 @@ impl<M: Twin> World<M> {
                 if status == OK {
                     if !"in".contains(state) {
                         now.show();
+                    } else if std::mem::take(&mut now.old) {
+                        now.observe();
                     }
                     self.slots[slot].1 = Some(now.clone());
                 }

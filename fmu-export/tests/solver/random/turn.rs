@@ -46,8 +46,10 @@ impl<M: Twin> Turn<'_, M> {
     pub fn exit(&mut self) -> Call {
         let wanted = if self.is("n") && self.now.block.model.fits() && self.now.is_storable() { OK } else { ERROR };
         if wanted == OK {
-            self.now.block.initialize();
-            (self.now.fresh, self.now.running) = (false, true);
+            if self.now.fresh || !self.now.stated {
+                self.now.initialize();
+            }
+            (self.now.running, self.now.old) = (true, false);
             self.now.state = if self.now.kind.handles_events() { 'v' } else { 's' };
             if self.now.kind.handles_events() {
                 self.now.begin();
@@ -69,12 +71,14 @@ impl<M: Twin> Turn<'_, M> {
 
     pub fn event(&mut self) -> Call {
         let may = if self.now.kind.exchanges() {
-            self.is(if self.now.kind.version() == 2 { "vc" } else { "c" })
+            self.is("vc")
         } else {
             self.now.kind.handles_events() && self.is("s")
         };
         let wanted = if may { OK } else { ERROR };
-        if may {
+        // FMI 3.0 does not allow it in Event Mode; where no time has passed, it does nothing.
+        let (again, later) = (self.is("v") && self.now.kind.version() == 3, self.now.end > self.now.settled);
+        if may && (!again || later) {
             self.now.begin();
             self.now.state = 'v';
         }
@@ -106,9 +110,13 @@ impl<M: Twin> Turn<'_, M> {
     pub fn set_time(&mut self) -> Call {
         let wrong = self.draw.rarely();
         let t = self.now.end
-            + self.draw.of(if wrong { &[-1.0, f64::NAN, f64::INFINITY] } else { &[0.0, 0.005, 0.01, 0.02, 0.003] });
+            + self.draw.of(if wrong {
+                &[-1.0, f64::NAN, f64::INFINITY]
+            } else {
+                &[0.0, 0.005, 0.01, 0.02, 0.003, -0.004, -0.02]
+            });
         let fits = t.is_finite() && t >= self.now.settled - 4.0 * f64::EPSILON * self.now.settled.abs();
-        let wanted = if self.in_exchange("vc", "c") && fits { OK } else { ERROR };
+        let wanted = if self.in_exchange("vc", "vc") && fits { OK } else { ERROR };
         if wanted == OK {
             let start = self.now.start.unwrap();
             self.now.end = t.max(start);
@@ -119,7 +127,6 @@ impl<M: Twin> Turn<'_, M> {
 
     pub fn completed(&mut self) -> Call {
         let wanted = if self.in_exchange("c", "c") { OK } else { ERROR };
-        self.now.settled = self.now.settled.max(self.now.end);
         (self.fmu.completed(), wanted)
     }
 
@@ -150,13 +157,20 @@ impl<M: Twin> Turn<'_, M> {
         let rows = M::CAN.rows().unwrap();
         let ranges = rows.iter().map(|&row| M::TABLE.locate(row).unwrap().1.range);
         let wanted = match () {
-            () if !self.in_exchange("c", "c") || x.len() != nx => ERROR,
+            () if !self.in_exchange("nvc", "vc") || x.len() != nx => ERROR,
             () if ranges.zip(&x).any(|(range, x)| !range.contains(*x)) => DISCARD,
             () => OK,
         };
         if wanted == OK {
+            self.now.show();
+        }
+        // Outside of Continuous-Time Mode, equal values change nothing.
+        if wanted == OK && (self.is("c") || self.now.states() != x) {
             for (state, x) in M::CAN.states().iter().zip(&x) {
                 *state.at(&mut self.now.block.model) = *x;
+            }
+            if self.is("n") {
+                (self.now.old, self.now.stated) = (true, true);
             }
         }
         (self.fmu.set_states(&x), wanted)

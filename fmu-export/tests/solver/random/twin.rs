@@ -30,7 +30,12 @@ pub struct Snapshot<M: Twin> {
     pub start: Option<f64>,
     pub elapsed: Elapsed,
     pub end: f64,
+    /// Time of the last event.
     pub settled: f64,
+    /// States were set in Initialization Mode.
+    pub stated: bool,
+    /// In Initialization Mode, the outputs are not those of these states.
+    pub old: bool,
     pub pending: bool,
     pub fresh: bool,
     /// Initialization is over.
@@ -48,6 +53,8 @@ impl<M: Twin> Snapshot<M> {
             elapsed: Elapsed::ZERO,
             end: start,
             settled: start,
+            stated: false,
+            old: false,
             pending: false,
             fresh: true,
             running: false,
@@ -59,14 +66,24 @@ impl<M: Twin> Snapshot<M> {
     pub fn show(&mut self) {
         if "in".contains(self.state) {
             if self.fresh {
-                self.block.initialize();
-                self.fresh = false;
+                self.initialize();
             }
-        } else if self.kind.exchanges() && self.running {
-            match &M::CAN.continuous {
-                Some(continuous) => (continuous.observe)(&self.block.model, self.elapsed, &mut self.block.out),
-                None => self.block.model.output(self.elapsed, &mut self.block.out),
-            }
+        }
+        if std::mem::take(&mut self.old) || !"in".contains(self.state) && self.kind.exchanges() && self.running {
+            self.observe();
+        }
+    }
+
+    pub fn initialize(&mut self) {
+        self.block.initialize();
+        (self.fresh, self.stated) = (false, false);
+    }
+
+    /// The outputs of this instant, in Model Exchange.
+    pub fn observe(&mut self) {
+        match &M::CAN.continuous {
+            Some(continuous) => (continuous.observe)(&self.block.model, self.elapsed, &mut self.block.out),
+            None => self.block.model.output(self.elapsed, &mut self.block.out),
         }
     }
 
@@ -269,11 +286,25 @@ impl<M: Twin> Snapshot<M> {
             (Causality::Parameter, _) => "in".contains(state),
             _ => exchanges && row && "vc".contains(state),
         };
-        match (may, range.contains(value)) {
+        // Habits of importers: a parameter is set to its own value when it is too late.
+        let stays = "vcs".contains(state) && (causality == Causality::Parameter || exact) && *x == value;
+        match (may || stays, range.contains(value)) {
             (true, true) => OK,
-            (true, false) if state == 'c' => DISCARD,
+            (true, false) if may && state == 'c' => DISCARD,
             _ if exchanges && state == 'c' && causality == Causality::Input => DISCARD,
             _ => ERROR,
+        }
+    }
+
+    /// The value is what the variable has, which cannot change now.
+    fn is_held(&mut self, index: usize, value: f64) -> bool {
+        let tunes = self.state != 'c';
+        match M::TABLE.entry(&mut self.block, index) {
+            Some((meta, Slot::Real(x))) if meta.causality == Causality::Parameter => {
+                !(meta.variability == Variability::Tunable && tunes) && *x == value
+            }
+            Some((meta, Slot::Real(x))) => meta.exact && !self.kind.exchanges() && *x == value,
+            _ => false,
         }
     }
 
@@ -294,6 +325,9 @@ impl<M: Twin> Snapshot<M> {
         }
         let rows = M::CAN.rows().unwrap();
         for (index, value) in places {
+            if "vcs".contains(self.state) && self.is_held(index, value) {
+                continue;
+            }
             self.fresh |= "in".contains(self.state);
             if let Some(i) = rows.iter().position(|row| *row == index) {
                 *M::CAN.states()[i].at(&mut self.block.model) = value;

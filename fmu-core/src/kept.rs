@@ -1,0 +1,131 @@
+//! What a model has counted at points of the solution, for an importer that goes back in time.
+
+use crate::Elapsed;
+use serde::{Deserialize, Serialize};
+
+/// Number of points after the last event that are kept. Stages of one step of a solver, and its retries, take fewer.
+const NEWEST: u8 = 8;
+
+/// What happens to the counts of a model with [`CompletedSteps`](crate::CompletedSteps).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Account {
+    /// They are those at an event: the importer goes back no further.
+    Event(Elapsed),
+    /// They are those at a completed step.
+    Step(Elapsed),
+    /// A step is completed at this time, again: what was counted up to it is taken back, and counted anew.
+    Again(Elapsed),
+    /// The importer goes back to this time: what was counted after it is taken back.
+    Back(Elapsed),
+}
+
+/// Copies of the counts `C`: at the last event and at the newest points after it.
+///
+/// ```
+/// use fmu_core::{Account, Elapsed, Kept};
+///
+/// let (mut kept, at) = (Kept::default(), |t| Elapsed::ZERO.plus(t));
+/// let mut area = 1.0;
+/// kept.follow(Account::Event(at(0.0)), &mut area);
+/// for (t, sum) in [(1.0, 3.0), (2.0, 7.0)] {
+///     area = sum;
+///     kept.follow(Account::Step(at(t)), &mut area);
+/// }
+/// kept.follow(Account::Back(at(1.5)), &mut area);
+/// assert_eq!(area, 3.0);
+/// kept.follow(Account::Back(at(0.5)), &mut area);
+/// assert_eq!(area, 1.0);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Kept<C> {
+    event: C,
+    /// A ring of points, from the oldest on at `first`.
+    newest: [(Elapsed, C); NEWEST as usize],
+    first: u8,
+    count: u8,
+}
+
+impl<C: Clone> Kept<C> {
+    /// Keeps a copy of the `counts`, or takes back what was counted after a time: they become those of the newest point until
+    /// then. If more points were completed since, and none of those that are kept is early enough, they become those of the event.
+    pub fn follow(&mut self, account: Account, counts: &mut C) {
+        match account {
+            Account::Event(_) => {
+                self.event.clone_from(counts);
+                self.count = 0;
+            }
+            Account::Step(now) => {
+                if self.count == NEWEST {
+                    self.first = (self.first + 1) % NEWEST;
+                    self.count -= 1;
+                }
+                self.count += 1;
+                let place = self.place(self.count - 1);
+                self.newest[place] = (now, counts.clone());
+            }
+            Account::Back(time) | Account::Again(time) => {
+                let again = matches!(account, Account::Again(_));
+                let falls = |left: f64| left < 0.0 || again && left <= 0.0;
+                while self.last().is_some_and(|(point, _)| falls(time.since(*point))) {
+                    self.count -= 1;
+                }
+                counts.clone_from(self.last().map_or(&self.event, |(_, counts)| counts));
+            }
+        }
+    }
+
+    fn last(&self) -> Option<&(Elapsed, C)> {
+        self.count.checked_sub(1).map(|i| &self.newest[self.place(i)])
+    }
+
+    fn place(&self, i: u8) -> usize {
+        usize::from((self.first + i) % NEWEST)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(t: u32) -> Elapsed {
+        Elapsed::ZERO.plus(f64::from(t))
+    }
+
+    #[test]
+    fn the_counts_are_those_of_the_newest_point_until_then() {
+        // A list that is searched, instead of a ring.
+        let (mut kept, mut event, mut list) = (Kept::default(), (0, 0), Vec::<(u32, u32)>::new());
+        let (mut now, mut seed, mut far) = (0, 7_u32, 0);
+        for i in 1..100_000 {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let n = seed >> 16;
+            match n % 8 {
+                0 => {
+                    now = event.0 + n / 8 % (now - event.0 + 1);
+                    list.retain(|(time, _)| *time <= now);
+                    far += u32::from(list.is_empty());
+                    let mut counts = 0;
+                    kept.follow(Account::Back(at(now)), &mut counts);
+                    assert_eq!(counts, list.last().unwrap_or(&event).1);
+                }
+                1 if n % 5 == 0 => {
+                    (event, list) = ((now, i), Vec::new());
+                    kept.follow(Account::Event(at(now)), &mut i.clone());
+                }
+                _ => {
+                    now += n / 8 % 3;
+                    if list.last().is_some_and(|(time, _)| *time == now) {
+                        list.pop();
+                        let mut counts = 0;
+                        kept.follow(Account::Again(at(now)), &mut counts);
+                        assert_eq!(counts, list.last().unwrap_or(&event).1);
+                    }
+                    list.push((now, i));
+                    list = list.split_off(list.len().saturating_sub(NEWEST.into()));
+                    kept.follow(Account::Step(at(now)), &mut i.clone());
+                }
+            }
+        }
+        assert!(far > 100, "it hardly ever goes back to the event");
+    }
+}

@@ -1,0 +1,56 @@
+//! Habits of importers that the standards forbid and that can do no harm: the call is taken, and a warning names the habit once
+//! for each instance. All else is as strict as the standards.
+//!
+//! The importers that have them are in `docs/import.md`, the orders of their calls in `tests/orders/`.
+
+use crate::instance::Instance;
+use fmu_core::Exported;
+use fmu_core::log::WARNING;
+
+/// A habit, the number of a bit of [`Instance::forgiven`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum Habit {
+    /// Variables that cannot change now are set, to the values that they have.
+    Fixed,
+    /// `SetContinuousStates` in Event Mode, and in Initialization Mode of FMI 2.0.
+    States,
+    /// `SetTime` to a time before the last completed step.
+    Back,
+    /// `fmi3SetTime` in Event Mode.
+    Time,
+    /// `fmi3EnterEventMode` in Event Mode.
+    Event,
+}
+
+impl Habit {
+    /// What the importer does, and what comes of it.
+    const fn tell(self) -> &'static str {
+        match self {
+            Self::Fixed => {
+                "the importer sets variables that cannot change now, such as fixed parameters after the initialization; their values are unchanged"
+            }
+            Self::States => {
+                "the importer sets the continuous states outside Continuous-Time Mode; they are taken as those of its integrator"
+            }
+            Self::Back => {
+                "the importer sets a time before the last completed step; what was counted after that time is taken back"
+            }
+            Self::Time => "the importer sets the time in Event Mode; the event is handled at that time",
+            Self::Event => "the importer enters Event Mode in Event Mode; the event is that of the time that it has set",
+        }
+    }
+}
+
+impl<E: Exported> Instance<E> {
+    /// Takes a call that the standard forbids, and says so if that was not heard before.
+    #[cold]
+    pub(crate) fn forgive(&mut self, habit: Habit) {
+        let bit = 1 << habit as u8;
+        if self.forgiven & bit == 0 && self.log.hears_model(&[]) {
+            self.forgiven |= bit;
+            let Self { name, current, .. } = &*self;
+            self.log.said(WARNING, &[], &format!("{name}: at {} s: {}", current.end, habit.tell()));
+        }
+    }
+}

@@ -1,0 +1,534 @@
+//! An importer in Model Exchange that calls in a given order: the method of Dormand and Prince, roots by bisection.
+
+use super::case::Case;
+use super::order::{Completes, Order, STRICT, Starts};
+use fmu_import::Status;
+use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, Simple, Vector, take_events};
+use model_description::{BaseType, Causality, FmiVersion, ModelDescription, Variability};
+use std::io::Read;
+use std::path::Path;
+
+/// A packed FMU, loaded.
+pub struct Loaded {
+    raw: Raw,
+    pub description: ModelDescription,
+    _folder: tempfile::TempDir,
+}
+
+impl Loaded {
+    pub fn new(path: &Path) -> Self {
+        let mut zip = zip::ZipArchive::new(std::fs::File::open(path).unwrap()).unwrap();
+        let description = fmu_import::contents(path).unwrap().0;
+        let folder = tempfile::tempdir().unwrap();
+        let of = if description.version == FmiVersion::V2 { "linux64" } else { "x86_64-linux" };
+        let name = &description.model_exchange.as_ref().unwrap().model_identifier;
+        let mut bytes = Vec::new();
+        zip.by_name(&format!("binaries/{of}/{name}.so")).unwrap().read_to_end(&mut bytes).unwrap();
+        let file = folder.path().join(format!("{name}.so"));
+        std::fs::write(&file, bytes).unwrap();
+        Self { raw: Raw::open(&file, description.version).unwrap(), description, _folder: folder }
+    }
+}
+
+/// An instance that is called; every call succeeds, or the test ends with what the FMU said.
+struct Instance<'a> {
+    fmu: &'a Loaded,
+    it: Handle,
+}
+
+impl<'a> Instance<'a> {
+    fn new(fmu: &'a Loaded, interface: Interface) -> Self {
+        let arguments = Arguments {
+            name: Some(c"it".into()),
+            token: Some(std::ffi::CString::new(fmu.description.token.as_str()).unwrap()),
+            resources: None,
+            interface,
+            logger: true,
+            callbacks: true,
+            memory: true,
+            lasting: true,
+            logging: true,
+            event_mode: false,
+            early_return: false,
+            environment: 0,
+            intermediate: None,
+            locks: false,
+        };
+        let it = fmu.raw.instantiate(&arguments).unwrap().expect("an instance");
+        Self { fmu, it }
+    }
+
+    fn version(&self) -> FmiVersion {
+        self.fmu.description.version
+    }
+
+    fn ok(&self, call: &str, status: Option<Status>) {
+        let status = status.unwrap_or_else(|| panic!("{call} is missing"));
+        if !status.is_ok() {
+            let said: Vec<_> = take_events().into_iter().filter_map(|e| e.text).collect();
+            panic!("{call} of {}: {status:?}\n{}", self.fmu.description.model_name, said.join("\n"));
+        }
+    }
+
+    fn simple(&self, name: Simple) {
+        self.ok(name.as_str(), self.fmu.raw.simple(name, self.it));
+    }
+
+    fn set(&self, base: BaseType, references: &[u32], bits: &[u64]) {
+        let mut values = Buffer::of(base, self.version(), bits);
+        let n = references.len();
+        self.ok("a setter", self.fmu.raw.set(self.it, base, Some(references), n, Some(&mut values), bits.len()));
+    }
+
+    fn get(&self, base: BaseType, references: &[u32]) -> Vec<u64> {
+        let (n, mut values) = (references.len(), Buffer::room(base, self.version(), references.len()));
+        self.ok("a getter", self.fmu.raw.get(self.it, base, Some(references), n, Some(&mut values), n));
+        values.bits()
+    }
+
+    fn reals(&self, references: &[u32]) -> Vec<f64> {
+        self.get(BaseType::Float64, references).into_iter().map(f64::from_bits).collect()
+    }
+
+    fn numbers(&self, recorded: &[(BaseType, u32)]) -> Vec<f64> {
+        let number = |&(base, reference): &(BaseType, u32)| match (base, self.get(base, &[reference])[0]) {
+            (BaseType::Float64, bits) => f64::from_bits(bits),
+            (_, bits) => f64::from(u32::try_from(bits).unwrap().cast_signed()),
+        };
+        recorded.iter().map(number).collect()
+    }
+
+    fn vector(&self, name: Vector, values: &mut [f64]) {
+        let n = values.len();
+        self.ok(name.as_str(), self.fmu.raw.vector(name, self.it, Some(values), n));
+    }
+
+    /// Every parameter to its start value, all of a type in one call.
+    fn set_starts(&self) {
+        let mut calls: Vec<(BaseType, Vec<u32>, Vec<u64>)> = Vec::new();
+        for v in &self.fmu.description.variables {
+            let bits: Option<Vec<u64>> = match (v.causality, &v.start) {
+                (Causality::Parameter, Some(start)) => start.split_whitespace().map(|x| bits(v.base, x)).collect(),
+                _ => None,
+            };
+            // Texts are set one by one elsewhere, and no parameter of these FMUs is one.
+            let Some(bits) = bits else { continue };
+            match calls.iter_mut().find(|call| call.0 == v.base) {
+                Some(call) => {
+                    call.1.push(v.value_reference);
+                    call.2.extend(bits);
+                }
+                None => calls.push((v.base, vec![v.value_reference], bits)),
+            }
+        }
+        for (base, references, bits) in calls {
+            self.set(base, &references, &bits);
+        }
+    }
+}
+
+impl Drop for Instance<'_> {
+    fn drop(&mut self) {
+        self.fmu.raw.free(self.it);
+    }
+}
+
+/// The bits of a start value; none for texts and bytes.
+fn bits(base: BaseType, text: &str) -> Option<u64> {
+    match base {
+        BaseType::Float64 => text.parse().ok().map(f64::to_bits),
+        BaseType::Float32 => text.parse().ok().map(|x: f32| x.to_bits().into()),
+        BaseType::Boolean => Some(u64::from(text == "true" || text == "1")),
+        BaseType::String | BaseType::Binary | BaseType::Clock => None,
+        _ => text.parse::<i64>().ok().map(i64::cast_unsigned),
+    }
+}
+
+/// What a run gives: the case's outputs at its points, one row each, and the warnings.
+pub struct Run {
+    pub rows: Vec<Vec<f64>>,
+    pub warnings: Vec<String>,
+    pub rejected: usize,
+}
+
+/// Relative tolerance of a step; the absolute one is this times the nominal value of each state.
+const TOLERANCE: f64 = 1e-9;
+
+struct Importer<'a> {
+    it: Instance<'a>,
+    case: &'a Case,
+    order: Order,
+    /// Decides on habits one by one, in a random order.
+    draw: &'a mut dyn FnMut() -> bool,
+    reals: Vec<u32>,
+    booleans: Vec<u32>,
+    outputs: Vec<u32>,
+    others: Vec<(BaseType, Vec<u32>)>,
+    recorded: Vec<(BaseType, u32)>,
+    nominal: Vec<f64>,
+    indicators: usize,
+    continuous: bool,
+    /// Time of the initialization, at which FMI 3.0 has no SetTime yet.
+    initial: bool,
+    next: Option<f64>,
+    rejected: usize,
+}
+
+/// Runs the case in this order; `draw` says for every call that the standard forbids whether it is made, and a constant `true`
+/// makes them all.
+pub fn run(fmu: &Loaded, case: &Case, order: Order, draw: &mut dyn FnMut() -> bool) -> Run {
+    take_events();
+    let it = Instance::new(fmu, Interface::ModelExchange);
+    let d = &fmu.description;
+    let find = |name: &str| d.variables.iter().find(|v| v.name == name).unwrap_or_else(|| panic!("no {name}")).value_reference;
+    let of = |causality, base| -> Vec<u32> {
+        let fits = |v: &&model_description::ModelVariable| v.causality == causality && v.base == base && v.dimensions.is_empty();
+        d.variables.iter().filter(fits).map(|v| v.value_reference).collect()
+    };
+    let names = |base: BaseType| case.inputs.iter().filter(move |i| i.boolean == (base == BaseType::Boolean)).map(|i| i.name);
+    let (nx, nz) = sizes(d);
+    let mut importer = Importer {
+        reals: names(BaseType::Float64).map(find).collect(),
+        booleans: names(BaseType::Boolean).map(find).collect(),
+        outputs: of(Causality::Output, BaseType::Float64),
+        others: [BaseType::Int32, BaseType::Boolean].map(|base| (base, of(Causality::Output, base))).into(),
+        recorded: recorded(d, case),
+        nominal: vec![1.0; nx],
+        indicators: nz,
+        continuous: false,
+        initial: true,
+        next: None,
+        rejected: 0,
+        it,
+        case,
+        order,
+        draw,
+    };
+    let rows = importer.simulate();
+    let rejected = importer.rejected;
+    importer.it.simple(Simple::Terminate);
+    drop(importer);
+    let warnings = take_events().into_iter().filter(|e| e.status == 1).filter_map(|e| e.text).collect();
+    Run { rows, warnings, rejected }
+}
+
+fn recorded(d: &ModelDescription, case: &Case) -> Vec<(BaseType, u32)> {
+    let found = |name: &&str| d.variables.iter().find(|v| v.name == *name).map(|v| (v.base, v.value_reference)).unwrap();
+    case.outputs.iter().map(found).collect()
+}
+
+/// Numbers of states and of event indicators.
+fn sizes(d: &ModelDescription) -> (usize, usize) {
+    let states = d.variables.iter().filter(|v| v.derivative.is_some()).count();
+    (states, d.number_of_event_indicators.map_or(d.event_indicators.len(), |n| n as usize))
+}
+
+impl Importer<'_> {
+    /// Whether a habit of this order shows now.
+    fn does(&mut self, habit: bool) -> bool {
+        habit && (self.draw)()
+    }
+
+    fn simulate(&mut self) -> Vec<Vec<f64>> {
+        let (raw, it) = (&self.it.fmu.raw, self.it.it);
+        let stop = self.case.stop();
+        self.it.ok("the experiment", raw.experiment(it, None, 0.0, Some(stop)));
+        if self.it.version() == FmiVersion::V2 {
+            self.it.simple(Simple::EnterInitializationMode);
+        }
+        if self.order.starts == Starts::Before {
+            self.it.set_starts();
+        }
+        self.set_inputs(0.0, true);
+        self.it.simple(Simple::ExitInitializationMode);
+        if self.order.starts == Starts::After && (self.draw)() {
+            self.it.set_starts();
+        }
+        let mut x = vec![0.0; self.nominal.len()];
+        if !x.is_empty() {
+            self.it.vector(Vector::GetContinuousStates, &mut x);
+            let mut nominal = std::mem::take(&mut self.nominal);
+            self.it.vector(Vector::GetNominalsOfContinuousStates, &mut nominal);
+            self.nominal = nominal;
+        }
+        if self.order.settles {
+            self.update(&mut x, 0.0);
+        } else {
+            // The first event is a root just after the start; the FMU is in Event Mode until then.
+            self.initial = false;
+            for t in [0.0, 1e-6, 5e-7, 2e-9] {
+                self.evaluate(t, &x);
+            }
+            self.event(1e-10, &mut x);
+        }
+        self.initial = false;
+        let mut rows = Vec::new();
+        let (mut t, mut h, mut k) = (if self.order.settles { 0.0 } else { 1e-10 }, 1e-6, 1);
+        let jumps = self.case.jumps();
+        while k <= self.case.points {
+            let grid = self.case.point(k);
+            let jump = jumps.iter().copied().find(|jump| *jump > t);
+            let mut limit = jump.map_or(grid, |jump| jump.min(grid));
+            if self.order.late == 0.0 {
+                limit = self.next.map_or(limit, |next| next.min(limit));
+            }
+            let (end, hit) = if t + 1.01 * h >= limit { (limit, true) } else { (t + h, false) };
+            let Some((x1, grow)) = self.step(t, &x, end) else {
+                (h, self.rejected) = ((end - t) * 0.3, self.rejected + 1);
+                if self.order.returns {
+                    self.evaluate(t, &x);
+                }
+                continue;
+            };
+            let event = self.locate(t, &x, end, &x1);
+            let (reached, found) = event.map_or((end, false), |at| (at, true));
+            if found {
+                let (at, _) = self.step(t, &x, reached).unwrap_or((x1, 1.0));
+                x = at;
+            } else {
+                x = x1;
+            }
+            if !hit {
+                h = (end - t) * grow;
+            } else if grow < 1.0 {
+                h = (end - t) * grow;
+            }
+            t = reached;
+            self.place(t, &x);
+            if self.order.completes != Completes::Never && self.continuous {
+                self.complete();
+            }
+            let due = self.order.late == 0.0 && self.next.is_some_and(|next| t >= next);
+            if found || due || jump.is_some_and(|jump| t >= jump) {
+                self.event(t, &mut x);
+                h = h.min(1e-5);
+            } else if t >= grid {
+                self.place(t, &x);
+                rows.push(self.it.numbers(&self.recorded));
+                k += 1;
+            }
+        }
+        rows
+    }
+
+    /// Inputs at a time: all, or those that a solver sets.
+    fn set_inputs(&mut self, t: f64, discrete: bool) {
+        let (mut references, mut values) = (Vec::new(), Vec::new());
+        let reals = self.case.inputs.iter().filter(|i| !i.boolean).zip(&self.reals);
+        for (input, reference) in reals.filter(|(input, _)| discrete || !input.discrete) {
+            references.push(*reference);
+            values.push(input.at(t).to_bits());
+        }
+        if !references.is_empty() {
+            self.it.set(BaseType::Float64, &references, &values);
+        }
+        if discrete && !self.booleans.is_empty() {
+            let values: Vec<u64> = self.case.inputs.iter().filter(|i| i.boolean).map(|i| u64::from(i.at(t) != 0.0)).collect();
+            self.it.set(BaseType::Boolean, &self.booleans, &values);
+        }
+    }
+
+    /// Time, inputs and states of a point.
+    fn place(&mut self, t: f64, x: &[f64]) {
+        if self.continuous || !self.initial {
+            self.it.ok("SetTime", self.it.fmu.raw.set_time(self.it.it, t));
+        }
+        let discrete = !self.continuous && self.order.discrete_inputs;
+        self.set_inputs(t, discrete);
+        if !x.is_empty() && (self.continuous || self.does(self.order.states_in_event)) {
+            self.it.vector(Vector::SetContinuousStates, &mut x.to_vec());
+        }
+    }
+
+    fn complete(&self) {
+        let (status, flags) = self.it.fmu.raw.completed_integrator_step(self.it.it, true, false).expect("the function");
+        self.it.ok("CompletedIntegratorStep", Some(status));
+        assert_eq!(flags, [0, 0]);
+    }
+
+    /// Derivatives and indicators at a point.
+    fn evaluate(&mut self, t: f64, x: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let mut found = (vec![0.0; x.len()], vec![0.0; self.indicators]);
+        for _ in 0..self.order.repeats {
+            self.place(t, x);
+            if !x.is_empty() && (self.continuous || self.order.derivatives_in_event) {
+                let v2 = self.it.version() == FmiVersion::V2;
+                let name = if v2 { Vector::GetDerivatives } else { Vector::GetContinuousStateDerivatives };
+                self.it.vector(name, &mut found.0);
+            }
+            if self.indicators > 0 {
+                self.it.vector(Vector::GetEventIndicators, &mut found.1);
+            }
+            if self.order.repeats > 1 {
+                self.it.reals(&self.outputs);
+                for (base, references) in self.others.iter().filter(|(_, references)| !references.is_empty()) {
+                    self.it.get(*base, references);
+                }
+            }
+            if self.continuous && self.does(self.order.completes == Completes::Evaluations) {
+                self.complete();
+            }
+        }
+        found
+    }
+
+    /// A step of the method of Dormand and Prince, and how much longer the next may be; `None`: rejected.
+    fn step(&mut self, t: f64, x: &[f64], end: f64) -> Option<(Vec<f64>, f64)> {
+        const C: [f64; 7] = [0.0, 0.2, 0.3, 0.8, 8.0 / 9.0, 1.0, 1.0];
+        const A: [&[f64]; 7] = [
+            &[],
+            &[0.2],
+            &[3.0 / 40.0, 9.0 / 40.0],
+            &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0],
+            &[19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0],
+            &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
+            &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
+        ];
+        const E: [f64; 7] = [
+            71.0 / 57600.0,
+            0.0,
+            -71.0 / 16695.0,
+            71.0 / 1920.0,
+            -17253.0 / 339_200.0,
+            22.0 / 525.0,
+            -1.0 / 40.0,
+        ];
+        if x.is_empty() {
+            self.evaluate(end, x);
+            return Some((Vec::new(), 5.0));
+        }
+        let h = end - t;
+        let mut k: Vec<Vec<f64>> = Vec::new();
+        let mut y = x.to_vec();
+        for (c, a) in C.iter().zip(A) {
+            for (i, y) in y.iter_mut().enumerate() {
+                *y = x[i] + h * a.iter().zip(&k).map(|(a, k)| a * k[i]).sum::<f64>();
+            }
+            let at = if *c == 1.0 { end } else { t + c * h };
+            k.push(self.evaluate(at, &y).0);
+        }
+        let scaled = |i: usize| {
+            let error: f64 = h * E.iter().zip(&k).map(|(e, k)| e * k[i]).sum::<f64>();
+            error / (TOLERANCE * x[i].abs().max(y[i].abs()).max(self.nominal[i]))
+        };
+        let error = (0..x.len()).map(scaled).fold(0.0, |a: f64, b| a.max(b.abs()));
+        let factor = (0.9 * error.powf(-0.2)).clamp(0.2, 5.0);
+        if error <= 1.0 || h < 1e-11 { Some((y, factor)) } else { None }
+    }
+
+    /// The first instant after which an indicator has changed its sign or a time event has passed, if there is one.
+    fn locate(&mut self, t: f64, x: &[f64], end: f64, x1: &[f64]) -> Option<f64> {
+        let late = self.order.late;
+        let next = self.next.filter(|next| late > 0.0 && *next > t);
+        if next.is_none_or(|next| next >= end) && self.indicators == 0 {
+            return None;
+        }
+        let (d0, z0) = self.evaluate(t, x);
+        let (d1, z1) = self.evaluate(end, x1);
+        let passed = |at: f64, z: &[f64]| {
+            next.is_some_and(|next| next < at) || z0.iter().zip(z).any(|(a, b)| (*a > 0.0) != (*b > 0.0))
+        };
+        if !passed(end, &z1) {
+            return None;
+        }
+        let (mut low, mut high, width) = (t, end, late.max(1e-10));
+        while high - low > width {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            let (h, s) = (end - t, (middle - t) / (end - t));
+            let (s2, s3) = (s * s, s * s * s);
+            let between = |i: usize| {
+                (2.0 * s3 - 3.0 * s2 + 1.0) * x[i] + (s3 - 2.0 * s2 + s) * h * d0[i] + (3.0 * s2 - 2.0 * s3) * x1[i]
+                    + (s3 - s2) * h * d1[i]
+            };
+            let x: Vec<f64> = (0..x.len()).map(between).collect();
+            let (_, z) = self.evaluate(middle, &x);
+            if passed(middle, &z) { high = middle } else { low = middle }
+        }
+        Some(high)
+    }
+
+    fn event(&mut self, t: f64, x: &mut Vec<f64>) {
+        self.place(t, x);
+        self.it.simple(Simple::EnterEventMode);
+        self.continuous = false;
+        self.update(x, t);
+    }
+
+    /// From Event Mode to Continuous-Time Mode.
+    fn update(&mut self, x: &mut Vec<f64>, t: f64) {
+        self.set_inputs(t, true);
+        if !x.is_empty() && self.does(self.order.states_in_event) {
+            self.it.vector(Vector::SetContinuousStates, x);
+        }
+        loop {
+            let (status, update) = self.it.fmu.raw.update_discrete_states(self.it.it, false).expect("the function");
+            self.it.ok("the update of discrete states", Some(status));
+            assert_eq!(update.terminate, 0);
+            let known = self.order.blind || update.next_event_time_defined == 1;
+            self.next = known.then_some(update.next_event_time).filter(|next| *next > t);
+            if update.again == 0 || !self.order.iterates {
+                break;
+            }
+        }
+        if !x.is_empty() {
+            self.it.vector(Vector::GetContinuousStates, x);
+        }
+        self.it.simple(Simple::EnterContinuousTimeMode);
+        self.continuous = true;
+    }
+}
+
+/// A run in the order that the standards have.
+pub fn strict(fmu: &Loaded, case: &Case) -> Run {
+    run(fmu, case, STRICT, &mut || true)
+}
+
+/// Co-Simulation as Simulink and Modelica-FMI call: parameters before the initialization, inputs that hold over a step, outputs
+/// after it.
+pub fn stepped(fmu: &Loaded, case: &Case, (delayed, starts): (bool, bool)) -> Run {
+    take_events();
+    let it = Instance::new(fmu, Interface::CoSimulation);
+    let d = &fmu.description;
+    let find = |name: &str| d.variables.iter().find(|v| v.name == name).unwrap_or_else(|| panic!("no {name}")).value_reference;
+    let v2 = it.version() == FmiVersion::V2;
+    if starts {
+        it.set_starts();
+    }
+    it.ok("the experiment", fmu.raw.experiment(it.it, None, 0.0, Some(case.stop() + 1.0)));
+    if v2 {
+        it.simple(Simple::EnterInitializationMode);
+    }
+    it.simple(Simple::ExitInitializationMode);
+    if starts {
+        // Set again with the inputs at the first step, as gemseo-fmu does.
+        it.set_starts();
+    }
+    let recorded = recorded(d, case);
+    let mut rows = Vec::new();
+    for k in 1..=case.points {
+        let (t, end) = (case.point(k - 1), case.point(k));
+        let at = if delayed { case.point((k - 1).saturating_sub(1)) } else { t };
+        for input in case.inputs {
+            let base = if input.boolean { BaseType::Boolean } else { BaseType::Float64 };
+            let x = input.at(at);
+            it.set(base, &[find(input.name)], &[if input.boolean { u64::from(x != 0.0) } else { x.to_bits() }]);
+        }
+        let (status, _) = fmu.raw.do_step(it.it, t, end - t, true, [true; 4]).expect("the function");
+        it.ok("DoStep", Some(status));
+        rows.push(it.numbers(&recorded));
+    }
+    drop(it);
+    let warnings = take_events().into_iter().filter(|e| e.status == 1).filter_map(|e| e.text).collect();
+    Run { rows, warnings, rejected: 0 }
+}
+
+/// Whether a parameter of a type that FMI 2.0 passes as an Integer is tunable: importers that pass enumerations unconverted stop there.
+pub fn tunable_enumerations(d: &ModelDescription) -> Vec<&str> {
+    let fits = |v: &&model_description::ModelVariable| {
+        v.causality == Causality::Parameter && v.variability == Variability::Tunable && v.base == BaseType::Enumeration
+    };
+    d.variables.iter().filter(fits).map(|v| v.name.as_str()).collect()
+}

@@ -1,0 +1,201 @@
+//! Importers call in orders that the standards forbid: what the packed FMUs then give, against the order of the standards in our own
+//! importer, which FMPy confirms (`cargo test --test fmpy`). No importer runs here: the orders are replayed from `order.rs`.
+//!
+//! `cargo test --release --test orders random -- --ignored --nocapture` makes a million calls in random orders; `FMU_CALLS` and
+//! `FMU_SEED` select others.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+#![allow(missing_docs)]
+
+mod case;
+#[path = "../common/mod.rs"]
+mod common;
+mod importer;
+mod order;
+mod packed;
+
+use case::{Case, OURS, REFERENCE};
+use fmu_import::cosimulation::Method;
+use importer::{Loaded, run, stepped, strict};
+use order::{Completes, ORDERS, Order, STRICT, Starts};
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+/// The log of the FMUs is that of the process.
+static ONE: Mutex<()> = Mutex::new(());
+
+fn ours(case: &Case, standard: usize) -> PathBuf {
+    common::archives().join(["fmi2", "fmi3"][standard]).join(format!("{}.fmu", case.fmu))
+}
+
+/// Every order on a case: the largest deviation from our importer; the table's lines.
+fn replay(case: &Case, file: impl Fn(usize) -> PathBuf) -> String {
+    let mut lines = String::new();
+    for standard in 0..2 {
+        let (file, name) = (file(standard), ["FMI 2.0", "FMI 3.0"][standard]);
+        let (fmu, reference) = (Loaded::new(&file), case.reference(&file));
+        for order in ORDERS.iter().filter(|order| order.standards[standard]) {
+            let made = run(&fmu, case, *order, &mut || true);
+            let (deviation, output) = case.deviation(&made.rows, &reference);
+            let line = format!("{:52} {:20} {name} {deviation:9.1e} {output}\n", order.name, case.fmu);
+            print!("{line}");
+            assert!(deviation <= case.tolerance, "{line}");
+            let told: Vec<_> = made.warnings.iter().filter(|text| text.contains("the importer")).collect();
+            let lawful = order.completes != Completes::Evaluations && order.starts != Starts::After && !order.states_in_event;
+            assert!(!lawful || told.is_empty(), "{line}{told:?}");
+            assert!(order.late == 0.0 || !told.is_empty(), "{line}");
+            assert!((1..told.len()).all(|i| !told[..i].iter().any(|one| habit(one) == habit(told[i]))), "{told:?}");
+            lines += &line;
+        }
+    }
+    lines
+}
+
+/// What a warning is about, without the time.
+fn habit(text: &str) -> &str {
+    text.split_once("the importer").map_or(text, |(_, habit)| habit)
+}
+
+#[test]
+fn the_drive_in_every_order() {
+    let _one = ONE.lock();
+    for case in OURS {
+        replay(case, |standard| ours(case, standard));
+    }
+}
+
+#[test]
+fn the_reference_fmus_in_every_order() {
+    let _one = ONE.lock();
+    for case in REFERENCE {
+        replay(case, |standard| packed::archive(case.fmu, standard));
+    }
+}
+
+/// In the order of the standards, nothing is warned of, and inputs that a tool feeds 0 are named.
+#[test]
+fn inputs_at_zero_are_named_once() {
+    let _one = ONE.lock();
+    const ZERO: &[(f64, f64)] = &[(0.0, 0.0)];
+    for (fmu, expected) in [
+        ("PmsmPlant", "u_dc = 0 (start value 325), enable = false (start value true)"),
+        ("PmsmDrive", "enable = false (start value true), sensor_valid = false (start value true), u_dc = 0 (start value 325)"),
+        ("PmsmDriveMean", "enable = false (start value true), sensor_valid = false (start value true), u_dc = 0 (start value 325)"),
+        ("SensorlessController", "enable = false (start value true), u_dc = 0 (start value 325), sensor_valid = false (start value true)"),
+    ] {
+        let mut inputs = vec![case::steps("u_dc", ZERO), case::boolean("enable", ZERO)];
+        if fmu != "PmsmPlant" {
+            inputs.push(case::boolean("sensor_valid", ZERO));
+        }
+        let case = Case { fmu, inputs: inputs.leak(), outputs: &[], apart: 1e-4, points: 2, tolerance: 0.0 };
+        for standard in 0..2 {
+            let fmu = Loaded::new(&ours(&case, standard));
+            for made in [strict(&fmu, &case), stepped(&fmu, &case, (false, false))] {
+                let told: Vec<_> = made.warnings.iter().filter(|text| text.contains("the run begins with")).collect();
+                assert!(told.len() == 1 && told[0].contains(expected), "{:?}", made.warnings);
+            }
+            let fed = Case { inputs: &[], ..case };
+            assert!(strict(&fmu, &fed).warnings.iter().all(|text| !text.contains("the run begins with")));
+        }
+    }
+}
+
+/// In Co-Simulation, inputs hold over a step, and Modelica-FMI passes them on a step later; parameters are set before the
+/// initialization and, by some, after it. The bits are those of our importer.
+#[test]
+fn the_orders_of_co_simulation() {
+    let _one = ONE.lock();
+    for case in OURS {
+        let case = Case { apart: 1e-4, points: 300, ..*case };
+        for standard in 0..2 {
+            let file = ours(&case, standard);
+            let fmu = Loaded::new(&file);
+            let reference = case.recorded(&file, Method::default());
+            let plain = stepped(&fmu, &case, (false, false));
+            assert_eq!(plain.rows, reference, "{}", case.fmu);
+            assert!(plain.warnings.iter().all(|text| !text.contains("the importer")), "{:?}", plain.warnings);
+            let set = stepped(&fmu, &case, (false, true));
+            assert_eq!(set.rows, reference, "{}: parameters set to what they are", case.fmu);
+            let told = set.warnings.iter().filter(|text| text.contains("their values are unchanged")).count();
+            assert_eq!(told, 1, "{:?}", set.warnings);
+            let later = stepped(&fmu, &case, (true, false)).rows;
+            let apart = case.deviation(&later, &reference);
+            println!("Modelica-FMI, inputs a step later: {:20} {:9.1e} {}", case.fmu, apart.0, apart.1);
+        }
+    }
+}
+
+/// Modelica-FMI passes enumerations of FMI 2.0 unconverted where they are tunable: its code then does not compile.
+#[test]
+fn no_enumeration_is_tunable() {
+    for case in OURS {
+        for standard in 0..2 {
+            let fmu = Loaded::new(&ours(case, standard));
+            assert_eq!(importer::tunable_enumerations(&fmu.description), [""; 0], "{}", case.fmu);
+        }
+    }
+}
+
+/// Random orders: each habit, and each single call of it, by chance.
+fn random(calls: u64) {
+    let mut seed = std::env::var("FMU_SEED").map_or(1, |text| text.parse::<u64>().expect("a whole number"));
+    let mut next = move || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        seed >> 33
+    };
+    let short: Vec<Case> = OURS.iter().map(|case| Case { points: case.points / 4, ..*case }).collect();
+    let all: Vec<_> = (0..short.len()).flat_map(|i| [(i, 0), (i, 1)]).collect();
+    let loaded: Vec<_> = all
+        .iter()
+        .map(|&(i, standard)| {
+            let file = ours(&short[i], standard);
+            (Loaded::new(&file), short[i].reference(&file))
+        })
+        .collect();
+    let (mut made, mut runs, mut worst) = (0, 0, vec![0.0_f64; all.len()]);
+    while made < calls {
+        let which = usize::try_from(next()).unwrap() % all.len();
+        let ((i, standard), (fmu, reference)) = (all[which], &loaded[which]);
+        let mut flip = |n: u64| next() % n == 0;
+        let order = Order {
+            name: "random",
+            standards: [standard == 0, standard == 1],
+            starts: [Starts::Never, Starts::Before, Starts::After][usize::from(flip(2)) + usize::from(flip(2))],
+            settles: flip(2),
+            iterates: flip(2),
+            completes: if flip(3) { Completes::Steps } else { Completes::Evaluations },
+            states_in_event: flip(2),
+            derivatives_in_event: flip(2),
+            discrete_inputs: flip(2),
+            late: [0.0, 1e-10, 1e-9][usize::from(flip(2)) + usize::from(flip(2))],
+            blind: flip(2),
+            repeats: 1 + u8::from(flip(2)),
+            returns: flip(2),
+            ..STRICT
+        };
+        let (case, rarity) = (&short[i], 1 + next() % 4);
+        let outcome = run(fmu, case, order, &mut || {
+            made += 1;
+            next() % rarity == 0
+        });
+        let (deviation, output) = case.deviation(&outcome.rows, reference);
+        assert!(deviation <= case.tolerance, "{deviation} of {output} in {}: {order:?}, one in {rarity}", case.fmu);
+        (runs, worst[which]) = (runs + 1, worst[which].max(deviation));
+    }
+    for (&(i, standard), worst) in all.iter().zip(worst) {
+        println!("{:22} {} {worst:9.1e}", short[i].fmu, ["FMI 2.0", "FMI 3.0"][standard]);
+    }
+    println!("{made} calls that the standards forbid, or not made, in {runs} runs");
+}
+
+#[test]
+fn some_random_orders() {
+    let _one = ONE.lock();
+    random(20_000);
+}
+
+#[test]
+#[ignore = "minutes: see CONTRIBUTING.md"]
+fn random_orders() {
+    let _one = ONE.lock();
+    random(std::env::var("FMU_CALLS").map_or(1_000_000, |text| text.parse().expect("a whole number")));
+}
