@@ -55,12 +55,12 @@ impl<C: Clone> Kept<C> {
                 self.count = 0;
             }
             Account::Step(now) => {
-                if self.count == NEWEST {
-                    self.first = (self.first + 1) % NEWEST;
-                    self.count -= 1;
+                // Stored bytes may hold any numbers.
+                if self.count >= NEWEST {
+                    (self.first, self.count) = ((self.first % NEWEST + 1) % NEWEST, NEWEST - 1);
                 }
+                let place = self.place(self.count);
                 self.count += 1;
-                let place = self.place(self.count - 1);
                 self.newest[place] = (now, counts.clone());
             }
             Account::Back(time) | Account::Again(time) => {
@@ -79,7 +79,7 @@ impl<C: Clone> Kept<C> {
     }
 
     fn place(&self, i: u8) -> usize {
-        usize::from((self.first + i) % NEWEST)
+        (usize::from(self.first) + usize::from(i)) % usize::from(NEWEST)
     }
 }
 

@@ -37,7 +37,9 @@ impl Habit {
                 "the importer sets a time before the last completed step; what was counted after that time is taken back"
             }
             Self::Time => "the importer sets the time in Event Mode; the event is handled at that time",
-            Self::Event => "the importer enters Event Mode in Event Mode; the event is that of the time that it has set",
+            Self::Event => {
+                "the importer enters Event Mode in Event Mode; the event is that of the time that it has set"
+            }
         }
     }
 }

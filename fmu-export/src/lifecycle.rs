@@ -352,9 +352,7 @@ impl Call {
             }
             Self::Status => stepping(each(&[Step, Ended, Terminated], &[]), Stay),
             // An FMU of FMI 2.0 without states may never leave Event Mode (FMI 2.0.5, 3.2.3). FMI 3.0: `Habit::Event`.
-            Self::EnterEvent => {
-                Row { event: States::of(&[Step]), ..exchange(both(&[Event, Continuous]), To(Event)) }
-            }
+            Self::EnterEvent => Row { event: States::of(&[Step]), ..exchange(both(&[Event, Continuous]), To(Event)) },
             Self::UpdateDiscrete => Row { event: States::of(&[Event]), ..exchange(both(&[Event]), Stay) },
             Self::EvaluateDiscrete => Row { event: States::of(&[Event]), ..exchange(each(&[], &[Event]), Stay) },
             Self::EnterContinuous => exchange(both(&[Event]), To(Continuous)),

@@ -111,9 +111,8 @@ impl<M: Model> Clone for Snapshot<M> {
 
     /// Reuses what `self` holds: for a plain model, and one with a `clone_from` of its own, nothing is allocated.
     fn clone_from(&mut self, source: &Self) {
-        let Self {
-            life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks, block
-        } = source;
+        let Self { life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks, block } =
+            source;
         (self.life, self.experiment, self.elapsed) = (*life, *experiment, *elapsed);
         (self.end, self.settled, self.completed, self.stated) = (*end, *settled, *completed, *stated);
         (self.pending, self.dirty) = (*pending, *dirty);

@@ -6,8 +6,8 @@ mod solver;
 
 use fmu_core::unit::{Exponents, Quantity, SECOND, Unit};
 use fmu_core::{
-    Account, Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Kept, Model, Next, Outcome, Row, State,
-    Step, Table, integrate, table,
+    Account, Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Kept, Model, Next,
+    Outcome, Row, State, Step, Table, integrate, table,
 };
 use serde::{Deserialize, Serialize};
 use solver::{CS, ERROR, Fmu, ME, OK, has_logger};

@@ -64,7 +64,8 @@ impl Case {
 
     /// Times at which an input jumps or bends.
     pub fn jumps(&self) -> Vec<f64> {
-        let mut all: Vec<f64> = self.inputs.iter().flat_map(|i| i.points.iter().map(|(t, _)| *t)).filter(|t| *t > 0.0).collect();
+        let mut all: Vec<f64> =
+            self.inputs.iter().flat_map(|i| i.points.iter().map(|(t, _)| *t)).filter(|t| *t > 0.0).collect();
         all.sort_by(f64::total_cmp);
         all.dedup();
         all
@@ -72,7 +73,10 @@ impl Case {
 
     /// Our importer, in the order of the standards, at a tighter tolerance.
     pub fn reference(&self, file: &Path) -> Vec<Vec<f64>> {
-        self.recorded(file, Method::ModelExchange(Integration { solver: Solver::Dopri { rtol: 1e-11 }, ..Integration::default() }))
+        self.recorded(
+            file,
+            Method::ModelExchange(Integration { solver: Solver::Dopri { rtol: 1e-11 }, ..Integration::default() }),
+        )
     }
 
     /// Our importer with a method.
@@ -99,7 +103,11 @@ impl Case {
             let scale = reference.iter().map(|row| row[i].abs()).fold(1e-9, f64::max);
             rows.iter().zip(reference).map(|(a, b)| (a[i] - b[i]).abs() / scale).fold(0.0, f64::max)
         };
-        self.outputs.iter().enumerate().map(|(i, name)| (of(i), *name)).fold((0.0, "-"), |a, b| if b.0 >= a.0 { b } else { a })
+        self.outputs
+            .iter()
+            .enumerate()
+            .map(|(i, name)| (of(i), *name))
+            .fold((0.0, "-"), |a, b| if b.0 >= a.0 { b } else { a })
     }
 }
 

@@ -180,12 +180,16 @@ pub fn run(fmu: &Loaded, case: &Case, order: Order, draw: &mut dyn FnMut() -> bo
     take_events();
     let it = Instance::new(fmu, Interface::ModelExchange);
     let d = &fmu.description;
-    let find = |name: &str| d.variables.iter().find(|v| v.name == name).unwrap_or_else(|| panic!("no {name}")).value_reference;
+    let find =
+        |name: &str| d.variables.iter().find(|v| v.name == name).unwrap_or_else(|| panic!("no {name}")).value_reference;
     let of = |causality, base| -> Vec<u32> {
-        let fits = |v: &&model_description::ModelVariable| v.causality == causality && v.base == base && v.dimensions.is_empty();
+        let fits = |v: &&model_description::ModelVariable| {
+            v.causality == causality && v.base == base && v.dimensions.is_empty()
+        };
         d.variables.iter().filter(fits).map(|v| v.value_reference).collect()
     };
-    let names = |base: BaseType| case.inputs.iter().filter(move |i| i.boolean == (base == BaseType::Boolean)).map(|i| i.name);
+    let names =
+        |base: BaseType| case.inputs.iter().filter(move |i| i.boolean == (base == BaseType::Boolean)).map(|i| i.name);
     let (nx, nz) = sizes(d);
     let mut importer = Importer {
         reals: names(BaseType::Float64).map(find).collect(),
@@ -213,7 +217,8 @@ pub fn run(fmu: &Loaded, case: &Case, order: Order, draw: &mut dyn FnMut() -> bo
 }
 
 fn recorded(d: &ModelDescription, case: &Case) -> Vec<(BaseType, u32)> {
-    let found = |name: &&str| d.variables.iter().find(|v| v.name == *name).map(|v| (v.base, v.value_reference)).unwrap();
+    let found =
+        |name: &&str| d.variables.iter().find(|v| v.name == *name).map(|v| (v.base, v.value_reference)).unwrap();
     case.outputs.iter().map(found).collect()
 }
 
@@ -323,7 +328,8 @@ impl Importer<'_> {
             self.it.set(BaseType::Float64, &references, &values);
         }
         if discrete && !self.booleans.is_empty() {
-            let values: Vec<u64> = self.case.inputs.iter().filter(|i| i.boolean).map(|i| u64::from(i.at(t) != 0.0)).collect();
+            let values: Vec<u64> =
+                self.case.inputs.iter().filter(|i| i.boolean).map(|i| u64::from(i.at(t) != 0.0)).collect();
             self.it.set(BaseType::Boolean, &self.booleans, &values);
         }
     }
@@ -384,15 +390,8 @@ impl Importer<'_> {
             &[9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0],
             &[35.0 / 384.0, 0.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0],
         ];
-        const E: [f64; 7] = [
-            71.0 / 57600.0,
-            0.0,
-            -71.0 / 16695.0,
-            71.0 / 1920.0,
-            -17253.0 / 339_200.0,
-            22.0 / 525.0,
-            -1.0 / 40.0,
-        ];
+        const E: [f64; 7] =
+            [71.0 / 57600.0, 0.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339_200.0, 22.0 / 525.0, -1.0 / 40.0];
         if x.is_empty() {
             self.evaluate(end, x);
             return Some((Vec::new(), 5.0));
@@ -440,7 +439,9 @@ impl Importer<'_> {
             let (h, s) = (end - t, (middle - t) / (end - t));
             let (s2, s3) = (s * s, s * s * s);
             let between = |i: usize| {
-                (2.0 * s3 - 3.0 * s2 + 1.0) * x[i] + (s3 - 2.0 * s2 + s) * h * d0[i] + (3.0 * s2 - 2.0 * s3) * x1[i]
+                (2.0 * s3 - 3.0 * s2 + 1.0) * x[i]
+                    + (s3 - 2.0 * s2 + s) * h * d0[i]
+                    + (3.0 * s2 - 2.0 * s3) * x1[i]
                     + (s3 - s2) * h * d1[i]
             };
             let x: Vec<f64> = (0..x.len()).map(between).collect();
@@ -492,7 +493,8 @@ pub fn stepped(fmu: &Loaded, case: &Case, (delayed, starts): (bool, bool)) -> Ru
     take_events();
     let it = Instance::new(fmu, Interface::CoSimulation);
     let d = &fmu.description;
-    let find = |name: &str| d.variables.iter().find(|v| v.name == name).unwrap_or_else(|| panic!("no {name}")).value_reference;
+    let find =
+        |name: &str| d.variables.iter().find(|v| v.name == name).unwrap_or_else(|| panic!("no {name}")).value_reference;
     let v2 = it.version() == FmiVersion::V2;
     if starts {
         it.set_starts();

@@ -40,7 +40,8 @@ fn replay(case: &Case, file: impl Fn(usize) -> PathBuf) -> String {
             print!("{line}");
             assert!(deviation <= case.tolerance, "{line}");
             let told: Vec<_> = made.warnings.iter().filter(|text| text.contains("the importer")).collect();
-            let lawful = order.completes != Completes::Evaluations && order.starts != Starts::After && !order.states_in_event;
+            let lawful =
+                order.completes != Completes::Evaluations && order.starts != Starts::After && !order.states_in_event;
             assert!(!lawful || told.is_empty(), "{line}{told:?}");
             assert!(order.late == 0.0 || !told.is_empty(), "{line}");
             assert!((1..told.len()).all(|i| !told[..i].iter().any(|one| habit(one) == habit(told[i]))), "{told:?}");
@@ -78,9 +79,18 @@ fn inputs_at_zero_are_named_once() {
     const ZERO: &[(f64, f64)] = &[(0.0, 0.0)];
     for (fmu, expected) in [
         ("PmsmPlant", "u_dc = 0 (start value 325), enable = false (start value true)"),
-        ("PmsmDrive", "enable = false (start value true), sensor_valid = false (start value true), u_dc = 0 (start value 325)"),
-        ("PmsmDriveMean", "enable = false (start value true), sensor_valid = false (start value true), u_dc = 0 (start value 325)"),
-        ("SensorlessController", "enable = false (start value true), u_dc = 0 (start value 325), sensor_valid = false (start value true)"),
+        (
+            "PmsmDrive",
+            "enable = false (start value true), sensor_valid = false (start value true), u_dc = 0 (start value 325)",
+        ),
+        (
+            "PmsmDriveMean",
+            "enable = false (start value true), sensor_valid = false (start value true), u_dc = 0 (start value 325)",
+        ),
+        (
+            "SensorlessController",
+            "enable = false (start value true), u_dc = 0 (start value 325), sensor_valid = false (start value true)",
+        ),
     ] {
         let mut inputs = vec![case::steps("u_dc", ZERO), case::boolean("enable", ZERO)];
         if fmu != "PmsmPlant" {

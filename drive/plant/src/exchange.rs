@@ -28,8 +28,8 @@ use drive_base::frame::{Axis, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use fmu_core::unit::{RAD_PER_S2, SPEED, VOLT};
 use fmu_core::{
-    Account, CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome, Scalar,
-    State,
+    Account, CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Next, Outcome,
+    Scalar, State,
 };
 
 /// Shift of the indicators in the direction of the decision that an event took, so that none stays at 0.

@@ -12,8 +12,8 @@ use drive_plant::signals::{PlantInputs, PlantOutputs};
 use fmu_core::events::{bounded, grid};
 use fmu_core::unit::VOLT_PER_S;
 use fmu_core::{
-    Account, CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Model, Next, Outcome,
-    Sampled, Scalar, State,
+    Account, CompletedSteps, ContinuousTime, Differentiable, Dual, Elapsed, Events, Fault, Indicator, Model, Next,
+    Outcome, Sampled, Scalar, State,
 };
 
 impl PmsmDrive {

@@ -243,7 +243,9 @@ impl World {
                 let fits = n == twin.values(reference).len() && values.iter().all(|x| x.is_finite());
                 // A fixed parameter, and in Continuous-Time Mode a tunable one, may be set to what it is.
                 let kept = twin.is("svx") && n > 0 && values == twin.values(reference);
-                wanted = verdict((open || kept) && fits || n == 0 && twin.values(reference).is_empty() && twin.is("icnsvxr"));
+                wanted = verdict(
+                    (open || kept) && fits || n == 0 && twin.values(reference).is_empty() && twin.is("icnsvxr"),
+                );
                 if wanted == OK {
                     let model = &mut twin.block.model;
                     let place = if name == "map" { &mut model.map.values } else { &mut model.gains };

@@ -34,7 +34,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the vectors in Initialization Mode.", fix: "Compute them when they are read." },
     Check { id: "E02", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused),
         requirement: "Every call that the state of a Model Exchange instance does not allow returns Error, or Discard where it sets a variable \
-            in Continuous-Time Mode.",
+            in Continuous-Time Mode; one that is taken all the same is told of by a message of status Warning.",
         tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error." },
     Check { id: "E03", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts),
         requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.",

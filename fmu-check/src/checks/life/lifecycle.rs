@@ -53,7 +53,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Every call that the state allows succeeds.",
         tried: "Makes every allowed call in every state.", fix: "Extend the table of allowed states by the call that is named." },
     Check { id: "L08", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Probe(refused),
-        requirement: "Every call that the state does not allow returns Error.",
+        requirement: "Every call that the state does not allow returns Error, or is taken with a message of status Warning.",
         tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error." },
     Check { id: "L08u", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::HARD, run: Run::Probe(unsupported),
         requirement: "A function of a capability that the FMU does not have returns Error in every state.",

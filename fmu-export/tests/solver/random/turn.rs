@@ -70,11 +70,8 @@ impl<M: Twin> Turn<'_, M> {
     }
 
     pub fn event(&mut self) -> Call {
-        let may = if self.now.kind.exchanges() {
-            self.is("vc")
-        } else {
-            self.now.kind.handles_events() && self.is("s")
-        };
+        let may =
+            if self.now.kind.exchanges() { self.is("vc") } else { self.now.kind.handles_events() && self.is("s") };
         let wanted = if may { OK } else { ERROR };
         // FMI 3.0 does not allow it in Event Mode; where no time has passed, it does nothing.
         let (again, later) = (self.is("v") && self.now.kind.version() == 3, self.now.end > self.now.settled);
