@@ -14,7 +14,7 @@ mod order;
 mod packed;
 
 use case::{Case, OURS, REFERENCE};
-use fmu_import::cosimulation::Method;
+use fmu_system::cosimulation::Method;
 use importer::{Loaded, run, stepped, strict};
 use order::{Completes, ORDERS, Order, STRICT, Starts};
 use std::path::PathBuf;
