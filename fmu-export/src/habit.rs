@@ -3,11 +3,7 @@
 //!
 //! The importers that have them are in `docs/import.md`, the orders of their calls in `tests/orders/`.
 
-use crate::instance::Instance;
-use fmu_core::Exported;
-use fmu_core::log::WARNING;
-
-/// A habit, the number of a bit of [`Instance::forgiven`].
+/// A habit, the number of a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Habit {
@@ -25,7 +21,7 @@ pub(crate) enum Habit {
 
 impl Habit {
     /// What the importer does, and what comes of it.
-    const fn tell(self) -> &'static str {
+    pub(crate) const fn tell(self) -> &'static str {
         match self {
             Self::Fixed => {
                 "the importer sets variables that cannot change now, such as fixed parameters after the initialization; their values are unchanged"
@@ -40,19 +36,6 @@ impl Habit {
             Self::Event => {
                 "the importer enters Event Mode in Event Mode; the event is that of the time that it has set"
             }
-        }
-    }
-}
-
-impl<E: Exported> Instance<E> {
-    /// Takes a call that the standard forbids, and says so if that was not heard before.
-    #[cold]
-    pub(crate) fn forgive(&mut self, habit: Habit) {
-        let bit = 1 << habit as u8;
-        if self.forgiven & bit == 0 && self.log.hears_model(&[]) {
-            self.forgiven |= bit;
-            let Self { name, current, .. } = &*self;
-            self.log.said(WARNING, &[], &format!("{name}: at {} s: {}", current.end, habit.tell()));
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::clocks::Clocks;
 use crate::exchange::MAX_ITERATIONS;
+use crate::habit::Habit;
 use crate::inside::Inside;
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
@@ -79,7 +80,7 @@ pub struct Instance<E: Exported> {
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
     /// The habits of the importer that were heard, a bit for each.
-    pub(crate) forgiven: u8,
+    forgiven: u8,
     /// The first step, or continuous time, has begun.
     pub(crate) begun: bool,
     /// What was set and has no effect.
@@ -316,6 +317,17 @@ impl<E: Exported> Instance<E> {
         if heard && !self.warned.iter().any(|&(other, _)| other == key) {
             self.warned.push((key, now));
             self.log.said(WARNING, &[], &format!("{}: at {} s: {}", self.name, self.current.end, message()));
+        }
+    }
+
+    /// Takes a call that the standard forbids, and says so if that was not heard before.
+    #[cold]
+    pub(crate) fn forgive(&mut self, habit: Habit) {
+        let bit = 1 << habit as u8;
+        if self.forgiven & bit == 0 && self.log.hears_model(&[]) {
+            self.forgiven |= bit;
+            let Self { name, current, .. } = &*self;
+            self.log.said(WARNING, &[], &format!("{name}: at {} s: {}", current.end, habit.tell()));
         }
     }
 

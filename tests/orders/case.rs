@@ -1,7 +1,7 @@
 //! What is simulated: FMUs, inputs over time, outputs to compare.
 
 use fmu_import::Fmu;
-use fmu_import::cosimulation::{Integration, Method, Schedule, Settings, Solver, System};
+use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, Solver, System};
 use std::ops::ControlFlow;
 use std::path::Path;
 

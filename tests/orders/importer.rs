@@ -293,9 +293,7 @@ impl Importer<'_> {
             } else {
                 x = x1;
             }
-            if !hit {
-                h = (end - t) * grow;
-            } else if grow < 1.0 {
+            if !hit || grow < 1.0 {
                 h = (end - t) * grow;
             }
             t = reached;

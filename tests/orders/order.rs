@@ -94,12 +94,6 @@ const OPENMODELICA: Order = Order {
 pub const ORDERS: &[Order] = &[
     STRICT,
     Order {
-        name: "without completed steps",
-        source: "CasADi 3.8.2, `FmuFunction`; PathSim",
-        completes: Completes::Never,
-        ..STRICT
-    },
-    Order {
         name: "OpenModelica 1.20",
         source: "CodegenFMU.tpl of the tag v1.20.0: parameters before ExitInitializationMode, all else as later",
         ..OPENMODELICA
