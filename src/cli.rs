@@ -1,7 +1,8 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{
-    atlas, build, compare, identify, info, map, merge, new, page, preset, prove, reproduce, simulate, ssp, sweep, tune,
+    atlas, build, compare, identify, info, map, merge, modelica, new, page, preset, prove, reproduce, simulate, ssp,
+    sweep, tune,
 };
 use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -36,6 +37,7 @@ enum Command {
     Identify(identify::Identify),
     Map(map::Map),
     Ssp(ssp::Ssp),
+    Modelica(modelica::Modelica),
     Preset(preset::Preset),
     Page(page::Page),
     Prove(prove::Prove),
@@ -118,6 +120,10 @@ pub fn main() -> ExitCode {
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Identify(args) => identify::run(&args).map(|whole| ExitCode::from(u8::from(!whole))),
         Command::Preset(args) => preset::run(&args).map(|text| {
+            print!("{text}");
+            ExitCode::SUCCESS
+        }),
+        Command::Modelica(args) => modelica::run(&args).map(|text| {
             print!("{text}");
             ExitCode::SUCCESS
         }),

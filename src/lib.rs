@@ -5,7 +5,7 @@
 //!   [`release`]: from Rust sources to `.fmu` files.
 //! - [`preset`]: an FMU with other start values, from its archive; [`page`]: a page that runs an FMU in a browser.
 //! - [`message`]: errors, warnings and notes on standard error.
-//! - [`ssp`], [`ssv`]: write systems and parameter values.
+//! - [`ssp`], [`ssv`]: write systems and parameter values; [`modelica`]: a Modelica package around an FMU.
 //!
 //! [`fmu_import`] runs FMUs, [`fmu_check`] checks them, [`drive_study`] reproduces, compares and tunes drives, and [`fmu_plot`]
 //! draws.
@@ -19,6 +19,7 @@ pub mod documentation;
 pub mod icons;
 pub mod licenses;
 pub mod message;
+pub mod modelica;
 pub mod pack;
 pub mod page;
 pub mod picture;

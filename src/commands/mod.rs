@@ -7,6 +7,7 @@ pub mod identify;
 pub mod info;
 pub mod map;
 pub mod merge;
+pub mod modelica;
 pub mod new;
 pub mod page;
 pub mod preset;
