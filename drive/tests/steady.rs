@@ -5,8 +5,11 @@
 mod lossy;
 #[path = "../control/tests/machines/mod.rs"]
 mod machines;
+#[path = "../control/tests/random_machines/mod.rs"]
+mod random_machines;
 
 use drive::PmsmDrive;
+use drive::control::reference::max_torque_per_ampere;
 use drive::frame::Dq;
 use drive::plant::power::Powers;
 use drive::plant::tables::PlantParameters;
@@ -326,6 +329,46 @@ fn the_powers_are_balanced() {
                 let size = p_in.abs() + losses.sum();
                 assert!((p_in - electric).abs() <= 1e-12 * size, "{rpm} rpm, {share}: {p_in} W, {electric} W");
                 assert!(point.efficiency.is_finite() && losses.sum().is_finite());
+            }
+        }
+    }
+}
+
+/// Machines whose voltage R i is up to 0.6 of the link's: the greatest torques, with field weakening and without, by brute force.
+#[test]
+fn the_limits_of_random_machines() {
+    for machine in random_machines::all() {
+        let (motor, mut steady) = (&machine.motor, bare(&machine));
+        for w in random_machines::speeds(&machine) {
+            let speed = w / f64::from(motor.n_p);
+            let under = |U| random_machines::Brute { motor, I: machine.i, w, U };
+            (steady.controller.weakening.used, steady.controller.weakening.bandwidth) = (true, 0.0);
+            steady.derive();
+            let condition = Condition { speed, u_dc: machine.u_dc, temperatures: steady.start_temperatures() };
+            let ends = steady.at(&condition).ends();
+            let most = steady.at(&Condition { speed: 0.0, u_dc: 1e9, ..condition }).limits()[1];
+            for (end, s) in ends.into_iter().zip([-1.0, 1.0]) {
+                let (wanted, _) = under(machine.U(0.95)).limit(s);
+                assert!(
+                    (s * end.tau_e - wanted).abs() < 1e-6 * most,
+                    "{motor:?}, {w} rad/s, {s}: {end:?}, not {wanted}"
+                );
+            }
+            // Without it: along the plain references.
+            steady.controller.weakening.used = false;
+            steady.derive();
+            let (brute, at) = (under(machine.U(1.0)), steady.at(&condition));
+            for s in [-1.0, 1.0] {
+                let fits = |share: f64| {
+                    let i = max_torque_per_ampere(motor, s * share * most);
+                    brute.voltage([i.d(), i.q()]) <= brute.U * (1.0 + 1e-12)
+                };
+                let last = (0..=2000).rev().map(|k| f64::from(k) / 2000.0).find(|&share| fits(share)).unwrap_or(0.0);
+                let (tau, found) = (last * most, s * at.by_reference(s * most).tau_e);
+                assert!(
+                    found > tau - 1e-6 * most && found < tau + 6e-4 * most,
+                    "{motor:?}, {w} rad/s, {s}: {found}, not {tau}"
+                );
             }
         }
     }

@@ -2,7 +2,6 @@
 #![allow(missing_docs, non_snake_case)]
 
 mod machines;
-#[path = "random_machines/mod.rs"]
 mod random_machines;
 
 use drive_base::frame::DqHat;
@@ -58,7 +57,10 @@ fn the_currents() {
         let i_most = most / motor.torque_constant();
         let base = envelope.base_speed(U);
         let at = |w: f64| brute(&machine, w).limit(1.0).0 / most;
-        assert!(base == 0.0 && at(1e-3) < 1.0 || at(0.999 * base) > 1.0 - SMALL && at(1.01 * base) < 1.0, "{motor:?}: {base}");
+        assert!(
+            base == 0.0 && at(1e-3) < 1.0 || at(0.999 * base) > 1.0 - SMALL && at(1.01 * base) < 1.0,
+            "{motor:?}: {base}"
+        );
         for w in random_machines::speeds(&machine) {
             let (state, (low, high)) = Weakening::settled(&gains, &par.weakening, (w, machine.u_dc), i_most, 0.0);
             for share in [-0.98, -0.7, -0.3, -0.05, 0.0, 0.05, 0.3, 0.7, 0.98] {

@@ -1,5 +1,7 @@
 //! Random machines of every kind, and a search through all currents that knows no algebra of field weakening.
 
+#![allow(dead_code, reason = "each test program uses a part")]
+
 use super::machines::Machine;
 use drive_base::motor::Motor;
 
