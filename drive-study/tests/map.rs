@@ -79,7 +79,8 @@ fn the_energy_of_the_cycle_exactly_and_from_tables() {
     for (got, figure) in [(sum, 1.322_449), (out, 1.497_219), (back, -0.174_770)] {
         assert!((got / figure - 1.0).abs() < 1e-5, "{got} kWh, not {figure} kWh");
     }
-    for (got, figure) in five(&exact.losses).iter().zip([0.015_373, 0.027_246, 0.014_992, 0.013_319, 0.053_891]) {
+    // 0.014_992 with the machine's voltage for that of the legs, which has the drop of 0.9 to 1.4 V too: 1e-4 of the conduction loss.
+    for (got, figure) in five(&exact.losses).iter().zip([0.015_373, 0.027_246, 0.014_990, 0.013_319, 0.053_891]) {
         assert!((got * KWH / figure - 1.0).abs() < 1e-4, "{} kWh, not {figure} kWh", got * KWH);
     }
     for (grid, percent) in [((11, 11), 0.177), ((21, 21), 0.049), ((31, 31), 0.024), ((47, 41), 0.010)] {
@@ -222,8 +223,10 @@ fn a_map_that_is_wrong_says_so() {
         assert!(count.contains("3 of 3 points differ") && count.contains("--verify 0"), "{count}");
         one.clone()
     };
-    let power = refused(&|point| point.powers.p_in *= 1.002);
-    assert!(power.contains("the map differs from PmsmDrive at") && power.contains("0.2"), "{power}");
+    let power = refused(&|point| point.powers.p_in *= 1.005);
+    for part in ["the map differs from PmsmDrive at", " % of ", " W apart, allowed 0.1 %"] {
+        assert!(power.contains(part), "{power}");
+    }
     let loss = refused(&|point| point.powers.losses.sw *= 1.02);
     for part in ["rpm", "N.m, 400 V, 20.0 degC: p_sw is ", " W, not ", "apart, allowed 1 %"] {
         assert!(loss.contains(part) && loss.lines().count() == 1, "{loss}");

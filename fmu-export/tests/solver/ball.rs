@@ -131,7 +131,7 @@ impl Model for Ball {
         ..Info::DEFAULT
     };
     fn idle(&self, name: &str) -> Option<&'static str> {
-        (name == "u" && self.u == 99.0).then_some("that much lift has no effect")
+        (name == "u" && self.u.to_bits() == 99.0_f64.to_bits()).then_some("that much lift has no effect")
     }
 
     const TABLE: &'static Table<Block<Self>> = table![
