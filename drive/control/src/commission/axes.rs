@@ -86,7 +86,7 @@ impl Loops {
             // A free rotor's magnet lies near 0.
             let beside = axis.abs() > std::f64::consts::FRAC_PI_4;
             if !blocked && beside != inverse && L_q > LOOKED * L_d {
-                return Err(Fault::Axis);
+                return Err(Fault::Inductance);
             }
             if !blocked && beside {
                 let axis = axis - std::f64::consts::FRAC_PI_2.copysign(axis);

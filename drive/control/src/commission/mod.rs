@@ -99,11 +99,10 @@ enumeration! {
         5 Inductance "The pulses or loops give no inductance";
         6 NotFollowing "The rotor turns at the start, does not come to rest, is blocked in mode Spin or does not follow the start";
         7 Lost "The observer has lost the turning rotor";
-        8 Flux "The turning rotor shows no flux linkage within 0.25 and 1.15 of u_dc / (sqrt(3) n_p commission.speed)";
+        8 Flux "The levels of speed give no flux linkage";
         9 Mechanics "The levels and sweeps do not fit inertia and friction";
         10 Time "commission.t_max is over";
         11 Aborted "commission_start or enable became false";
-        12 Axis "The rest of the rotor does not show along which inductance its magnet lies";
     }
 }
 

@@ -392,7 +392,7 @@ impl Commission {
             self.results.blocked = self.bench.blocked;
             if !self.bench.blocked {
                 if self.alignment.stuck || inverse && !magnet {
-                    return Err(Fault::Axis);
+                    return Err(Fault::Inductance);
                 }
                 self.bench.tensor = self.bench.tensor.aligned(inverse);
             }
