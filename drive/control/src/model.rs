@@ -294,13 +294,6 @@ impl Model for SensorlessController {
         why(idle::ACTS, &self.parameters, name)
     }
 
-    fn idle(&self, name: &str) -> Option<&'static str> {
-        if name == "u_dc" && self.inputs.u_dc == 0.0 {
-            return Some(idle::NO_VOLTAGE);
-        }
-        why(idle::ACTS, &self.parameters, name)
-    }
-
     fn derive(&mut self) {
         if !self.tuned {
             self.last_gains.clone_from(&self.gains);
