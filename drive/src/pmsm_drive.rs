@@ -218,11 +218,6 @@ impl Model for PmsmDrive {
         idle::of_drive((plant, controller, &self.link_parameters), &self.inputs, name)
     }
 
-    fn idle(&self, name: &str) -> Option<&'static str> {
-        let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
-        idle::of_drive((plant, controller, &self.link_parameters), &self.inputs, name)
-    }
-
     fn derive(&mut self) {
         self.pair.plant.model.derive();
         self.pair.controller.model.derive();
