@@ -79,7 +79,8 @@ fn the_energy_of_the_cycle_exactly_and_from_tables() {
     for (got, figure) in [(sum, 1.322_449), (out, 1.497_219), (back, -0.174_770)] {
         assert!((got / figure - 1.0).abs() < 1e-5, "{got} kWh, not {figure} kWh");
     }
-    for (got, figure) in five(&exact.losses).iter().zip([0.015_373, 0.027_246, 0.014_992, 0.013_319, 0.053_891]) {
+    // 0.014_992 with the machine's voltage for that of the legs, which has the drop of 0.9 to 1.4 V too: 1e-4 of the conduction loss.
+    for (got, figure) in five(&exact.losses).iter().zip([0.015_373, 0.027_246, 0.014_990, 0.013_319, 0.053_891]) {
         assert!((got * KWH / figure - 1.0).abs() < 1e-4, "{} kWh, not {figure} kWh", got * KWH);
     }
     for (grid, percent) in [((11, 11), 0.177), ((21, 21), 0.049), ((31, 31), 0.024), ((47, 41), 0.010)] {
@@ -208,17 +209,24 @@ fn maps_agree_with_the_running_drive() {
     }
 }
 
-/// A map of another drive than the one that runs is refused, with the place and both numbers.
+/// Where a map differs from the drive that runs, it says so with the place and both numbers, and how to leave the comparison out.
 #[test]
-fn a_map_that_is_wrong_is_refused() {
+fn a_map_that_is_wrong_says_so() {
     let map = small("traction-63kw", Request { verify: 0, ..Request::default() });
     let refused = |change: &dyn Fn(&mut drive::steady::Point)| {
         let mut sheet = map.sheets[0].clone();
         sheet.points.iter_mut().flatten().for_each(change);
-        verify::verify(&map.drive, &map.axes, &[sheet], 3).unwrap_err().to_string()
+        let found = verify::verify(&map.drive, &map.axes, &[sheet], 3).unwrap();
+        assert_eq!(found.apart.len(), 3);
+        let report = report::of(&Map { verified: found, ..map.clone() }, &Cycle::example().unwrap(), true);
+        let [.., count, one, _, _] = &report.notes[..] else { panic!("{:?}", report.notes) };
+        assert!(count.contains("3 of 3 points differ") && count.contains("--verify 0"), "{count}");
+        one.clone()
     };
-    let power = refused(&|point| point.powers.p_in *= 1.002);
-    assert!(power.contains("the map differs from PmsmDrive at") && power.contains("0.2"), "{power}");
+    let power = refused(&|point| point.powers.p_in *= 1.005);
+    for part in ["the map differs from PmsmDrive at", " % of ", " W apart, allowed 0.1 %"] {
+        assert!(power.contains(part), "{power}");
+    }
     let loss = refused(&|point| point.powers.losses.sw *= 1.02);
     for part in ["rpm", "N.m, 400 V, 20.0 degC: p_sw is ", " W, not ", "apart, allowed 1 %"] {
         assert!(loss.contains(part) && loss.lines().count() == 1, "{loss}");
@@ -299,7 +307,7 @@ fn the_files() {
 fn the_page() {
     let request = Request { u_dc: vec![350.0, 400.0], verify: 0, ..Request::default() };
     let map = small("traction-63kw", request);
-    let report = report::of(&map, &Cycle::example().unwrap());
+    let report = report::of(&map, &Cycle::example().unwrap(), true);
     let html = page::page(&map, &report).unwrap();
     for part in ["Efficiency map of traction-63kw", "<option value=\"1\" selected>400 V, 20 °C</option>", "map.npz"] {
         assert!(html.contains(part), "{part}");
@@ -354,13 +362,16 @@ fn a_machine_with_a_flux_map() {
         let wanted = [(row[0] - psi_M) / L_d, row[1] / L_q + s_q * row[1].powi(3)];
         assert!((row[2] - wanted[0]).abs() < 3.0 && (row[3] - wanted[1]).abs() < 3.0, "{row:?}, not {wanted:?}");
     }
-    let report = report::of(&map, &Cycle::example().unwrap()).text();
+    let report = report::of(&map, &Cycle::example().unwrap(), true).text();
     assert!(
         report.contains("the controller computes with constant inductances: a reference of 80 N.m gives"),
         "{report}"
     );
     assert!(
-        map::files(&map, &report::of(&map, &Cycle::example().unwrap())).unwrap().iter().any(|f| f.0 == "flux_map.csv")
+        map::files(&map, &report::of(&map, &Cycle::example().unwrap(), true))
+            .unwrap()
+            .iter()
+            .any(|f| f.0 == "flux_map.csv")
     );
     assert!(map::linear::cost(&traction(), map.rated, 400.0, T_20).is_none());
 }

@@ -13,6 +13,7 @@
 
 pub mod dc_link;
 pub mod documentation;
+mod idle;
 pub mod pair;
 pub mod pmsm_drive;
 pub mod pmsm_drive_mean;

@@ -18,6 +18,7 @@ pub use period::Means;
 
 use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
+use crate::idle;
 use crate::pair::Pair;
 #[cfg(doc)]
 use crate::{PmsmPlant, SensorlessController};
@@ -114,18 +115,29 @@ pub struct PmsmDrive {
     /// Model Exchange: the command that acts in the plant since the last sample.
     before: Commanded,
     period: Period,
-    overload: Overload,
+    overload: Happened,
 }
 
-/// Whether the load has been far above the torque that the drive gives.
+/// Whether something has been that is said once, such as a load far above the torque that the drive gives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-enum Overload {
+pub(crate) enum Happened {
     #[default]
     Never,
     /// For the first time, at the last step.
     Now,
     /// Before.
     Before,
+}
+
+impl Happened {
+    /// After a step in which it `is` so.
+    pub(crate) fn followed_by(self, is: bool) -> Self {
+        match self {
+            Self::Never if is => Self::Now,
+            Self::Now => Self::Before,
+            same => same,
+        }
+    }
 }
 
 /// Load in units of `tau_max` above which it is reported.
@@ -178,11 +190,7 @@ impl PmsmDrive {
         let Self { inputs: DriveInputs { tau_load, .. }, pair, overload, .. } = self;
         let ControllerOutputs { tau_max, tau_min, .. } = pair.controller.out;
         let acts = !pair.plant.model.parameters.mechanics.imposed && tau_max > 0.0 && tau_min < 0.0;
-        *overload = match *overload {
-            Overload::Never if acts && (*tau_load > FAR * tau_max || *tau_load < FAR * tau_min) => Overload::Now,
-            Overload::Now => Overload::Before,
-            same => same,
-        };
+        *overload = overload.followed_by(acts && (*tau_load > FAR * tau_max || *tau_load < FAR * tau_min));
     }
 }
 
@@ -204,6 +212,12 @@ impl Model for PmsmDrive {
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
     const STATE_VERSION: u16 = 18;
+
+    fn idle(&self, name: &str) -> Option<&'static str> {
+        let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
+        let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        idle::of_drive((plant, controller, &self.link_parameters), (u_dc, [speed_shaft, angle_shaft]), name)
+    }
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
@@ -229,7 +243,7 @@ impl Model for PmsmDrive {
         self.set_inputs();
         self.pair.initialize();
         self.period = Period::new(self.pair.plant.out.powers);
-        self.overload = Overload::default();
+        self.overload = Happened::default();
         self.before = self.pair.plant.model.inputs.commanded();
     }
 
@@ -349,7 +363,7 @@ impl Warns for PmsmDrive {
         }
         plant.warn(log);
         self.pair.controller.model.warn(log);
-        if self.overload == Overload::Now {
+        if self.overload == Happened::Now {
             let ControllerOutputs { tau_max, tau_min, .. } = self.pair.controller.out;
             let tau_load = self.inputs.tau_load;
             log.warn("tau_load", || {

@@ -251,6 +251,41 @@ fn the_speed_loop_is_that_of_the_drive() {
     }
 }
 
+/// What comes from the link is in the shaft, the load or the losses, whatever step and mode; and it is as much as with small steps.
+#[test]
+fn the_energy_is_balanced_at_every_step() {
+    let (plant, mut controller) = traction();
+    let mut plant = plant;
+    (plant.mechanics.imposed, plant.mechanics.J) = (false, 1.5);
+    controller.speed_loop.bandwidth = 5.0;
+    // Up and down, with and without the gates.
+    let ramp = |t: f64| 20.0 * t.min(20.0).min((40.0 - t).max(0.0));
+    for (torque_mode, coasts) in [(false, false), (true, false), (false, true)] {
+        controller.speed_loop.torque_mode = torque_mode;
+        let set = |t: f64, i: &mut DriveInputs| {
+            (i.u_dc, i.speed_ref, i.tau_load) = (400.0, ramp(t), if t > 10.0 { 15.0 } else { 0.0 });
+            (i.tau_ref, i.enable) = (if t < 20.0 { 40.0 } else { -30.0 }, !coasts || t < 15.0);
+        };
+        let mut reference = 0.0;
+        for h in [1e-3, 2e-3, 5e-3, 1e-2, 5e-2] {
+            let mut block = PmsmDriveMean::new(&plant, &controller);
+            let (mut most, mut worst) = (0.0_f64, 0.0_f64);
+            run(&mut block, 40.0, h, set, |_, out| {
+                let Energy { r#in, mech, loss } = out.plant.energy;
+                most = most.max(r#in);
+                worst = worst.max((r#in - mech - loss - 0.5 * 1.5 * out.plant.speed.powi(2)).abs());
+            });
+            if reference == 0.0 {
+                reference = most;
+            }
+            println!("torque mode {torque_mode}, coasts {coasts}, h = {h}: {worst:.3e} J of {most} J ({reference} J)");
+            assert!(worst < 1e-9 * most, "h = {h}: {worst} J of {most} J");
+            // The reference on its ramp is held over a step: with 50 ms, the shaft is 0.5 rad/s behind.
+            assert!(h > 0.02 || (most / reference - 1.0).abs() < 1e-3, "h = {h}: {most} J, not {reference} J");
+        }
+    }
+}
+
 /// Gates off: the shaft coasts under friction and iron, and the link gives nothing.
 #[test]
 fn without_enable_the_shaft_coasts() {

@@ -5,9 +5,13 @@
 mod lossy;
 #[path = "../control/tests/machines/mod.rs"]
 mod machines;
+#[path = "../control/tests/random_machines/mod.rs"]
+mod random_machines;
 
 use drive::PmsmDrive;
+use drive::control::reference::max_torque_per_ampere;
 use drive::frame::Dq;
+use drive::motor::Motor;
 use drive::plant::power::Powers;
 use drive::plant::tables::PlantParameters;
 use drive::plant::thermal::Temperatures;
@@ -238,6 +242,24 @@ fn compare(steady: &Steady, rpm: f64, u_dc: f64, tau_ref: f64, point: &Point) {
     }
 }
 
+/// At 36 V, the drop of diodes of 0.7 V is a part of the legs' voltage: without it, the conduction loss is 2 % too high.
+#[test]
+fn the_drop_of_the_devices_is_in_the_legs() {
+    let motor = Motor { n_p: 15, R_s: 0.2, L_d: 0.35e-3, L_q: 0.35e-3, psi_M: 0.0155 };
+    let machine = Machine { motor, i: 25.0, u_dc: 36.0, J: 0.01 };
+    let mut steady = bare(&machine).sampled();
+    let devices = &mut steady.plant.inverter.devices;
+    (devices.r_transistor, devices.u_diode, devices.r_diode) = (5e-3, 0.7, 5e-3);
+    for (rpm, tau_ref) in [(573.0, 5.2), (430.0, -6.9), (239.0, -1.7)] {
+        let point = at(&steady, rpm, machine.u_dc).by_reference(tau_ref);
+        let ([p_in, _, _, cond, ..], ..) = settled(&steady, rpm * RPM, machine.u_dc, tau_ref);
+        let size = 1.5 * point.u.magnitude() * point.i.magnitude();
+        println!("{rpm} rpm: {} of {cond} W, {} of {p_in} W", point.powers.losses.cond, point.powers.p_in);
+        assert!((point.powers.losses.cond / cond - 1.0).abs() < 1e-2, "{} W, not {cond} W", point.powers.losses.cond);
+        assert!((point.powers.p_in - p_in).abs() < 1e-3 * size, "{} W, not {p_in} W", point.powers.p_in);
+    }
+}
+
 /// Saturation, AC copper, a warm machine and wrong estimates; the trim of field weakening at work.
 #[test]
 fn points_of_a_drive_that_is_not_as_its_controller_thinks() {
@@ -326,6 +348,46 @@ fn the_powers_are_balanced() {
                 let size = p_in.abs() + losses.sum();
                 assert!((p_in - electric).abs() <= 1e-12 * size, "{rpm} rpm, {share}: {p_in} W, {electric} W");
                 assert!(point.efficiency.is_finite() && losses.sum().is_finite());
+            }
+        }
+    }
+}
+
+/// Machines whose voltage R i is up to 0.6 of the link's: the greatest torques, with field weakening and without, by brute force.
+#[test]
+fn the_limits_of_random_machines() {
+    for machine in random_machines::all() {
+        let (motor, mut steady) = (&machine.motor, bare(&machine));
+        for w in random_machines::speeds(&machine) {
+            let speed = w / f64::from(motor.n_p);
+            let under = |U| random_machines::Brute { motor, I: machine.i, w, U };
+            (steady.controller.weakening.used, steady.controller.weakening.bandwidth) = (true, 0.0);
+            steady.derive();
+            let condition = Condition { speed, u_dc: machine.u_dc, temperatures: steady.start_temperatures() };
+            let ends = steady.at(&condition).ends();
+            let most = steady.at(&Condition { speed: 0.0, u_dc: 1e9, ..condition }).limits()[1];
+            for (end, s) in ends.into_iter().zip([-1.0, 1.0]) {
+                let (wanted, _) = under(machine.U(0.95)).limit(s);
+                assert!(
+                    (s * end.tau_e - wanted).abs() < 1e-6 * most,
+                    "{motor:?}, {w} rad/s, {s}: {end:?}, not {wanted}"
+                );
+            }
+            // Without it: along the plain references.
+            steady.controller.weakening.used = false;
+            steady.derive();
+            let (brute, at) = (under(machine.U(1.0)), steady.at(&condition));
+            for s in [-1.0, 1.0] {
+                let fits = |share: f64| {
+                    let i = max_torque_per_ampere(motor, s * share * most);
+                    brute.voltage([i.d(), i.q()]) <= brute.U * (1.0 + 1e-12)
+                };
+                let last = (0..=2000).rev().map(|k| f64::from(k) / 2000.0).find(|&share| fits(share)).unwrap_or(0.0);
+                let (tau, found) = (last * most, s * at.by_reference(s * most).tau_e);
+                assert!(
+                    found > tau - 1e-6 * most && found < tau + 6e-4 * most,
+                    "{motor:?}, {w} rad/s, {s}: {found}, not {tau}"
+                );
             }
         }
     }

@@ -92,6 +92,7 @@ pub mod dual;
 pub mod enumeration;
 pub mod events;
 pub mod fault;
+pub mod idle;
 pub mod integer;
 pub mod integrate;
 pub mod intermediate;

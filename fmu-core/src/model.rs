@@ -156,6 +156,12 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
         true
     }
 
+    /// Why the parameter or input of this name has no effect with the values of the others. Of a model with
+    /// [`Warns`](crate::Warns), a value other than the start value is then reported once, after the first step.
+    fn idle(&self, _name: &str) -> Option<&'static str> {
+        None
+    }
+
     /// Calculated parameters from the parameters; runs again when a tunable parameter was set.
     fn derive(&mut self) {}
 

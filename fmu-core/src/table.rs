@@ -380,7 +380,7 @@ impl<W: 'static> Table<W> {
         self.tell_index(&mut whole.clone(), index)
     }
 
-    fn tell_index(&self, whole: &mut W, index: usize) -> Option<String> {
+    pub(crate) fn tell_index(&self, whole: &mut W, index: usize) -> Option<String> {
         let (meta, slot) = self.entry(whole, index)?;
         let value = match &slot {
             Slot::Enumeration(x) => item(meta, x.get()),

@@ -9,6 +9,7 @@ use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
 use fmu_core::capability::{Eventful, ToEvent};
+use fmu_core::idle::Watch;
 use fmu_core::log::WARNING;
 use fmu_core::log::{Said, Warnings};
 use fmu_core::resource::Shelf;
@@ -77,6 +78,8 @@ pub struct Instance<E: Exported> {
     pub(crate) inside: Option<Box<Inside<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
+    /// What was set and has no effect.
+    watch: Watch,
     starts: Starts,
 }
 
@@ -118,6 +121,7 @@ impl<E: Exported> Instance<E> {
             inside: None,
             clocks: Clocks::of::<E>(),
             warned: Vec::new(),
+            watch: Watch::default(),
             starts: Starts::default(),
         }
     }
@@ -177,6 +181,7 @@ impl<E: Exported> Instance<E> {
             self.refresh();
         }
         self.warned.clear();
+        self.watch = Watch::default();
         self.log.event(|| format!("{}: reset", self.name));
     }
 
@@ -353,8 +358,11 @@ impl<E: Exported> Instance<E> {
         if !self.log.hears_model(own) {
             return;
         }
-        let Self { current, log, warned, name, .. } = self;
-        let now = current.elapsed.seconds();
+        let Self { current, log, warned, watch, name, .. } = self;
+        let (now, end) = (current.elapsed.seconds(), current.end);
+        if log.hears(WARNING, own) {
+            watch.look(&mut current.block, |said| log.said(WARNING, own, &format!("{name}: at {end} s: {said}")));
+        }
         warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
         let mut sink = |(category, key, message): Said<'_>| {
             if log.hears(category, own) && !warned.iter().any(|&(other, _)| other == key) {

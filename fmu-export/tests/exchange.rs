@@ -492,3 +492,27 @@ fn warnings_come_once_a_second() {
         }
     }
 }
+
+/// A value without effect is said once, by name, whatever is said later; after a reset again.
+#[test]
+fn a_value_without_effect_is_said_once() {
+    for kind in [Kind::Me2, Kind::Me3, Kind::Cs2, Kind::Cs3 { event: false, early: false }] {
+        let fmu = Fmu::running(kind, 0.0);
+        assert_eq!(fmu.logging(true, &[c"logStatusWarning"]), OK);
+        let mut heard = Vec::new();
+        for k in 0..300_u32 {
+            let t = f64::from(k) * 0.01;
+            if k == 50 {
+                assert_eq!(fmu.set(&[U], &[99.0]), OK);
+            }
+            if kind.exchanges() {
+                assert_eq!((fmu.set_time(t), fmu.set_states(&[0.1, 3.0]), fmu.completed()), (OK, OK, OK));
+            } else {
+                assert_eq!(fmu.step(t, 0.01).0, OK);
+            }
+            heard.extend(fmu.messages().into_iter().filter(|m| m.text.contains("no effect")).map(|m| (k, m.text)));
+        }
+        let [(k, text)] = &heard[..] else { panic!("{kind:?}: {heard:?}") };
+        assert!((50..=51).contains(k) && text.contains("u = 99 ") && text.contains("that much lift"), "{k}: {text}");
+    }
+}

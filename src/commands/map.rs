@@ -15,10 +15,11 @@ use std::path::PathBuf;
 ///
 /// The map covers speed and torque at the shaft in both quadrants, for each DC-link voltage and temperature. It counts the losses
 /// of copper, iron, inverter and friction that the motor file describes (its tables iron, inverter and mechanics). Points of it are
-/// compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, nothing is written.
+/// compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, a note says where and by how much.
 ///
 /// Writes map.csv (a line per point), envelope.csv, map.npz (for numpy.load), map.svg and map.html, which needs no network, and
-/// prints the best point, the losses at the rated point and the energy of a driving cycle.
+/// prints the best point, the losses at the rated point and the energy of a driving cycle. The example's cycle is left out where
+/// the drive cannot follow it.
 ///
 ///   fmu map motors/traction-63kw.toml --out target/map
 ///   fmu map motors/traction-63kw.toml --u-dc 300,350,400 --T 20,80,120 --grid 21x21
@@ -68,7 +69,7 @@ fn cycle(args: &Map) -> Result<Cycle> {
 /// Runs the command.
 ///
 /// # Errors
-/// The motor file or an option is wrong, a point differs from `PmsmDrive`, or a file cannot be written.
+/// The motor file or an option is wrong, or a file cannot be written.
 pub fn run(args: &Map) -> Result<()> {
     let values = |option: &str, given: &Option<String>| {
         let Some(text) = given else { return Ok(Vec::new()) };
@@ -87,7 +88,7 @@ pub fn run(args: &Map) -> Result<()> {
     request.check()?;
     let cycle = cycle(args)?;
     let map = map::make(&MotorFile::read(&args.motor)?, &request)?;
-    let report = report::of(&map, &cycle);
+    let report = report::of(&map, &cycle, args.cycle.is_some() || args.vehicle.is_some());
     // All of them are ready before the first is written.
     let files = map::files(&map, &report)?;
     let out = args.out.clone().map_or_else(|| output_folder("map"), Ok)?;

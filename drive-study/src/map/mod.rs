@@ -87,7 +87,7 @@ pub fn drive(tuned: &Tuned) -> Steady {
 /// Computes the map of a machine, and verifies it.
 ///
 /// # Errors
-/// A value of the request or of the file is wrong, the rated point is out of reach, or a point differs from the running drive.
+/// A value of the request or of the file is wrong, or the rated point is out of reach.
 pub fn make(motor: &MotorFile, request: &Request) -> Result<Map> {
     request.check()?;
     let tuned = rules::tune(motor)?;

@@ -12,9 +12,13 @@ use std::f64::consts::PI;
 /// rpm in a rad/s.
 const RPM: f64 = 30.0 / PI;
 
-/// Efficiencies in % at which the color changes, from below the first to above the last. Lightness grows with the efficiency:
+/// Number of efficiencies at which the color changes, from below the first to above the last. Lightness grows with the efficiency:
 /// the map can be read in gray too, and with color blindness (viridis).
-const LEVELS: [f64; 9] = [70.0, 80.0, 85.0, 90.0, 92.0, 94.0, 95.0, 96.0, 97.0];
+const COUNT: usize = 9;
+/// These efficiencies in % for a machine that reaches at least 95 %.
+const LEVELS: [f64; COUNT] = [70.0, 80.0, 85.0, 90.0, 92.0, 94.0, 95.0, 96.0, 97.0];
+/// Steps in % between those of the others.
+const STEPS: [f64; 6] = [5.0, 2.0, 1.0, 0.5, 0.2, 0.1];
 const INKS: [Ink; 10] =
     ["#440154", "#482878", "#3e4a89", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6dcd59", "#b4de2c", "#fde725"];
 
@@ -64,6 +68,10 @@ pub fn chart(map: &Map, sheet: usize) -> Chart {
     if let Some(point) = map.rated_point(shown) {
         dots.push(((map.rated[0] * RPM, point.powers.tau_shaft), "rated".into()));
     }
+    // One scale for all pictures of a map.
+    let best =
+        map.sheets.iter().filter_map(|sheet| map.best(sheet)).fold(0.0, |most, (_, point)| point.efficiency.max(most));
+    let best = 100.0 * best;
     let margin = 0.06 * (most[1] - most[0]);
     Chart {
         title: format!("{}: efficiency from DC link to shaft, {}{}", map.name, map.title(shown), map.uncounted()),
@@ -72,21 +80,38 @@ pub fn chart(map: &Map, sheet: usize) -> Chart {
         range: (most[0] - margin, most[1] + margin),
         fields: vec![quadrant(0), quadrant(1)],
         legend: "efficiency".into(),
-        bands: bands(),
+        bands: bands(best),
         lines,
         marks: marks(map, shown),
         dots,
     }
 }
 
-fn bands() -> Vec<Band> {
+/// Efficiencies in % at which the color changes where the best one is `best` (%): up to the last multiple of a step below it.
+fn levels(best: f64) -> [f64; COUNT] {
+    if best >= LEVELS[6] {
+        return LEVELS;
+    }
+    // Fine steps only near 100 %, and where there is not enough efficiency for coarse ones.
+    let fits = |step: f64| (best < 90.0 || step <= 2.0) && (best / step).floor() >= 9.0;
+    let step = STEPS.into_iter().find(|&step| fits(step)).unwrap_or(STEPS[5]);
+    let mut count = (best / step).floor() - 9.0;
+    [0.0; COUNT].map(|_| {
+        count += 1.0;
+        // Without the rounding of a sum.
+        (count * step * 10.0).round() / 10.0
+    })
+}
+
+fn bands(best: f64) -> Vec<Band> {
+    let levels = levels(best);
     let first =
-        Band { level: f64::NEG_INFINITY, name: String::new(), legend: format!("< {} %", LEVELS[0]), ink: INKS[0] };
+        Band { level: f64::NEG_INFINITY, name: String::new(), legend: format!("< {} %", levels[0]), ink: INKS[0] };
     let level = |(k, &level): (usize, &f64)| {
-        let legend = LEVELS.get(k + 1).map_or_else(|| format!("≥ {level} %"), |next| format!("{level} … {next} %"));
+        let legend = levels.get(k + 1).map_or_else(|| format!("≥ {level} %"), |next| format!("{level} … {next} %"));
         Band { level, name: level.to_string(), legend, ink: INKS[k + 1] }
     };
-    std::iter::once(first).chain(LEVELS.iter().enumerate().map(level)).collect()
+    std::iter::once(first).chain(levels.iter().enumerate().map(level)).collect()
 }
 
 /// Lines of constant power at the shaft, up to the edge of the picture; up to five of each sign, within the greatest `power`.
@@ -138,4 +163,26 @@ fn marks(map: &Map, sheet: &Sheet) -> Vec<(f64, String)> {
     all.retain(|(speed, _)| *speed > 0.0 && *speed <= top);
     all.sort_by(|a, b| a.0.total_cmp(&b.0));
     all.into_iter().map(|(speed, name)| (speed * RPM, format!("{name} {:.0} rpm", speed * RPM))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The best color is that of the best points, whatever the machine reaches.
+    #[test]
+    fn the_colors_follow_the_machine() {
+        for (best, expected) in [
+            (97.2, LEVELS),
+            (83.1, [40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 70.0, 75.0, 80.0]),
+            (92.9, [76.0, 78.0, 80.0, 82.0, 84.0, 86.0, 88.0, 90.0, 92.0]),
+        ] {
+            assert_eq!(levels(best).map(f64::to_bits), expected.map(f64::to_bits), "{best}");
+        }
+        for best in [3.0, 12.0, 31.0, 44.0, 60.0, 89.9, 94.9] {
+            let levels = levels(best);
+            assert!(levels[0] > 0.0 && levels[8] <= best && levels[8] > 0.85 * best, "{best}: {levels:?}");
+            assert!(levels.windows(2).all(|pair| pair[0] < pair[1]), "{levels:?}");
+        }
+    }
 }

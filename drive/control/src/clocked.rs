@@ -39,6 +39,10 @@ impl Model for SensorlessControllerClocked {
 
     const STATE_VERSION: u16 = SensorlessController::STATE_VERSION;
 
+    fn idle(&self, name: &str) -> Option<&'static str> {
+        self.controller.model.idle(name)
+    }
+
     fn derive(&mut self) {
         self.controller.model.derive();
     }

@@ -4,9 +4,15 @@
 //! dL = L_q - L_d. Largest torque of one sign s (motoring +1, generating -1; w > 0) under |u| <= U and |i| <= I:
 //!
 //! - **MTPA end**: maximum torque per ampere at |i| = I, where its voltage suffices;
-//! - else **MTPV**, if it lies within I (which takes psi_M < L_d I): on the voltage limit, i(u) = Z^-1 (u - j w psi_M).
-//!   With u turned by an angle, i' = Z^-1 j u and i'' = -Z^-1 u; the torque is stationary where l i_q' - dL i_d' i_q = 0;
-//! - else **the circle**: i_d = -I (1 - x^2) / (1 + x^2), i_q = s 2 I x / (1 + x^2) make |u| = U a quartic in x > 0.
+//! - else **the circle**: i_d = -I (1 - x^2) / (1 + x^2), i_q = s 2 I x / (1 + x^2) make |u| = U a quartic in x > 0. Its root next
+//!   to the MTPA end is the limit where the torque falls from there along |u| = U into the circle;
+//! - else **MTPV**, which then lies within I: on the voltage limit, i(u) = Z^-1 (u - j w psi_M). With u turned by an angle, i' =
+//!   Z^-1 j u and i'' = -Z^-1 u; the torque is stationary where l i_q' - dL i_d' i_q = 0.
+//!
+//! Both limits are convex, and log |t| is concave where l > 0 and s i_q > 0, so the gradient decides. Where only the circle
+//! and |u| = U act, s grad t = m i + n grad |u|^2 with m, n >= 0. It follows that i_d is not above that of maximum torque per
+//! ampere, so that the root on the other side of the MTPA end is never the limit. Without R, MTPV needs psi_M < L_d I; with R
+//! it does not: a machine whose R i is above w L i has it at any speed at which R I + w psi_M > U.
 //!
 //! For a torque below the limit, the least current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
 //! = t / l. The cross term is constant and f is convex, so Newton's method from the right does not overshoot, and from
@@ -38,6 +44,9 @@ pub struct Envelope {
 /// Iterations run to their end, at most so many and until a step is as small as this: the next one would be below the rounding.
 const MOST: u32 = 60;
 const SMALL: f64 = 1e-8;
+
+/// Halvings that find the least voltage on the circle.
+const HALVINGS: u32 = 30;
 
 /// The limit of one sign: its currents (A) and the magnitude of its torque (N.m).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -113,29 +122,72 @@ impl Envelope {
     #[inline]
     fn iterated<const TO_THE_END: bool>(&self, w: f64, s: f64, U: f64, warm: &mut WarmStart) -> Limit {
         let p = self.quartic(w, s, U);
-        let on_circle = |x: f64| self.on_circle(x, s);
-        let mut left = 0.0;
         if value(&p, self.x_mtpa) <= 0.0 {
             *warm = WarmStart::default();
-            return self.at(on_circle(self.x_mtpa));
+            return self.at(self.on_circle(self.x_mtpa, s));
         }
-        if self.psi_M < self.L_d * self.I {
+        if warm.u != [0.0; 2] {
+            // Where it was the limit at the last sample, it mostly still is.
             let i = self.max_torque_per_volt::<TO_THE_END>(w, s, U, &mut warm.u);
-            let magnitude = i.magnitude();
-            if magnitude <= self.I {
-                warm.x = 0.0;
+            if i.magnitude() <= self.I && s * i.q() > 0.0 {
                 return self.at(i);
             }
-            if p[0] > 0.0 {
-                left = ((magnitude + i.d()) / (magnitude - i.d())).sqrt().min(self.x_mtpa);
+            *warm = WarmStart::default();
+        }
+        let left = if p[0] > 0.0 { self.least_voltage(w, s) } else { 0.0 };
+        if value(&p, left) <= 0.0 {
+            warm.x = root::<TO_THE_END>(&p, left, self.x_mtpa, warm.x);
+            let i = self.on_circle(warm.x, s);
+            if self.falls_inwards(i, w, s) {
+                return self.at(i);
             }
         }
-        if value(&p, left) > 0.0 {
-            *warm = WarmStart::default();
-            return Limit { i: DqHat::new(-self.I.min(self.psi_M / self.L_d), 0.0), tau: 0.0 };
+        *warm = WarmStart::default();
+        let i = self.max_torque_per_volt::<TO_THE_END>(w, s, U, &mut warm.u);
+        if i.magnitude() <= self.I * (1.0 + 1e-9) && s * i.q() > 0.0 {
+            return self.at(i);
         }
-        warm.x = root::<TO_THE_END>(&p, left, self.x_mtpa, warm.x);
-        self.at(on_circle(warm.x))
+        *warm = WarmStart::default();
+        Limit { i: DqHat::new(self.least_i_d(w), 0.0), tau: 0.0 }
+    }
+
+    /// i_d (A) of the least voltage without torque, within I.
+    #[inline]
+    pub fn least_i_d(&self, w: f64) -> f64 {
+        let x = w * w * self.L_d;
+        -self.I.min(x * self.psi_M / (self.R * self.R + x * self.L_d))
+    }
+
+    /// The place x on the circle with the least voltage, up to maximum torque per ampere.
+    #[cold]
+    fn least_voltage(&self, w: f64, s: f64) -> f64 {
+        let (mut left, mut right) = (0.0, self.x_mtpa);
+        for _ in 0..HALVINGS {
+            let x = 0.5 * (left + right);
+            let i = self.on_circle(x, s);
+            // Along the circle, i turns by -90 degrees times s.
+            let (_, [d, q]) = self.gradients(i, w);
+            *(if s * (d * i.q() - q * i.d()) > 0.0 { &mut right } else { &mut left }) = x;
+        }
+        left
+    }
+
+    /// Gradients of t and of |u|^2 / 2 at the currents `i` (A).
+    #[inline]
+    fn gradients(&self, i: DqHat, w: f64) -> ([f64; 2], [f64; 2]) {
+        let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
+        let t = [-dL * i.q(), psi_M - dL * i.d()];
+        let flux = [L_d * (psi_M + L_d * i.d()), L_q * L_q * i.q()];
+        let of = |k: usize, i: f64| R * R * i + w * w * flux[k] + R * w * t[k];
+        (t, [of(0, i.d()), of(1, i.q())])
+    }
+
+    /// Whether the torque of the sign `s` falls from `i` (A), where the circle crosses |u| = U, along |u| = U into the circle.
+    #[inline]
+    fn falls_inwards(&self, i: DqHat, w: f64, s: f64) -> bool {
+        let (t, u) = self.gradients(i, w);
+        let (t_u, i_u) = (t[0] * u[1] - t[1] * u[0], i.d() * u[1] - i.q() * u[0]);
+        s * t_u * i_u >= 0.0
     }
 
     /// Coefficients p_0 to p_4 of |u|^2 - U^2 on the circle, times (1 + x^2)^2.
@@ -155,28 +207,41 @@ impl Envelope {
     /// Currents (A) of the most torque per volt; `warm` is the direction of u, from the last sample on.
     fn max_torque_per_volt<const TO_THE_END: bool>(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
         let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
-        let (mut u, steps) =
-            if warm.iter().all(|&part| part == 0.0) { (self.without_resistance(w, s, U), 4) } else { (*warm, 2) };
         let inverse = 1.0 / (R * R + w * w * L_d * L_q);
         // Currents of the voltage (d, q) with the magnet's EMF set to zero.
         let current = |d: f64, q: f64| ((R * d + w * L_q * q) * inverse, (R * q - w * L_d * d) * inverse);
-        for _ in 0..if TO_THE_END { MOST } else { steps } {
+        let of = |u: [f64; 2]| current(U * u[0], U * u[1] - w * psi_M);
+        let torque = |u: [f64; 2]| {
+            let (i_d, i_q) = of(u);
+            s * (psi_M - dL * i_d) * i_q
+        };
+        let (mut u, steps) = if *warm == [0.0; 2] {
+            // Exact without R, and without saliency.
+            let (salient, length) = (self.without_resistance(w, s, U), (R * R + w * w * L_d * L_d).sqrt());
+            let round = [-s * w * L_d / length, s * R / length];
+            (if torque(salient) > torque(round) { salient } else { round }, MOST)
+        } else {
+            (*warm, if TO_THE_END { MOST } else { 2 })
+        };
+        for _ in 0..steps {
             let (d, q) = (U * u[0], U * u[1]);
             let (i_d, i_q) = current(d, q - w * psi_M);
             let (i1_d, i1_q) = current(-q, d);
             let (i2_d, i2_q) = current(-d, -q);
             let l = psi_M - dL * i_d;
-            let slope = l * i2_q - 2.0 * dL * i1_d * i1_q - dL * i2_d * i_q;
-            let h = (-(l * i1_q - dL * i1_d * i_q) / slope).clamp(-0.3, 0.3);
+            let rise = s * (l * i1_q - dL * i1_d * i_q);
+            let bend = s * (l * i2_q - 2.0 * dL * i1_d * i1_q - dL * i2_d * i_q);
+            // Where the torque bends upwards, Newton's method would look for the least.
+            let h = if bend < 0.0 { (-rise / bend).clamp(-0.3, 0.3) } else { 0.3_f64.copysign(rise) };
             let turned = [u[0] - h * u[1], u[1] + h * u[0]];
             let length = (turned[0] * turned[0] + turned[1] * turned[1]).sqrt();
             u = [turned[0] / length, turned[1] / length];
-            if TO_THE_END && h.abs() < SMALL {
+            if h.abs() < SMALL {
                 break;
             }
         }
         *warm = u;
-        let (i_d, i_q) = current(U * u[0], U * u[1] - w * psi_M);
+        let (i_d, i_q) = of(u);
         DqHat::new(i_d, i_q)
     }
 
@@ -187,8 +252,8 @@ impl Envelope {
         [-s * (f * f - psi_d * psi_d).max(0.0).sqrt() / f, psi_d / f]
     }
 
-    /// i_d (A) of the least current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by `steps` of
-    /// Newton's method from `i_d`; none where the slope is not positive.
+    /// i_d (A) of the least current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by at most `steps`
+    /// of Newton's method from `i_d`; none where the slope is not positive.
     #[inline]
     pub fn i_d(&self, tau: f64, w: f64, U: f64, mut i_d: f64, steps: u32) -> Option<f64> {
         let &Self { k, R, L_d, L_q, dL, psi_M, .. } = self;
@@ -203,7 +268,11 @@ impl Envelope {
             if slope <= 0.0 {
                 return None;
             }
-            i_d -= (g * l * l + e) * l / slope;
+            let step = (g * l * l + e) * l / slope;
+            i_d -= step;
+            if step.abs() <= SMALL * SMALL * self.I {
+                break;
+            }
         }
         Some(i_d)
     }

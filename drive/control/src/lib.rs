@@ -18,6 +18,7 @@ pub mod documentation;
 pub mod envelope;
 pub mod estimator;
 mod gains;
+pub mod idle;
 pub mod lock;
 pub mod model;
 pub mod polarity;

@@ -7,6 +7,7 @@ use crate::current;
 use crate::cycle::within_hexagon;
 use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
 use crate::gains::Gains;
+use crate::idle;
 use crate::lock::{LOST, Lock};
 use crate::polarity;
 use crate::signals::{ControllerInputs, ControllerOutputs};
@@ -18,6 +19,7 @@ use crate::weakening;
 use crate::zero_speed::{self, ZeroSpeed};
 use drive_base::frame::Phases;
 use drive_base::motor::Motor;
+use fmu_core::idle::why;
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
@@ -284,6 +286,13 @@ impl Model for SensorlessController {
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
     const STATE_VERSION: u16 = 15;
+
+    fn idle(&self, name: &str) -> Option<&'static str> {
+        if name == "u_dc" && self.inputs.u_dc == 0.0 {
+            return Some(idle::NO_VOLTAGE);
+        }
+        why(idle::ACTS, &self.parameters, name)
+    }
 
     fn derive(&mut self) {
         if !self.tuned {

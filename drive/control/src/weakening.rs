@@ -39,6 +39,9 @@ pub const GREATEST_TRIM: f64 = 0.3;
 const EVERY: u64 = 8;
 const LEAST_CHANGE: f64 = 0.01;
 
+/// Most steps from the plain reference to the voltage limit.
+const COLD: u32 = 40;
+
 /// Least electrical speed in rad/s that the limits are computed for.
 const LEAST_SPEED: f64 = 1e-3;
 
@@ -74,8 +77,6 @@ pub struct WeakeningGains {
     per_torque: f64,
     /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
     voltage: [f64; 3],
-    /// Least useful i_d in A.
-    least: f64,
     /// Least bandwidth of the tracker.
     pub(super) tracker: LeastTracker,
 }
@@ -97,7 +98,6 @@ impl WeakeningGains {
             end,
             per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
-            least: -limit.i.min(motor.psi_M / motor.L_d),
             tracker: LeastTracker::new(par),
         }
     }
@@ -116,7 +116,7 @@ impl WeakeningGains {
     fn beyond(&self, s: f64, w: f64, U: f64) -> Option<Limit> {
         let end = DqHat::new(self.end.d(), s * self.end.q());
         let fits = self.envelope.excess(end, w, U) <= 0.0;
-        fits.then(|| Limit { i: DqHat::new(self.least, 0.0), tau: f64::INFINITY })
+        fits.then(|| Limit { i: DqHat::new(self.envelope.least_i_d(w), 0.0), tau: f64::INFINITY })
     }
 
     /// Electrical speed in rad/s below which all plain references fit the voltage `U` (V).
@@ -262,8 +262,10 @@ impl Weakening {
         let limit = self.limits[usize::from(self.generates)];
         self.clipped = tau.abs() >= limit.tau * (1.0 - 1e-9);
         let solve = |i_d, steps| gains.envelope.i_d(tau, w, self.U, i_d, steps);
+        // Motoring, i_d falls up to the limit; generating, the voltage over R makes it rise at first.
+        let least = if self.generates { limit.i.d().min(gains.envelope.least_i_d(w)) } else { limit.i.d() };
         let on_the_limit = |i_d: f64| {
-            let i_d = i_d.max(limit.i.d());
+            let i_d = i_d.max(least);
             DqHat::new(i_d, gains.envelope.i_q(tau, i_d))
         };
         // While weakening, the root is near the last one, and left of maximum torque per ampere.
@@ -280,7 +282,7 @@ impl Weakening {
                 return plain;
             }
             let warm = if self.weakens && !mtpa { solve(self.i_d, 2) } else { None };
-            let i = on_the_limit(warm.or_else(|| solve(plain.d(), 8)).unwrap_or(limit.i.d()));
+            let i = on_the_limit(warm.or_else(|| solve(plain.d(), COLD)).unwrap_or(least));
             if i.d() >= plain.d() {
                 self.weakens = false;
                 return plain;

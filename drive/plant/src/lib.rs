@@ -16,6 +16,7 @@ mod damping;
 pub mod documentation;
 pub mod exchange;
 pub mod flux_map;
+pub mod idle;
 mod integration;
 pub mod inverter;
 pub mod iron;

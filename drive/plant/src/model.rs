@@ -2,6 +2,7 @@
 
 use crate::counters::Point;
 use crate::flux_map;
+use crate::idle;
 use crate::legs::Legs;
 use crate::losses::{Losses, efficiency};
 use crate::machine;
@@ -16,6 +17,7 @@ use drive_base::connection::Measured;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
+use fmu_core::idle::why;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Model, Scalar, Step, Table, Terminal, Warns};
 use serde::{Deserialize, Serialize};
@@ -182,6 +184,15 @@ impl Model for PmsmPlant {
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
     const STATE_VERSION: u16 = 12;
+
+    fn idle(&self, name: &str) -> Option<&'static str> {
+        let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        match name {
+            "u_dc" if u_dc == 0.0 => Some(idle::NO_VOLTAGE),
+            "mechanics.imposed" if speed_shaft == 0.0 && angle_shaft == 0.0 => Some(idle::AT_REST),
+            _ => why(idle::ACTS, &self.parameters, name),
+        }
+    }
 
     fn derive(&mut self) {
         self.warm.least_inductance = self.parameters.least_inductance();

@@ -22,7 +22,8 @@ mod motion;
 mod show;
 
 use crate::dc_link::{LINK, LinkParameters};
-use crate::pmsm_drive::{DriveInputs, DriveOutputs, INPUTS, OUTPUTS, in_part, same_pole_pairs};
+use crate::idle;
+use crate::pmsm_drive::{DriveInputs, DriveOutputs, Happened, INPUTS, OUTPUTS, in_part, same_pole_pairs};
 use crate::steady::{Condition, Point, Steady};
 use drive_base::frame::Dq;
 use drive_base::math::all_finite;
@@ -64,6 +65,8 @@ pub struct PmsmDriveMean {
     moved: bool,
     /// Model Exchange: what the controller shows since the last event.
     held: ControllerOutputs,
+    /// Whether there has been no such drive.
+    impossible: Happened,
     /// Time in s for which the torque reference has been beyond its limits.
     clipped_for: f64,
     /// None: a drive in its steady state does not commission itself.
@@ -86,6 +89,7 @@ impl Default for PmsmDriveMean {
             known: false,
             moved: false,
             held: ControllerOutputs::default(),
+            impossible: Happened::default(),
             clipped_for: 0.0,
             commissioning: None,
         }
@@ -118,6 +122,9 @@ pub struct MeanOutputs {
     /// Flux linkage in Wb.
     pub psi: Dq,
 }
+
+/// Share of u_dc / sqrt 3 above which a voltage is more than the link has.
+const FULL: f64 = 1.0 + 1e-6;
 
 /// Temperatures that cannot be.
 const REMEDY: &str = "the network became too hot; reduce the torque, or raise thermal.G_ws and thermal.G_sc";
@@ -179,6 +186,10 @@ impl PmsmDriveMean {
     }
 }
 
+/// Why the others have none.
+const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no DC link, no limits of its current, no estimator, start, sensor, \
+                                 trip, short circuit or commissioning: PmsmDrive has";
+
 /// Parameters of the controller that have an effect: these, and those below these groups.
 const EFFECTIVE: [&str; 13] = [
     "T_s",
@@ -213,6 +224,8 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
+    const STATE_VERSION: u16 = 2;
+
     const CONTINUOUS: bool = true;
 
     fn has_effect(parameter: &str) -> bool {
@@ -222,6 +235,15 @@ impl Model for PmsmDriveMean {
         }
         let elsewhere = ["plant.inverter.dead_time", "plant.inverter.i_zero"].contains(&parameter);
         !elsewhere && !parameter.starts_with("dc_link.") && !parameter.starts_with("chopper.")
+    }
+
+    fn idle(&self, name: &str) -> Option<&'static str> {
+        if !Self::has_effect(name) || ["asc", "sensor_valid", "commission_start"].contains(&name) {
+            return Some(ONLY_IN_THE_DRIVE);
+        }
+        let Steady { plant, controller, .. } = &self.drive;
+        let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        idle::of_drive((plant, controller, &self.link_parameters), (u_dc, [speed_shaft, angle_shaft]), name)
     }
 
     fn derive(&mut self) {
@@ -247,7 +269,7 @@ impl Model for PmsmDriveMean {
         };
         self.state = State { speed, angle, speed_ref: controller.speed_est, ..State::default() };
         (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
-        self.clipped_for = 0.0;
+        (self.clipped_for, self.impossible) = (0.0, Happened::default());
         let temperatures = self.temperatures();
         self.point = self.point_at(&self.state, temperatures);
         (self.asked, self.known) = (self.question(&self.state, temperatures), true);
@@ -274,6 +296,7 @@ impl Model for PmsmDriveMean {
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
         (self.state, self.point, self.moved) = (state, point, true);
         (self.asked, self.known) = (self.question(&state, temperatures), true);
+        self.impossible = self.impossible.followed_by(self.is_impossible());
         self.clipped_for = if self.is_clipped() { self.clipped_for + step.h } else { 0.0 };
         if thermal.mode == ThermalMode::Network {
             let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
@@ -285,8 +308,33 @@ impl Model for PmsmDriveMean {
     }
 }
 
+impl PmsmDriveMean {
+    /// Whether there is no such drive: no current fits the voltage of the link, or diodes conduct.
+    fn is_impossible(&self) -> bool {
+        let DriveInputs { u_dc, enable, .. } = self.inputs;
+        if enable {
+            return u_dc > 0.0 && self.point.u_share > FULL;
+        }
+        self.speed(&self.state).abs() > self.drive.diode_speed(u_dc, self.temperatures().magnet)
+    }
+}
+
 impl Warns for PmsmDriveMean {
     fn warn(&self, log: &mut Warnings<'_>) {
+        if self.impossible == Happened::Now {
+            let (speed, u_share, u_dc) = (self.speed(&self.state), self.point.u_share, self.inputs.u_dc);
+            log.warn("u_share", || {
+                let why = if self.inputs.enable {
+                    format!("no current fits u_dc = {u_dc} V (u_share = {u_share:.3})")
+                } else {
+                    format!("the back EMF is above u_dc = {u_dc} V with the gates off")
+                };
+                format!(
+                    "{why} at {speed} rad/s: the diodes would conduct and the machine feed the link. PmsmDriveMean does not have \
+                     that, and its outputs are not those of a drive; PmsmDrive has it"
+                )
+            });
+        }
         if self.clipped_for >= 1.0 {
             log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point.limits));
         }

@@ -14,7 +14,9 @@
 //! M k_1 = f(y),   M k_2 = f(y + h k_1) - 2 k_1,   y + h (3 k_1 + k_2)/2,   error about h (k_1 + k_2)/2
 //! ```
 //!
-//! A step with a greater error than [`SMALL`] is taken in parts. Powers are the trapezoid of both stages.
+//! A step with a greater error than [`SMALL`] is taken in parts. Losses are the trapezoid of both stages. The power from the link
+//! is what they, the load and the kinetic energy take, so that no energy is lost: the stages' own power from the link misses the
+//! change of the kinetic energy by the error of the speed, which a ramp collects with one sign.
 
 use super::{PmsmDriveMean, State};
 use crate::pmsm_drive::DriveInputs;
@@ -210,11 +212,15 @@ impl PmsmDriveMean {
             [by * (tau - loops * (k_p * w - i)), i, w]
         };
         let lagging = |rate: f64| if exact { 0.0 } else { rate };
-        let k_1 = solve(lagging(one.tau), one.integral, one.speed);
+        // Gates off, the integral part decays with the lag; nothing reads it.
+        let enable = self.inputs.enable;
+        let of_loop = |rate: f64| if enable { rate } else { 0.0 };
+        let k_1 = solve(lagging(one.tau), of_loop(one.integral), one.speed);
         let ahead =
             State { tau: y.tau + h * k_1[0], integral: y.integral + h * k_1[1], speed: y.speed + h * k_1[2], ..y };
         let two = self.rates(&ahead, at);
-        let k_2 = solve(lagging(two.tau) - 2.0 * k_1[0], two.integral - 2.0 * k_1[1], two.speed - 2.0 * k_1[2]);
+        let k_2 =
+            solve(lagging(two.tau) - 2.0 * k_1[0], of_loop(two.integral) - 2.0 * k_1[1], two.speed - 2.0 * k_1[2]);
         let step = |n: usize| h * (1.5 * k_1[n] + 0.5 * k_2[n]);
         let off = |n: usize| 0.5 * h * (k_1[n] + k_2[n]).abs();
         let speed = y.speed + step(2);
@@ -222,13 +228,26 @@ impl PmsmDriveMean {
         let error = torque.max(off(2) / (SMALL[1] * (1.0 + speed.abs())));
         let state = State {
             tau: if exact { end_tau } else { y.tau + step(0) },
-            integral: y.integral + step(1),
+            integral: if enable { y.integral + step(1) } else { y.integral * exp(-lag * h) },
             speed_ref: controller.speed_loop.ramped(start.speed_ref, self.inputs.speed_ref, h),
             speed,
             angle: start.angle + 0.5 * h * (start.speed + speed),
         };
         let powers =
             self.powers_of(&one.point, self.speed(&y)).with(self.powers_of(&two.point, self.speed(&ahead)), 0.5);
+        let powers = if imposed { powers } else { self.balanced(powers, [start, &state], h) };
         (two.point.limits, (state, powers, error))
+    }
+
+    /// The mean `powers` of a part of a step of `h` (s) between two states, with what the shaft gives its load and keeps: the
+    /// rest is the link's, or without gates a loss.
+    fn balanced(&self, powers: Powers, [start, end]: [&State; 2], h: f64) -> Powers {
+        let kept = 0.5 * self.drive.plant.mechanics.J * (end.speed * end.speed - start.speed * start.speed) / h;
+        let p_mech = self.inputs.tau_load * 0.5 * (start.speed + end.speed);
+        if !self.inputs.enable {
+            return Powers { p_mech, p_loss: -(p_mech + kept), ..powers };
+        }
+        let (p_in, u_dc) = (p_mech + kept + powers.p_loss, self.inputs.u_dc);
+        Powers { p_mech, p_in, i_dc: if u_dc > 0.0 { p_in / u_dc } else { 0.0 }, ..powers }
     }
 }

@@ -12,6 +12,10 @@ use drive_plant::machine;
 use drive_plant::power::Powers;
 use serde::{Deserialize, Serialize};
 
+/// Rounds for the drop of the devices, at most, and the change of their loss, as a share, at which they end.
+const MOST: u32 = 20;
+const SMALL: f64 = 1e-9;
+
 /// Where a point lies among the limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Region {
@@ -182,27 +186,19 @@ impl<'a> At<'a> {
         let at_sample = psi.turned() * *w;
         let (mut e, mut rippled) = (at_sample, 0.0);
         if *held < 1.0 {
+            // What the held voltage would be as a flux linkage: with R i.
+            let chord = psi - i_s.turned() * (R / w);
             let [d, cross, q] = machine::slope(motor, plant.magnetics(), psi);
-            let along = Dq::new(d * psi.d() + cross * psi.q(), cross * psi.d() + q * psi.q());
+            let along = Dq::new(d * chord.d() + cross * chord.q(), cross * chord.d() + q * chord.q());
             rippled = ripple * along.dot(along);
-            psi = psi * (held * held);
+            psi = psi - chord * (1.0 - held * held);
             e = psi.turned() * *w;
             i = machine::current(motor, plant.magnetics(), psi) + e * *G;
         }
         let u = i * *R + e;
         let square = i.dot(i);
-        let (amplitude, magnitude) = (square.sqrt(), u.magnitude());
-        let (u_i, product) = (u.dot(i), amplitude * magnitude);
-        let (cond, drop) = if plant.inverter.devices.is_none() || amplitude == 0.0 {
-            (0.0, 0.0)
-        } else {
-            let cos_phi = if product > 0.0 { (u_i / product).clamp(-1.0, 1.0) } else { 1.0 };
-            let u_dc = self.condition.u_dc;
-            let m = if u_dc > 0.0 { 2.0 * magnitude / u_dc } else { 0.0 };
-            let loss = conduction::mean(&plant.inverter.devices, m, cos_phi, amplitude);
-            // The drop of the devices is a voltage along the current.
-            (loss, loss / (1.5 * square))
-        };
+        let amplitude = square.sqrt();
+        let (cond, drop) = self.conduction(u, i, amplitude);
         let losses = Losses {
             cu: 1.5 * R * (square + rippled),
             // The held voltage has this magnitude all the time.
@@ -213,13 +209,38 @@ impl<'a> At<'a> {
         };
         // The current of the flux linkage is the rest of that at the terminals.
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i - e * *G);
-        let requested = (i * (R + drop) + at_sample * *held).magnitude();
+        let requested = (i * (R + drop) + e).magnitude() / held;
         let u_share = share(requested, self.condition.u_dc);
         let tau_ref = controller.motor.torque(i_s.d(), i_s.q());
         self.point(
             Point { tau_ref, limits: self.limits(), i, psi, u, requested, u_share, tau_e, ..Point::default() },
             losses,
         )
+    }
+
+    /// Loss (W) of the devices that conduct with the voltage `u` (V) at the machine and the current `i` (A) of this magnitude, and the drop
+    /// per ampere (Ohm), along the current. The legs have the voltage of the machine and the drop, which decides how long transistor and
+    /// diode conduct: a fixed point, whose rounds leave a share of about drop / u_dc each.
+    fn conduction(&self, u: Dq, i: Dq, amplitude: f64) -> (f64, f64) {
+        let (devices, u_dc) = (&self.drive.plant.inverter.devices, self.condition.u_dc);
+        let (mut loss, mut drop) = (0.0, 0.0);
+        if devices.is_none() || amplitude == 0.0 {
+            return (loss, drop);
+        }
+        for _ in 0..MOST {
+            let leg = u + i * drop;
+            let magnitude = leg.magnitude();
+            let product = amplitude * magnitude;
+            let cos_phi = if product > 0.0 { (leg.dot(i) / product).clamp(-1.0, 1.0) } else { 1.0 };
+            let m = if u_dc > 0.0 { 2.0 * magnitude / u_dc } else { 0.0 };
+            let last = loss;
+            loss = conduction::mean(devices, m, cos_phi, amplitude);
+            drop = loss / (1.5 * amplitude * amplitude);
+            if (loss - last).abs() <= SMALL * loss {
+                break;
+            }
+        }
+        (loss, drop)
     }
 
     /// The point with the gates off and diodes that block: iron and friction brake. Above the

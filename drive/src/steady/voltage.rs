@@ -2,7 +2,7 @@
 //!
 //! With field weakening, its trim y lowers the voltage of the references until the requested voltage is k_t u_dc / sqrt 3:
 //! the drive settles there, or at the greatest trim. Without, the current loop saturates; the torque is lowered until the
-//! voltage is u_dc / sqrt 3, the greatest that a sinusoid can have, and to 0 where the EMF alone is more. Both are equations of
+//! voltage is u_dc / sqrt 3, the greatest that a sinusoid can have, and to 0 where no torque of its sign needs less. Both are equations of
 //! one unknown.
 
 use super::operating::{At, Point, Region};
@@ -11,6 +11,9 @@ use drive_control::weakening::GREATEST_TRIM;
 
 /// Share of the voltage to which the equation is solved.
 const SMALL: f64 = 1e-10;
+
+/// Steps to the least voltage, each of which leaves two thirds.
+const THIRDS: u32 = 40;
 
 impl At<'_> {
     /// Voltage in V that the current loop may request in steady state.
@@ -42,13 +45,25 @@ impl At<'_> {
             let bracket = [(0.0, excess(&at_once)), (greatest, excess(&last))];
             return trimmed(root(bracket, small, |trim| excess(&trimmed(trim))));
         }
-        let none = self.of_reference(0.0);
-        let tau_ref = if excess(&none) >= 0.0 {
-            0.0
-        } else {
-            let bracket = [(at_once.tau_ref, excess(&at_once)), (0.0, excess(&none))];
-            root(bracket, small, |tau| excess(&self.of_reference(tau)))
-        };
+        let of = |tau: f64| excess(&self.of_reference(tau));
+        let fits = |tau: f64| Some((tau, of(tau))).filter(|(_, excess)| *excess < 0.0);
+        let inside = fits(0.0).or_else(|| fits(self.least_voltage(at_once.tau_ref)));
+        let tau_ref = inside.map_or(0.0, |inside| root([(at_once.tau_ref, excess(&at_once)), inside], small, of));
         Point { region: Region::Limit, ..self.of_reference(tau_ref) }
+    }
+
+    /// The torque reference between 0 and `tau` (N.m) that takes the least voltage: a generator's R i is against the EMF.
+    fn least_voltage(&self, tau: f64) -> f64 {
+        let requested = |tau: f64| self.of_reference(tau).requested;
+        let (mut low, mut high) = (0.0, tau);
+        for _ in 0..THIRDS {
+            let third = (high - low) / 3.0;
+            if requested(low + third) < requested(high - third) {
+                high -= third;
+            } else {
+                low += third;
+            }
+        }
+        0.5 * (low + high)
     }
 }

@@ -130,6 +130,10 @@ impl Model for Ball {
         experiment: Experiment { stop: 3.0, step: 0.1, ..Experiment::DEFAULT },
         ..Info::DEFAULT
     };
+    fn idle(&self, name: &str) -> Option<&'static str> {
+        (name == "u" && self.u.to_bits() == 99.0_f64.to_bits()).then_some("that much lift has no effect")
+    }
+
     const TABLE: &'static Table<Block<Self>> = table![
         Var::input("u", &ACCELERATION, "Lift", |m| &mut m.model.u).at_least(-100.0).at_most(100.0),
         Var::discrete_input("k", &ONE, "Tenfold lift", |m| &mut m.model.k).at_least(-5.0).at_most(5.0),

@@ -1,0 +1,68 @@
+//! When the variables of the drive act: those of its plant, its controller and its DC link.
+
+use crate::dc_link::LinkParameters;
+use drive_control::idle as control;
+use drive_control::tables::ControllerParameters;
+use drive_plant::idle as plant;
+use drive_plant::tables::PlantParameters;
+use fmu_core::idle::{Acts, why};
+
+/// The DC link's.
+const LINK: &[Acts<LinkParameters>] = &[
+    Acts { names: &["dc_link.use", "chopper.use"], when: |_| true, why: "" },
+    Acts {
+        names: &["dc_link.C", "dc_link.R_source", "dc_link.R_precharge"],
+        when: |p| p.dc_link.used,
+        why: "no effect without dc_link.use",
+    },
+    Acts {
+        names: &["chopper.u_on", "chopper.u_off", "chopper.R"],
+        when: |p| p.chopper.used,
+        why: "no effect without chopper.use",
+    },
+];
+
+/// Why the parameter or input `name` of a drive has no effect, with the inputs `u_dc` (V), `speed_shaft` and `angle_shaft`.
+pub(crate) fn of_drive(
+    (plant, controller, link): (&PlantParameters, &ControllerParameters, &LinkParameters),
+    (u_dc, shaft): (f64, [f64; 2]),
+    name: &str,
+) -> Option<&'static str> {
+    if name == "u_dc" && u_dc == 0.0 {
+        return Some(control::NO_VOLTAGE);
+    }
+    if let Some(name) = name.strip_prefix("plant.") {
+        let rests = name == "mechanics.imposed" && shaft == [0.0; 2];
+        return if rests { Some(plant::AT_REST) } else { why(plant::ACTS, plant, name) };
+    }
+    match name.strip_prefix("controller.") {
+        Some(name) => why(control::ACTS, controller, name),
+        None => why(LINK, link, name)
+            .or_else(|| why(control::ACTS, controller, name))
+            .or_else(|| why(plant::ACTS, plant, name)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::PmsmDrive;
+    use crate::dc_link;
+    use fmu_core::idle::unstated;
+    use fmu_core::{Causality, Model};
+
+    /// Every input is one of the plant's or of the controller's, and so their lists have it.
+    #[test]
+    fn no_variable_is_forgotten() {
+        let missing = unstated(LINK, dc_link::LINK);
+        assert!(missing.is_empty(), "{missing:?} must be in LINK once");
+        let lists = |name: &str| {
+            control::ACTS.iter().any(|acts| acts.names.contains(&name))
+                || plant::ACTS.iter().any(|acts| acts.names.contains(&name))
+        };
+        for index in PmsmDrive::TABLE.indices() {
+            let (name, meta, _) = PmsmDrive::TABLE.locate(index).unwrap();
+            assert!(meta.causality != Causality::Input || lists(&name), "{name}");
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! Values that a user has set and that change nothing with the others: found at the first step, and said once, by name.
+//!
+//! A model states in lists of [`Acts`] when its parameters and inputs act, and [`Model::idle`] looks there. A value that is not the
+//! start value counts as set. [`Watch`] looks at the parameters once and at an input until it is set.
+
+use crate::row::Slot;
+use crate::table::Table;
+use crate::variable::Causality;
+use crate::{Block, Model};
+
+/// When variables act, for a model with the parameters `P`.
+pub struct Acts<P: 'static> {
+    /// Names of parameters and inputs.
+    pub names: &'static [&'static str],
+    /// Whether they act.
+    pub when: fn(&P) -> bool,
+    /// What is said of them if they do not.
+    pub why: &'static str,
+}
+
+/// Why the variable `name` does not act with these parameters.
+pub fn why<P>(all: &[Acts<P>], par: &P, name: &str) -> Option<&'static str> {
+    let found = all.iter().find(|acts| acts.names.contains(&name))?;
+    if (found.when)(par) { None } else { Some(found.why) }
+}
+
+/// The parameters and inputs of `table` that `all` does not name exactly once, and the names there that the table does not have: a
+/// test has none.
+pub fn unstated<P, W>(all: &[Acts<P>], table: &Table<W>) -> Vec<String> {
+    let listed = |name: &str| all.iter().flat_map(|acts| acts.names).filter(|listed| **listed == name).count();
+    let located = table.indices().filter_map(|index| table.locate(index)).filter(|(.., element)| *element == 0);
+    let settable = |causality| matches!(causality, Causality::Parameter | Causality::Input);
+    let names: Vec<String> = located.filter(|(_, meta, _)| settable(meta.causality)).map(|(name, ..)| name).collect();
+    let unknown = all.iter().flat_map(|acts| acts.names).filter(|name| !names.iter().any(|own| own == *name));
+    names.iter().filter(|name| listed(name) != 1).cloned().chain(unknown.map(|name| (*name).to_owned())).collect()
+}
+
+/// What is left to look at.
+#[derive(Debug, Default)]
+pub struct Watch {
+    begun: bool,
+    /// Inputs with their start values.
+    inputs: Vec<(usize, f64)>,
+}
+
+impl Watch {
+    /// Passes what was found since the last call to `tell`, a message for each reason.
+    pub fn look<M: Model>(&mut self, block: &mut Block<M>, mut tell: impl FnMut(&str)) {
+        let mut found = Vec::new();
+        if !std::mem::replace(&mut self.begun, true) {
+            let mut start = Block::<M>::default();
+            for index in M::TABLE.indices() {
+                let Some((meta, slot)) = M::TABLE.entry(&mut start, index) else { continue };
+                let (causality, Some(at_start)) = (meta.causality, number(&slot)) else { continue };
+                match causality {
+                    Causality::Input => self.inputs.push((index, at_start)),
+                    Causality::Parameter => {
+                        find(block, (index, at_start), &mut found);
+                    }
+                    _ => (),
+                }
+            }
+        }
+        self.inputs.retain(|&input| !find(block, input, &mut found));
+        for (why, values) in found {
+            tell(&format!("{}: {why}", values.join(", ")));
+        }
+    }
+}
+
+/// Whether the variable has another value than at the start; if it does not act, `found` gets its name and value.
+fn find<M: Model>(
+    block: &mut Block<M>,
+    (index, at_start): (usize, f64),
+    found: &mut Vec<(&'static str, Vec<String>)>,
+) -> bool {
+    let value = M::TABLE.entry(block, index).and_then(|(_, slot)| number(&slot));
+    if value.is_none_or(|value| value.to_bits() == at_start.to_bits()) {
+        return false;
+    }
+    let name = M::TABLE.locate(index).map(|(name, ..)| name).unwrap_or_default();
+    if let (Some(why), Some(told)) = (block.model.idle(&name), M::TABLE.tell_index(block, index)) {
+        match found.iter_mut().find(|(other, _)| *other == why) {
+            Some((_, values)) => values.push(told),
+            None => found.push((why, vec![told])),
+        }
+    }
+    true
+}
+
+/// The value of a number, a Boolean or an enumeration.
+#[expect(clippy::cast_precision_loss, reason = "compared with itself alone")]
+fn number(slot: &Slot<'_>) -> Option<f64> {
+    match slot {
+        Slot::Real(x) => Some(**x),
+        Slot::Boolean(x) => Some(f64::from(u8::from(**x))),
+        Slot::Integer(x) => Some(x.get() as f64),
+        Slot::Enumeration(x) => Some(f64::from(x.get())),
+        _ => None,
+    }
+}
