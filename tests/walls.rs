@@ -376,6 +376,7 @@ const OF_THE_DRIVE: &[(&str, &[&str])] = &[
             "circuit.rs",
             "counters.rs",
             "flux_map.rs",
+            "idle.rs",
             "integration.rs",
             "inverter.rs",
             "legs.rs",

@@ -1,7 +1,6 @@
 //! When the variables of the drive act: those of its plant, its controller and its DC link.
 
 use crate::dc_link::LinkParameters;
-use crate::pmsm_drive::DriveInputs;
 use drive_control::idle as control;
 use drive_control::tables::ControllerParameters;
 use drive_plant::idle as plant;
@@ -23,18 +22,17 @@ const LINK: &[Acts<LinkParameters>] = &[
     },
 ];
 
-/// Why the parameter or input `name` of a drive has no effect.
+/// Why the parameter or input `name` of a drive has no effect, with the inputs `u_dc` (V), `speed_shaft` and `angle_shaft`.
 pub(crate) fn of_drive(
     (plant, controller, link): (&PlantParameters, &ControllerParameters, &LinkParameters),
-    inputs: &DriveInputs,
+    (u_dc, shaft): (f64, [f64; 2]),
     name: &str,
 ) -> Option<&'static str> {
-    let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = *inputs;
     if name == "u_dc" && u_dc == 0.0 {
         return Some(control::NO_VOLTAGE);
     }
     if let Some(name) = name.strip_prefix("plant.") {
-        let rests = name == "mechanics.imposed" && speed_shaft == 0.0 && angle_shaft == 0.0;
+        let rests = name == "mechanics.imposed" && shaft == [0.0; 2];
         return if rests { Some(plant::AT_REST) } else { why(plant::ACTS, plant, name) };
     }
     match name.strip_prefix("controller.") {

@@ -215,7 +215,8 @@ impl Model for PmsmDrive {
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
-        idle::of_drive((plant, controller, &self.link_parameters), &self.inputs, name)
+        let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        idle::of_drive((plant, controller, &self.link_parameters), (u_dc, [speed_shaft, angle_shaft]), name)
     }
 
     fn derive(&mut self) {

@@ -242,7 +242,8 @@ impl Model for PmsmDriveMean {
             return Some(ONLY_IN_THE_DRIVE);
         }
         let Steady { plant, controller, .. } = &self.drive;
-        idle::of_drive((plant, controller, &self.link_parameters), &self.inputs, name)
+        let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
+        idle::of_drive((plant, controller, &self.link_parameters), (u_dc, [speed_shaft, angle_shaft]), name)
     }
 
     fn derive(&mut self) {
