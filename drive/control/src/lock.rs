@@ -516,7 +516,7 @@ mod tests {
         let sample = Sample { u: AlphaBeta::new(2.0, 0.0), ..Sample::default() };
         let mut lock = Lock::default();
         for _ in 0..=3183 {
-            lock.update(&gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None));
+            lock.update(&gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None, 0.0));
         }
         assert!((lock.e.d() / 2.0 - 1.0 + (-1.0_f64).exp()).abs() < 1e-3, "{:?}", lock.e);
     }
