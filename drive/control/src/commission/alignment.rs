@@ -12,7 +12,6 @@
 //! rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the swing must
 //! also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
 
-use super::bench::Bench;
 use drive_base::math::{sin_cos, wrap};
 use serde::{Deserialize, Serialize};
 
@@ -30,6 +29,9 @@ const STIFF: f64 = 0.6;
 /// What the angles at rest have shown.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Alignment {
+    /// Current in A of an alignment where 0.4 I is too much, and about the flux linkage of the magnet in Wb; 0: it is not.
+    pub(super) i_0: f64,
+    pub(super) psi_1: f64,
     /// Angle in rad of the smaller inductance from the current, of the last look.
     off: f64,
     looks: f64,
@@ -51,29 +53,29 @@ pub(super) enum Looked {
 }
 
 impl Alignment {
-    /// The rotor rests with its smaller inductance `angle` (rad) from the current.
-    pub(super) fn look(&mut self, bench: &mut Bench, angle: f64) -> Looked {
-        let (i, before) = (bench.aligned(), self.off);
+    /// The rotor rests with its smaller inductance `angle` (rad) from the current `i` (A), of `I` (A); the greater one is greater
+    /// by `salient` (H).
+    pub(super) fn look(&mut self, [i, I]: [f64; 2], salient: f64, angle: f64) -> Looked {
+        let before = self.off;
         // Half of a turn is the same axis.
         self.off = 0.5 * wrap(2.0 * angle).abs();
         self.looks += 1.0;
-        let salient = bench.tensor.saliency();
         if self.off <= ALONG {
-            if bench.i_0 > 0.0 {
-                bench.psi_1 = bench.psi_1.max(salient * i);
-                bench.i_0 = i.min(STIFF * bench.psi_1 / salient);
+            if self.i_0 > 0.0 {
+                self.psi_1 = self.psi_1.max(salient * i);
+                self.i_0 = i.min(STIFF * self.psi_1 / salient);
             }
             self.over = true;
             return Looked::Over;
         }
         let follows = self.looks < 1.5 || (self.off - before).abs() > FOLLOWS;
-        if follows && i > FEWEST * bench.I {
+        if follows && i > FEWEST * I {
             let cos = sin_cos(self.off).1;
-            bench.psi_1 = salient * i * cos;
-            bench.i_0 = i * if self.off > ACROSS { NEXT } else { STIFF * cos };
+            self.psi_1 = salient * i * cos;
+            self.i_0 = i * if self.off > ACROSS { NEXT } else { STIFF * cos };
             return Looked::Lower;
         }
-        (bench.i_0, bench.psi_1) = (0.0, 0.0);
+        (self.i_0, self.psi_1) = (0.0, 0.0);
         (self.over, self.inverse) = (true, self.off > ACROSS);
         self.stuck = !self.inverse && self.off > std::f64::consts::FRAC_PI_4;
         Looked::Over
@@ -82,18 +84,18 @@ impl Alignment {
 
 #[cfg(test)]
 mod tests {
-    use super::super::probe::Tensor;
     use super::*;
 
     /// Looks at a rotor that rests `off(i)` (rad) from the current i (A), until no look follows.
-    fn looked(off: impl Fn(f64) -> f64) -> (Alignment, Bench) {
-        let mut bench = Bench { I: 50.0, tensor: Tensor::of(10e-3, 30e-3), ..Bench::default() };
-        let mut alignment = Alignment::default();
+    fn looked(off: impl Fn(f64) -> f64) -> (Alignment, f64) {
+        let (mut i, mut alignment) = (20.0, Alignment::default());
         for side in [1.0, -1.0].into_iter().cycle().take(20) {
             // An axis has two directions.
-            let angle = side * off(bench.aligned()) + if side > 0.0 { std::f64::consts::PI } else { 0.0 };
-            if alignment.look(&mut bench, angle) == Looked::Over {
-                return (alignment, bench);
+            let angle = side * off(i) + if side > 0.0 { std::f64::consts::PI } else { 0.0 };
+            let over = alignment.look([i, 50.0], 20e-3, angle) == Looked::Over;
+            i = if alignment.i_0 > 0.0 { alignment.i_0 } else { 20.0 };
+            if over {
+                return (alignment, i);
             }
         }
         panic!("no end: {alignment:?}");
@@ -103,21 +105,21 @@ mod tests {
     #[test]
     fn a_magnet_beside_the_current_gets_less_current() {
         for i_1 in [15.0_f64, 8.0, 3.0] {
-            let (found, bench) = looked(|i| (i_1 / i).min(1.0).acos());
+            let (found, i) = looked(|i| (i_1 / i).min(1.0).acos());
             assert!(found.over && !found.inverse && !found.stuck, "{found:?}");
-            assert!(bench.aligned() <= i_1 && bench.aligned() > 0.25 * i_1, "{} A of {i_1} A", bench.aligned());
-            assert!((bench.psi_1 / (20e-3 * i_1) - 1.0).abs() < 0.1, "{} Wb of {i_1} A", bench.psi_1);
+            assert!(i <= i_1 && i > 0.25 * i_1, "{} A of {i_1} A", i);
+            assert!((found.psi_1 / (20e-3 * i_1) - 1.0).abs() < 0.1, "{} Wb of {i_1} A", found.psi_1);
         }
-        let (found, bench) = looked(|_| 0.1);
-        assert!(found.over && bench.i_0 == 0.0 && bench.psi_1 == 0.0, "0.4 I is little enough: {bench:?}");
+        let (found, i) = looked(|_| 0.1);
+        assert!(found.over && found.i_0 == 0.0 && found.psi_1 == 0.0, "0.4 I is little enough: {found:?}, {i} A");
     }
 
     /// An angle that stays: L_d > L_q, or a rotor that does not follow.
     #[test]
     fn an_angle_that_stays_is_no_magnet_beside_the_current() {
         for (off, inverse, stuck) in [(1.55, true, false), (1.0, false, true), (0.5, false, false)] {
-            let (found, bench) = looked(|_| off);
-            assert_eq!((found.inverse, found.stuck, bench.i_0), (inverse, stuck, 0.0), "{off} rad");
+            let (found, i) = looked(|_| off);
+            assert_eq!((found.inverse, found.stuck, i.to_bits()), (inverse, stuck, 20.0_f64.to_bits()), "{off} rad");
         }
     }
 }

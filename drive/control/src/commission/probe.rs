@@ -45,12 +45,6 @@ impl Tensor {
         Self { mean, cos: cos * share, sin: sin * share }
     }
 
-    /// Of a machine with the inductances `L_d` and `L_q` (H), L_d at 0 rad.
-    #[cfg(test)]
-    pub(super) fn of(L_d: f64, L_q: f64) -> Self {
-        Self { mean: 0.5 * (1.0 / L_d + 1.0 / L_q), cos: 0.5 * (1.0 / L_d - 1.0 / L_q), sin: 0.0 }
-    }
-
     /// L in H at the angle `phi` (rad).
     pub(super) fn inductance(&self, phi: f64) -> f64 {
         let (s, c) = sin_cos(2.0 * phi);

@@ -31,7 +31,7 @@ const MOTION: [f64; 2] = [0.004, 0.1];
 /// Square of time times rate of a turn by reluctance: in small loops, and in large ones.
 const GROWN: [f64; 2] = [0.1, 1.0];
 /// Ratio of the probe's inductances above which the rest of the rotor is looked at.
-const SALIENT: f64 = 1.3;
+const SALIENT: f64 = 1.6;
 /// R T/L above which L(0) comes from a small loop's output error.
 const SLOW: f64 = 0.005;
 
@@ -307,7 +307,9 @@ impl Commission {
                 Probed::Done(_, tensor) => {
                     self.dc.u = 0.0;
                     self.bench.tensor = tensor;
-                    let again = self.alignment.look(&mut self.bench, tensor.axis() - FIRST) == Looked::Lower;
+                    let i = [self.bench.aligned(), self.bench.I];
+                    let again = self.alignment.look(i, tensor.saliency(), tensor.axis() - FIRST) == Looked::Lower;
+                    (self.bench.i_0, self.bench.psi_1) = (self.alignment.i_0, self.alignment.psi_1);
                     self.enter(if again { Stage::First } else { Stage::FirstStaircase });
                 }
             },
