@@ -6,6 +6,7 @@
 //! HOLD_ONLY=hub-36v cargo test --release -p drive-study --test hold -- --ignored --nocapture     # machines with this in the name
 //! HOLD_MACHINES=DIR ...      # the machine files of a folder, in addition
 //! HOLD_CELLS=1 ...           # a line for each cell that is not held
+//! HOLD_SET=adaptation.resistance=true,speed_loop.bandwidth=40 ...     # other values of the controller
 //! ```
 //!
 //! | of a cell | |
@@ -23,7 +24,7 @@ mod cell;
 use cell::{Cell, Outcome};
 use drive_study::queue;
 use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules::{self, Tuned};
+use drive_study::tune::rules::{self, Tuned, Value};
 use drive_study::tune::{limits, trial};
 use std::path::{Path, PathBuf};
 
@@ -48,6 +49,20 @@ fn machines() -> Vec<PathBuf> {
     let only = std::env::var("HOLD_ONLY").unwrap_or_default();
     all.retain(|path| path.to_string_lossy().contains(&only));
     all
+}
+
+/// The drive with the values of `HOLD_SET`.
+fn changed(tuned: Tuned) -> Tuned {
+    let set = std::env::var("HOLD_SET").unwrap_or_default();
+    set.split(',').filter(|one| !one.is_empty()).fold(tuned, |tuned, one| {
+        let (name, value) = one.split_once('=').unwrap_or_else(|| panic!("HOLD_SET: {one} is not NAME=VALUE"));
+        let value = match (value.parse(), value.parse()) {
+            (Ok(x), _) => Value::Real(x),
+            (_, Ok(yes)) => Value::Boolean(yes),
+            _ => Value::Item(value.into()),
+        };
+        tuned.with(name.to_owned().leak(), value)
+    })
 }
 
 /// Counts of the cells of a machine or of all.
@@ -155,6 +170,7 @@ fn held_or_said() {
                 continue;
             }
         };
+        let tuned = changed(tuned);
         let outcomes = run(&tuned, &cell::all());
         let told = told(&motor, &tuned);
         if std::env::var("HOLD_CELLS").is_ok() {

@@ -42,8 +42,12 @@
 //! an offset of current or voltage makes it drift. It also acts where the speed reference and i_q have the same sign:
 //! a start under load then leaves the false lock at the limit of i_q. For a generating load it would be unstable.
 //!
-//! Not observable: R^ without current or while the reference is a speed; theta~ at rest; psi_M^ at rest. In torque mode
-//! nothing indicates whether the rotor is at standstill: R^ stays `motor.R_s`.
+//! **In torque mode**, no torque asked for stands for rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
+//! vanish, so R^ may adapt while the rotor coasts below 2 rad/s, too. There it goes to the R^ that explains the error of psi_M^,
+//! x = -d, and returns within 1 / b once the rotor rests. R^ begins with `motor.R_s` and stays constant as long as a torque is
+//! asked for; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will turn.
+//!
+//! Not observable: R^ without current, while the reference is a speed, or while it is a torque; theta~ and psi_M^ at rest.
 
 use crate::estimator::{Context, Sample, Setup};
 use drive_base::frame::DqHat;
@@ -61,6 +65,12 @@ pub(super) const FILTER: f64 = 100.0;
 
 /// Current i_q below which the tracking slows down, as a share of `adaptation.i`.
 const LITTLE: f64 = 0.12;
+
+/// Current i_q that counts as no torque in torque mode, as a share of `adaptation.i`.
+const NO_TORQUE: f64 = 5e-3;
+
+/// Least c_1 in torque mode, as a share of c_1.
+const LEAST_C_1: f64 = 0.2;
 
 /// Parameters of the adaptation; shares are relative to `motor.R_s`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -105,8 +115,7 @@ impl Default for ResistanceParameters {
 }
 
 impl ResistanceParameters {
-    /// First estimate in Ohm: `motor.R_s` in torque mode, where nothing indicates
-    /// whether the rotor is at standstill.
+    /// First estimate in Ohm: `motor.R_s` in torque mode, where a torque that is asked for at once leaves no time to adapt.
     pub(super) fn first(&self, motor: &Motor, sample: &Sample) -> f64 {
         let share = if sample.speed_ref.is_some() { self.start } else { 1.0 };
         share * motor.R_s
@@ -152,12 +161,15 @@ impl Resistance {
         let Context { motor, T_s, par, .. } = *context;
         let (par, c_1, n_p) = (&par.adaptation, par.rasmussen.c_1, f64::from(motor.n_p));
         self.w_f += T_s * FILTER * (w - self.w_f);
-        let Some(speed_ref) = sample.speed_ref else { return Adapted { c_1, v_q: 0.0 } };
+        // Whether nothing is asked for, the sign of what is, and the least speed at which c_1 is full.
+        let (rest, asked, least) = match sample.speed_ref {
+            Some(speed_ref) => (speed_ref.abs() < STANDSTILL, speed_ref, n_p * speed_ref.abs()),
+            None => (sample.i_ref.q().abs() < NO_TORQUE * par.i, 0.0, LEAST_C_1 * c_1),
+        };
         let share = self.w_f / (n_p * GATE);
         let near = (1.0 - share * share).max(0.0);
         let g = near * near * near * near;
-        let rest = speed_ref.abs() < STANDSTILL;
-        let v_q = if rest || speed_ref * i.q() > 0.0 { par.k_a * motor.R_s * g * i.q() } else { 0.0 };
+        let v_q = if rest || asked * i.q() > 0.0 { par.k_a * motor.R_s * g * i.q() } else { 0.0 };
         if rest {
             let rate = T_s * par.bandwidth * g / (i.d() * i.d() + i.q() * i.q() + par.i * par.i);
             let R = self.R + rate * c_1 * x * i.d();
@@ -168,7 +180,7 @@ impl Resistance {
         if par.tracking > 0.0 {
             self.track(context, x, i.q());
         }
-        let low = c_1.min(par.k_c * self.w_f.abs().max(n_p * speed_ref.abs()));
+        let low = c_1.min(par.k_c * self.w_f.abs().max(least));
         Adapted { c_1: low + self.remaining * self.remaining * (c_1 - low), v_q }
     }
 }
