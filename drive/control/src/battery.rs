@@ -149,4 +149,15 @@ mod tests {
         let (low, high) = Battery::default().limits(&par, &motor, 500.0, 50.0, DqHat::ZERO);
         assert!((high - 20.0).abs() < 1e-12 && (low - 10.0).abs() < 1e-12, "{low} {high}");
     }
+
+    /// The power of i_d is smoothed: a quarter of the change in a sample.
+    #[test]
+    fn the_power_of_i_d_follows_in_some_samples() {
+        let (motor, par, mut battery) = (Motor::IPMSM_2_2_KW, DcLimits::default(), Battery::default());
+        let whole = 1.5 * motor.R_s * 16.0;
+        for share in [0.25, 0.4375] {
+            battery.limits(&par, &motor, 540.0, 50.0, DqHat::new(-4.0, 1.0));
+            assert!((battery.p_d / whole - share).abs() < 1e-12, "{} W of {whole} W", battery.p_d);
+        }
+    }
 }

@@ -388,6 +388,29 @@ mod tests {
         }
     }
 
+    /// Beyond the hexagon the injection is cut in the same ratio; the estimators see the command, or with `observe` the output.
+    #[test]
+    fn the_estimators_see_what_is_left_of_an_injection() {
+        let (mut controller, mut frame) = turning(200.0, |c| c.inputs.u_dc = 60.0);
+        frame.injection = Injection::Stator(AlphaBeta::new(10.0, -20.0));
+        controller.modulate(Mode::Voltage(DqHat::new(0.0, 90.0)), &frame, DqHat::ZERO, false);
+        let Command { u, injected } = controller.state.commands[0];
+        let whole = frame.axis.ahead(frame.half).ahead(frame.half).ahead(frame.half).to_stator(DqHat::new(0.0, 90.0))
+            + AlphaBeta::new(10.0, -20.0);
+        let share = u.magnitude() / whole.magnitude();
+        assert!(share < 0.6 && (injected - AlphaBeta::new(10.0, -20.0) * share).magnitude() < 1e-9, "{injected:?}");
+        for observe in [false, true] {
+            let (mut controller, frame) = turning(200.0, |c| {
+                (c.parameters.compensation.u_dead, c.parameters.compensation.observe) = (6.5, observe);
+                c.inputs.u_dc = 325.0;
+            });
+            let (output, ..) =
+                controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, DqHat::new(0.0, 4.0), false);
+            let beside = (output.to_stator() - controller.state.commands[0].u).magnitude();
+            assert_eq!(beside < 1e-9, observe, "{beside} V");
+        }
+    }
+
     /// The next sample reads what the PI gave, and the torque of the references.
     #[test]
     fn the_next_sample_reads_references_and_output() {

@@ -357,4 +357,17 @@ mod tests {
             assert!((S - expected).abs() < 1e-3, "{S}, not {expected}");
         }
     }
+
+    /// The voltage is smoothed at 50 Hz: 1 - 1/e after 3.2 ms.
+    #[test]
+    fn the_voltage_is_smoothed_at_50_hz() {
+        let (motor, T_s) = (Motor::default(), 1e-6);
+        let gains = LockGains::new(&LockParameters::default(), &motor, T_s, REACH);
+        let sample = Sample { u: AlphaBeta::new(2.0, 0.0), ..Sample::default() };
+        let mut lock = Lock::default();
+        for _ in 0..=3183 {
+            lock.update(&gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None));
+        }
+        assert!((lock.e.d() / 2.0 - 1.0 + (-1.0_f64).exp()).abs() < 1e-3, "{:?}", lock.e);
+    }
 }

@@ -181,4 +181,15 @@ mod tests {
         }
         assert!((offset.i.a - 0.02).abs() < 1e-5, "{}", offset.i.a);
     }
+
+    #[test]
+    fn each_phase_has_its_gain_and_its_offset() {
+        let sensor = Sensor {
+            gain: Phases { a: 1.1, b: 0.9, c: 1.2 },
+            offset: Phases { a: 0.1, b: -0.2, c: 0.3 },
+            ..Sensor::default()
+        };
+        let Phases { a, b, c } = sensor.measure(Phases { a: 1.0, b: 2.0, c: -3.0 }, 4);
+        assert!((a - 1.2).abs() < 1e-12 && (b - 1.6).abs() < 1e-12 && (c + 3.3).abs() < 1e-12, "{a} {b} {c}");
+    }
 }

@@ -277,4 +277,22 @@ mod tests {
             assert!((i_ref.q() / expected - 1.0).abs() < 0.01, "{w} rad/s: {} A, not {expected} A", i_ref.q());
         }
     }
+
+    /// First a quarter of a turn behind the estimate, then on it, then n_p times the acceleration.
+    #[test]
+    fn the_current_stands_behind_and_then_accelerates() {
+        let par = StartParameters::default();
+        for (reference, side) in [(50.0, 1.0), (-50.0, -1.0)] {
+            for (t, angle, speed) in [
+                (0.5 * par.t_align, Some(-FRAC_PI_2), 0.0),
+                (1.5 * par.t_align, Some(0.0), 0.0),
+                (2.0 * par.t_align + 0.1, None, side * 3.0 * 100.0 * 0.1),
+            ] {
+                let (step, _) = beside(reference, t, |frame, _| frame);
+                let StartStep::Current { theta, w, .. } = step else { panic!("{step:?}") };
+                assert!(angle.is_none_or(|angle| (theta - angle).abs() < 1e-9), "{theta} rad after {t} s");
+                assert!((w - speed).abs() < 0.2, "{w} rad/s after {t} s, not {speed}");
+            }
+        }
+    }
 }

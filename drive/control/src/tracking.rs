@@ -85,4 +85,17 @@ mod tests {
         assert!((LeastTracker::new(&par).at(1e9) - 30.0).abs() < 1e-9, "a third of the EMF's bandwidth");
         assert!(LeastTracker::new(&par).at(-5.0).abs() < 1e-12, "no torque by angle, no bound");
     }
+
+    /// Where the set bandwidth leaves less than the margin of 1.5, weakening does not raise it at A = 0.
+    #[test]
+    fn a_tracker_with_little_margin_stays() {
+        let mut par = ControllerParameters { estimator: Kind::ExtendedEmf, ..ControllerParameters::default() };
+        par.estimators.emf.bandwidth = 1e4;
+        (par.speed_loop.bandwidth, par.speed_loop.t_is) = (40.0, 4.0);
+        for (rho, expected) in [(50.0, 50.0), (60.0, 60.0), (90.0, 60.0)] {
+            par.estimators.tracker.bandwidth = rho;
+            let least = LeastTracker::new(&par).at(0.0);
+            assert!((least - expected).abs() < 1e-9, "{least} rad/s with {rho} rad/s");
+        }
+    }
 }

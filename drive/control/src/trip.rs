@@ -146,3 +146,48 @@ pub const TRIP: &Table<TripParameters> = table![
         |p| &mut p.asc,
     ),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Any phase in either direction, and the link, beyond the limits alone.
+    #[test]
+    fn each_phase_and_the_link_trip() {
+        let par = TripParameters { i: 15.0, u_dc: 450.0, ..TripParameters::default() };
+        for side in [1.0, -1.0] {
+            for (i, cause) in [(14.9, Cause::None), (15.1, Cause::OverCurrent)] {
+                let i = side * i;
+                for (a, b, c) in [(i, 0.0, 0.0), (0.0, i, 0.0), (0.0, 0.0, i)] {
+                    assert_eq!(par.cause(Phases { a, b, c }, 449.0), cause, "{a} {b} {c} A");
+                }
+            }
+        }
+        assert_eq!(par.cause(Phases::default(), 451.0), Cause::OverVoltage);
+    }
+
+    /// sqrt 3 psi_M n_p |w| is the line-to-line EMF: beyond u_dc the machine is shorted until 0.9 u_dc, by the measured speed, or
+    /// by that at the trip.
+    #[test]
+    fn a_short_circuit_begins_and_ends_by_the_emf() {
+        let mut par = ControllerParameters::default();
+        par.trip.asc = true;
+        let at = 300.0 / (3.0_f64.sqrt() * par.motor.psi_M * 3.0);
+        for side in [1.0, -1.0] {
+            let mut trip = Trip::new(Cause::OverVoltage, 0.0);
+            for (share, shorts) in [(0.95, false), (1.01, true), (0.91, true), (0.89, false), (0.99, false)] {
+                let inputs =
+                    ControllerInputs { u_dc: 300.0, speed_meas: side * share * at, ..ControllerInputs::default() };
+                trip.update(&par, &inputs, true);
+                assert_eq!(trip.shorts, shorts, "{share} of the speed, {side}");
+                let mut without = Trip::new(Cause::OverVoltage, side * 1.01 * at);
+                without.update(&par, &inputs, false);
+                assert!(without.shorts, "the speed at the trip stays");
+            }
+        }
+        par.trip.asc = false;
+        let mut trip = Trip::new(Cause::OverVoltage, 2.0 * at);
+        trip.update(&par, &ControllerInputs { u_dc: 300.0, ..ControllerInputs::default() }, false);
+        assert!(!trip.shorts);
+    }
+}

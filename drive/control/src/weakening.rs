@@ -434,4 +434,17 @@ mod tests {
             u.magnitude()
         );
     }
+
+    /// A torque is the i_q of the magnet alone, and i_d = -psi_M / L_d cancels the magnet, on a salient machine, too.
+    #[test]
+    fn the_gains_count_the_magnet_along_d() {
+        let motor = Motor::IPMSM_2_2_KW;
+        let mut par = ControllerParameters { motor: motor.clone(), ..ControllerParameters::default() };
+        for (limit, least) in [(1e3, -motor.psi_M / motor.L_d), (7.0, -7.0)] {
+            par.limit.i = limit;
+            let gains = WeakeningGains::new(&par, 20.0, false);
+            assert!((gains.least - least).abs() < 1e-12, "{} A", gains.least);
+            assert!((gains.per_torque * 1.5 * f64::from(motor.n_p) * motor.psi_M - 1.0).abs() < 1e-12);
+        }
+    }
 }

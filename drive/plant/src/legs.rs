@@ -123,3 +123,25 @@ impl Legs {
         (a.abs().max(b.abs()).max(c.abs()), phases(Dq::new(0.0, w * motor.psi_M)).span())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With the gates off, the diodes of two legs conduct where the line-to-line back EMF exceeds the link and their thresholds.
+    #[test]
+    fn the_diodes_open_by_the_link_and_their_thresholds() {
+        let (motor, mut inverter) = (Motor::default(), Inverter::default());
+        inverter.devices.u_diode = 10.0;
+        let legs = Legs::off(&inverter, motor.L_d, 300.0);
+        // Along phase a, the line-to-line voltage of the EMF on the q-axis is the greatest.
+        let axis = Axis::<Rotor>::at(0.0);
+        for (share, blocks) in [(0.99, true), (1.01, false)] {
+            let w = share * 320.0 / (3.0_f64.sqrt() * motor.psi_M);
+            assert_eq!(legs.block(&motor, axis, Dq::ZERO, w), blocks, "{share}");
+            let [current, voltage] = legs.excess(&motor, axis, Dq::ZERO, w);
+            assert!((current + 1.0).abs() < 1e-12 && (voltage - share + 1.0).abs() < 1e-12, "{current} {voltage}");
+        }
+        assert!(!legs.block(&motor, axis, Dq::new(2.0 * legs.i_zone(), 0.0), 0.0), "it carries a current");
+    }
+}

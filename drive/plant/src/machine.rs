@@ -191,4 +191,21 @@ mod tests {
         assert!((Machine::<_>::new(&motor, Magnetics::Linear).torque(psi, i) - expected).abs() < 1e-14);
         assert!((current(&motor, Magnetics::Linear, psi).q() - 4.0).abs() < 1e-14);
     }
+
+    /// Saturation adds to the current, in either axes.
+    #[test]
+    fn saturation_adds_to_the_current() {
+        let motor = Motor { L_q: 9e-3, ..Motor::default() };
+        let saturation = Saturation { s_2: 40.0, s_3: 300.0, s_dq: 7.0 };
+        let magnetics = Magnetics::Polynomial(&saturation);
+        let (x, q) = (0.05, -0.03);
+        let psi = Dq::new(motor.psi_M + x, q);
+        let expected =
+            Dq::new(x / motor.L_d + 40.0 * x * x + 300.0 * x * x * x + 3.5 * q * q, q / motor.L_q + 7.0 * x * q);
+        assert!((current(&motor, magnetics, psi) - expected).magnitude() < 1e-12);
+        let axis = Axis::<Rotor>::at(0.8);
+        let machine = Machine::<_>::new(&motor, magnetics);
+        let i = machine.stator_current(axis, machine.to_stator(axis, psi));
+        assert!((axis.from_stator(i) - expected).magnitude() < 1e-12, "{i:?}");
+    }
 }

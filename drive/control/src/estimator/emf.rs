@@ -246,4 +246,24 @@ mod tests {
             assert!((tracker.w - w - slow - 1e-4 * rho * rho * expected).abs() < 1e-9, "{w} rad/s: {tracker:?}");
         }
     }
+
+    /// Where the EMF is less than that of w_h, its own sign is that of the direction; beyond, the tracker's is.
+    #[test]
+    fn the_direction_comes_from_a_small_emf() {
+        let (mut par, motor) = (crate::estimator::EstimatorParameters::default(), drive_base::motor::Motor::default());
+        par.emf.hold_reversal = true;
+        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        for share in [0.9, 1.1] {
+            // The rotor turns backwards, the tracker still forwards.
+            let (mut tracker, mut direction) = (Tracker::at(0.0, 1.0, 1e-4), Direction::of(1.0));
+            let length = share * par.emf.w_hold * motor.psi_M;
+            let e = DqHat::new(0.1 * length, -length);
+            follow(&mut tracker, &mut direction, &context, e, &Sample::default());
+            let angle = f64::atan2(0.1, 1.0) - if share < 1.0 { 0.0 } else { std::f64::consts::PI };
+            let g = 1.0 / (1.0 + share * share * 1.01);
+            let correction = (tracker.w_frame - tracker.w) / par.tracker.bandwidth;
+            let expected = (1.0 - g) * angle * (2.0 - 1e-4 * par.tracker.bandwidth);
+            assert!((correction - expected).abs() < 1e-9, "{correction}, not {expected}, at {share} w_h");
+        }
+    }
 }

@@ -250,4 +250,50 @@ mod tests {
             assert!((observer.h - expected).magnitude() < 1e-15, "{:?}, not {expected:?} at {w} rad/s", observer.h);
         }
     }
+
+    /// One sample beside a rotor at `w` (rad/s), after which the flux is `error` (Wb) too long and h is `h` (Wb/Ohm), both along d.
+    fn after(par: &EstimatorParameters, w: f64, error: f64, h: f64) -> FluxObserver {
+        let (motor, T_s) = (salient(), 1e-4);
+        let context = Context { par, motor: &motor, J: 15e-3, T_s };
+        let (mut observer, _) =
+            FluxObserver::start(&context, &Sample { speed_ref: Some(w), ..Sample::default() }, 0.4, w);
+        let d = Axis::<Estimated>::at(0.4 + T_s * w);
+        (observer.h, observer.w_f) = (d.along(h), 0.0);
+        let u = (d.along(motor.psi_M + error) - observer.psi) * (1.0 / T_s);
+        observer.update(&context, &Sample { u, speed_ref: Some(w), ..Sample::default() });
+        observer
+    }
+
+    /// v = c r psi_a, c = R/2 (1/L_d + 1/L_q) + k_w |w|, and the speed that bounds c follows with FILTER.
+    #[test]
+    fn the_feedback_grows_with_the_speed() {
+        let (par, motor) = (EstimatorParameters::default(), salient());
+        for w in [300.0, -300.0] {
+            let observer = after(&par, w, 0.01, 0.0);
+            let c = 0.5 * motor.R_s * (1.0 / motor.L_d + 1.0 / motor.L_q) + par.flux_observer.k_w * 300.0;
+            assert!((observer.v - DqHat::new(-0.01 * c, 0.0)).magnitude() < 1e-9, "{:?} at {w} rad/s", observer.v);
+            assert!((observer.w_f - 1e-4 * FILTER * w).abs() < 1e-9, "{} rad/s", observer.w_f);
+        }
+    }
+
+    /// dR^/dt = b r rho / (rho^2 + rho_0^2), psi^ += h dR^, and psi_M^ follows -r the less, the more R^ has to do with it.
+    #[test]
+    fn what_the_resistance_explains_is_not_the_magnet() {
+        let (mut par, motor) = (EstimatorParameters::default(), salient());
+        (par.adaptation.resistance, par.flux_observer.magnet) = (true, 5.0);
+        let R = par.adaptation.first(&motor, &Sample { speed_ref: Some(300.0), ..Sample::default() });
+        let c_0 = 0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q);
+        let (rho_0, r) = (par.adaptation.i / (c_0 * motor.psi_M), -0.01 / motor.psi_M);
+        for share in [0.0, 0.3, 1.0] {
+            let rho = share * rho_0;
+            let observer = after(&par, 300.0, 0.01, rho * motor.psi_M);
+            let dR = 1e-4 * par.adaptation.bandwidth * r * rho / (rho * rho + rho_0 * rho_0);
+            assert!((observer.R - R - dR).abs() < 1e-12, "{} Ohm at {share} rho_0", observer.R);
+            let longer = observer.psi.magnitude() - motor.psi_M - 0.01;
+            assert!((longer - rho * motor.psi_M * dR).abs() < 1e-12, "{longer} Wb at {share} rho_0");
+            let left = 1.0 / (1.0 + (share / 0.3) * (share / 0.3));
+            let expected = -1e-4 * 5.0 * r * motor.psi_M * left;
+            assert!((observer.psi_M - motor.psi_M - expected).abs() < 1e-12, "{} Wb at {share} rho_0", observer.psi_M);
+        }
+    }
 }

@@ -138,4 +138,20 @@ mod tests {
             assert!(angle.to_degrees().abs() < 2.0, "{w} rad/s: {} deg", angle.to_degrees());
         }
     }
+
+    /// Without voltage and current, |eta| returns to psi_M: d|eta|/dt = b/2 |eta| (1 - |eta|^2 / psi_M^2); clamped, at once.
+    #[test]
+    fn the_length_returns_with_the_bandwidth() {
+        let (mut par, motor, T_s) = (EstimatorParameters::default(), salient(), 1e-4);
+        for clamped in [false, true] {
+            par.gradient = GradientParameters { bandwidth: 80.0, clamped };
+            let context = Context { par: &par, motor: &motor, J: 15e-3, T_s };
+            let (mut observer, _) = GradientObserver::start(&context, &Sample::default(), 0.0, 0.0);
+            observer.eta = observer.eta * 1.02;
+            observer.update(&context, &Sample::default());
+            let expected = if clamped { 1.0 } else { 1.02 * (1.0 + 0.5 * T_s * 80.0 * (1.0 - 1.02 * 1.02)) };
+            let length = observer.eta.magnitude() / motor.psi_M;
+            assert!((length - expected).abs() < 1e-12, "{length}, not {expected}");
+        }
+    }
 }

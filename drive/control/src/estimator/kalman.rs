@@ -387,4 +387,13 @@ mod tests {
             }
         }
     }
+
+    /// In a sample, each variance grows by its density of noise times T_s.
+    #[test]
+    fn the_variances_grow_with_the_noise() {
+        let (mut filter, noise) = (Kalman::default(), KalmanParameters::default());
+        filter.spread(&Matrix4::identity(), &noise, T_S);
+        let expected = Matrix4::from_diagonal(&Vector4::new(1e-7, 1e-4, 2.0, 0.0));
+        assert!((filter.P - expected).abs().max() < 1e-12, "{:?}", filter.P);
+    }
 }
