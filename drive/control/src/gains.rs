@@ -48,7 +48,7 @@ impl Gains {
         let weakening = WeakeningGains::new(par, tau, current.mtpa);
         let speed = SpeedGains::new(speed_loop, *J, k);
         let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
-        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
+        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p / J, lag: speed_loop.lag() };
         Self {
             current: CurrentGains::new(current, motor),
             speed,
