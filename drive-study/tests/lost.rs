@@ -11,7 +11,7 @@
 use drive::estimator::Kind;
 use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
-use drive_study::atlas::run::{self, Loss, Verdict};
+use drive_study::atlas::run::{self, Verdict};
 use drive_study::queue;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -149,5 +149,4 @@ fn the_population() {
         );
     }
     println!("{} drives, {:.0} s", drives.len(), began.elapsed().as_secs_f64());
-    let _ = Loss::ALL;
 }
