@@ -1,8 +1,9 @@
 //! Torque reference instead of speed control, and the ramp of the speed reference.
-#![allow(missing_docs)]
+#![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
 use drive::estimator::Kind;
+use drive::motor::Motor;
 use drive_study::runner;
 
 const T_S: f64 = 1e-4;
@@ -101,4 +102,46 @@ fn the_ramp_leads_the_speed() {
     // Set-point weight 0.5 and a slope: behind by slope (1 - b) t_is / w_s - ... , 2.5 rad/s at most.
     assert!(worst < 4.0, "{worst} rad/s beside the ramp");
     assert!((pair.plant.out.speed - 50.0).abs() < 0.2, "{}", pair.plant.out.speed);
+}
+
+/// A shaft that pulsates at half of its speed, like that of an engine: the observer follows with the angle error dw W / (W^2 +
+/// w_n^2), and `lock_lost` shows one that does not.
+#[test]
+fn a_pulsating_shaft() {
+    let (n_p, speed) = (21.0, 150.0);
+    for (share, w_n, found) in [(0.1, 300.0, true), (0.2, 600.0, true), (0.3, 1200.0, true), (0.7, 300.0, false)] {
+        let mut pair = Pair::default();
+        let plant = &mut pair.plant.model;
+        plant.parameters.motor = Motor { n_p: 21, R_s: 0.03, L_d: 60e-6, L_q: 60e-6, psi_M: 0.004 };
+        plant.parameters.mechanics.imposed = true;
+        let par = &mut pair.controller.model.parameters;
+        par.motor = plant.parameters.motor.clone();
+        (par.limit.i, par.limit.i_q, par.zero_speed.i_0, par.lock.u) = (60.0, 60.0, 20.0, 1.0);
+        (par.speed_loop.torque_mode, par.speed_est, par.estimators.rasmussen.w_n) = (true, speed, w_n);
+        plant.inputs.speed_shaft = speed;
+        pair.set_inputs(0.0, 0.0, 48.0);
+        pair.start().unwrap();
+        let at = |t: f64| speed * (1.0 + share * (0.5 * speed * t).sin());
+        let (mut angle, mut error, mut lost) = (0.0, 0.0_f64, 0.0_f64);
+        for k in 0..15_000_u32 {
+            let t = T_S * f64::from(k);
+            let inputs = &mut pair.plant.model.inputs;
+            (inputs.speed_shaft, inputs.angle_shaft) = (at(t), angle);
+            angle += T_S * at(t + 0.5 * T_S);
+            pair.step(T_S).unwrap();
+            if k > 5000 {
+                error = error.max(runner::rotor_ahead(&pair).abs());
+                lost = lost.max(pair.controller.out.lock_lost);
+            }
+        }
+        let W = 0.5 * speed;
+        let expected = (n_p * share * speed * W / (W * W + w_n * w_n)).to_degrees();
+        println!("+-{share}, {w_n} rad/s: {error} deg, expected {expected} deg, lock_lost {lost}");
+        if found {
+            assert!((error - expected).abs() < 0.15 * expected + 1.0, "{error} deg, not {expected} deg");
+            assert!(lost < 0.8, "{lost}");
+        } else {
+            assert!(error > 60.0 && lost > 1.0, "{error} deg: {lost}");
+        }
+    }
 }

@@ -9,6 +9,7 @@ mod machines;
 use drive::PmsmDrive;
 use drive::control::battery::DcLimits;
 use drive::pmsm_drive::DriveOutputs;
+use fmu_core::log::Warnings;
 use fmu_core::{Model, Step};
 use importer::Importer;
 use machines::{Machine, RPM, a, b, c};
@@ -159,4 +160,37 @@ fn limits_of_the_wrong_sign_are_refused() {
     drive.pair.controller.model.parameters.dc = DcLimits { used: false, max: -1.0, min: 1.0 };
     drive.derive();
     drive.validate().unwrap();
+}
+
+/// i_0 = 5 A alone would take 1.5 * 2 Ohm * 25 A2 / 325 V = 0.231 A.
+#[test]
+fn the_current_of_standstill_is_within_the_limit_and_the_drive_starts() {
+    for (max, i_0) in [(0.1, (0.1_f64 * 325.0 / 6.0).sqrt()), (0.2, (0.2_f64 * 325.0 / 6.0).sqrt()), (1.0, 5.0)] {
+        let mut drive = PmsmDrive::default();
+        let par = &mut drive.pair.controller.model.parameters;
+        (par.motor.R_s, par.dc) = (2.0, limits(max, -max));
+        let mut importer = Importer::new(drive, 2e-5, 1);
+        let (mut most, mut warned) = (0.0_f64, Vec::new());
+        for k in 0..30_000 {
+            importer.block.model.inputs.speed_ref = if k < 5000 { 0.0 } else { 300.0 * RPM };
+            let step = Step { start: importer.now, h: T_S };
+            importer.block.step(&step).unwrap();
+            importer.now = step.end();
+            let out = &importer.block.out;
+            if k == 4999 {
+                assert!((out.controller.i_ref.d - i_0).abs() < 1e-6, "{max} A: {:?}", out.controller.i_ref);
+                fmu_core::Warns::warn(
+                    &importer.block.model,
+                    &mut Warnings::to(&mut |(_, key, text)| warned.push((key, text()))),
+                );
+            }
+            // While the current rises, the magnetic field takes power, too.
+            most = most.max(if k % 5000 < 200 { 0.0 } else { out.means.p_in / 325.0 });
+        }
+        assert!(most < 1.05 * max, "{max} A: {most} A");
+        let speed = importer.block.out.plant.speed;
+        assert!((speed / (300.0 * RPM) - 1.0).abs() < 0.01, "{max} A: {speed} rad/s");
+        let told = warned.iter().any(|(key, text)| *key == "limit.i_dc_max" && text.contains("= 0.231 A"));
+        assert!(told == (i_0 < 5.0) && warned.len() < 2, "{warned:?}");
+    }
 }

@@ -34,7 +34,7 @@ pub struct Atlas {
     /// Estimators
     #[arg(long, value_name = "ESTIMATOR,...", value_delimiter = ',', default_value = "Rasmussen")]
     pub estimator: Vec<String>,
-    /// Scenarios: load, speed, heating, noise, inverter [default: load]
+    /// Scenarios: load, speed, heating, noise, inverter, cold, hot, torque, sign [default: load]
     #[arg(long, value_name = "SCENARIO,...", value_delimiter = ',')]
     pub scenario: Option<Vec<String>>,
     /// Resistance estimate as a share of the resistance [default: 11 values, 0.5..1.5]
@@ -52,7 +52,7 @@ pub struct Atlas {
     /// Angle in deg by which the rotor is ahead of the first estimate [default: 0]
     #[arg(long, value_name = "DEG,...", allow_hyphen_values = true)]
     pub angle: Option<String>,
-    /// Start from the full grid: all scenarios, 7 fluxes, speeds of both signs, 3 angles (40425 cells, about half an hour)
+    /// Start from the full grid: five scenarios, 7 fluxes, speeds of both signs, 3 angles (40425 cells, about half an hour)
     #[arg(long)]
     pub full: bool,
     /// Run only every N-th cell

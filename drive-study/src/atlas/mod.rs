@@ -7,6 +7,7 @@
 pub mod cell;
 pub mod drive;
 pub mod map;
+pub mod outside;
 pub mod report;
 pub mod run;
 

@@ -18,11 +18,12 @@
 
 use super::cell::{Cell, Course};
 use super::drive::Drive;
+use super::outside::Outside;
 use crate::runner::{Bench, step};
 use drive::Pair;
+use drive::frame::Phases;
 use drive::math::wrap;
 use fmu_core::{Fault, Model};
-use std::f64::consts::TAU;
 
 /// How the drive comes to its speed; it also decides what counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,10 +45,17 @@ const OFF: f64 = 0.05;
 /// Dead time as a share of the sample period: 2 us at 10 kHz.
 const DEAD_TIME: f64 = 0.02;
 
+/// Temperatures of `cold` and `hot` above that of the machine's data, -30 and 130 degC above 20 degC, and what copper and magnet
+/// change per K.
+const COLD: f64 = -50.0;
+const HOT: f64 = 110.0;
+const COPPER: f64 = 3.93e-3;
+const MAGNET: f64 = -1.1e-3;
+
 /// How the rotor was lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Loss {
-    /// The rotor slips against the estimated frame, by a turn or more in the last 2 s.
+    /// The rotor slips against the estimated frame, by a turn or more in the last 2 s, or by the mean of the speeds.
     Slips,
     /// Rotor and estimate turn together at a speed that is not the reference.
     Creeps,
@@ -117,6 +125,8 @@ fn course(approach: Approach, cell: &Cell, t: f64) -> (f64, f64) {
     let slow_down = |share: f64| first + share * (cell.speed - first);
     match (approach, cell.scenario) {
         (Approach::Rest, Course::Speed) => (cell.speed * step(1.5), cell.load * step(0.5)),
+        // On a shaft that something else turns.
+        (Approach::Rest, Course::Torque) => (cell.speed * ramp(0.2, 1.0), cell.load * step(1.0)),
         (Approach::Rest, _) => (cell.speed * step(0.2), cell.load * step(1.0)),
         (Approach::Turning, Course::Speed) => (slow_down(ramp(1.0, 1.8)), cell.load * ramp(0.2, 0.5)),
         (Approach::Turning, _) => (slow_down(ramp(0.2, 1.0)), cell.load * ramp(1.5, 1.8)),
@@ -140,6 +150,21 @@ fn prepared(drive: &Drive, cell: &Cell) -> Bench {
     par.sensor.noise = 0.0;
     if matches!(cell.scenario, Course::Noise | Course::Inverter) {
         par.sensor.noise = NOISE * par.limit.i;
+    }
+    let degrees = match cell.scenario {
+        Course::Cold => COLD,
+        Course::Hot => HOT,
+        _ => 0.0,
+    };
+    truth.motor.R_s *= 1.0 + COPPER * degrees;
+    truth.motor.psi_M *= 1.0 + MAGNET * degrees;
+    if cell.scenario == Course::Torque {
+        (par.speed_loop.torque_mode, truth.mechanics.imposed) = (true, true);
+        plant.inputs.speed_shaft = truth.initial.speed;
+        plant.inputs.angle_shaft = truth.initial.theta_e / f64::from(truth.motor.n_p);
+    }
+    if cell.scenario == Course::Sign {
+        par.sensor.gain = Phases { a: -1.0, b: -1.0, c: -1.0 };
     }
     if cell.scenario == Course::Inverter {
         (par.sensor.offset.a, par.sensor.offset.b) = (OFFSET * par.limit.i, -OFFSET * par.limit.i);
@@ -172,8 +197,13 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     };
     let (mut lost_at, mut before, mut after, mut last) = (None, 0.0_f64, 0.0_f64, 0.0);
     let (mut while_held, mut last_off) = (0.0_f64, 0.0);
-    let (mut speed_error, mut angle_error, mut slip, mut theta_tilde) = (0.0_f64, 0.0_f64, 0.0, 0.0);
+    let (mut speed_error, mut angle_error, mut theta_tilde) = (0.0_f64, 0.0_f64, 0.0);
     let (mut mean, mut judged) = (0.0, 0.0);
+    let (mut outside, mut angle_shaft) = (Outside::default(), 0.0);
+    let (rated, torque, torques) = (drive.bench.speed, drive.bench.torque, cell.scenario == Course::Torque);
+    let T_s = pair.controller.model.parameters.T_s;
+    let start = pair.plant.model.parameters.initial.theta_e;
+    let n_p = f64::from(pair.plant.model.parameters.motor.n_p);
     let mut hot = 0_u32;
     let course = |t: f64, p: &mut Pair| {
         let on = t >= off - 1e-9;
@@ -185,7 +215,14 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
             p.plant.model.parameters.motor.R_s = cold * (1.0 + HEATING * f64::from(hot) / 40.0);
             p.plant.model.derive();
         }
-        course(drive.approach, cell, t - off)
+        let (speed, load) = course(drive.approach, cell, t - off);
+        if torques {
+            let inputs = &mut p.plant.model.inputs;
+            (inputs.speed_shaft, inputs.angle_shaft) = (speed * rated, start / n_p + angle_shaft);
+            angle_shaft += speed * rated * T_s;
+            p.controller.model.inputs.tau_ref = load * torque;
+        }
+        (speed, load)
     };
     let finished = bench.run(end, course, |moment| {
         let (t, error, out) = (moment.t, moment.theta_tilde, &moment.pair.controller.out);
@@ -200,7 +237,9 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
         if t > end - 2.0 - 1e-9 {
             speed_error = speed_error.max(off.abs());
             angle_error = angle_error.max(error.abs().to_degrees());
-            slip += wrap(error - theta_tilde);
+            let speeds = (moment.speed, out.speed_est / rated);
+            let limited = out.current_limited || out.voltage_limited;
+            outside.see(t - end + 2.0, speeds, (error, wrap(error - theta_tilde)), out.lock_lost, limited);
             (mean, judged) = (mean + off, judged + 1.0);
             if is_off {
                 lost_at = lost_at.or(Some(t));
@@ -216,13 +255,22 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
     if !finished {
         lost_at = lost_at.or(Some(last));
     }
+    let from_outside = outside.slips() || outside.swings();
+    if finished && !from_outside && outside.limited() && mean.abs() / judged > tolerance {
+        // A limit keeps it off the reference.
+        lost_at = None;
+        while_held = outside.lock_lost();
+    }
+    if from_outside && lost_at.is_none() {
+        (lost_at, after) = (Some(end - 2.0), outside.lock_lost());
+    }
     let class = if !finished {
         Loss::Failed
-    } else if slip.abs() >= TAU {
+    } else if outside.slips() {
         Loss::Slips
     } else if (mean / judged).abs() > tolerance {
         Loss::Creeps
-    } else if speed_error > tolerance {
+    } else if speed_error > tolerance || outside.swings() {
         Loss::Swings
     } else {
         Loss::Angle

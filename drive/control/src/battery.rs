@@ -11,8 +11,16 @@
 //! i_d follows the references through a low-pass: with maximum torque per ampere i_d depends on the torque, and the limits
 //! would otherwise alternate between two samples. The controller does not know the losses of iron and inverter.
 //!
+//! At standstill i_0 of the low-speed law takes 1.5 R i_0^2 without a torque. It is lowered to the current that takes half of
+//! the limit, which leaves i_q the other half, so that the drive starts:
+//!
+//! ```text
+//! i_0 <= sqrt(i_dc_max u_dc / (3 R))
+//! ```
+//!
 //! Derived here. u in V, i in A, w in rad/s, tau in N.m.
 
+use crate::estimator::Class;
 use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
@@ -37,6 +45,32 @@ pub struct DcLimits {
 impl Default for DcLimits {
     fn default() -> Self {
         Self { used: false, max: 10.0, min: -10.0 }
+    }
+}
+
+impl DcLimits {
+    /// Greatest i_0 (A) of the low-speed law on a link of `u_dc` (V).
+    #[inline]
+    pub fn i_0(&self, motor: &Motor, u_dc: f64) -> f64 {
+        (self.max * u_dc / (3.0 * motor.R_s)).sqrt()
+    }
+
+    /// Whether the limits lower `zero_speed.i_0` on a link of `u_dc` (V).
+    pub(crate) fn lowers(par: &ControllerParameters, u_dc: f64) -> bool {
+        par.dc.used && par.estimator.class() == Class::FluxObserver && par.zero_speed.i_0 > par.dc.i_0(&par.motor, u_dc)
+    }
+
+    /// The warning of this.
+    pub(crate) fn lowered(par: &ControllerParameters, u_dc: f64) -> String {
+        let (i_0, most) = (par.zero_speed.i_0, par.dc.i_0(&par.motor, u_dc));
+        let alone = 1.5 * par.motor.R_s * i_0 * i_0 / u_dc;
+        format!(
+            "{}: {} alone would take 1.5 R_s i_0^2 / u_dc = {alone:.3} A at standstill, more than half of it; i_0 is {most:.3} A, \
+             which holds a load of up to {:.3} N.m",
+            PARAMETERS.tell(par, |p| &mut p.dc.max),
+            PARAMETERS.tell(par, |p| &mut p.zero_speed.i_0),
+            par.motor.torque_constant() * most
+        )
     }
 }
 

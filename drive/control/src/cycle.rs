@@ -11,7 +11,7 @@ use crate::tables::Compensation;
 use crate::trip::Cause;
 use crate::weakening::share;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
-use drive_base::math::wrap;
+use drive_base::math::{at_most, wrap};
 use drive_base::modulation::{dead_time_loss, limit_span};
 
 /// The estimated rotor frame at a sample and the quantities controlled in it.
@@ -63,7 +63,7 @@ impl SensorlessController {
             self.reference(mode, speed, frame.injection, tuned);
         let (u, voltage_limited, u_share) = self.modulate(mode, &frame, i_ref, tuned);
         let R_s_est = self.state.estimator.resistance(&self.in_use.estimators, &self.parameters.motor);
-        let lock_lost = self.lock(mode, &frame, &sample, R_s_est);
+        let lock_lost = self.lock(mode, &frame, &sample, R_s_est, at_most(low, high));
         self.keep(&sample, i_ref, frame.i);
 
         ControllerOutputs {
@@ -225,7 +225,7 @@ impl SensorlessController {
 
     /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.
     #[inline(always)]
-    fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample, R_s: f64) -> f64 {
+    fn lock(&mut self, mode: Mode, frame: &Frame, sample: &Sample, R_s: f64, tau: f64) -> f64 {
         let Self { parameters: par, gains, state, .. } = self;
         match mode {
             Mode::Current(_) | Mode::Voltage(_) | Mode::AfterSearch => {
@@ -235,7 +235,7 @@ impl SensorlessController {
             Mode::AfterStart | Mode::ClosedLoop => {
                 let n_p = f64::from(par.motor.n_p);
                 let w_ref = (!par.speed_loop.torque_mode).then_some(n_p * state.w_ref);
-                state.lock.update(&gains.lock, &par.motor, R_s, sample, frame.axis, (frame.w, w_ref))
+                state.lock.update(&gains.lock, &par.motor, R_s, sample, frame.axis, (frame.w, w_ref, tau))
             }
         }
     }

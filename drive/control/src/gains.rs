@@ -48,7 +48,7 @@ impl Gains {
         let weakening = WeakeningGains::new(par, tau, current.mtpa);
         let speed = SpeedGains::new(speed_loop, *J, k);
         let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
-        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p * k * i / J };
+        let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p / J, lag: speed_loop.lag() };
         Self {
             current: CurrentGains::new(current, motor),
             speed,
@@ -61,15 +61,15 @@ impl Gains {
         }
     }
 
-    /// The low-speed law of a flux observer at the estimated mechanical `speed` (rad/s), and the torque that remains; other
-    /// estimators have no such law.
+    /// The low-speed law of a flux observer with the current `i_0` (A) at the estimated mechanical `speed` (rad/s), and the torque
+    /// that remains; other estimators have no such law.
     #[inline]
-    pub(crate) fn law(&self, par: &ControllerParameters, speed: f64) -> Law {
+    pub(crate) fn law(&self, par: &ControllerParameters, i_0: f64, speed: f64) -> Law {
         if !self.observes_flux {
             return Law { limit: self.i_tau, ..Law::default() };
         }
         let share = par.zero_speed.share(speed);
-        let i_d = share * par.zero_speed.i_0;
+        let i_d = share * i_0;
         let end = if par.current.mtpa { i_d + (1.0 - share) * self.i_d_end } else { i_d };
         let i_q = par.limit.i_q_beside(end);
         let most = if Self::exact(par) { par.motor.torque(end, i_q) / self.k } else { i_q };
@@ -135,13 +135,14 @@ pub(crate) mod tests {
         });
         for tau in [3.0, -9.0] {
             for (speed, law_share) in [(0.0, 1.0), (-10.0 * std::f64::consts::LN_2, 0.5), (1e4, 0.0)] {
-                let law = gains.law(&par, speed);
+                let law = gains.law(&par, par.zero_speed.i_0, speed);
                 let i = gains.currents(&par, &law, tau / gains.k);
                 let torque = par.motor.torque(i.d(), i.q());
                 assert!((torque - tau).abs() < 1e-9, "{tau} N.m at {speed} rad/s: {torque} N.m");
                 assert!((law.share - law_share).abs() < 1e-12 && (law.i_d - 4.0 * law_share).abs() < 1e-12);
             }
-            let [still, fast] = [0.0, 1e4].map(|speed| gains.currents(&par, &gains.law(&par, speed), tau / gains.k));
+            let [still, fast] = [0.0, 1e4]
+                .map(|speed| gains.currents(&par, &gains.law(&par, par.zero_speed.i_0, speed), tau / gains.k));
             assert!((still.d() - 4.0).abs() < 1e-12, "at rest the law alone: {still:?}");
             let mtpa = max_torque_per_ampere(&par.motor, tau);
             assert!((fast - mtpa).magnitude() < 1e-6, "at speed: {fast:?}, not {mtpa:?}");
@@ -152,10 +153,10 @@ pub(crate) mod tests {
     #[test]
     fn the_low_speed_law_leaves_the_rest_of_the_current_limit() {
         let (gains, par) = controller(|p| (p.limit.i, p.limit.i_q, p.zero_speed.i_0) = (5.0, 5.0, 3.0));
-        let law = gains.law(&par, 0.0);
+        let law = gains.law(&par, par.zero_speed.i_0, 0.0);
         assert!((law.limit - 4.0).abs() < 1e-12, "{} A", law.limit);
         let (others, par) = controller(|p| p.estimator = crate::estimator::Kind::ExtendedEmf);
-        let law = others.law(&par, 0.0);
+        let law = others.law(&par, par.zero_speed.i_0, 0.0);
         assert!(law.i_d.abs() < 1e-15 && (law.limit - 6.0).abs() < 1e-12, "no law: {} A", law.limit);
     }
 }

@@ -5,26 +5,47 @@
 //! measured current. Over the last interval, `epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s` is
 //! zero if the estimate and the machine values are correct, with any injection. A rotor at another angle leaves j w
 //! psi_M (e^{j theta} - e^{j theta^}), with magnitude 2 sin(theta~/2) |w| psi_M; a wrong speed leaves the difference of
-//! the two back EMFs. epsilon is transformed to the estimated frame and smoothed at 50 Hz. A resistance that is wrong
-//! by up to 30 % explains part of it; what remains is divided by lock.u + 2 sin(lock.angle / 2) psi_M |w^|.
+//! the two back EMFs. A rotor that slips turns its EMF in the estimated frame: there the mean of epsilon is the EMF of
+//! the frame alone, and only the mean square has both, psi_M^2 (w^2 + w^^2). So epsilon is transformed to the estimated frame,
+//! smoothed, and the quotient is
+//!
+//! ```text
+//! min over dR of sqrt(mean |epsilon - dR i|^2) / (lock.u + 2 sin(lock.angle / 2) psi_M mean |w^|),  |dR| <= 0.3 R^
+//! ```
+//!
+//! dR is the part that a resistance explains which stays wrong in the same way. The smoothing, 50 Hz or 4 lock.u / psi_M,
+//! takes away no slip that matters: beyond it, the EMF of a rotor that turns with the slip still passes with
+//! 4 lock.u. A frame that turns by more than pi / 2 in a sample follows no rotor: the quotient is 10.
 //!
 //! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There the speed shows it:
 //!
 //! # Speed
 //! A rotor that turns with the estimated frame but not at the reference is lost: the estimate itself shows it. The
-//! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of the reference that a drive
-//! with half of its torque could follow, whichever is nearer:
+//! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of it, whichever is
+//! nearer. The model lags by (1 - b) t_is / w_s, what the set-point weight leaves to the integral part, and changes no faster than
+//! half of the torque that the limits leave can:
 //!
 //! ```text
-//! S = (1 / S_0) int |x| dt     while |x| > w_0 + 5 % of the reference; otherwise S decays with 8 lock.time
+//! S = (1 / S_0) int |x| dt     while |x| > w_0 + 5 % of the reference + f; otherwise S decays with 8 lock.time
 //! S_0 = 1.6 n_p i_max / K_i,   w_0 = n_p i_max / (K_i 60 lock.time)
 //! ```
 //!
+//! f is the distance of w^ from the frame's speed, at most 20 % of the reference: an estimator that takes the speed from the EMF is
+//! off by the error of psi_M, and the speed loop with it.
+//!
 //! n_p i_max / K_i is the error integral for which the speed loop goes from no torque to its limit. No load that the
 //! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. S is at most 2,
-//! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5. There is no x in torque mode.
+//! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5; then a speed that is not reached is
+//! that of a drive at its limit.
 //!
-//! The greater of the quotient and S, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
+//! A drive at its limit does not swing. So half-waves about reference and model of w^, as far as the torque that the limits leave
+//! moves the rotor, count, confirmed or not: W is the sum of their |x| over S_0 while |x| > 1.4 lock.u / psi_M, which is 5 % of the rated speed with the lock.u of `fmu tune`, each
+//! half-wave as far as the one before reached, which had the other sign; W decays with 20 lock.time and is at most 2. A load step and
+//! its overshoot are one half-wave and a small one.
+//!
+//! There is no x in torque mode: there a rotor that the load swings is no error, and the voltage shows an estimate that does not follow.
+//!
+//! The greatest of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
 //! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
 //!
 //! `lock.u` covers the errors that remain with a good estimate: what (R - R^) i leaves, and for the dead time 4/3 of a
@@ -52,12 +73,22 @@ pub const LOST: f64 = 10.0;
 const FILTER: f64 = TAU * 50.0;
 /// Bandwidth in rad/s of the smoothing of the speed error: an injection turns current noise into a noisy speed.
 const SMOOTH: f64 = TAU * 7.0;
+/// Bandwidth of the voltage, at least, in units of lock.u / psi_M: the EMF of a rotor that turns backwards beyond it still counts.
+const SLIP: f64 = 4.0;
+/// Bandwidth in rad/s of the powers.
+const MEAN: f64 = TAU * 8.0;
+/// Greatest turn of the frame in a sample in rad.
+const FASTEST: f64 = 0.5 * PI;
+/// Half of a swing that counts, in units of lock.u / psi_M.
+const SWING: f64 = 1.4;
 /// Share of R^ by which the resistance may be wrong before the voltage shows it.
 const RESISTANCE: f64 = 0.3;
 /// S_0 in units of the speed loop's error integral.
 const MARGIN: f64 = 1.6;
 /// Share of the reference by which the speed may be off.
 const SPEED: f64 = 0.05;
+/// Share of the reference that an error of psi_M explains, where the estimated speed is not that of the frame.
+const FLUX: f64 = 0.2;
 
 /// The parameters with the prefix `lock.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,14 +112,18 @@ impl Default for LockParameters {
 pub struct Reach {
     /// Integral of the electrical speed error in rad for which it goes from no torque to its limit.
     pub integral: f64,
-    /// Electrical acceleration in rad/s2 that its greatest torque gives.
+    /// Electrical acceleration in rad/s2 that a torque of 1 N.m gives.
     pub acceleration: f64,
+    /// Time in s by which the speed lags behind a reference that moves, by the weight of the set point.
+    pub lag: f64,
 }
 
 /// Gains computed from the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LockGains {
     filter: f64,
+    /// Smoothing of the powers.
+    mean: f64,
     /// Smoothing of the speed error.
     smooth: f64,
     level: f64,
@@ -103,15 +138,22 @@ pub struct LockGains {
     integrates: f64,
     /// Decay of S in a sample.
     decays: f64,
-    /// Change of the reference's model in a sample in rad/s.
+    /// Change of the reference's model in a sample in rad/s, for each N.m that the limits leave.
     follows: f64,
+    /// The model's approach to the reference in a sample.
+    lags: f64,
+    /// Half of the swing in rad/s that counts.
+    swing: f64,
+    /// Decay of the swings in a sample.
+    forgets: f64,
 }
 
 impl LockGains {
     /// For the machine estimates `motor`, the sample period `T_s` (s) and the speed loop's `reach`.
     pub fn new(par: &LockParameters, motor: &Motor, T_s: f64, reach: Reach) -> Self {
         Self {
-            filter: 1.0 - exp(-FILTER * T_s),
+            filter: 1.0 - exp(-(FILTER.max(SLIP * par.u / motor.psi_M)) * T_s),
+            mean: 1.0 - exp(-MEAN * T_s),
             smooth: 1.0 - exp(-SMOOTH * T_s),
             level: 1.0 - exp(-T_s / par.time),
             u: par.u,
@@ -121,6 +163,9 @@ impl LockGains {
             integrates: T_s / (MARGIN * reach.integral),
             decays: 1.0 - exp(-T_s / (8.0 * par.time)),
             follows: 0.5 * reach.acceleration * T_s,
+            lags: T_s / (T_s + reach.lag),
+            swing: SWING * par.u / motor.psi_M,
+            forgets: 1.0 - exp(-T_s / (20.0 * par.time)),
         }
     }
 }
@@ -134,6 +179,10 @@ pub struct Lock {
     psi: AlphaBeta,
     /// Smoothed voltage in V.
     e: DqHat,
+    /// Means of |e|^2 in V2, of e . i in V.A and of |i|^2 in A2.
+    powers: [f64; 3],
+    /// Mean of |w^| in rad/s.
+    w: f64,
     /// The output.
     level: f64,
     following: Following,
@@ -146,34 +195,69 @@ struct Following {
     d: AlphaBeta,
     /// Model of the reference in rad/s.
     w_m: f64,
+    /// Estimated speed in rad/s as far as the drive's torque moves the rotor.
+    w_r: f64,
+    /// Estimated speed less that of the frame in rad/s, smoothed.
+    apart: f64,
     /// Speed of the frame less the reference in rad/s, smoothed.
     off: f64,
     /// Speed of the frame less the model in rad/s, smoothed.
     off_m: f64,
     /// Integral of the speed error as a share of S_0.
     S: f64,
+    /// Half-waves of a swing: the present one and the last one as shares of S_0, the first signed, and what they give together.
+    half: f64,
+    last: f64,
+    W: f64,
 }
 
 impl Following {
     /// S after a sample with the d axis at `d` and the reference `w_ref` (rad/s), none in torque mode; 0 if the EMF has
     /// `confirmed` the angle.
     #[inline]
-    fn update(&mut self, gains: &LockGains, d: AlphaBeta, w_ref: Option<f64>, confirmed: bool) -> f64 {
+    fn update(
+        &mut self,
+        gains: &LockGains,
+        d: AlphaBeta,
+        (w_hat, w_ref): (f64, Option<f64>),
+        tau: f64,
+        confirmed: bool,
+    ) -> f64 {
         let w = self.d.cross(d) * gains.rate;
         self.d = d;
-        let w_ref = w_ref.unwrap_or(w);
-        self.w_m += within(w_ref - self.w_m, gains.follows);
+        let Some(w_ref) = w_ref else { return 0.0 };
+        self.w_m += within((w_ref - self.w_m) * gains.lags, gains.follows * tau);
+        let (high, low) = (at_least(w_ref, self.w_m), at_most(w_ref, self.w_m));
+        self.w_r += within(w_hat - self.w_r, 2.0 * gains.follows * tau);
+        self.swings(gains, at_least(self.w_r - high, 0.0) + at_most(self.w_r - low, 0.0));
         self.off += (w - w_ref - self.off) * gains.smooth;
         self.off_m += (w - self.w_m - self.off_m) * gains.smooth;
+        self.apart += (w_hat - w - self.apart) * gains.smooth;
         let x = at_least(at_most(self.off, self.off_m), -at_least(self.off, self.off_m));
         if confirmed {
             self.S = 0.0;
-        } else if x > gains.w_0 + SPEED * w_ref.abs() {
+        } else if x > gains.w_0 + SPEED * w_ref.abs() + at_most(self.apart.abs(), FLUX * w_ref.abs()) {
             self.S = at_most(self.S + gains.integrates * x, 2.0);
         } else {
             self.S -= self.S * gains.decays;
         }
-        self.S
+        at_least(self.S, self.W)
+    }
+
+    /// Adds half-waves of the speed error `x` (rad/s), each as far as the last one reached.
+    #[inline]
+    fn swings(&mut self, gains: &LockGains, x: f64) {
+        self.W -= self.W * gains.forgets;
+        if x.abs() > gains.swing {
+            if self.half * x < 0.0 {
+                (self.last, self.half) = (self.half.abs(), 0.0);
+            }
+            let part = gains.integrates * x;
+            self.half += part;
+            if self.half.abs() < self.last {
+                self.W = at_most(self.W + part.abs(), 2.0);
+            }
+        }
     }
 }
 
@@ -184,7 +268,8 @@ impl Lock {
     }
 
     /// `lock_lost` after a sample with the estimated frame on `axis`, turning at `w` (rad/s) with the reference `w_ref`
-    /// (rad/s), none in torque mode; `R_s` (Ohm) is the resistance that the estimator uses.
+    /// (rad/s), none in torque mode; `R_s` (Ohm) is the resistance that the estimator uses, `tau` (N.m) the torque that the limits
+    /// leave.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
     pub fn update(
@@ -194,7 +279,7 @@ impl Lock {
         R_s: f64,
         sample: &Sample,
         axis: Axis<Estimated>,
-        (w, w_ref): (f64, Option<f64>),
+        (w, w_ref, tau): (f64, Option<f64>, f64),
     ) -> f64 {
         let i = axis.from_stator(sample.i);
         let psi = DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q());
@@ -202,11 +287,19 @@ impl Lock {
             let resistive = (sample.i_last + sample.i) * (0.5 * R_s);
             let epsilon = axis.from_stator(sample.u - resistive + self.psi * gains.rate) - psi * gains.rate;
             self.e += (epsilon - self.e) * gains.filter;
+            self.w += (w.abs() - self.w) * gains.mean;
+            for (mean, now) in self.powers.iter_mut().zip([self.e.dot(self.e), self.e.dot(i), i.dot(i)]) {
+                *mean += (now - *mean) * gains.mean;
+            }
+            let [e, ei, ii] = self.powers;
             // The error of the resistance that explains most; the tiny current keeps 0/0 away.
-            let dR = within(self.e.dot(i) / (i.dot(i) + 1e-12), RESISTANCE * R_s);
-            let quotient = at_most((self.e - i * dR).magnitude() / (gains.u + gains.psi * w.abs()), LOST);
+            let dR = within(ei / (ii + 1e-12), RESISTANCE * R_s);
+            let left = at_least(e - dR * (2.0 * ei - dR * ii), 0.0);
+            let quotient = at_most(left.sqrt() / (gains.u + gains.psi * self.w), LOST);
             let confirmed = quotient < 0.5 && motor.psi_M * w.abs() > 2.0 * gains.u;
-            let level = at_least(quotient, self.following.update(gains, axis.along(1.0), w_ref, confirmed));
+            // A frame that turns by a quarter in a sample follows no rotor.
+            let quotient = if w.abs() > FASTEST * gains.rate { LOST } else { quotient };
+            let level = at_least(quotient, self.following.update(gains, axis.along(1.0), (w, w_ref), tau, confirmed));
             self.level += (level - self.level) * gains.level;
         }
         (self.started, self.psi) = (true, axis.to_stator(psi));
@@ -235,7 +328,9 @@ mod tests {
 
     const T_S: f64 = 1e-4;
     /// Reach of the reference drive.
-    const REACH: Reach = Reach { integral: 5.0, acceleration: 8000.0 };
+    const REACH: Reach = Reach { integral: 5.0, acceleration: 2000.0, lag: 0.0 };
+    /// Its torque in N.m.
+    const TAU_MAX: f64 = 4.0;
 
     /// `lock_lost` for an estimate `theta_tilde` (rad) off a loaded rotor turning at `w` (rad/s), estimated as `w_hat`.
     fn beside(theta_tilde: f64, w: f64, w_hat: f64) -> f64 {
@@ -249,7 +344,14 @@ mod tests {
             let u = (at(w * t, flux(&motor, i)) - at(w * last, flux(&motor, i))) * (1.0 / T_S)
                 + (i_now + i_last) * (0.5 * motor.R_s);
             let sample = Sample { i: i_now, i_last, u, ..Sample::default() };
-            level = lock.update(&gains, &motor, motor.R_s, &sample, Axis::at(w_hat * t - theta_tilde), (w_hat, None));
+            level = lock.update(
+                &gains,
+                &motor,
+                motor.R_s,
+                &sample,
+                Axis::at(w_hat * t - theta_tilde),
+                (w_hat, None, TAU_MAX),
+            );
         }
         level
     }
@@ -277,7 +379,7 @@ mod tests {
         let (motor, i) = (Motor::default(), AlphaBeta::new(3.0, 4.0));
         let sample = Sample { i, i_last: i, u: i * R, ..Sample::default() };
         let mut lock = Lock::default();
-        let mut update = || lock.update(gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None));
+        let mut update = || lock.update(gains, &motor, motor.R_s, &sample, Axis::at(0.0), (0.0, None, TAU_MAX));
         (0..10_000).map(|_| update()).last().unwrap()
     }
 
@@ -285,7 +387,8 @@ mod tests {
     #[test]
     fn a_wrong_resistance_explains_its_voltage() {
         let gains = LockGains::new(&LockParameters::default(), &Motor::default(), T_S, REACH);
-        assert!(at_rest(2.6, &gains) < 1e-9 && at_rest(1.4, &gains) < 1e-9);
+        // The root of the rounding of 9 V2.
+        assert!(at_rest(2.6, &gains) < 1e-7 && at_rest(1.4, &gains) < 1e-7);
         assert!((at_rest(3.2, &gains) - 0.6).abs() < 1e-3 && (at_rest(0.8, &gains) - 0.6).abs() < 1e-3);
     }
 
@@ -296,7 +399,7 @@ mod tests {
         while t < seconds {
             t += T_S;
             let d = Axis::<Estimated>::at(start + w * t).to_stator(DqHat::new(1.0, 0.0));
-            watch.update(&gains, d, Some(w_ref), confirmed);
+            watch.update(&gains, d, (w, Some(w_ref)), TAU_MAX, confirmed);
         }
         watch.S
     }
@@ -334,15 +437,62 @@ mod tests {
         }
     }
 
-    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad, and 0.675 N.m/A times 6 A accelerate
-    /// 1.5e-3 kg.m2; both count pole pairs.
+    /// A rotor that slips turns its EMF in the estimated frame; w psi_M of both, at right angles, is left of 60 V at 100 Hz.
+    #[test]
+    fn a_rotor_that_is_driven_against_the_frame_is_seen() {
+        for (w, w_hat) in [(-600.0, 20.0), (300.0, -300.0), (-900.0, 300.0)] {
+            let level = beside(0.0, w, w_hat);
+            assert!(level > 1.5, "{w} against {w_hat} rad/s: {level}");
+        }
+    }
+
+    /// A frame that turns by a quarter and more in a sample would be divided away by its own speed.
+    #[test]
+    fn a_frame_that_runs_away_is_lost() {
+        let level = beside(0.0, 300.0, 0.6 * PI / T_S);
+        assert!(level > 0.99 * LOST, "{level}");
+    }
+
+    /// W of a speed that swings by `swing` (rad/s) with 10 rad/s about a reference for a second.
+    fn swung(gains: &LockGains, swing: impl Fn(f64) -> f64) -> f64 {
+        let mut watch = Following::default();
+        (0..10_000)
+            .map(|k| {
+                watch.swings(gains, swing(T_S * f64::from(k)));
+                watch.W
+            })
+            .fold(0.0, f64::max)
+    }
+
+    /// Half-waves that alternate count, one excursion and its overshoot do not, and neither does a swing that is small.
+    #[test]
+    fn a_swing_is_seen() {
+        let gains = LockGains::new(&LockParameters::default(), &Motor::default(), T_S, REACH);
+        assert!(swung(&gains, |t| 90.0 * (30.0 * t).sin()) > 1.0);
+        assert!(swung(&gains, |t| gains.swing * (30.0 * t).sin()) < 1e-9);
+        assert!(swung(&gains, |t| 90.0 * (30.0 * t).sin().abs()) < 1e-9, "a drive at its limit");
+        // A load step: 8 rad are the greatest, the overshoot is a third.
+        let step = |t: f64| {
+            if t < 0.1 {
+                80.0
+            } else if t < 0.15 {
+                -53.0
+            } else {
+                0.0
+            }
+        };
+        assert!(swung(&gains, step) < 0.4);
+    }
+
+    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad; both count pole pairs. The set-point weight 0.5
+    /// leaves half of a change to the integral part, with 4 / (80 rad/s).
     #[test]
     fn the_gains_know_the_reach_of_the_speed_loop() {
         let mut controller = crate::SensorlessController::default();
         fmu_core::Model::derive(&mut controller);
-        let reach = Reach { integral: 3.0 * 1.6875, acceleration: 3.0 * 0.675 * 6.0 / 1.5e-3 };
+        let reach = Reach { integral: 3.0 * 1.6875, acceleration: 3.0 / 1.5e-3, lag: 0.5 * 4.0 / 80.0 };
         let expected = LockGains::new(&LockParameters::default(), &controller.parameters.motor, T_S, reach);
-        let of = |gains: &LockGains| [gains.w_0, gains.integrates, gains.follows];
+        let of = |gains: &LockGains| [gains.w_0, gains.integrates, gains.follows, gains.lags];
         for (gain, expected) in of(&controller.gains.lock).into_iter().zip(of(&expected)) {
             assert!((gain / expected - 1.0).abs() < 1e-9, "{gain}, not {expected}");
         }

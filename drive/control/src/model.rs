@@ -1,6 +1,6 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
-use crate::battery;
+use crate::battery::{self, DcLimits};
 use crate::commission::{CommissionFault, CommissionState};
 use crate::commissioning::{self, CommissionMode, Held, IDENTIFIED, Turn};
 use crate::current;
@@ -285,7 +285,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 15;
+    const STATE_VERSION: u16 = 16;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -396,6 +396,10 @@ impl Warns for SensorlessController {
                     about.map_or("", |item| item.description)
                 )
             });
+        }
+        // Where the low-speed law acts.
+        if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && DcLimits::lowers(par, self.inputs.u_dc) {
+            log.warn("limit.i_dc_max", || DcLimits::lowered(par, self.inputs.u_dc));
         }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {

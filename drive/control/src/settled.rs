@@ -33,7 +33,7 @@ impl Settled {
     #[inline]
     pub fn at<'a>(&'a self, par: &'a ControllerParameters, speed: f64, u_dc: f64, trim: f64) -> SettledAt<'a> {
         let gains = &self.gains;
-        let (law, w) = (gains.law(par, speed), f64::from(par.motor.n_p) * speed);
+        let (law, w) = (gains.law(par, par.zero_speed.i_0, speed), f64::from(par.motor.n_p) * speed);
         let (weakening, (low, high)) = if par.weakening.used {
             Weakening::settled(&gains.weakening, &par.weakening, (w, u_dc), law.limit, trim)
         } else {

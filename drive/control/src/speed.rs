@@ -38,6 +38,12 @@ impl Default for SpeedLoop {
 }
 
 impl SpeedLoop {
+    /// Time in s by which the speed lags behind a reference that moves: the proportional part sees the share b of it, the integral
+    /// part gives the rest.
+    pub fn lag(&self) -> f64 {
+        (1.0 - self.b) * self.t_is / self.bandwidth
+    }
+
     /// The reference (rad/s) one sample of `T_s` (s) after `last`, on its way to `w_ref` (rad/s).
     #[inline]
     pub fn ramped(&self, last: f64, w_ref: f64, T_s: f64) -> f64 {

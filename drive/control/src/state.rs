@@ -14,7 +14,7 @@ use crate::tables::ControllerParameters;
 use crate::trip::Trip;
 use crate::weakening::Weakening;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
-use drive_base::math::{within, wrap};
+use drive_base::math::{at_most, within, wrap};
 use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
@@ -241,7 +241,11 @@ impl State {
         if let Some(old) = old {
             self.speed.retune(old, &gains.speed, w_ref, speed);
         }
-        let law = gains.law(par, speed);
+        let mut i_0 = par.zero_speed.i_0;
+        if par.dc.used {
+            i_0 = at_most(i_0, par.dc.i_0(&par.motor, inputs.u_dc));
+        }
+        let law = gains.law(par, i_0, speed);
         let limit = law.limit;
         if par.weakening.used || par.dc.used {
             return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
