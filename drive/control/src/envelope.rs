@@ -126,7 +126,7 @@ impl Envelope {
             *warm = WarmStart::default();
             return self.at(self.on_circle(self.x_mtpa, s));
         }
-        if warm.u != [0.0; 2] {
+        if warm.u.iter().any(|&x| x != 0.0) {
             // Where it was the limit at the last sample, it mostly still is.
             let i = self.max_torque_per_volt::<TO_THE_END>(w, s, U, &mut warm.u);
             if i.magnitude() <= self.I && s * i.q() > 0.0 {
@@ -215,7 +215,7 @@ impl Envelope {
             let (i_d, i_q) = of(u);
             s * (psi_M - dL * i_d) * i_q
         };
-        let (mut u, steps) = if *warm == [0.0; 2] {
+        let (mut u, steps) = if warm.iter().all(|&x| x == 0.0) {
             // Exact without R, and without saliency.
             let (salient, length) = (self.without_resistance(w, s, U), (R * R + w * w * L_d * L_d).sqrt());
             let round = [-s * w * L_d / length, s * R / length];
