@@ -107,7 +107,7 @@ mod tests {
         for i_1 in [15.0_f64, 8.0, 3.0] {
             let (found, i) = looked(|i| (i_1 / i).min(1.0).acos());
             assert!(found.over && !found.inverse && !found.stuck, "{found:?}");
-            assert!(i <= i_1 && i > 0.25 * i_1, "{} A of {i_1} A", i);
+            assert!(i <= i_1 && i > 0.25 * i_1, "{i} A of {i_1} A");
             assert!((found.psi_1 / (20e-3 * i_1) - 1.0).abs() < 0.1, "{} Wb of {i_1} A", found.psi_1);
         }
         let (found, i) = looked(|_| 0.1);
