@@ -32,7 +32,7 @@ pub(crate) fn of_drive(
         return Some(control::NO_VOLTAGE);
     }
     if let Some(name) = name.strip_prefix("plant.") {
-        let rests = name == "mechanics.imposed" && shaft == [0.0; 2];
+        let rests = name == "mechanics.imposed" && shaft.iter().all(|&x| x == 0.0);
         return if rests { Some(plant::AT_REST) } else { why(plant::ACTS, plant, name) };
     }
     match name.strip_prefix("controller.") {

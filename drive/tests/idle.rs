@@ -89,10 +89,10 @@ fn outputs(block: &mut Block<PmsmDrive>) -> Option<Vec<u64>> {
         block.step(&step).ok()?;
         now = step.end();
         for index in PmsmDrive::TABLE.indices() {
-            if let Some((meta, Slot::Real(x))) = PmsmDrive::TABLE.entry(block, index) {
-                if meta.causality == Causality::Output {
-                    bits.push(x.to_bits());
-                }
+            if let Some((meta, Slot::Real(x))) = PmsmDrive::TABLE.entry(block, index)
+                && meta.causality == Causality::Output
+            {
+                bits.push(x.to_bits());
             }
         }
     }

@@ -43,7 +43,8 @@ pub struct Stepped {
     pub terminate: bool,
 }
 
-/// One instance. Its functions assume that the lifecycle admits them: that is judged at the gate.
+/// One instance. Its functions assume that the lifecycle admits them: the gate checks that.
+#[expect(clippy::struct_excessive_bools, reason = "independent facts")]
 pub struct Instance<E: Exported> {
     /// The standard that it was instantiated with.
     pub standard: Standard,

@@ -287,7 +287,6 @@ const fn clocks(events: &[State], scheduled: &[State]) -> Row {
 }
 
 impl Call {
-    #[expect(clippy::too_many_lines, reason = "a table")]
     const fn row(self) -> Row {
         use Next::{Configure, Configured, Start, Stay, To};
         use State::{

@@ -159,7 +159,7 @@ pub(super) fn text(package: &str, about: &str, interface: &Interface, machine: &
     }
     if let Some((u, i, area)) = &interface.link {
         let Area { x1, y1, x2, y2 } = area.unwrap_or(around(0.0, 100.0, 10.0));
-        let (x, y) = ((x1 + x2) / 2.0, (y1 + y2) / 2.0);
+        let (x, y) = (f64::midpoint(x1, x2), f64::midpoint(y1, y2));
         for (pin, class, sign, at, what) in
             [("p", "Positive", "", x - 40.0, "Positive"), ("n", "Negative", "-", x + 40.0, "Negative")]
         {
@@ -173,7 +173,7 @@ pub(super) fn text(package: &str, about: &str, interface: &Interface, machine: &
         let _ = writeln!(equations, "  if not use_dc_link then\n    v_p = {u}_constant;\n    v_n = 0;\n  end if;");
         let _ = writeln!(equations, "  fmu.{u} = v_p - v_n;");
     }
-    for Heat { name, about, temperature: t, heat, area } in &interface.heats {
+    for Heat { name, about, temperature: t, flow: heat, area } in &interface.heats {
         let head = "Modelica.Thermal.HeatTransfer.Interfaces.HeatPort_a";
         // Heat is positive out of the FMU, and Q_flow into it.
         let port = format!("{name}(final T=fmu.{t}, final Q_flow=-fmu.{heat}) if use_{name}");
@@ -208,7 +208,7 @@ fn outputs(interface: &Interface) -> String {
     let rows: Vec<(&&str, f64)> = sent.iter().zip((0..).map(row)).collect();
     // The type of an enumeration is the block's: read it there, as fmu.tripped.
     for v in interface.outputs.iter().filter(|v| !matches!(v.kind, Kind::Enumeration { .. })) {
-        let units: Vec<String> = v.modifiers().into_iter().filter(|m| !m.starts_with("m")).collect();
+        let units: Vec<String> = v.modifiers().into_iter().filter(|m| !m.starts_with('m')).collect();
         let value = match &v.kind {
             _ if v.is_array && !v.elements.is_empty() => {
                 format!("{{{}}}", v.elements.iter().map(|e| format!("fmu.{e}")).collect::<Vec<_>>().join(", "))

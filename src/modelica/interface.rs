@@ -94,7 +94,7 @@ pub(super) struct Heat {
     pub(super) name: String,
     pub(super) about: String,
     pub(super) temperature: String,
-    pub(super) heat: String,
+    pub(super) flow: String,
     pub(super) area: Option<Area>,
 }
 
@@ -159,22 +159,20 @@ impl Interface {
         let is = |v: Option<&ModelVariable>, causality| v.is_some_and(|v| v.causality == causality);
         let area = terminal.picture.as_ref().map(|p| p.area);
         let of = |v: &ModelVariable| identifier(&v.name);
-        match (member("speed", "signal"), member("angle", "signal"), member("tau", "outflow")) {
-            (Some(speed), Some(angle), Some(tau)) => {
-                let shaft = Shaft { speed: of(speed), angle: of(angle), tau: of(tau) };
-                if is(Some(tau), Causality::Input) {
-                    self.shaft = Some(shaft);
-                } else {
-                    let flag = self.parameters.iter().find(|p| p.fmi.ends_with("mechanics.imposed"));
-                    let inertia = flag.and_then(|flag| {
-                        let name = format!("{}J", flag.fmi.strip_suffix("imposed")?);
-                        self.parameters.iter().find(|p| p.fmi == name)
-                    });
-                    self.imposed = flag.zip(inertia).map(|(f, j)| (shaft, f.name.clone(), j.name.clone()));
-                }
-                return;
+        let shaft = [member("speed", "signal"), member("angle", "signal"), member("tau", "outflow")];
+        if let [Some(speed), Some(angle), Some(tau)] = shaft {
+            let shaft = Shaft { speed: of(speed), angle: of(angle), tau: of(tau) };
+            if is(Some(tau), Causality::Input) {
+                self.shaft = Some(shaft);
+            } else {
+                let flag = self.parameters.iter().find(|p| p.fmi.ends_with("mechanics.imposed"));
+                let inertia = flag.and_then(|flag| {
+                    let name = format!("{}J", flag.fmi.strip_suffix("imposed")?);
+                    self.parameters.iter().find(|p| p.fmi == name)
+                });
+                self.imposed = flag.zip(inertia).map(|(f, j)| (shaft, f.name.clone(), j.name.clone()));
             }
-            _ => {}
+            return;
         }
         if let (Some(temperature), Some(heat)) = (member("T", "signal"), member("Q", "outflow"))
             && is(Some(temperature), Causality::Input)
@@ -183,7 +181,7 @@ impl Interface {
                 name: identifier(&terminal.name),
                 about: terminal.description.clone().unwrap_or_default(),
                 temperature: of(temperature),
-                heat: of(heat),
+                flow: of(heat),
                 area,
             });
             return;

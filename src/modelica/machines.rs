@@ -78,7 +78,11 @@ pub(super) fn text(package: &str, machines: &[Machine], interface: &Interface) -
         let (tab, group) = dialog(&v.fmi);
         let annotation = format!("Dialog(tab=\"{tab}\", group=\"{group}\")");
         let line = declare(&v.head(), &v.name, &v.modifiers(), &v.start(), &v.about, &annotation);
-        out += &line.lines().map(|line| format!("  {line}\n")).collect::<String>();
+        for line in line.lines() {
+            out += "  ";
+            out += line;
+            out += "\n";
+        }
     }
     out += "  end Values;\n";
     for Machine { name, about, values } in machines {

@@ -86,7 +86,7 @@ pub fn files(fmu: &Path, options: &Options) -> Result<(String, BTreeMap<String, 
     put("Examples.mo", examples::text(&package, &interface));
     order.insert(0, "Examples");
     put("package.mo", head(&package, &md, &identifier, &block));
-    put("package.order", order.iter().map(|name| format!("{name}\n")).collect());
+    put("package.order", order.join("\n") + "\n");
     if options.block.is_none() && interface.imposed.is_some() {
         let figures = figures::of(fmu, &interface).map_err(|why| format!("{why:#}"));
         let script = examples::script(&package, &format!("{identifier}.fmu"), &block, &figures);

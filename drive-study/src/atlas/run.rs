@@ -252,9 +252,7 @@ pub fn run(drive: &Drive, cell: &Cell) -> Result<Verdict, Fault> {
             Some(_) => {}
         }
     })?;
-    if !finished {
-        lost_at = lost_at.or(Some(last));
-    }
+    lost_at = lost_at.or((!finished).then_some(last));
     let from_outside = outside.slips() || outside.swings();
     if finished && !from_outside && outside.limited() && mean.abs() / judged > tolerance {
         // A limit keeps it off the reference.

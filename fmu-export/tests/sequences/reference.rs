@@ -80,10 +80,12 @@ impl Snapshot {
     /// The value is that of a fixed parameter: in Step Mode such a set is taken and changes nothing.
     fn is_kept(&self, version: u8, kind: Kind, reference: u32, value: Mixed) -> bool {
         match (kind, reference) {
-            (Kind::Real, R | 8..=10) => self.real(reference) == value.real,
-            (Kind::Integer, N) => i64::from(self.integer(reference)) == value.integer,
-            (Kind::Integer, MODE) if version == 2 => i64::from(self.integer(reference)) == value.integer,
-            (Kind::Enumeration, MODE) => i64::from(self.integer(reference)) == value.integer,
+            // -0 equals 0.
+            (Kind::Real, R | 8..=10) => (self.real(reference) + 0.0).to_bits() == (value.real + 0.0).to_bits(),
+            (Kind::Integer, MODE) if version != 2 => false,
+            (Kind::Integer, N | MODE) | (Kind::Enumeration, MODE) => {
+                i64::from(self.integer(reference)) == value.integer
+            }
             (Kind::Boolean, FLAG) => self.truth(reference) == (value.truth != 0),
             _ => false,
         }

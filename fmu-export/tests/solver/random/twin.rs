@@ -24,6 +24,7 @@ pub trait Twin: Model + PartialEq {
 }
 
 #[derive(Clone)]
+#[expect(clippy::struct_excessive_bools, reason = "independent facts")]
 pub struct Snapshot<M: Twin> {
     pub kind: Kind,
     pub state: char,
@@ -64,10 +65,8 @@ impl<M: Twin> Snapshot<M> {
 
     /// What a getter shows.
     pub fn show(&mut self) {
-        if "in".contains(self.state) {
-            if self.fresh {
-                self.initialize();
-            }
+        if "in".contains(self.state) && self.fresh {
+            self.initialize();
         }
         if std::mem::take(&mut self.old) || !"in".contains(self.state) && self.kind.exchanges() && self.running {
             self.observe();
