@@ -55,11 +55,6 @@ impl Cell {
     pub(crate) fn has_the_truth_of(&self, other: &Self) -> bool {
         Self { R: None, ..*self } == Self { R: None, ..*other }
     }
-
-    /// Whether its run on a sensor stands for all cells with another R^.
-    pub(crate) fn is_first_of_its_truth(&self) -> bool {
-        self.R.is_none() || !TEMPERATURES.contains(&self.T)
-    }
 }
 
 impl fmt::Display for Cell {

@@ -137,7 +137,12 @@ const HEAD: &str = "                          lost,  lost,   off,   off,        
 
 /// The cells of a machine and their outcomes.
 fn run(tuned: &Tuned, cells: &[Cell]) -> Vec<(Cell, Outcome)> {
-    let sensor: Vec<_> = cells.iter().filter(|cell| cell.is_first_of_its_truth()).copied().collect();
+    let mut sensor: Vec<Cell> = Vec::new();
+    for cell in cells {
+        if !sensor.iter().any(|other| other.has_the_truth_of(cell)) {
+            sensor.push(*cell);
+        }
+    }
     let goals = queue::map(&sensor, |cell| cell::on_sensor(tuned, cell));
     let goal = |cell: &Cell| {
         let place = sensor.iter().position(|other| other.has_the_truth_of(cell)).expect("the truth of a cell");
