@@ -71,6 +71,13 @@ impl Case {
         all
     }
 
+    /// Largest deviation where samples are up to `late` (s) late. `p_in_mean` is the energy from one sample to the next over T_s =
+    /// 0.1 ms; each of the two instants moves it by `late` times the power.
+    pub fn allowed(&self, late: f64) -> f64 {
+        let moved = if self.outputs.contains(&"p_in_mean") { 2.0 * late / 1e-4 } else { 0.0 };
+        self.tolerance + moved
+    }
+
     /// Our importer, in the order of the standards, at a tighter tolerance.
     pub fn reference(&self, file: &Path) -> Vec<Vec<f64>> {
         self.recorded(
@@ -167,12 +174,12 @@ pub const OURS: &[Case] = &[
     },
 ];
 
-/// Those of the Reference-FMUs in Rust that an explicit method integrates (not Roberts) and that FMI 2.0 has (no clocks and no arrays
-/// of variable size).
+/// Those of the Reference-FMUs in Rust that an explicit method integrates (not Roberts), without clocks and arrays of variable size.
 pub const REFERENCE: &[Case] = &[
     Case { fmu: "BouncingBall", inputs: &[], outputs: &["h", "v"], apart: 0.013_137, points: 180, tolerance: 1e-5 },
     Case { fmu: "Dahlquist", inputs: &[], outputs: &["x"], apart: 0.137, points: 70, tolerance: 1e-6 },
-    Case { fmu: "Stair", inputs: &[], outputs: &["counter"], apart: 0.137, points: 69, tolerance: 0.0 },
+    // It ends the simulation at 9 s.
+    Case { fmu: "Stair", inputs: &[], outputs: &["counter"], apart: 0.137, points: 65, tolerance: 0.0 },
     Case { fmu: "VanDerPol", inputs: &[], outputs: &["x0", "x1"], apart: 0.137, points: 140, tolerance: 1e-5 },
     Case {
         fmu: "Feedthrough",

@@ -148,7 +148,6 @@ fn bits(base: BaseType, text: &str) -> Option<u64> {
 pub struct Run {
     pub rows: Vec<Vec<f64>>,
     pub warnings: Vec<String>,
-    pub rejected: usize,
 }
 
 /// Relative tolerance of a step; the absolute one is this times the nominal value of each state.
@@ -171,7 +170,9 @@ struct Importer<'a> {
     /// Time of the initialization, at which FMI 3.0 has no SetTime yet.
     initial: bool,
     next: Option<f64>,
-    rejected: usize,
+    /// Time of the last event. Inputs jump in events alone: the step before a jump ends with the value before it, or the plant
+    /// would count that step's energy along a straight line to the new value.
+    since: f64,
 }
 
 /// Runs the case in this order; `draw` says for every call that the standard forbids whether it is made, and a constant `true`
@@ -202,18 +203,17 @@ pub fn run(fmu: &Loaded, case: &Case, order: Order, draw: &mut dyn FnMut() -> bo
         continuous: false,
         initial: true,
         next: None,
-        rejected: 0,
+        since: 0.0,
         it,
         case,
         order,
         draw,
     };
     let rows = importer.simulate();
-    let rejected = importer.rejected;
     importer.it.simple(Simple::Terminate);
     drop(importer);
     let warnings = take_events().into_iter().filter(|e| e.status == 1).filter_map(|e| e.text).collect();
-    Run { rows, warnings, rejected }
+    Run { rows, warnings }
 }
 
 fn recorded(d: &ModelDescription, case: &Case) -> Vec<(BaseType, u32)> {
@@ -279,7 +279,7 @@ impl Importer<'_> {
             }
             let (end, hit) = if t + 1.01 * h >= limit { (limit, true) } else { (t + h, false) };
             let Some((x1, grow)) = self.step(t, &x, end) else {
-                (h, self.rejected) = ((end - t) * 0.3, self.rejected + 1);
+                h = (end - t) * 0.3;
                 if self.order.returns {
                     self.evaluate(t, &x);
                 }
@@ -320,14 +320,14 @@ impl Importer<'_> {
         let reals = self.case.inputs.iter().filter(|i| !i.boolean).zip(&self.reals);
         for (input, reference) in reals.filter(|(input, _)| discrete || !input.discrete) {
             references.push(*reference);
-            values.push(input.at(t).to_bits());
+            values.push(input.at(if input.linear { t } else { self.since }).to_bits());
         }
         if !references.is_empty() {
             self.it.set(BaseType::Float64, &references, &values);
         }
         if discrete && !self.booleans.is_empty() {
             let values: Vec<u64> =
-                self.case.inputs.iter().filter(|i| i.boolean).map(|i| u64::from(i.at(t) != 0.0)).collect();
+                self.case.inputs.iter().filter(|i| i.boolean).map(|i| u64::from(i.at(self.since) != 0.0)).collect();
             self.it.set(BaseType::Boolean, &self.booleans, &values);
         }
     }
@@ -458,6 +458,7 @@ impl Importer<'_> {
 
     /// From Event Mode to Continuous-Time Mode.
     fn update(&mut self, x: &mut Vec<f64>, t: f64) {
+        self.since = t;
         self.set_inputs(t, true);
         if !x.is_empty() && self.does(self.order.states_in_event) {
             self.it.vector(Vector::SetContinuousStates, x);
@@ -509,20 +510,20 @@ pub fn stepped(fmu: &Loaded, case: &Case, (delayed, starts): (bool, bool)) -> Ru
     let recorded = recorded(d, case);
     let mut rows = Vec::new();
     for k in 1..=case.points {
-        let (t, end) = (case.point(k - 1), case.point(k));
+        let t = case.point(k - 1);
         let at = if delayed { case.point((k - 1).saturating_sub(1)) } else { t };
         for input in case.inputs {
             let base = if input.boolean { BaseType::Boolean } else { BaseType::Float64 };
             let x = input.at(at);
             it.set(base, &[find(input.name)], &[if input.boolean { u64::from(x != 0.0) } else { x.to_bits() }]);
         }
-        let (status, _) = fmu.raw.do_step(it.it, t, end - t, true, [true; 4]).expect("the function");
+        let (status, _) = fmu.raw.do_step(it.it, t, case.apart, true, [true; 4]).expect("the function");
         it.ok("DoStep", Some(status));
         rows.push(it.numbers(&recorded));
     }
     drop(it);
     let warnings = take_events().into_iter().filter(|e| e.status == 1).filter_map(|e| e.text).collect();
-    Run { rows, warnings, rejected: 0 }
+    Run { rows, warnings }
 }
 
 /// Whether a parameter of a type that FMI 2.0 passes as an Integer is tunable: importers that pass enumerations unconverted stop there.

@@ -4,7 +4,7 @@
 //! `cargo test --release --test orders random -- --ignored --nocapture` makes a million calls in random orders; `FMU_CALLS` and
 //! `FMU_SEED` select others.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
-#![allow(missing_docs)]
+#![allow(missing_docs, unreachable_pub)]
 
 mod case;
 #[path = "../common/mod.rs"]
@@ -17,6 +17,7 @@ use case::{Case, OURS, REFERENCE};
 use fmu_system::cosimulation::Method;
 use importer::{Loaded, run, stepped, strict};
 use order::{Completes, ORDERS, Order, STRICT, Starts};
+use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
@@ -27,10 +28,9 @@ fn ours(case: &Case, standard: usize) -> PathBuf {
     common::archives().join(["fmi2", "fmi3"][standard]).join(format!("{}.fmu", case.fmu))
 }
 
-/// Every order on a case: the largest deviation from our importer; the table's lines.
-fn replay(case: &Case, file: impl Fn(usize) -> PathBuf) -> String {
-    let mut lines = String::new();
-    for standard in 0..2 {
+/// Every order on a case in FMI 2.0 (0) and 3.0 (1): prints the largest deviation from our importer.
+fn replay(case: &Case, standards: Range<usize>, file: impl Fn(usize) -> PathBuf) {
+    for standard in standards {
         let (file, name) = (file(standard), ["FMI 2.0", "FMI 3.0"][standard]);
         let (fmu, reference) = (Loaded::new(&file), case.reference(&file));
         for order in ORDERS.iter().filter(|order| order.standards[standard]) {
@@ -46,10 +46,8 @@ fn replay(case: &Case, file: impl Fn(usize) -> PathBuf) -> String {
             let states = fmu.description.variables.iter().any(|v| v.derivative.is_some());
             assert!(order.late == 0.0 || !states || !told.is_empty(), "{line}");
             assert!((1..told.len()).all(|i| !told[..i].iter().any(|one| habit(one) == habit(told[i]))), "{told:?}");
-            lines += &line;
         }
     }
-    lines
 }
 
 /// What a warning is about, without the time.
@@ -61,7 +59,7 @@ fn habit(text: &str) -> &str {
 fn the_drive_in_every_order() {
     let _one = ONE.lock();
     for case in OURS {
-        replay(case, |standard| ours(case, standard));
+        replay(case, 0..2, |standard| ours(case, standard));
     }
 }
 
@@ -69,7 +67,9 @@ fn the_drive_in_every_order() {
 fn the_reference_fmus_in_every_order() {
     let _one = ONE.lock();
     for case in REFERENCE {
-        replay(case, |standard| packed::archive(case.fmu, standard));
+        // FMI 2.0 has no bytes, which Feedthrough has.
+        let standards = if case.fmu == "Feedthrough" { 1..2 } else { 0..2 };
+        replay(case, standards, |standard| packed::archive(case.fmu, standard));
     }
 }
 
@@ -164,7 +164,7 @@ fn random(calls: u64) {
         .collect();
     let (mut made, mut runs, mut worst) = (0, 0, vec![0.0_f64; all.len()]);
     while made < calls {
-        let which = usize::try_from(next()).unwrap() % all.len();
+        let which = runs % all.len();
         let ((i, standard), (fmu, reference)) = (all[which], &loaded[which]);
         let mut flip = |n: u64| next() % n == 0;
         let order = Order {
@@ -189,7 +189,11 @@ fn random(calls: u64) {
             next() % rarity == 0
         });
         let (deviation, output) = case.deviation(&outcome.rows, reference);
-        assert!(deviation <= case.tolerance, "{deviation} of {output} in {}: {order:?}, one in {rarity}", case.fmu);
+        assert!(
+            deviation <= case.allowed(order.late),
+            "{deviation} of {output} in {}: {order:?}, one in {rarity}",
+            case.fmu
+        );
         (runs, worst[which]) = (runs + 1, worst[which].max(deviation));
     }
     for (&(i, standard), worst) in all.iter().zip(worst) {
@@ -201,7 +205,7 @@ fn random(calls: u64) {
 #[test]
 fn some_random_orders() {
     let _one = ONE.lock();
-    random(20_000);
+    random(100_000);
 }
 
 #[test]
