@@ -45,7 +45,8 @@ pub(super) fn literal(text: &str) -> String {
 
 /// A text for the HTML of a documentation annotation, inside a string literal.
 pub(super) fn html(text: &str) -> String {
-    literal(&text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;"))[1..].trim_end_matches('"').into()
+    let quoted = literal(&text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;"));
+    quoted[1..quoted.len() - 1].into()
 }
 
 /// A declaration: what comes before the name, name, modifiers, value, description, annotation.
