@@ -3,7 +3,7 @@
 use anyhow::{Result, ensure};
 use std::fmt::Write as _;
 
-/// Words that Modelica 3.6 reserves (its section 2.3.3).
+/// The reserved words of Modelica 3.6.
 const RESERVED: &str = " algorithm and annotation block break class connect connector constant constrainedby der discrete each \
      else elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow for function if \
      import impure in initial inner input loop model not operator or outer output package parameter partial protected public \
