@@ -46,7 +46,7 @@ fn of(file: &Path, tuned: &Tuned, interface: &Interface) -> Result<Machine> {
     for (name, _) in &values {
         ensure!(variable(interface, name).is_some(), "a machine has {name}, and the FMU has no such parameter");
     }
-    let stem = file.file_stem().and_then(|s| s.to_str()).context("its name is no text")?;
+    let stem = file.file_stem().and_then(|s| s.to_str()).context("its name is not valid UTF-8")?;
     let name = identifier(stem);
     let name = if name.starts_with(|c: char| c.is_ascii_digit()) { format!("m_{name}") } else { name };
     super::text::check("the record", &name)?;

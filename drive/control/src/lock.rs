@@ -43,7 +43,7 @@
 //! half-wave as far as the one before reached, which had the other sign; W decays with 20 lock.time and is at most 2. A load step and
 //! its overshoot are one half-wave and a small one.
 //!
-//! There is no x in torque mode: there a rotor that the load swings is no error, and the voltage shows an estimate that does not follow.
+//! There is no x in torque mode: a rotor may swing with its load there, and the voltage shows an estimate that does not follow.
 //!
 //! The greatest of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
 //! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
