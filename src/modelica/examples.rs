@@ -71,7 +71,13 @@ pub(super) fn text(package: &str, interface: &Interface) -> String {
     if interface.shaft.is_some() {
         let drive = placed("CompliantShaft", &[used, &format!("c={c}"), &format!("d={d}")]);
         let connect = "    connect(drive.flange, load.flange_a) annotation(Line(points={{-10,0},{30,0}}));\n";
-        put("TwoInertiasCompliant", "Two inertias behind a compliant shaft, with the rotor in the FMU", &drive, "", connect);
+        put(
+            "TwoInertiasCompliant",
+            "Two inertias behind a compliant shaft, with the rotor in the FMU",
+            &drive,
+            "",
+            connect,
+        );
     }
     let coolant = interface.heats.iter().any(|h| h.name == "coolant");
     if let (Some((u, ..)), true, true) = (&interface.link, coolant, interface.imposed.is_some()) {

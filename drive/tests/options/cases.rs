@@ -416,7 +416,10 @@ pub(super) const CASES: &[Case] = &[
         },
         ask: |p| p.estimators.adaptation.resistance = true,
         figures: at_rest,
-        acts: |_, [fixed, _], [adapted, _]| (fixed / 3.24 - 1.0).abs() < 1e-9 && (adapted / 3.6 - 1.0).abs() < 0.03,
+        // A sensor needs no resistance, and the controller says that the option has no effect.
+        acts: |kind, [fixed, _], [adapted, _]| {
+            kind == Kind::Sensored || (fixed / 3.24 - 1.0).abs() < 1e-9 && (adapted / 3.6 - 1.0).abs() < 0.03
+        },
     },
     Case {
         option: "adaptation.k_a",

@@ -36,7 +36,7 @@ const CHOICES: &[Choice] = &[
         why: "injection leaves no voltage for field weakening", off: "set it to false" },
     Choice { name: "tracker.kind", asked: |s| s.par.tracker.kind != TrackerKind::Pll, has: |kind| !NO_TRACKER.contains(&kind),
         why: "it has no tracker", off: "set it to Pll" },
-    Choice { name: "adaptation.resistance", asked: |s| s.par.adaptation.resistance, has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
+    Choice { name: "adaptation.resistance", asked: |s| s.par.adaptation.resistance && s.kind != Sensored, has: |kind| matches!(kind, Kind::Rasmussen | Kind::FluxObserver),
         why: "it does not adapt the resistance", off: "set it to false" },
     Choice { name: "adaptation.tracking", asked: |s| s.par.adaptation.tracking > 0.0, has: |kind| kind == Kind::Rasmussen,
         why: "only Rasmussen needs it; FluxObserver adapts the resistance at every speed", off: "set adaptation.tracking = 0" },
