@@ -1,7 +1,7 @@
 //! A Modelica package around an FMU: a drive with a flange, ports and a dialog, for the block that an import makes of the FMU.
 //!
-//! - [`interface`]: which terminal is which port; [`base`], [`shafts`]: the drives; [`machines`]: records of machines.
-//! - [`examples`]: drive trains, and the script for OpenModelica.
+//! - `interface`: which terminal is which port; `base`, `shafts`: the drives; `machines`: records of machines.
+//! - `examples`: drive trains, and the script for OpenModelica.
 
 mod base;
 mod examples;

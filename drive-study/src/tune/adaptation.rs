@@ -11,7 +11,7 @@
 //!
 //! - the thresholds of the inverter, which the controller does not know, count as resistance: 4/pi u / i_0 with the mean u of both
 //!   thresholds is more than 0.05 R;
-//! - the [`trial`](super::trial) with it holds less than without it, at the temperature of the data, at -30 or at 130 degC, or swings
+//! - the [`trial`] with it holds less than without it, at the temperature of the data, at -30 or at 130 degC, or swings
 //!   at more speeds.
 
 use super::motor::{Data, Inverter, Number};
