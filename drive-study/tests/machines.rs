@@ -98,60 +98,27 @@ fn a_heavy_rotor_gets_the_time_it_needs() {
     );
     assert_eq!(tried(&heavy, 0.5, 4).held, 4);
     let short = |tuned: &Tuned| value(tuned, "motor.R_s") / 0.05;
-    let fixed = |motor: &MotorFile| rules::fixed(motor).unwrap();
-    let (light, heavy) = (fixed(&MotorFile::read(&file("drone-22v")).unwrap()), fixed(&changed("drone-22v", 30.0, "")));
+    let (light, heavy) = (tuned("drone-22v"), heavier("drone-22v"));
     assert!((short(&light) - 0.9).abs() < 1e-9 && short(&heavy) > 0.95, "{} {}", short(&light), short(&heavy));
     assert_eq!(tried(&heavy, 0.1, 4).held, 4);
     // With 10 % below R, it does not start.
     assert!(tried(&heavy.with("motor.R_s", Value::Real(0.9 * 0.05)), 0.1, 4).started < 4);
 }
 
-/// A fixed R^ is closer to R where (R - R^) i takes much of the EMF at 0.1 pu, and farther where the estimate would hardly drift.
+/// R^ is closer to R where (R - R^) i takes much of the EMF at 0.1 pu, and farther where the estimate would hardly drift.
 #[test]
 fn the_resistance_fits_the_machine() {
     let machine = |R_s: f64| {
         let text = std::fs::read_to_string(file("servo-6.6kw")).unwrap();
         let text = text.replacen("R_s = 0.268", &format!("R_s = {R_s}"), 1).replacen("J = 0.0146", "J = 0.002", 1);
         let text = text.split_once("[bandwidth]").unwrap().0.to_owned();
-        rules::fixed(&MotorFile::parse(&text, Path::new("m.toml")).unwrap()).unwrap()
+        rules::tune(&MotorFile::parse(&text, Path::new("m.toml")).unwrap()).unwrap()
     };
     // i_0 = 25.7 A, w_0 = 194 rad/s: 0.025 w_0 psi_M / i_0 is missing. 0.15 of 0.1 times 231 V at 19.03 A.
     for (R_s, missing) in [(0.03_f64, 0.025 * 194.4 * 0.12258 / 25.696), (0.5, 0.05), (3.0, 0.015 * 231.06 / 19.035)] {
         let found = R_s - value(&machine(R_s), "motor.R_s");
         let expected = f64::min(missing, 0.5 * R_s);
         assert!((found / expected - 1.0).abs() < 5e-3, "{R_s}: {found}, not {expected}");
-    }
-}
-
-/// The adaptation measures the resistance of a cold and of a hot winding, where the drive with a fixed one loses starts and loads; the
-/// bandwidth follows the swing of the rotor on i_0. It is left off, with a note, where it does harm: at a rotor that swings on, and at
-/// an inverter whose thresholds would count as resistance.
-#[test]
-fn the_adaptation_is_on_where_it_does_no_harm() {
-    let both = |motor: &MotorFile| (rules::fixed(motor).unwrap(), rules::tune(motor).unwrap());
-    let (fixed, adapting) = both(&MotorFile::read(&file("hub-36v")).unwrap());
-    let lost = |tuned: &Tuned, celsius| {
-        let trials = trial::all(&trial::at_temperature(tuned, celsius), 4);
-        trials.iter().filter(|trial| !(trial.starts() && trial.holds())).count()
-    };
-    for celsius in trial::TEMPERATURES {
-        assert!(lost(&fixed, celsius) > 0 && lost(&adapting, celsius) == 0, "{celsius} degC");
-    }
-    assert!((value(&adapting, "adaptation.start") - 0.75).abs() < 1e-12);
-    // w_0 = sqrt(n_p 1.35 T / J), at most 20 1/s.
-    assert!((value(&adapting, "adaptation.bandwidth") - 0.5 * 35.59).abs() < 0.01, "{adapting:?}");
-    assert!(adapting.notes.iter().any(|note| note.contains("measures R^")), "{:?}", adapting.notes);
-    let thresholds = "[inverter]\nu_transistor = 0.0\nu_diode = 0.7\n";
-    for (motor, why) in [
-        (MotorFile::read(&file("elevator-5kw")).unwrap(), "starts and loads held"),
-        (changed("hub-36v", 1.0, thresholds), "thresholds of the inverter"),
-    ] {
-        let (fixed, tuned) = both(&motor);
-        assert!(
-            tuned.controller == fixed.controller && tuned.notes.iter().any(|note| note.contains(why)),
-            "{:?}",
-            tuned.notes
-        );
     }
 }
 

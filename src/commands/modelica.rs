@@ -1,6 +1,6 @@
 //! `fmu modelica`: a Modelica package around an FMU.
 
-use crate::modelica::{self, Options};
+use crate::modelica::{self, Wrapping};
 use crate::pack;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -46,7 +46,7 @@ pub struct Modelica {
 /// # Errors
 /// The FMU has no shaft, a name is wrong, or the folder is not empty or cannot be written.
 pub fn run(args: &Modelica) -> Result<String> {
-    let options = Options { name: args.name.clone(), block: args.block.clone(), motors: args.motor.clone() };
+    let options = Wrapping { name: args.name.clone(), block: args.block.clone(), motors: args.motor.clone() };
     let out = args.out.display();
     if args.out.exists() {
         let mut entries = args.out.read_dir().with_context(|| format!("--out {out}"))?;

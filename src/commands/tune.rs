@@ -21,9 +21,7 @@ use std::path::{Path, PathBuf};
 ///
 /// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
 /// a load at rating.speed_max if that is given. A note names each load and each start that the drive does not hold, with remedies
-/// that the command has tried too; the exit status is still 0. Another note names the speed at which the drive without a load swings
-/// most, on the way from 0.1 to 1 pu and back. Rasmussen's observer adapts the resistance, unless the trial holds less with it: a note
-/// says so. --check prints the trial as a table, and that of a machine of -30 and of 130 degC.
+/// that the command has tried too; the exit status is still 0. --check prints the trial as a table.
 ///
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
@@ -113,16 +111,8 @@ pub fn run(args: &Tune) -> Result<()> {
     for limit in &limits {
         println!("\nnote: {limit}");
     }
-    let swings = trial::swings(&tuned);
-    if let Some(worst) = swings.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)) {
-        println!("\nnote: {worst}; {} of the speeds tried swing", swings.len());
-    }
     if args.check {
-        table(&trials, "does not hold: see the note");
-        for celsius in trial::TEMPERATURES {
-            println!("\nwinding and magnet at {celsius:.0} degC since before the start, the rated current:");
-            table(&trial::all(&trial::at_temperature(&tuned, celsius), ANGLES / 4), "does not hold");
-        }
+        table(&trials);
     }
     println!();
     for file in &files {
@@ -132,7 +122,7 @@ pub fn run(args: &Tune) -> Result<()> {
 }
 
 /// Prints the trial.
-fn table(trials: &[Trial], lost: &str) {
+fn table(trials: &[Trial]) {
     println!("\nspeed   started    held load  least speed  angle error");
     for trial in trials {
         let Trial { task, angles, started, held, least, error, .. } = trial;
@@ -141,7 +131,7 @@ fn table(trials: &[Trial], lost: &str) {
         let verdict = match (trial.starts() && trial.holds(), trial.slips()) {
             (true, false) => "holds",
             (true, true) => "slipped, recovered",
-            (false, _) => lost,
+            (false, _) => "does not hold: see the note",
         };
         let level = format!("{:.2}", task.level);
         let level = level.trim_end_matches('0').trim_end_matches('.');

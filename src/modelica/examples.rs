@@ -1,20 +1,8 @@
 //! `Examples.mo`: drive trains that run, and the script that imports the FMU into OpenModelica and runs one.
 
-use super::figures::Figure;
+use super::figures::{COUPLING, Figure, LOAD, SPEED, STOP};
 use super::interface::Interface;
 use std::fmt::Write as _;
-
-/// Speed reference in rad/s from 0.1 s on: 1000 rpm.
-pub(super) const SPEED: f64 = 104.72;
-
-/// Load torque in N.m from 0.6 s on.
-pub(super) const LOAD: f64 = 1.0;
-
-/// The coupling: stiffness in N.m/rad, damping in N.m.s/rad; and the inertia of the load in kg.m2.
-pub(super) const COUPLING: (f64, f64, f64) = (500.0, 0.2, 2e-3);
-
-/// End of the examples in s.
-pub(super) const STOP: f64 = 1.0;
 
 /// The text of `Examples.mo`.
 pub(super) fn text(package: &str, interface: &Interface) -> String {

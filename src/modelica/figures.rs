@@ -3,11 +3,19 @@
 //! J_r dw_r/dt = tau_shaft - tau_c, J_l dw_l/dt = tau_c + tau_load, tau_c = c (phi_r - phi_l) + d (w_r - w_l). In a step h the FMU has
 //! the speed of its begin, and the train the mean torque of the step, so the result is off by a delay of about h / 2.
 
-use super::examples::{COUPLING, LOAD, SPEED, STOP};
 use super::interface::Interface;
 use anyhow::{Context, Result, ensure};
 use fmu_import::{Fmu, Instance, Values};
 use std::path::Path;
+
+/// Speed reference in rad/s from 0.1 s on: 1000 rpm.
+pub(super) const SPEED: f64 = 104.72;
+/// Load torque in N.m from 0.6 s on.
+pub(super) const LOAD: f64 = 1.0;
+/// The coupling: stiffness in N.m/rad, damping in N.m.s/rad; and the inertia of the load in kg.m2.
+pub(super) const COUPLING: (f64, f64, f64) = (500.0, 0.2, 2e-3);
+/// End of the examples in s.
+pub(super) const STOP: f64 = 1.0;
 
 /// Steps in a second. Half of their length moves the figures by 0.006 rad/s and 0.001 N.m.
 const RATE: f64 = 50_000.0;

@@ -21,7 +21,7 @@ use text::html;
 
 /// What to write.
 #[derive(Clone, Debug, Default)]
-pub struct Options {
+pub struct Wrapping {
     /// Name of the package, if it is not that of the FMU with `Lib`.
     pub name: Option<String>,
     /// Class of the imported block, if it is not that of OpenModelica.
@@ -37,7 +37,7 @@ const ICON: &str = "terminalsAndIcons/icon.png";
 ///
 /// # Errors
 /// The FMU has no shaft, or Model Exchange is missing; a name is none of Modelica; a machine does not fit.
-pub fn files(fmu: &Path, options: &Options) -> Result<(String, BTreeMap<String, Vec<u8>>)> {
+pub fn files(fmu: &Path, options: &Wrapping) -> Result<(String, BTreeMap<String, Vec<u8>>)> {
     let (md, contents) = fmu_import::contents(fmu)?;
     let terminals = fmu_import::outline(fmu)?.terminals;
     let of = || fmu.display().to_string();

@@ -90,8 +90,7 @@ pub fn drive(tuned: &Tuned) -> Steady {
 /// A value of the request or of the file is wrong, or the rated point is out of reach.
 pub fn make(motor: &MotorFile, request: &Request) -> Result<Map> {
     request.check()?;
-    // With a sensor, nothing adapts.
-    let tuned = rules::fixed(motor)?;
+    let tuned = rules::tune(motor)?;
     let drive = drive(&tuned);
     let nominal = *motor.data.dc_link.u_dc.get_ref();
     let u_dc = if request.u_dc.is_empty() { vec![nominal] } else { request.u_dc.clone() };

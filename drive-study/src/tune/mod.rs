@@ -2,13 +2,12 @@
 //!
 //! - [`motor`]: the TOML file of a machine. [`plausible`] checks its values, [`saturation`] its saturation.
 //! - [`rules`]: how values follow from the file: [`bandwidth`] for the loops, [`rasmussen`] and [`extended_emf`] for the
-//!   estimators, [`adaptation`] for the resistance, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test, [`flux_map`] for a map from a
+//!   estimators, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test, [`flux_map`] for a map from a
 //!   table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
 //!   compares them with the variables of the models; [`Tuned::pair`](rules::Tuned::pair) is the native drive with these values.
 //! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: what it will not
 //!   hold, and why. [`remedy`]: what helps.
 
-pub mod adaptation;
 pub mod bandwidth;
 pub mod check;
 pub mod extended_emf;

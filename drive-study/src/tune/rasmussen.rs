@@ -4,8 +4,8 @@
 //! w_0 = 30 rad/s electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest
 //! electrical acceleration alpha = n_p K i_q / J.
 //!
-//! A resistance that is not adapted ([`adaptation`](super::adaptation)) is R^ = 0.9 R: the safe side at standstill, where R^ > R runs
-//! away. At rest on i_0 the estimate then drifts by (R - R^) i_0 / psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). The rules choose R^
+//! R^ = 0.9 R: the safe side at standstill, where R^ > R runs away. At rest on i_0 the estimate then drifts by (R - R^) i_0 /
+//! psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). The rules choose R^
 //!
 //! - closer to R where the drift would exceed w_0: the rotor is too heavy to follow the estimate;
 //! - closer to R where (R - R^) i with the rated torque would exceed 0.15 of the EMF at 0.1 pu: the estimate turns away by c_1

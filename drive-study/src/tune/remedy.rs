@@ -71,8 +71,7 @@ impl Cure {
                 let sensed = tuned
                     .with("estimator", Value::Item("Sensored".into()))
                     .with("start.mode", Value::Item("Direct".into()))
-                    .with("emf.hold_reversal", Value::Boolean(false))
-                    .with("adaptation.resistance", Value::Boolean(false));
+                    .with("emf.hold_reversal", Value::Boolean(false));
                 return Some((sensed, *task));
             }
             Self::Bandwidths { speed, observer } => {

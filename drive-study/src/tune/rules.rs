@@ -17,7 +17,7 @@ use super::check::check;
 use super::iron;
 use super::motor::{Data, MotorFile, Number, RULED};
 use super::voltage::{self, Voltage};
-use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, saturation};
+use super::{extended_emf, flux_map, losses, plausible, rasmussen, saturation};
 use anyhow::{Result, anyhow, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
@@ -94,21 +94,6 @@ pub(super) fn real(name: &'static str, x: f64, rule: &str) -> Setting {
 /// # Errors
 /// Inconsistent values, with their position and a remedy.
 pub fn tune(motor: &MotorFile) -> Result<Tuned> {
-    let mut tuned = adaptation::chosen(&motor.data, fixed(motor)?);
-    if tuned.rest > REST {
-        tuned.notes.push(format!(
-            "keep speed_ref at 0 for the first {:.2} s: the rotor turns to the current that holds standstill",
-            tuned.rest
-        ));
-    }
-    Ok(tuned)
-}
-
-/// Derives the values of a drive that does not adapt the resistance.
-///
-/// # Errors
-/// Those of [`tune`].
-pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
     let data = &motor.data;
     let mut plant = plant(data);
     let estimator = estimator(motor)?;
@@ -143,6 +128,11 @@ pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
     check(&plant, &controller, motor)?;
     // 5 / w_0: five periods of the swing, which the observer damps, over 2 pi.
     let rest = if rasmussen { (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST) } else { 0.0 };
+    if rest > REST {
+        notes.push(format!(
+            "keep speed_ref at 0 for the first {rest:.2} s: the rotor turns to the current that holds standstill"
+        ));
+    }
     let (speed, torque) = (*data.rating.speed.get_ref(), *data.rating.torque.get_ref());
     let tuned = Tuned {
         name: data.name.clone(),

@@ -216,7 +216,7 @@ const LIGHT: &str = include_str!("machines/light-24v.toml");
 #[test]
 fn a_small_machine_holds_what_it_lost() {
     let motor = read(SMALL);
-    let tuned = rules::fixed(&motor).unwrap();
+    let tuned = rules::tune(&motor).unwrap();
     assert!(trial::all(&tuned, 8).iter().all(|trial| trial.started == 8 && trial.held == 8));
     compare(&motor, 4);
     // Known by 10 % only, R loses the load.

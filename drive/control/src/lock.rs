@@ -39,7 +39,8 @@
 //! that of a drive at its limit.
 //!
 //! A drive at its limit does not swing. So half-waves about reference and model of w^, as far as the torque that the limits leave
-//! moves the rotor, count, confirmed or not: W is the sum of their |x| over S_0 while |x| > 1.4 lock.u / psi_M, which is 5 % of the rated speed with the lock.u of `fmu tune`, each
+//! moves the rotor, count, confirmed or not: W is the sum of their |x| over S_0 while |x| > 1.4 lock.u / psi_M,
+//! which is 5 % of the rated speed with the lock.u of `fmu tune`, each
 //! half-wave as far as the one before reached, which had the other sign; W decays with 20 lock.time and is at most 2. A load step and
 //! its overshoot are one half-wave and a small one.
 //!
