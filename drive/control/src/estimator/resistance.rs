@@ -231,7 +231,8 @@ type P = Row<ResistanceParameters>;
 pub const ADAPTATION: &Table<ResistanceParameters> = table![
             P::boolean_parameter(
                 "resistance",
-                "Rasmussen (while the reference is standstill) and FluxObserver adapt the resistance, Sensored ignores it, the others refuse it; false: motor.R_s",
+                "Rasmussen (while the reference is standstill) and FluxObserver adapt the resistance, Sensored ignores it, \
+                 the others refuse it; false: motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(
