@@ -13,7 +13,8 @@ pub(super) fn text(package: &str, interface: &Interface) -> String {
     let (c, d, inertia) = COUPLING;
     let reference = || {
         let source = format!(
-            "    Modelica.Blocks.Sources.Step speed(height={SPEED}, startTime=0.1)\n      annotation(Placement(transformation(extent={{{{-90,-10}},{{-70,10}}}})));\n"
+            "    Modelica.Blocks.Sources.Step speed(height={SPEED}, startTime=0.1)\n      \
+             annotation(Placement(transformation(extent={{{{-90,-10}},{{-70,10}}}})));\n"
         );
         let connect =
             "    connect(speed.y, drive.speed_ref) annotation(Line(points={{-69,0},{-52,0}}, color={0,0,127}));\n";
@@ -47,7 +48,8 @@ pub(super) fn text(package: &str, interface: &Interface) -> String {
         )
     };
     let coupling = format!(
-        "    Modelica.Mechanics.Rotational.Components.SpringDamper coupling(c={c}, d={d})\n      annotation(Placement(transformation(extent={{{{0,-10}},{{20,10}}}})));\n"
+        "    Modelica.Mechanics.Rotational.Components.SpringDamper coupling(c={c}, d={d})\n      \
+         annotation(Placement(transformation(extent={{{{0,-10}},{{20,10}}}})));\n"
     );
     let coupled = "    connect(drive.flange, coupling.flange_a) annotation(Line(points={{-10,0},{0,0}}));
     connect(coupling.flange_b, load.flange_a) annotation(Line(points={{20,0},{30,0}}));\n";
