@@ -1,4 +1,4 @@
-//! What a rotor that is lost looks like from outside, whatever the reference: in the last 2 s of a run, cut into quarters of
+//! What a lost rotor looks like from outside, at any reference: in the last 2 s of a run, cut into quarters of
 //! 0.5 s,
 //!
 //! - the rotor turns against the estimated frame by a turn or more,
@@ -101,14 +101,14 @@ impl Outside {
         self.quarters.windows(2).any(both)
     }
 
-    /// Greatest `lock_lost`: a loss shows in every second.
+    /// Maximum `lock_lost`: a loss shows in every second.
     pub fn lock_lost(&self) -> f64 {
         let second = |pair: &[Quarter]| pair[0].lock_lost.max(pair[1].lock_lost);
         self.quarters.windows(2).map(second).fold(f64::INFINITY, f64::min)
     }
 
     /// Whether the angle is right within 30 deg, a limit acts for most of the time, and the speed is above a
-    /// tenth of the rated one: near standstill, nothing tells an overload from a lost rotor.
+    /// tenth of the rated one: near standstill, an overload looks like a lost rotor.
     pub fn limited(&self) -> bool {
         let speed: f64 = self.quarters.iter().map(|q| q.speed.sum).sum();
         let share = |x: f64| (x / self.n).abs();

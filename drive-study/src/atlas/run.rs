@@ -99,9 +99,9 @@ impl Loss {
 pub struct Verdict {
     /// How and when (s) the drive was lost: the first time out of its tolerance while it is judged.
     pub lost: Option<(Loss, f64)>,
-    /// Greatest `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
+    /// Maximum `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
     pub lock_lost: f64,
-    /// Greatest `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
+    /// Maximum `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
     pub while_held: f64,
     /// Greatest speed error while judged, as a share of the rated speed.
     pub speed_error: f64,

@@ -8,7 +8,7 @@ use drive::plant::losses::Losses;
 use drive::steady::{Point, Steady};
 use fmu_core::{Block, Elapsed, Model, Step};
 
-/// Greatest difference of the power from the link, as a share of the size of the powers ([`size`]), and of each loss.
+/// Maximum difference of the power from the link, as a share of the size of the powers ([`size`]), and of each loss.
 const OF_POWER: f64 = 1e-3;
 const OF_LOSS: f64 = 1e-2;
 /// A loss below this share of all is not compared on its own.
@@ -23,7 +23,7 @@ const MEAN: f64 = 1.0;
 pub struct Verified {
     /// Number of points.
     pub points: usize,
-    /// Greatest difference of the power from the link, as a share of the size of the powers.
+    /// Maximum difference of the power from the link, as a share of the size of the powers.
     pub power: f64,
     /// Greatest relative difference of a loss.
     pub loss: f64,

@@ -70,7 +70,7 @@ pub struct Trial {
     pub held: u32,
     /// Least speed after the load step in pu.
     pub least: f64,
-    /// Greatest angle error in deg after the load step where it was held.
+    /// Maximum angle error in deg after the load step where it was held.
     pub error: f64,
     /// Greatest torque in N.m that the controller allows at this speed.
     pub most: f64,

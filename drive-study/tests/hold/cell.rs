@@ -76,7 +76,7 @@ pub(crate) struct End {
     pub(crate) swing: (f64, f64),
     /// Mean torque in rated torques.
     pub(crate) torque: f64,
-    /// Greatest angle error in deg.
+    /// Maximum angle error in deg.
     pub(crate) error: f64,
 }
 
@@ -117,7 +117,7 @@ pub(crate) struct Outcome {
     pub(crate) on_sensor: bool,
     end: End,
     goal: End,
-    /// Greatest `lock_lost`: near the loss, otherwise in the last seconds.
+    /// Maximum `lock_lost`: near the loss, otherwise in the last seconds.
     lock_lost: f64,
 }
 
