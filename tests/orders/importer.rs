@@ -401,7 +401,7 @@ impl Importer<'_> {
             for (i, y) in y.iter_mut().enumerate() {
                 *y = x[i] + h * a.iter().zip(&k).map(|(a, k)| a * k[i]).sum::<f64>();
             }
-            let at = if *c == 1.0 { end } else { t + c * h };
+            let at = if *c < 1.0 { t + c * h } else { end };
             k.push(self.evaluate(at, &y).0);
         }
         let scaled = |i: usize| {
@@ -449,7 +449,7 @@ impl Importer<'_> {
         Some(high)
     }
 
-    fn event(&mut self, t: f64, x: &mut Vec<f64>) {
+    fn event(&mut self, t: f64, x: &mut [f64]) {
         self.place(t, x);
         self.it.simple(Simple::EnterEventMode);
         self.continuous = false;
@@ -457,7 +457,7 @@ impl Importer<'_> {
     }
 
     /// From Event Mode to Continuous-Time Mode.
-    fn update(&mut self, x: &mut Vec<f64>, t: f64) {
+    fn update(&mut self, x: &mut [f64], t: f64) {
         self.since = t;
         self.set_inputs(t, true);
         if !x.is_empty() && self.does(self.order.states_in_event) {

@@ -76,8 +76,8 @@ fn the_reference_fmus_in_every_order() {
 /// In the order of the standards, nothing is warned of, and inputs that a tool feeds 0 are named.
 #[test]
 fn inputs_at_zero_are_named_once() {
-    let _one = ONE.lock();
     const ZERO: &[(f64, f64)] = &[(0.0, 0.0)];
+    let _one = ONE.lock();
     for (fmu, expected) in [
         ("PmsmPlant", "u_dc = 0 (start value 325), enable = false (start value true)"),
         (
