@@ -2,7 +2,7 @@
 
 import ctypes as c
 
-from ..abi import DISCARD, ERROR, OK
+from ..abi import DISCARD, ERROR, OK, REAL
 from ..case import case
 from ..run import alone, excite, recovers, refused, run
 from ..signatures import DERIVATIVES, FUNCTIONS, UNSUPPORTED
@@ -49,7 +49,7 @@ def reach(fmu, state):
 def perform(it, call, saved):
     """Makes a call with arguments that are right; the status."""
     fmu = it.fmu
-    parameter = next(v for v in fmu.of("parameter") if v.variability == "fixed")
+    parameter = next(v for v in fmu.of("parameter") if v.variability == "fixed" and v.type == REAL[it.version] and float(v.start))
     match call:
         case "SetDebugLogging":
             return it.call(call, 1, 0, None)
@@ -70,7 +70,7 @@ def perform(it, call, saved):
         case "SetInput":
             return it.set(fmu.of("input")[0].name, 1.5)
         case "SetParameter":
-            return it.set(parameter.name, float(parameter.start))
+            return it.set(parameter.name, 1.1 * float(parameter.start))
         case "SaveState":
             state = c.c_void_p()
             return it.state_call("GetFMUState", c.byref(state))

@@ -171,19 +171,34 @@ def parameters_that_do_not_fit_together(fmu):
 
 @case
 def not_settable(fmu):
-    """Outputs and time never, fixed parameters not after initialization; the value stays."""
+    """Outputs and time never, fixed parameters not after initialization, unless the value is the one they have; it stays."""
     for variable in fmu.variables.values():
         if variable.causality == "input" or variable.variability == "tunable":
             continue
         it = fmu.instance().begin()
         before = it.get(variable.name)
-        refused(it, it.set(variable.name, 1), variable.name)
+        refused(it, it.set(variable.name, 0 if before == [1] else 1), variable.name)
         assert it.get(variable.name) == before
         it.free()
         if variable.causality != "parameter":
             it = fmu.instance().enter()
             refused(it, it.set(variable.name, 1), variable.name)
             it.free()
+
+
+@case
+def fixed_parameters_set_to_what_they_are(fmu):
+    """Some importers write all parameters after the initialization: taken with one warning, and the run stays the same."""
+    trace = alone(fmu, 10)
+    it = fmu.instance().begin()
+    it.messages.clear()
+    for v in fmu.settable():
+        if v.variability == "fixed":
+            assert it.set(v.name, it.get(v.name)[0]) == OK, (v.name, it.messages)
+    warnings = [m for m in it.messages if m.category == "logStatusWarning"]
+    assert len(warnings) == 1 and not it.errors(), it.messages
+    assert run(it, 10) == trace
+    it.free()
 
 
 @case
