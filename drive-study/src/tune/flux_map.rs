@@ -13,7 +13,7 @@ mod judge;
 mod squares;
 
 use super::motor::{FluxMap as Given, MotorFile};
-use super::rules::{Setting, Value};
+use super::setting::{Setting, Value};
 use crate::csv::Columns;
 use anyhow::{Context, Result, bail, ensure};
 use drive::frame::Dq;

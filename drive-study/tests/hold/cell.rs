@@ -2,8 +2,8 @@
 
 use drive::Pair;
 use drive::math::wrap;
-use drive_study::tune::pace::{Pace, begin};
-use drive_study::tune::rules::{Tuned, Value};
+use drive_study::tune::pace::{Begin, Pace};
+use drive_study::tune::setting::{Tuned, Value};
 use std::f64::consts::TAU;
 use std::fmt;
 
@@ -223,7 +223,8 @@ fn parts(time: f64) -> usize {
 
 /// Times in s: of the reference, from which the rotor counts, of the load, and of the end.
 fn times(tuned: &Tuned, pair: &Pair, cell: &Cell) -> [f64; 4] {
-    let (turn, ready) = begin(tuned, pair, cell.level);
+    let Begin { rest: turn, measures, ready } = Begin::of(tuned, pair, cell.level);
+    let ready = turn + measures + ready;
     if cell.torque_mode {
         let J = pair.plant.model.parameters.mechanics.J;
         let accelerates = J * cell.level * tuned.speed / (cell.load * tuned.torque);

@@ -6,6 +6,7 @@
 //! HOLD_ONLY=hub-36v cargo test --release -p drive-study --test hold -- --ignored --nocapture     # machines with this in the name
 //! HOLD_MACHINES=DIR ...      # the machine files of a folder, in addition
 //! HOLD_CELLS=1 ...           # a line for each cell that is not held
+//! HOLD_FIXED=1 ...      # without the adaptation of the resistance that `fmu tune` may choose
 //! HOLD_SET=adaptation.resistance=true,speed_loop.bandwidth=40 ...     # other values of the controller
 //! ```
 //!
@@ -24,7 +25,8 @@ mod cell;
 use cell::{Cell, Outcome};
 use drive_study::queue;
 use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules::{self, Tuned, Value};
+use drive_study::tune::rules;
+use drive_study::tune::setting::{Tuned, Value};
 use drive_study::tune::{limits, trial};
 use std::path::{Path, PathBuf};
 
@@ -167,7 +169,8 @@ fn held_or_said() {
     for path in machines() {
         let name = path.file_stem().unwrap().to_string_lossy().into_owned();
         let motor = MotorFile::read(&path);
-        let (motor, tuned) = match motor.and_then(|motor| rules::tune(&motor).map(|tuned| (motor, tuned))) {
+        let tune = if std::env::var("HOLD_FIXED").is_ok() { rules::fixed } else { rules::tune };
+        let (motor, tuned) = match motor.and_then(|motor| tune(&motor).map(|tuned| (motor, tuned))) {
             Ok(both) => both,
             Err(reason) => {
                 println!("{name:18} refused: {reason:#}");

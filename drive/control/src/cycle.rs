@@ -2,17 +2,19 @@
 
 #![expect(clippy::inline_always, reason = "one sample is one function: its values stay in registers")]
 
-use crate::estimator::{Estimate, Estimating, Estimator, Injection, Sample};
+use crate::estimator::{Estimate, Estimating, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::lock::Lock;
 use crate::model::SensorlessController;
-use crate::signals::ControllerOutputs;
+use crate::signals::{ControllerInputs, ControllerOutputs};
+use crate::start::StartMode;
 use crate::state::{Command, Leader, Mode, References, context};
-use crate::tables::Compensation;
+use crate::tables::{Compensation, ControllerParameters};
 use crate::trip::Cause;
 use crate::weakening::share;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use drive_base::math::{at_most, wrap};
 use drive_base::modulation::{dead_time_loss, limit_span};
+use fmu_core::Elapsed;
 
 /// The estimated rotor frame at a sample and the quantities controlled in it.
 struct Frame {
@@ -35,16 +37,37 @@ impl SensorlessController {
     pub(super) fn control(&mut self) {
         let Self { tuned, state, .. } = self;
         let steady = state.k > 0 && !*tuned && matches!(state.leader, Leader::Estimator);
-        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) {
+        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) && !self.measures_resistance() {
             self.state.computed = self.cycle(true);
         } else {
             self.any_cycle();
         }
     }
 
+    /// Whether a drive that starts at rest still measures its resistance: until then, it rests on i_0 and follows no reference.
+    #[inline]
+    pub fn measures_resistance(&self) -> bool {
+        let ControllerParameters { estimators: EstimatorParameters { adaptation, .. }, estimator, start, .. } =
+            &self.parameters;
+        adaptation.resistance
+            && *estimator == Kind::Rasmussen
+            && start.mode == StartMode::Direct
+            && self.parameters.speed_est == 0.0
+            && Elapsed::periods(self.state.k, self.parameters.T_s).seconds() < adaptation.longest_rest()
+            && match &self.state.estimator {
+                Estimator::Rasmussen(observer) => self.state.k == 0 || !observer.knows_resistance(),
+                _ => self.state.k == 0,
+            }
+    }
+
     #[inline(never)]
     fn any_cycle(&mut self) {
+        let ControllerInputs { speed_ref, tau_ref, .. } = self.inputs;
+        if self.measures_resistance() {
+            (self.inputs.speed_ref, self.inputs.tau_ref) = (0.0, 0.0);
+        }
         self.state.computed = self.cycle(false);
+        (self.inputs.speed_ref, self.inputs.tau_ref) = (speed_ref, tau_ref);
     }
 
     /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default
@@ -305,6 +328,45 @@ mod tests {
         assert!((u.alpha() - (10.0 - 65.0 * 0.04)).abs() < 1e-12 && u.beta().abs() < 1e-12, "{u:?}");
         controller.parameters.compensation.observe = false;
         assert!((controller.measure().u.alpha() - 10.0).abs() < 1e-12);
+    }
+
+    /// A drive with the adaptation ignores its references until the resistance is measured, here until the bound, without a current; a
+    /// drive that starts at speed, and one without the adaptation, follow at once.
+    #[test]
+    fn the_references_wait_for_the_resistance() {
+        let samples = |torque_mode: bool, adapts: bool, speed_est: f64| {
+            let [mut asked, mut idle] = [30.0, 0.0].map(|reference| {
+                let mut controller = SensorlessController::default();
+                let par = &mut controller.parameters;
+                (par.speed_loop.torque_mode, par.speed_est) = (torque_mode, speed_est);
+                (par.estimators.adaptation.resistance, par.estimators.adaptation.bandwidth) = (adapts, 200.0);
+                (controller.inputs.speed_ref, controller.inputs.tau_ref) = (reference, 0.1 * reference);
+                controller.inputs.u_dc = 325.0;
+                controller.derive();
+                controller.initialize();
+                controller
+            });
+            let equal = |asked: &SensorlessController, idle: &SensorlessController| asked.state == idle.state;
+            let mut samples = 0;
+            while samples < 2000 {
+                for controller in [&mut asked, &mut idle] {
+                    controller.control();
+                    controller.state.k += 1;
+                }
+                if !equal(&asked, &idle) {
+                    break;
+                }
+                samples += 1;
+            }
+            assert!((asked.inputs.speed_ref - 30.0).abs() < 1e-12, "the input stays");
+            samples
+        };
+        for torque_mode in [false, true] {
+            // 20 / 200 s.
+            assert_eq!(samples(torque_mode, true, 0.0), 1000, "torque mode {torque_mode}");
+            assert_eq!(samples(torque_mode, false, 0.0), 0);
+            assert_eq!(samples(torque_mode, true, 5.0), 0);
+        }
     }
 
     /// The newest command acted in the last interval; with a delay of 1 or 2, the second or third newest.

@@ -91,7 +91,7 @@ impl Estimating for FluxObserver {
         let Context { motor, par, T_s, .. } = *context;
         let axis = Axis::<Estimated>::at(theta);
         let psi = axis.to_stator(flux(motor, motor.psi_M, axis.from_stator(sample.i)));
-        let (R, psi_M) = (par.adaptation.first(motor, sample), motor.psi_M);
+        let (R, psi_M) = (par.adaptation.first(motor, sample.speed_ref.is_none()), motor.psi_M);
         let tracker = Tracker::at(theta, w, T_s);
         (Self { tracker, psi, R, psi_M, w_f: w, ..Self::default() }, Estimate::new(theta, w, sample))
     }
@@ -281,7 +281,7 @@ mod tests {
     fn what_the_resistance_explains_is_not_the_magnet() {
         let (mut par, motor) = (EstimatorParameters::default(), salient());
         (par.adaptation.resistance, par.flux_observer.magnet) = (true, 5.0);
-        let R = par.adaptation.first(&motor, &Sample { speed_ref: Some(300.0), ..Sample::default() });
+        let R = par.adaptation.first(&motor, false);
         let c_0 = 0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q);
         let (rho_0, r) = (par.adaptation.i / (c_0 * motor.psi_M), -0.01 / motor.psi_M);
         for share in [0.0, 0.3, 1.0] {

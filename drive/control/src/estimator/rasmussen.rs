@@ -140,6 +140,12 @@ impl RasmussenParameters {
 }
 
 impl Rasmussen {
+    /// Whether the adaptation has measured the resistance.
+    #[inline]
+    pub fn knows_resistance(&self) -> bool {
+        self.resistance.is_known()
+    }
+
     /// Estimated permanent-magnet flux linkage in Wb at the last sample, in the estimated frame on `axis`.
     #[inline]
     fn psi_r(&self, motor: &Motor, axis: Axis<Estimated>) -> DqHat {
