@@ -334,7 +334,7 @@ fn inputs(folder: &Path) {
     let platform = fmu_import::platform::Platform::host();
     let library = (0..archive.len()).find_map(|k| {
         let mut entry = archive.by_index(k).unwrap();
-        let is_it = entry.name().starts_with(&format!("binaries/{}/", platform.tuple()));
+        let is_it = entry.name().unwrap().starts_with(&format!("binaries/{}/", platform.tuple()));
         let mut bytes = Vec::new();
         std::io::Read::read_to_end(&mut entry, &mut bytes).unwrap();
         is_it.then_some(bytes)
@@ -351,7 +351,7 @@ fn inputs(folder: &Path) {
     write("known.toml", "");
     write("stimuli.csv", "time,tau_load\n0,0\n0.1,1\n");
     let ssv = |name: &str| {
-        let value = std::iter::once((name, &drive_study::tune::rules::Value::Real(1.0)));
+        let value = std::iter::once((name, &drive_study::tune::setting::Value::Real(1.0)));
         fmu::ssv::text_of("values", value)
     };
     write("plant.ssv", &ssv("motor.R_s"));
@@ -407,7 +407,7 @@ fn every_option_changes_something_or_is_refused() {
                 problems.push(format!("fmu {name} --{id}: has no value in COMMANDS"));
                 continue;
             }
-            cases.extend(row.modes.iter().map(|mode| (name, mode, option.clone(), value)));
+            cases.extend(row.modes.iter().map(|mode| (row.command, mode, option.clone(), value)));
         }
     }
     assert!(cases.len() > 150, "{} cases", cases.len());

@@ -16,7 +16,7 @@ use super::setting::{LEVELS, Setting, Value};
 use drive::estimator::Kind;
 use std::f64::consts::{E, TAU};
 
-/// Least number of samples per electrical period at the highest speed.
+/// Minimum number of samples per electrical period at the highest speed.
 const SAMPLES: f64 = 12.0;
 
 /// Sample periods in s to choose from.
@@ -127,7 +127,7 @@ pub fn acceleration(data: &Data) -> f64 {
     data.rating.torque.get_ref() / data.mechanics.J.get_ref()
 }
 
-/// Least bandwidth in rad/s of the observer: it follows the greatest acceleration.
+/// Minimum bandwidth in rad/s of the observer: it follows the greatest acceleration.
 pub fn least_observer(data: &Data) -> f64 {
     let greatest = torque_constant(data) * 0.8 * data.rating.current.get_ref() / data.mechanics.J.get_ref();
     (f64::from(*data.machine.n_p.get_ref()) * greatest / 0.35).sqrt()
@@ -139,7 +139,7 @@ pub const GREATEST_TORQUE: f64 = 1.6;
 /// Bandwidth of the EMF observer in units of the tracker's.
 pub const EMF_PER_TRACKER: f64 = 7.5;
 
-/// Greatest loop gain through the EMF of the change of i_q, at 0.1 pu.
+/// Maximum loop gain through the EMF of the change of i_q, at 0.1 pu.
 pub const GREATEST_GAIN: f64 = 40.0;
 
 /// Gain of the speed loop through the EMF that a change of i_q makes, per rad/s of w_s, at 0.1 pu and the tracker's `rho`

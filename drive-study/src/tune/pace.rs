@@ -14,7 +14,7 @@ use drive::Pair;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
 
-/// Least torque that a load leaves, as a share of the load: an assumption where it leaves less.
+/// Minimum torque that a load leaves, as a share of the load: an assumption where it leaves less.
 const LEAST_SPARE: f64 = 0.02;
 
 /// Time constants in s.

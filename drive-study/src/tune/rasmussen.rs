@@ -22,13 +22,13 @@ use super::setting::{LEVELS, Setting, real};
 use anyhow::{Result, bail};
 use drive::control::tables::ControllerParameters;
 
-/// Greatest share of the EMF at 0.1 pu for (R - R^) i at the rated torque.
+/// Maximum share of the EMF at 0.1 pu for (R - R^) i at the rated torque.
 const LOST_EMF: f64 = 0.15;
 
-/// Least drift of the estimate at rest as a share of the rotor's swing, and the greatest share of R that the rules give up for it.
+/// Minimum drift of the estimate at rest as a share of the rotor's swing, and the maximum share of R that the rules give up for it.
 const LEAST_DRIFT: (f64, f64) = (0.025, 0.5);
 
-/// Least share by which R^ can be kept below R: less than this is below the uncertainty of R.
+/// Minimum share by which R^ can be kept below R: less than this is below the uncertainty of R.
 pub const LEAST_MARGIN: f64 = 0.02;
 
 /// Share of R by which R^ should be below R.
@@ -38,7 +38,7 @@ pub fn resistance_margin(data: &Data) -> f64 {
     0.1_f64.max((share * followed).min(most)).min(followed).min(held)
 }
 
-/// Greatest shares of R by which R^ may be below R: so that the rotor follows at rest, and so that the EMF at 0.1 pu stays larger.
+/// Maximum shares of R by which R^ may be below R: so that the rotor follows at rest, and so that the EMF at 0.1 pu stays larger.
 fn bounds(data: &Data) -> (f64, f64) {
     let (R_s, psi_M) = (*data.machine.R_s.get_ref(), *data.machine.psi_M.get_ref());
     let (i_0, i) = (zero_speed_current(data), data.rating.torque.get_ref() / torque_constant(data));

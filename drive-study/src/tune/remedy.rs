@@ -50,7 +50,7 @@ pub enum Cure {
         /// Whether it is more than in the file: with the inertia of the load.
         more: bool,
     },
-    /// Greatest change of the speed reference in rad/s2.
+    /// Maximum change of the speed reference in rad/s2.
     Ramp(f64),
     /// A sensor of the rotor's angle.
     Sensor,

@@ -194,7 +194,7 @@ fn ratings(motor: &MotorFile) -> Result<()> {
     Ok(())
 }
 
-/// Least number of samples per electrical period.
+/// Minimum number of samples per electrical period.
 const LEAST_SAMPLES: f64 = 10.0;
 
 /// Checks bandwidths and sample period, for every estimator.

@@ -32,7 +32,7 @@ const HELD: (f64, f64) = (0.02, 30.0);
 /// Tolerances of a run that has clearly settled.
 const CALM: (f64, f64) = (0.005, 25.0);
 
-/// Greatest movement in the window of a run that has clearly settled: speed in pu, angle in deg.
+/// Maximum movement in the window of a run that has clearly settled: speed in pu, angle in deg.
 const STILL: (f64, f64) = (0.002, 1.0);
 
 /// Distance from the reference in pu, in addition to its magnitude, from which no drive returns.
@@ -70,11 +70,11 @@ pub struct Trial {
     pub started: u32,
     /// How many of these held the load.
     pub held: u32,
-    /// Least speed after the load step in pu.
+    /// Minimum speed after the load step in pu.
     pub least: f64,
     /// Maximum angle error in deg after the load step where it was held.
     pub error: f64,
-    /// Greatest torque in N.m that the controller allows at this speed.
+    /// Maximum torque in N.m that the controller allows at this speed.
     pub most: f64,
 }
 
@@ -113,9 +113,9 @@ struct Part {
     off: f64,
     /// Angle error in deg, greatest magnitude.
     ahead: f64,
-    /// Least and greatest speed in pu.
+    /// Minimum and maximum speed in pu.
     speed: (f64, f64),
-    /// Least and greatest angle error in deg.
+    /// Minimum and maximum angle error in deg.
     angle: (f64, f64),
 }
 
@@ -254,7 +254,7 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
 /// Number of speeds between 0 and the rated one at which a drive without a load is tried for swings.
 const STAIRS: u32 = 10;
 
-/// Least swing: speed in pu, current as a share of the maximum, power as a share of the rated one, all from peak to peak.
+/// Minimum swing: speed in pu, current as a share of the maximum, power as a share of the rated one, all from peak to peak.
 const SWING: [f64; 3] = [0.01, 0.25, 0.25];
 
 /// A drive without a load that swings at a constant reference.

@@ -11,7 +11,7 @@ use drive::control::reference::max_torque_per_ampere;
 use drive::control::weakening::WeakeningParameters;
 use drive::frame::DqHat;
 
-/// Greatest load at the highest speed as a share of the greatest torque: the rest is for the speed loop.
+/// Maximum load at the highest speed as a share of the maximum torque: the rest is for the speed loop.
 const TOP_SHARE: f64 = 0.8;
 
 /// Field weakening and load at the highest speed.

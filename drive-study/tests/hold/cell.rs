@@ -180,7 +180,7 @@ fn prepared(tuned: &Tuned, cell: &Cell, sensor: bool) -> Pair {
     pair
 }
 
-/// Least and greatest value and sum over a part of the time.
+/// Minimum and maximum value and sum over a part of the time.
 #[derive(Clone, Copy)]
 struct Part {
     low: [f64; 2],

@@ -16,7 +16,7 @@
 //! | lost | the estimate slipped by a turn, or its mean speed was 5 % of rated off the rotor's for 1 s, or both swing by 10 % of rated |
 //! | off | neither held nor lost |
 //! | said | `lock_lost` was 1 or more within 1 s of the loss, or a limit says why the drive is off |
-//! | told | `fmu tune` says that the drive will not hold a start or a load at this speed |
+//! | named | `fmu tune` says that the drive will not hold a start or a load at this speed |
 //! | false | a held cell in which `lock_lost` was 1 or more, later than 1 s after the start |
 #![allow(missing_docs, non_snake_case)]
 
@@ -30,7 +30,7 @@ use drive_study::tune::setting::{Tuned, Value};
 use drive_study::tune::{limits, trial};
 use std::path::{Path, PathBuf};
 
-/// Start angles of the trial whose notes count as told.
+/// Start angles of the trial whose notes count.
 const ANGLES: u32 = 4;
 
 /// The files of a folder.
@@ -75,7 +75,7 @@ struct Count {
     lost_and_silent: usize,
     off_and_said: usize,
     off_and_silent: usize,
-    told: usize,
+    named: usize,
     /// Cells that the sensor holds, and those of them that the drive holds.
     on_sensor: (usize, usize),
     /// Held cells in which `lock_lost` reached 1 after the start.
@@ -83,10 +83,10 @@ struct Count {
 }
 
 impl Count {
-    fn of(outcomes: &[(Cell, Outcome)], told: &[f64]) -> Self {
+    fn of(outcomes: &[(Cell, Outcome)], named: &[f64]) -> Self {
         let mut count = Self::default();
         for (cell, outcome) in outcomes {
-            let announced = told.iter().any(|level| (level - cell.level).abs() < 1e-9);
+            let announced = named.iter().any(|level| (level - cell.level).abs() < 1e-9);
             let class = match outcome.class() {
                 _ if outcome.held => &mut count.held,
                 _ if outcome.said => {
@@ -96,7 +96,7 @@ impl Count {
                         &mut count.off_and_said
                     }
                 }
-                _ if announced => &mut count.told,
+                _ if announced => &mut count.named,
                 Some(_) => &mut count.lost_and_silent,
                 None if !outcome.on_sensor => &mut count.off_and_said,
                 None => &mut count.off_and_silent,
@@ -117,17 +117,17 @@ impl Count {
         self.lost_and_silent += other.lost_and_silent;
         self.off_and_said += other.off_and_said;
         self.off_and_silent += other.off_and_silent;
-        self.told += other.told;
+        self.named += other.named;
         self.on_sensor.0 += other.on_sensor.0;
         self.on_sensor.1 += other.on_sensor.1;
         self.false_alarms += other.false_alarms;
     }
 
     fn print(&self, name: &str) {
-        let Self { held, lost_and_said, lost_and_silent, off_and_said, off_and_silent, told, on_sensor, false_alarms } =
+        let Self { held, lost_and_said, lost_and_silent, off_and_said, off_and_silent, named, on_sensor, false_alarms } =
             self;
         println!(
-            "{name:18} {held:5} {lost_and_said:6} {lost_and_silent:6} {off_and_said:6} {off_and_silent:6} {told:6}   {:5} of {:5}  {false_alarms:5}",
+            "{name:18} {held:5} {lost_and_said:6} {lost_and_silent:6} {off_and_said:6} {off_and_silent:6} {named:6}   {:5} of {:5}  {false_alarms:5}",
             on_sensor.1, on_sensor.0
         );
     }
@@ -135,7 +135,7 @@ impl Count {
 
 /// The head of the table.
 const HEAD: &str = "                          lost,  lost,   off,   off,         held of what         \n\
-                    machine             held   said silent   said silent   told    a sensor holds  false";
+                    machine             held   said silent   said silent  named    a sensor holds  false";
 
 /// The cells of a machine and their outcomes.
 fn run(tuned: &Tuned, cells: &[Cell]) -> Vec<(Cell, Outcome)> {
@@ -155,7 +155,7 @@ fn run(tuned: &Tuned, cells: &[Cell]) -> Vec<(Cell, Outcome)> {
 }
 
 /// Speeds in pu at which `fmu tune` says that the drive will not hold a start or a load.
-fn told(motor: &MotorFile, tuned: &Tuned) -> Vec<f64> {
+fn named(motor: &MotorFile, tuned: &Tuned) -> Vec<f64> {
     let trials = trial::all(tuned, ANGLES);
     limits::of(motor, tuned, &trials).0.iter().map(|limit| limit.level).collect()
 }
@@ -180,13 +180,13 @@ fn held_or_said() {
         };
         let tuned = changed(tuned);
         let outcomes = run(&tuned, &cell::all());
-        let told = told(&motor, &tuned);
+        let named = named(&motor, &tuned);
         if std::env::var("HOLD_CELLS").is_ok() {
             for (cell, outcome) in outcomes.iter().filter(|(_, outcome)| !outcome.held || outcome.alarm) {
                 println!("  {cell}: {outcome}");
             }
         }
-        let count = Count::of(&outcomes, &told);
+        let count = Count::of(&outcomes, &named);
         count.print(&name);
         all.add(count);
     }

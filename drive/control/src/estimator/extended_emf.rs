@@ -148,7 +148,10 @@ mod tests {
             let (lost, E) = (motor.R_s - hat.R_s, w * (motor.psi_M + (motor.L_d - motor.L_q) * i.d()));
             let expected = (lost * i.d() / (E + lost * i.q())).atan() + off;
             let error = wrap(angle - expected).to_degrees();
-            assert!(error.abs() < 0.1 && speed.abs() < 0.05, "R^ = {share} R, {w} rad/s, {i_q} A: {error} deg, {speed} rad/s");
+            assert!(
+                error.abs() < 0.1 && speed.abs() < 0.05,
+                "R^ = {share} R, {w} rad/s, {i_q} A: {error} deg, {speed} rad/s"
+            );
         }
     }
 
