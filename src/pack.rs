@@ -21,7 +21,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 pub struct Entry {
     /// Its contents.
     pub bytes: Vec<u8>,
-    /// Whether it gets the permission to be executed.
+    /// Whether it is executable.
     pub executable: bool,
 }
 
@@ -31,7 +31,7 @@ impl Entry {
     }
 }
 
-/// The time at which the FMU is made: `SOURCE_DATE_EPOCH`, or now.
+/// The time of generation: `SOURCE_DATE_EPOCH`, or now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     seconds: i64,
@@ -110,7 +110,7 @@ pub fn contents(
     Ok(files)
 }
 
-/// Where the libraries of a model identifier lie in an archive. In FMI 2.0 `darwin64` receives those of macOS, both as one
+/// Paths of the libraries of a model identifier in an archive. In FMI 2.0 `darwin64` receives those of macOS, both as one
 /// universal library, and `linux64` that of the platform `linux64`.
 ///
 /// # Errors
@@ -142,17 +142,17 @@ pub fn libraries_of(
     folders.into_iter().map(one).collect()
 }
 
-/// The files of a folder, with those of its folders, as `resources/` of an FMU. Hidden files stay out: systems and editors make
+/// The files of a folder and its subfolders, as `resources/` of an FMU. Hidden files are omitted: systems and editors create
 /// them.
 ///
 /// # Errors
-/// A file cannot be read, is neither file nor folder (links are followed), or has a name that some system cannot write.
+/// A file cannot be read, is neither file nor folder (links are followed), or has a name that is invalid on some system.
 pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(folder.to_owned(), "resources".to_owned(), 0)];
     while let Some((folder, prefix, depth)) = folders.pop() {
         // A link may lead back to where it is.
-        ensure!(depth < 32, "{}: more than 32 folders inside each other", folder.display());
+        ensure!(depth < 32, "{}: folders are nested more than 32 deep", folder.display());
         for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
             let path = entry?.path();
             let of = || path.display().to_string();

@@ -1,5 +1,5 @@
-//! An FMU with other start values, made from its archive: the same binaries with a [`preset`] among their
-//! resources, and a description that says so.
+//! An FMU with other start values, made from its archive: the same binaries with a [`preset`] among their resources, and a
+//! matching description.
 
 use crate::TOOL;
 use crate::documentation;
@@ -27,20 +27,20 @@ pub struct Course {
     pub stimuli: String,
     /// Stop time.
     pub stop: f64,
-    /// Communication step, if it is not that of the archive.
+    /// Communication step, if it differs from that of the archive.
     pub step: Option<f64>,
 }
 
-/// An FMU, and the start values that it will have.
+/// An FMU, and its new start values.
 pub struct PresetFmu {
     /// The archive, for messages.
     file: PathBuf,
     md: ModelDescription,
     files: BTreeMap<String, Vec<u8>>,
     unpacked: Unpacked,
-    /// The model as it is without a preset.
+    /// The model without a preset.
     own: Description,
-    /// The model as FMI 3.0 describes it, with arrays, to read what users write.
+    /// The model as described by FMI 3.0, with arrays, to parse user input.
     reader: ModelDescription,
     /// Names and values by value reference, which is the order of the table.
     values: BTreeMap<u32, (String, String)>,
@@ -49,7 +49,7 @@ pub struct PresetFmu {
 }
 
 impl PresetFmu {
-    /// Opens an FMU of this exporter, with the values that it already presets.
+    /// Opens an FMU of this exporter, with the values of its preset, if it is one.
     ///
     /// # Errors
     /// The file is not an FMU of this exporter with a binary for this computer.
@@ -87,15 +87,15 @@ impl PresetFmu {
         Ok(Self { file: file.into(), md, files, unpacked, own, reader, values, earlier })
     }
 
-    /// The model as it is without a preset.
+    /// The model without a preset.
     pub fn own(&self) -> &Description {
         &self.own
     }
 
-    /// The model as the archive has it, with its default experiment, and the file that feeds it.
+    /// The model of the archive, with its default experiment and the file of inputs.
     ///
     /// # Errors
-    /// The binary knows no presets.
+    /// The binary does not support presets.
     pub fn archived(&self) -> Result<(Description, Option<Vec<u8>>)> {
         let mut description = if self.values.is_empty() { self.own.clone() } else { self.described(None)? };
         description.title = (self.md.model_name != description.name).then(|| self.md.model_name.clone());
@@ -112,19 +112,18 @@ impl PresetFmu {
         (experiment.stop, experiment.step) = (stop.unwrap_or(experiment.stop), step.unwrap_or(experiment.step));
     }
 
-    /// The file that feeds the default experiment of the archive.
+    /// The file with the inputs of the archive's default experiment.
     fn stimuli(&self) -> Option<&[u8]> {
         let packed = self.files.iter().find(|(name, _)| name.starts_with(FOLDER) && name.ends_with("_in.csv"));
         packed.map(|(_, bytes)| bytes.as_slice())
     }
 
-    /// The names that an earlier preset has set and this one has not.
+    /// The names set by an earlier preset but not by this one.
     pub fn earlier(&self) -> Vec<&str> {
         self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
     }
 
-    /// Sets the start value of a variable, of a whole array, or of an element, from the text of a user, in `unit` if that is
-    /// given.
+    /// Sets the start value of a variable, of a whole array, or of an element, from user input, in `unit` if that is given.
     ///
     /// # Errors
     /// Names the variable and the value, and what is expected.
@@ -146,7 +145,7 @@ impl PresetFmu {
         let read = self.reader.variable(&variable.name).context(variable.name.clone())?;
         let own_unit = read.unit.as_deref().unwrap_or("1");
         if let Some(unit) = unit.filter(|unit| *unit != own_unit) {
-            bail!("{name} is given in {unit}, and {model} has it in {own_unit}: convert the value");
+            bail!("{name} is given in {unit}, but {model} has it in {own_unit}: convert the value");
         }
         let elements = texts(&Values::read(text, read, &self.reader).map_err(anyhow::Error::msg)?, variable);
         let places: Vec<usize> = element.map_or_else(|| (0..variable.elements()).collect(), |one| vec![one]);
@@ -158,12 +157,13 @@ impl PresetFmu {
         Ok(())
     }
 
-    /// Writes the FMU with these start values to `out`; nothing is written unless all of them are allowed. `title` is the name
-    /// that users see; without it and without `course`, those of the archive stay. Returns a line for every start value that
-    /// differs from the model's own.
+    /// Writes the FMU with these start values to `out`; nothing is written unless all are allowed. `title` is the name that
+    /// users see; by default, name and experiment are those of the archive. Returns a line for every start value that differs
+    /// from the model's.
     ///
     /// # Errors
-    /// The binary knows no presets; a value is not allowed, or the FMU refuses them together; the file cannot be written.
+    /// The binary does not support presets; a value is not allowed, or the FMU refuses them together; the file cannot be
+    /// written.
     pub fn write(self, title: Option<&str>, course: Option<&Course>, out: &Path) -> Result<Vec<String>> {
         let moment = Moment::of_environment()?;
         let mut description = self.described(title)?;
@@ -195,7 +195,7 @@ impl PresetFmu {
         preset::write(self.values.values().map(|(name, value)| (name.as_str(), value.as_str())))
     }
 
-    /// The description that the binary gives of itself with the preset: it judges every name and value.
+    /// The description that the binary returns with the preset: it checks every name and value.
     fn described(&self, title: Option<&str>) -> Result<Description> {
         let (name, text) = (self.file.display(), self.text());
         fs::write(self.unpacked.resources().join(FILE), &text)?;
@@ -204,7 +204,7 @@ impl PresetFmu {
         let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
         ensure!(
             description.token == token,
-            "{name}: its binary knows no presets, because an earlier version made it: build the FMU again"
+            "{name}: its binary does not support presets, because an earlier version built it: build the FMU again"
         );
         let title = title.unwrap_or(&self.md.model_name);
         description.title = (title != description.name).then(|| title.to_owned());
@@ -212,7 +212,7 @@ impl PresetFmu {
         Ok(description)
     }
 
-    /// Requires that the FMU initializes with the preset, where it does without.
+    /// Requires that the FMU initializes with the preset if it does so without.
     fn starts(&self, archive: &Path) -> Result<()> {
         let (fmu, name) = (Fmu::open(archive)?, self.file.display());
         for (kind, what) in [(Kind::default(), "Co-Simulation"), (Kind::ModelExchange, "Model Exchange")] {
@@ -266,7 +266,7 @@ fn entry(name: &str, bytes: Vec<u8>) -> Entry {
     Entry { bytes, executable: name.starts_with(BINARIES) }
 }
 
-/// Why a library cannot be described, without the path where it was unpacked and without the line of the preset.
+/// The reason why a library cannot be described, without the unpacked path and without the line of the preset.
 fn cause(error: &str, unpacked: &Unpacked) -> String {
     let library = unpacked.library.display().to_string();
     let rest = error.strip_prefix(&library).map_or(error, |rest| rest.trim_start_matches([':', ' ']));
@@ -329,7 +329,7 @@ fn shown(variable: &Variable) -> String {
     variable.start.iter().flatten().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The elements as the file has them, rounded to the type of the variable.
+/// The elements as in the file, rounded to the type of the variable.
 fn texts(values: &Values, variable: &Variable) -> Vec<String> {
     #[expect(clippy::cast_possible_truncation, reason = "rounds")]
     let real = |x: &f64| match variable.kind {

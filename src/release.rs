@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// File of the checksums, as `sha256sum --check` reads it.
+/// File of the checksums, in the format of `sha256sum --check`.
 const SUMS: &str = "SHA256SUMS";
 /// File of the bill of materials.
 const MATERIALS: &str = "sbom.cdx.json";

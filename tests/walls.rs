@@ -1,4 +1,4 @@
-//! The walls of ARCHITECTURE.md: which crate knows which, and where unsafe code may stand.
+//! The walls of ARCHITECTURE.md: the dependencies between crates, and the places of unsafe code.
 #![allow(missing_docs)]
 
 #[path = "common/circles.rs"]
@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Each crate with the crates of this workspace that it may know.
+/// Each crate with the crates of this workspace on which it may depend.
 const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-core", &[]),
     ("fmu-export", &["fmu-core"]),
@@ -84,7 +84,7 @@ fn every_arrow_goes_one_way() {
         );
     }
     let listed: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
-    // An FMU of the examples knows what an author's does.
+    // An FMU of the examples depends on the same crates as an author's.
     let author = BTreeSet::from(["fmu-core".to_owned(), "fmu-export".to_owned()]);
     let is_example = |folder: &Path| folder.starts_with(root().join("examples"));
     let foreign = crates.values().find(|(folder, known)| is_example(folder) && !known.is_subset(&author));
@@ -147,7 +147,7 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
                 assert_eq!(allows, expected, "{}", file.display());
             }
         } else if *name == "fmurun" {
-            // PyO3's macros expand to unsafe code that allows itself, which `forbid` does not let them.
+            // PyO3's macros expand to unsafe code that allows itself, which `forbid` does not allow.
             assert!(lib.contains("#![deny(unsafe_code)]"), "{name}");
             let mut files = Vec::new();
             sources(&folder.join("src"), &mut files);
@@ -181,7 +181,7 @@ fn an_estimator_does_not_know_the_controller() {
     }
 }
 
-/// A file of the checker names the module that a type lives in; types at the root would tie all files into one circle.
+/// A file of the checker names the module of a type; types at the root would tie all files into one circle.
 #[test]
 fn no_module_of_the_checker_depends_on_its_root() {
     let mut files = Vec::new();
@@ -201,7 +201,7 @@ fn no_module_of_the_checker_depends_on_its_root() {
     }
 }
 
-/// What a crate makes public has one name: a word means one thing.
+/// Public types of a crate have unique names: a word means one thing.
 #[test]
 fn no_two_public_types_of_a_crate_share_a_name() {
     for (name, (folder, _)) in &crates() {
@@ -448,7 +448,7 @@ const OF_THE_DRIVE: &[(&str, &[&str])] = &[
     ("drive-study", &["tune/limits.rs", "tune/remedy.rs"]),
 ];
 
-/// A file that can be read alone names others that do not name it.
+/// Dependencies between files go one way, so that a file can be read alone.
 #[test]
 fn no_circle_of_files_is_new() {
     assert!(STAYING.len() <= 2 && STAYING.len() + SMALL.len() <= 10, "too many circles of files");

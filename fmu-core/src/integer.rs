@@ -1,17 +1,17 @@
-//! The integer types of FMI 3.0, and a row of constructors for each. In FMI 2.0 all are Integer, of 32 bits: a value outside of
-//! it is an error of the call that would carry it.
+//! The integer types of FMI 3.0, and a row of constructors for each. In FMI 2.0 all are Integer, of 32 bits: a value that does
+//! not fit is an error of the call.
 
 use crate::row::{Access, Constant, Row};
 use crate::variable::{Causality, Kind, Range, Variability};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// The place where a model holds an integer of some type.
+/// A field of a model with an integer of some type.
 pub trait Whole: Debug {
     /// The value.
     fn get(&self) -> i128;
 
-    /// Stores the value; returns false and changes nothing if the type does not have it.
+    /// Stores the value; returns false and changes nothing if it does not fit the type.
     fn set(&mut self, value: i128) -> bool;
 }
 

@@ -12,7 +12,7 @@ pub trait Element: 'static {
     /// Base type of the variable.
     const KIND: Kind;
 
-    /// The element as a table finds it.
+    /// The element as a table slot.
     fn slot(&mut self) -> Slot<'_>;
 }
 

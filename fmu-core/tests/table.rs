@@ -1,4 +1,4 @@
-//! A small model with every kind of variable, a part and an array: what a table makes of it.
+//! The table of a small model with every kind of variable, a part and an array.
 #![allow(missing_docs, clippy::float_cmp)]
 
 use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};

@@ -1,7 +1,7 @@
 //! Intermediate update: a communication step in parts, between which the importer reads and sets variables, and may end the
 //! step (FMI 3.0.2, 4.2.2). The gate calls the importer while nothing here is borrowed.
 //!
-//! Only parts that are accepted are shown, so each is the end of a finished step of the solver.
+//! Only accepted parts are shown, so each is the end of a finished step of the solver.
 
 use crate::access::index;
 use crate::instance::{Instance, Refusal, Stepped};
@@ -11,22 +11,22 @@ use fmu_core::description::TIME;
 use fmu_core::{Causality, Elapsed, Exported, Fault, Model, integrate};
 use std::mem::{MaybeUninit, swap};
 
-/// What the importer does inside communication steps.
+/// The importer's use of intermediate updates.
 pub struct Inside<M: Model> {
-    /// The variables that it asked for at instantiation.
+    /// The variables that it requested at instantiation.
     required: Vec<u32>,
     /// The outputs at the last communication point: variables that are not intermediate keep them.
     outputs: M::Outputs,
 }
 
-/// A communication step that is under way: its parts from here on.
+/// A communication step in progress: its remaining parts.
 pub(crate) struct Parts {
     start: Elapsed,
     t: f64,
     h: f64,
     count: f64,
     done: f64,
-    /// Where the last part ends.
+    /// End of the last part.
     end: f64,
     stepped: Stepped,
 }
@@ -40,10 +40,10 @@ pub struct Pause {
     pub can_return: bool,
 }
 
-/// What it answers: the time (s) at which the step is to end, if it wants that.
+/// Its answer: the time (s) at which the step is to end, if it requests that.
 pub type Reply = Option<f64>;
 
-/// What follows a part of a step.
+/// The action after a part of a step.
 pub(crate) enum Then {
     /// The importer is called, and the step goes on.
     Call(Pause),
@@ -52,7 +52,7 @@ pub(crate) enum Then {
 }
 
 impl<E: Exported> Instance<E> {
-    /// The importer will be called inside steps, where it uses these variables.
+    /// The importer will be called inside steps and uses these variables there.
     ///
     /// # Errors
     /// A variable does not exist.
@@ -69,7 +69,7 @@ impl<E: Exported> Instance<E> {
     /// Begins a communication step from `t` to `t + h` at its first call, then advances by one part.
     ///
     /// # Errors
-    /// As [`do_step`](Self::do_step), or the importer wants to end the step at a time outside of it.
+    /// As [`do_step`](Self::do_step), or the importer requests an end outside of the step.
     pub(crate) fn step_part(
         &mut self,
         (t, h): (f64, f64),
@@ -138,7 +138,8 @@ impl<E: Exported> Instance<E> {
         Ok(Then::Call(Pause { time: self.current.end, can_return: self.early_return }))
     }
 
-    /// Refuses variables that the importer did not ask for at instantiation, and to set those that are not intermediate.
+    /// Refuses variables that the importer did not request at instantiation, and refuses to set those that are not
+    /// intermediate.
     ///
     /// # Errors
     /// Names the first one.
@@ -196,7 +197,7 @@ impl<E: Exported> Instance<E> {
     }
 }
 
-/// Whether a variable is marked so.
+/// Whether a variable is marked as intermediate.
 fn is_intermediate<E: Exported>(reference: u32, causality: Causality) -> bool {
     let found = E::Model::TABLE.locate(index::<E>(reference));
     found.is_some_and(|(_, meta, _)| meta.intermediate && meta.causality == causality)

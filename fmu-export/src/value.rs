@@ -1,4 +1,4 @@
-//! Values as they cross the C interface: which base type of the table each C type carries.
+//! Values as they cross the C interface: the base type of the table that each C type carries.
 
 use crate::lifecycle::Standard;
 use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Kinds, Meta, Model, Slot};
@@ -9,7 +9,7 @@ use std::mem::MaybeUninit;
 /// The reference of a table's first variable, after that of `time`.
 const FIRST: u32 = 1;
 
-/// Number of inputs that are set quickly: the room for the values that they had before.
+/// Maximum number of inputs that are set quickly: the size of the buffer for their previous values.
 const SHORT: usize = 8;
 
 /// A C type of one of the standards, in the layout of C.
@@ -26,19 +26,19 @@ pub trait Value: Copy + Display + PartialEq {
     /// The value in `slot`, `None` if the variable has another base type, or a value that this type lacks.
     fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self>;
 
-    /// Writes a value that was [judged](Value::judge) before.
+    /// Writes a value that has been [checked](Value::judge).
     fn write(self, slot: Slot<'_>);
 
     /// Whether the variable may take this value, `None` if it has another base type.
     fn judge(self, meta: &Meta, standard: Standard) -> Option<bool>;
 
-    /// Reads scalars that hold this very type, quickly, up to the first reference of anything else; returns how many.
+    /// Quickly reads scalars of exactly this type, up to the first reference of another kind; returns their number.
     #[inline]
     fn read_reals<M: Model>(_block: &mut Block<M>, _references: &[u32], _out: &mut [MaybeUninit<Self>]) -> usize {
         0
     }
 
-    /// Sets inputs that hold this very type, quickly: all of them or, if one cannot be set in this way, none.
+    /// Quickly sets inputs of exactly this type: all of them or, if one cannot be set in this way, none.
     #[inline]
     fn write_inputs<M: Model>(_block: &mut Block<M>, _references: &[u32], _values: &[Self], _continuous: bool) -> bool {
         false
@@ -132,7 +132,7 @@ impl Value for f64 {
     }
 }
 
-/// Undoes a partial set, the last value first: a reference may come twice.
+/// Undoes a partial set, the last value first: a reference may occur twice.
 #[cold]
 fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
     for (&reference, &value) in list.iter().zip(before).rev() {
@@ -165,7 +165,7 @@ impl Value for f32 {
     }
 }
 
-/// The integers of FMI 3.0, each of which carries the variables of its own type.
+/// The integers of FMI 3.0; each carries the variables of its type.
 macro_rules! integers {
     ($($type:ident $name:ident $carries:literal;)*) => { $(
         impl Value for $type {
@@ -258,7 +258,7 @@ impl Value for Fmi2Integer {
     }
 }
 
-/// The truth values of the standards: the C type, and the number that it is. Everything but 0 is true.
+/// The truth values of the standards: the C type, and its number. Everything except 0 is true.
 macro_rules! truth_values {
     ($($(#[$doc:meta])* $name:ident $number:ident;)*) => { $(
         $(#[$doc])*

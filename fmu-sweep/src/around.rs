@@ -1,9 +1,10 @@
 //! Runs at a point and beside it, for derivatives of measures with respect to variables.
 //!
-//! Two runs that the master integrates (Model Exchange) differ by more than their values: the solver chooses other steps, and that
-//! difference, of the size of its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
-//! ([`with_copy`](fmu_system::cosimulation::Plan::with_copy)), which is integrated in common steps. What is differentiated is then the
-//! computed solution, and its derivative is as exact as the solution itself, at any tolerance. Events and samples are each run's own.
+//! Two runs that the master integrates (Model Exchange) differ not only by their values: the solver chooses other steps, and
+//! that difference, about its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
+//! ([`with_copy`](fmu_system::cosimulation::Plan::with_copy)), which is integrated in common steps. Thus the computed solution
+//! is differentiated, and its derivative is as exact as the solution itself, at any tolerance. Each run has its own events and
+//! samples.
 //!
 //! Source: H. G. Bock, Numerical treatment of inverse problems in chemical reaction kinetics, in: Modelling of Chemical Reaction
 //! Systems, Springer 1981, 102-125: internal numerical differentiation.
@@ -15,11 +16,11 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 impl Plan {
-    /// Runs at a point, then with each variable above it by its step, then with each below it: as many rows as twice the variables,
-    /// and one. `progress` is called with the number of rows done.
+    /// Runs at a point, then with each variable above it by its step, then with each below it: two rows for each variable, plus
+    /// one. `progress` is called with the number of rows done.
     ///
     /// # Errors
-    /// An FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run is in its row.
+    /// An FMU refuses an instance, or `progress` stops it. An error of a run is in its row.
     pub fn run_around(
         &self,
         variables: &[Variable],

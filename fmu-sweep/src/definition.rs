@@ -8,7 +8,7 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// A sweep: the system, its runs, what is varied and what is measured. A program fills in the fields that a file would have.
+/// A sweep: the system, its runs, varied variables and measures. A program fills in the fields of a file.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {
@@ -22,33 +22,33 @@ pub struct Definition {
     pub terminal: Vec<[String; 2]>,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
-    /// How all FMUs run; otherwise each steps itself if it can.
+    /// How to run all FMUs; by default each steps itself if it can.
     pub interface: Option<Interface>,
-    /// Names of the FMUs that step themselves all the same, in a system for Model Exchange.
+    /// Names of FMUs that still step themselves in a system for Model Exchange.
     pub stepping: Vec<String>,
-    /// How states are integrated (Model Exchange); otherwise with the adaptive solver.
+    /// Integration method (Model Exchange); by default the adaptive solver.
     pub solver: Option<SolverName>,
-    /// Relative tolerance of the adaptive solver; otherwise 1e-6.
+    /// Relative tolerance of the adaptive solver; by default 1e-6.
     pub rtol: Option<f64>,
-    /// Start time in s; otherwise from the FMUs.
+    /// Start time in s; by default from the FMUs.
     pub start: Option<f64>,
-    /// Stop time in s; otherwise from the FMUs.
+    /// Stop time in s; by default from the FMUs.
     pub stop: Option<f64>,
-    /// Communication step in s; otherwise from the FMUs.
+    /// Communication step in s; by default from the FMUs.
     pub step: Option<f64>,
-    /// Reuse instances from run to run by resetting them; otherwise found out by comparing two rows.
+    /// Reuse instances from run to run by resetting them; by default determined by comparing two rows.
     pub reuse: Option<bool>,
     /// Parameters and unconnected inputs, the same in all runs.
     pub set: Ordered<Scalar>,
     /// Inputs over time, written as for `fmu simulate --input`.
     pub input: Ordered<String>,
-    /// How rows are made.
+    /// How to generate rows.
     pub design: Option<Design>,
     /// The varied variables; their order is that of the columns.
     pub vary: Ordered<Vary>,
     /// The measures of each run.
     pub measure: Ordered<MeasureDefinition>,
-    /// Which runs are recorded.
+    /// The runs to record.
     pub trace: Option<Trace>,
 }
 
@@ -71,7 +71,7 @@ pub enum SolverName {
     Rk4,
 }
 
-/// How rows are made.
+/// How to generate rows.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Design {
@@ -79,11 +79,11 @@ pub struct Design {
     pub kind: Kind,
     /// Number of rows, of a random, LHS or Sobol design.
     pub runs: Option<u64>,
-    /// Another seed gives other rows, of a random, LHS or Sobol design.
+    /// Seed of a random, LHS or Sobol design; another seed gives other rows.
     pub seed: Option<u64>,
     /// CSV file of a list; its header names the variables.
     pub file: Option<String>,
-    /// Rows of a part; otherwise about 5 s of work.
+    /// Rows of a part; by default about 5 s of work.
     pub part: Option<u64>,
 }
 
@@ -95,7 +95,7 @@ pub enum Kind {
     Grid,
     /// Independent random numbers.
     Random,
-    /// Latin hypercube sampling: of each variable one number in each of as many strata as there are rows.
+    /// Latin hypercube sampling: with n rows, each variable has one value in each of n strata.
     Lhs,
     /// Sobol's sequence, shifted by the seed.
     Sobol,
@@ -121,11 +121,11 @@ pub struct Vary {
     pub from: Option<f64>,
     /// The last of them.
     pub to: Option<f64>,
-    /// How many there are.
+    /// Their number.
     pub count: Option<u32>,
     /// Equal to another column ...
     pub same: Option<String>,
-    /// ... times this; otherwise 1.
+    /// ... times this; by default 1.
     pub times: Option<f64>,
 }
 
@@ -137,9 +137,9 @@ pub struct MeasureDefinition {
     pub of: String,
     /// The function to compute from it.
     pub is: Function,
-    /// Wraps the sum into half of this on both sides of 0: a number, or one before `pi`.
+    /// Period to which the sum is wrapped (±period/2): a number or a multiple of pi such as `2pi`.
     pub wrap: Option<Scalar>,
-    /// Time in s from which on it counts; otherwise the start.
+    /// Time in s from which on values count; by default the start.
     pub after: Option<f64>,
     /// Time in s, of `at`.
     pub time: Option<f64>,
@@ -149,7 +149,7 @@ pub struct MeasureDefinition {
     pub to: Option<f64>,
     /// The value at which it settles.
     pub target: Option<f64>,
-    /// How far from the target it may be when it has settled.
+    /// Maximum distance from the target of a settled value.
     pub band: Option<f64>,
 }
 
@@ -173,7 +173,7 @@ pub enum Function {
     Integral,
     /// The value at a time: that of the first communication point at or after it.
     At,
-    /// Time in s from the first passage of `from` to the next passage of `to`, interpolated; infinite without them.
+    /// Time in s from the first crossing of `from` to the next crossing of `to`, interpolated; infinite without them.
     Rise,
     /// Time in s until it stays within `band` of `target`; infinite if it never does.
     Settling,
@@ -185,13 +185,13 @@ pub enum Function {
 pub struct Trace {
     /// Variables to record.
     pub of: Vec<String>,
-    /// Every how many communication points; otherwise each.
+    /// Record every n-th communication point; by default each.
     pub every: Option<u32>,
     /// Which runs.
     pub runs: Runs,
 }
 
-/// Which runs are recorded.
+/// The runs to record.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(untagged)]
 pub enum Runs {
@@ -236,7 +236,7 @@ impl fmt::Display for Scalar {
     }
 }
 
-/// A table whose order counts.
+/// An ordered table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ordered<T>(pub Vec<(String, T)>);
 
@@ -280,7 +280,7 @@ impl Definition {
     /// Reads a file.
     ///
     /// # Errors
-    /// The file cannot be read, or is not a definition of a sweep: names the line and what is wrong there.
+    /// The file cannot be read, or is not a definition of a sweep: names the line and the fault.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         Self::parse(&text).map_err(|cause| Error::file(path, cause))
@@ -289,7 +289,7 @@ impl Definition {
     /// Reads the text of a file.
     ///
     /// # Errors
-    /// The line and what is wrong there.
+    /// The line and the fault.
     pub fn parse(text: &str) -> Result<Self, String> {
         toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);

@@ -1,11 +1,11 @@
 //! Many runs of FMUs, of any tool: designs, measures, threads, parts that a killed sweep resumes from.
 //!
-//! - [`Definition`]: what a sweep is, from a TOML file or from a program.
+//! - [`Definition`]: the definition of a sweep, from a TOML file or from a program.
 //! - [`Plan`]: the system with its measures; runs rows on threads. [`Rows`]: the rows of a design.
-//! - [`Sweep`]: both, from a file. [`run`]: a sweep into a folder; [`isolate`]: in processes of their own.
+//! - [`Sweep`]: both, from a file. [`run`]: a sweep into a folder; [`isolate`]: in separate processes.
 //!
-//! A row is a function of the definition, the seed and its number, and its results have the same bits whichever thread, process
-//! or machine computes it.
+//! A row is a function of the definition, the seed and its number, and its results have the same bits on every thread, process
+//! and machine.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_sweep::Error> {

@@ -1,6 +1,6 @@
 //! Measures: one number from a run, computed while it runs.
 //!
-//! Sums are taken in the order of time, so a measure has the same bits on every thread and machine.
+//! Sums are accumulated in the order of time, so a measure has the same bits on every thread and machine.
 
 use crate::definition::{Function, MeasureDefinition};
 use crate::signal::Signal;
@@ -40,9 +40,9 @@ pub(crate) struct Reading {
     count: f64,
     /// Extremum, sum, or last value.
     x: f64,
-    /// Time and value before.
+    /// Previous time and value.
     before: (f64, f64),
-    /// Time of an event: a passage of `from`, or the return into the band.
+    /// Time of an event: a crossing of `from`, or the return into the band.
     since: Option<f64>,
     /// Time of the end of a rise.
     until: Option<f64>,
@@ -123,7 +123,7 @@ impl Measure {
         Reading { count: 0.0, x: f64::NAN, before: (0.0, 0.0), since: None, until: None, begun: 0.0, bad: None }
     }
 
-    /// Takes the values of a communication point.
+    /// Processes the values of a communication point.
     pub(crate) fn take(&self, s: &mut Reading, t: f64, values: &[f64]) {
         if t < self.after - SAME || s.bad.is_some() {
             return;

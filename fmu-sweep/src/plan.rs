@@ -15,7 +15,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What all runs share. A clone refers to the same data; any thread may use it.
+/// Data shared by all runs. A clone refers to the same data; any thread may use it.
 #[derive(Clone)]
 pub struct Plan(Arc<Shared>);
 
@@ -26,7 +26,7 @@ struct Shared {
     measures: Vec<Measure>,
     columns: Vec<Column>,
     trace: Vec<usize>,
-    /// `instance.variable` of all that the definition sets.
+    /// `instance.variable` of all variables that the definition sets.
     set: Vec<String>,
     outputs: Vec<String>,
     reuse: bool,
@@ -36,7 +36,8 @@ struct Shared {
 /// The first column of all results; neither a measure nor a varied variable may have its name.
 pub(crate) const RUN: &str = "run";
 
-/// Names of the last two columns of all results: `end` and `error`, or `run.end` and `run.error` where one of these names is taken.
+/// Names of the last two columns of all results: `end` and `error`, or `run.end` and `run.error` if one of these names is
+/// taken.
 pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
     ["end", "error"].map(|name| {
         let mut name = name.to_owned();
@@ -54,7 +55,7 @@ pub struct Column {
     pub name: String,
     /// Unit; empty for none.
     pub unit: String,
-    /// Numbers and names of an enumeration's values, of which results show the names; empty for other types.
+    /// Numbers and names of an enumeration's values (results show the names); empty for other types.
     pub items: Vec<(i64, String)>,
 }
 
@@ -83,9 +84,9 @@ impl Variable {
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outcome {
-    /// The measures, or one line with what went wrong.
+    /// The measures, or the error in one line.
     pub result: Result<Vec<f64>, String>,
-    /// Time in s that was reached; NaN if the run never began.
+    /// Time reached, in s; NaN if the run never began.
     pub end: f64,
 }
 
@@ -94,17 +95,17 @@ pub struct Outcome {
 pub struct Outcomes {
     /// A column for each measure; NaN where the run failed.
     pub measures: Vec<Vec<f64>>,
-    /// Time in s that was reached; NaN if the run never began.
+    /// Time reached, in s; NaN if the run never began.
     pub end: Vec<f64>,
     /// The error.
     pub errors: Vec<Option<String>>,
 }
 
 impl Plan {
-    /// Opens the FMUs of a definition, connects them and sets what is the same in all runs. Relative paths begin in `folder`.
+    /// Opens the FMUs of a definition, connects them and sets the values common to all runs. Relative paths begin in `folder`.
     ///
     /// # Errors
-    /// A file is not an FMU that runs here, a name or a value is wrong, or a measure makes no sense.
+    /// A file is not an FMU that runs here, or a name, a value or a measure is invalid.
     pub fn new(definition: &Definition, folder: &Path) -> Result<Self, Error> {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");
@@ -120,7 +121,7 @@ impl Plan {
         };
         let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, method)?;
         if let Some(name) = unknown {
-            return invalid(format!("stepping: {name} is the name of no FMU"));
+            return invalid(format!("stepping: {name} is not the name of an FMU"));
         }
         let integrates = loaded.system.instances().iter().any(|i| i.kind() == Kind::ModelExchange);
         if !integrates && (definition.solver.is_some() || definition.rtol.is_some()) {
@@ -129,7 +130,7 @@ impl Plan {
             );
         }
         if integrates && definition.sequential {
-            return invalid("sequential: FMUs step one after another in Co-Simulation alone");
+            return invalid("sequential: FMUs step one after another only in Co-Simulation");
         }
         for [from, to] in &definition.connect {
             loaded.system.connect(from, to)?;
@@ -202,7 +203,7 @@ impl Plan {
         self.0.reuse
     }
 
-    /// What reads the measures from recorded values.
+    /// The reader of the measures from recorded values.
     pub(crate) fn readers(&self) -> &[Measure] {
         &self.0.measures
     }
@@ -232,7 +233,7 @@ impl Plan {
         &self.0.outputs
     }
 
-    /// The name of an FMU of which a process can have one instance only, if there is one: then runs are on one thread.
+    /// The name of an FMU that allows only one instance per process, if there is one; then all runs are on one thread.
     pub fn only_one_instance(&self) -> Option<&str> {
         self.0.system.only_one_instance()
     }
@@ -247,7 +248,7 @@ impl Plan {
             let system = &self.0.system;
             let mut targets = Vec::new();
             for port in self.0.connectors.ports(name)? {
-                // Values in an SSP file are what a run may replace; those of the definition are for all runs.
+                // A run may replace values of an SSP file, but not those of the definition.
                 if self.0.set.contains(&port) {
                     return invalid(format!("{name} is set for all runs and varied: remove one of them"));
                 }
@@ -284,10 +285,10 @@ impl Plan {
         Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
     }
 
-    /// Makes a runner of one row after another, for one thread.
+    /// Creates a runner of one row after another, for one thread.
     ///
     /// # Errors
-    /// An FMU refuses to make an instance.
+    /// An FMU refuses an instance.
     pub fn runner(&self, variables: &[Variable]) -> Result<Runner, Error> {
         Ok(Runner {
             plan: self.clone(),
@@ -303,8 +304,8 @@ impl Plan {
     /// the threads, and may stop the run.
     ///
     /// # Errors
-    /// The columns are not of one length, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run
-    /// is in its row.
+    /// The columns are not of one length, an FMU refuses to make an instance, or `progress` stops it. An error of a run is in
+    /// its row.
     pub fn run_many(
         &self,
         variables: &[Variable],
@@ -331,7 +332,7 @@ impl Plan {
         self.run_rows(variables, u64::try_from(length).unwrap_or(u64::MAX), &row, threads, progress)
     }
 
-    /// The measures that the readings of a run have come to.
+    /// The measures from the readings of a run.
     pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<f64>, String> {
         let of = |((measure, reading), column): ((&Measure, &Reading), &Column)| {
             measure.end(reading).map_err(|cause| format!("{}: {cause}", column.name))
@@ -396,7 +397,7 @@ impl Outcomes {
     }
 }
 
-/// How the FMUs run: as the definition says, otherwise those step themselves that can.
+/// How to run the FMUs: as in the definition; by default those that can step themselves do.
 fn method(definition: &Definition, fmus: &[(String, Fmu)]) -> Method {
     let steps = |fmu: &Fmu| fmu.description().co_simulation.is_some();
     let stepping = match definition.interface {
@@ -413,7 +414,7 @@ fn method(definition: &Definition, fmus: &[(String, Fmu)]) -> Method {
     Method::ModelExchange(Integration { solver, stepping, ..Integration::default() })
 }
 
-/// The place of a name in a list, added if it is new.
+/// The position of a name in a list, added if it is new.
 fn place(names: &mut Vec<String>, name: &str) -> usize {
     names.iter().position(|n| n == name).unwrap_or_else(|| {
         names.push(name.to_owned());

@@ -11,7 +11,7 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
-    /// Reads `[number *] variable` with ` + ` and ` - ` between them: the spaces, because names may have signs.
+    /// Reads `[number *] variable` terms joined by ` + ` or ` - `; the spaces are required because names may contain signs.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut terms = Vec::new();
         let mut sign = Some(1.0);
@@ -54,12 +54,12 @@ impl Sum {
 pub(crate) struct Signal {
     /// Factors and columns.
     terms: Vec<(f64, usize)>,
-    /// Period that it is wrapped by.
+    /// Period of the wrapping.
     wrap: Option<f64>,
 }
 
 impl Signal {
-    /// `column` finds the place of a variable among the recorded values.
+    /// `column` returns the position of a variable among the recorded values.
     pub(crate) fn new(sum: &Sum, wrap: Option<f64>, mut column: impl FnMut(&str) -> usize) -> Self {
         Self { terms: sum.terms.iter().map(|(factor, name)| (*factor, column(name))).collect(), wrap }
     }

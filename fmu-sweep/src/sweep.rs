@@ -13,7 +13,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A sweep, ready to run: the file that defines it has been read, its FMUs are open, its names are found.
+/// A sweep, ready to run: its file is read, its FMUs are open, its names are resolved.
 #[derive(Clone)]
 pub struct Sweep {
     definition: Definition,
@@ -78,7 +78,7 @@ impl Sweep {
         Ok(Self { definition, folder, plan, rows, variables })
     }
 
-    /// The folder that relative paths refer to.
+    /// The folder to which relative paths refer.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -106,8 +106,7 @@ impl Sweep {
     /// Runs rows `first..first + count`, which must be rows of the design.
     ///
     /// # Errors
-    /// There are fewer rows, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run is in its
-    /// row.
+    /// There are fewer rows, an FMU refuses an instance, or `progress` stops it. An error of a run is in its row.
     pub fn run(
         &self,
         first: u64,
@@ -140,7 +139,7 @@ impl Sweep {
         names.join(",") + "\n"
     }
 
-    /// Everything that an FMU or another file of the sweep is read from, with the SHA-256 of its bytes.
+    /// All files of the sweep, FMUs included, with the SHA-256 of their bytes.
     pub(crate) fn files(&self) -> Result<Vec<(String, String)>, Error> {
         let list = self.definition.design.iter().filter_map(|design| design.file.as_deref());
         let fmus = self.definition.fmus.iter().map(|text| fmu_system::ssp::load::name_and_path(text));
@@ -198,8 +197,8 @@ impl Sweep {
         line.trim_end().splitn(columns + 1, ',').nth(columns).filter(|error| !error.is_empty())
     }
 
-    /// How long a run takes in s, and whether instances are reused: whether the last row has the same line after a reset as with
-    /// new instances.
+    /// Duration of a run in s, and whether instances can be reused, that is, whether the last row gives the same line after a
+    /// reset as with new instances.
     pub(crate) fn probe(&self) -> Result<(f64, bool), Error> {
         let (first, last) = (0, self.rows.count() - 1);
         let mut writer = self.writer(true, None)?;
@@ -273,7 +272,7 @@ fn push_value(text: &mut String, items: &[(i64, String)], x: f64) {
 /// A number that reads back to the same double, in few characters.
 fn push_number(text: &mut String, x: f64) {
     let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite();
-    // A String takes everything.
+    // Writing to a String cannot fail.
     let _ = if plain { write!(text, "{x}") } else { write!(text, "{x:e}") };
 }
 

@@ -1,4 +1,4 @@
-//! `fmu info`: what an FMU is, in half a page.
+//! `fmu info`: summary of an FMU, in half a page.
 
 use anyhow::Result;
 use clap::Args;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 /// Describes an FMU: standard, interfaces, platforms, size, terminals, and its variables by group.
 ///
-/// The command reads the archive and runs nothing in it.
+/// The command only reads the archive; it does not run the FMU.
 ///
 /// The inputs, outputs and parameters of the drive, with units and start values:
 ///   fmu info target/fmu/fmi3/PmsmDrive.fmu

@@ -161,7 +161,7 @@ fn dateless(bytes: &[u8], date: &str) -> Vec<u8> {
     }
 }
 
-/// A library that is named after the FMU, of one platform.
+/// A library named after the FMU, for one platform.
 struct Library<'a> {
     /// Its path in the archive.
     path: &'a str,
@@ -171,8 +171,8 @@ struct Library<'a> {
     bytes: &'a [u8],
 }
 
-/// The libraries of a part; a universal library counts once for each processor. The folder decides where a library does not say its
-/// platform.
+/// The libraries of a part; a universal library counts once for each processor. The folder counts if a library does not state
+/// its platform.
 fn libraries(part: &Part) -> Result<Vec<Library<'_>>> {
     let md = &part.description;
     let interfaces = [&md.co_simulation, &md.model_exchange, &md.scheduled_execution].into_iter().flatten();

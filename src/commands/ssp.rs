@@ -39,11 +39,11 @@ pub struct Ssp {
     /// Values for controller or plant as SSV of SSP 1.0 (repeatable)
     #[arg(long, value_name = "COMPONENT=FILE.ssv")]
     pub parameters: Vec<String>,
-    /// Write values of enumerations by name, as SSP 1.0 describes them, instead of by number; some importers read no names
+    /// Write values of enumerations by name, as SSP 1.0 describes them, instead of by number; some importers do not read names
     /// (OMSimulator)
     #[arg(long)]
     pub names: bool,
-    /// Write values of enumerations by number: the default; older scripts pass it
+    /// Write values of enumerations by number: the default, kept for older scripts
     #[arg(long, hide = true, conflicts_with = "names")]
     pub integers: bool,
     /// Connect `enabled` of the controller to `enable` of the plant, for a drive that can be switched off; some importers do
@@ -110,7 +110,7 @@ fn is_of(folder: &Path, version: FmiVersion) -> Result<()> {
         let file = folder.join(fmu).with_extension("fmu");
         let found = fmu_import::outline(&file)?.description.version;
         if found != version {
-            bail!("{}: is of FMI {found}, but --fmi asks for {version}", file.display());
+            bail!("{}: is of FMI {found}, but --fmi is {version}", file.display());
         }
     }
     Ok(())
@@ -134,10 +134,10 @@ fn values(args: &Ssp) -> Result<Vec<Values>> {
             text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --parameters COMPONENT=FILE.ssv"))?;
         if !COMPONENTS.iter().any(|(name, ..)| *name == component) {
             let names: Vec<&str> = COMPONENTS.iter().map(|(name, ..)| *name).collect();
-            bail!("--parameters {text}: there is no component {component}; there are {}", names.join(" and "));
+            bail!("--parameters {text}: there is no component {component}; available: {}", names.join(", "));
         }
         if values.iter().any(|v| v.component == component) {
-            bail!("--parameters {text}: {component} has a file already: put the values of both into one");
+            bail!("--parameters {text}: {component} already has a file: put the values of both into one");
         }
         let content = std::fs::read_to_string(file).with_context(|| file.to_owned())?;
         values.push(Values { component: component.into(), file: file.into(), text: content });

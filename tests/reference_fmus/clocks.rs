@@ -1,4 +1,4 @@
-//! `clocks`: an importer that makes its ticks.
+//! `clocks`: an importer that generates its ticks.
 
 use super::{archive, open, script};
 use fmu_import::{Instance, Kind, Values};

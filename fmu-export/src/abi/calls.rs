@@ -38,7 +38,7 @@ impl<E: Exported> Abi<'_, E> {
         self.0.set(vr, values)
     }
 
-    /// Judges the variables that the importer uses inside a step, or that are on clocks.
+    /// Checks the variables that the importer uses inside a step, or that are on clocks.
     #[inline]
     fn inside(&mut self, vr: &[u32], sets: bool) -> Answer {
         if const { E::CAN.clocked.is_some() } {
@@ -50,7 +50,7 @@ impl<E: Exported> Abi<'_, E> {
         Ok(())
     }
 
-    /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
+    /// The texts remain valid until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
     pub unsafe fn get_texts(
         &mut self,
         vr: References,
@@ -82,8 +82,7 @@ impl<E: Exported> Abi<'_, E> {
         self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })
     }
 
-    /// The bytes stay where they are until the next call that sets or computes them (FMI 3.0.2, 2.2.7.2); their pointer is never
-    /// NULL.
+    /// The bytes remain valid until the next call that sets or computes them (FMI 3.0.2, 2.2.7.2); their pointer is never NULL.
     pub unsafe fn get_bytes(
         &mut self,
         vr: References,
@@ -106,7 +105,7 @@ impl<E: Exported> Abi<'_, E> {
         })
     }
 
-    /// Every size is judged before a pointer is looked at.
+    /// Every size is checked before a pointer is read.
     pub unsafe fn set_bytes(
         &mut self,
         vr: References,
@@ -158,7 +157,7 @@ impl<E: Exported> Abi<'_, E> {
         Ok(self.0.restore(state.addr())?)
     }
 
-    /// Ignores NULL and a variable that holds NULL.
+    /// Ignores NULL and a variable that is NULL.
     pub unsafe fn free_state(&mut self, state: *mut FmuState) -> Answer {
         if state.is_null() {
             return Ok(());

@@ -3,7 +3,7 @@
 use super::ball::*;
 use super::*;
 
-/// How exact they are.
+/// Their accuracy.
 #[derive(Clone, Copy)]
 pub struct Exactness {
     /// Against differences of Set and Get at v = 0, where v |v| has a kink in its derivative; 1e-6 elsewhere.
@@ -12,7 +12,7 @@ pub struct Exactness {
     pub linear: f64,
 }
 
-/// What is wrong, and the call.
+/// The fault, and the call.
 type Wrong = (&'static str, fn(&Fmu) -> c_int);
 
 const KNOWNS: [u32; 3] = [U, H, V];

@@ -1,4 +1,4 @@
-//! How one variable varies: from a number between 0 and 1, or the number of a level, to its value.
+//! Variation of one variable: maps a number between 0 and 1, or the number of a level, to its value.
 
 use super::normal;
 use crate::definition::{Scalar, Vary};
@@ -14,7 +14,7 @@ pub(super) enum Source {
         low: f64,
         high: f64,
     },
-    /// Truncated to `low..high`, which the probabilities `from` and `to` belong to.
+    /// Truncated to `low..high`, with the probabilities `from` and `to`.
     Normal {
         mean: f64,
         deviation: f64,

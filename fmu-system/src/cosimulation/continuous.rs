@@ -1,8 +1,8 @@
 //! Model Exchange: the master integrates all FMUs of a system as one, [`Fmus`](super::coupled::Fmus).
 //!
-//! Outputs are passed on to continuous inputs until nothing changes; a point of a schedule is an event. FMUs for Co-Simulation in
-//! the system step from one communication point to the next: between two, the others see their outputs of the first. There, all
-//! FMUs meet in an event.
+//! Outputs are passed on to continuous inputs until nothing changes; a point of a schedule is an event. FMUs for Co-Simulation
+//! in the system step from one communication point to the next: between two points, the other FMUs see their outputs of the
+//! first. A communication point is an event of all FMUs.
 
 use super::coupled::{Equations, Feed};
 use super::exchange::{Exchange, Inputs};
@@ -80,7 +80,7 @@ pub(super) fn run(
             break;
         }
         if point.touched {
-            // The hook may have set what the derivatives depend on.
+            // The hook may have set variables on which the derivatives depend.
             equations.forget();
             driver.forget();
         }

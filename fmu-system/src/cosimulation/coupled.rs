@@ -11,7 +11,7 @@ use crate::integration::{Hybrid, Trial};
 use fmu_import::{CompletedStep, Error, Instance, Kind, Update};
 use std::ops::Range;
 
-/// What sets the inputs of FMUs for Model Exchange.
+/// Sets the inputs of FMUs for Model Exchange.
 pub trait Feed {
     /// Sets inputs at the time `t` (s) until nothing changes; returns whether a discrete input has changed.
     ///
@@ -19,7 +19,8 @@ pub trait Feed {
     /// An FMU refuses, or the inputs do not settle.
     fn settle(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<bool, Error>;
 
-    /// An event begins at the time `t` (s); the FMUs still have what holds before it. The end of the initialization is one.
+    /// An event begins at the time `t` (s); the FMUs still have the values before it. The end of the initialization is an
+    /// event.
     ///
     /// # Errors
     /// An FMU refuses.
@@ -29,19 +30,19 @@ pub trait Feed {
     fn next_point(&self, t: f64) -> Option<f64>;
 }
 
-/// What is known of the FMUs between two steps; any number of runs of it follow one another.
+/// State of the FMUs between two steps, for any number of successive runs.
 pub struct Equations {
     integration: Integration,
-    /// Where the states and the indicators of each instance are.
+    /// Ranges of the states and the indicators of each instance.
     states: Vec<Range<usize>>,
     indicators: Vec<Range<usize>>,
-    /// Which instances ask for completed steps.
+    /// Instances that need completed steps.
     completes: Vec<bool>,
     nominals: Vec<f64>,
     /// The instances for Model Exchange in the order of updates.
     order: Vec<usize>,
     outcomes: Vec<Iterated>,
-    /// Time and states that the FMUs have; the time is NaN when they are not known.
+    /// Time and states of the FMUs; the time is NaN when they are unknown.
     t: f64,
     x: Vec<f64>,
     /// The FMUs are in event mode from their initialization.
@@ -51,7 +52,7 @@ pub struct Equations {
 }
 
 impl Equations {
-    /// Asks instances that are initialized and in event mode.
+    /// Queries instances that are initialized and in event mode.
     ///
     /// # Errors
     /// An FMU refuses, or a nominal value is not positive.
@@ -108,7 +109,7 @@ impl Equations {
         }
     }
 
-    /// The name of a state of an instance; its number, from 1, where the description does not name it.
+    /// The name of a state of an instance, or its number, from 1, if the description does not name it.
     fn state(&self, instance: &Instance, index: usize, state: usize) -> String {
         let (description, count) = (instance.description(), self.states[index].len());
         match description.states().get(state) {
@@ -119,7 +120,7 @@ impl Equations {
 
     /// The first value that is not finite, as an error.
     fn finite(&self, instances: &[Instance], what: &str, values: &[f64], t: f64) -> Result<(), Error> {
-        // 0 times a number that is not finite is NaN: one branch for all, because this runs twice in an evaluation.
+        // 0 times a non-finite number is NaN: a single branch, because this runs twice in an evaluation.
         if values.iter().map(|x| 0.0 * x).sum::<f64>() == 0.0 {
             return Ok(());
         }
@@ -134,12 +135,12 @@ impl Equations {
         self.ended_by
     }
 
-    /// The FMUs were used by others: what they have is not known.
+    /// Other code has used the FMUs: their time and states are unknown.
     pub fn forget(&mut self) {
         self.t = f64::NAN;
     }
 
-    /// The system for the next calls, with the instances that it was made of.
+    /// The system for the next calls, with its instances.
     pub fn of<'a, F: Feed>(&'a mut self, instances: &'a mut [Instance], feed: &'a mut F) -> Fmus<'a, F> {
         Fmus { equations: self, instances, feed }
     }
@@ -153,7 +154,7 @@ pub struct Fmus<'a, F> {
 }
 
 impl<F: Feed> Fmus<'_, F> {
-    /// Gives the FMUs this time, these states and the inputs that follow.
+    /// Sets this time, these states and the resulting inputs in the FMUs.
     ///
     /// # Errors
     /// An FMU refuses.

@@ -1,7 +1,7 @@
-//! A system made ready for many runs.
+//! A system prepared for many runs.
 //!
-//! A [`Plan`] is what all runs share, and threads share it. A [`Worker`] has instances of its own and runs one setting after
-//! another: it resets its instances where that works and makes new ones after an error.
+//! A [`Plan`] contains the data shared by all runs and threads. A [`Worker`] owns its instances and runs one setting after
+//! another: it resets its instances where that works and creates new ones after an error.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
@@ -35,11 +35,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What all runs of a system share: FMUs, connections, recorded variables, times, and the values that were set.
+/// Data shared by all runs of a system: FMUs, connections, recorded variables, times, and set values.
 pub struct Plan {
     method: Method,
     parts: Parts,
-    /// The FMU of each part to make instances of.
+    /// The FMU of each part, for new instances.
     live: Vec<Arc<Live>>,
     wiring: Wiring,
     set: Vec<(Port, Values)>,
@@ -52,7 +52,7 @@ pub struct Plan {
 /// An FMU that is opened again after the status Fatal.
 struct Live {
     fmu: Mutex<Fmu>,
-    /// How often it was opened again.
+    /// Number of times it was opened again.
     generation: AtomicU32,
 }
 
@@ -81,7 +81,7 @@ impl Target {
 }
 
 impl System {
-    /// Makes the system ready for many runs from start to stop.
+    /// Prepares the system for many runs from start to stop.
     ///
     /// # Errors
     /// The settings make no sense.
@@ -128,7 +128,7 @@ impl Plan {
         self.parts.column(&target.port, target.name())
     }
 
-    /// What a user writes for a target as the number that stands for it: `3.3`, `true`, or a name of an enumeration.
+    /// Converts user input for a target to a number: `3.3`, `true`, or a name of an enumeration.
     ///
     /// # Errors
     /// The text is not a value of the target's type.
@@ -205,7 +205,7 @@ impl Plan {
         self.grid.settings()
     }
 
-    /// The name of an FMU of which a process can have one instance only, if there is one: then there is one worker.
+    /// The name of an FMU that allows only one instance per process, if there is one; then there is one worker.
     pub fn only_one_instance(&self) -> Option<&str> {
         let flag = |interface: &Interface| interface.flag("canBeInstantiatedOnlyOncePerProcess");
         let interface = |part: &Part| match part.kind {
@@ -216,10 +216,10 @@ impl Plan {
         self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
     }
 
-    /// Makes a worker that runs this plan on one thread.
+    /// Creates a worker that runs this plan on one thread.
     ///
     /// # Errors
-    /// An FMU refuses to make an instance.
+    /// An FMU refuses an instance.
     pub fn worker(self: &Arc<Self>) -> Result<Worker, Error> {
         let mut worker = Worker {
             plan: self.clone(),
@@ -252,8 +252,8 @@ impl Worker {
         &self.plan
     }
 
-    /// Runs from start to stop with these values in addition to those that were set in the system. `hook` sees the time and the
-    /// recorded values of every communication point, and may end the run. A run does not depend on those before it.
+    /// Runs from start to stop with these values in addition to those set in the system. `hook` sees the time and the recorded
+    /// values of every communication point, and may end the run. A run does not depend on those before it.
     ///
     /// # Errors
     /// An FMU refuses a value or a call. The next run has new instances.
@@ -288,12 +288,12 @@ impl Worker {
         Ok(recording)
     }
 
-    /// Makes new instances, for an FMU whose reset leaves something behind.
+    /// Creates new instances, for an FMU whose reset is incomplete.
     ///
     /// # Errors
     /// An FMU refuses.
     pub fn renew(&mut self) -> Result<(), Error> {
-        // Before the new ones: of some FMUs there can be one at a time.
+        // Dropped before the new ones: some FMUs allow only one instance at a time.
         self.instances.clear();
         self.generations.clear();
         for (part, live) in self.plan.parts.0.iter().zip(self.plan.live.iter()) {
@@ -305,7 +305,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Instances as after instantiation, with the values of the system.
+    /// Instances in their state after instantiation, with the values of the system.
     fn refresh(&mut self) -> Result<(), Error> {
         let Self { plan, instances, generations, .. } = self;
         let mut lost = instances.len() < plan.parts.0.len();
@@ -317,7 +317,7 @@ impl Worker {
             // Drops the messages of earlier runs.
             drop(instance.take_messages());
         }
-        // An FMU that cannot be reset runs all the same.
+        // An FMU that cannot be reset still runs.
         if lost || (self.used && instances.iter_mut().any(|instance| instance.reset().is_err())) {
             self.renew()?;
         }
@@ -350,7 +350,7 @@ impl Worker {
         for ((live, generation), instance) in self.plan.live.iter().zip(&self.generations).zip(&self.instances) {
             let mut fmu = live.fmu();
             if instance.is_dead() && live.generation() == *generation {
-                // If that fails, new instances of the old binary will tell what is wrong.
+                // If that fails, new instances of the old binary will report the fault.
                 if let Ok(again) = fmu.open_again() {
                     *fmu = again;
                     live.generation.fetch_add(1, Ordering::Release);

@@ -4,7 +4,7 @@ use super::exchange::Exchange;
 use fmu_import::{Error, Instance, Message};
 use std::ops::ControlFlow;
 
-/// A communication point, as a hook sees it: outputs are read, inputs are set, the step is to come.
+/// A communication point as seen by a hook: outputs are read, inputs are set, the step has not been taken.
 pub struct Point<'a> {
     /// Number of the point, from 0.
     pub index: u32,
@@ -18,7 +18,7 @@ pub struct Point<'a> {
 }
 
 impl Point<'_> {
-    /// An instance by its name: to read more, or to set what is not connected.
+    /// An instance by its name: to read further variables, or to set unconnected ones.
     pub fn instance(&mut self, name: &str) -> Option<&mut Instance> {
         self.touched = true;
         self.instances.iter_mut().find(|i| i.name() == name)
@@ -30,7 +30,7 @@ impl Point<'_> {
     }
 }
 
-/// How a run ended.
+/// The end of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ended {
     /// Time of the last communication point in s.
@@ -39,7 +39,7 @@ pub struct Ended {
     pub by: Option<String>,
 }
 
-/// The last point of a run that an instance has ended after the point `ended`: outputs are read, nothing is set.
+/// The last point of a run that an instance has ended: outputs are read, nothing is set.
 pub(super) fn end(
     instances: &mut [Instance],
     exchange: &mut Exchange,
@@ -52,7 +52,7 @@ pub(super) fn end(
         ended.time = time;
         exchange.read_all(instances)?;
         exchange.row(time, row);
-        // The run is over, whatever the hook says.
+        // The run is over, regardless of the hook's result.
         hook(&mut Point { index, time, values: row, instances, touched: false }).map(drop)?;
     }
     Ok(())

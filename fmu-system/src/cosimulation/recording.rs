@@ -45,9 +45,9 @@ pub struct TextColumn {
 pub struct Recording {
     /// The communication points in s.
     pub time: Vec<f64>,
-    /// The recorded variables, in the order they were asked for.
+    /// The recorded variables, in the order of the requests.
     pub columns: Vec<Column>,
-    /// The recorded texts, in the order they were asked for.
+    /// The recorded texts, in the order of the requests.
     pub texts: Vec<TextColumn>,
     /// The instance that asked to end the simulation, if one did.
     pub ended_by: Option<String>,
@@ -88,7 +88,7 @@ impl Recording {
 
     /// The last values as a table, with the display unit where there is one.
     pub fn last_values(&self) -> String {
-        // Longer names of other tools break their own row alone.
+        // Longer names of other tools misalign only their own row.
         let texts = || self.texts.iter().filter_map(|c| Some((c.name.as_str(), c.values.last()?)));
         let names = self.columns.iter().map(|c| c.name.as_str()).chain(texts().map(|(name, _)| name));
         let width = names.map(str::len).max().unwrap_or(0).min(200);

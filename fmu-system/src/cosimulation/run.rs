@@ -10,8 +10,8 @@ use super::{continuous, events};
 use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;
 
-/// Simulates instances that have their values, from start to stop. `hook` sees every communication point, the last one
-/// included, and may end the run. All runs begin and end here.
+/// Simulates instances whose values are set, from start to stop. `hook` sees every communication point, the last one included,
+/// and may end the run. All runs begin and end here.
 pub(super) fn simulate(
     method: &Method,
     instances: &mut [Instance],
@@ -28,7 +28,7 @@ pub(super) fn simulate(
         instance.setup(settings.start, Some(settings.stop))?;
         instance.enter_initialization()?;
     }
-    // An initial output may depend on an input, through as many FMUs as there are.
+    // An initial output may depend on an input through any number of FMUs.
     for _ in 0..instances.len() {
         exchange.read_all(instances)?;
         exchange.write_all(instances, settings.start)?;
@@ -96,7 +96,7 @@ impl System {
     /// Simulates from start to stop. `hook` sees every communication point, the last one included, and may end the run.
     ///
     /// # Errors
-    /// The settings make no sense, or an FMU refuses.
+    /// The settings are invalid, or an FMU refuses.
     pub fn run(
         &mut self,
         settings: &Settings,

@@ -41,7 +41,7 @@ fn slopes(step: &Step, i: usize) -> [f64; 7] {
     [step.f[i], a, b, c, d, e, step.f_end[i]]
 }
 
-/// The error estimate relative to the tolerance, root mean square over the states: a step with at most 1 is good.
+/// The error estimate relative to the tolerance, root mean square over the states: a step with at most 1 is accepted.
 pub(super) fn error(step: &Step, rtol: f64, nominals: &[f64]) -> f64 {
     let h = step.t_end - step.t;
     let of = |(i, nominal): (usize, &f64)| {

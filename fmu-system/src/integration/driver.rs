@@ -7,16 +7,16 @@ use super::{dopri, rk4};
 use fmu_import::Error;
 use std::ops::ControlFlow;
 
-/// Most events at one instant.
+/// Maximum number of events at one instant.
 const EVENTS: u32 = 100;
-/// Width of the interval that a state event is located in, relative to the step.
+/// Width of the interval in which a state event is located, relative to the step.
 const WIDTH: f64 = 1e-10;
 
-/// How states are integrated.
+/// The integration method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
-    /// The classical Runge-Kutta method of order 4, with the communication step as its step; a step that an event, an input or
-    /// a communication point cuts is shorter.
+    /// The classical Runge-Kutta method of order 4, with the communication step as its step; a step cut by an event, an input
+    /// or a communication point is shorter.
     Rk4,
     /// The method of Dormand and Prince of order 5, with an adaptive step.
     Dopri {
@@ -32,7 +32,7 @@ impl Default for Solver {
     }
 }
 
-/// Why the driver stopped.
+/// The reason why the driver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
     /// The target is reached.
@@ -107,8 +107,8 @@ impl Driver {
         self.known = false;
     }
 
-    /// Integrates to the time `until`, and over an event that is at the same time but for rounding. Breaks if the system asks
-    /// to end the simulation.
+    /// Integrates to the time `until`, and over an event that differs from it only by rounding. Breaks if the system asks to
+    /// end the simulation.
     ///
     /// # Errors
     /// The system cannot be integrated to that time.
@@ -168,7 +168,7 @@ impl Driver {
         }
     }
 
-    /// Handles an event at the time reached, whether the system asked for it or something outside of it has changed.
+    /// Handles an event at the time reached, requested by the system or caused by a change outside it.
     ///
     /// # Errors
     /// The system cannot handle the event.
@@ -202,7 +202,7 @@ impl Driver {
         if event { Ok(Some(Stop::of(self.event(system)?, Stop::Event))) } else { Ok(None) }
     }
 
-    /// A step that the system computes and whose error is small enough.
+    /// A step that the system can compute and whose error is small enough.
     fn accepted_step(&mut self, system: &mut impl Hybrid, target: f64) -> Result<(), Error> {
         let t = self.step.t;
         let rest = target - t;
@@ -213,7 +213,7 @@ impl Driver {
         };
         let mut may_grow = true;
         loop {
-            // A millionth more is rounding.
+            // An excess of a millionth is rounding.
             let whole = h >= rest * (1.0 - 1e-6);
             self.step.t_end = if whole { target } else { t + h };
             let size = self.step.t_end - t;
@@ -227,7 +227,7 @@ impl Driver {
                 Ok(error) if error <= 1.0 => {
                     let factor = dopri::factor(error);
                     let next = size * if may_grow { factor } else { factor.min(1.0) };
-                    // A step that only a target cut says nothing against the size before.
+                    // A step cut only by a target does not reduce the previous size.
                     self.proposed = if whole && self.proposed.is_finite() { next.max(self.proposed) } else { next };
                     return Ok(());
                 }
@@ -281,7 +281,7 @@ impl Driver {
         Ok(())
     }
 
-    /// Handles the event at this time, and begins anew.
+    /// Handles the event at this time, and restarts.
     fn event(&mut self, system: &mut impl Hybrid) -> Result<ControlFlow<()>, Error> {
         let t = self.step.t;
         self.events = if t - self.last_event <= near(t, t) { self.events + 1 } else { 1 };

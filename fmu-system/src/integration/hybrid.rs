@@ -2,9 +2,9 @@
 
 use fmu_import::{CompletedStep, Error, Update};
 
-/// Why a trial evaluation has no result.
+/// The reason why a trial evaluation has no result.
 pub enum Trial {
-    /// The point is outside of what the system can compute: a shorter step may succeed.
+    /// The system cannot be computed at this point: a shorter step may succeed.
     Discard(Error),
     /// The run is over.
     Stop(Error),

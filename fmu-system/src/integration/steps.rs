@@ -1,4 +1,4 @@
-//! One step of an integrator: what both share.
+//! One step of an integrator, shared by both methods.
 
 use super::hybrid::{Hybrid, Trial};
 

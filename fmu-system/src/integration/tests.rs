@@ -17,10 +17,10 @@ struct Plain<F, Z, E> {
 }
 
 impl<F, Z, E> Plain<F, Z, E> {
-    /// A run of these systems makes some thousand calls: an integrator that goes round in a circle ends here, and does not hang.
+    /// A run of these systems makes some thousand calls: an endless loop of an integrator ends here instead of hanging.
     fn count(&mut self) {
         self.calls += 1;
-        assert!(self.calls < 1_000_000, "the integrator makes calls without end");
+        assert!(self.calls < 1_000_000, "the integrator makes an endless number of calls");
     }
 }
 
@@ -289,7 +289,7 @@ fn location_is_fast_and_sure() {
     }
 }
 
-/// Time events are met exactly, also one that is at a communication point but for rounding.
+/// Time events are hit exactly, even one that differs from a communication point only by rounding.
 #[test]
 fn time_events_are_exact() {
     let (mut k, mut events) = (0, Vec::new());
@@ -321,7 +321,7 @@ fn time_events_are_exact() {
     }
 }
 
-/// What a system cannot compute is tried with a shorter step; where no step helps, the run ends with its message.
+/// A point that the system cannot compute is tried with a shorter step; if no step helps, the run ends with its message.
 #[test]
 fn discarded_steps_are_halved() {
     // Up to t = 1 the root is real.

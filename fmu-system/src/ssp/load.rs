@@ -18,11 +18,11 @@ use zip::ZipArchive;
 pub struct Loaded {
     /// Its FMUs, connected and with their values.
     pub system: System,
-    /// Default experiments: its own times, the FMUs' steps.
+    /// Default experiments: the times of the file, the steps of the FMUs.
     pub experiments: Vec<Experiment>,
     /// The connectors of an SSP's system.
     pub connectors: Connectors,
-    /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
+    /// Values for unknown names, which SSP 1.0 allows (4.4, ParameterBindings).
     pub notes: Vec<String>,
 }
 
@@ -31,15 +31,15 @@ pub struct Loaded {
 pub struct Connectors {
     /// Names of the inputs, each with the inputs `component.variable` that it feeds.
     pub inputs: Vec<(String, Vec<String>)>,
-    /// Names of the outputs, each with the output `component.variable` that it is.
+    /// Names of the outputs, each with its source `component.variable`.
     pub outputs: Vec<(String, String)>,
 }
 
 impl Connectors {
-    /// The ports that a name to set stands for: the inputs that one of the system feeds, or the name itself.
+    /// The ports denoted by a name to set: the inputs that an input of the system feeds, or the name itself.
     ///
     /// # Errors
-    /// The system has no input of this name, which has no dot.
+    /// The name has no dot, and the system has no such input.
     pub fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
         if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
             return Ok(targets.clone());
@@ -52,8 +52,7 @@ impl Connectors {
         Ok(vec![name.to_owned()])
     }
 
-    /// The port that a name to record stands for: an output of the system, one of the inputs that one of the system feeds, or
-    /// the name itself.
+    /// The port denoted by a name to record: an output of the system, an input fed by one of the system, or the name itself.
     ///
     /// # Errors
     /// As for [`ports`](Self::ports).
@@ -75,7 +74,7 @@ impl Package<'_> {
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>, Error> {
         let of = || self.path.display();
         let mut bytes = Vec::new();
-        // What the headers claim is within the limits: see `check_entries`.
+        // The sizes in the headers are within the limits: see `check_entries`.
         match self.zip.by_name(name) {
             Ok(entry) => {
                 let read = entry.take(limits::UNPACKED.most).read_to_end(&mut bytes);
@@ -134,7 +133,7 @@ impl Loaded {
         Ok(loaded)
     }
 
-    /// Times that are not given come from the files: the latest stop, the shortest step.
+    /// Missing times come from the files: the latest stop, the shortest step.
     pub fn settings(&self, start: Option<f64>, stop: Option<f64>, step: Option<f64>, sequential: bool) -> Settings {
         let start = start.or_else(|| self.experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
         let latest = self.experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
@@ -147,7 +146,7 @@ impl Loaded {
     /// Opens an SSP file.
     ///
     /// # Errors
-    /// Names the file, the place in it, what is wrong and what to do.
+    /// Names the file, the location in it, the fault and the remedy.
     pub fn open(path: &Path, logging: bool) -> Result<Self, Error> {
         Self::open_with(path, logging, |_| Method::default())
     }
@@ -185,7 +184,7 @@ impl Loaded {
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
         for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
             let experiment = fmu.description().default_experiment;
-            // The system's times go before those of its parts.
+            // The system's times take precedence over those of its parts.
             let times = structure.start.or(structure.stop).is_some();
             let part = Experiment { step: experiment.step, ..Experiment::default() };
             loaded.experiments.push(if times { part } else { experiment });
@@ -215,7 +214,7 @@ impl Loaded {
     /// Feeds an input over time: one of the system's, or `component.variable`.
     ///
     /// # Errors
-    /// There is none of this name, or it is fed already.
+    /// There is none of this name, or it is already fed.
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
@@ -223,10 +222,10 @@ impl Loaded {
         Ok(())
     }
 
-    /// Feeds an input of any type over time, as [`input`](Self::input), from the texts that a user or a file has.
+    /// Feeds an input of any type over time, as [`input`](Self::input), from texts of a user or a file.
     ///
     /// # Errors
-    /// There is none of this name, it is fed already, or a text is not a value of its type.
+    /// There is none of this name, it is already fed, or a text is not a value of its type.
     pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.sequence(&port, texts)?;
@@ -234,8 +233,8 @@ impl Loaded {
         Ok(())
     }
 
-    /// Feeds an input over time from what a user writes: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input
-    /// of another type.
+    /// Feeds an input over time from user input: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input of
+    /// another type.
     ///
     /// # Errors
     /// As [`input`](Self::input), or the text has another form.
@@ -274,7 +273,7 @@ impl Loaded {
         Ok(self.system.record_as(&port, name)?)
     }
 
-    /// Records all outputs of the system, or those of all FMUs where it has none.
+    /// Records all outputs of the system, or those of all FMUs if it has none.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -316,7 +315,7 @@ impl Loaded {
         let (start, end) = (find(structure, &c.start)?, find(structure, &c.end)?);
         let kind = |end: &ConnectionEnd, connector: &Connector| (end.element.is_some(), connector.kind.clone());
         let (one, other) = (kind(&c.start, start), kind(&c.end, end));
-        // What comes out of an element or into the system sends; start and end say nothing of direction.
+        // Outputs of elements and inputs of the system are senders; start and end do not determine the direction.
         let sends = |(element, kind): &(bool, String)| kind == if *element { "output" } else { "input" };
         let takes = |(element, kind): &(bool, String)| kind == if *element { "input" } else { "output" };
         let (from, to) = match (sends(&one) && takes(&other), sends(&other) && takes(&one)) {
@@ -370,7 +369,7 @@ impl Loaded {
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
-    /// The values of a binding; names begin with `prefix` and those of the system's connectors stand for themselves.
+    /// The values of a binding; names begin with `prefix`; those of the system's connectors are used as they are.
     fn bound(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Vec<Given> {
         let mut given = Vec::new();
         for p in parameters {
@@ -422,7 +421,7 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
         None => (format!("the system {}", structure.name), &structure.connectors),
         Some(element) => {
             let names: Vec<&str> = structure.components.iter().map(|c| c.name.as_str()).collect();
-            let none = || format!("there is no component {element}; there are {}", names.join(", "));
+            let none = || format!("there is no component {element}; available: {}", names.join(", "));
             (element.clone(), &structure.component(element).ok_or_else(none)?.connectors)
         }
     };
@@ -432,7 +431,7 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
 }
 
 impl Package<'_> {
-    /// The values of a binding, its prefix before every name, with what to call their file.
+    /// The values of a binding, its prefix before every name, with a name for their file.
     fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
         let path = self.path.display().to_string();
         let (file, parameters) = match &binding.values {

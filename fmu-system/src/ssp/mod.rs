@@ -1,7 +1,7 @@
 //! Systems of FMUs as one file: System Structure and Parameterization, SSP 1.0.
 //!
-//! [`structure`]: the structure of any system; [`load`]: a system made ready for co-simulation; [`values`] and [`ssv`]:
-//! parameter values from SSV files.
+//! [`structure`]: the structure of any system; [`load`]: a system prepared for co-simulation; [`values`] and [`ssv`]: parameter
+//! values from SSV files.
 
 mod error;
 pub mod load;

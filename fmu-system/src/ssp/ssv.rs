@@ -7,9 +7,9 @@ use model_description::Element;
 pub struct Parameter {
     /// Name of the variable.
     pub name: String,
-    /// Its value, as a user writes it.
+    /// Its value, as in user input.
     pub value: String,
-    /// Its unit, where the file tells it.
+    /// Its unit, if the file gives one.
     pub unit: Option<String>,
     /// Line of the element.
     pub line: usize,

@@ -20,7 +20,7 @@ pub struct Structure {
     pub connectors: Vec<Connector>,
     /// Connections between connectors.
     pub connections: Vec<Connection>,
-    /// Values by names `component.variable`, and of the system's own connectors.
+    /// Values by names `component.variable`, and of the system's connectors.
     pub bindings: Vec<Binding>,
 }
 
@@ -35,7 +35,7 @@ pub struct Component {
     pub connectors: Vec<Connector>,
     /// Values of its variables.
     pub bindings: Vec<Binding>,
-    /// It is made for Model Exchange alone.
+    /// It is for Model Exchange only.
     pub model_exchange: bool,
     /// Line of the element.
     pub line: usize,
@@ -48,20 +48,20 @@ pub struct Connector {
     pub name: String,
     /// `input`, `output`, `parameter`, `calculatedParameter` or `inout`.
     pub kind: String,
-    /// Unit, where the file tells it.
+    /// Unit, if the file gives one.
     pub unit: Option<String>,
     /// Line of the element.
     pub line: usize,
 }
 
-/// Two connectors; which of them sends follows from their kinds.
+/// Two connectors; their kinds determine the sender.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Connection {
     /// One end.
     pub start: ConnectionEnd,
     /// The other.
     pub end: ConnectionEnd,
-    /// Whether values pass without conversion, whatever the units.
+    /// Whether values pass without conversion, regardless of units.
     pub no_conversion: bool,
     /// Line of the element.
     pub line: usize,
@@ -134,7 +134,7 @@ impl Structure {
     /// Reads the text of a SystemStructure.ssd.
     ///
     /// # Errors
-    /// The line, and what is missing, wrong or not supported there.
+    /// The line, and the element that is missing, wrong or not supported.
     pub fn read(text: &str) -> Result<Self, String> {
         let root = Element::parse(text).map_err(|e| e.to_string())?;
         if local(&root) != "SystemStructureDescription" {

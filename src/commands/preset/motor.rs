@@ -10,8 +10,8 @@ use drive_study::tune::{
 };
 use fmu_core::Description;
 
-/// Sets the values of the machine, also those that equal the model's own, because the FMU may be a preset for another machine. A
-/// note names the values that stay from that one. Returns the default experiment.
+/// Sets the values of the machine, even those that equal the model's start values, because the FMU may be a preset for another
+/// machine. A note lists the values of that machine that remain. Returns the default experiment.
 ///
 /// # Errors
 /// The FMU is not one of the drive's.
@@ -39,15 +39,15 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
     }
     let stay = preset.earlier().join(", ");
     if !stay.is_empty() {
-        message::note(&format!("values of the earlier preset that {} does not have stay: {stay}", tuned.name));
+        message::note(&format!("values of the earlier preset that {} does not have remain: {stay}", tuned.name));
     }
     Ok(course(preset.own(), tuned))
 }
 
-/// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of the
-/// rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth of that
-/// torque and a third of the voltage for its largest current at standstill; the controller alone gets a tenth of the speed and an
-/// eighth of its largest current.
+/// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of
+/// the rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth
+/// of that torque and a third of the voltage for its maximum current at standstill; the controller alone gets a tenth of the
+/// speed and an eighth of its maximum current.
 fn course(own: &Description, tuned: &Tuned) -> Course {
     let of = |settings: &[Setting], wanted: &str| {
         settings.iter().find_map(|s| match s.value {
