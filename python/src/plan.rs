@@ -1,4 +1,4 @@
-//! Many runs of one system: `fmurun.Plan` in `fmurun/_plan.py` has one of these.
+//! Many runs of one system: the implementation behind `fmurun.Plan` in `fmurun/_plan.py`.
 
 use crate::error::{gate, plain, raise};
 use fmu_import::guard::patiently;
@@ -37,7 +37,7 @@ pub(crate) fn read_definition(path: PathBuf) -> PyResult<String> {
     })
 }
 
-/// Paths of the files of a definition: those of the FMUs, then that of the design, as they are written.
+/// Paths of the files of a definition, as written there: those of the FMUs, then that of the design.
 #[pyfunction]
 pub(crate) fn paths(definition: &str) -> PyResult<Vec<String>> {
     gate(|| {
@@ -175,7 +175,7 @@ impl Plan {
         self.plan.outputs().to_vec()
     }
 
-    /// Numbers and names of an enumeration's values, of a variable that runs set; empty for other types.
+    /// Numbers and names of an enumeration's values, for a variable set in runs; empty for other types.
     fn items(&self, name: &str) -> PyResult<Vec<(i64, String)>> {
         gate(|| Ok(self.plan.bind([name]).map_err(failed)?.swap_remove(0).column.items))
     }
@@ -193,7 +193,7 @@ impl Plan {
         fmu_sweep::last_columns(|name| columns.iter().any(|column| column == name))
     }
 
-    /// The number that a text stands for as the value of a variable.
+    /// The number of a text as the value of a variable.
     fn number(&self, name: &str, text: &str) -> PyResult<f64> {
         gate(|| {
             let variable = self.plan.bind([name]).map_err(failed)?;
@@ -210,7 +210,7 @@ impl Plan {
     }
 }
 
-/// Gets the number of rows done, and says whether to go on.
+/// Called with the number of rows done; returns whether to continue.
 type GoOn<'a> = dyn Fn(u64) -> ControlFlow<()> + Sync + 'a;
 
 /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.

@@ -135,7 +135,7 @@ def test_a_full_disk_is_told_and_what_is_there_stays(archives, client, tmp_path)
     rows = table(40)
     sweep(drive(archives), rows, tmp_path, client, chunk=20)
     (tmp_path / "part-000000000020.parquet").unlink()
-    with pytest.raises(FmuError, match=r"part-000000000020\.parquet: OSError: .*No space.*; the other parts stay"):
+    with pytest.raises(FmuError, match=r"part-000000000020\.parquet: OSError: .*No space.*; the other parts remain"):
         sweep(drive(archives, Full), rows, tmp_path, client)
     assert sweep(drive(archives), rows, tmp_path, client)["skipped"] == 1
 
