@@ -1,4 +1,4 @@
-//! An FMU of your own in one file: a capacitor charged through a resistor, for Co-Simulation and Model Exchange.
+//! Your FMU in one file: a capacitor charged through a resistor, for Co-Simulation and Model Exchange.
 //!
 //! ```sh
 //! cargo run --release -- build --package own-fmu
@@ -93,7 +93,7 @@ impl ContinuousTime for RcCircuit {
     }
 }
 
-// Goes to the importer's log, at most once a second, if the importer wants warnings.
+// Goes to the importer's log, at most once a second, if warnings are enabled.
 impl Warns for RcCircuit {
     fn warn(&self, log: &mut Warnings<'_>) {
         if self.u_c.abs() > self.u_rated {

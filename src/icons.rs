@@ -3,7 +3,7 @@
 //! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here,
 //! in the size stated by the SVG.
 
-use crate::pack::Entry;
+use crate::pack::PackedFile;
 use crate::picture;
 use anyhow::{Context, Result};
 use fmu_core::Description;
@@ -26,9 +26,9 @@ const MANIFEST: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
 ///
 /// # Errors
 /// A picture is not an SVG document, or contains text.
-pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, Entry>> {
+pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, PackedFile>> {
     let mut files = BTreeMap::new();
-    let file = |bytes: Vec<u8>| Entry { bytes, executable: false };
+    let file = |bytes: Vec<u8>| PackedFile { bytes, executable: false };
     if let Some(xml) = write_terminals(description, version) {
         files.insert(format!("{FOLDER}/terminalsAndIcons.xml"), file(xml.into_bytes()));
     }

@@ -1,5 +1,5 @@
-//! Messages on standard error, with a colored first word on a terminal. `NO_COLOR` takes the color away, `CLICOLOR_FORCE` gives it
-//! to files and pipes too.
+//! Messages on standard error, with a colored first word on a terminal. `NO_COLOR` disables the color, `CLICOLOR_FORCE` enables
+//! it for files and pipes too.
 
 use clap::builder::Styles;
 use clap::builder::styling::{AnsiColor, Style};

@@ -4,7 +4,7 @@
 use crate::TOOL;
 use crate::documentation;
 use crate::message;
-use crate::pack::{self, Entry, Moment};
+use crate::pack::{self, GenerationTime, PackedFile};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmu_core::description::{Value, Variable, VariableKind};
@@ -22,7 +22,7 @@ const PAGE: &str = "documentation/index.html";
 const BINARIES: &str = "binaries/";
 
 /// The default experiment of the new FMU: its inputs, and its times in s.
-pub struct Course {
+pub struct NewExperiment {
     /// CSV with time first and a column for each input.
     pub stimuli: String,
     /// Stop time.
@@ -68,14 +68,14 @@ impl PresetFmu {
         let suffix = preset::suffix_of(&md.token, &own.token).with_context(|| {
             format!("{name}: {DESCRIPTION} and binary are of different builds: build the FMU again")
         })?;
-        let reader = model_description::write(&own, FmiVersion::V3, &generation(Moment::fixed(0)));
+        let reader = model_description::write(&own, FmiVersion::V3, &generation(GenerationTime::fixed(0)));
         let reader = model_description::read(reader)?;
         let mut values = BTreeMap::new();
         if !suffix.is_empty() {
             let old = old.filter(|bytes| preset::suffix(bytes) == suffix);
             let old =
                 old.with_context(|| format!("{name}: resources/{FILE} is missing, or not that of {DESCRIPTION}"))?;
-            for preset::Entry { name, value, .. } in
+            for preset::PresetValue { name, value, .. } in
                 preset::read(&old).map_err(|e| anyhow!("{}: {e}", file.display()))?
             {
                 let (variable, element) =
@@ -104,7 +104,7 @@ impl PresetFmu {
     }
 
     /// The default experiment of the archive, or another course.
-    fn take_experiment(&self, description: &mut Description, course: Option<&Course>) {
+    fn take_experiment(&self, description: &mut Description, course: Option<&NewExperiment>) {
         let of_archive = &self.md.default_experiment;
         let experiment = &mut description.experiment;
         let stop = course.map(|course| course.stop).or(of_archive.stop);
@@ -164,12 +164,12 @@ impl PresetFmu {
     /// # Errors
     /// The binary does not support presets; a value is not allowed, or the FMU refuses them together; the file cannot be
     /// written.
-    pub fn write(self, title: Option<&str>, course: Option<&Course>, out: &Path) -> Result<Vec<String>> {
-        let moment = Moment::of_environment()?;
+    pub fn write(self, title: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Vec<String>> {
+        let moment = GenerationTime::of_environment()?;
         let mut description = self.described(title)?;
         self.take_experiment(&mut description, course);
         let changes = changes(&description, &self.own);
-        let mut files: BTreeMap<String, Entry> = self
+        let mut files: BTreeMap<String, PackedFile> = self
             .files
             .iter()
             .filter(|(name, _)| !name.starts_with(FOLDER))
@@ -234,9 +234,9 @@ impl PresetFmu {
         &self,
         archive: &Path,
         description: &Description,
-        course: Option<&Course>,
+        course: Option<&NewExperiment>,
         dir: &Path,
-    ) -> Result<BTreeMap<String, Entry>> {
+    ) -> Result<BTreeMap<String, PackedFile>> {
         let stimuli = dir.join(reference::STIMULI);
         // Without a file, the inputs keep their start values.
         if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(self.stimuli()) {
@@ -258,12 +258,12 @@ fn initialized(fmu: &Fmu, kind: Kind) -> Result<(), fmu_import::Error> {
     instance.exit_initialization()
 }
 
-fn generation(moment: Moment) -> Generation {
+fn generation(moment: GenerationTime) -> Generation {
     Generation { tool: TOOL.into(), date_and_time: moment.date_and_time() }
 }
 
-fn entry(name: &str, bytes: Vec<u8>) -> Entry {
-    Entry { bytes, executable: name.starts_with(BINARIES) }
+fn entry(name: &str, bytes: Vec<u8>) -> PackedFile {
+    PackedFile { bytes, executable: name.starts_with(BINARIES) }
 }
 
 /// The reason why a library cannot be described, without the unpacked path and without the line of the preset.

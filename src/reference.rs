@@ -5,7 +5,7 @@
 //! The CSV files follow the rules for the examples that the FMI tools page lists: names in quotes, time first, at most ten
 //! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
-use crate::pack::Entry;
+use crate::pack::PackedFile;
 use anyhow::{Context, Result, bail};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
@@ -41,7 +41,7 @@ pub fn files(
     description: &Description,
     stimuli: &Path,
     parameters: Option<(&str, &str)>,
-) -> Result<BTreeMap<String, Entry>> {
+) -> Result<BTreeMap<String, PackedFile>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
     let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
     let system = system(archive, &fed).with_context(|| stimuli.display().to_string())?;
@@ -91,7 +91,7 @@ pub fn files(
     }
     texts.push(("fmi-ls-manifest.xml".into(), manifest + "</fmiReferences>\n"));
     let entry = |(file, text): (String, String)| {
-        (format!("{FOLDER}{file}"), Entry { bytes: text.into_bytes(), executable: false })
+        (format!("{FOLDER}{file}"), PackedFile { bytes: text.into_bytes(), executable: false })
     };
     Ok(texts.into_iter().map(entry).collect())
 }

@@ -3,11 +3,11 @@
 //! support are optional.
 
 use crate::TOOL;
-use crate::pack::{Entry, Moment};
+use crate::pack::{GenerationTime, PackedFile};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;
-use fmu_import::{Fmu, Values as Read};
+use fmu_import::{Values as Read, Fmu};
 use fmu_system::cosimulation::{Settings, System};
 use fmu_system::ssp::ssv::{Parameter, read};
 use fmu_system::ssp::values::{self, Given};
@@ -34,7 +34,7 @@ const TERMINALS: [&str; 2] = ["phases", "sensor"];
 const SIZE: f64 = 100.0;
 
 /// Parameter values for one of the components, with their file.
-pub struct Values {
+pub struct ComponentValues {
     /// Name of the component.
     pub component: String,
     /// Name of the file for errors.
@@ -69,13 +69,13 @@ struct Outside<'a> {
 /// the file runs.
 pub fn files(
     folder: &Path,
-    parameters: &[Values],
+    parameters: &[ComponentValues],
     options: Options,
-    moment: Moment,
-) -> Result<BTreeMap<String, Entry>> {
+    moment: GenerationTime,
+) -> Result<BTreeMap<String, PackedFile>> {
     let mut system = System::default();
     let mut files = BTreeMap::new();
-    let mut put = |name: String, bytes: Vec<u8>| files.insert(name, Entry { bytes, executable: false });
+    let mut put = |name: String, bytes: Vec<u8>| files.insert(name, PackedFile { bytes, executable: false });
     let mut descriptions = Vec::new();
     for (name, fmu, _) in COMPONENTS {
         let path = folder.join(fmu).with_extension("fmu");
@@ -249,7 +249,7 @@ fn description(
     outputs: &[Outside<'_>],
     of_components: &[&str],
     (options, step): (Options, f64),
-    moment: Moment,
+    moment: GenerationTime,
 ) -> String {
     let outside = |kind: &str, all: &[Outside<'_>]| -> Vec<Element> {
         all.iter().map(|o| connector(&o.name, kind, o.variable)).collect()

@@ -154,7 +154,7 @@ impl Workspace {
         self.packages.iter().filter(|p| self.is_member(p)).filter(is_fmu).collect()
     }
 
-    /// The package of this name, a member of the workspace if several have it.
+    /// The package of this name; if there are several, a member of the workspace.
     pub fn package(&self, name: &str) -> Option<&Package> {
         let member = self.packages.iter().find(|p| p.name == name && self.is_member(p));
         member.or_else(|| self.packages.iter().find(|p| p.name == name))

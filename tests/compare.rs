@@ -197,7 +197,7 @@ fn what_is_outside_is_marked() {
     assert!(html.contains(" out\" title=\"expected 0.093") && html.contains(">0.200 ✗</td>"), "{html}");
 }
 
-/// Rasmussen's row is of another machine, and every table says so.
+/// Rasmussen's row is for another machine, and every table says so.
 #[test]
 fn another_machine_is_told_in_its_row() {
     let cells = of(grid(), &["Rasmussen", "ExtendedEmf"], &["generating-0.1"]);

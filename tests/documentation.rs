@@ -326,7 +326,8 @@ fn pages_in_a_browser() {
     common::python::pytest("pages", "pages", &["test_browser.py"], &[("FMU_PAGES", &folder)]);
 }
 
-/// The lines of `docs/reference-fmus.md`, counted as the page says; each file has at most 60 % of the lines of its original.
+/// The lines of `docs/reference-fmus.md`, counted as described on the page; each file has at most 60 % of the lines of its
+/// original.
 #[test]
 fn the_reference_fmus_have_the_lines_that_the_page_says() {
     let page = std::fs::read_to_string(root().join("docs/reference-fmus.md")).unwrap();

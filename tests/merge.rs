@@ -5,7 +5,7 @@ mod common;
 
 use fmu::commands::build::Linux64;
 use fmu::commands::merge::{self, Merge};
-use fmu::pack::{Entry, Moment, archive, write};
+use fmu::pack::{GenerationTime, PackedFile, archive, write};
 use fmu_check as check;
 use fmu_import::platform::Platform;
 use fmu_import::{Fmu, contents, machine};
@@ -36,10 +36,10 @@ fn changed(standard: &str, path: &Path, change: impl Fn(&mut Files)) {
     change(&mut files);
     let entry = |(name, bytes): (String, Vec<u8>)| {
         let executable = name.starts_with("binaries/");
-        (name, Entry { bytes, executable })
+        (name, PackedFile { bytes, executable })
     };
     let files = files.into_iter().map(entry).collect();
-    write(path, &archive(&files, Moment::fixed(0)).unwrap()).unwrap();
+    write(path, &archive(&files, GenerationTime::fixed(0)).unwrap()).unwrap();
 }
 
 fn replace(files: &mut Files, name: &str, from: &str, to: &str) {

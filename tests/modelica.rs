@@ -79,7 +79,7 @@ fn the_package_has_what_the_import_lacks() {
         assert!(script.contains(wanted), "{script}");
     }
     assert_eq!(fs::read(out.join("PmsmDrive.fmu")).unwrap(), fs::read(archive("fmi2", "PmsmDrive")).unwrap());
-    // The load overshoots before its torque steps, because the speed loop is tuned for the rotor alone, and settles at the end.
+    // The load overshoots before its torque steps, because the speed loop is tuned only for the rotor, and settles at the end.
     let figures: Vec<[f64; 3]> = script.lines().filter_map(figure).collect();
     assert_eq!(figures.len(), 4, "{script}");
     let [_, before, _, end] = figures[..] else { unreachable!() };

@@ -4,7 +4,7 @@
 mod common;
 
 use drive::PmsmDrive;
-use fmu::page::own::{Own, Run};
+use fmu::page::own::{Own, PresetRun};
 use fmu::page::{Source, judged, page};
 use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
 use serde_json::{Value, json};
@@ -18,7 +18,7 @@ fn drive() -> Description {
     Description::of::<PmsmDrive>().unwrap()
 }
 
-fn presets() -> Vec<Run> {
+fn presets() -> Vec<PresetRun> {
     judged(&drive(), Some((Path::new("page.toml"), OWN))).unwrap().presets
 }
 
@@ -47,7 +47,7 @@ fn values<M: Model>(block: &mut Block<M>, names: &[String]) -> Vec<f64> {
 }
 
 /// A run of the page, natively: a row at the start and after every step.
-fn run<M: Model>(run: &Run, names: &[String]) -> Vec<Vec<f64>> {
+fn run<M: Model>(run: &PresetRun, names: &[String]) -> Vec<Vec<f64>> {
     let mut block = Block::<M>::default();
     run.set.iter().for_each(|(name, value)| set(&mut block, name, value));
     block.initialize();
@@ -223,7 +223,7 @@ fn another_module_is_refused() {
 }
 
 /// The serialized state of the packed FMU at the end of a run, in hexadecimal digits.
-fn state(run: &Run) -> String {
+fn state(run: &PresetRun) -> String {
     let fmu = fmu_import::Fmu::open(common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();
     let mut instance = fmu.instantiate("instance", false).unwrap();
     let set = |instance: &mut fmu_import::Instance, (name, value): &(String, Value)| {
@@ -264,7 +264,7 @@ fn pages_in_a_browser() {
     println!("PmsmDrive.html {} bytes, RcCircuit.html {} bytes", bytes("PmsmDrive.html"), bytes("RcCircuit.html"));
     assert!(bytes("PmsmDrive.html") <= 600_000 && bytes("RcCircuit.html") <= 260_000);
     // The experiment of the reference: start angle, speed step, load step, in all real outputs.
-    let experiment = Run {
+    let experiment = PresetRun {
         title: "bits".into(),
         text: String::new(),
         set: vec![("plant.initial.theta_e".into(), json!(3.0))],

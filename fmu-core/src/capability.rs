@@ -126,7 +126,7 @@ pub struct Capabilities<M: Model> {
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
 
-#[allow(non_snake_case, reason = "each method bears the name of its trait, as the line that exports a model has it")]
+#[allow(non_snake_case, reason = "each method has the name of its trait, as in the line that exports a model")]
 impl<M: Model> Capabilities<M> {
     /// Co-simulation only.
     pub const NONE: Self = Self {

@@ -129,7 +129,7 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// A state that an event may change.
     pub reinit: bool,
-    /// Value references of the clocks that it is on.
+    /// Value references of its clocks.
     pub clocks: Vec<u32>,
     /// It can be read or set inside a communication step (FMI 3.0).
     pub intermediate: bool,

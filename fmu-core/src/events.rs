@@ -22,7 +22,7 @@ pub enum Next {
 }
 
 impl Next {
-    /// Seconds from `now` to this event: 0 if it is due, or if rounding alone separates the two. An importer's time counts as
+    /// Seconds from `now` to this event: 0 if it is due, or if only rounding separates the two. An importer's time counts as
     /// that of the event if both agree to 1e-9 of the time.
     pub fn left(self, now: Elapsed) -> Option<f64> {
         let left = match self {

@@ -3,10 +3,10 @@
 use crate::Model;
 
 /// A continuous model that shows its outputs, and takes inputs, inside a communication step (intermediate update, FMI 3.0.2,
-/// 4.2.2): an importer that asks for it is called after each part of a step, where it reads and sets the rows that are marked
+/// 4.2.2): an importer that requests it is called after each part of a step, where it reads and sets the rows that are marked
 /// with [`intermediate`](crate::Row::intermediate), and may end the step.
 ///
-/// An importer that does not ask gets whole steps.
+/// Other importers get whole steps.
 ///
 /// ```
 /// # use fmu_core::unit::{METER, METER_PER_S, NEWTON};

@@ -16,7 +16,7 @@ pub trait Element: 'static {
     fn slot(&mut self) -> Slot<'_>;
 }
 
-/// The types, one a line: in Rust, its kind, and its slot.
+/// The types, one per line: type in Rust, kind, and slot.
 macro_rules! elements {
     ($($type:ty: $kind:expr, $slot:ident;)*) => { $(
         impl Element for $type {

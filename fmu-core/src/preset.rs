@@ -29,7 +29,7 @@ const FORMAT: &str = "1";
 
 /// A line of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct PresetValue {
     /// Number of the line, from 1.
     pub line: usize,
     /// Name of the variable, an element of an array as `name[1,2]`.
@@ -62,7 +62,7 @@ pub fn write<'a>(values: impl IntoIterator<Item = (&'a str, &'a str)>) -> String
 ///
 /// # Errors
 /// Names the line and the fault: size, encoding, format, or syntax of a line.
-pub fn read(bytes: &[u8]) -> Result<Vec<Entry>, Fault> {
+pub fn read(bytes: &[u8]) -> Result<Vec<PresetValue>, Fault> {
     if bytes.len() as u64 > MOST {
         return Err(Fault::new(format!("is larger than {MOST} bytes, the maximum size of a preset")));
     }
@@ -83,7 +83,7 @@ pub fn read(bytes: &[u8]) -> Result<Vec<Entry>, Fault> {
         let wrong = |why: &str| Fault::new(format!("line {line}: {why}"));
         let (name, value) = text.split_once('\t').ok_or_else(|| wrong("expected a name, a tab and a value"))?;
         let value = unescaped(value).ok_or_else(|| wrong("after \\ comes n, r, t or \\"))?;
-        Ok(Entry { line, name: name.into(), value })
+        Ok(PresetValue { line, name: name.into(), value })
     };
     (2..).zip(lines).map(entry).collect()
 }

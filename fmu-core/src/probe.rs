@@ -248,7 +248,7 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
     let mut value = |i| M::TABLE.entry(&mut block, i).map_or(0, |(_, slot)| slot.bits());
     let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
     for (first, n) in wide::<M>().arrays {
-        // Elements that differ by rounding alone change the hash, so a wide array may get too many dependencies.
+        // Elements that differ only by rounding change the hash, so a wide array may get too many dependencies.
         let of_all = (first..first + n)
             .map(&mut value)
             .fold(0, |hash: u64, bits| (hash.rotate_left(5) ^ bits).wrapping_mul(0x0100_0000_01b3));

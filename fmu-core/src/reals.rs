@@ -9,7 +9,7 @@ use std::mem::{MaybeUninit, replace};
 
 /// Values for real inputs.
 #[derive(Debug)]
-pub struct Inputs<'a> {
+pub struct RealInputs<'a> {
     /// The values, one for each reference.
     pub values: &'a [f64],
     /// Buffer for the previous values of the inputs.
@@ -48,8 +48,8 @@ impl<W: 'static> Table<W> {
     /// Writes real scalar inputs up to the first reference of another kind, the first input that may not be set, or the first
     /// value out of range; returns their number. The buffer for previous values is large enough.
     #[inline]
-    pub fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize {
-        let Inputs { values, before, continuous } = inputs;
+    pub fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize {
+        let RealInputs { values, before, continuous } = inputs;
         let n = list.len().min(values.len()).min(before.len());
         let (list, values, before, mut i) = (&list[..n], &values[..n], &mut before[..n], 0);
         while i < n {
@@ -64,7 +64,7 @@ impl<W: 'static> Table<W> {
                     i += 1;
                 }
                 Access::Part { node, .. } => {
-                    let rest = Inputs { values: &values[i..], before: &mut before[i..], continuous };
+                    let rest = RealInputs { values: &values[i..], before: &mut before[i..], continuous };
                     let done = node.write(whole, &list[i..], list[i].wrapping_sub(inner), rest);
                     if done == 0 {
                         break;
@@ -150,7 +150,7 @@ mod tests {
     /// The number written, and all values afterwards.
     fn write(list: &[u32], values: &[f64], continuous: bool) -> (usize, [f64; 5]) {
         let (mut whole, mut before) = (Whole { u: 1.0, ..Whole::default() }, [f64::NAN; 8]);
-        let inputs = Inputs { values, before: &mut before, continuous };
+        let inputs = RealInputs { values, before: &mut before, continuous };
         let n = TABLE.write(&mut whole, list, 1, inputs);
         for (&reference, x) in list[..n].iter().zip(&before) {
             assert_eq!(x.to_bits(), f64::from(u8::from(reference == 1)).to_bits(), "value of {reference} before");

@@ -104,7 +104,7 @@ thread_local! {
         const { RefCell::new(Used { data: ManuallyDrop::new(Vec::new()), next: 0, collects: false }) };
 }
 
-/// Empties the thread's shelf at its end, in a panic too.
+/// Empties the thread's shelf at its end, even after a panic.
 struct InUse;
 
 impl InUse {

@@ -15,7 +15,7 @@ use crate::integer::Getter;
 use crate::kinds::Kinds;
 use crate::list::List;
 use crate::need::Need;
-use crate::reals::{Inputs, Interval};
+use crate::reals::{Interval, RealInputs};
 use crate::sizes::Sizes;
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
@@ -26,7 +26,7 @@ use std::mem::MaybeUninit;
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
     fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize;
-    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
     fn clocks_of(&self, index: usize) -> &'static str;
@@ -134,8 +134,8 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(model.fan.name(), "On");
 /// ```
 ///
-/// Arrays, matrices, single precision and texts. An array is one variable of FMI 3.0, and `a[1]`, `a[2]` or `m[1,2]` in
-/// FMI 2.0; an array of another type than real numbers is a list:
+/// Arrays, matrices, single precision and texts. An array is one variable of FMI 3.0, and `a[1]`, `a[2]` or `m[1,2]` in FMI
+/// 2.0; an array of other types is a list:
 ///
 /// ```
 /// # use fmu_core::unit::{ONE, VOLT};

@@ -7,7 +7,7 @@
 use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::kinds::Kinds;
-use crate::reals::Inputs;
+use crate::reals::RealInputs;
 use crate::row::{Access, Constant, Node, Row, SizedNode, Slot};
 use crate::rules::{demand, same_text};
 use crate::sizes::{Sizes, check_sized};
@@ -46,7 +46,7 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.read((self.lens)(whole), list, first, out)
     }
 
-    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize {
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize {
         self.table.write((self.lens)(whole), list, first, inputs)
     }
 

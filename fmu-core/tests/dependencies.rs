@@ -169,7 +169,7 @@ fn at_the_start() {
         let variable = description.variable(name).unwrap();
         assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), wanted, "{name}");
     }
-    // For co-simulation alone there is nothing between events, and no state is an initial unknown.
+    // With only co-simulation there is nothing between events, and no state is an initial unknown.
     let plain = Description::of::<Known>().unwrap();
     assert!(plain.variables.iter().all(|v| v.dependencies.as_ref().is_none_or(Vec::is_empty)));
     assert!(plain.variable("y").unwrap().initial_dependencies.is_none() && plain.variable("der(x)").is_none());

@@ -5,7 +5,7 @@ use crate::habit::Habit;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Standard, State};
 use crate::message;
-use crate::value::Value;
+use crate::value::CValue;
 use fmu_core::description::TIME;
 use fmu_core::{Causality, Exported, Fault, Kind, Meta, Model, Slot, Table, Variability};
 use std::fmt::Display;
@@ -65,7 +65,7 @@ const fn table<E: Exported>() -> &'static Table<fmu_core::Block<E::Model>> {
 }
 
 /// Whether the model has a variable of this type.
-pub(crate) const fn has<E: Exported, T: Value>() -> bool {
+pub(crate) const fn has<E: Exported, T: CValue>() -> bool {
     E::Model::TABLE.kinds().meets(T::KINDS)
 }
 
@@ -77,7 +77,7 @@ impl<E: Exported> Instance<E> {
     /// Unknown reference, another type, or a number of values that does not match `out`.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    pub fn get<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         if const { !has::<E, T>() } {
             return self.get_none(references, out.len(), T::CARRIES);
         }
@@ -87,7 +87,7 @@ impl<E: Exported> Instance<E> {
             return self.get_counted(references, out);
         }
         self.refresh();
-        // Scalars alone: one value for each reference.
+        // Only scalars: one value for each reference.
         let done = T::read_reals(&mut self.current.block, references, out);
         if done == out.len() {
             Ok(())
@@ -99,7 +99,7 @@ impl<E: Exported> Instance<E> {
     }
 
     #[inline(never)]
-    fn get_counted<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    fn get_counted<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         self.check_count(references, out.len())?;
         self.refresh();
         self.get_each(references, out)
@@ -122,7 +122,7 @@ impl<E: Exported> Instance<E> {
 
     /// Gets variables of any type; their number was checked.
     #[inline(never)]
-    fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    fn get_each<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         let (mut references, mut out) = (references, out);
         while let Some((&reference, others)) = references.split_first() {
             let count = if self.arrays { self.elements(reference)? } else { 1 };
@@ -143,7 +143,7 @@ impl<E: Exported> Instance<E> {
 
     /// The value of `time`, of a derivative or of an indicator, or an error: no variable of this type has the reference.
     #[cold]
-    fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
+    fn read_other<T: CValue>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
         let x = self.read_number(reference, index, (T::CARRIES, T::NARROW))?;
         T::from_real(x).ok_or_else(|| message::real(is_time(reference, self.standard), T::CARRIES).into())
     }
@@ -199,7 +199,7 @@ impl<E: Exported> Instance<E> {
     /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub fn set<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let state = self.current.life.state();
         let configures =
             const { E::CAN.resizable.is_some() } && matches!(state, State::Configuration | State::Reconfiguration);
@@ -239,7 +239,7 @@ impl<E: Exported> Instance<E> {
     /// Checks all values, then writes them. In Continuous-Time Mode, a solver tries values: one out of range is discarded,
     /// states can be set too, and discrete inputs only to their present values.
     #[inline(never)]
-    pub(crate) fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub(crate) fn set_each<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         self.check_count(references, values.len())?;
         let state = self.current.life.state();
         for write in [false, true] {
@@ -256,7 +256,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// Whether the value can be written in this state.
-    fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
+    fn try_value<T: CValue>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         let mut possible = None;
         if let Some((meta, slot)) = found {
@@ -292,7 +292,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// Writes a value that has been checked.
-    fn write<T: Value>(&mut self, index: usize, value: T) {
+    fn write<T: CValue>(&mut self, index: usize, value: T) {
         if self.stays(index) {
             self.forgive(Habit::Fixed);
         } else if let (Some(i), Some(x)) = (self.states.iter().position(|&row| row == index), value.real()) {

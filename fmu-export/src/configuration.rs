@@ -5,7 +5,7 @@
 
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
-use crate::value::Value;
+use crate::value::CValue;
 use fmu_core::{Block, Causality, Exported, Fault, Model};
 use std::mem;
 
@@ -61,7 +61,7 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// As [`set`](Self::set) and [`exit_configuration`](Self::exit_configuration): nothing has changed.
     #[cold]
-    pub(crate) fn set_and_configure<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub(crate) fn set_and_configure<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let structural = |reference: &u32| {
             let found = E::Model::TABLE.locate(E::CAN.index(*reference));
             found.is_some_and(|(_, meta, _)| meta.causality == Causality::StructuralParameter)

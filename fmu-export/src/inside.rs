@@ -4,15 +4,15 @@
 //! Only accepted parts are shown, so each is the end of a finished step of the solver.
 
 use crate::access::index;
-use crate::instance::{Instance, Refusal, Stepped};
+use crate::instance::{Instance, Refusal, StepResult};
 use crate::message;
-use crate::value::Value;
+use crate::value::CValue;
 use fmu_core::description::TIME;
 use fmu_core::{Causality, Elapsed, Exported, Fault, Model, integrate};
 use std::mem::{MaybeUninit, swap};
 
 /// The importer's use of intermediate updates.
-pub struct Inside<M: Model> {
+pub struct IntermediateUpdates<M: Model> {
     /// The variables that it requested at instantiation.
     required: Vec<u32>,
     /// The outputs at the last communication point: variables that are not intermediate keep them.
@@ -28,7 +28,7 @@ pub(crate) struct Parts {
     done: f64,
     /// End of the last part.
     end: f64,
-    stepped: Stepped,
+    stepped: StepResult,
 }
 
 /// The importer is to be called.
@@ -48,7 +48,7 @@ pub(crate) enum Then {
     /// The importer is called, and the step goes on.
     Call(Pause),
     /// The step is done.
-    Done(Stepped),
+    Done(StepResult),
 }
 
 impl<E: Exported> Instance<E> {
@@ -62,7 +62,10 @@ impl<E: Exported> Instance<E> {
         if let Some(&reference) = required.iter().find(|&&reference| reference as usize > last) {
             return Err(message::unknown::<E>(reference, self.standard));
         }
-        self.inside = Some(Box::new(Inside { required: required.to_vec(), outputs: self.current.block.out.clone() }));
+        self.inside = Some(Box::new(IntermediateUpdates {
+            required: required.to_vec(),
+            outputs: self.current.block.out.clone(),
+        }));
         Ok(())
     }
 
@@ -94,7 +97,7 @@ impl<E: Exported> Instance<E> {
             if until > now {
                 *parts = self.divide(now, until - now)?;
             }
-            (parts.end, parts.stepped) = (until, Stepped { early, ..Stepped::default() });
+            (parts.end, parts.stepped) = (until, StepResult { early, ..StepResult::default() });
             if until <= now {
                 return Ok(Then::Done(parts.stepped));
             }
@@ -109,7 +112,7 @@ impl<E: Exported> Instance<E> {
             return Err(Fault::value("the longest part of a step", longest, "greater than 0: an error of the model"));
         }
         let count = integrate::substeps(h, longest)?;
-        Ok(Parts { start: self.current.elapsed, t, h, count, done: 0.0, end: t + h, stepped: Stepped::default() })
+        Ok(Parts { start: self.current.elapsed, t, h, count, done: 0.0, end: t + h, stepped: StepResult::default() })
     }
 
     fn advance_part(&mut self, parts: &mut Parts) -> Result<Then, Fault> {
@@ -130,7 +133,7 @@ impl<E: Exported> Instance<E> {
         }
         // An event ends the step where the importer takes steps that end early.
         if parts.stepped.early || (parts.stepped.event && self.early_return && !last) {
-            return Ok(Then::Done(Stepped { early: true, ..parts.stepped }));
+            return Ok(Then::Done(StepResult { early: true, ..parts.stepped }));
         }
         self.current.elapsed = next;
         self.current.end = if last { parts.end } else { (parts.t + parts.done * h).min(parts.end) };
@@ -169,7 +172,7 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// As [`get`](Self::get) and [`check_inside`](Self::check_inside).
-    pub(crate) fn get_inside<T: Value>(
+    pub(crate) fn get_inside<T: CValue>(
         &mut self,
         references: &[u32],
         out: &mut [MaybeUninit<T>],

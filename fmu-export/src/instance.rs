@@ -3,7 +3,7 @@
 use crate::clocks::Clocks;
 use crate::exchange::MAX_ITERATIONS;
 use crate::habit::Habit;
-use crate::inside::Inside;
+use crate::inside::IntermediateUpdates;
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
 use crate::sensitivity::Scratch;
@@ -34,7 +34,7 @@ impl From<Fault> for Refusal {
 
 /// The results of a communication step in addition to its status (FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Stepped {
+pub struct StepResult {
     /// The importer is to enter Event Mode.
     pub event: bool,
     /// The step ended before the next communication point.
@@ -77,7 +77,7 @@ pub struct Instance<E: Exported> {
     /// The properties of the clocks, for a model with clocks.
     pub(crate) clocks: Option<Box<Clocks>>,
     /// What the importer does inside communication steps.
-    pub(crate) inside: Option<Box<Inside<E::Model>>>,
+    pub(crate) inside: Option<Box<IntermediateUpdates<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
     /// The importer's habits already reported, one bit each.
@@ -202,7 +202,7 @@ impl<E: Exported> Instance<E> {
     /// model.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub fn do_step(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
+    pub fn do_step(&mut self, t: f64, h: f64) -> Result<StepResult, Fault> {
         let next = self.begin_step(t, h)?;
         self.advance(t, h, next)
     }
@@ -227,7 +227,7 @@ impl<E: Exported> Instance<E> {
     /// A communication step that has been checked, or a part of it.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<Stepped, Fault> {
+    pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<StepResult, Fault> {
         let current = &mut self.current;
         let handles_events = current.life.handles_events();
         if E::CAN.event_mode() && E::CAN.clocked.is_none() && (handles_events || self.early_return) {
@@ -249,13 +249,13 @@ impl<E: Exported> Instance<E> {
         self.current.elapsed = next;
         self.current.end = t + h;
         self.warn();
-        Ok(Stepped::default())
+        Ok(StepResult::default())
     }
 
     /// The result of an incomplete step: the model ends the simulation (FMI 2.0.5, 4.2.2 and 4.2.3; FMI 3.0.2, 4.2.1), or the
     /// step fails. Without early return, FMI 3.0 cannot report a time before the end of the step.
     #[cold]
-    fn end_or_fail(&mut self, fault: Fault, t: f64, h: f64) -> Result<Stepped, Fault> {
+    fn end_or_fail(&mut self, fault: Fault, t: f64, h: f64) -> Result<StepResult, Fault> {
         let Some(at) = fault.ends() else { return Err(fault) };
         let current = &mut self.current;
         let end = current.elapsed.plus(h);
@@ -267,19 +267,19 @@ impl<E: Exported> Instance<E> {
         current.block.model.output(current.elapsed, &mut current.block.out);
         self.log.event(|| format!("{}: {fault}", self.name));
         self.warn();
-        Ok(Stepped { early, terminate: true, ..Stepped::default() })
+        Ok(StepResult { early, terminate: true, ..StepResult::default() })
     }
 
     /// A step of a sampled model for an importer that handles its events, or takes steps that end early. Every sample reads the
     /// inputs set at its instant, or else those set last.
-    fn step_to_event(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
-        let Some(samples) = &E::CAN.samples else { return Ok(Stepped::default()) };
+    fn step_to_event(&mut self, t: f64, h: f64) -> Result<StepResult, Fault> {
+        let Some(samples) = &E::CAN.samples else { return Ok(StepResult::default()) };
         let event_mode = self.current.life.handles_events();
         let (start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
         let model = &mut self.current.block.model;
         (samples.bounded)(model, if self.early_return { start } else { end })?;
         let grid = SampleGrid { period: (samples.period)(model) };
-        let mut stepped = Stepped::default();
+        let mut stepped = StepResult::default();
         loop {
             let k = (samples.samples)(model);
             if !grid.reached(k, end) {
@@ -334,11 +334,11 @@ impl<E: Exported> Instance<E> {
 
     /// A step of a model with states for an importer that handles its events, or takes steps that end early. Events that the
     /// importer does not handle are handled as in [`Model::advance`].
-    fn step_to_stop(&mut self, to_event: ToEvent<E::Model>, t: f64, h: f64) -> Result<Stepped, Fault> {
-        let Some(events) = &E::CAN.events else { return Ok(Stepped::default()) };
+    fn step_to_stop(&mut self, to_event: ToEvent<E::Model>, t: f64, h: f64) -> Result<StepResult, Fault> {
+        let Some(events) = &E::CAN.events else { return Ok(StepResult::default()) };
         let event_mode = self.current.life.handles_events();
         let (mut start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
-        let mut stepped = Stepped::default();
+        let mut stepped = StepResult::default();
         let stop = loop {
             let rest = if start == self.current.elapsed { h } else { end.since(start) };
             let stop = match to_event(&mut self.current.block.model, &Step { start, h: rest }) {

@@ -48,7 +48,7 @@ impl Log {
         Self { sink, enabled: if on { !0 } else { 0 } }
     }
 
-    /// Logs why a call failed, even with logging off: the status alone does not help.
+    /// Logs why a call failed, even with logging off: the status alone is not enough.
     #[cold]
     pub fn error(&self, message: &str) {
         self.sink.write(Status::Error, ERROR, message);

@@ -3,7 +3,7 @@
 
 use crate::lifecycle::State;
 use crate::message;
-use fmu_core::preset::{self, Entry, FILE, MOST};
+use fmu_core::preset::{self, FILE, MOST, PresetValue};
 use fmu_core::{Block, Bytes, Capabilities, Fault, Kind, Meta, Model, Slot};
 use std::fmt::Display;
 use std::fs::File;
@@ -101,11 +101,11 @@ fn content(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Sets the start values as an importer would after instantiation.
-fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault> {
+fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[PresetValue]) -> Result<(), Fault> {
     let rows = can.rows()?;
     let indices: Vec<usize> = M::TABLE.indices().collect();
     let (mut set, mut next) = (vec![false; indices.len()], 0);
-    for Entry { line, name, value } in entries {
+    for PresetValue { line, name, value } in entries {
         let wrong = |fault: Fault| Fault::new(format!("line {line}: {fault}"));
         // `fmu preset` writes the variables in the order of the table.
         let mut places = (next..indices.len()).chain(0..next);

@@ -1,7 +1,7 @@
 //! Values as they cross the C interface: the base type of the table that each C type carries.
 
 use crate::lifecycle::Standard;
-use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Kinds, Meta, Model, Slot};
+use fmu_core::{Block, Constant, IntegerType, Kind, Kinds, Meta, Model, RealInputs, Slot};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::mem::MaybeUninit;
@@ -13,7 +13,7 @@ const FIRST: u32 = 1;
 const SHORT: usize = 8;
 
 /// A C type of one of the standards, in the layout of C.
-pub trait Value: Copy + Display + PartialEq {
+pub trait CValue: Copy + Display + PartialEq {
     /// Name of the type in messages.
     const CARRIES: &'static str;
 
@@ -26,7 +26,7 @@ pub trait Value: Copy + Display + PartialEq {
     /// The value in `slot`, `None` if the variable has another base type, or a value that this type lacks.
     fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self>;
 
-    /// Writes a value that has been [checked](Value::judge).
+    /// Writes a value that has been [checked](CValue::judge).
     fn write(self, slot: Slot<'_>);
 
     /// Whether the variable may take this value, `None` if it has another base type.
@@ -66,7 +66,7 @@ impl Display for Fmi2Integer {
     }
 }
 
-impl Value for f64 {
+impl CValue for f64 {
     const CARRIES: &'static str = "a real number";
     // Time and derivatives have no row.
     const KINDS: Kinds = Kinds::ALL;
@@ -115,7 +115,7 @@ impl Value for f64 {
         if list.len() > SHORT {
             return false;
         }
-        let done = M::TABLE.write(block, list, FIRST, Inputs { values, before: &mut before, continuous });
+        let done = M::TABLE.write(block, list, FIRST, RealInputs { values, before: &mut before, continuous });
         if done == list.len() {
             return true;
         }
@@ -142,7 +142,7 @@ fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
     }
 }
 
-impl Value for f32 {
+impl CValue for f32 {
     const CARRIES: &'static str = "a Float32";
     const KINDS: Kinds = Kinds::FLOAT32;
 
@@ -168,7 +168,7 @@ impl Value for f32 {
 /// The integers of FMI 3.0; each carries the variables of its type.
 macro_rules! integers {
     ($($type:ident $name:ident $carries:literal;)*) => { $(
-        impl Value for $type {
+        impl CValue for $type {
             const CARRIES: &'static str = $carries;
             const KINDS: Kinds = {
                 let own = Kinds::integer(IntegerType::$name);
@@ -231,7 +231,7 @@ integers! {
     u64 UInt64 "a UInt64";
 }
 
-impl Value for Fmi2Integer {
+impl CValue for Fmi2Integer {
     const CARRIES: &'static str = "an integer or an enumeration";
     const KINDS: Kinds = Kinds::INTEGERS.and(Kinds::ENUMERATION);
     const NARROW: bool = true;
@@ -278,7 +278,7 @@ macro_rules! truth_values {
             }
         }
 
-        impl Value for $name {
+        impl CValue for $name {
             const CARRIES: &'static str = "a truth value";
             const KINDS: Kinds = Kinds::BOOLEAN;
 

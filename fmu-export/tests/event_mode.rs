@@ -170,7 +170,7 @@ fn every_sample_reads_what_was_set_at_its_instant() {
     }
 }
 
-/// An importer that is offered Event Mode and does not enter it loses no sample: each reads the held inputs.
+/// An importer that does not enter an offered Event Mode loses no sample: each reads the held inputs.
 #[test]
 fn without_entering_event_mode_nothing_is_lost() {
     for early in [false, true] {
@@ -332,7 +332,7 @@ fn a_tunable_parameter_acts_at_the_update() {
     }
 }
 
-/// An FMU state inside Event Mode keeps the event that is pending, through bytes too.
+/// An FMU state inside Event Mode keeps the pending event, also as bytes.
 #[test]
 fn a_state_inside_event_mode() {
     for kind in [Kind::Cs3 { event: true, early: true }, Kind::Me2, Kind::Me3] {

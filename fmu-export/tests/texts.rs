@@ -232,7 +232,7 @@ fn a_load_that_fails_gives_no_instance() {
     }
 }
 
-/// `fmu build` asks the library for its description with the folder at hand.
+/// `fmu build` requests the library's description with the folder available.
 #[test]
 fn a_load_that_changes_the_state_is_not_described() {
     extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {

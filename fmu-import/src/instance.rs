@@ -221,7 +221,7 @@ impl Instance {
         self.tick()
     }
 
-    /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.
+    /// Steps from `t` to `t + h`; breaks when the FMU requests the end of the simulation.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -231,7 +231,7 @@ impl Instance {
         Ok(if stepped.terminate { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
-    /// Time (s) that the last step reached; it differs from its end when the FMU asked to end the simulation.
+    /// Time (s) that the last step reached; it differs from its end if the FMU requested the end of the simulation.
     ///
     /// # Errors
     /// The FMU refuses, or does not report it.

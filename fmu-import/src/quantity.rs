@@ -2,7 +2,7 @@
 
 use model_description::{ModelDescription, ModelVariable};
 
-/// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a number alone.
+/// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a plain number.
 pub fn split(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     if let Ok(number) = text.parse() {

@@ -64,7 +64,7 @@ pub(super) struct Directions<'a> {
 /// What `DoStep` returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepped {
-    /// The FMU asks to end the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
     /// The FMU is to enter event mode before the next step (FMI 3.0 only).
     pub event: bool,
@@ -80,7 +80,7 @@ pub struct Stepped {
 pub struct Update {
     /// The FMU needs another update.
     pub again: bool,
-    /// The FMU asks to end the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
     /// Nominal values of states have changed.
     pub nominals_changed: bool,
@@ -95,7 +95,7 @@ pub struct Update {
 pub struct CompletedStep {
     /// There is a step event.
     pub enter_event_mode: bool,
-    /// The FMU asks to end the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
 }
 

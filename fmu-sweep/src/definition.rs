@@ -39,7 +39,7 @@ pub struct Definition {
     /// Reuse instances from run to run by resetting them; by default determined by comparing two rows.
     pub reuse: Option<bool>,
     /// Parameters and unconnected inputs, the same in all runs.
-    pub set: Ordered<Scalar>,
+    pub set: Ordered<SetValue>,
     /// Inputs over time, written as for `fmu simulate --input`.
     pub input: Ordered<String>,
     /// How to generate rows.
@@ -49,7 +49,7 @@ pub struct Definition {
     /// The measures of each run.
     pub measure: Ordered<MeasureDefinition>,
     /// The runs to record.
-    pub trace: Option<Trace>,
+    pub trace: Option<Traces>,
 }
 
 /// Who integrates the states of an FMU.
@@ -116,7 +116,7 @@ pub struct Vary {
     /// Truncates the normal distribution.
     pub within: Option<[f64; 2]>,
     /// One of these.
-    pub values: Option<Vec<Scalar>>,
+    pub values: Option<Vec<SetValue>>,
     /// One of `count` evenly spaced numbers: the first.
     pub from: Option<f64>,
     /// The last of them.
@@ -136,9 +136,9 @@ pub struct MeasureDefinition {
     /// A sum of variables, each optionally after a number and `*`.
     pub of: String,
     /// The function to compute from it.
-    pub is: Function,
+    pub is: MeasureFunction,
     /// Period to which the sum is wrapped (±period/2): a number or a multiple of pi such as `2pi`.
-    pub wrap: Option<Scalar>,
+    pub wrap: Option<SetValue>,
     /// Time in s from which on values count; by default the start.
     pub after: Option<f64>,
     /// Time in s, of `at`.
@@ -156,7 +156,7 @@ pub struct MeasureDefinition {
 /// The function that a measure computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Function {
+pub enum MeasureFunction {
     /// The last value.
     Final,
     /// The least value.
@@ -182,7 +182,7 @@ pub enum Function {
 /// Recordings of runs, as files in the folder `traces`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct Trace {
+pub struct Traces {
     /// Variables to record.
     pub of: Vec<String>,
     /// Record every n-th communication point; by default each.
@@ -214,7 +214,7 @@ pub enum Which {
 /// A number, a Boolean or a text.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(untagged, expecting = "expected a number, true, false or a text; put a name with dots in quotes")]
-pub enum Scalar {
+pub enum SetValue {
     /// `true` or `false`.
     Boolean(bool),
     /// An integer.
@@ -225,7 +225,7 @@ pub enum Scalar {
     Text(String),
 }
 
-impl fmt::Display for Scalar {
+impl fmt::Display for SetValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Boolean(x) => x.fmt(f),
@@ -313,7 +313,7 @@ mod tests {
         assert_eq!(d.vary.0.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["z.b", "z.a"]);
         let values: Vec<_> = d.vary.0[1].1.values.as_ref().unwrap().iter().map(ToString::to_string).collect();
         assert_eq!(values, ["1", "2.5", "true", "Off"]);
-        assert_eq!((d.measure.0[0].1.is, d.measure.0[0].1.after), (Function::MaxAbs, Some(1.0)));
+        assert_eq!((d.measure.0[0].1.is, d.measure.0[0].1.after), (MeasureFunction::MaxAbs, Some(1.0)));
     }
 
     #[test]

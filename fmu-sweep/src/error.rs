@@ -1,4 +1,4 @@
-//! Errors before a run, and errors of files. An error within a run is part of its row: [`Outcome`](crate::Outcome).
+//! Errors before a run, and errors of files. An error within a run is part of its row: [`RunResult`](crate::RunResult).
 
 use std::path::{Path, PathBuf};
 

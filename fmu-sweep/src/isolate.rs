@@ -4,7 +4,7 @@
 //! print as well: each answer begins a new line with a mark, and other lines are skipped.
 
 use crate::sweep::Writer;
-use crate::{Definition, Error, Outcome, Sweep};
+use crate::{Definition, Error, RunResult, Sweep};
 use fmu_import::guard;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
@@ -99,7 +99,7 @@ impl<'a> Process<'a> {
             let Some(Died(how)) = died else { continue };
             self.running = None;
             if announced == Some(rows.start) {
-                let (mut values, outcome) = (Vec::new(), Outcome { result: Err(how), end: f64::NAN });
+                let (mut values, outcome) = (Vec::new(), RunResult { result: Err(how), end: f64::NAN });
                 self.sweep.rows().row(rows.start, &mut values);
                 lines.push_str(&self.sweep.line(rows.start, &values, &outcome));
                 rows.start += 1;

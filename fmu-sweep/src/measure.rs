@@ -2,7 +2,7 @@
 //!
 //! Sums are accumulated in the order of time, so a measure has the same bits on every thread and machine.
 
-use crate::definition::{Function, MeasureDefinition};
+use crate::definition::{MeasureDefinition, MeasureFunction};
 use crate::signal::Signal;
 use fmu_system::cosimulation::Settings;
 
@@ -56,16 +56,18 @@ impl Measure {
     pub(crate) fn new(definition: &MeasureDefinition, signal: Signal, settings: &Settings) -> Result<Self, String> {
         let MeasureDefinition { of, is, after, time, from, to, target, band, .. } = definition;
         let kind = match is {
-            Function::Final => Kind::Final,
-            Function::Min => Kind::Min,
-            Function::Max => Kind::Max,
-            Function::MaxAbs => Kind::MaxAbs,
-            Function::Mean => Kind::Mean,
-            Function::Rms => Kind::Rms,
-            Function::Integral => Kind::Integral,
-            Function::At => Kind::At(time.ok_or("at needs time")?),
-            Function::Rise => Kind::Rise { from: from.ok_or("rise needs from")?, to: to.ok_or("rise needs to")? },
-            Function::Settling => Kind::Settling {
+            MeasureFunction::Final => Kind::Final,
+            MeasureFunction::Min => Kind::Min,
+            MeasureFunction::Max => Kind::Max,
+            MeasureFunction::MaxAbs => Kind::MaxAbs,
+            MeasureFunction::Mean => Kind::Mean,
+            MeasureFunction::Rms => Kind::Rms,
+            MeasureFunction::Integral => Kind::Integral,
+            MeasureFunction::At => Kind::At(time.ok_or("at needs time")?),
+            MeasureFunction::Rise => {
+                Kind::Rise { from: from.ok_or("rise needs from")?, to: to.ok_or("rise needs to")? }
+            }
+            MeasureFunction::Settling => Kind::Settling {
                 target: target.ok_or("settling needs target")?,
                 band: band.ok_or("settling needs band")?,
             },

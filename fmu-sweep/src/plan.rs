@@ -8,7 +8,7 @@ use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
 use fmu_import::{Fmu, Kind};
 use fmu_system::cosimulation::{
-    self, Integration, Method, Recording, Schedule, Settings, Solver, Target, Worker, item,
+    self, Integration, Method, PlanTarget, Recording, Schedule, Settings, Solver, Worker, item,
 };
 use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
@@ -21,10 +21,10 @@ pub struct Plan(Arc<Shared>);
 
 struct Shared {
     /// Records the variables of the measures, then those of the trace.
-    system: Arc<cosimulation::Plan>,
+    system: Arc<cosimulation::SystemPlan>,
     connectors: Connectors,
     measures: Vec<Measure>,
-    columns: Vec<Column>,
+    columns: Vec<ResultColumn>,
     trace: Vec<usize>,
     /// `instance.variable` of all variables that the definition sets.
     set: Vec<String>,
@@ -50,7 +50,7 @@ pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
 
 /// Name and unit of a column of results.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Column {
+pub struct ResultColumn {
     /// Name.
     pub name: String,
     /// Unit; empty for none.
@@ -59,7 +59,7 @@ pub struct Column {
     pub items: Vec<(i64, String)>,
 }
 
-impl Column {
+impl ResultColumn {
     /// The name of the enumeration's value `x`.
     pub fn item(&self, x: f64) -> Option<&str> {
         item(&self.items, x)
@@ -68,22 +68,22 @@ impl Column {
 
 /// A variable that runs set, found by [`Plan::bind`]: one of an FMU, or an input of an SSP's system, which may feed several.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Variable {
+pub struct RunVariable {
     /// Name and unit.
-    pub column: Column,
-    targets: Vec<Target>,
+    pub column: ResultColumn,
+    targets: Vec<PlanTarget>,
 }
 
-impl Variable {
+impl RunVariable {
     /// The variables of FMUs that it sets.
-    pub(crate) fn targets(&self) -> &[Target] {
+    pub(crate) fn targets(&self) -> &[PlanTarget] {
         &self.targets
     }
 }
 
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
+pub struct RunResult {
     /// The measures, or the error in one line.
     pub result: Result<Vec<f64>, String>,
     /// Time reached, in s; NaN if the run never began.
@@ -92,7 +92,7 @@ pub struct Outcome {
 
 /// The results of many runs: columns with one value per run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcomes {
+pub struct RunResults {
     /// A column for each measure; NaN where the run failed.
     pub measures: Vec<Vec<f64>>,
     /// Time reached, in s; NaN if the run never began.
@@ -185,7 +185,7 @@ impl Plan {
                 _ => None,
             };
             let unit = measure.unit(if same { units[0] } else { "" });
-            Column { name: name.clone(), unit, items: items.unwrap_or_default() }
+            ResultColumn { name: name.clone(), unit, items: items.unwrap_or_default() }
         });
         let columns = columns.collect();
         let measures = measures.into_iter().map(|(measure, _)| measure).collect();
@@ -194,7 +194,7 @@ impl Plan {
     }
 
     /// The FMUs, ready for runs.
-    pub(crate) fn system(&self) -> &cosimulation::Plan {
+    pub(crate) fn system(&self) -> &cosimulation::SystemPlan {
         &self.0.system
     }
 
@@ -209,7 +209,7 @@ impl Plan {
     }
 
     /// Names and units of the measures.
-    pub fn measures(&self) -> &[Column] {
+    pub fn measures(&self) -> &[ResultColumn] {
         &self.0.columns
     }
 
@@ -242,8 +242,8 @@ impl Plan {
     ///
     /// # Errors
     /// A variable does not exist, is not a number, cannot be set, is fed or set for all runs, or occurs twice.
-    pub fn bind<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Vec<Variable>, Error> {
-        let mut all: Vec<Variable> = Vec::new();
+    pub fn bind<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Vec<RunVariable>, Error> {
+        let mut all: Vec<RunVariable> = Vec::new();
         for name in names {
             let system = &self.0.system;
             let mut targets = Vec::new();
@@ -259,7 +259,7 @@ impl Plan {
             }
             let of = targets.first().map(|target| system.column(target));
             let (unit, items) = of.map(|c| (c.unit, c.items)).unwrap_or_default();
-            all.push(Variable { column: Column { name: name.into(), unit, items }, targets });
+            all.push(RunVariable { column: ResultColumn { name: name.into(), unit, items }, targets });
         }
         Ok(all)
     }
@@ -268,8 +268,8 @@ impl Plan {
     ///
     /// # Errors
     /// The text is not a value of the variable's type.
-    pub fn number(&self, variable: &Variable, text: &str) -> Result<f64, Error> {
-        let number = |target: &Target| self.0.system.number(target, text);
+    pub fn number(&self, variable: &RunVariable, text: &str) -> Result<f64, Error> {
+        let number = |target: &PlanTarget| self.0.system.number(target, text);
         Ok(variable.targets.first().map_or(Ok(f64::NAN), number)?)
     }
 
@@ -277,7 +277,7 @@ impl Plan {
     ///
     /// # Errors
     /// The variable does not exist, or an FMU refuses.
-    pub fn simulate(&self, values: &[(Variable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
+    pub fn simulate(&self, values: &[(RunVariable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
         let source = |name: &String| Ok((self.0.connectors.source(name)?, name.clone()));
         let variables = outputs.iter().map(source).collect::<Result<Vec<_>, Error>>()?;
@@ -289,7 +289,7 @@ impl Plan {
     ///
     /// # Errors
     /// An FMU refuses an instance.
-    pub fn runner(&self, variables: &[Variable]) -> Result<Runner, Error> {
+    pub fn runner(&self, variables: &[RunVariable]) -> Result<Runner, Error> {
         Ok(Runner {
             plan: self.clone(),
             worker: self.0.system.worker()?,
@@ -308,11 +308,11 @@ impl Plan {
     /// its row.
     pub fn run_many(
         &self,
-        variables: &[Variable],
+        variables: &[RunVariable],
         columns: &[&[f64]],
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         if variables.len() != columns.len() {
             return invalid(format!("{} columns of values for {} variables", columns.len(), variables.len()));
         }
@@ -334,7 +334,7 @@ impl Plan {
 
     /// The measures from the readings of a run.
     pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<f64>, String> {
-        let of = |((measure, reading), column): ((&Measure, &Reading), &Column)| {
+        let of = |((measure, reading), column): ((&Measure, &Reading), &ResultColumn)| {
             measure.end(reading).map_err(|cause| format!("{}: {cause}", column.name))
         };
         self.0.measures.iter().zip(readings).zip(&self.0.columns).map(of).collect()
@@ -346,15 +346,15 @@ impl Plan {
     /// As for [`run_many`](Self::run_many).
     pub fn run_rows(
         &self,
-        variables: &[Variable],
+        variables: &[RunVariable],
         count: u64,
         row: &(dyn Fn(u64, &mut Vec<f64>) + Sync),
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         let rows =
             usize::try_from(count).map_err(|_| Error::Invalid(format!("{count} rows are too many for the memory")))?;
-        let all = Mutex::new((Outcomes::empty(self.0.measures.len(), rows), 0));
+        let all = Mutex::new((RunResults::empty(self.0.measures.len(), rows), 0));
         let threads = if self.only_one_instance().is_some() { 1 } else { threads };
         pool::run(
             count.div_ceil(BLOCK),
@@ -362,7 +362,7 @@ impl Plan {
             |_| Ok((self.runner(variables)?, Vec::new())),
             |(runner, values), block| {
                 let range = pool::rows_of(block, count);
-                let outcomes: Vec<Outcome> = range
+                let outcomes: Vec<RunResult> = range
                     .clone()
                     .map(|index| {
                         row(index, values);
@@ -383,12 +383,12 @@ impl Plan {
     }
 }
 
-impl Outcomes {
+impl RunResults {
     pub(crate) fn empty(measures: usize, rows: usize) -> Self {
         Self { measures: vec![vec![f64::NAN; rows]; measures], end: vec![f64::NAN; rows], errors: vec![None; rows] }
     }
 
-    pub(crate) fn put(&mut self, row: usize, outcome: Outcome) {
+    pub(crate) fn put(&mut self, row: usize, outcome: RunResult) {
         self.end[row] = outcome.end;
         match outcome.result {
             Ok(values) => self.measures.iter_mut().zip(values).for_each(|(column, x)| column[row] = x),
@@ -433,7 +433,7 @@ fn of(measure: &MeasureDefinition, settings: &Settings, recorded: &mut Vec<Strin
 pub struct Runner {
     plan: Plan,
     worker: Worker,
-    variables: Vec<Variable>,
+    variables: Vec<RunVariable>,
     states: Vec<Reading>,
     reuse: bool,
     /// No run yet.
@@ -447,7 +447,7 @@ impl Runner {
     }
 
     /// Runs with a value for each variable. `trace` sees the time and the traced variables of every communication point.
-    pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> Outcome {
+    pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> RunResult {
         let Self { plan, worker, variables, states, .. } = self;
         let Shared { measures, trace: traced, .. } = &*plan.0;
         let mut end = f64::NAN;
@@ -467,7 +467,7 @@ impl Runner {
             })
         });
         let result = ended.map_err(|error| error.to_string()).and_then(|_| plan.measured(states));
-        Outcome { result, end }
+        RunResult { result, end }
     }
 }
 

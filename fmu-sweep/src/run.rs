@@ -31,7 +31,7 @@ pub struct Options {
 }
 
 /// Receives progress of a run, on any thread.
-pub trait Watch: Sync {
+pub trait Progress: Sync {
     /// A note of one line.
     fn note(&self, text: &str);
     /// The numbers of rows done, to run, and failed.
@@ -55,7 +55,7 @@ pub struct Report {
 ///
 /// # Errors
 /// The folder is of another sweep, a file cannot be written, or an FMU cannot be instantiated. Complete parts remain.
-pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -> Result<Report, Error> {
+pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress) -> Result<Report, Error> {
     // An FMU may change the working directory.
     let folder = &std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
     if options.restart {
@@ -106,7 +106,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     };
     let log = Log::new(folder)?;
     log.write(&format!("{rows} rows in {} parts on {threads} jobs", jobs.len()))?;
-    let state = Mutex::new(Progress::default());
+    let state = Mutex::new(Tally::default());
     let work = Work { sweep, output: &output, jobs: &jobs, state: &state, watch, log: &log, rows };
     pool::run(
         blocks,
@@ -161,7 +161,7 @@ enum Executor<'a> {
 }
 
 #[derive(Default)]
-struct Progress {
+struct Tally {
     /// The completed lines of unfinished parts, by part number.
     parts: HashMap<u64, HashMap<u64, String>>,
     begun: HashMap<u64, Instant>,
@@ -173,8 +173,8 @@ struct Work<'a> {
     sweep: &'a Sweep,
     output: &'a Output,
     jobs: &'a [Job],
-    state: &'a Mutex<Progress>,
-    watch: &'a dyn Watch,
+    state: &'a Mutex<Tally>,
+    watch: &'a dyn Progress,
     log: &'a Log,
     /// Rows of all jobs.
     rows: u64,
@@ -218,7 +218,7 @@ impl Work<'_> {
         Ok(())
     }
 
-    fn state(&self) -> std::sync::MutexGuard<'_, Progress> {
+    fn state(&self) -> std::sync::MutexGuard<'_, Tally> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -252,7 +252,7 @@ struct Marker {
 }
 
 impl Marker {
-    fn new(folder: &Path, watch: &dyn Watch) -> Result<Self, Error> {
+    fn new(folder: &Path, watch: &dyn Progress) -> Result<Self, Error> {
         let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
         let names = entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(".running-"));
         let mut killed = false;

@@ -1,9 +1,9 @@
 //! A sweep from its file: its rows and their results, as lines of CSV.
 
-use crate::definition::{Runs, Trace, Which};
+use crate::definition::{Runs, Traces, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
-use crate::{Column, Definition, Error, Outcome, Outcomes, Plan, Rows, Runner, Variable};
+use crate::{Definition, DesignRows, Error, Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner};
 use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -19,8 +19,8 @@ pub struct Sweep {
     definition: Definition,
     folder: PathBuf,
     plan: Plan,
-    rows: Rows,
-    variables: Vec<Variable>,
+    rows: DesignRows,
+    variables: Vec<RunVariable>,
 }
 
 impl Sweep {
@@ -53,7 +53,7 @@ impl Sweep {
             let variable = plan.bind([name]).map_err(|e| e.to_string())?;
             plan.number(&variable[0], text).map_err(|e| e.to_string())
         };
-        let rows = Rows::new(design, &definition.vary, &folder, &number)?;
+        let rows = DesignRows::new(design, &definition.vary, &folder, &number)?;
         if rows.names().any(|name| name == RUN) {
             return invalid(format!("vary: {RUN} is the column with the number of each run: write INSTANCE.{RUN}"));
         }
@@ -69,7 +69,7 @@ impl Sweep {
                 return invalid(format!("measure: {name:?} has a comma, a quote or a line break: rename it"));
             }
         }
-        if let Some(Trace { every: Some(0), .. }) = definition.trace {
+        if let Some(Traces { every: Some(0), .. }) = definition.trace {
             return invalid("trace: every = 0, expected at least 1");
         }
         if design.part == Some(0) {
@@ -94,12 +94,12 @@ impl Sweep {
     }
 
     /// The rows of the design.
-    pub fn rows(&self) -> &Rows {
+    pub fn rows(&self) -> &DesignRows {
         &self.rows
     }
 
     /// The varied variables, in the order of the columns of a row.
-    pub fn variables(&self) -> &[Variable] {
+    pub fn variables(&self) -> &[RunVariable] {
         &self.variables
     }
 
@@ -113,7 +113,7 @@ impl Sweep {
         count: u64,
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         if first.checked_add(count).is_none_or(|end| end > self.rows.count()) {
             let all = self.rows.count();
             return invalid(format!("rows from {first}, {count} of them, of a design with {all} rows"));
@@ -123,8 +123,9 @@ impl Sweep {
     }
 
     /// All columns of the results: `run`, the varied variables, the measures, `end`, `error` (or [`last_columns`]).
-    pub fn columns(&self) -> Vec<Column> {
-        let plain = |name: &str, unit: &str| Column { name: name.into(), unit: unit.into(), ..Column::default() };
+    pub fn columns(&self) -> Vec<ResultColumn> {
+        let plain =
+            |name: &str, unit: &str| ResultColumn { name: name.into(), unit: unit.into(), ..ResultColumn::default() };
         let varied = self.variables.iter().map(|variable| &variable.column);
         let mut all = vec![plain(RUN, "")];
         all.extend(varied.chain(self.plan.measures()).cloned());
@@ -167,9 +168,9 @@ impl Sweep {
     }
 
     /// The line of a row, with its line break.
-    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &Outcome) -> String {
+    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &RunResult) -> String {
         let mut line = row.to_string();
-        let mut put = |(column, x): (&Column, &f64)| {
+        let mut put = |(column, x): (&ResultColumn, &f64)| {
             line.push(',');
             push_value(&mut line, &column.items, *x);
         };

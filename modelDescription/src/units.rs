@@ -52,7 +52,7 @@ pub struct DisplayUnit {
 }
 
 impl DisplayUnit {
-    /// The conversion of differences of values: its factor alone.
+    /// The conversion of differences of values: only its factor.
     pub fn of_differences(&self) -> Self {
         Self { offset: 0.0, ..self.clone() }
     }

@@ -6,7 +6,7 @@ use crate::record::Record;
 use crate::stepping::update;
 use fmu_import::{Error, Instance};
 use fmu_system::cosimulation::{Equations, Feed, Inputs, Integration, Solver};
-use fmu_system::integration::{Driver, Stop, Trial};
+use fmu_system::integration::{Driver, StopReason, TrialError};
 use std::slice;
 
 /// FMPy's forward Euler: one step from point to point; events are not located.
@@ -192,7 +192,7 @@ impl Integrating {
         let mut signals = Signals { input, record, since: &mut self.since, records };
         let mut fmus = equations.of(slice::from_mut(instance), &mut signals);
         let (t, x) = driver.point();
-        fmus.place(t, x).map_err(Trial::into_error)?;
+        fmus.place(t, x).map_err(TrialError::into_error)?;
         if sampled {
             signals.record.sample(instance, course.time)?;
         }
@@ -201,11 +201,11 @@ impl Integrating {
         }
         let stop = driver.stop_at(&mut equations.of(slice::from_mut(instance), &mut signals), next)?;
         self.regular = course.regular();
-        course.time = if stop == Stop::Target { next } else { driver.point().0 };
+        course.time = if stop == StopReason::Target { next } else { driver.point().0 };
         if is_close(course.time, self.regular) {
             course.reached += 1;
         }
-        course.ended = stop == Stop::End;
+        course.ended = stop == StopReason::End;
         Ok(!course.ended)
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::error::{gate, plain, raise};
 use fmu_import::guard::patiently;
-use fmu_sweep::{Definition, Outcomes, Sweep, Variable};
+use fmu_sweep::{Definition, RunResults, RunVariable, Sweep};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -79,7 +79,7 @@ impl Plan {
         gate(|| {
             let run = || {
                 let set = self.plan.bind(names.iter().map(String::as_str))?;
-                let number = |(v, text): (Variable, &String)| Ok((v.clone(), self.plan.number(&v, text)?));
+                let number = |(v, text): (RunVariable, &String)| Ok((v.clone(), self.plan.number(&v, text)?));
                 let set: Vec<_> = set.into_iter().zip(&values).map(number).collect::<Result<_, fmu_sweep::Error>>()?;
                 self.plan.simulate(&set, outputs.as_deref())
             };
@@ -112,7 +112,7 @@ impl Plan {
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
             let run = |go_on: &GoOn<'_>| self.plan.run_many(&variables, &columns, threads, go_on);
-            let Outcomes { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
+            let RunResults { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
             let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
             Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
@@ -132,7 +132,7 @@ impl Plan {
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let run = |go_on: &GoOn<'_>| self.plan.run_around(&variables, &point, &steps, threads, go_on);
-            let Outcomes { measures, errors, .. } = py.detach(|| attended(run, None))?;
+            let RunResults { measures, errors, .. } = py.detach(|| attended(run, None))?;
             let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
             Ok((measures, errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
@@ -215,9 +215,9 @@ type GoOn<'a> = dyn Fn(u64) -> ControlFlow<()> + Sync + 'a;
 
 /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
 fn attended(
-    run: impl Fn(&GoOn<'_>) -> Result<Outcomes, fmu_sweep::Error> + Sync,
+    run: impl Fn(&GoOn<'_>) -> Result<RunResults, fmu_sweep::Error> + Sync,
     progress: Option<&Py<PyAny>>,
-) -> PyResult<Outcomes> {
+) -> PyResult<RunResults> {
     let stop = AtomicBool::new(false);
     let done_rows = AtomicU64::new(0);
     let tell = |py: Python<'_>| match progress {

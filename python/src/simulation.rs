@@ -146,7 +146,7 @@ impl Simulation {
         self.with(py, |run, i| run.course.record.sample(i, time))
     }
 
-    /// Take one step; false when there was none, or when it was the last because the FMU asked to end.
+    /// Take one step; false if there was none, or if it was the last because the FMU requested the end.
     fn step(&self, py: Python<'_>) -> PyResult<bool> {
         self.with(py, Run::step)
     }

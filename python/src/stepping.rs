@@ -72,7 +72,7 @@ impl Stepping {
     }
 }
 
-/// Updates the discrete states in event mode until they need no other update, or the FMU asks to end the simulation.
+/// Updates the discrete states in event mode until they need no other update, or the FMU requests the end of the simulation.
 pub(crate) fn update(instance: &mut Instance, time: f64) -> Result<Update, Error> {
     for _ in 0..UPDATES {
         let update = instance.update_discrete_states()?;

@@ -167,7 +167,7 @@ def test_embedded_archives(standard, tmp_path):
 
 
 def test_the_pair_in_model_exchange_is_the_drive(standard):
-    """Coupled, with each sample at its instant, regardless of the communication step: the FMU that has both inside."""
+    """Coupled, with each sample at its instant, regardless of the communication step: the FMU that contains both."""
     more = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-11, "step_size": 1e-3, "stop_time": 0.1}
     apart = pair(standard, output=["p.speed", "p.i_a", "c.theta_est"], **more).simulate()
     whole = Plan(standard / "PmsmDrive.fmu", input={"speed_ref": SPEED}, output=["speed", "i_a", "theta_est"], **more).simulate()
@@ -240,7 +240,7 @@ def test_bad_input_is_told_before_the_first_run(archives, case):
 
 
 def ticks(plan):
-    """Share of the sleeps of 1 ms of another thread that end while runs go on, of those that end otherwise."""
+    """Number of sleeps of 1 ms that another thread completes during the runs, relative to those without runs."""
     done, stop = [], threading.Event()
 
     def tick():

@@ -6,7 +6,7 @@ use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
 use crate::message;
-use crate::pack::{self, Entry, Moment};
+use crate::pack::{self, GenerationTime, PackedFile};
 use crate::target::{Target, Tools, ZIG, has_modules};
 use crate::workspace::{Package, Workspace, output_folder};
 use crate::{reference, release};
@@ -132,7 +132,7 @@ struct Model {
     binaries: Vec<(Platform, Vec<u8>)>,
     licenses: Licenses,
     /// The model's resource files.
-    resources: BTreeMap<String, Entry>,
+    resources: BTreeMap<String, PackedFile>,
     /// The file that feeds the default experiment.
     stimuli: PathBuf,
 }
@@ -145,7 +145,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     if let Some(folder) = &args.release_dir {
         return release(args, folder);
     }
-    let moment = Moment::of_environment()?;
+    let moment = GenerationTime::of_environment()?;
     let versions = match args.fmi.as_deref() {
         None => vec![FmiVersion::V2, FmiVersion::V3],
         Some(version) => vec![version.parse()?],
@@ -201,7 +201,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
 }
 
 /// The reference files for the model's archives. A model that cannot run alone has none; a note gives the reason.
-fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTreeMap<String, Entry>> {
+fn reference(model: &Model, version: FmiVersion, moment: GenerationTime) -> Result<BTreeMap<String, PackedFile>> {
     let Model { description, stimuli, .. } = model;
     let dir = tempfile::tempdir()?;
     let archive = dir.path().join("reference.fmu");
@@ -219,7 +219,7 @@ fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTree
 
 /// Writes all files of a release to a folder; returns them.
 fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
-    let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, Moment::of_environment()?);
+    let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, GenerationTime::of_environment()?);
     let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
     let (fmus, fmi, linux64) = (args.fmus.clone(), args.fmi.clone(), args.linux64);
     let mut packages: Vec<String> = choose(&workspace.fmus(), &fmus)?.iter().map(|p| p.name.clone()).collect();

@@ -195,7 +195,7 @@ fn options(args: &Identify) -> Result<Options> {
     })
 }
 
-/// The values, one a line.
+/// The values, one per line.
 fn rows<'a>(values: impl Iterator<Item = &'a Quantity>) -> String {
     let row = |value: &Quantity| {
         let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value);

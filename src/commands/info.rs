@@ -79,7 +79,7 @@ fn head(Outline { description: md, terminals, files }: &Outline, size: u64) -> V
     let interfaces = [interface("Co-Simulation", &md.co_simulation), interface("Model Exchange", &md.model_exchange)];
     let interfaces: Vec<String> = interfaces.into_iter().flatten().collect();
     line("standard", format!("FMI {}; {}", md.version, interfaces.join(" and ")));
-    // The names of FMI 2.0 do not say which processor.
+    // The names of FMI 2.0 do not identify the processor.
     let folder = |(name, bytes): (&String, &Vec<u8>)| {
         let (folder, _) = name.strip_prefix("binaries/")?.split_once('/')?;
         let platforms: Vec<&str> = machine::platforms(bytes).into_iter().map(Platform::tuple).collect();

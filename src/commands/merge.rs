@@ -1,7 +1,7 @@
 //! `fmu merge`: one archive from several archives of one FMU, each with binaries for other platforms.
 
 use super::build::Linux64;
-use crate::pack::{self, Entry, Moment};
+use crate::pack::{self, GenerationTime, PackedFile};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use fmu_import::platform::Platform;
@@ -47,7 +47,7 @@ struct Part {
 /// # Errors
 /// A file is not an FMU, or two FMUs differ in more than binaries and date.
 pub fn run(args: &Merge) -> Result<()> {
-    let moment = Moment::of_environment()?;
+    let moment = GenerationTime::of_environment()?;
     let open = |path: &PathBuf| {
         let (description, files) = contents(path)?;
         Ok(Part { name: path.display().to_string(), description, files })
@@ -55,7 +55,7 @@ pub fn run(args: &Merge) -> Result<()> {
     let parts = args.files.iter().map(open).collect::<Result<Vec<_>>>()?;
     let entry = |(name, bytes): (String, Vec<u8>)| {
         let executable = name.starts_with(BINARIES);
-        (name, Entry { bytes, executable })
+        (name, PackedFile { bytes, executable })
     };
     if let Some(linux64) = args.linux64 {
         has_linux64(&parts, linux64.platform())?;

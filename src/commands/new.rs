@@ -1,6 +1,6 @@
 //! `fmu new`: a project for a new FMU.
 
-use crate::pack::Moment;
+use crate::pack::GenerationTime;
 use crate::vendor;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -75,7 +75,7 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
     };
     let install =
         if carried { "cargo install --locked --git ${{ vars.FMU_GIT }} fmu" } else { "cargo install --locked fmu" };
-    let year = &Moment::of_environment()?.date_and_time()[..4];
+    let year = &GenerationTime::of_environment()?.date_and_time()[..4];
     let places = [
         ("{package}", name),
         ("{model}", &fmu_name(name)),

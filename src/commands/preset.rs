@@ -2,7 +2,7 @@
 
 mod motor;
 
-use crate::preset::{Course, PresetFmu};
+use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, rules::Tuned};
@@ -99,23 +99,22 @@ pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
 }
 
 /// The default experiment with the inputs of a file.
-fn course(path: &Path) -> Result<Course> {
+fn course(path: &Path) -> Result<NewExperiment> {
     let of = || format!("--stimuli {}", path.display());
     let stimuli = std::fs::read_to_string(path).with_context(of)?;
     let wrong = |cause: String| anyhow!("--stimuli {cause}");
     Schedule::read_csv(path).map_err(wrong)?;
     let last = stimuli.lines().rfind(|line| !line.trim().is_empty()).and_then(|line| line.split([',', ';']).next());
     let stop = last.and_then(|time| time.trim().parse().ok()).with_context(|| format!("{}: has no last time", of()))?;
-    Ok(Course { stimuli, stop, step: None })
+    Ok(NewExperiment { stimuli, stop, step: None })
 }
 
-/// Checks that a name for users is also a file name on every system, because the reference files have it.
+/// Checks that a name for users is also a file name on every system, because the reference files use it.
 fn judge(name: &str) -> Result<()> {
     let plain = |b: u8| (b' '..=b'~').contains(&b) && !br#"/\:*?"<>|"#.contains(&b);
     ensure!(
         name.bytes().all(plain) && (1..=100).contains(&name.len()) && name.trim() == name && !name.starts_with('.'),
-        "--name {name}: a name has 1 to 100 letters of ASCII, none of / \\ : * ? \" < > |, no blank at its ends and no dot \
-         before it, because files have it"
+        "--name {name}: a name has 1 to 100 letters of ASCII, none of / \\ : * ? \" < > |, no blank at its ends and no dot before it, because files use it"
     );
     Ok(())
 }

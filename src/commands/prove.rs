@@ -215,7 +215,7 @@ fn own(example: &Example) -> Result<f64> {
     Ok(largest)
 }
 
-/// The values of a column as CSV has them.
+/// The values of a column in CSV form.
 fn cells(recording: &Recording, name: &str) -> Option<Vec<String>> {
     let numbers = |column: &fmu_system::cosimulation::Column| column.values.iter().map(f64::to_string).collect();
     let texts = || Some(recording.texts.iter().find(|column| column.name == name)?.values.clone());
@@ -241,7 +241,7 @@ fn deviation<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> f64 {
     apart / size
 }
 
-/// Replays the example in FMPy; `None` if the Python does not have it.
+/// Replays the example in FMPy; `None` if the Python lacks it.
 fn fmpy(example: &Example, python: &Path) -> Result<Option<Replay>> {
     let has_it = Command::new(python).args(["-c", "import fmpy"]).output();
     if !has_it.is_ok_and(|output| output.status.success()) {

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
-use fmu_system::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
+use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
 use fmu_system::ssp::values::{self, Given};
@@ -125,7 +125,7 @@ pub struct Simulate {
     pub me: bool,
     /// Integrator of --me [default: dopri]
     #[arg(long, value_enum)]
-    pub solver: Option<SolverName>,
+    pub solver: Option<SolverOption>,
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
@@ -157,7 +157,7 @@ pub struct Simulate {
 
 /// Integrators of Model Exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SolverName {
+pub enum SolverOption {
     /// Runge-Kutta of order 4, with fixed steps of the size --step
     Rk4,
     /// Dormand-Prince of order 5, with adaptive steps
@@ -178,7 +178,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
         _ => {}
     }
     let solver = match (args.solver, args.rtol) {
-        (Some(SolverName::Rk4), _) => Solver::Rk4,
+        (Some(SolverOption::Rk4), _) => Solver::Rk4,
         (_, Some(rtol)) => Solver::Dopri { rtol },
         (_, None) => Solver::default(),
     };
@@ -221,7 +221,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
         bail!("--solver and --rtol are for Model Exchange: add --me");
     }
-    if args.solver == Some(SolverName::Rk4) && args.rtol.is_some() {
+    if args.solver == Some(SolverOption::Rk4) && args.rtol.is_some() {
         bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
     }
     std::env::set_current_dir(&home)?;
@@ -230,7 +230,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     let Loaded { mut system, .. } = loaded;
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
-    let mut hook = |point: &mut Point<'_>| {
+    let mut hook = |point: &mut CommunicationPoint<'_>| {
         if args.logging {
             show(&point.take_messages());
         }

@@ -1,8 +1,8 @@
 //! `fmu ssp`: the closed loop of plant and controller as one file.
 
 use super::build::{self, Build};
-use crate::pack::{self, Moment};
-use crate::ssp::{self, COMPONENTS, Options, Values};
+use crate::pack::{self, GenerationTime};
+use crate::ssp::{self, COMPONENTS, ComponentValues, Options};
 use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -63,7 +63,7 @@ pub struct Ssp {
 /// # Errors
 /// The FMUs do not build, values do not fit, or the file cannot be written.
 pub fn run(args: &Ssp) -> Result<()> {
-    let moment = Moment::of_environment()?;
+    let moment = GenerationTime::of_environment()?;
     let values = values(args)?;
     let dir = tempfile::tempdir()?;
     if values.is_empty() && args.names {
@@ -117,10 +117,10 @@ fn is_of(folder: &Path, version: FmiVersion) -> Result<()> {
 }
 
 /// The values, each with its file.
-fn values(args: &Ssp) -> Result<Vec<Values>> {
+fn values(args: &Ssp) -> Result<Vec<ComponentValues>> {
     if let Some(motor) = &args.motor {
         let tuned = tune::tune(motor)?;
-        let of = |component: &str, settings: &[tune::rules::Setting]| Values {
+        let of = |component: &str, settings: &[tune::rules::Setting]| ComponentValues {
             component: component.into(),
             file: motor.display().to_string(),
             text: ssv::text(&format!("{} {component}", tuned.name), settings),
@@ -128,7 +128,7 @@ fn values(args: &Ssp) -> Result<Vec<Values>> {
         let (plant, controller) = tune::needed(&tuned, false)?;
         return Ok(vec![of("controller", &controller), of("plant", &plant)]);
     }
-    let mut values: Vec<Values> = Vec::new();
+    let mut values: Vec<ComponentValues> = Vec::new();
     for text in &args.parameters {
         let (component, file) =
             text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --parameters COMPONENT=FILE.ssv"))?;
@@ -140,7 +140,7 @@ fn values(args: &Ssp) -> Result<Vec<Values>> {
             bail!("--parameters {text}: {component} already has a file: put the values of both into one");
         }
         let content = std::fs::read_to_string(file).with_context(|| file.to_owned())?;
-        values.push(Values { component: component.into(), file: file.into(), text: content });
+        values.push(ComponentValues { component: component.into(), file: file.into(), text: content });
     }
     Ok(values)
 }

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fmu_sweep::isolate::Isolation;
-use fmu_sweep::{Options, Report, Sweep as Definition, Watch, threads_here};
+use fmu_sweep::{Options, Progress, Report, Sweep as Definition, threads_here};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::{self, IsTerminal};
@@ -159,7 +159,7 @@ struct Shown {
     bar: std::sync::OnceLock<ProgressBar>,
 }
 
-impl Watch for Shown {
+impl Progress for Shown {
     fn note(&self, text: &str) {
         crate::message::note(text);
     }

@@ -13,7 +13,7 @@ use fmu_plot::ink::CURVES;
 use fmu_plot::page::{AXIS, document, escape};
 use fmu_system::cosimulation::Schedule;
 use model_description::{FmiVersion, Generation};
-use own::{Judged, Own, Run, is_curve};
+use own::{Judged, Own, PresetRun, is_curve};
 use serde_json::{Map, Value, json};
 use std::io::Write as _;
 use std::path::Path;
@@ -72,7 +72,7 @@ pub fn page(source: &Source<'_>) -> Result<String> {
     let Judged { mut members, presets } = judged(plain, source.own)?;
     // The author's presets are for the author's start values.
     let is_plain = of.variables.iter().zip(&plain.variables).all(|(a, b)| a.start == b.start);
-    let mut presets: Vec<Value> = presets.iter().filter(|_| is_plain).map(Run::json).collect();
+    let mut presets: Vec<Value> = presets.iter().filter(|_| is_plain).map(PresetRun::json).collect();
     if presets.is_empty() {
         let run = default_experiment(of, source.stimuli)?;
         if !is_plain {
@@ -99,7 +99,7 @@ pub fn page(source: &Source<'_>) -> Result<String> {
 }
 
 /// The ranges of the inputs of a run, twice those needed, for a machine to which the author's ranges do not apply.
-fn ranges_of(run: &Run) -> Value {
+fn ranges_of(run: &PresetRun) -> Value {
     let mut ranges = Map::new();
     for (_, name, value) in &run.events {
         let most = ranges.get(name).map_or(0.0, |range: &Value| range[1].as_f64().unwrap_or(0.0));
@@ -281,9 +281,9 @@ fn plots(of: &Description) -> Value {
 }
 
 /// The default experiment, with its inputs held over the steps.
-fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<Run> {
+fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<PresetRun> {
     let experiment = &of.experiment;
-    let mut run = Run {
+    let mut run = PresetRun {
         title: "Default experiment".into(),
         text: String::new(),
         set: Vec::new(),

@@ -123,12 +123,12 @@ pub struct Judged {
     /// Members of the page's description of the model.
     pub members: serde_json::Map<String, Value>,
     /// The preset runs.
-    pub presets: Vec<Run>,
+    pub presets: Vec<PresetRun>,
 }
 
 /// A preset in SI units and steps.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct PresetRun {
     /// Its name.
     pub title: String,
     /// What to see.
@@ -145,7 +145,7 @@ pub struct Run {
     pub compare: bool,
 }
 
-impl Run {
+impl PresetRun {
     /// The run in the form that the page uses.
     pub fn json(&self) -> Value {
         let Self { title, text, set, events, stop, rate, compare } = self;
@@ -359,7 +359,7 @@ impl Model<'_> {
         }
     }
 
-    fn run(&self, preset: &Preset) -> Result<Run, String> {
+    fn run(&self, preset: &Preset) -> Result<PresetRun, String> {
         let experiment = &self.of.experiment;
         let set = preset.set.iter().map(|(name, text)| {
             self.value(name, text).map(|value| (name.clone(), value)).map_err(|e| format!("set: {e}"))
@@ -394,6 +394,6 @@ impl Model<'_> {
         };
         let events = preset.events.iter().map(event).collect::<Result<_, _>>()?;
         let Preset { title, text, rate, compare, .. } = preset.clone();
-        Ok(Run { title, text, set, events, stop: Some(stop), rate, compare })
+        Ok(PresetRun { title, text, set, events, stop: Some(stop), rate, compare })
     }
 }

@@ -150,7 +150,7 @@ impl Modules {
         }
     }
 
-    /// A path of at least two words: a word alone is a variable, or was imported.
+    /// A path of at least two words: a single word is a variable, or was imported.
     fn path(&mut self, tokens: &[TokenTree], mut at: usize, module: usize) -> usize {
         let is_within = at > 0 && [':', '.', '\''].iter().any(|&before| is(tokens.get(at - 1), before));
         let is_rest = is_within && !(is(tokens.get(at - 1), ':') && !(at > 1 && is(tokens.get(at - 2), ':')));

@@ -37,9 +37,9 @@ pub struct Order {
     /// It updates the discrete states until that is no longer needed; without, once for each event.
     pub iterates: bool,
     pub completes: Completes,
-    /// It sets the continuous states in Event Mode, too.
+    /// It also sets the continuous states in Event Mode.
     pub states_in_event: bool,
-    /// It reads derivatives in Event Mode, too.
+    /// It also reads derivatives in Event Mode.
     pub derivatives_in_event: bool,
     /// It sets discrete inputs at every evaluation outside of Continuous-Time Mode, not only at events.
     pub discrete_inputs: bool,

@@ -282,7 +282,7 @@ fn a_preset_finds_an_element_of_a_matrix() {
     let fmu = fmu_import::Fmu::open(&out).unwrap();
     let a = fmu.description().variable("A").unwrap();
     assert_eq!(a.start.as_deref(), Some("1 0 0 5 1 0 0 0 1"));
-    // The binary has it too: y = x + u, and x_2 grows with 5 x_1.
+    // The binary does the same: y = x + u, and x_2 grows with 5 x_1.
     let of = |fmu| run(exchange(), fmu, &[], 1.0, 0.1);
     let (with, without) = (rows(&of(&out)), rows(&of(&archive("state-space", V3))));
     let last = |rows: &[Vec<f64>]| rows.last().unwrap().clone();

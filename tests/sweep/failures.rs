@@ -176,6 +176,6 @@ fn a_full_disk_names_the_file_and_loses_no_part() {
             assert!(!half.contains(".part-") && half.contains("part-0"), "{half}");
             assert_eq!(folder.results("copy"), folder.results("whole"));
         }
-        other => println!("no disk of one's own here: {other:?}"),
+        other => println!("no separate disk here: {other:?}"),
     }
 }

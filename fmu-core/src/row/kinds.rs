@@ -10,8 +10,8 @@ use crate::rules::demand;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Variability};
 
-/// Constructors with the same arguments (after their type parameters) and the same row: one a line, with its causality and
-/// its variability.
+/// Constructors with the same arguments (after their type parameters) and the same row: one per line, with causality and
+/// variability.
 macro_rules! constructors {
     ([$($generic:tt)*] $arguments:tt => $row:expr; $($(#[$doc:meta])* $name:ident $causality:ident $variability:ident;)*) => {
         constructors! { @ [$($generic)*] $arguments [$row] $([$(#[$doc])* $name $causality $variability])* }
@@ -111,13 +111,13 @@ constructors! {
 constructors! {
     [T: Element] (name: &'static str, description: &'static str, dimension: usize, items: &'static Items<W, T>)
         => Self::new(name, description, T::KIND, Access::List(items)).of_dimension(dimension);
-    /// An array of inputs of another type than real numbers; `dimension` elements, and `items` locates them in the model.
+    /// An array of inputs other than real numbers; `dimension` elements, and `items` locates them in the model.
     list_input Input Discrete;
-    /// An array of outputs of another type than real numbers; `dimension` elements.
+    /// An array of outputs other than real numbers; `dimension` elements.
     list_output Output Discrete;
-    /// An array of `dimension` variables other than outputs, of another type than real numbers.
+    /// An array of `dimension` variables, neither outputs nor real numbers.
     list_local Local Discrete;
-    /// A fixed array of parameters of another type than real numbers; `dimension` elements.
+    /// A fixed array of parameters other than real numbers; `dimension` elements.
     list_parameter Parameter Fixed;
 }
 

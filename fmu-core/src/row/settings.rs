@@ -122,7 +122,7 @@ impl<W: 'static> Row<W> {
     /// Values greater than `bound` only.
     ///
     /// # Panics
-    /// At compile time, as every bound: if the variable is not a number, or if no value is left.
+    /// At compile time, like every bound: if the variable is not a number, or if no value is left.
     #[track_caller]
     pub const fn above(mut self, bound: f64) -> Self {
         self.meta.range.min = bound;

@@ -2,7 +2,7 @@
 
 use crate::bytes::Bytes;
 use crate::enumeration::Choice;
-use crate::integer::Whole;
+use crate::integer::IntegerField;
 use crate::variable::{Kind, Meta};
 use std::hash::{DefaultHasher, Hasher as _};
 
@@ -29,7 +29,7 @@ pub enum Slot<'a> {
     /// A real number in single precision.
     Float32(&'a mut f32),
     /// An integer.
-    Integer(&'a mut dyn Whole),
+    Integer(&'a mut dyn IntegerField),
     /// A truth value.
     Boolean(&'a mut bool),
     /// An item of an enumeration.

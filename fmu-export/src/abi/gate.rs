@@ -242,7 +242,7 @@ pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
 pub(crate) struct Steps<'a> {
     /// They may end early.
     pub(crate) early_return: bool,
-    /// The functions that it wants to be called.
+    /// The callback functions.
     pub(crate) callbacks: Callbacks,
     /// The variables that it uses inside a step.
     pub(crate) required: &'a [u32],

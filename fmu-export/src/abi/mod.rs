@@ -189,8 +189,8 @@ macro_rules! functions {
 /// Turns the crate into the binary of an FMU: it exports all C functions of FMI 2.0 and FMI 3.0 for one model, and
 /// `fmu_description`, which passes its description to `fmu build`.
 ///
-/// After the model come its [capabilities](fmu_core::capability), each of which it must implement; without any, the FMU
-/// is for co-simulation.
+/// The model is followed by its [capabilities](fmu_core::capability), all of which it must implement; without any, the FMU is
+/// for co-simulation.
 ///
 /// ```ignore
 /// fmu_export::export!(drive::PmsmPlant: ContinuousTime + Events + Differentiable);

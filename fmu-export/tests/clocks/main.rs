@@ -501,7 +501,7 @@ fn intervals_and_qualifiers() {
         assert_eq!(host.get(14), Some(0.25), "T_fixed");
         assert_eq!(host.exit(), OK);
         if kind == Kind::Se {
-            // Afterwards, as `scheduled` has it.
+            // Afterwards, as in `scheduled`.
             continue;
         }
         // A changing clock has an interval where it ticked.

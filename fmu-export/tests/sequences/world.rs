@@ -55,7 +55,7 @@ pub(crate) struct World {
     lost: Vec<FmuState>,
     /// For reading without side effects.
     glass: FmuState,
-    /// Bytes of a stored state: as many for every state of this model.
+    /// Size of a stored state in bytes: the same for every state of this model.
     size: usize,
     prints: [Vec<u8>; 2],
 }
@@ -141,7 +141,7 @@ impl World {
         }
     }
 
-    /// Frees an instance and makes another, after one try with a mistake.
+    /// Frees an instance and creates another, after one try with a mistake.
     fn renew(&mut self, who: usize, version: u8, wrong: u8, tally: &mut Tally) {
         if wrong > 0 {
             let journal = Journal::default();
@@ -249,7 +249,7 @@ impl World {
         }
     }
 
-    /// The call alone; slots and blobs follow.
+    /// Only the call; slots and blobs follow.
     fn attempt(&mut self, call: &Call, version: u8, it: InstancePointer) -> Done {
         match call {
             Call::Logging { on, categories } => perform::logging(version, it, *on, categories),

@@ -184,7 +184,7 @@ impl World {
         let name = choose(twin, draw);
         let _ = write!(self.trace, "\n{who} {} {name}", twin.state);
         let before = twin.clone();
-        // In Model Exchange alone, and in these states.
+        // Only in Model Exchange, and in these states.
         let admits = |twin: &Twin, states: &str| twin.exchange && twin.is(states);
         let verdict = |fits: bool| if fits { OK } else { ERROR };
         let mut wanted = OK;

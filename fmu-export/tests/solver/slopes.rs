@@ -233,7 +233,7 @@ pub fn input_derivatives() {
     let fmu = ramped(0.4, true);
     let v = fmu.get(V);
     assert_eq!(fmu.get(U), 2.0, "the input is as it was set");
-    // They held for one step; a mean over the step is one over the whole step.
+    // They applied to one step; a mean over the step covers the whole step.
     let again = ramped(0.4, true);
     let h = again.get(H);
     assert_eq!((fmu.step(0.8, 0.4).0, again.input_derivatives(&[U], &[1], &[0.0])), (OK, OK));

@@ -154,8 +154,8 @@ impl Calls {
     /// Gets or sets values.
     ///
     /// # Safety
-    /// `values` is NULL or leads to as many values of the type as both counts say, to which a getter may write; texts that are set
-    /// are NULL or C strings.
+    /// `values` is NULL or points to values of the type, as many as both counts state, to which a getter may write; texts that
+    /// are set are NULL or C strings.
     #[inline]
     pub(super) unsafe fn transfer(
         &self,
@@ -222,7 +222,7 @@ impl Calls {
         let list: Vec<*const c_char> =
             categories.unwrap_or_default().iter().map(|c| c.map_or(ptr::null(), CStr::as_ptr)).collect();
         let list = Array::of(categories.map(|_| &list[..]), n).pointer();
-        // SAFETY: of both: the standard's type; as many strings as said, or NULL.
+        // SAFETY: of both: the standard's type; as many strings as stated, or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.debug_logging_2.call(|f| f(i.0, c_int::from(on), n, list)),
@@ -265,13 +265,13 @@ impl Calls {
 
     /// `SerializeFMUState`.
     pub(super) fn serialize(&self, i: Given<'_>, state: Given<'_>, mut bytes: ArrayMut<'_, u8>) -> Answer {
-        // SAFETY: the standards' type; the array is as long as said.
+        // SAFETY: the standards' type; the array is as long as stated.
         self.serialize.call(|f| unsafe { f(i.0, state.0, bytes.pointer(), bytes.1) })
     }
 
     /// `DeserializeFMUState`.
     pub(super) fn deserialize(&self, i: Given<'_>, bytes: Array<'_, u8>) -> Answer<StatePointer> {
-        // SAFETY: the standards' type; the array is NULL or as long as said; the variable is ours.
+        // SAFETY: the standards' type; the array is NULL or as long as stated; the variable is ours.
         self.deserialize.write(ptr::null_mut(), |f, state| unsafe { f(i.0, bytes.pointer(), bytes.1, state) })
     }
 
@@ -398,7 +398,7 @@ impl Calls {
     /// `SetContinuousStates`.
     #[inline]
     pub(super) fn set_states(&self, i: Given<'_>, x: Array<'_, f64>) -> Answer {
-        // SAFETY: the standards' type; the array is NULL or as long as said.
+        // SAFETY: the standards' type; the array is NULL or as long as stated.
         self.set_states.call(|f| unsafe { f(i.0, x.pointer(), x.1) })
     }
 
@@ -406,7 +406,7 @@ impl Calls {
     #[inline]
     pub(super) fn vector(&self, name: Vector, i: Given<'_>, mut values: ArrayMut<'_, f64>) -> Answer {
         // SAFETY: all functions that `Vector` names have this type, up to the mutability of the array, which is ours, NULL or
-        // as long as said.
+        // as long as stated.
         self.vectors[name as usize].call(|f| unsafe { f(i.0, values.pointer(), values.1) })
     }
 
@@ -441,7 +441,7 @@ impl Calls {
             (FmiVersion::V3, Sensitivity::GetAdjointDerivative) => &self.adjoint_3,
         };
         let (s, n_s, to, n) = (seed.pointer(), seed.1, results.pointer(), results.1);
-        // SAFETY: FMI 3.0's type; arrays are NULL or as long as said.
+        // SAFETY: FMI 3.0's type; arrays are NULL or as long as stated.
         function.call(|f| unsafe { f(i.0, u, n_u, k, n_k, s, n_s, to, n) })
     }
 
@@ -455,7 +455,7 @@ impl Calls {
     ) -> Answer {
         let (r, n, orders) = (references.as_ptr(), references.len(), Array::from(orders).holding(references.len()));
         let mut values = ArrayMut::from(values);
-        // SAFETY: of both: the standard's type; the arrays are as long as said.
+        // SAFETY: of both: the standard's type; the arrays are as long as stated.
         unsafe {
             match self.version {
                 FmiVersion::V2 => {
@@ -477,7 +477,7 @@ impl Calls {
     ) -> Answer {
         let (r, n) = (references.pointer(), references.1);
         let (orders, values) = (orders.holding(n), values.holding(n));
-        // SAFETY: FMI 2.0's type; arrays are NULL or as long as said.
+        // SAFETY: FMI 2.0's type; arrays are NULL or as long as stated.
         self.input_derivatives_2.call(|f| unsafe { f(i.0, r, n, orders, values) })
     }
 }

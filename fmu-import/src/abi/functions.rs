@@ -12,7 +12,7 @@ use libloading::Library;
 use model_description::FmiVersion;
 use std::sync::Arc;
 
-/// A function with its full name; `None` if the library does not have it.
+/// A function with its full name; `None` if the library lacks it.
 pub(super) struct Function<T>(pub(super) &'static str, pub(super) Option<T>);
 
 impl<T: Copy> Function<T> {

@@ -62,7 +62,8 @@ impl Instance {
         }
     }
 
-    /// Numbers of continuous states and of event indicators. FMI 3.0 asks the FMU, FMI 2.0 the description.
+    /// Numbers of continuous states and of event indicators. In FMI 3.0 they come from the FMU, in FMI 2.0 from the
+    /// description.
     ///
     /// # Errors
     /// The FMU refuses.

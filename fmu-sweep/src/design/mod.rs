@@ -19,7 +19,7 @@ const MOST: u64 = 1 << 40;
 
 /// The rows of a design.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rows {
+pub struct DesignRows {
     columns: Vec<(String, Column)>,
     count: u64,
     kind: Kind,
@@ -40,7 +40,7 @@ enum Column {
     Tied { to: usize, times: f64 },
 }
 
-impl Rows {
+impl DesignRows {
     /// `number` reads a text as the number of a variable: names of enumerations, `true`.
     ///
     /// # Errors
@@ -217,13 +217,13 @@ mod tests {
     use super::*;
     use crate::definition::Definition;
 
-    fn rows(text: &str) -> Result<Rows, Error> {
+    fn rows(text: &str) -> Result<DesignRows, Error> {
         let definition = Definition::parse(text).unwrap();
         let number = |_: &str, text: &str| text.parse().map_err(|_| format!("{text} is not a number"));
-        Rows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &number)
+        DesignRows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &number)
     }
 
-    fn all(rows: &Rows) -> Vec<Vec<f64>> {
+    fn all(rows: &DesignRows) -> Vec<Vec<f64>> {
         let one = |k| {
             let mut values = Vec::new();
             rows.row(k, &mut values);
@@ -232,7 +232,7 @@ mod tests {
         (0..rows.count()).map(one).collect()
     }
 
-    fn design(kind: &str, runs: u64, seed: u64) -> Rows {
+    fn design(kind: &str, runs: u64, seed: u64) -> DesignRows {
         rows(&format!(
             "[design]\nkind = '{kind}'\nruns = {runs}\nseed = {seed}\n[vary]\na = {{ uniform = [0, 1] }}\n\
              b = {{ uniform = [-1, 1] }}\nc = {{ same = 'a', times = 2 }}\nd = {{ values = [1, 2, 3] }}"

@@ -8,8 +8,8 @@ use super::coupled::{Equations, Feed};
 use super::exchange::{Exchange, Inputs};
 use super::grid::Grid;
 use super::method::Integration;
-use super::point::{Ended, Point, end};
-use crate::integration::{Driver, Trial};
+use super::point::{CommunicationPoint, Ended, end};
+use crate::integration::{Driver, TrialError};
 use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;
 
@@ -35,7 +35,7 @@ pub(super) fn run(
     grid: &Grid,
     integration: &Integration,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let start = grid.settings().start;
     let mut ended = Ended { time: start, by: None };
@@ -69,13 +69,13 @@ pub(super) fn run(
         }
         ended.time = time;
         let (t, x) = driver.point();
-        equations.of(instances, exchange).place(t, x).map_err(Trial::into_error)?;
+        equations.of(instances, exchange).place(t, x).map_err(TrialError::into_error)?;
         exchange.read_all(instances)?;
         exchange.row(t, row);
         if index < grid.steps() {
             steppers.iter().try_for_each(|&i| exchange.write(i, &mut instances[i], time))?;
         }
-        let mut point = Point { index, time, values: row, instances, touched: false };
+        let mut point = CommunicationPoint { index, time, values: row, instances, touched: false };
         if hook(&mut point)?.is_break() {
             break;
         }

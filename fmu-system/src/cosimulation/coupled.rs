@@ -1,13 +1,13 @@
 //! FMUs for Model Exchange as one system of differential equations with events.
 //!
-//! At every evaluation all FMUs get time and states, and a [`Feed`] gives their continuous inputs. Discrete inputs are set in event
-//! mode alone. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of discrete
-//! states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are left alone.
+//! At every evaluation all FMUs get time and states, and a [`Feed`] sets their continuous inputs. Discrete inputs are set in
+//! event mode alone. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of
+//! discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are left alone.
 
 use super::exchange::Inputs;
 use super::iteration::{Iterated, iterate};
 use super::method::Integration;
-use crate::integration::{Hybrid, Trial};
+use crate::integration::{HybridSystem, TrialError};
 use fmu_import::{CompletedStep, Error, Instance, Kind, Update};
 use std::ops::Range;
 
@@ -47,7 +47,7 @@ pub struct Equations {
     x: Vec<f64>,
     /// The FMUs are in event mode from their initialization.
     initial: bool,
-    /// Index of the instance that asked to end the simulation.
+    /// Index of the instance that requested the end of the simulation.
     ended_by: Option<usize>,
 }
 
@@ -130,7 +130,7 @@ impl Equations {
         Err(Error::usage(instances[index].name(), format!("{what}{state} is {} at t = {t} s", values[at])))
     }
 
-    /// Index of the instance that asked to end the simulation.
+    /// Index of the instance that requested the end of the simulation.
     pub fn ended_by(&self) -> Option<usize> {
         self.ended_by
     }
@@ -158,13 +158,13 @@ impl<F: Feed> Fmus<'_, F> {
     ///
     /// # Errors
     /// An FMU refuses.
-    pub fn place(&mut self, t: f64, x: &[f64]) -> Result<(), Trial> {
+    pub fn place(&mut self, t: f64, x: &[f64]) -> Result<(), TrialError> {
         let Self { equations, instances, feed } = self;
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
         if t.to_bits() == equations.t.to_bits() && same(&equations.x, x) {
             return Ok(());
         }
-        equations.finite(instances, "", x, t).map_err(Trial::Discard)?;
+        equations.finite(instances, "", x, t).map_err(TrialError::Discard)?;
         equations.t = f64::NAN;
         for &index in &equations.order {
             instances[index].set_time(t).map_err(trial)?;
@@ -186,11 +186,11 @@ impl<F: Feed> Fmus<'_, F> {
 }
 
 /// A discarded call can be tried again with a shorter step.
-fn trial(error: Error) -> Trial {
-    if error.is_discard() { Trial::Discard(error) } else { Trial::Stop(error) }
+fn trial(error: Error) -> TrialError {
+    if error.is_discard() { TrialError::Discard(error) } else { TrialError::Stop(error) }
 }
 
-impl<F: Feed> Hybrid for Fmus<'_, F> {
+impl<F: Feed> HybridSystem for Fmus<'_, F> {
     fn nominals(&self) -> &[f64] {
         &self.equations.nominals
     }
@@ -204,15 +204,15 @@ impl<F: Feed> Hybrid for Fmus<'_, F> {
         self.equations.indicators.last().map_or(0, |range| range.end)
     }
 
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Trial> {
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), TrialError> {
         self.place(t, x)?;
         for (instance, range) in self.instances.iter_mut().zip(&self.equations.states) {
             instance.get_derivatives(&mut dx[range.clone()]).map_err(trial)?;
         }
-        self.equations.finite(self.instances, "the derivative of ", dx, t).map_err(Trial::Discard)
+        self.equations.finite(self.instances, "the derivative of ", dx, t).map_err(TrialError::Discard)
     }
 
-    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), Trial> {
+    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), TrialError> {
         self.place(t, x)?;
         for (instance, range) in self.instances.iter_mut().zip(&self.equations.indicators) {
             instance.get_event_indicators(&mut z[range.clone()]).map_err(trial)?;
@@ -225,7 +225,7 @@ impl<F: Feed> Hybrid for Fmus<'_, F> {
         if !self.equations.completes.contains(&true) {
             return Ok(all);
         }
-        self.place(t, x).map_err(Trial::into_error)?;
+        self.place(t, x).map_err(TrialError::into_error)?;
         for (index, instance) in self.instances.iter_mut().enumerate() {
             if !self.equations.completes[index] {
                 continue;
@@ -242,7 +242,7 @@ impl<F: Feed> Hybrid for Fmus<'_, F> {
     fn event(&mut self, t: f64, x: &mut [f64]) -> Result<Update, Error> {
         let first = std::mem::replace(&mut self.equations.initial, false);
         if !first {
-            self.place(t, x).map_err(Trial::into_error)?;
+            self.place(t, x).map_err(TrialError::into_error)?;
         }
         let Self { equations, instances, feed } = self;
         feed.event(instances, t)?;

@@ -10,7 +10,7 @@
 use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
-use super::point::{Ended, Point, end};
+use super::point::{CommunicationPoint, Ended, end};
 use fmu_import::{Error, FmuState, Instance, Kind, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
@@ -31,7 +31,7 @@ struct Fmus<'a> {
     stepped: Vec<Stepped>,
     /// Instants that are closer than this (s) are the same.
     near: f64,
-    /// Index of the instance that asked to end the simulation.
+    /// Index of the instance that requested the end of the simulation.
     ended_by: Option<usize>,
 }
 
@@ -162,7 +162,7 @@ pub(super) fn run(
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let (start, near) = (grid.settings().start, 1e-9 * grid.settings().step);
     let of = |wanted: fn(Kind) -> bool| -> Vec<usize> {
@@ -188,7 +188,8 @@ pub(super) fn run(
         if index < grid.steps() {
             fmus.exchange.write_all(fmus.instances, time)?;
         }
-        let flow = hook(&mut Point { index, time, values: row, instances: fmus.instances, touched: false })?;
+        let flow =
+            hook(&mut CommunicationPoint { index, time, values: row, instances: fmus.instances, touched: false })?;
         if flow.is_break() || index == grid.steps() {
             break;
         }

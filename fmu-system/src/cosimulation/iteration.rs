@@ -17,7 +17,7 @@ pub(super) struct Iterated {
 
 /// Updates the instances in this order. Before the first update of any, and after each, `pass_on` passes outputs on to inputs
 /// and returns whether a discrete input changed; then another update follows (FMI 2.0.5, 3.1; FMI 3.0.2, 2.3.5). Returns the
-/// index of an instance that asks to end the simulation.
+/// index of an instance that requests the end of the simulation.
 pub(super) fn iterate(
     instances: &mut [Instance],
     order: &[usize],

@@ -25,7 +25,7 @@
 //! # Ok(()) }
 //! ```
 //!
-//! For many runs of one system there is [`Plan`].
+//! For many runs of one system there is [`SystemPlan`].
 
 mod continuous;
 mod coupled;
@@ -50,8 +50,8 @@ pub use coupled::{Equations, Feed, Fmus};
 pub use exchange::Inputs;
 pub use grid::Settings;
 pub use method::{Integration, Method};
-pub use plan::{Plan, Target, Worker};
-pub use point::{Ended, Point};
+pub use plan::{PlanTarget, SystemPlan, Worker};
+pub use point::{CommunicationPoint, Ended};
 pub use recording::{Column, Recording, TextColumn, cell, item};
 pub use schedule::Schedule;
 pub use sequence::Sequence;

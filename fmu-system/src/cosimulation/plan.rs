@@ -1,6 +1,6 @@
 //! A system prepared for many runs.
 //!
-//! A [`Plan`] contains the data shared by all runs and threads. A [`Worker`] owns its instances and runs one setting after
+//! A [`SystemPlan`] contains the data shared by all runs and threads. A [`Worker`] owns its instances and runs one setting after
 //! another: it resets its instances where that works and creates new ones after an error.
 //!
 //! ```no_run
@@ -36,7 +36,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Data shared by all runs of a system: FMUs, connections, recorded variables, times, and set values.
-pub struct Plan {
+pub struct SystemPlan {
     method: Method,
     parts: Parts,
     /// The FMU of each part, for new instances.
@@ -68,12 +68,12 @@ impl Live {
 
 /// A variable of a plan that each run sets.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Target {
+pub struct PlanTarget {
     port: Port,
     written: String,
 }
 
-impl Target {
+impl PlanTarget {
     /// `instance.variable`.
     pub fn name(&self) -> &str {
         &self.written
@@ -85,13 +85,13 @@ impl System {
     ///
     /// # Errors
     /// The settings make no sense.
-    pub fn into_plan(self, settings: &Settings) -> Result<Plan, Error> {
+    pub fn into_plan(self, settings: &Settings) -> Result<SystemPlan, Error> {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let columns = self.columns().collect();
         let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });
         let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
-        Ok(Plan {
+        Ok(SystemPlan {
             live,
             exchange,
             grid,
@@ -110,21 +110,21 @@ impl System {
     }
 }
 
-impl Plan {
+impl SystemPlan {
     /// A variable to set in runs, written `instance.variable`.
     ///
     /// # Errors
     /// The variable does not exist, is not a number, cannot be set, or is fed.
-    pub fn target(&self, written: &str) -> Result<Target, Error> {
+    pub fn target(&self, written: &str) -> Result<PlanTarget, Error> {
         let port = self.parts.settable(written)?;
         if self.wiring.feeds(port.instance, &port.name) {
             return Err(Error::usage(written, "is fed by a connection or a schedule: remove that, or do not vary it"));
         }
-        Ok(Target { port, written: written.into() })
+        Ok(PlanTarget { port, written: written.into() })
     }
 
     /// Units and, of an enumeration, names of the values of a target.
-    pub fn column(&self, target: &Target) -> Column {
+    pub fn column(&self, target: &PlanTarget) -> Column {
         self.parts.column(&target.port, target.name())
     }
 
@@ -132,7 +132,7 @@ impl Plan {
     ///
     /// # Errors
     /// The text is not a value of the target's type.
-    pub fn number(&self, target: &Target, text: &str) -> Result<f64, Error> {
+    pub fn number(&self, target: &PlanTarget, text: &str) -> Result<f64, Error> {
         let Port { instance, name, .. } = &target.port;
         let part = &self.parts.0[*instance];
         let values = Values::read(text, self.parts.variable(*instance, name)?, part.description());
@@ -165,9 +165,9 @@ impl Plan {
         })
     }
 
-    /// The system and a copy of it beside it: neither feeds the other, the columns are those of the system, then those of the copy.
-    /// FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by these values
-    /// alone and not by the solver's choice of steps.
+    /// The system together with a copy of it: neither feeds the other, the columns are those of the system, then those of the
+    /// copy. FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by
+    /// these values alone and not by the solver's choice of steps.
     #[must_use]
     pub fn with_copy(&self) -> Self {
         let count = self.parts.0.len();
@@ -191,8 +191,8 @@ impl Plan {
 
     /// The variable of the copy in [`with_copy`](Self::with_copy) that a target of this plan is.
     #[must_use]
-    pub fn in_copy(&self, target: &Target) -> Target {
-        Target { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
+    pub fn in_copy(&self, target: &PlanTarget) -> PlanTarget {
+        PlanTarget { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
     }
 
     /// Whether the master integrates an FMU (Model Exchange).
@@ -236,7 +236,7 @@ impl Plan {
 
 /// Runs a plan again and again.
 pub struct Worker {
-    plan: Arc<Plan>,
+    plan: Arc<SystemPlan>,
     /// Empty after an error.
     instances: Vec<Instance>,
     /// Generation of the FMU of each instance.
@@ -248,7 +248,7 @@ pub struct Worker {
 
 impl Worker {
     /// The plan that this runs.
-    pub fn plan(&self) -> &Arc<Plan> {
+    pub fn plan(&self) -> &Arc<SystemPlan> {
         &self.plan
     }
 
@@ -259,7 +259,7 @@ impl Worker {
     /// An FMU refuses a value or a call. The next run has new instances.
     pub fn run<'a>(
         &mut self,
-        values: impl IntoIterator<Item = (&'a Target, f64)>,
+        values: impl IntoIterator<Item = (&'a PlanTarget, f64)>,
         mut hook: impl FnMut(f64, &[f64]) -> ControlFlow<()>,
     ) -> Result<Ended, Error> {
         self.refresh()?;
@@ -278,7 +278,7 @@ impl Worker {
     ///
     /// # Errors
     /// As for [`run`](Self::run).
-    pub fn record<'a>(&mut self, values: impl IntoIterator<Item = (&'a Target, f64)>) -> Result<Recording, Error> {
+    pub fn record<'a>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> Result<Recording, Error> {
         let mut recording = Recording::new(self.plan.columns.iter().cloned());
         let ended = self.run(values, |time, values| {
             recording.push(time, values);
@@ -330,8 +330,8 @@ impl Worker {
         Ok(())
     }
 
-    fn set<'a>(&mut self, values: impl IntoIterator<Item = (&'a Target, f64)>) -> Result<(), Error> {
-        for (Target { port, written }, value) in values {
+    fn set<'a>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> Result<(), Error> {
+        for (PlanTarget { port, written }, value) in values {
             let instance = &mut self.instances[port.instance];
             let outcome = if port.base == BaseType::Float64 {
                 instance.set_reals(&[port.reference], &[value])

@@ -5,7 +5,7 @@ use fmu_import::{Error, Instance, Message};
 use std::ops::ControlFlow;
 
 /// A communication point as seen by a hook: outputs are read, inputs are set, the step has not been taken.
-pub struct Point<'a> {
+pub struct CommunicationPoint<'a> {
     /// Number of the point, from 0.
     pub index: u32,
     /// Time in s.
@@ -17,7 +17,7 @@ pub struct Point<'a> {
     pub(super) touched: bool,
 }
 
-impl Point<'_> {
+impl CommunicationPoint<'_> {
     /// An instance by its name: to read further variables, or to set unconnected ones.
     pub fn instance(&mut self, name: &str) -> Option<&mut Instance> {
         self.touched = true;
@@ -35,7 +35,7 @@ impl Point<'_> {
 pub struct Ended {
     /// Time of the last communication point in s.
     pub time: f64,
-    /// The instance that asked to end the simulation, if one did.
+    /// The instance that requested the end of the simulation, if any.
     pub by: Option<String>,
 }
 
@@ -44,7 +44,7 @@ pub(super) fn end(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     (index, time): (u32, f64),
     ended: &mut Ended,
 ) -> Result<(), Error> {
@@ -53,7 +53,7 @@ pub(super) fn end(
         exchange.read_all(instances)?;
         exchange.row(time, row);
         // The run is over, regardless of the hook's result.
-        hook(&mut Point { index, time, values: row, instances, touched: false }).map(drop)?;
+        hook(&mut CommunicationPoint { index, time, values: row, instances, touched: false }).map(drop)?;
     }
     Ok(())
 }

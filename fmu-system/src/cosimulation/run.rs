@@ -3,7 +3,7 @@
 use super::exchange::Exchange;
 use super::grid::{Grid, Settings};
 use super::method::Method;
-use super::point::{Ended, Point, end};
+use super::point::{CommunicationPoint, Ended, end};
 use super::recording::{Recording, TextColumn};
 use super::system::System;
 use super::{continuous, events};
@@ -18,7 +18,7 @@ pub(super) fn simulate(
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
     let kinds: Vec<Kind> = instances.iter().map(Instance::kind).collect();
@@ -55,7 +55,7 @@ fn step(
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
     let (mut ended, mut last) = (Ended { time: settings.start, by: None }, f64::INFINITY);
@@ -67,7 +67,7 @@ fn step(
         if index < grid.steps() {
             exchange.write_all(instances, time)?;
         }
-        let flow = hook(&mut Point { index, time, values: row, instances, touched: false })?;
+        let flow = hook(&mut CommunicationPoint { index, time, values: row, instances, touched: false })?;
         if flow.is_break() || index == grid.steps() {
             break;
         }
@@ -100,7 +100,7 @@ impl System {
     pub fn run(
         &mut self,
         settings: &Settings,
-        mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+        mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> Result<Recording, Error> {
         let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
         let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);

@@ -125,7 +125,7 @@ impl Sequence {
         let value = |(t, text, at): &(f64, String, String)| {
             let number = |_: &String| Values::from_number(text.trim().parse().ok()?, variable.base).ok();
             let read = Values::read(text, variable, description);
-            // Tools write integers and truth values as 1.0 too.
+            // Tools also write integers and truth values as 1.0.
             let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));
             values.map(|values| (*t, values))
         };

@@ -1,6 +1,6 @@
 //! Integration of ordinary differential equations with events, for Model Exchange: numerics independent of FMUs.
 //!
-//! [`Hybrid`] is the integrated system; [`Driver`] steps it and handles its events: it hits time events exactly, locates state
+//! [`HybridSystem`] is the integrated system; [`Driver`] steps it and handles its events: it hits time events exactly, locates state
 //! events, which are changes of sign of indicators, and restarts after each event. [`Solver`] selects the method: `rk4` with a
 //! fixed step, or `dopri` with a step controlled by its error estimate.
 //!
@@ -17,5 +17,5 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-pub use driver::{Driver, Solver, Stop};
-pub use hybrid::{Hybrid, Trial};
+pub use driver::{Driver, Solver, StopReason};
+pub use hybrid::{HybridSystem, TrialError};

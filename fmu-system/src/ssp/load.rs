@@ -96,7 +96,7 @@ impl Package<'_> {
 }
 
 impl Loaded {
-    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Paths that are relative begin in `folder`.
+    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Relative paths begin in `folder`.
     ///
     /// # Errors
     /// As [`open`](Self::open), or an SSP file is not alone.

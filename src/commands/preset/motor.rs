@@ -2,7 +2,7 @@
 
 use crate::commands::tune::place;
 use crate::message;
-use crate::preset::{Course, PresetFmu};
+use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
@@ -15,7 +15,7 @@ use fmu_core::Description;
 ///
 /// # Errors
 /// The FMU is not one of the drive's.
-pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
+pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<NewExperiment> {
     let named = |settings: &[Setting]| settings.iter().map(|s| (s.name.to_owned(), s.value.clone())).collect();
     let values: Vec<(String, Value)> = match place(preset.own())? {
         Some(0) => joined(&tuned.plant, &tuned.controller),
@@ -48,7 +48,7 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
 /// the rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth
 /// of that torque and a third of the voltage for its maximum current at standstill; the controller alone gets a tenth of the
 /// speed and an eighth of its maximum current.
-fn course(own: &Description, tuned: &Tuned) -> Course {
+fn course(own: &Description, tuned: &Tuned) -> NewExperiment {
     let of = |settings: &[Setting], wanted: &str| {
         settings.iter().find_map(|s| match s.value {
             Value::Real(x) if s.name == wanted => Some(x),
@@ -89,5 +89,5 @@ fn course(own: &Description, tuned: &Tuned) -> Course {
         let value = |(_, one, two): &(&str, f64, f64)| [0.0, *one, *two][which].to_string();
         lines.push(std::iter::once(t.to_string()).chain(columns.iter().map(value)).collect());
     }
-    Course { stimuli: lines.into_iter().map(|line| line.join(",") + "\n").collect(), stop, step }
+    NewExperiment { stimuli: lines.into_iter().map(|line| line.join(",") + "\n").collect(), stop, step }
 }

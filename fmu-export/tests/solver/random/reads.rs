@@ -38,7 +38,7 @@ impl<M: Twin> Turn<'_, M> {
         (status, verdict)
     }
 
-    /// The `name` says which: states, derivatives, indicators or nominals.
+    /// The `name` selects states, derivatives, indicators or nominals.
     pub fn values(&mut self, name: &str) -> Call {
         let right = if name == "indicators" { M::CAN.indicators().len() } else { M::CAN.states().len() };
         let n = self.n(right);

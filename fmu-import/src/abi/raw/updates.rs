@@ -47,7 +47,7 @@ pub enum Inside {
     Return(f64),
     /// Gets a Float64.
     Get(u32),
-    /// Calls a function of the instance alone.
+    /// Calls a function that takes only the instance.
     Call(Simple),
     /// Gets whether a clock is active.
     Clock(u32),
