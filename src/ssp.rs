@@ -7,7 +7,7 @@ use crate::pack::{GenerationTime, PackedFile};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::rules::Value;
-use fmu_import::{Values as Read, Fmu};
+use fmu_import::{Fmu, Values as Read};
 use fmu_system::cosimulation::{Settings, System};
 use fmu_system::ssp::ssv::{Parameter, read};
 use fmu_system::ssp::values::{self, Given};
