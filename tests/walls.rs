@@ -213,10 +213,11 @@ fn public_types(folder: &Path) -> Vec<(String, PathBuf)> {
         for line in code.lines().filter_map(|line| line.trim().strip_prefix("pub ")) {
             let kinds = ["struct ", "enum ", "trait ", "type ", "union "];
             let Some(rest) = kinds.iter().find_map(|kind| line.strip_prefix(kind)) else { continue };
-            found.push((
-                rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap().to_owned(),
-                file.clone(),
-            ));
+            let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next().unwrap();
+            // A macro names its type by a variable.
+            if !name.is_empty() {
+                found.push((name.to_owned(), file.clone()));
+            }
         }
     }
     found

@@ -23,7 +23,7 @@ impl Port {
         self.base == BaseType::Float64 && self.element.is_none()
     }
 
-    /// The same variable in the instance `count` positions later.
+    /// This variable in the instance `count` positions later.
     pub(super) fn shifted(&self, count: usize) -> Self {
         Self { instance: self.instance + count, ..self.clone() }
     }
