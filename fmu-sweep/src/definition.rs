@@ -20,6 +20,8 @@ pub struct Definition {
     pub connect: Vec<[String; 2]>,
     /// Pairs of terminals.
     pub terminal: Vec<[String; 2]>,
+    /// Pass numbers between different units on as they are; otherwise they are converted by the BaseUnits of both FMUs.
+    pub no_unit_conversion: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
     /// How all FMUs run; otherwise each steps itself if it can.

@@ -8,7 +8,7 @@ use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
 use fmu_import::{Fmu, Kind};
 use fmu_system::cosimulation::{
-    self, Integration, Method, Recording, Schedule, Settings, Solver, Target, Worker, item,
+    self, Integration, Method, Recording, Schedule, Settings, Solver, System, Target, Units, Worker, item,
 };
 use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
@@ -113,12 +113,13 @@ impl Plan {
             return invalid(format!("rtol = {rtol}: expected a number between 1e-14 and 0.1"));
         }
         let mut unknown = None;
-        let method = |fmus: &[(String, Fmu)]| {
+        let units = if definition.no_unit_conversion { Units::PassOn } else { Units::Convert };
+        let system = |fmus: &[(String, Fmu)]| {
             let known = |name: &&String| fmus.iter().any(|(other, _)| other == *name);
             unknown = definition.stepping.iter().find(|name| !known(name)).cloned();
-            method(definition, fmus)
+            System::new(method(definition, fmus)).with_units(units)
         };
-        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, method)?;
+        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, system)?;
         if let Some(name) = unknown {
             return invalid(format!("stepping: {name} is the name of no FMU"));
         }
@@ -171,7 +172,8 @@ impl Plan {
         } else {
             loaded.connectors.outputs.iter().map(|(name, _)| name.clone()).collect()
         };
-        let Loaded { system, connectors, notes, .. } = loaded;
+        let Loaded { mut system, connectors, mut notes, .. } = loaded;
+        notes.extend(system.take_notes());
         let system = Arc::new(system.into_plan(&settings)?);
         let of = |name: &str| system.columns().iter().find(|c| c.name == name);
         let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
-use fmu_system::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
+use fmu_system::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
 use fmu_system::ssp::values::{self, Given};
@@ -79,6 +79,9 @@ pub struct Simulate {
     /// Connect every unconnected input to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
+    /// Pass numbers between different units on as they are; without it they are converted by the BaseUnits of both FMUs
+    #[arg(long)]
+    pub no_unit_conversion: bool,
     /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
     #[arg(long, value_name = "INSTANCE=FILE.ssv")]
     pub parameters: Vec<String>,
@@ -215,7 +218,9 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     // An FMU may change it; the files of the command are named from here.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
-    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
+    let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
+    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units);
+    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
         bail!("--solver and --rtol are for Model Exchange: add --me");
@@ -227,6 +232,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
+    system.take_notes().iter().for_each(|note| message::note(&printable(note)));
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut Point<'_>| {

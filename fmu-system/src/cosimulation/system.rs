@@ -8,7 +8,17 @@ use super::schedule::Schedule;
 use super::sequence::Sequence;
 use fmu_core::Need;
 use fmu_import::{Error, Fmu, Instance, Message, Values};
-use model_description::{BaseType, Causality, ModelVariable, Variability};
+use model_description::{BaseType, Causality, Measured, ModelVariable, Passage, Variability};
+
+/// What a connection between different units does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Units {
+    /// It converts the number.
+    #[default]
+    Convert,
+    /// It passes the number on as it is.
+    PassOn,
+}
 
 /// FMUs and their connections.
 #[derive(Default)]
@@ -25,12 +35,40 @@ pub struct System {
     pub(super) columns: Vec<String>,
     /// Texts that a single run records, with the names of their columns.
     pub(super) texts: Vec<(Port, String)>,
+    units: Units,
+    notes: Vec<String>,
 }
 
 impl System {
     /// A system that is run by this method.
     pub fn new(method: Method) -> Self {
         Self { method, ..Self::default() }
+    }
+
+    /// The system with other connections from here on: by default they convert units.
+    #[must_use]
+    pub fn with_units(self, units: Units) -> Self {
+        Self { units, ..self }
+    }
+
+    /// What connections between different units do.
+    pub fn units(&self) -> Units {
+        self.units
+    }
+
+    /// How the system is run.
+    pub fn method(&self) -> &Method {
+        &self.method
+    }
+
+    /// Adds a note.
+    pub(crate) fn note(&mut self, text: String) {
+        self.notes.push(text);
+    }
+
+    /// What was noticed since the last call: units that are not known.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
     }
 
     /// Adds an instance of an FMU.
@@ -128,11 +166,26 @@ impl System {
         Ok(())
     }
 
-    /// Connects an output to an input, both written `instance.variable`.
+    /// Connects an output to an input, both written `instance.variable`. A number in another unit of the same quantity is converted
+    /// (see [`with_units`](Self::with_units)); without a unit on one side it passes as it is, with a [note](Self::take_notes).
     ///
     /// # Errors
-    /// A variable does not exist, causalities or types do not fit, or the input is fed already.
+    /// A variable does not exist, causalities, types or units do not fit, or the input is fed already.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
+        self.connect_by(from, to, self.units, [None; 2])
+    }
+
+    /// [`connect`](Self::connect), with or without conversion, and with units of the source and of the target where the FMU has none.
+    ///
+    /// # Errors
+    /// As [`connect`](Self::connect).
+    pub fn connect_by(
+        &mut self,
+        from: &str,
+        to: &str,
+        units: Units,
+        stated: [Option<Measured<'_>>; 2],
+    ) -> Result<(), Error> {
         let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
         if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
             return Err(Error::usage(from, "is not an output"));
@@ -140,7 +193,33 @@ impl System {
         if kind(source.base) != kind(target.base) {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
-        self.feed(target, to, Source::Port(source))
+        let conversion = match units {
+            Units::PassOn => None,
+            Units::Convert => match self.measured(from, stated[0])?.into_unit(self.measured(to, stated[1])?) {
+                Ok(Passage::Equal) => None,
+                Ok(Passage::Converted(conversion)) => Some(conversion),
+                Ok(Passage::Unknown(cause)) => {
+                    self.notes.push(format!("{from} to {to}: {cause}: the number passes as it is"));
+                    None
+                }
+                Err(cause) => {
+                    let remedy = "connect what has one quantity, or switch the conversion of units off";
+                    return Err(Error::usage(to, format!("cannot be fed by {from}: {cause}: {remedy}")));
+                }
+            },
+        };
+        self.feed(target, to, Source::Port(source, conversion))
+    }
+
+    /// What is known of the unit of a variable, written `instance.variable`; what is `stated` elsewhere if its FMU names none.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn measured<'a>(&'a self, port: &str, stated: Option<Measured<'a>>) -> Result<Measured<'a>, Error> {
+        let port = self.parts.port(port)?;
+        let variable = self.parts.variable(port.instance, &port.name)?;
+        let own = self.parts.0[port.instance].description().measured(variable);
+        Ok(stated.filter(|_| own.unit.is_none()).unwrap_or(own))
     }
 
     /// Connects every input that nothing feeds to the output of the same name of another FMU; returns the connections.

@@ -5,9 +5,9 @@ use super::error::{Error, invalid};
 use super::ssv::{self, Parameter};
 use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
 use super::values::{self, Given};
-use crate::cosimulation::{Method, Schedule, Sequence, Settings, System};
+use crate::cosimulation::{Method, Schedule, Sequence, Settings, System, Units};
 use fmu_import::{Fmu, check_entries, document, limits};
-use model_description::{Experiment, decode};
+use model_description::{Experiment, Measured, Passage, decode};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -102,10 +102,10 @@ impl Loaded {
     /// # Errors
     /// As [`open`](Self::open), or an SSP file is not alone.
     pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self, Error> {
-        Self::open_files_with(files, folder, logging, |_| Method::default())
+        Self::open_files_with(files, folder, logging, |_| System::default())
     }
 
-    /// Like [`open_files`](Self::open_files), run by the method that suits the FMUs.
+    /// Like [`open_files`](Self::open_files), in a system that suits the FMUs.
     ///
     /// # Errors
     /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
@@ -113,7 +113,7 @@ impl Loaded {
         files: &[String],
         folder: &Path,
         logging: bool,
-        method: impl FnOnce(&[(String, Fmu)]) -> Method,
+        system: impl FnOnce(&[(String, Fmu)]) -> System,
     ) -> Result<Self, Error> {
         let mut fmus = Vec::new();
         for text in files {
@@ -122,11 +122,11 @@ impl Loaded {
                 if files.len() > 1 {
                     return invalid(format!("{}: an SSP is simulated alone: its FMUs are inside", path.display()));
                 }
-                return Self::open_with(&folder.join(path), logging, method);
+                return Self::open_with(&folder.join(path), logging, system);
             }
             fmus.push((name, Fmu::open(folder.join(path))?));
         }
-        let mut loaded = Self { system: System::new(method(&fmus)), ..Self::default() };
+        let mut loaded = Self { system: system(&fmus), ..Self::default() };
         for (name, fmu) in &fmus {
             loaded.experiments.push(fmu.description().default_experiment);
             loaded.system.add(name, fmu, logging)?;
@@ -149,11 +149,11 @@ impl Loaded {
     /// # Errors
     /// Names the file, the place in it, what is wrong and what to do.
     pub fn open(path: &Path, logging: bool) -> Result<Self, Error> {
-        Self::open_with(path, logging, |_| Method::default())
+        Self::open_with(path, logging, |_| System::default())
     }
 
-    /// Like [`open`](Self::open), run by the method that suits the FMUs.
-    fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self, Error> {
+    /// Like [`open`](Self::open), in a system that suits the FMUs.
+    fn open_with(path: &Path, logging: bool, system: impl FnOnce(&[(String, Fmu)]) -> System) -> Result<Self, Error> {
         let of = || path.display();
         let within = |cause: String| Error::Invalid(format!("{}: {cause}", of()));
         let unreadable = |e: std::io::Error| within(e.to_string());
@@ -174,14 +174,14 @@ impl Loaded {
             let fmu = Fmu::open(&fmu).map_err(|e| within(format!("{}: {}", component.source, e.cause())))?;
             fmus.push((component.name.clone(), fmu));
         }
-        let method = method(&fmus);
+        let system = system(&fmus);
         if let (Method::CoSimulation { .. }, Some(component)) =
-            (&method, structure.components.iter().find(|component| component.model_exchange))
+            (system.method(), structure.components.iter().find(|component| component.model_exchange))
         {
             let cause = "implementation=\"ModelExchange\" is not Co-Simulation: simulate it with --me";
             return Err(in_description(format!("line {}: {cause}", component.line)));
         }
-        let mut loaded = Self { system: System::new(method), ..Self::default() };
+        let mut loaded = Self { system, ..Self::default() };
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
         for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
             let experiment = fmu.description().default_experiment;
@@ -330,21 +330,18 @@ impl Loaded {
                 ));
             }
         };
-        if let (Some(a), Some(b), false) = (&start.unit, &end.unit, c.no_conversion)
-            && a != b
-        {
-            return Err(format!(
-                "connects {} in {a} with {} in {b}: units are not converted, give both in one",
-                c.start, c.end
-            ));
-        }
+        let units = if c.no_conversion { Units::PassOn } else { self.system.units() };
+        let stated = if from == &c.start { [start, end] } else { [end, start] }.map(|end| structure.measured(end));
         let port = |end: &ConnectionEnd| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
         match (port(from), port(to)) {
             (_, Some(target)) if self.is_fed(&target)? => {
                 Err(format!("{target} is fed twice: remove one of the connections"))
             }
-            (Some(source), Some(target)) => self.system.connect(&source, &target).map_err(|e| e.to_string()),
+            (Some(source), Some(target)) => {
+                self.system.connect_by(&source, &target, units, stated).map_err(|e| e.to_string())
+            }
             (None, Some(target)) => {
+                self.check_unit(&target, units, stated)?;
                 match self.connectors.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
                     Some((_, targets)) => targets.push(target),
                     None => self.connectors.inputs.push((from.connector.clone(), vec![target])),
@@ -358,10 +355,28 @@ impl Loaded {
                         to.connector
                     ));
                 }
+                self.check_unit(&source, units, [stated[1], stated[0]])?;
                 self.connectors.outputs.push((to.connector.clone(), source));
                 Ok(())
             }
             (None, None) => Err("connects the system with itself, which is not supported: remove it".into()),
+        }
+    }
+
+    /// A connector of the system has the unit of the variable that it stands for. `stated` are the units of the connector of the
+    /// system and of that of the component.
+    fn check_unit(&self, port: &str, units: Units, stated: [Option<Measured<'_>>; 2]) -> Result<(), String> {
+        let [Some(of_system), _] = stated else { return Ok(()) };
+        if units == Units::PassOn {
+            return Ok(());
+        }
+        match of_system.into_unit(self.system.measured(port, stated[1]).map_err(|e| e.to_string())?) {
+            Ok(Passage::Converted(_)) => Err(format!(
+                "the connector of the system is in {}, and {port} in another unit: give both in one",
+                of_system.unit.unwrap_or_default()
+            )),
+            Ok(_) => Ok(()),
+            Err(cause) => Err(format!("{port}: {cause}")),
         }
     }
 

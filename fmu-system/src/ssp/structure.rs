@@ -3,7 +3,7 @@
 
 use super::FMU_TYPE;
 use super::ssv::{self, Parameter};
-use model_description::{Element, parse_number};
+use model_description::{BaseUnit, Element, Measured, parse_number};
 
 /// A system of FMUs.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +22,8 @@ pub struct Structure {
     pub connections: Vec<Connection>,
     /// Values by names `component.variable`, and of the system's own connectors.
     pub bindings: Vec<Binding>,
+    /// Units that the file defines.
+    pub units: Vec<(String, BaseUnit)>,
 }
 
 /// An FMU of the system.
@@ -169,7 +171,15 @@ impl Structure {
             connectors: connectors(system)?,
             connections: list(system, "Connections").map(connection).collect::<Result<_, _>>()?,
             bindings: bindings(system)?,
+            units: units(&root)?,
         })
+    }
+
+    /// What the file says of the unit of a connector.
+    pub fn measured<'a>(&self, connector: &'a Connector) -> Option<Measured<'a>> {
+        let unit = connector.unit.as_deref()?;
+        let base = self.units.iter().find(|(name, _)| name == unit).map(|(_, base)| *base);
+        Some(Measured { unit: Some(unit), base, relative: false })
     }
 
     /// The component of this name.
@@ -200,6 +210,21 @@ fn component(e: &Element) -> Result<Component, String> {
     })
 }
 
+/// The units of a file: name and relation to the SI base units (SSP 1.0, 4.3).
+pub(super) fn units(root: &Element) -> Result<Vec<(String, BaseUnit)>, String> {
+    let one = |e: &Element| {
+        let base = child(e, "BaseUnit").map(BaseUnit::read).transpose().map_err(|why| at(e, why))?;
+        Ok::<_, String>((required(e, "name")?, base))
+    };
+    let all = list(root, "Units").map(one).collect::<Result<Vec<_>, _>>()?;
+    Ok(all.into_iter().filter_map(|(name, base)| Some((name, base?))).collect())
+}
+
+/// The unit of a typed element. Some tools write `None` for none.
+pub(super) fn unit(typed: &Element) -> Option<String> {
+    typed.get("unit").filter(|unit| !["", "None"].contains(unit)).map(str::to_owned)
+}
+
 /// A relative URI as a path within the archive.
 fn path(e: &Element, uri: &str) -> Result<String, String> {
     let bad =
@@ -222,7 +247,7 @@ fn path(e: &Element, uri: &str) -> Result<String, String> {
 
 fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
     let one = |c: &Element| {
-        let unit = c.children.iter().find_map(|kind| kind.get("unit")).map(str::to_owned);
+        let unit = c.children.iter().find_map(|kind| unit(kind));
         Ok(Connector { name: required(c, "name")?, kind: required(c, "kind")?, unit, line: c.line })
     };
     list(e, "Connectors").map(one).collect()
