@@ -109,8 +109,10 @@ impl Plan {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");
         }
-        if let Some(rtol) = definition.rtol.filter(|rtol| !(1e-14..=0.1).contains(rtol)) {
-            return invalid(format!("rtol = {rtol}: expected a number between 1e-14 and 0.1"));
+        for (name, given) in [("rtol", definition.rtol), ("tolerance", definition.tolerance)] {
+            if let Some(x) = given.filter(|x| !(1e-14..=0.1).contains(x)) {
+                return invalid(format!("{name} = {x}: expected a number between 1e-14 and 0.1"));
+            }
         }
         let mut unknown = None;
         let units = if definition.no_unit_conversion { Units::PassOn } else { Units::Convert };
@@ -124,11 +126,11 @@ impl Plan {
             return invalid(format!("stepping: {name} is the name of no FMU"));
         }
         let integrates = loaded.system.instances().iter().any(|i| i.kind() == Kind::ModelExchange);
-        if !integrates && (definition.solver.is_some() || definition.rtol.is_some()) {
-            return invalid(
-                "solver and rtol are for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'",
-            );
+        if !integrates && definition.solver.is_some() {
+            return invalid("solver is for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'");
         }
+        let own = definition.rtol.filter(|_| !integrates);
+        loaded.system = loaded.system.with_tolerance(definition.tolerance.or(own));
         if integrates && definition.sequential {
             return invalid("sequential: FMUs step one after another in Co-Simulation alone");
         }
@@ -153,6 +155,7 @@ impl Plan {
         }
         let Definition { start, stop, step, .. } = *definition;
         let settings = loaded.settings(start, stop, step, definition.sequential);
+        let settings = loaded.system.feasible(&settings)?;
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
         for (name, measure) in &definition.measure.0 {

@@ -130,7 +130,10 @@ mod tests {
         assert_eq!(difference(KELVIN).into_unit(difference(CELSIUS)), Ok(Passage::Equal));
         assert!((converted(difference(KELVIN), difference(FAHRENHEIT), 10.0) - 18.0).abs() < 1e-12);
         let mixed = difference(KELVIN).into_unit(CELSIUS).unwrap_err();
-        assert!(mixed.contains("a difference (relativeQuantity) in K, the target an absolute value in degC"), "{mixed}");
+        assert!(
+            mixed.contains("a difference (relativeQuantity) in K, the target an absolute value in degC"),
+            "{mixed}"
+        );
     }
 
     #[test]

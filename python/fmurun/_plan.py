@@ -45,7 +45,9 @@ class Plan:
         fmi_type: "CoSimulation", "ModelExchange", or a dictionary with the one of each FMU; by default FMUs step themselves if they
             can. FMUs for Model Exchange are integrated as one system: events of any of them are met at their time, and algebraic
             loops are solved. Those for Co-Simulation among them step from one communication point to the next
-        solver, relative_tolerance: for Model Exchange: "Dopri" (the default, with a relative tolerance of 1e-6) or "RK4"
+        solver: for Model Exchange: "Dopri" (the default) or "RK4"
+        relative_tolerance: of "Dopri", by default 1e-6, or of the solvers inside FMUs for Co-Simulation, by default those of their
+            default experiments
 
     >>> plan = Plan(PLANT, start_values={"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}, stop_time=0.01, step_size=1e-4,
     ...             output=["i_a"], measures={"last": "i_a", "peak": ("i_a", "max_abs")})

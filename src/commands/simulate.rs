@@ -131,6 +131,9 @@ pub struct Simulate {
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: that of the default experiment of each]
+    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true, conflicts_with = "me")]
+    pub tolerance: Option<f64>,
     /// Handle events of FMUs of FMI 3.0 that have event mode at their time (Co-Simulation)
     #[arg(long, conflicts_with_all = ["me", "sequential"])]
     pub event_mode: bool,
@@ -219,7 +222,10 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     let home = std::env::current_dir()?;
     let streams = Streams::now();
     let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
-    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units);
+    if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
+        bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
+    }
+    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
     let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
@@ -232,6 +238,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
+    let settings = system.feasible(&settings)?;
     system.take_notes().iter().for_each(|note| message::note(&printable(note)));
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);

@@ -20,6 +20,8 @@ pub struct Settings {
 pub(super) struct Grid {
     settings: Settings,
     steps: u32,
+    /// Relative tolerance for the solvers inside the FMUs; otherwise that of the default experiment of each.
+    pub(super) tolerance: Option<f64>,
 }
 
 impl Settings {
@@ -52,7 +54,7 @@ impl Settings {
             reason = "an integer in the range, see above"
         )]
         let steps = whole as u32;
-        Ok(Grid { settings: *self, steps })
+        Ok(Grid { settings: *self, steps, tolerance: None })
     }
 }
 
@@ -69,6 +71,12 @@ impl Grid {
     pub(super) fn time(&self, k: u32) -> f64 {
         let Settings { start, stop, step, .. } = self.settings;
         if k == self.steps { stop } else { start + f64::from(k) * step }
+    }
+
+    /// The settings up to the last whole step, if the last one is shorter.
+    pub(super) fn without_short_step(&self) -> Option<Settings> {
+        let last = self.steps - 1;
+        (self.size(last) < self.settings.step).then(|| Settings { stop: self.time(last), ..self.settings })
     }
 
     /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, but for a short last one.
@@ -104,6 +112,8 @@ mod tests {
         assert_eq!((g.steps(), g.time(4)), (4, 2.0));
         assert!((g.size(3) - 0.1).abs() < 1e-12, "{}", g.size(3));
         assert_eq!(grid(0.0, 0.1, 0.3).unwrap().size(0), 0.1);
+        assert_eq!(g.without_short_step().unwrap().stop, 1.0 + 3.0 * 0.3);
+        assert_eq!(grid(0.0, 1.0, 0.1).unwrap().without_short_step(), None);
     }
 
     #[test]

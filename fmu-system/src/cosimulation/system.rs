@@ -1,14 +1,15 @@
 //! FMUs and their connections, before a run.
 
 use super::exchange::{Source, Wiring};
+use super::grid::{Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port, kind};
 use super::point::take_messages;
 use super::schedule::Schedule;
 use super::sequence::Sequence;
 use fmu_core::Need;
-use fmu_import::{Error, Fmu, Instance, Message, Values};
-use model_description::{BaseType, Causality, Measured, ModelVariable, Passage, Variability};
+use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
+use model_description::{BaseType, Causality, Interface, Measured, ModelVariable, Passage, Variability, parse_number};
 
 /// What a connection between different units does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +37,7 @@ pub struct System {
     /// Texts that a single run records, with the names of their columns.
     pub(super) texts: Vec<(Port, String)>,
     units: Units,
+    tolerance: Option<f64>,
     notes: Vec<String>,
 }
 
@@ -51,6 +53,13 @@ impl System {
         Self { units, ..self }
     }
 
+    /// The system with this relative tolerance for the solvers inside FMUs for Co-Simulation; by default each has that of its default
+    /// experiment.
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
+        Self { tolerance, ..self }
+    }
+
     /// What connections between different units do.
     pub fn units(&self) -> Units {
         self.units
@@ -59,6 +68,47 @@ impl System {
     /// How the system is run.
     pub fn method(&self) -> &Method {
         &self.method
+    }
+
+    /// The settings that the FMUs can follow: where one cannot vary its step (`canHandleVariableCommunicationStepSize` is false), no
+    /// shorter last step. What that changes is a [note](Self::take_notes), and so is a step that an FMU's `fixedInternalStepSize`
+    /// does not divide.
+    ///
+    /// # Errors
+    /// The settings make no sense, or leave no step.
+    pub fn feasible(&mut self, settings: &Settings) -> Result<Settings, Error> {
+        let wrong = |cause| Error::usage("settings", cause);
+        let grid = settings.grid().map_err(wrong)?;
+        let stepping = |i: &Instance| match i.kind() {
+            Kind::CoSimulation { .. } => i.description().co_simulation.clone().map(|of| (i.name().to_owned(), of)),
+            Kind::ModelExchange => None,
+        };
+        let interfaces: Vec<(String, Interface)> = self.instances.iter().filter_map(stepping).collect();
+        for (name, interface) in &interfaces {
+            let internal = interface.attribute("fixedInternalStepSize").and_then(parse_number).filter(|h| *h > 0.0);
+            let count = internal.map_or(1.0, |internal| settings.step / internal);
+            if count < 0.5 || (count - count.round()).abs() > 1e-6 * count {
+                let h = internal.unwrap_or_default();
+                let cause =
+                    format!("its fixedInternalStepSize is {h} s, and the step of {} s is no multiple", settings.step);
+                self.notes.push(format!("{name}: {cause}"));
+            }
+        }
+        let fixed = interfaces.iter().find(|(_, of)| !of.flag("canHandleVariableCommunicationStepSize"));
+        let (Some((name, _)), Some(shorter)) = (fixed, grid.without_short_step()) else { return Ok(*settings) };
+        let cause = format!("{name} cannot vary its step (canHandleVariableCommunicationStepSize is false)");
+        if shorter.stop <= shorter.start {
+            return Err(wrong(format!("{cause}, and the simulation is shorter than one step of {} s", settings.step)));
+        }
+        self.notes.push(format!("{cause}: the simulation ends with the last whole step, at {} s", shorter.stop));
+        Ok(shorter)
+    }
+
+    /// The communication points of a run.
+    pub(super) fn grid(&mut self, settings: &Settings) -> Result<Grid, Error> {
+        let mut grid = self.feasible(settings)?.grid().map_err(|cause| Error::usage("settings", cause))?;
+        grid.tolerance = self.tolerance;
+        Ok(grid)
     }
 
     /// Adds a note.

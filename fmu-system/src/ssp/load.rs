@@ -134,10 +134,13 @@ impl Loaded {
         Ok(loaded)
     }
 
-    /// Times that are not given come from the files: the latest stop, the shortest step.
+    /// Times that are not given come from the files: the latest stop, the shortest step. After a later start, the simulation takes as
+    /// long as it does there.
     pub fn settings(&self, start: Option<f64>, stop: Option<f64>, step: Option<f64>, sequential: bool) -> Settings {
-        let start = start.or_else(|| self.experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
+        let usual = self.experiments.iter().find_map(|x| x.start).unwrap_or(0.0);
+        let start = start.unwrap_or(usual);
         let latest = self.experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
+        let latest = latest.map(|stop| if stop > start { stop } else { start + (stop - usual) });
         let stop = stop.or(latest).unwrap_or(start + 1.0);
         let shortest = self.experiments.iter().filter_map(|x| x.step).reduce(f64::min);
         let step = step.or(shortest).unwrap_or((stop - start) / 1000.0);
@@ -484,6 +487,7 @@ mod tests {
         let two = of(&[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
         let s = two.settings(None, None, None, true);
         assert_eq!((s.start, s.stop, s.step, s.sequential), (0.0, 3.0, 1e-4, true));
+        assert_eq!(two.settings(Some(5.0), None, None, false).stop, 8.0);
         let s = of(&[experiment(None, None)]).settings(None, Some(4.0), None, false);
         assert_eq!((s.stop, s.step), (4.0, 0.004));
     }

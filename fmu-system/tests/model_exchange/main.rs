@@ -486,3 +486,62 @@ fn a_plan_integrates_too() {
     assert_eq!(worker.record([]).unwrap(), first);
     assert_solution(&first, 1e-6);
 }
+
+/// The last value of `variable` of a plant, the last time, and the notes.
+fn ran(system: System, fmu: &Fmu, variable: &str, stop: f64) -> Result<(f64, f64, Vec<String>), fmu_import::Error> {
+    let mut system = system;
+    system.add("p", fmu, false)?;
+    system.record(&format!("p.{variable}"))?;
+    let settings = Settings { start: 0.0, stop, step: 0.1, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(())))?;
+    let (value, time) = (recording.columns[0].values.last().unwrap(), recording.time.last().unwrap());
+    Ok((*value, *time, system.take_notes()))
+}
+
+#[test]
+fn the_tolerance_of_the_description_or_of_the_user_reaches_the_fmu() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let fmu = workshop.plain("plant", version);
+        let told = |system| ran(system, &fmu, "tolerance", 0.2).unwrap().0;
+        let exchange = |solver| System::new(Method::ModelExchange(Integration { solver, ..Integration::default() }));
+        assert_eq!(told(System::default()), 1e-5);
+        assert_eq!(told(System::default().with_tolerance(Some(1e-3))), 1e-3);
+        assert_eq!(told(exchange(Solver::Dopri { rtol: 1e-8 })), 1e-8);
+        assert_eq!(told(exchange(Solver::Rk4)), -1.0);
+    }
+}
+
+#[test]
+fn an_fmu_that_cannot_vary_its_step_gets_no_shorter_one() {
+    let workshop = Workshop::new();
+    let with = |attribute: &str| {
+        let xml = |xml: String| xml.replace("canHandleVariableCommunicationStepSize='true'", attribute);
+        workshop.fmu("plant", 2, &[], xml)
+    };
+    let varies = workshop.plain("plant", 2);
+    assert!(matches!(ran(System::default(), &varies, "x", 0.95).unwrap(), (_, 0.95, notes) if notes.is_empty()));
+    for fmu in [with(""), with("canHandleVariableCommunicationStepSize='false'")] {
+        let (_, end, notes) = ran(System::default(), &fmu, "x", 0.95).unwrap();
+        assert!((end - 0.9).abs() < 1e-12, "{end}");
+        let [note] = &notes[..] else { panic!("{notes:?}") };
+        assert!(
+            note.starts_with("p cannot vary its step") && note.contains("ends with the last whole step, at 0.9"),
+            "{note}"
+        );
+        assert!(ran(System::default(), &fmu, "x", 1.0).unwrap().2.is_empty());
+        let error = ran(System::default(), &fmu, "x", 0.05).unwrap_err().to_string();
+        assert!(error.contains("shorter than one step of 0.1 s"), "{error}");
+    }
+    let internal = workshop.fmu("plant", 3, &[], |xml| {
+        xml.replace(
+            "canHandleVariableCommunicationStepSize='true'",
+            "canHandleVariableCommunicationStepSize='true' fixedInternalStepSize='0.03'",
+        )
+    });
+    let notes = ran(System::default(), &internal, "x", 0.2).unwrap().2;
+    assert!(
+        notes[0].contains("its fixedInternalStepSize is 0.03 s, and the step of 0.1 s is no multiple"),
+        "{notes:?}"
+    );
+}
