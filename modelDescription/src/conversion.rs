@@ -16,6 +16,14 @@ impl Conversion {
     pub fn apply(&self, x: f64) -> f64 {
         self.factor * x + self.offset
     }
+
+    /// One conversion after the other; `None` is none.
+    pub fn then(first: Option<Self>, second: Option<Self>) -> Option<Self> {
+        match (first, second) {
+            (Some(a), Some(b)) => Some(Self { factor: b.factor * a.factor, offset: b.apply(a.offset) }),
+            (one, other) => one.or(other),
+        }
+    }
 }
 
 /// What is known of the unit of a number.

@@ -56,6 +56,15 @@ impl Wiring {
         both
     }
 
+    /// Inputs that are fed over time, with the times (s) at which their values jump.
+    pub(super) fn jumps(&self) -> impl Iterator<Item = (&Port, Vec<f64>)> {
+        let feeds = self.feeds.iter().filter_map(|feed| match &feed.source {
+            Source::Schedule(schedule) => Some((&feed.target, schedule.jumps().collect())),
+            Source::Port(..) => None,
+        });
+        feeds.chain(self.held.iter().map(|(target, held)| (target, held.times().collect())))
+    }
+
     fn targets(&self) -> impl Iterator<Item = &Port> {
         self.feeds.iter().map(|feed| &feed.target).chain(self.held.iter().map(|(target, _)| target))
     }

@@ -179,6 +179,10 @@ impl Held {
     }
 
     /// Time (s) of the first value after `t`.
+    pub(super) fn times(&self) -> impl Iterator<Item = f64> {
+        self.0.iter().skip(1).map(|(t, _)| *t)
+    }
+
     pub(super) fn next_point(&self, t: f64) -> Option<f64> {
         self.0.get(last_before(&self.0, t)).map(|(time, _)| *time)
     }

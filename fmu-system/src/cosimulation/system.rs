@@ -9,7 +9,9 @@ use super::schedule::Schedule;
 use super::sequence::Sequence;
 use fmu_core::Need;
 use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
-use model_description::{BaseType, Causality, Interface, Measured, ModelVariable, Passage, Variability, parse_number};
+use model_description::{
+    BaseType, Causality, Conversion, Interface, Measured, ModelVariable, Passage, Variability, parse_number,
+};
 
 /// What a connection between different units does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +21,17 @@ pub enum Units {
     Convert,
     /// It passes the number on as it is.
     PassOn,
+}
+
+/// How a value gets from an output to an input.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Crossing<'a> {
+    /// Whether units are converted.
+    pub units: Units,
+    /// Units of source and target, for an FMU that names none.
+    pub stated: [Option<Measured<'a>>; 2],
+    /// Conversion after that of the units.
+    pub transformation: Option<Conversion>,
 }
 
 /// FMUs and their connections.
@@ -72,7 +85,7 @@ impl System {
 
     /// The settings that the FMUs can follow: where one cannot vary its step (`canHandleVariableCommunicationStepSize` is false), no
     /// shorter last step. What that changes is a [note](Self::take_notes), and so is a step that an FMU's `fixedInternalStepSize`
-    /// does not divide.
+    /// does not divide, and an input that jumps between two communication points.
     ///
     /// # Errors
     /// The settings make no sense, or leave no step.
@@ -94,6 +107,15 @@ impl System {
                 self.notes.push(format!("{name}: {cause}"));
             }
         }
+        let late = self.wiring.jumps().filter_map(|(port, times)| {
+            let instance = &self.instances[port.instance];
+            let stepped = matches!(instance.kind(), Kind::CoSimulation { event_mode: false, .. });
+            let (t, after) = times.into_iter().find_map(|t| Some((t, grid.after(t)?))).filter(|_| stepped)?;
+            let cause = format!("the value of {t} s, between two communication points, acts from {after} s on");
+            Some(format!("{}.{}: {cause}", instance.name(), port.name))
+        });
+        let late: Vec<String> = late.collect();
+        self.notes.extend(late);
         let fixed = interfaces.iter().find(|(_, of)| !of.flag("canHandleVariableCommunicationStepSize"));
         let (Some((name, _)), Some(shorter)) = (fixed, grid.without_short_step()) else { return Ok(*settings) };
         let cause = format!("{name} cannot vary its step (canHandleVariableCommunicationStepSize is false)");
@@ -222,25 +244,21 @@ impl System {
     /// # Errors
     /// A variable does not exist, causalities, types or units do not fit, or the input is fed already.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
-        self.connect_by(from, to, self.units, [None; 2])
+        self.connect_by(from, to, &Crossing { units: self.units, ..Crossing::default() })
     }
 
-    /// [`connect`](Self::connect), with or without conversion, and with units of the source and of the target where the FMU has none.
+    /// [`connect`](Self::connect), as a crossing says.
     ///
     /// # Errors
     /// As [`connect`](Self::connect).
-    pub fn connect_by(
-        &mut self,
-        from: &str,
-        to: &str,
-        units: Units,
-        stated: [Option<Measured<'_>>; 2],
-    ) -> Result<(), Error> {
+    pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing<'_>) -> Result<(), Error> {
+        let Crossing { units, stated, transformation } = crossing;
         let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
         if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
             return Err(Error::usage(from, "is not an output"));
         }
-        if kind(source.base) != kind(target.base) {
+        let widens = matches!((kind(source.base), kind(target.base)), (Some('i'), Some('r')));
+        if kind(source.base) != kind(target.base) && !widens {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
         let conversion = match units {
@@ -258,7 +276,7 @@ impl System {
                 }
             },
         };
-        self.feed(target, to, Source::Port(source, conversion))
+        self.feed(target, to, Source::Port(source, Conversion::then(conversion, *transformation)))
     }
 
     /// What is known of the unit of a variable, written `instance.variable`; what is `stated` elsewhere if its FMU names none.
