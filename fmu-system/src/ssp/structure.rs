@@ -2,8 +2,10 @@
 //! its line, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
+use super::flat::{Flat, Level, Reach, flat};
+use super::ssm::{self, MappingEntry};
 use super::ssv::{self, Parameter};
-use model_description::{Element, parse_number};
+use model_description::{BaseUnit, Conversion, Element, Measured, parse_number};
 
 /// A system of FMUs.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +16,7 @@ pub struct Structure {
     pub start: Option<f64>,
     /// Stop time in s.
     pub stop: Option<f64>,
-    /// Its FMUs.
+    /// Its FMUs; those of inner systems have their names before their own, as in `in.b`.
     pub components: Vec<Component>,
     /// Connectors of the system itself.
     pub connectors: Vec<Connector>,
@@ -22,6 +24,10 @@ pub struct Structure {
     pub connections: Vec<Connection>,
     /// Values by names `component.variable`, and of the system's own connectors.
     pub bindings: Vec<Binding>,
+    /// Units that the file defines.
+    pub units: Vec<(String, BaseUnit)>,
+    /// Parameters of systems, and connectors of inner systems: what each reaches.
+    pub(super) reach: Reach,
 }
 
 /// An FMU of the system.
@@ -55,14 +61,16 @@ pub struct Connector {
 }
 
 /// Two connectors; which of them sends follows from their kinds.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
     /// One end.
     pub start: ConnectionEnd,
     /// The other.
     pub end: ConnectionEnd,
-    /// Whether values pass without conversion, whatever the units.
+    /// Whether values pass without conversion, even between different units.
     pub no_conversion: bool,
+    /// Conversion of the value, after that of the units.
+    pub transformation: Option<Conversion>,
     /// Line of the element.
     pub line: usize,
 }
@@ -92,6 +100,17 @@ pub struct Binding {
     pub values: ParameterValues,
     /// Prefix of every name.
     pub prefix: String,
+    /// Mapping of the names.
+    pub mapping: Option<Mapping>,
+}
+
+/// Location of a mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Mapping {
+    /// In a file of the archive.
+    File(String),
+    /// In the description itself.
+    Inline(Vec<MappingEntry>),
 }
 
 /// Location of values.
@@ -104,7 +123,7 @@ pub enum ParameterValues {
 }
 
 /// Name without its namespace prefix.
-fn local(element: &Element) -> &str {
+pub(super) fn local(element: &Element) -> &str {
     element.name.rsplit(':').next().unwrap_or_default()
 }
 
@@ -145,9 +164,6 @@ impl Structure {
         }
         let system =
             child(&root, "System").ok_or_else(|| at(&root, format!("<{}> has no element <System>", root.name)))?;
-        if let Some(e) = child(system, "SignalDictionaries") {
-            return Err(unsupported(e, "signal dictionaries are not supported: connect the components directly"));
-        }
         let experiment = child(&root, "DefaultExperiment");
         let time = |name: &str| {
             let read = |text: &str| parse_number(text).ok_or_else(|| format!("{name}={text:?} is not a number"));
@@ -156,20 +172,25 @@ impl Structure {
                 .map(|(e, text)| read(text).map_err(|w| at(e, w)))
                 .transpose()
         };
-        let components = list(system, "Elements").map(component).collect::<Result<Vec<_>, _>>()?;
-        let twice = components.iter().enumerate().find(|(k, c)| components[..*k].iter().any(|b| b.name == c.name));
-        if let Some((_, Component { name, line, .. })) = twice {
-            return Err(format!("line {line}: two components have the name {name}: rename one"));
-        }
+        let Flat { components, connectors, connections, bindings, reach } = flat(level(system, String::new())?)?;
         Ok(Self {
             name: required(system, "name")?,
             start: time("startTime")?,
             stop: time("stopTime")?,
             components,
-            connectors: connectors(system)?,
-            connections: list(system, "Connections").map(connection).collect::<Result<_, _>>()?,
-            bindings: bindings(system)?,
+            connectors,
+            connections,
+            bindings,
+            units: units(&root)?,
+            reach,
         })
+    }
+
+    /// What the file says of the unit of a connector.
+    pub fn measured<'a>(&self, connector: &'a Connector) -> Option<Measured<'a>> {
+        let unit = connector.unit.as_deref()?;
+        let base = self.units.iter().find(|(name, _)| name == unit).map(|(_, base)| *base);
+        Some(Measured { unit: Some(unit), base, relative: false })
     }
 
     /// The component of this name.
@@ -178,12 +199,36 @@ impl Structure {
     }
 }
 
-fn component(e: &Element) -> Result<Component, String> {
+/// A system with what is inside it.
+fn level(e: &Element, path: String) -> Result<Level, String> {
+    if let Some(e) = child(e, "SignalDictionaries") {
+        return Err(unsupported(e, "signal dictionaries are not supported: connect the components directly"));
+    }
+    let (mut components, mut inner): (Vec<Component>, Vec<Level>) = (Vec::new(), Vec::new());
+    for element in list(e, "Elements") {
+        if local(element) == "System" {
+            inner.push(level(element, format!("{path}{}.", required(element, "name")?))?);
+        } else {
+            components.push(component(element, &path)?);
+        }
+    }
+    let twice = components.iter().enumerate().find(|(k, c)| components[..*k].iter().any(|b| b.name == c.name));
+    if let Some((_, Component { name, line, .. })) = twice {
+        return Err(format!("line {line}: two components have the name {name}: rename one"));
+    }
+    Ok(Level {
+        components,
+        connectors: connectors(e)?,
+        connections: list(e, "Connections").map(connection).collect::<Result<_, _>>()?,
+        bindings: bindings(e)?,
+        path,
+        inner,
+    })
+}
+
+fn component(e: &Element, path: &str) -> Result<Component, String> {
     if local(e) != "Component" {
-        return Err(unsupported(
-            e,
-            "only components are supported: put the parts of an inner system beside each other",
-        ));
+        return Err(unsupported(e, "only components and systems are supported"));
     }
     let source = required(e, "source")?;
     let kind = e.get("type").unwrap_or(FMU_TYPE);
@@ -191,8 +236,8 @@ fn component(e: &Element) -> Result<Component, String> {
         return Err(at(e, format!("type={kind:?} is not supported, expected {FMU_TYPE}")));
     }
     Ok(Component {
-        name: required(e, "name")?,
-        source: path(e, &source)?,
+        name: format!("{path}{}", required(e, "name")?),
+        source: within(e, &source)?,
         connectors: connectors(e)?,
         bindings: bindings(e)?,
         model_exchange: e.get("implementation") == Some("ModelExchange"),
@@ -200,8 +245,23 @@ fn component(e: &Element) -> Result<Component, String> {
     })
 }
 
+/// The units of a file: name and relation to the SI base units (SSP 1.0, 4.3).
+pub(super) fn units(root: &Element) -> Result<Vec<(String, BaseUnit)>, String> {
+    let one = |e: &Element| {
+        let base = child(e, "BaseUnit").map(BaseUnit::read).transpose().map_err(|why| at(e, why))?;
+        Ok::<_, String>((required(e, "name")?, base))
+    };
+    let all = list(root, "Units").map(one).collect::<Result<Vec<_>, _>>()?;
+    Ok(all.into_iter().filter_map(|(name, base)| Some((name, base?))).collect())
+}
+
+/// The unit of a typed element. Some tools write `None` for none.
+pub(super) fn unit(typed: &Element) -> Option<String> {
+    typed.get("unit").filter(|unit| !["", "None"].contains(unit)).map(str::to_owned)
+}
+
 /// A relative URI as a path within the archive.
-fn path(e: &Element, uri: &str) -> Result<String, String> {
+fn within(e: &Element, uri: &str) -> Result<String, String> {
     let bad =
         || at(e, format!("source={uri:?} is not a file within the archive, expected for example resources/plant.fmu"));
     let mut bytes = Vec::new();
@@ -222,16 +282,20 @@ fn path(e: &Element, uri: &str) -> Result<String, String> {
 
 fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
     let one = |c: &Element| {
-        let unit = c.children.iter().find_map(|kind| kind.get("unit")).map(str::to_owned);
+        let unit = c.children.iter().find_map(|kind| unit(kind));
         Ok(Connector { name: required(c, "name")?, kind: required(c, "kind")?, unit, line: c.line })
     };
     list(e, "Connectors").map(one).collect()
 }
 
 fn connection(e: &Element) -> Result<Connection, String> {
-    if let Some(t) = e.children.iter().find(|c| local(c).ends_with("Transformation")) {
-        return Err(unsupported(t, "transformations are not supported: remove it, or put it into a component"));
-    }
+    let transformation = match e.children.iter().find(|c| local(c).ends_with("Transformation")) {
+        None => None,
+        Some(t) if local(t) == "LinearTransformation" => Some(ssm::linear(t)?),
+        Some(t) => {
+            return Err(unsupported(t, "only LinearTransformation is supported: put the table into a component"));
+        }
+    };
     let end = |element: &str, connector: &str| {
         Ok::<_, String>(ConnectionEnd {
             element: e.get(element).map(str::to_owned),
@@ -242,6 +306,7 @@ fn connection(e: &Element) -> Result<Connection, String> {
         start: end("startElement", "startConnector")?,
         end: end("endElement", "endConnector")?,
         no_conversion: matches!(e.get("suppressUnitConversion"), Some("true" | "1")),
+        transformation,
         line: e.line,
     })
 }
@@ -251,24 +316,27 @@ fn bindings(e: &Element) -> Result<Vec<Binding>, String> {
 }
 
 fn binding(e: &Element) -> Result<Binding, String> {
-    if let Some(mapping) = child(e, "ParameterMapping") {
-        return Err(unsupported(
-            mapping,
-            "mappings are not supported: give the values under the names of the variables",
-        ));
-    }
+    let mapping = child(e, "ParameterMapping").map(|mapping| match mapping.get("source") {
+        Some(source) => Ok::<_, String>(Mapping::File(within(mapping, source)?)),
+        None => {
+            let inline = child(mapping, "ParameterMapping");
+            let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
+            Ok(Mapping::Inline(ssm::read(inline)?))
+        }
+    });
+    let mapping = mapping.transpose()?;
     if e.get("sourceBase") == Some("component") {
         return Err(at(e, "sourceBase=\"component\" is not supported: put the file beside the FMU"));
     }
     let values = if let Some(source) = e.get("source") {
-        ParameterValues::File(path(e, source)?)
+        ParameterValues::File(within(e, source)?)
     } else {
         let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
         ParameterValues::Inline(ssv::parameters(
             set.ok_or_else(|| at(e, "a binding without source and without values"))?,
         )?)
     };
-    Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into() })
+    Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into(), mapping })
 }
 
 #[cfg(test)]
@@ -288,7 +356,8 @@ mod tests {
             <s:ParameterBindings><s:ParameterBinding prefix='a.' source='./resources/a%20b.ssv'/><s:ParameterBinding>
             <s:ParameterValues><v:ParameterSet><v:Parameters><v:Parameter name='a.x'><v:Real value='3' unit='V'/></v:Parameter>
             </v:Parameters></v:ParameterSet></s:ParameterValues></s:ParameterBinding></s:ParameterBindings>
-            <s:Elements><s:Component name='a' source='resources/a.fmu'/></s:Elements>
+            <s:Elements><s:Component name='a' source='resources/a.fmu'><s:Connectors><s:Connector name='v' kind='input'/>
+            </s:Connectors></s:Component></s:Elements>
             <s:Connections><s:Connection startConnector='u' endElement='a' endConnector='v'/></s:Connections>",
         )
         .unwrap();
@@ -310,7 +379,7 @@ mod tests {
         let component = |attributes: &str| system(&format!("<Elements><Component name='a' {attributes}/></Elements>"));
         for (structure, part) in [
             (Structure::read("<a/>"), "line 1: the root element is <a>"),
-            (system("<Elements><System name='i'/></Elements>"), "line 2: <System>: only components"),
+            (system("<Elements><System/></Elements>"), "line 2: <System> has no attribute name"),
             (
                 system("<Elements><SignalDictionaryReference name='i'/></Elements>"),
                 "line 2: <SignalDictionaryReference>",
@@ -327,15 +396,15 @@ mod tests {
             ),
             (
                 system(
-                    "<Connections><Connection startConnector='a' endConnector='b'><LinearTransformation/></Connection></Connections>",
+                    "<Connections><Connection startConnector='a' endConnector='b'><EnumerationMappingTransformation/></Connection></Connections>",
                 ),
-                "<LinearTransformation>: transformations",
+                "<EnumerationMappingTransformation>: only LinearTransformation",
             ),
             (
                 system(
                     "<ParameterBindings><ParameterBinding source='a'><ParameterMapping/></ParameterBinding></ParameterBindings>",
                 ),
-                "<ParameterMapping>: mappings",
+                "line 2: a mapping without source and without entries",
             ),
             (system("<ParameterBindings><ParameterBinding/></ParameterBindings>"), "without source and without values"),
         ] {
