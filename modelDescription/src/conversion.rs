@@ -40,11 +40,11 @@ pub struct Measured<'a> {
 /// How a number gets from one side of a connection to the other.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Passage {
-    /// As it is: the units are equal.
+    /// Unchanged: the units are equal.
     Equal,
     /// Converted.
     Converted(Conversion),
-    /// As it is, because this is not known.
+    /// Unchanged, for this reason: a unit is not known.
     Unknown(String),
 }
 
@@ -103,21 +103,21 @@ fn formula(base: &BaseUnit) -> String {
 mod tests {
     use super::*;
 
-    const fn base(exponents: [i32; 8], factor: f64, offset: f64) -> Option<BaseUnit> {
-        Some(BaseUnit { exponents, factor, offset })
+    const fn base(exponents: [i32; 8], factor: f64, offset: f64) -> BaseUnit {
+        BaseUnit { exponents, factor, offset }
     }
 
     const K: [i32; 8] = [0, 0, 0, 0, 1, 0, 0, 0];
-    const KELVIN: Measured = Measured { unit: Some("K"), base: base(K, 1.0, 0.0), relative: false };
-    const CELSIUS: Measured = Measured { unit: Some("degC"), base: base(K, 1.0, 273.15), relative: false };
+    const KELVIN: Measured = Measured { unit: Some("K"), base: Some(base(K, 1.0, 0.0)), relative: false };
+    const CELSIUS: Measured = Measured { unit: Some("degC"), base: Some(base(K, 1.0, 273.15)), relative: false };
     const FAHRENHEIT: Measured =
-        Measured { unit: Some("degF"), base: base(K, 5.0 / 9.0, 273.15 - 160.0 / 9.0), relative: false };
+        Measured { unit: Some("degF"), base: Some(base(K, 5.0 / 9.0, 273.15 - 160.0 / 9.0)), relative: false };
     const RADIANS: Measured =
-        Measured { unit: Some("rad/s"), base: base([0, 0, -1, 0, 0, 0, 0, 1], 1.0, 0.0), relative: false };
+        Measured { unit: Some("rad/s"), base: Some(base([0, 0, -1, 0, 0, 0, 0, 1], 1.0, 0.0)), relative: false };
     const HERTZ: Measured =
-        Measured { unit: Some("1/s"), base: base([0, 0, -1, 0, 0, 0, 0, 0], 1.0, 0.0), relative: false };
+        Measured { unit: Some("1/s"), base: Some(base([0, 0, -1, 0, 0, 0, 0, 0], 1.0, 0.0)), relative: false };
     const NEWTON: Measured =
-        Measured { unit: Some("N"), base: base([1, 1, -2, 0, 0, 0, 0, 0], 1.0, 0.0), relative: false };
+        Measured { unit: Some("N"), base: Some(base([1, 1, -2, 0, 0, 0, 0, 0], 1.0, 0.0)), relative: false };
     const NOTHING: Measured = Measured { unit: None, base: None, relative: false };
 
     fn converted(from: Measured, to: Measured, x: f64) -> f64 {

@@ -35,7 +35,7 @@ def modelica_type(tag):
 def block(fmu, name, speed_ref):
     """The text of the class `name`; `speed_ref` stands in for a reference where the FMU has none."""
     root = ElementTree.fromstring(zipfile.ZipFile(fmu).read("modelDescription.xml"))
-    *packages, name = name.split(".")
+    full, (*packages, name) = name, name.split(".")
     lines, equations, types = [f"model {name}"], [], {}
     for definition in root.find("TypeDefinitions"):
         items = definition if definition.tag == "EnumerationType" else definition.find("Enumeration")
@@ -63,7 +63,7 @@ def block(fmu, name, speed_ref):
         elif causality == "output":
             if of == "Enumeration":
                 of = kind.get("declaredType")
-                value = f"{of}.{types[of][0]}"
+                value = f"{full}.{of}.{types[of][0]}"
                 lines.append(f"  output {of} {mine};")
             else:
                 value = OUTPUTS.get(mine, "false" if of == "Boolean" else "0")

@@ -84,7 +84,8 @@ def test_modelica_runs_the_examples(package):
 
     for file in package.folder.glob("*.mo"):
         parse(file.read_text())
-    sources = [(HERE / "library" / "Modelica.mo").read_text(), package.block, package.merged()]
+    block = re.sub(r"\n  parameter Real \w+\[\d+\][^\n]*", "", package.block)
+    sources = [(HERE / "library" / "Modelica.mo").read_text(), block, package.merged()]
     sources = [parse(source) for source in sources]
     for example, expected in EXAMPLES.items():
         flat = modelica.flatten(sources, f"{package.name}.Examples.{example}")

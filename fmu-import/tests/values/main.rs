@@ -192,7 +192,9 @@ fn only_a_saved_state_can_bring_back_an_earlier_time() {
             let state = saved.then(|| it.get_state().unwrap());
             assert!(it.do_step(0.0, 1.0).unwrap().is_continue());
             assert_eq!(real(it, 6).to_bits(), f64::to_bits(expected), "FMI {version}");
-            state.into_iter().for_each(|state| it.free_state(state).unwrap());
+            if let Some(state) = state {
+                it.free_state(state).unwrap();
+            }
         }
     });
 }

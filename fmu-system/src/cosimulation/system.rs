@@ -102,8 +102,10 @@ impl System {
             let count = internal.map_or(1.0, |internal| settings.step / internal);
             if count < 0.5 || (count - count.round()).abs() > 1e-6 * count {
                 let h = internal.unwrap_or_default();
-                let cause =
-                    format!("its fixedInternalStepSize is {h} s, and the step of {} s is no multiple", settings.step);
+                let cause = format!(
+                    "its fixedInternalStepSize is {h} s, and the step of {} s is not a multiple",
+                    settings.step
+                );
                 self.notes.push(format!("{name}: {cause}"));
             }
         }
@@ -239,7 +241,7 @@ impl System {
     }
 
     /// Connects an output to an input, both written `instance.variable`. A number in another unit of the same quantity is converted
-    /// (see [`with_units`](Self::with_units)); without a unit on one side it passes as it is, with a [note](Self::take_notes).
+    /// (see [`with_units`](Self::with_units)); without a unit on one side it passes unchanged, with a [note](Self::take_notes).
     ///
     /// # Errors
     /// A variable does not exist, causalities, types or units do not fit, or the input is fed already.
@@ -261,17 +263,18 @@ impl System {
         if kind(source.base) != kind(target.base) && !widens {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
+        self.check_fed(&target, to, false)?;
         let conversion = match units {
             Units::PassOn => None,
             Units::Convert => match self.measured(from, stated[0])?.into_unit(self.measured(to, stated[1])?) {
                 Ok(Passage::Equal) => None,
                 Ok(Passage::Converted(conversion)) => Some(conversion),
                 Ok(Passage::Unknown(cause)) => {
-                    self.notes.push(format!("{from} to {to}: {cause}: the number passes as it is"));
+                    self.notes.push(format!("{from} to {to}: {cause}: the number passes unchanged"));
                     None
                 }
                 Err(cause) => {
-                    let remedy = "connect what has one quantity, or switch the conversion of units off";
+                    let remedy = "connect variables of the same quantity, or pass the number without conversion";
                     return Err(Error::usage(to, format!("cannot be fed by {from}: {cause}: {remedy}")));
                 }
             },

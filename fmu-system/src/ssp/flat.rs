@@ -3,7 +3,7 @@
 //! A component `b` of the inner system `in` becomes the component `in.b`. A connector of an inner system, and a parameter of any
 //! system, is a name for the connectors of components that it reaches.
 
-use super::structure::{Binding, Component, Connection, ConnectionEnd, Connector};
+use super::component::{Binding, Component, Connection, ConnectionEnd, Connector};
 use model_description::Conversion;
 
 /// A system as its element has it.
@@ -35,7 +35,7 @@ pub(super) struct Flat {
 /// A connector with the full name of what it belongs to.
 #[derive(Clone, PartialEq)]
 struct Node {
-    /// Of a component, or of a system with its dot.
+    /// Full name of a component, or path of a system, which ends with a dot.
     owner: String,
     connector: String,
     is_component: bool,
@@ -73,9 +73,9 @@ struct Edge<'a> {
 ///
 /// # Errors
 /// The line of a connection, and what is wrong with it.
-pub(super) fn flat(outer: Level) -> Result<Flat, String> {
+pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
     let mut levels = Vec::new();
-    collect(&outer, &mut levels);
+    collect(outer, &mut levels);
     let mut edges = Vec::new();
     for level in &levels {
         for connection in &level.connections {

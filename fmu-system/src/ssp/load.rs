@@ -172,7 +172,8 @@ impl Loaded {
         let mut zip = ZipArchive::new(file).map_err(|e| within(format!("not a ZIP archive, or cut short: {e}")))?;
         check_entries(&mut zip).map_err(within)?;
         let names = zip.file_names().filter_map(Result::ok).map(std::borrow::Cow::into_owned);
-        let mut variants: Vec<String> = names.filter(|name| name.ends_with(".ssd")).collect();
+        let mut variants: Vec<String> =
+            names.filter(|name| Path::new(name).extension().is_some_and(|e| e == "ssd")).collect();
         variants.sort_unstable();
         if !variants.iter().any(|name| name == description) && !variants.is_empty() {
             let (all, file) = (variants.join(", "), path.file_name().unwrap_or_default().display());
@@ -372,7 +373,7 @@ impl Loaded {
 
     /// A connector of the system has the unit of the variable that it stands for. `stated` are the units of the connector of the
     /// system and of that of the component.
-    fn check_unit(&self, port: &str, units: Units, stated: [Option<Measured<'_>>; 2]) -> Result<(), String> {
+    fn check_unit(&mut self, port: &str, units: Units, stated: [Option<Measured<'_>>; 2]) -> Result<(), String> {
         let [Some(of_system), _] = stated else { return Ok(()) };
         if units == Units::PassOn {
             return Ok(());
@@ -382,7 +383,11 @@ impl Loaded {
                 "the connector of the system is in {}, and {port} in another unit: give both in one",
                 of_system.unit.unwrap_or_default()
             )),
-            Ok(_) => Ok(()),
+            Ok(Passage::Unknown(cause)) => {
+                self.system.note(format!("the system to {port}: {cause}: the number passes unchanged"));
+                Ok(())
+            }
+            Ok(Passage::Equal) => Ok(()),
             Err(cause) => Err(format!("{port}: {cause}")),
         }
     }
@@ -523,7 +528,7 @@ mod tests {
         let two = of(&[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
         let s = two.settings(None, None, None, true);
         assert_eq!((s.start, s.stop, s.step, s.sequential), (0.0, 3.0, 1e-4, true));
-        assert_eq!(two.settings(Some(5.0), None, None, false).stop, 8.0);
+        assert!((two.settings(Some(5.0), None, None, false).stop - 8.0).abs() < 1e-12);
         let s = of(&[experiment(None, None)]).settings(None, Some(4.0), None, false);
         assert_eq!((s.stop, s.step), (4.0, 0.004));
     }

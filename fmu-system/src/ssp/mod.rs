@@ -3,6 +3,8 @@
 //! [`structure`]: the structure of any system; [`load`]: a system made ready for co-simulation; [`values`], [`ssv`] and [`ssm`]:
 //! parameter values from SSV files and their mappings.
 
+mod component;
+mod element;
 mod error;
 mod flat;
 pub mod load;

@@ -1,7 +1,7 @@
 //! Mappings of the values of one file to the parameters of another system (System Structure Parameter Mapping, SSP 1.0, 5.5).
 
+use super::element::local;
 use super::ssv::Parameter;
-use super::structure::local;
 use model_description::{Conversion, Element, format_number, parse_number};
 
 /// An entry: from a name of the file to one of the system.

@@ -1,6 +1,6 @@
 //! Parameter values from a file of SSP 1.0 (System Structure Parameter Values).
 
-use super::structure::{unit, units};
+use super::element::{unit, units};
 use model_description::{BaseUnit, Element};
 
 /// A value of a file.

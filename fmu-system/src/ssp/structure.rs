@@ -2,10 +2,11 @@
 //! its line, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
+pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Mapping, ParameterValues};
+use super::element::{at, child, list, local, required, unit, units};
 use super::flat::{Flat, Level, Reach, flat};
-use super::ssm::{self, MappingEntry};
-use super::ssv::{self, Parameter};
-use model_description::{BaseUnit, Conversion, Element, Measured, parse_number};
+use super::{ssm, ssv};
+use model_description::{BaseUnit, Element, Measured, parse_number};
 
 /// A system of FMUs.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,120 +29,6 @@ pub struct Structure {
     pub units: Vec<(String, BaseUnit)>,
     /// Parameters of systems, and connectors of inner systems: what each reaches.
     pub(super) reach: Reach,
-}
-
-/// An FMU of the system.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Component {
-    /// Name, by which connections refer to it.
-    pub name: String,
-    /// Its archive, a path within the SSP.
-    pub source: String,
-    /// Variables that can be connected.
-    pub connectors: Vec<Connector>,
-    /// Values of its variables.
-    pub bindings: Vec<Binding>,
-    /// It is made for Model Exchange alone.
-    pub model_exchange: bool,
-    /// Line of the element.
-    pub line: usize,
-}
-
-/// A variable that can be connected.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Connector {
-    /// Name; of a component, that of the variable.
-    pub name: String,
-    /// `input`, `output`, `parameter`, `calculatedParameter` or `inout`.
-    pub kind: String,
-    /// Unit, where the file tells it.
-    pub unit: Option<String>,
-    /// Line of the element.
-    pub line: usize,
-}
-
-/// Two connectors; which of them sends follows from their kinds.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Connection {
-    /// One end.
-    pub start: ConnectionEnd,
-    /// The other.
-    pub end: ConnectionEnd,
-    /// Whether values pass without conversion, even between different units.
-    pub no_conversion: bool,
-    /// Conversion of the value, after that of the units.
-    pub transformation: Option<Conversion>,
-    /// Line of the element.
-    pub line: usize,
-}
-
-/// An end of a connection.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ConnectionEnd {
-    /// The component; `None` for the system itself.
-    pub element: Option<String>,
-    /// Name of the connector.
-    pub connector: String,
-}
-
-impl std::fmt::Display for ConnectionEnd {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match &self.element {
-            Some(element) => write!(f, "{element}.{}", self.connector),
-            None => write!(f, "{} of the system", self.connector),
-        }
-    }
-}
-
-/// Parameter values of a component or of the system.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Binding {
-    /// File within the SSP, or the values themselves.
-    pub values: ParameterValues,
-    /// Prefix of every name.
-    pub prefix: String,
-    /// Mapping of the names.
-    pub mapping: Option<Mapping>,
-}
-
-/// Location of a mapping.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Mapping {
-    /// In a file of the archive.
-    File(String),
-    /// In the description itself.
-    Inline(Vec<MappingEntry>),
-}
-
-/// Location of values.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ParameterValues {
-    /// In a file of the archive.
-    File(String),
-    /// In the description itself.
-    Inline(Vec<Parameter>),
-}
-
-/// Name without its namespace prefix.
-pub(super) fn local(element: &Element) -> &str {
-    element.name.rsplit(':').next().unwrap_or_default()
-}
-
-fn child<'a>(parent: &'a Element, name: &str) -> Option<&'a Element> {
-    parent.children.iter().find(|c| local(c) == name)
-}
-
-/// The children of a child, or none.
-fn list<'a>(parent: &'a Element, name: &str) -> impl Iterator<Item = &'a Element> {
-    child(parent, name).into_iter().flat_map(|e| &e.children).filter(|e| local(e) != "Annotations")
-}
-
-fn at(e: &Element, what: impl std::fmt::Display) -> String {
-    format!("line {}: {what}", e.line)
-}
-
-fn required(e: &Element, name: &str) -> Result<String, String> {
-    e.get(name).map(str::to_owned).ok_or_else(|| at(e, format!("<{}> has no attribute {name}", e.name)))
 }
 
 /// An unsupported feature, and the remedy.
@@ -172,7 +59,7 @@ impl Structure {
                 .map(|(e, text)| read(text).map_err(|w| at(e, w)))
                 .transpose()
         };
-        let Flat { components, connectors, connections, bindings, reach } = flat(level(system, String::new())?)?;
+        let Flat { components, connectors, connections, bindings, reach } = flat(&level(system, String::new())?)?;
         Ok(Self {
             name: required(system, "name")?,
             start: time("startTime")?,
@@ -245,21 +132,6 @@ fn component(e: &Element, path: &str) -> Result<Component, String> {
     })
 }
 
-/// The units of a file: name and relation to the SI base units (SSP 1.0, 4.3).
-pub(super) fn units(root: &Element) -> Result<Vec<(String, BaseUnit)>, String> {
-    let one = |e: &Element| {
-        let base = child(e, "BaseUnit").map(BaseUnit::read).transpose().map_err(|why| at(e, why))?;
-        Ok::<_, String>((required(e, "name")?, base))
-    };
-    let all = list(root, "Units").map(one).collect::<Result<Vec<_>, _>>()?;
-    Ok(all.into_iter().filter_map(|(name, base)| Some((name, base?))).collect())
-}
-
-/// The unit of a typed element. Some tools write `None` for none.
-pub(super) fn unit(typed: &Element) -> Option<String> {
-    typed.get("unit").filter(|unit| !["", "None"].contains(unit)).map(str::to_owned)
-}
-
 /// A relative URI as a path within the archive.
 fn within(e: &Element, uri: &str) -> Result<String, String> {
     let bad =
@@ -282,7 +154,7 @@ fn within(e: &Element, uri: &str) -> Result<String, String> {
 
 fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
     let one = |c: &Element| {
-        let unit = c.children.iter().find_map(|kind| unit(kind));
+        let unit = c.children.iter().find_map(unit);
         Ok(Connector { name: required(c, "name")?, kind: required(c, "kind")?, unit, line: c.line })
     };
     list(e, "Connectors").map(one).collect()
@@ -316,13 +188,13 @@ fn bindings(e: &Element) -> Result<Vec<Binding>, String> {
 }
 
 fn binding(e: &Element) -> Result<Binding, String> {
-    let mapping = child(e, "ParameterMapping").map(|mapping| match mapping.get("source") {
-        Some(source) => Ok::<_, String>(Mapping::File(within(mapping, source)?)),
-        None => {
-            let inline = child(mapping, "ParameterMapping");
-            let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
-            Ok(Mapping::Inline(ssm::read(inline)?))
+    let mapping = child(e, "ParameterMapping").map(|mapping| {
+        if let Some(source) = mapping.get("source") {
+            return Ok::<_, String>(Mapping::File(within(mapping, source)?));
         }
+        let inline = child(mapping, "ParameterMapping");
+        let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
+        Ok(Mapping::Inline(ssm::read(inline)?))
     });
     let mapping = mapping.transpose()?;
     if e.get("sourceBase") == Some("component") {

@@ -49,7 +49,7 @@ pub fn set(system: &mut System, given: &[Given]) -> Result<(), Error> {
 }
 
 fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<(), Error> {
-    let (name, mut value) = (&p.name, std::borrow::Cow::from(&p.value));
+    let (name, mut value, mut notes) = (&p.name, std::borrow::Cow::from(&p.value), Vec::new());
     if let Some(i) = system.instances().iter().find(|i| i.name() == instance) {
         let model = &i.description().model_name;
         let Some(variable) = find(i.description(), name) else {
@@ -58,10 +58,13 @@ fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<(), Error> 
         match in_unit_of(p, variable, i.description()) {
             Ok((converted, note)) => {
                 value = converted.map_or(value, Into::into);
-                note.into_iter().for_each(|note| system.note(format!("{instance}.{name}: {note}")));
+                notes.extend(note.map(|note| format!("{instance}.{name}: {note}")));
             }
-            Err(cause) => return invalid(format!("{name}: {cause}")),
+            Err(cause) => return invalid(format!("{name} {cause}")),
         }
+    }
+    for note in notes {
+        system.note(note);
     }
     Ok(system.set(&format!("{instance}.{name}"), &value)?)
 }
@@ -75,21 +78,25 @@ fn in_unit_of(
     let Some(unit) = p.unit.as_deref() else { return Ok((None, None)) };
     let each = |convert: &dyn Fn(f64) -> Result<f64, String>| {
         let number = |text: &str| {
-            let number = parse_number(text).ok_or_else(|| format!("{text:?} in {unit} is not a number"))?;
+            let number = parse_number(text).ok_or_else(|| format!("= {text:?} in {unit} is not a number"))?;
             Ok::<_, String>(format_number(convert(number)?))
         };
         Ok::<_, String>(p.value.split_whitespace().map(number).collect::<Result<Vec<_>, _>>()?.join(" "))
     };
-    if p.base.is_none() && variable.unit.is_some() {
-        if variable.unit.as_deref() == Some(unit) {
+    if let (None, Some(own)) = (p.base, variable.unit.as_deref()) {
+        if own == unit {
             return Ok((None, None));
         }
-        return Ok((Some(each(&|x| quantity::convert(x, unit, variable, description))?), None));
+        let model = &description.model_name;
+        let unknown = |_| {
+            format!("is given in {unit}, and {model} has it in {own}: define {unit} in the file, or convert the value")
+        };
+        return Ok((Some(each(&|x| quantity::convert(x, unit, variable, description).map_err(unknown))?), None));
     }
     let given = Measured { unit: Some(unit), base: p.base, relative: variable.relative };
-    match given.into_unit(description.measured(variable))? {
+    match given.into_unit(description.measured(variable)).map_err(|cause| format!("does not fit: {cause}"))? {
         Passage::Equal => Ok((None, None)),
-        Passage::Unknown(why) => Ok((None, Some(format!("{why}: the number passes as it is")))),
+        Passage::Unknown(why) => Ok((None, Some(format!("{why}: the number passes unchanged")))),
         Passage::Converted(conversion) => Ok((Some(each(&|x| Ok(conversion.apply(x)))?), None)),
     }
 }

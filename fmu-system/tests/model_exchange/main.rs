@@ -542,7 +542,7 @@ fn an_fmu_that_cannot_vary_its_step_gets_no_shorter_one() {
     });
     let notes = ran(System::default(), &internal, "x", 0.2).unwrap().2;
     assert!(
-        notes[0].contains("its fixedInternalStepSize is 0.03 s, and the step of 0.1 s is no multiple"),
+        notes[0].contains("its fixedInternalStepSize is 0.03 s, and the step of 0.1 s is not a multiple"),
         "{notes:?}"
     );
 }
