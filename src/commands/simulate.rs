@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
-use fmu_system::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
+use fmu_system::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
 use fmu_system::ssp::values::{self, Given};
@@ -79,6 +79,9 @@ pub struct Simulate {
     /// Connect every unconnected input to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
+    /// Pass numbers between different units on as they are; without it they are converted by the BaseUnits of both FMUs
+    #[arg(long)]
+    pub no_unit_conversion: bool,
     /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
     #[arg(long, value_name = "INSTANCE=FILE.ssv")]
     pub parameters: Vec<String>,
@@ -128,6 +131,9 @@ pub struct Simulate {
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: that of the default experiment of each]
+    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true, conflicts_with = "me")]
+    pub tolerance: Option<f64>,
     /// Handle events of FMUs of FMI 3.0 that have event mode at their time (Co-Simulation)
     #[arg(long, conflicts_with_all = ["me", "sequential"])]
     pub event_mode: bool,
@@ -215,7 +221,12 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     // An FMU may change it; the files of the command are named from here.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
-    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
+    let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
+    if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
+        bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
+    }
+    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
+    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
         bail!("--solver and --rtol are for Model Exchange: add --me");
@@ -227,6 +238,8 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
+    let settings = system.feasible(&settings)?;
+    system.take_notes().iter().for_each(|note| message::note(&printable(note)));
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut Point<'_>| {

@@ -129,10 +129,11 @@ pub(super) fn text(package: &str, about: &str, interface: &Interface, machine: &
             let start = v.start();
             let _ = writeln!(
                 equations,
-                "  assert({name} == {start},\n    \"{fmi} of the FMU is {start}: its import sends no enumeration. For another \
+                "  assert({name} == {start},\n    \"{fmi} of the FMU is {item}, and no enumeration is sent to it. For another \
                  value: fmu preset FILE.fmu --set {fmi}=VALUE --out NEW.fmu, then import NEW.fmu and write this package again\");",
                 name = v.name,
                 fmi = v.fmi,
+                item = start.rsplit('.').next().unwrap_or(&start),
             );
         }
     }

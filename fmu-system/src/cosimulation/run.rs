@@ -25,7 +25,14 @@ pub(super) fn simulate(
     method.check(&kinds, settings.sequential)?;
     exchange.begin();
     for instance in instances.iter_mut() {
-        instance.setup(settings.start, Some(settings.stop))?;
+        let tolerance = match method {
+            // Of the algorithms inside an FMU that our solver calls.
+            Method::ModelExchange(integration) if instance.kind() == Kind::ModelExchange => {
+                integration.solver.tolerance()
+            }
+            _ => grid.tolerance.or(instance.description().default_experiment.tolerance),
+        };
+        instance.setup_with(settings.start, Some(settings.stop), tolerance)?;
         instance.enter_initialization()?;
     }
     // An initial output may depend on an input, through as many FMUs as there are.
@@ -102,7 +109,7 @@ impl System {
         settings: &Settings,
         mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> Result<Recording, Error> {
-        let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
+        let grid = self.grid(settings)?;
         let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let mut recording = Recording::new(self.columns());
         recording.texts =
