@@ -254,7 +254,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         }
         Ok(ControlFlow::Continue(()))
     };
-    let outcome = system.run(&settings, &mut hook);
+    let (recording, outcome) = system.run_keeping(&settings, &mut hook);
     progress.end();
     if args.logging {
         show(&system.take_messages());
@@ -268,11 +268,14 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         std::mem::forget(system);
         bail!("{text}");
     }
-    let recording = outcome?;
+    let failed = match outcome {
+        Err(error) if recording.time.is_empty() => return Err(error.into()),
+        outcome => outcome.err().map(|error| ending(&error, recording.time.last(), settings.step)),
+    };
     journal::writes();
     std::env::set_current_dir(&home)?;
     let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
-    let bad = bad.map(|column| format!("{} is not finite at the end", column.name));
+    let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
     let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
     let written = output::write(recording, for_plot, alone, args, &mut out);
     for text in warnings(&system, &settings) {
@@ -295,6 +298,13 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         Some(time) => Err(Failed(format!("interrupted at {time} s, where the results end")).into()),
         None => Ok(()),
     }
+}
+
+/// What ended a run early, and what may help.
+fn ending(error: &fmu_import::Error, last: Option<&f64>, step: f64) -> String {
+    let advice =
+        if error.is_discard() { format!("; a shorter step may go on: --step {}", 0.5 * step) } else { String::new() };
+    format!("{error}; the results end at {} s{advice}", last.copied().unwrap_or_default())
 }
 
 /// Warns of inputs that keep their start values and of a step that is too long: no FMU refuses either.

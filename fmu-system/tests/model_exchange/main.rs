@@ -655,3 +655,19 @@ fn an_ssp_with_inner_systems_mappings_and_transformations() {
     let error = open("nested.ssp").unwrap_err();
     assert!(error.contains("in.w is fed twice"), "{error}");
 }
+
+#[test]
+fn what_was_recorded_before_an_error_is_kept() {
+    let workshop = Workshop::new();
+    let mut system = System::default();
+    system.add("p", &workshop.plain("plant", 2), false).unwrap();
+    system.record("p.x").unwrap();
+    system.record_text_as("p.x", "text").unwrap_err();
+    let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+    let (recording, outcome) = system.run_keeping(&settings, |point| {
+        let error = || fmu_import::Error::usage("p", "stops here");
+        if point.index < 3 { Ok(ControlFlow::Continue(())) } else { Err(error()) }
+    });
+    assert!(outcome.unwrap_err().to_string().contains("stops here"));
+    assert_eq!((recording.time.len(), recording.columns[0].values.len()), (4, 4));
+}
