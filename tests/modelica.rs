@@ -41,6 +41,9 @@ fn two_compilers_take_every_package_and_run_its_examples() {
         let args = Modelica { motor, ..request(archive("fmi2", name), &folder.join(name)) };
         modelica::run(&args).unwrap();
     }
+    let (drive, block, out) = (archive("fmi3", "PmsmDrive"), Some("FMUs.PmsmDrive".into()), folder.join("OtherImport"));
+    modelica::run(&Modelica { block, motor: few(), ..request(drive.clone(), &out) }).unwrap();
+    fs::copy(drive, out.join("PmsmDrive.fmu")).unwrap();
     pytest("modelica", "modelica", &["test_judges.py"], &[("MODELICA_PACKAGES", &folder)]);
 }
 

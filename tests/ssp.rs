@@ -383,7 +383,12 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", "</ssd:System>", "</ssd:Systm>");
     fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "not well-formed XML"]);
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", "unit=\"rad/s\"", "unit=\"rpm\"");
-    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "units are not converted"]);
+    let output = fmu(&["simulate", &path, "--stop", "0.001"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && said.contains("and rpm has no BaseUnit: the number passes unchanged"), "{said}");
+    let units = "</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit rad=\"1\" s=\"-1\" factor=\"0.1047\"/></ssc:Unit></ssd:Units>";
+    let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", units);
+    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "the connector of the system is in rpm"]);
     let (old, new) = ("implementation=\"CoSimulation\"", "implementation=\"ModelExchange\"");
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
     fails(

@@ -1,6 +1,6 @@
 //! User input for a variable: numbers with or without a unit, names with or without a typing error.
 
-use model_description::{ModelDescription, ModelVariable};
+use model_description::{Measured, ModelDescription, ModelVariable, Passage};
 
 /// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a plain number.
 pub fn split(text: &str) -> Option<(f64, &str)> {
@@ -12,8 +12,8 @@ pub fn split(text: &str) -> Option<(f64, &str)> {
     (1..=digits).rev().find_map(|end| Some((text.get(..end)?.parse().ok()?, text.get(end..)?.trim())))
 }
 
-/// Converts a number from `unit` to the unit of the variable; `unit` is that of the variable (also if empty) or one of its
-/// display units.
+/// Converts a number from `unit` to the unit of the variable; `unit` is that of the variable (also if empty), one of its display
+/// units, or another unit of the FMU for the same quantity.
 ///
 /// # Errors
 /// Names the units that the variable has.
@@ -29,6 +29,13 @@ pub fn convert(
     }
     if let Some(shown) = description.display_unit(variable, Some(unit)) {
         return Ok(shown.unshow(number));
+    }
+    let defined = description.unit(unit).and_then(|defined| defined.base);
+    let given = Measured { unit: Some(unit), base: defined, relative: variable.relative };
+    match given.into_unit(description.measured(variable)) {
+        Ok(Passage::Equal) if defined.is_some() => return Ok(number),
+        Ok(Passage::Converted(conversion)) => return Ok(conversion.apply(number)),
+        _ => {}
     }
     let definition = own.and_then(|own| description.unit(own));
     let of = format!("{} = {number}{unit}", variable.name);

@@ -20,6 +20,8 @@ pub struct Definition {
     pub connect: Vec<[String; 2]>,
     /// Pairs of terminals.
     pub terminal: Vec<[String; 2]>,
+    /// Pass numbers between different units on as they are; otherwise they are converted by the BaseUnits of both FMUs.
+    pub no_unit_conversion: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
     /// How to run all FMUs; by default each steps itself if it can.
@@ -28,8 +30,10 @@ pub struct Definition {
     pub stepping: Vec<String>,
     /// Integration method (Model Exchange); by default the adaptive solver.
     pub solver: Option<SolverName>,
-    /// Relative tolerance of the adaptive solver; by default 1e-6.
+    /// Relative tolerance of the adaptive solver; by default 1e-6. If no FMU is integrated, as `tolerance`.
     pub rtol: Option<f64>,
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation; by default that of the default experiment of each.
+    pub tolerance: Option<f64>,
     /// Start time in s; by default from the FMUs.
     pub start: Option<f64>,
     /// Stop time in s; by default from the FMUs.

@@ -8,7 +8,7 @@ use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
 use fmu_import::{Fmu, Kind};
 use fmu_system::cosimulation::{
-    self, Integration, Method, PlanTarget, Recording, Schedule, Settings, Solver, Worker, item,
+    self, Integration, Method, PlanTarget, Recording, Schedule, Settings, Solver, System, Units, Worker, item,
 };
 use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
@@ -110,25 +110,28 @@ impl Plan {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");
         }
-        if let Some(rtol) = definition.rtol.filter(|rtol| !(1e-14..=0.1).contains(rtol)) {
-            return invalid(format!("rtol = {rtol}: expected a number between 1e-14 and 0.1"));
+        for (name, given) in [("rtol", definition.rtol), ("tolerance", definition.tolerance)] {
+            if let Some(x) = given.filter(|x| !(1e-14..=0.1).contains(x)) {
+                return invalid(format!("{name} = {x}: expected a number between 1e-14 and 0.1"));
+            }
         }
         let mut unknown = None;
-        let method = |fmus: &[(String, Fmu)]| {
+        let units = if definition.no_unit_conversion { Units::PassOn } else { Units::Convert };
+        let system = |fmus: &[(String, Fmu)]| {
             let known = |name: &&String| fmus.iter().any(|(other, _)| other == *name);
             unknown = definition.stepping.iter().find(|name| !known(name)).cloned();
-            method(definition, fmus)
+            System::new(method(definition, fmus)).with_units(units)
         };
-        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, method)?;
+        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, system)?;
         if let Some(name) = unknown {
             return invalid(format!("stepping: {name} is not the name of an FMU"));
         }
         let integrates = loaded.system.instances().iter().any(|i| i.kind() == Kind::ModelExchange);
-        if !integrates && (definition.solver.is_some() || definition.rtol.is_some()) {
-            return invalid(
-                "solver and rtol are for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'",
-            );
+        if !integrates && definition.solver.is_some() {
+            return invalid("solver is for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'");
         }
+        let own = definition.rtol.filter(|_| !integrates);
+        loaded.system = loaded.system.with_tolerance(definition.tolerance.or(own));
         if integrates && definition.sequential {
             return invalid("sequential: FMUs step one after another only in Co-Simulation");
         }
@@ -153,6 +156,7 @@ impl Plan {
         }
         let Definition { start, stop, step, .. } = *definition;
         let settings = loaded.settings(start, stop, step, definition.sequential);
+        let settings = loaded.system.feasible(&settings)?;
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
         for (name, measure) in &definition.measure.0 {
@@ -172,7 +176,8 @@ impl Plan {
         } else {
             loaded.connectors.outputs.iter().map(|(name, _)| name.clone()).collect()
         };
-        let Loaded { system, connectors, notes, .. } = loaded;
+        let Loaded { mut system, connectors, mut notes, .. } = loaded;
+        notes.extend(system.take_notes());
         let system = Arc::new(system.into_plan(&settings)?);
         let of = |name: &str| system.columns().iter().find(|c| c.name == name);
         let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {

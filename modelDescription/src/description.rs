@@ -1,5 +1,6 @@
 //! The content of modelDescription.xml that importers need.
 
+use crate::conversion::Measured;
 use crate::units::{DisplayUnit, TypeDefinition, Unit};
 use crate::variable::{Dimension, ModelVariable};
 use crate::version::FmiVersion;
@@ -131,6 +132,12 @@ impl ModelDescription {
     pub fn display_unit(&self, v: &ModelVariable, name: Option<&str>) -> Option<DisplayUnit> {
         let shown = self.unit(v.unit.as_deref()?)?.display_unit(name.or(v.display_unit.as_deref())?)?;
         Some(if v.relative { shown.of_differences() } else { shown.clone() })
+    }
+
+    /// What is known of the unit of a variable's values.
+    pub fn measured<'a>(&self, v: &'a ModelVariable) -> Measured<'a> {
+        let base = v.unit.as_deref().and_then(|name| self.unit(name)?.base);
+        Measured { unit: v.unit.as_deref(), base, relative: v.relative }
     }
 
     /// The type definition with this name.

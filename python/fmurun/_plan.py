@@ -6,6 +6,7 @@ import os
 import shutil
 import tempfile
 import threading
+import warnings
 from collections import OrderedDict
 from contextlib import contextmanager
 
@@ -38,12 +39,15 @@ class Plan:
         output: names that `simulate` records; by default all outputs
         measures: name -> {"of": "p.speed", "is": "min", "after": 0.2}, or a text ("speed" is its final value), or
             (text, function): functions are final, min, max, max_abs, mean, rms, integral, at, rise, settling; see docs/sweeps.md
+        unit_conversion: convert numbers between connected variables in different units; False passes them on as they are
         sequential: step the FMUs one after another, each with the new outputs of those before it
         embed: pickle the files, too
         fmi_type: "CoSimulation", "ModelExchange", or a dictionary with the one of each FMU; by default FMUs step themselves if they
             can. FMUs for Model Exchange are integrated as one system: events of any of them are met at their time, and algebraic
             loops are solved. Those for Co-Simulation among them step from one communication point to the next
-        solver, relative_tolerance: for Model Exchange: "Dopri" (the default, with a relative tolerance of 1e-6) or "RK4"
+        solver: for Model Exchange: "Dopri" (the default) or "RK4"
+        relative_tolerance: of "Dopri", by default 1e-6, or of the solvers inside FMUs for Co-Simulation, by default those of their
+            default experiments
 
     >>> plan = Plan(PLANT, start_values={"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}, stop_time=0.01, step_size=1e-4,
     ...             output=["i_a"], measures={"last": "i_a", "peak": ("i_a", "max_abs")})
@@ -58,7 +62,7 @@ class Plan:
 
     def __init__(self, fmus, *, connections="by_name", terminals=(), start_values=None, input=None, start_time=None,
                  stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False,
-                 fmi_type=None, solver=None, relative_tolerance=None):  # fmt: skip
+                 fmi_type=None, solver=None, relative_tolerance=None, unit_conversion=True):  # fmt: skip
         files, self._prefix = _files(fmus)
         name = self._name if self._prefix else lambda name: name
         if isinstance(connections, str) and connections != "by_name":
@@ -69,6 +73,7 @@ class Plan:
             "auto_connect": by_name and len(files) > 1,
             "connect": [] if connections == "by_name" else [list(pair) for pair in connections],
             "terminal": [list(pair) for pair in terminals],
+            "no_unit_conversion": not unit_conversion,
             "sequential": bool(sequential),
             **_integration(fmi_type, solver, relative_tolerance, [key for key, _ in files], _is_ssp(files)),
             "start": _number("start_time", start_time),
@@ -99,6 +104,8 @@ class Plan:
         self._hashes = [hashlib.sha256(content).hexdigest() for content in contents]
         self._contents = contents if embed else None
         self._core = self._opened()
+        for note in self._core.notes():
+            warnings.warn(note, stacklevel=3)
 
     def _opened(self):
         key = json.dumps([self._definition, self._hashes, None if self._embed else self._folder], sort_keys=False)

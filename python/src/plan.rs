@@ -67,6 +67,11 @@ impl Plan {
         })
     }
 
+    /// What was noticed while the files were opened and connected.
+    fn notes(&self) -> Vec<String> {
+        self.plan.notes().to_vec()
+    }
+
     /// Run once: time, and (name, values) of each recorded variable.
     #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn simulate<'py>(

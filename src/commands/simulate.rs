@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
-use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System};
+use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
 use fmu_system::ssp::values::{self, Given};
@@ -80,6 +80,9 @@ pub struct Simulate {
     /// Connect every unconnected input to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
+    /// Pass numbers between different units on as they are; without it they are converted by the BaseUnits of both FMUs
+    #[arg(long)]
+    pub no_unit_conversion: bool,
     /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
     #[arg(long, value_name = "INSTANCE=FILE.ssv")]
     pub parameters: Vec<String>,
@@ -129,6 +132,9 @@ pub struct Simulate {
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: that of the default experiment of each]
+    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true, conflicts_with = "me")]
+    pub tolerance: Option<f64>,
     /// Handle events at their time, for FMUs of FMI 3.0 with event mode (Co-Simulation)
     #[arg(long, conflicts_with_all = ["me", "sequential"])]
     pub event_mode: bool,
@@ -216,7 +222,12 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     // An FMU may change the working directory; file names of the command are relative to this one.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
-    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
+    let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
+    if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
+        bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
+    }
+    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
+    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
         bail!("--solver and --rtol are for Model Exchange: add --me");
@@ -228,6 +239,8 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
+    let settings = system.feasible(&settings)?;
+    system.take_notes().iter().for_each(|note| message::note(&printable(note)));
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut CommunicationPoint<'_>| {
@@ -242,7 +255,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         }
         Ok(ControlFlow::Continue(()))
     };
-    let outcome = system.run(&settings, &mut hook);
+    let (recording, outcome) = system.run_keeping(&settings, &mut hook);
     progress.end();
     if args.logging {
         show(&system.take_messages());
@@ -256,11 +269,14 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         std::mem::forget(system);
         bail!("{text}");
     }
-    let recording = outcome?;
+    let failed = match outcome {
+        Err(error) if recording.time.is_empty() => return Err(error.into()),
+        outcome => outcome.err().map(|error| ending(&error, recording.time.last(), settings.step)),
+    };
     journal::writes();
     std::env::set_current_dir(&home)?;
     let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
-    let bad = bad.map(|column| format!("{} is not finite at the end", column.name));
+    let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
     let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
     let written = output::write(recording, for_plot, alone, args, &mut out);
     for text in warnings(&system, &settings) {
@@ -283,6 +299,13 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         Some(time) => Err(Failed(format!("interrupted at {time} s, where the results end")).into()),
         None => Ok(()),
     }
+}
+
+/// Why a run ended early, with advice.
+fn ending(error: &fmu_import::Error, last: Option<&f64>, step: f64) -> String {
+    let advice =
+        if error.is_discard() { format!("; a shorter step may go on: --step {}", 0.5 * step) } else { String::new() };
+    format!("{error}; the results end at {} s{advice}", last.copied().unwrap_or_default())
 }
 
 /// Warns of inputs that keep their start values and of a step that is too long, because FMUs refuse neither.

@@ -74,6 +74,17 @@ fn switch(name: &str, about: &str, group: &str) -> String {
     declare("parameter Boolean", &format!("use_{name}"), &[], "false", about, &annotation)
 }
 
+/// The assertion that an enumeration has the value of the FMU.
+fn unchanged(v: &Variable) -> String {
+    let (start, fmi) = (v.start(), &v.fmi);
+    let item = start.rsplit('.').next().unwrap_or(&start);
+    format!(
+        "  assert({} == {start},\n    \"{fmi} of the FMU is {item}, and no enumeration is sent to it. For another value: \
+         fmu preset FILE.fmu --set {fmi}=VALUE --out NEW.fmu, then import NEW.fmu and write this package again\");\n",
+        v.name
+    )
+}
+
 /// The value of an input that is not connected: its start value, or that of the machine.
 fn constant(v: &Variable, group: &str, disabled_by: &str, machine: &BTreeSet<String>) -> String {
     let value = if machine.contains(&v.fmi) { format!("machine.{}", v.name) } else { v.start() };
@@ -126,14 +137,7 @@ pub(super) fn text(package: &str, about: &str, interface: &Interface, machine: &
         let annotation = format!("Dialog(tab=\"{tab}\", group=\"{group}\")");
         out += &declare(&head, &v.name, &v.modifiers(), &value, &v.about, &annotation);
         if let Kind::Enumeration { .. } = v.kind {
-            let start = v.start();
-            let _ = writeln!(
-                equations,
-                "  assert({name} == {start},\n    \"{fmi} of the FMU is {start}: its import sends no enumeration. For another \
-                 value: fmu preset FILE.fmu --set {fmi}=VALUE --out NEW.fmu, then import NEW.fmu and write this package again\");",
-                name = v.name,
-                fmi = v.fmi,
-            );
+            equations += &unchanged(v);
         }
     }
     for (v, y) in signals.iter().zip(column(signals.len())) {

@@ -1,6 +1,5 @@
 //! Call orders of importers that the standards forbid: the results of the packed FMUs, against the order of the standards in
-//! our importer, which FMPy confirms (`cargo test --test fmpy`). No importer runs here: the orders are replayed from
-//! `order.rs`.
+//! our importer, whose results FMPy confirms. No other importer runs here: the orders are replayed from `order.rs`.
 //!
 //! `cargo test --release --test orders random -- --ignored --nocapture` makes a million calls in random orders; `FMU_CALLS` and
 //! `FMU_SEED` select others.
@@ -75,6 +74,35 @@ fn the_reference_fmus_in_every_order() {
         let standards = if case.fmu == "Feedthrough" { 1..2 } else { 0..2 };
         replay(case, standards, |standard| packed::archive(case.fmu, standard));
     }
+}
+
+/// FMPy with CVode gives the reference of the orders. Straight lines are steps here: FMPy 0.3.32 sets inputs where it looks for
+/// events and not where it reads derivatives.
+#[test]
+fn fmpy_gives_the_reference() {
+    let _one = ONE.lock();
+    let ours = OURS.iter().flat_map(|case| [0, 1].map(|standard| (case, standard, ours(case, standard))));
+    let packed = REFERENCE.iter().flat_map(|case| {
+        let standards = if case.fmu == "Feedthrough" { 1..2 } else { 0..2 };
+        standards.map(move |standard| (case, standard, packed::archive(case.fmu, standard)))
+    });
+    let runs: Vec<_> = ours
+        .chain(packed)
+        .map(|(case, standard, file)| {
+            let steps: Vec<_> = case.inputs.iter().map(|input| case::Input { linear: false, ..*input }).collect();
+            let case = Case { inputs: steps.leak(), ..*case };
+            let inputs = case.inputs.iter().map(
+                |input| serde_json::json!({ "name": input.name, "points": input.points, "boolean": input.boolean }),
+            );
+            serde_json::json!({ "name": format!("{}, FMI {}.0", case.fmu, standard + 2), "file": file,
+                "inputs": inputs.collect::<Vec<_>>(), "outputs": case.outputs,
+                "times": (1..=case.points).map(|k| case.point(k)).collect::<Vec<_>>(), "rows": case.reference(&file),
+                "tolerance": case.tolerance })
+        })
+        .collect();
+    let path = common::python::scratch().join("orders.json");
+    std::fs::write(&path, serde_json::to_vec(&runs).unwrap()).unwrap();
+    common::python::pytest("fmpy", "orders", &["test_orders.py"], &[("FMU_ORDERS", &path)]);
 }
 
 /// In the order of the standards, there is no warning, and inputs to which a tool feeds 0 are named.

@@ -177,3 +177,36 @@ fn times_have_their_places() {
         });
     }
 }
+
+fn real(it: &mut Instance, reference: u32) -> f64 {
+    let mut one = [f64::NAN];
+    it.get_reals(&[reference], &mut one).unwrap();
+    one[0]
+}
+
+/// An FMU that never has to return may forget: one of the public FMUs computes something else where it must not.
+#[test]
+fn only_a_saved_state_can_bring_back_an_earlier_time() {
+    both(|it, version| {
+        for (saved, expected) in [(false, 1.0), (true, 0.0), (false, 1.0)] {
+            let state = saved.then(|| it.get_state().unwrap());
+            assert!(it.do_step(0.0, 1.0).unwrap().is_continue());
+            assert_eq!(real(it, 6).to_bits(), f64::to_bits(expected), "FMI {version}");
+            if let Some(state) = state {
+                it.free_state(state).unwrap();
+            }
+        }
+    });
+}
+
+#[test]
+fn a_pending_step_is_awaited() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut it = instance(folder.path(), 2);
+    it.set_reals(&[0], &[32.0]).unwrap();
+    assert!(it.do_step(0.0, 1.0).unwrap().is_continue());
+    assert_eq!(real(&mut it, 7).to_bits(), 3.0_f64.to_bits());
+    // Discarded in the end, because the FMU ends the simulation.
+    it.set_reals(&[0], &[34.0]).unwrap();
+    assert!(it.do_step(1.0, 1.0).unwrap().is_break());
+}

@@ -4,12 +4,13 @@ use super::parts::Port;
 use super::sequence::Held;
 use super::{Schedule, loops};
 use fmu_import::{Error, Instance, Kind, Values};
+use model_description::Conversion;
 
 /// Source of an input.
 #[derive(Clone)]
 pub(super) enum Source {
-    /// A variable of another instance.
-    Port(Port),
+    /// A variable of another instance, converted to the unit of the target.
+    Port(Port, Option<Conversion>),
     /// A schedule.
     Schedule(Schedule),
 }
@@ -46,13 +47,22 @@ impl Wiring {
         both.feeds.extend(self.feeds.iter().map(|feed| Feed {
             target: feed.target.shifted(instances),
             source: match &feed.source {
-                Source::Port(port) => Source::Port(port.shifted(instances)),
+                Source::Port(port, conversion) => Source::Port(port.shifted(instances), *conversion),
                 schedule @ Source::Schedule(_) => schedule.clone(),
             },
             continuous: feed.continuous,
         }));
         both.held.extend(self.held.iter().map(|(port, held)| (port.shifted(instances), held.clone())));
         both
+    }
+
+    /// Inputs that are fed over time, with the times (s) at which their values jump.
+    pub(super) fn jumps(&self) -> impl Iterator<Item = (&Port, Vec<f64>)> {
+        let feeds = self.feeds.iter().filter_map(|feed| match &feed.source {
+            Source::Schedule(schedule) => Some((&feed.target, schedule.jumps().collect())),
+            Source::Port(..) => None,
+        });
+        feeds.chain(self.held.iter().map(|(target, held)| (target, held.times().collect())))
     }
 
     fn targets(&self) -> impl Iterator<Item = &Port> {
@@ -72,7 +82,7 @@ impl Wiring {
 /// Location of a number during the run.
 #[derive(Clone)]
 enum Place {
-    Read { instance: usize, slot: usize },
+    Read { instance: usize, slot: usize, conversion: Option<Conversion> },
     Schedule(Schedule),
 }
 
@@ -117,6 +127,8 @@ pub(super) struct Unsettled {
     pub(super) reference: u32,
     /// Instance and reference of its source, if both are continuous double-precision numbers.
     pub(super) source: Option<(usize, u32)>,
+    /// Change of the input for a change of what feeds it: not 1 between different units.
+    pub(super) factor: f64,
 }
 
 /// The inputs to be set.
@@ -134,14 +146,13 @@ impl Exchange {
         let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
         // A fed input need not be read: its value is known here.
         let origin = |port: &Port| match fed(port) {
-            Some(Source::Port(source)) => Source::Port(source.clone()),
-            Some(Source::Schedule(schedule)) => Source::Schedule(schedule.clone()),
-            None => Source::Port(port.clone()),
+            Some(source) => source.clone(),
+            None => Source::Port(port.clone(), None),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
         let sources = wiring.feeds.iter().map(|feed| &feed.source).chain(&origins);
         for (index, source) in sources.enumerate() {
-            let Source::Port(port) = source else { continue };
+            let Source::Port(port, _) = source else { continue };
             let traffic = &mut traffic[port.instance];
             if !port.is_fast() {
                 if !traffic.read_singly.contains(port) {
@@ -155,7 +166,10 @@ impl Exchange {
             }
         }
         let place = |traffic: &[Traffic], source: &Source| match source {
-            Source::Port(port) => Place::Read { instance: port.instance, slot: traffic[port.instance].slot(port) },
+            Source::Port(port, conversion) => {
+                let slot = traffic[port.instance].slot(port);
+                Place::Read { instance: port.instance, slot, conversion: *conversion }
+            }
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
         };
         let row = origins.iter().map(|source| place(&traffic, source)).collect();
@@ -280,19 +294,21 @@ impl Exchange {
             }
             for (slot, (reference, place)) in traffic.write.iter().enumerate() {
                 if self.value(place, t).to_bits() != traffic.buffer[slot].to_bits() {
-                    let source = match place {
-                        Place::Read { instance, slot } => {
-                            self.traffic[*instance].read.get(*slot).map(|r| (*instance, *r))
+                    let (source, factor) = match place {
+                        Place::Read { instance, slot, conversion } => {
+                            let source = self.traffic[*instance].read.get(*slot).map(|r| (*instance, *r));
+                            (source, conversion.map_or(1.0, |conversion| conversion.factor))
                         }
-                        Place::Schedule(_) => None,
+                        Place::Schedule(_) => (None, 1.0),
                     };
-                    let continuous = slot < traffic.continuous[0];
-                    all.push(Unsettled { index, slot, reference: *reference, source: source.filter(|_| continuous) });
+                    let source = source.filter(|_| slot < traffic.continuous[0]);
+                    all.push(Unsettled { index, slot, reference: *reference, source, factor });
                 }
             }
             for ((port, place), old) in traffic.write_singly.iter().zip(&traffic.singles) {
                 if self.value(place, t).to_bits() != old.to_bits() {
-                    all.push(Unsettled { index, slot: usize::MAX, reference: port.reference, source: None });
+                    let (slot, reference) = (usize::MAX, port.reference);
+                    all.push(Unsettled { index, slot, reference, source: None, factor: 1.0 });
                 }
             }
         }
@@ -396,7 +412,10 @@ impl Exchange {
 
     fn value(&self, place: &Place, t: f64) -> f64 {
         match place {
-            Place::Read { instance, slot } => self.traffic[*instance].values[*slot],
+            Place::Read { instance, slot, conversion } => {
+                let value = self.traffic[*instance].values[*slot];
+                conversion.map_or(value, |conversion| conversion.apply(value))
+            }
             Place::Schedule(schedule) => match self.since {
                 None => schedule.at(t),
                 Some(since) => schedule.held(since, t),

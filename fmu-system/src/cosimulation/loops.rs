@@ -73,7 +73,7 @@ fn matrix(
         let has = instance.description().model_exchange.as_ref().is_some_and(Interface::has_directional_derivatives);
         if has && instance.directional_derivative(&unknowns, &[known.reference], &[1.0], &mut column).is_ok() {
             for ((i, _), slope) in fed.iter().zip(&column) {
-                rows[*i][k] = -slope;
+                rows[*i][k] = -inputs[*i].factor * slope;
             }
         } else {
             let mut moved = u.to_vec();

@@ -55,4 +55,4 @@ pub use point::{CommunicationPoint, Ended};
 pub use recording::{Column, Recording, TextColumn, cell, item};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
-pub use system::System;
+pub use system::{Crossing, System, Units};

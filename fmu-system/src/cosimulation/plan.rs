@@ -85,8 +85,8 @@ impl System {
     ///
     /// # Errors
     /// The settings make no sense.
-    pub fn into_plan(self, settings: &Settings) -> Result<SystemPlan, Error> {
-        let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
+    pub fn into_plan(mut self, settings: &Settings) -> Result<SystemPlan, Error> {
+        let grid = self.grid(settings)?;
         let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let columns = self.columns().collect();
         let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });

@@ -25,7 +25,14 @@ pub(super) fn simulate(
     method.check(&kinds, settings.sequential)?;
     exchange.begin();
     for instance in instances.iter_mut() {
-        instance.setup(settings.start, Some(settings.stop))?;
+        let tolerance = match method {
+            // Of the algorithms inside an FMU that our solver calls.
+            Method::ModelExchange(integration) if instance.kind() == Kind::ModelExchange => {
+                integration.solver.tolerance()
+            }
+            _ => grid.tolerance.or(instance.description().default_experiment.tolerance),
+        };
+        instance.setup_with(settings.start, Some(settings.stop), tolerance)?;
         instance.enter_initialization()?;
     }
     // An initial output may depend on an input through any number of FMUs.
@@ -100,24 +107,39 @@ impl System {
     pub fn run(
         &mut self,
         settings: &Settings,
-        mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
+        hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> Result<Recording, Error> {
-        let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
-        let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
+        let (recording, outcome) = self.run_keeping(settings, hook);
+        outcome.map(|()| recording)
+    }
+
+    /// As [`run`](Self::run); the recording ends before an error.
+    pub fn run_keeping(
+        &mut self,
+        settings: &Settings,
+        mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
+    ) -> (Recording, Result<(), Error>) {
         let mut recording = Recording::new(self.columns());
         recording.texts =
             self.texts.iter().map(|(_, name)| TextColumn { name: name.clone(), values: vec![] }).collect();
+        let grid = match self.grid(settings) {
+            Ok(grid) => grid,
+            Err(error) => return (recording, Err(error)),
+        };
+        let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let texts = &self.texts;
         let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
-            recording.push(point.time, point.values);
-            for ((port, _), column) in texts.iter().zip(&mut recording.texts) {
+            // Texts first: where one cannot be read, no column is longer than another.
+            let mut cells = Vec::with_capacity(texts.len());
+            for (port, _) in texts {
                 let (_, count) = port.element.unwrap_or((0, 1));
-                let value = point.instances[port.instance].get_at(port.base, port.reference, count)?;
-                column.values.push(value.cell());
+                cells.push(point.instances[port.instance].get_at(port.base, port.reference, count)?.cell());
             }
+            recording.push(point.time, point.values);
+            recording.texts.iter_mut().zip(cells).for_each(|(column, cell)| column.values.push(cell));
             hook(point)
-        })?;
-        recording.ended_by = ended.by;
-        Ok(recording)
+        });
+        let outcome = ended.map(|ended| recording.ended_by = ended.by);
+        (recording, outcome)
     }
 }

@@ -119,6 +119,15 @@ impl Schedule {
         self.at(if self.linear { t } else { since })
     }
 
+    /// Times (s) at which the value jumps.
+    pub(super) fn jumps(&self) -> impl Iterator<Item = f64> {
+        let linear = self.linear;
+        let jumps = move |pair: &&[(f64, f64)]| {
+            pair[0].1.to_bits() != pair[1].1.to_bits() && (!linear || pair[1].0 <= pair[0].0)
+        };
+        self.points.windows(2).filter(jumps).map(|pair| pair[1].0)
+    }
+
     /// Time (s) of the first point after `t`.
     pub(super) fn next_point(&self, t: f64) -> Option<f64> {
         self.points.get(last_before(&self.points, t)).map(|(time, _)| *time)

@@ -32,6 +32,16 @@ impl Default for Solver {
     }
 }
 
+impl Solver {
+    /// Relative tolerance, if the step is adaptive.
+    pub(crate) fn tolerance(&self) -> Option<f64> {
+        match self {
+            Self::Rk4 => None,
+            Self::Dopri { rtol } => Some(*rtol),
+        }
+    }
+}
+
 /// The reason why the driver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
