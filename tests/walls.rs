@@ -272,6 +272,7 @@ const SHARED: &[(&str, &[&str])] = &[
             "Field",
             "Identified",
             "Limit",
+            "Measured",
             "Motion",
             "Outcome",
             "Point",

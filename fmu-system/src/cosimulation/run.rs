@@ -113,7 +113,7 @@ impl System {
         outcome.map(|()| recording)
     }
 
-    /// As [`run`](Self::run); the recording ends before an error.
+    /// Like [`run`](Self::run); the recording ends before an error.
     pub fn run_keeping(
         &mut self,
         settings: &Settings,
