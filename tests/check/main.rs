@@ -1,4 +1,5 @@
-//! `fmu check` on our own archives, on those of other tools, and on files that are no FMUs. `fmu-check/tests/faults/` has a fault for each check.
+//! `fmu check` on our own archives, on those of other tools, and on files other than FMUs. `fmu-check/tests/faults/` has a
+//! fault for each check.
 #![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 
 #[path = "../common/mod.rs"]
@@ -17,7 +18,7 @@ use findings::{check, check_within, listed, violated};
 use fmu_check::Verdict;
 use std::path::Path;
 
-/// What runs the probes.
+/// The program that runs the probes.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_fmu");
 
 /// Our own archives pass every check; a plain build of this machine, which needs its C library and libgcc_s, all but B03 and B04.
@@ -36,7 +37,7 @@ fn our_own_archives_violate_nothing() {
     }
 }
 
-/// The page has the list that the program has.
+/// The page has the program's list.
 #[test]
 fn the_page_has_the_list() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/check.md");
