@@ -4,7 +4,7 @@
 //! has an error of -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero, the current crosses zero within
 //! the dead time (ripple, switch capacitances) and the error falls linearly: -u_dead i / i_zero.
 //!
-//! [`modulation`](drive_base::modulation) computes the voltages. The dead-time model is the field's usual mean-value model;
+//! [`modulation`](drive_base::modulation) computes the voltages. This is the usual mean-value model of the dead time;
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};

@@ -1,4 +1,4 @@
-//! The model `PmsmPlant`: inverter, machine and mechanics, integrated with held inputs.
+//! The model `PmsmPlant`: inverter, machine and mechanics, integrated with constant inputs.
 
 use crate::counters::Point;
 use crate::flux_map;
@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PmsmPlant {
-    /// Inputs, held over a communication step.
+    /// Inputs, constant over a communication step.
     pub inputs: PlantInputs,
     /// Parameters; a step never changes them.
     pub parameters: PlantParameters,
@@ -40,9 +40,9 @@ pub struct PmsmPlant {
     /// In Model Exchange, the last point of the importer's solution, and the counts of earlier ones.
     pub(super) point: Point,
     pub(super) kept: Kept<(Energy, Point)>,
-    /// Temperatures and the machine at them, held over a step.
+    /// Temperatures and the machine at them, constant over a step.
     pub(super) warm: Warm,
-    /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
+    /// Current (A) at the terminals minus that of the flux linkage, at the end of a step.
     pub(super) by_iron: Dq,
 }
 
@@ -58,7 +58,7 @@ impl PmsmPlant {
         }
     }
 
-    /// The current (A) that the flux linkage of this `motor` has while the diodes block, at the mechanical `speed` (rad/s).
+    /// The current (A) of the flux linkage of this `motor` while the diodes block, at the mechanical `speed` (rad/s).
     #[inline]
     pub(super) fn idle_current<S: Scalar>(&self, motor: &Motor<S>, speed: S) -> Vector<Rotor, S> {
         let iron = &self.parameters.iron;
@@ -89,7 +89,7 @@ impl PmsmPlant {
         (at, i)
     }
 
-    /// The current (A) at the terminals less that of the flux linkage.
+    /// The current (A) at the terminals minus that of the flux linkage.
     pub(super) fn current_by_iron(&self) -> Dq {
         let (_, i) = self.reached_with_iron();
         i - self.reached().i
@@ -150,7 +150,7 @@ impl PmsmPlant {
         (speed, 3.0_f64.sqrt() * psi_M * (f64::from(*n_p) * speed).abs())
     }
 
-    /// What the sensors of a controller measure: the same as in the outputs, to the last bit.
+    /// Measured values for a controller: bit for bit those of the outputs.
     #[inline]
     pub fn measured(&self) -> Measured {
         let Instant { i, speed, angle, axis, .. } = self.reached();
@@ -264,8 +264,8 @@ impl Warns for PmsmPlant {
         if map.used && !map.holds(psi - Dq::new(self.warm.motor.psi_M, 0.0)) {
             log.warn("flux_map", || {
                 format!(
-                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map: the inductances of its edge go on there; limit the current, \
-                     or fit a map to a table of greater currents",
+                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map, which continues with the inductances of its edge; limit the \
+                     current, or fit a map to a table with larger currents",
                     psi.d(),
                     psi.q()
                 )
@@ -279,8 +279,8 @@ mod tests {
     use super::*;
     use drive_base::frame::AlphaBeta;
 
-    /// Current (A) of `motor` after each of 20 samples of 0.1 ms in steps of `h`, at the `speed` (rad/s), with a voltage that
-    /// jumps at every sample.
+    /// Current (A) of `motor` after each of 20 samples of 0.1 ms in steps of `h` (s), at the `speed` (rad/s), with a voltage
+    /// that jumps at every sample.
     pub(super) fn currents(motor: &Motor, speed: f64, h: f64) -> Vec<Dq> {
         let mut block = Block::<PmsmPlant>::default();
         block.model.parameters.motor = motor.clone();
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn a_step_of_a_sample_period_is_as_good_as_64() {
-        // With two steps in rotor axes instead of one in stator axes, the errors are 8.5, 0.9 and 92 uA.
+        // Two steps in rotor axes instead of one in stator axes give errors of 8.5, 0.9 and 92 uA.
         let servo = Motor { n_p: 4, R_s: 0.2, L_d: 1.2e-3, L_q: 1.2e-3, psi_M: 0.09 };
         // At 20 000 rpm, the rotor turns 0.84 rad in a sample: four steps.
         for (motor, rpm, allowed) in [
@@ -350,7 +350,7 @@ mod tests {
 
     #[test]
     fn dead_time_stops_a_current_at_zero() {
-        // A voltage below u_dead, 6.5 V, in every leg drives no more than the zone's current, however narrow the zone is.
+        // A voltage below u_dead, 6.5 V, in every leg drives at most the zone's current, however narrow the zone is.
         for i_zero in [0.1, 1e-3] {
             let mut block = Block::<PmsmPlant>::default();
             let inverter = &mut block.model.parameters.inverter;

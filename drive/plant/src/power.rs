@@ -8,17 +8,17 @@
 //!
 //! u_x is the voltage that the leg supplies on average over a PWM period, after the hexagon limit and the dead-time
 //! loss, or the voltage of its diodes while the gates are off, but before the drop of its devices
-//! ([`losses`](crate::losses)). With a switching loss, i_dc is greater by p_sw / u_dc. The magnetic energy is
+//! ([`losses`](crate::losses)). A switching loss increases i_dc by p_sw / u_dc. The magnetic energy is
 //! 0.75 (L_d i_d^2 + L_q i_q^2) without saturation. With an imposed speed, tau_shaft is tau_e minus friction and the
 //! kinetic energy belongs to the drive train; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
-//! With a held voltage and a turning rotor, power and torque change within the step, so an instantaneous value does not
-//! represent them. The outputs are therefore means over the plant's last step, integrated with the state by the same
-//! method; `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
+//! With a constant voltage and a turning rotor, power and torque change within the step, so an instantaneous value does not
+//! represent them. The outputs are therefore means over the plant's last step, integrated by the same method as the state;
+//! `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
 //! tau_shaft over the angle of its shaft receives `energy_mech`. Before the first step, the powers are the initial values.
 //! In Model Exchange, where the importer integrates, the powers and tau_shaft are those of the instant, and the energies are
-//! counted over the importer's steps ([`counters`](crate::counters)). i_dc is also defined for u_dc = 0 V: the link still carries
-//! the current of the legs connected to it; in this case it is the value at the end of the step.
+//! counted over the importer's steps ([`counters`](crate::counters)). i_dc is also defined for u_dc = 0 V, where the link
+//! still carries the current of the legs connected to it: it is then the value at the end of the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
 //! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.
@@ -72,7 +72,7 @@ impl Powers {
         Self { i_dc, p_in, p_mech, p_loss, losses: losses.map(|e| e * rate), tau_shaft }
     }
 
-    /// The mean of this value and `last`, which has the weight `share` (0..1).
+    /// The mean of this value and `last`, with the weight `share` (0..1) on `last`.
     #[inline]
     pub fn with(self, last: Self, share: f64) -> Self {
         let mean = |a: f64, b: f64| a + (b - a) * share;
@@ -116,7 +116,7 @@ pub struct Energy {
 }
 
 impl From<Powers> for Energy {
-    /// What a second at these powers passes on.
+    /// The energies of one second at these powers.
     fn from(powers: Powers) -> Self {
         Self { r#in: powers.p_in, mech: powers.p_mech, loss: powers.p_loss }
     }
@@ -177,7 +177,7 @@ pub const ENERGY: &Table<Energy> = table![
         "in",
         &JOULE,
         "Energy from the DC link since the start, the integral of p_in; in Model Exchange up to the last completed integrator step \
-                 or event, as exact as in Co-Simulation with inputs that are held or ramp between two of them",
+                 or event, as exact as in Co-Simulation if inputs are constant or linear between two of them",
         |e| &mut e.r#in,
     ),
     E::output(

@@ -29,7 +29,7 @@ impl State {
     }
 
     /// For messages.
-    pub(super) fn tell(&self) -> String {
+    pub(super) fn described(&self) -> String {
         let Self { psi, speed, angle, .. } = self;
         format!("psi_d = {} Wb, psi_q = {} Wb, speed = {speed} rad/s, angle = {angle} rad", psi.d(), psi.q())
     }
@@ -41,7 +41,7 @@ pub(super) fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
     Axis::at(f64::from(motor.n_p) * angle)
 }
 
-/// The state at an instant, with or without its change.
+/// The state at an instant; as [`Dual`](fmu_core::Dual) numbers, with its change.
 pub(super) struct Instant<S = f64> {
     /// Stator flux linkage in Wb.
     pub(super) psi: Vector<Rotor, S>,

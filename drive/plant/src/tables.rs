@@ -23,7 +23,7 @@ pub struct PlantParameters {
     pub motor: Motor,
     /// Its saturation.
     pub saturation: Saturation,
-    /// A map in place of inductances and saturation.
+    /// A map instead of inductances and saturation.
     pub flux_map: FluxMap,
     /// Inertia and friction.
     pub mechanics: Mechanics,
@@ -40,7 +40,7 @@ pub struct PlantParameters {
 }
 
 impl PlantParameters {
-    /// How the current follows from the flux linkage.
+    /// The relation between current and flux linkage.
     #[inline]
     pub fn magnetics(&self) -> Magnetics<'_> {
         if self.flux_map.used {
@@ -52,7 +52,7 @@ impl PlantParameters {
         }
     }
 
-    /// Whether the inductances alone give the current.
+    /// Whether the current follows from the inductances alone.
     #[inline]
     pub fn is_linear(&self) -> bool {
         self.saturation.is_none() && !self.flux_map.used
@@ -179,7 +179,7 @@ pub const TABLE: &Table<Block<PmsmPlant>> = table![
     .optional(),
     V::boolean_input(
         "asc",
-        "Active short circuit: all upper or all lower transistors conduct, whatever enable says",
+        "Active short circuit: all upper or all lower transistors conduct, regardless of enable",
         |m| &mut m.model.inputs.asc,
     )
     .optional(),

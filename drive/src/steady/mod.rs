@@ -5,19 +5,19 @@
 //!                  -> flux linkage and its current, iron and saturation included     psi   flux
 //!                  -> u = R i_s + j w psi, copper, iron and friction                       operating
 //!                  -> conduction and switching, means over a period in closed form         plant::losses
-//!                  -> what the voltage of the link cannot give is taken off                voltage
+//!                  -> reduced to the voltage of the link                                  voltage
 //! torque at the shaft -> torque reference                                                  search
-//! losses -> temperatures that stay -> losses                                               heat
+//! losses -> steady temperatures -> losses                                                 heat
 //! ```
 //!
 //! [`Steady::new`] takes the parameters of plant and controller, [`Steady::at`] a [`Condition`]: speed, link voltage and
 //! temperatures. There, [`At::by_reference`] gives the [`Point`] of a torque reference, [`At::by_shaft`] that of a torque at the
-//! shaft, [`At::by_current`] that of a current, [`At::ends`] those of least and greatest torque, which over the speeds are the
-//! envelope, and [`At::off`] that with the gates off. [`Steady::warmed`] finds the temperatures too.
+//! shaft, [`At::by_current`] that of a current, [`At::ends`] those of minimum and maximum torque, which over the speeds form the
+//! envelope, and [`At::off`] that with the gates off. [`Steady::warmed`] also finds the temperatures.
 //!
-//! The controller's estimates of angle and speed are the true ones, and nothing is injected. Dead time loses no power. The
-//! means of the inverter are those of sinusoidal currents. [`Steady::new`] has a controller without a sample period;
-//! [`Steady::sampled`] counts what holding the voltage over T_s does.
+//! The controller's estimates of angle and speed are exact, and nothing is injected. Dead time loses no power. The means of
+//! the inverter are those of sinusoidal currents. [`Steady::new`] has a controller without a sample period;
+//! [`Steady::sampled`] accounts for the voltage that is constant over T_s.
 //!
 //! Units SI, peak-valued vectors; torque and power have the motor's sign.
 
@@ -37,7 +37,7 @@ use drive_plant::tables::PlantParameters;
 use drive_plant::thermal::Temperatures;
 use serde::{Deserialize, Serialize};
 
-/// `x` within the limits; limits that are not numbers do not stop the program.
+/// `x` within the limits; unlike `clamp`, it does not panic if the limits are NaN.
 #[inline]
 pub(crate) fn within(x: f64, [low, high]: [f64; 2]) -> f64 {
     x.max(low).min(high)
@@ -45,7 +45,7 @@ pub(crate) fn within(x: f64, [low, high]: [f64; 2]) -> f64 {
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 
-/// A drive whose steady state is asked for.
+/// A drive in steady state.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Steady {
     /// The true machine, inverter and shaft.
@@ -54,11 +54,11 @@ pub struct Steady {
     pub controller: ControllerParameters,
     /// Computed from the controller's parameters.
     settled: Settled,
-    /// The voltage is held over the controller's sample period.
+    /// The voltage is constant over the controller's sample period.
     sampled: bool,
 }
 
-/// Where the drive operates, besides its torque.
+/// Operating condition, apart from the torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Condition {
     /// Mechanical speed in rad/s.
@@ -77,17 +77,17 @@ impl Steady {
         drive
     }
 
-    /// The drive with a controller that holds its voltage over the sample period: as `PmsmDrive` runs it.
+    /// The drive with a voltage that is constant over the sample period, as in `PmsmDrive`.
     pub fn sampled(self) -> Self {
         Self { sampled: true, ..self }
     }
 
-    /// Computes again what follows from the parameters; to be called after they have changed.
+    /// Updates derived values; call it after changing the parameters.
     pub fn derive(&mut self) {
         self.settled = Settled::new(&self.controller);
     }
 
-    /// What follows from the controller's parameters.
+    /// Values derived from the controller's parameters.
     pub fn settled(&self) -> &Settled {
         &self.settled
     }
@@ -103,8 +103,8 @@ impl Steady {
         At::new(self, condition)
     }
 
-    /// The speed (mechanical, rad/s) up to which the controller's estimates give its greatest torque, on a link of `u_dc` (V).
-    /// Without field weakening in use, with the whole voltage of the link.
+    /// Maximum speed (mechanical, rad/s) at which the controller's estimates give its full torque, on a link of `u_dc` (V);
+    /// without field weakening, with the full voltage of the link.
     pub fn base_speed(&self, u_dc: f64) -> f64 {
         let par = &self.controller;
         let share = if par.weakening.used { par.weakening.k_u } else { 1.0 };

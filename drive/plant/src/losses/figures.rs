@@ -1,5 +1,5 @@
-//! The loss split of three machines at eleven operating points, against figures of an independent calculation with the
-//! closed forms of the inverter (the reference, section 2): 0.05 % of each loss and 1e-4 of the efficiency.
+//! The loss split of three machines at eleven operating points, against an independent calculation with the closed forms of
+//! the inverter: 0.05 % of each loss and 1e-4 of the efficiency.
 
 #[path = "../../tests/lossy/mod.rs"]
 mod lossy;
@@ -35,7 +35,7 @@ impl Drive {
         for k in 0..count {
             let axis = Axis::<Rotor>::at(TAU * (f64::from(k) + 0.37) / f64::from(count));
             let (wanted, ideal) = (axis.to_stator(i_s), axis.to_stator(i_s * motor.R_s + psi.turned() * w));
-            // The current controller supplies the drop too.
+            // The current controller also supplies the drop.
             let mut u = ideal;
             for _ in 0..20 {
                 u = ideal + conduction.drop(u, wanted);
@@ -46,7 +46,7 @@ impl Drive {
             let circuit = Circuit { machine, path, shaft };
             let Rates { p_in, tau_given, losses, d_psi, .. } = circuit.rates(axis, axis.to_stator(psi), speed);
             let p_mech = tau_given * speed;
-            // Steady: d psi/dt = j w psi in stator axes, but for the resistance of the devices times G drop.
+            // Steady state: d psi/dt = j w psi in stator axes, except for the resistance of the devices times G drop.
             let rest: AlphaBeta = d_psi - axis.to_stator(psi.turned() * w);
             assert!(rest.magnitude() < 1e-3, "{rest:?} V");
             let powers = [p_in, p_mech, losses.cu, losses.iron, losses.cond, losses.sw, losses.friction];

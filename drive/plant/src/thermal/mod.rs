@@ -1,4 +1,4 @@
-//! Temperatures: where they come from, what they change in the machine, and the heat that the losses make.
+//! Temperatures: their sources, their effect on the machine, and the heat of the losses.
 //!
 //! ```text
 //! R_s(T) = R_s (1 + alpha_R (T_winding - T_ref))          psi_M(T) = psi_M (1 + alpha_psi (T_magnet - T_ref))
@@ -9,14 +9,14 @@
 //! | `thermal.mode` | temperatures | `Q_coolant` |
 //! |---|---|---|
 //! | Constant | `thermal.T_start` | all losses, at once |
-//! | Network | [`network`], which starts at `thermal.T_start` | what the network gives to the coolant |
+//! | Network | [`network`], which starts at `thermal.T_start` | heat flow from the network to the coolant |
 //! | Imposed | the inputs `T_winding_imposed` ... | 0: the heat leaves through the four parts |
 //!
-//! Temperatures, and with them R_s(T) and psi_M(T), hold over a step of the plant ([`warm`]). The controller keeps its own
-//! estimates of both. When psi_M changes by Delta, the stored energy changes by 1.5 i_d Delta at constant flux linkage:
-//! mJ over a warm-up, and in no loss.
+//! Temperatures, and with them R_s(T) and psi_M(T), are constant over a step of the plant ([`warm`]). The controller has
+//! separate estimates of both. When psi_M changes by Delta, the stored energy changes by 1.5 i_d Delta at constant flux
+//! linkage: mJ over a warm-up, which no loss contains.
 //!
-//! The coefficients are those of the field: copper 3.93e-3 /K, NdFeB -1.1e-3 /K, SmCo -0.4e-3 /K, ferrite -2e-3 /K at
+//! Usual coefficients: copper 3.93e-3 /K, NdFeB -1.1e-3 /K, SmCo -0.4e-3 /K, ferrite -2e-3 /K at
 //! 20 degC. T in K, Q in W, positive out of the part.
 
 pub mod network;
@@ -31,14 +31,14 @@ use fmu_core::{Fault, Field, Part, Row, Scalar, Table, enumeration, table};
 use network::{NETWORK, Network};
 use serde::{Deserialize, Serialize};
 
-/// 20 degC in K: where inputs, parameters and temperatures start.
+/// 20 degC in K: the start value of inputs, parameters and temperatures.
 const T_20: f64 = 293.15;
 
 enumeration! {
     /// Where the temperatures come from; values never change.
     #[derive(Serialize, Deserialize)]
     pub enum ThermalMode("ThermalMode", "Where the temperatures come from") {
-        1 Constant "thermal.T_start, whatever the losses";
+        1 Constant "thermal.T_start, regardless of the losses";
         2 Network "The thermal network of machine and inverter with the coolant at T_coolant; Co-Simulation only";
         3 Imposed "The inputs T_winding_imposed, T_stator_imposed, T_magnet_imposed, T_inverter_imposed";
     }
@@ -96,7 +96,7 @@ impl Temperatures {
         Self { winding: T, stator: T, magnet: T, inverter: T }
     }
 
-    /// Each of them and of `other` by `f`.
+    /// Applies `f` to each and that of `other`.
     fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> Temperatures<T> {
         Temperatures {
             winding: f(self.winding, other.winding),
@@ -108,19 +108,19 @@ impl Temperatures {
 }
 
 impl<S: Scalar> Temperatures<S> {
-    /// Each of them by `f`.
+    /// Applies `f` to each.
     pub fn map<T>(&self, f: impl Fn(S) -> T) -> Temperatures<T> {
         let &Self { winding, stator, magnet, inverter } = self;
         Temperatures { winding: f(winding), stator: f(stator), magnet: f(magnet), inverter: f(inverter) }
     }
 }
 
-/// Heat in W, positive out of the part that makes it.
+/// Heat in W, positive out of the part that produces it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Heat<S = f64> {
     /// From the winding.
     pub winding: S,
-    /// From the stator iron, with that of friction.
+    /// From the stator iron, including that of friction.
     pub iron: S,
     /// From the rotor with its magnets.
     pub magnet: S,
@@ -131,7 +131,7 @@ pub struct Heat<S = f64> {
 }
 
 impl<S: Scalar> Heat<S> {
-    /// Each of them by `f`.
+    /// Applies `f` to each.
     pub fn map<T>(&self, f: impl Fn(S) -> T) -> Heat<T> {
         let &Self { winding, iron, magnet, inverter, coolant } = self;
         Heat { winding: f(winding), iron: f(iron), magnet: f(magnet), inverter: f(inverter), coolant: f(coolant) }
@@ -141,7 +141,7 @@ impl<S: Scalar> Heat<S> {
 /// Inputs in K.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ThermalInputs<S = f64> {
-    /// Temperature of the coolant, of the network.
+    /// Temperature of the coolant, for the network.
     pub coolant: S,
     /// Imposed temperatures.
     pub imposed: Temperatures<S>,
@@ -154,13 +154,13 @@ impl Default for ThermalInputs {
 }
 
 impl ThermalInputs {
-    /// Each of them and of `other` by `f`.
+    /// Applies `f` to each and that of `other`.
     pub fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> ThermalInputs<T> {
         ThermalInputs { coolant: f(self.coolant, other.coolant), imposed: self.imposed.zip(&other.imposed, f) }
     }
 }
 
-/// A value at the temperature `T` (K) over its value at `T_ref` (K), with the coefficient `alpha` (1/K): exactly 1 for
+/// Ratio of a value at the temperature `T` (K) to that at `T_ref` (K), with the coefficient `alpha` (1/K): exactly 1 for
 /// alpha = 0.
 #[inline]
 pub fn factor<S: Scalar>(alpha: f64, T: S, T_ref: f64) -> S {
@@ -168,7 +168,7 @@ pub fn factor<S: Scalar>(alpha: f64, T: S, T_ref: f64) -> S {
 }
 
 impl Thermal {
-    /// The `motor` of the parameters with these temperatures.
+    /// The `motor` of the parameters at these temperatures.
     #[inline]
     pub fn motor<S: Scalar>(&self, motor: &Motor, at: &Temperatures<S>) -> Motor<S> {
         let &Motor { n_p, R_s, L_d, L_q, psi_M } = motor;
@@ -177,7 +177,7 @@ impl Thermal {
         Motor { n_p, R_s: resistance * R_s, L_d, L_q, psi_M: magnet * psi_M }
     }
 
-    /// The heat of the parts with these `losses`; that to the coolant is all of it.
+    /// The heat of the parts with these `losses`; the coolant receives all of it.
     #[inline]
     pub fn heat<S: Scalar>(&self, losses: &Losses<S>) -> Heat<S> {
         let magnet = losses.iron * self.rotor_share;
@@ -314,7 +314,7 @@ pub const THERMAL_OUTPUTS: &Table<PlantOutputs> = table![
     O::output(
         "Q_coolant",
         &WATT,
-        "Heat to the coolant, out of the FMU: Constant all losses, Network what the network gives, Imposed 0",
+        "Heat to the coolant, out of the FMU: Constant all losses, Network the heat flow from the network, Imposed 0",
         |o| &mut o.heat.coolant,
     )
     .mean(),

@@ -1,4 +1,4 @@
-//! How temperatures act in [`PmsmPlant`]: what holds over a step, and its change at the step's ends.
+//! Effect of the temperatures in [`PmsmPlant`]: constant over a step, with changes at its ends.
 //!
 //! A step begins with the imposed temperatures and ends with those of the network. In Model Exchange, the imposed
 //! temperatures act at once, and the derivatives depend on them.
@@ -15,14 +15,14 @@ use drive_base::motor::Motor;
 use fmu_core::{Fault, Interface, Scalar};
 use serde::{Deserialize, Serialize};
 
-/// Temperatures, and the machine that has them.
+/// Temperatures, and the machine at them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Warm {
     /// In K.
     pub at: Temperatures,
-    /// Resistance and permanent-magnet flux linkage are those at the temperatures.
+    /// With the resistance and the permanent-magnet flux linkage at these temperatures.
     pub motor: Motor,
-    /// Reciprocals of its inductances.
+    /// Reciprocals of the inductances.
     inverse: Inverse,
     /// [`PlantParameters::least_inductance`] in H.
     pub(crate) least_inductance: f64,
@@ -38,9 +38,9 @@ impl Default for Warm {
     }
 }
 
-/// What to do when the network leaves the possible temperatures.
-const RUNAWAY: &str = "the network became too hot; reduce the current, or raise thermal.G_ws and thermal.G_sc: with the \
-                       current held, the winding runs away where winding.alpha p_cu(T_ref) (1/G_ws + 1/G_sc) reaches 1";
+/// Remedy when the network leaves the possible temperatures.
+const RUNAWAY: &str = "the network became too hot; reduce the current, or raise thermal.G_ws and thermal.G_sc: at constant \
+                       current, the winding runs away where winding.alpha p_cu(T_ref) (1/G_ws + 1/G_sc) reaches 1";
 
 impl PmsmPlant {
     /// The temperatures (K) under these `inputs`.
@@ -68,7 +68,7 @@ impl PmsmPlant {
         Machine::with(&self.warm.motor, self.parameters.magnetics(), self.warm.inverse)
     }
 
-    /// The machine of [`motor`](Self::motor), whose inductances no temperature changes.
+    /// The machine of [`motor`](Self::motor); the inductances do not depend on the temperature.
     #[inline]
     pub(crate) fn machine_of<S: Scalar>(&self, motor: &Motor<S>) -> Machine<'_, S> {
         Machine::with(motor, self.parameters.magnetics(), self.warm.inverse)
@@ -80,14 +80,14 @@ impl PmsmPlant {
         self.parameters.thermal.heat_at(inputs.thermal.coolant, at, losses)
     }
 
-    /// From now on, the parts have these temperatures (K).
+    /// Sets the temperatures (K) of the parts.
     pub(crate) fn take(&mut self, at: Temperatures) {
         let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
         let (inverse, ideal) = (Inverse::of(&motor), losses::ideal(&self.parameters));
         self.warm = Warm { at, motor, inverse, ideal, ..self.warm };
     }
 
-    /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.
+    /// The temperatures (K) given by parameters and `inputs`, and the names of those of winding and magnets.
     fn given(&self, inputs: &PlantInputs) -> (Temperatures, [&'static str; 2]) {
         match self.parameters.thermal.mode {
             ThermalMode::Imposed => (inputs.thermal.imposed, ["T_winding_imposed", "T_magnet_imposed"]),
@@ -95,13 +95,13 @@ impl PmsmPlant {
         }
     }
 
-    /// The temperatures at the start act.
+    /// Sets the temperatures at the start.
     pub(crate) fn start_temperatures(&mut self) {
         self.warm.least_inductance = self.parameters.least_inductance();
         self.take(self.given(&self.inputs).0);
     }
 
-    /// The imposed temperatures act from the beginning of a step on.
+    /// Applies the imposed temperatures at the beginning of a step.
     #[inline(never)]
     pub(crate) fn impose(&mut self) -> Result<(), Fault> {
         let at = self.inputs.thermal.imposed;
@@ -112,7 +112,7 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// The network passes the step of `h` (s) with its mean losses.
+    /// Advances the network by a step of `h` (s) with its mean losses.
     #[inline(never)]
     pub(crate) fn warm_up(&mut self, h: f64) -> Result<(), Fault> {
         let thermal = &self.parameters.thermal;
@@ -123,8 +123,8 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// The temperatures (K) change between two steps. The flux linkage cannot jump, but a machine whose diodes block has
-    /// none besides that of its magnets.
+    /// Changes the temperatures (K) between two steps. The flux linkage cannot jump, but while the diodes block it is that of
+    /// the magnets.
     fn change(&mut self, at: Temperatures) {
         self.take(at);
         if self.blocked {
@@ -132,7 +132,7 @@ impl PmsmPlant {
         }
     }
 
-    /// Refuses given temperatures that cannot be.
+    /// Refuses impossible temperatures.
     pub(crate) fn judge_temperatures(&self, inputs: &PlantInputs) -> Result<(), Fault> {
         let (at, names) = self.given(inputs);
         let remedy = "temperatures are in K (20 degC are 293.15 K); correct the temperature or the coefficient";
