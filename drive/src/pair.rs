@@ -1,7 +1,8 @@
 //! Plant and controller as a pair. They exchange values as an importer does: read all outputs, set all inputs, step both
 //! (Jacobi). The packed FMUs must match this native reference bit for bit.
 
-use crate::{PmsmPlant, SensorlessController};
+use drive_control::model::SensorlessController;
+use drive_plant::PmsmPlant;
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 use serde::{Deserialize, Serialize};
 

@@ -20,13 +20,15 @@ use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::idle;
 use crate::pair::Pair;
-#[cfg(doc)]
-use crate::{PmsmPlant, SensorlessController};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
 use drive_control::commissioning::IDENTIFIED;
+#[cfg(doc)]
+use drive_control::model::SensorlessController;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
+#[cfg(doc)]
+use drive_plant::PmsmPlant;
 use drive_plant::signals::{PlantInputs, PlantOutputs};
 use drive_plant::tables::{self as plant, PlantParameters};
 use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};

@@ -6,7 +6,7 @@ use drive::control::commission::{CommissionFault as Fault, CommissionState as St
 use drive::control::commissioning::{CommissionMode, CommissionParameters};
 use drive::control::trip::Cause;
 use drive::motor::Motor;
-use drive::plant::signals::Gates;
+use drive::plant::inverter::Gates;
 use drive::{Pair, PmsmDrive, SensorlessController};
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Slot, Step, Warns, integrate};

@@ -8,7 +8,7 @@ mod machines;
 use drive::PmsmDrive;
 use drive::control::trip::Cause;
 use drive::estimator::Kind;
-use drive::plant::signals::Gates;
+use drive::plant::inverter::Gates;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns, integrate};
 use machines::{Machine, RPM, b, c};

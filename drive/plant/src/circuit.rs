@@ -120,6 +120,7 @@ impl Passed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverter::Gates;
     use crate::legs::Legs;
     use crate::losses::flow::{Dissipation, Ideal, Switches};
     use crate::machine::Magnetics;
@@ -170,8 +171,8 @@ mod tests {
                 machine: Machine::<_, false>::new(&motor, Magnetics::Polynomial(&saturation)),
                 path: Path {
                     u,
-                    dissipation: Dissipation::at(&par, motor.R_s, 4.0 * speed),
-                    drops: Switches::new(&par, true, 300.0, Legs::switching(&inverter, 300.0)),
+                    dissipation: par.dissipation(motor.R_s, 4.0 * speed),
+                    drops: Switches::new(&inverter, Gates::Switch, 300.0, Legs::switching(&inverter, 300.0)),
                 },
                 shaft: Shaft::new(&par.mechanics, tau_load, Standstill::new(&par.mechanics, speed)),
             };

@@ -13,12 +13,11 @@
 
 use crate::circuit::Rates;
 use crate::integration::LONGEST_STEP;
-use crate::losses::flow::Switches;
 use crate::machine;
 use crate::model::PmsmPlant;
 use crate::power::Energy;
 use crate::signals::PlantInputs;
-use crate::state::{Instant, State, axis_at};
+use crate::state::{Accepted, Instant, axis_at};
 use drive_base::frame::AlphaBeta;
 use drive_base::integrate::rk4;
 use drive_base::math::all_finite;
@@ -37,16 +36,6 @@ pub struct Total {
     pub time: Elapsed,
 }
 
-/// A point of the importer's solution.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Point {
-    time: Elapsed,
-    inputs: PlantInputs,
-    state: State,
-    /// Integral of the torque of the shaft up to here.
-    impulse: f64,
-}
-
 impl PmsmPlant {
     /// [`CompletedSteps::complete`](fmu_core::CompletedSteps::complete) under these `inputs`.
     ///
@@ -59,7 +48,7 @@ impl PmsmPlant {
             self.energy.add(&energy);
             self.point.impulse += impulse;
         }
-        self.point = Point { time: now, inputs: inputs.clone(), state: self.state, impulse: self.point.impulse };
+        self.point = Accepted { time: now, inputs: inputs.clone(), state: self.state, impulse: self.point.impulse };
         Ok(())
     }
 
@@ -76,8 +65,8 @@ impl PmsmPlant {
     }
 
     /// Energies and integral of the torque over the `h` (s) from the point `start` to the inputs at the `end`.
-    fn between(&self, start: &Point, end: &PlantInputs, h: f64) -> Result<(Energy, f64), Fault> {
-        let Point { inputs, state, .. } = start;
+    fn between(&self, start: &Accepted, end: &PlantInputs, h: f64) -> Result<(Energy, f64), Fault> {
+        let Accepted { inputs, state, .. } = start;
         let (imposed, motor) = (self.parameters.mechanics.imposed, &self.parameters.motor);
         let angle = if imposed { inputs.angle_shaft } else { state.angle };
         let psi = self.machine::<false>().to_stator(axis_at(motor, angle), state.psi);
@@ -87,7 +76,7 @@ impl PmsmPlant {
             self.count(h, LONGEST_STEP, speed)?
         } else {
             let legs = self.legs(inputs);
-            self.substeps(h, speed, &legs, &Switches::of(&self.parameters, inputs, legs))?
+            self.substeps(h, speed, &legs, &self.switches(inputs, legs))?
         };
         let step = h / left;
         let mut x = SVector::from([psi.alpha(), psi.beta(), state.speed, angle, 0.0, 0.0, 0.0, 0.0, 0.0]);

@@ -13,11 +13,11 @@
 //! divided by the DC-link voltage, both minus 1.
 
 use crate::circuit::{Circuit, Rates, blocked_rates};
-use crate::losses::flow::{Dissipation, Path, Switches};
+use crate::losses::flow::Path;
 use crate::machine;
 use crate::mechanics::{Shaft, Standstill};
 use crate::model::PmsmPlant;
-use crate::power::{Powers, dc_current};
+use crate::power::Powers;
 use crate::signals::{PlantInputs, PlantOutputs};
 use crate::state::Instant;
 use crate::tables::PlantParameters;
@@ -79,8 +79,8 @@ impl PmsmPlant {
         }
         let path = Path {
             u: inputs.voltage(),
-            dissipation: Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(at.speed)),
-            drops: Switches::of(&self.parameters, inputs, self.legs(inputs)),
+            dissipation: self.parameters.dissipation(machine.resistance(), machine.electrical(at.speed)),
+            drops: self.switches(inputs, self.legs(inputs)),
         };
         let psi = machine.to_stator(at.axis, at.psi);
         Circuit { machine, path, shaft }.rates(at.axis, psi, at.speed)
@@ -108,7 +108,7 @@ impl PmsmPlant {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
         let currents = || Phases::from_stator(at.axis.to_stator(i));
-        let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
+        let i_dc = inputs.dc_current(p_in, &self.legs(inputs), currents);
         let powers = Powers { i_dc, p_in, p_mech, p_loss: losses.sum(), losses, tau_shaft };
         self.shown(inputs, at, i, self.temperatures(inputs), powers)
     }
@@ -244,7 +244,7 @@ impl Events for PmsmPlant {
 
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
         if self.parameters.thermal.mode == ThermalMode::Imposed {
-            self.judge_temperatures(&self.inputs)?;
+            self.check_temperatures(&self.inputs)?;
         }
         let Instant { psi, speed, angle, axis, .. } = self.present(&self.inputs);
         let mut state = crate::state::State { psi, speed, angle, axis };

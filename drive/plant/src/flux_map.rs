@@ -14,11 +14,10 @@
 //! is checked at all knots. It holds for one temperature: with another psi_M, the map moves along the d-axis. The effect of the
 //! rotor angle (slots, harmonics) is not part of it. `fmu tune` fits the coefficients to a table. Flux linkages in Wb, w in J.
 
-use crate::tables::{PARAMETERS, PlantParameters};
 use drive_base::frame::{Dq, Rotor, Vector};
 use drive_base::motor::Motor;
 use fmu_core::unit::{JOULE, WEBER};
-use fmu_core::{Fault, Row, Scalar, Table, table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Coefficients along the d-axis.
@@ -187,48 +186,6 @@ impl FluxMap {
     }
 }
 
-/// Refuses a map that is in use but describes no machine.
-///
-/// # Errors
-/// A limit of the grid with the wrong sign, saturation parameters besides the map, a current without flux linkage, or the knot
-/// at which the Hessian is not positive definite.
-pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
-    let map = &parameters.flux_map;
-    if !map.used {
-        return Ok(());
-    }
-    let (positive, negative) = ("greater than 0 with flux_map.use = true", "less than 0 with flux_map.use = true");
-    if map.d_min >= 0.0 {
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.d_min, negative));
-    }
-    if map.d_max <= 0.0 {
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.d_max, positive));
-    }
-    if map.q_max <= 0.0 {
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.q_max, positive));
-    }
-    if !parameters.saturation.is_none() {
-        let allowed =
-            "false with saturation.s_2, saturation.s_3 or saturation.s_dq: the map has the saturation; set these to 0";
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.used, allowed));
-    }
-    if let Some(x) = map.flaw() {
-        return Err(Fault::new(format!(
-            "flux_map.w describes no machine: at psi_d = psi_M {:+.4} Wb, psi_q = {:.4} Wb, more flux needs less current; fit the map \
-             with fmu tune",
-            x.d(),
-            x.q()
-        )));
-    }
-    let (rest, scale) = (map.current(Dq::ZERO).d(), map.current(Dq::new(map.d_max, 0.0)).d());
-    if rest.abs() > 1e-6 * scale.abs() {
-        return Err(Fault::new(format!(
-            "flux_map.w gives a current of {rest} A at the flux linkage psi_M, where it must be 0; fit the map with fmu tune"
-        )));
-    }
-    Ok(())
-}
-
 /// The eigenvalues of a symmetric matrix, the smaller one first.
 fn eigenvalues([a, b, c]: [f64; 3]) -> [f64; 2] {
     let (middle, radius) = (0.5 * (a + c), (0.25 * (a - c) * (a - c) + b * b).sqrt());
@@ -366,38 +323,5 @@ mod tests {
                 assert!((found - wanted).abs() < 1e-10 * (1.0 + wanted.abs()), "{x:?}");
             }
         }
-    }
-
-    #[test]
-    fn a_map_of_no_machine_is_refused() {
-        let with = |map: FluxMap| {
-            let parameters = PlantParameters { flux_map: map, ..PlantParameters::default() };
-            validate(&parameters).map_err(|fault| fault.message().to_owned())
-        };
-        let linear = || linear(&crate::tables::PlantParameters::default().motor, [-0.2, 0.2], 0.2);
-        assert_eq!(with(linear()), Ok(()));
-        assert_eq!(with(FluxMap { used: false, d_max: -1.0, ..linear() }), Ok(()));
-        let mut hollow = linear();
-        hollow.w[6][3] += 1.0;
-        let mut shifted = linear();
-        shifted.w.iter_mut().enumerate().for_each(|(m, row)| row.iter_mut().for_each(|w| *w += 0.01 * m as f64));
-        for (map, message) in [
-            (FluxMap { d_min: 0.0, ..linear() }, "flux_map.d_min = 0 Wb is not allowed: less than 0"),
-            (FluxMap { d_max: -0.1, ..linear() }, "flux_map.d_max = -0.1 Wb is not allowed: greater than 0"),
-            (FluxMap { q_max: 0.0, ..linear() }, "flux_map.q_max = 0 Wb is not allowed: greater than 0"),
-            (FluxMap { w: [[0.0; Q]; D], ..linear() }, "flux_map.w describes no machine: at psi_d = psi_M -0.2000 Wb"),
-            (hollow, "more flux needs less current; fit the map with fmu tune"),
-            (shifted, "where it must be 0"),
-        ] {
-            let error = with(map).unwrap_err();
-            assert!(error.contains(message), "{error}");
-        }
-        let mut parameters = PlantParameters { flux_map: linear(), ..PlantParameters::default() };
-        parameters.saturation.s_2 = 1.0;
-        let error = validate(&parameters).unwrap_err();
-        assert!(
-            error.message().starts_with("flux_map.use = true is not allowed: false with saturation.s_2"),
-            "{error}"
-        );
     }
 }

@@ -39,6 +39,17 @@ impl Inverter {
     }
 }
 
+/// State of the inverter's transistors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gates {
+    /// They switch and produce the voltage references.
+    Switch,
+    /// All upper or all lower transistors conduct: the terminals of the machine are short-circuited.
+    Short,
+    /// Only the diodes conduct.
+    Off,
+}
+
 type P = Row<Inverter>;
 
 /// Variables of the inverter; their owner supplies the prefix `inverter.`.

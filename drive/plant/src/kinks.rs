@@ -6,7 +6,7 @@
 use crate::circuit::{Circuit, Passed};
 use crate::integration::LONGEST_STEP;
 use crate::legs::Legs;
-use crate::losses::flow::{Dissipation, Drops, Path, Switches};
+use crate::losses::flow::{Drops, Path, Switches};
 use crate::losses::sides::{OneSided, Sides};
 use crate::mechanics::{Coulomb, SHORTEST_STEP, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
@@ -62,7 +62,7 @@ impl PmsmPlant {
         let (zone, kinks) = (legs.i_zone(), switches.kinks());
         let time = legs.time(self.warm.least_inductance, parameters.inverter.devices.threshold());
         let resolved = LONGEST_STEP.min(RESOLVED * time);
-        let dissipation = |speed| Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
+        let dissipation = |speed| parameters.dissipation(machine.resistance(), machine.electrical(speed));
         let at_start = dissipation(state.speed);
         let guide = |state: &State, one_sided: Option<&OneSided>| {
             let psi = machine.to_stator(state.axis, state.psi);
@@ -169,7 +169,7 @@ impl PmsmPlant {
         let shaft = Shaft::new(&parameters.mechanics, self.inputs.tau_load, coulomb);
         let tau_e = machine.torque(start.psi, machine.current(start.psi));
         let speed = start.speed + 0.5 * h * shaft.motion(start.speed, tau_e).acceleration;
-        let dissipation = Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
+        let dissipation = parameters.dissipation(machine.resistance(), machine.electrical(speed));
         if let Some(&drops) = one_sided {
             let path = Path { u, dissipation, drops };
             self.integrate(start, h, &Circuit { machine, path, shaft })

@@ -27,6 +27,7 @@ pub mod machine;
 pub mod mechanics;
 pub mod model;
 pub mod power;
+pub mod rules;
 pub mod saturation;
 pub mod signals;
 mod state;
@@ -34,5 +35,6 @@ mod step;
 pub mod tables;
 pub mod terminals;
 pub mod thermal;
+mod warming;
 
 pub use model::PmsmPlant;

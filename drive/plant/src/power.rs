@@ -26,12 +26,9 @@
 //! These are definitions; the balance is derived from the voltage equation of [`machine`](crate::machine) and
 //! tested.
 
-use crate::legs::Legs;
 use crate::losses::{LOSSES, Losses};
-use crate::signals::{Gates, PlantInputs};
-use drive_base::frame::Phases;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
-use fmu_core::{Part, Row, Scalar, Table, table};
+use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Powers; motor sign, from the DC link to the load.
@@ -52,22 +49,14 @@ pub struct Powers<S = f64> {
 }
 
 impl Powers {
-    /// Means over a step of `h` (s) in which `energy` passed, with its `losses` and the mean torque `tau_shaft` (N.m); `i` gives
-    /// the stator currents (A) at its end.
+    /// Means over a step of `h` (s) with this `energy` and these `losses` (J) and the mean torque `tau_shaft` (N.m); `i_dc` gives
+    /// the current (A) from the DC link at the power from there (W).
     #[inline]
-    pub fn mean(
-        energy: &Energy,
-        losses: Losses,
-        tau_shaft: f64,
-        h: f64,
-        inputs: &PlantInputs,
-        legs: &Legs,
-        i: impl FnOnce() -> Phases,
-    ) -> Self {
+    pub fn mean(energy: &Energy, losses: Losses, tau_shaft: f64, h: f64, i_dc: impl FnOnce(f64) -> f64) -> Self {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let rate = 1.0 / h;
         let p_in = energy.r#in * rate + 0.0;
-        let i_dc = dc_current(p_in, inputs, legs, i);
+        let i_dc = i_dc(p_in);
         let (p_mech, p_loss) = (energy.mech * rate, energy.loss * rate);
         Self { i_dc, p_in, p_mech, p_loss, losses: losses.map(|e| e * rate), tau_shaft }
     }
@@ -85,23 +74,6 @@ impl Powers {
             tau_shaft: mean(self.tau_shaft, last.tau_shaft),
         }
     }
-}
-
-/// Current (A) that the inverter draws from the DC link at the power `p_in` (W), or without a link voltage with the
-/// stator currents `i` (A).
-#[inline]
-pub fn dc_current<S: Scalar>(p_in: S, inputs: &PlantInputs<S>, legs: &Legs<S>, i: impl FnOnce() -> Phases<S>) -> S {
-    if inputs.u_dc.value() > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) }
-}
-
-/// [`dc_current`] without a link voltage.
-fn link_current<S: Scalar>(inputs: &PlantInputs<S>, legs: &Legs<S>, i: Phases<S>) -> S {
-    let (u, span, zero) = (&inputs.u, inputs.u.span(), S::from(0.0));
-    let switches = inputs.gates() == Gates::Switch;
-    let full = if inputs.u_dc.value() > span.value() { inputs.u_dc } else { span };
-    // The currents sum to zero, so a common part of the voltages has no power.
-    let apparent = if switches { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
-    if full.value() > 0.0 { apparent / full - legs.feed(i) + zero } else { zero - legs.feed(i) }
 }
 
 /// Transferred energy in J; motor sign, from the DC link to the load.

@@ -1,5 +1,7 @@
 //! Inputs and outputs of the plant.
 
+use crate::inverter::Gates;
+use crate::legs::Legs;
 use crate::losses::efficiency;
 use crate::power::{Energy, Powers};
 use crate::thermal::{Heat, Temperatures, ThermalInputs};
@@ -8,17 +10,6 @@ use drive_base::frame::{Phases, Stator, Vector};
 use drive_base::modulation::limit_to_hexagon;
 use fmu_core::{Dual, Scalar};
 use serde::{Deserialize, Serialize};
-
-/// State of the inverter's transistors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gates {
-    /// They switch and produce the voltage references.
-    Switch,
-    /// All upper or all lower transistors conduct: the terminals of the machine are short-circuited.
-    Short,
-    /// Only the diodes conduct.
-    Off,
-}
 
 /// Inputs, constant over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -74,6 +65,23 @@ impl<S: Scalar> PlantInputs<S> {
             Gates::Switch => limit_to_hexagon(self.u, self.u_dc),
             Gates::Short | Gates::Off => Vector::fixed(Vector::ZERO),
         }
+    }
+
+    /// Current (A) that the inverter draws from the DC link at the power `p_in` (W), or without a link voltage with the stator
+    /// currents `i` (A).
+    #[inline]
+    pub fn dc_current(&self, p_in: S, legs: &Legs<S>, i: impl FnOnce() -> Phases<S>) -> S {
+        if self.u_dc.value() > 0.0 { p_in / self.u_dc } else { self.link_current(legs, i()) }
+    }
+
+    /// [`dc_current`](Self::dc_current) without a link voltage.
+    fn link_current(&self, legs: &Legs<S>, i: Phases<S>) -> S {
+        let (u, span, zero) = (&self.u, self.u.span(), S::from(0.0));
+        let switches = self.gates() == Gates::Switch;
+        let full = if self.u_dc.value() > span.value() { self.u_dc } else { span };
+        // The currents sum to zero, so a common part of the voltages has no power.
+        let apparent = if switches { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
+        if full.value() > 0.0 { apparent / full - legs.feed(i) + zero } else { zero - legs.feed(i) }
     }
 }
 

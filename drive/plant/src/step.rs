@@ -81,7 +81,7 @@ impl PmsmPlant {
         let (motor, machine) = (&self.warm.motor, self.machine::<false>());
         let shaft = self.shaft(start.speed);
         let Some(lost) = self.remaining(start, legs) else {
-            let dissipation = Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(start.speed));
+            let dissipation = self.parameters.dissipation(machine.resistance(), machine.electrical(start.speed));
             let path = Path { u: AlphaBeta::ZERO, dissipation, drops: switches };
             return self.integrate_switches(start, h, &Circuit { machine, path, shaft });
         };
@@ -193,7 +193,7 @@ impl PmsmPlant {
     fn advance_general(&mut self, h: f64) -> Result<(), Fault> {
         let conducts = !self.inputs.is_off();
         let legs = self.legs(&self.inputs);
-        let switches = Switches::of(&self.parameters, &self.inputs, legs);
+        let switches = self.switches(&self.inputs, legs);
         let (mut state, mut passed) = self.at_the_shaft();
         let count = self.substeps(h, state.speed, &legs, &switches)?;
         let (mut lost, mut by_iron) = (None, Dq::ZERO);
@@ -270,7 +270,8 @@ impl PmsmPlant {
         (self.state, self.blocked) = (state, blocked);
         self.energy.add(energy);
         let tau_shaft = self.parameters.mechanics.tau_shaft(passed.impulse * (1.0 / h), self.inputs.tau_load);
-        self.powers = Powers::mean(energy, passed.losses, tau_shaft, h, &self.inputs, legs, || self.currents());
+        let i_dc = |p_in| self.inputs.dc_current(p_in, legs, || self.currents());
+        self.powers = Powers::mean(energy, passed.losses, tau_shaft, h, i_dc);
         Ok(())
     }
 

@@ -19,8 +19,8 @@
 //!
 //! u, U in V, i in A, R in Ohm, C in F, energies in J.
 
-use crate::dc_link::LinkEnergy;
 use drive_base::math::exp;
+use serde::{Deserialize, Serialize};
 
 /// x below which the series are more exact than the closed forms.
 const SMALL: f64 = 0.01;
@@ -37,6 +37,26 @@ fn phi(x: f64) -> [f64; 3] {
     let d = exp(-x);
     let gone = 1.0 - d;
     [gone / x, (x - gone) / (x * x), (x - 2.0 * gone + 0.5 * (1.0 - d * d)) / (x * x * x)]
+}
+
+/// Energies in J.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LinkEnergy {
+    /// From the source.
+    pub source: f64,
+    /// Lost in the resistances of source and precharge.
+    pub resistor: f64,
+    /// Lost in the chopper.
+    pub chopper: f64,
+}
+
+impl LinkEnergy {
+    /// Adds those of an interval.
+    pub(super) fn add(&mut self, piece: &Self) {
+        self.source += piece.source;
+        self.resistor += piece.resistor;
+        self.chopper += piece.chopper;
+    }
 }
 
 /// Source, capacitor and chopper.

@@ -17,6 +17,7 @@ mod circuit;
 mod parameters;
 pub mod ripple;
 
+pub use circuit::LinkEnergy;
 use circuit::{Circuit, Piece};
 use fmu_core::unit::{AMPERE, JOULE, VOLT, WATT};
 use fmu_core::{Account, Dual, Elapsed, Kept, Row, Scalar, Table, table};
@@ -41,25 +42,6 @@ const MAX_PARTS: f64 = 50.0;
 /// Number of bisections to find a switching.
 const BISECTIONS: u32 = 40;
 
-/// Energies since the start in J.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct LinkEnergy {
-    /// From the source.
-    pub source: f64,
-    /// Lost in the resistances of source and precharge.
-    pub resistor: f64,
-    /// Lost in the chopper.
-    pub chopper: f64,
-}
-
-impl LinkEnergy {
-    fn add(&mut self, piece: &Self) {
-        self.source += piece.source;
-        self.resistor += piece.resistor;
-        self.chopper += piece.chopper;
-    }
-}
-
 /// State of the link.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Link {
@@ -78,13 +60,13 @@ pub struct Link {
     /// Energy in J that the inverter took from an empty capacitor.
     owed: f64,
     /// Model Exchange: the last point of the solution, and the counts of earlier ones.
-    point: Point,
-    kept: Kept<(LinkEnergy, Point)>,
+    point: Counted,
+    kept: Kept<(LinkEnergy, Counted)>,
 }
 
-/// A point of the importer's solution.
+/// The last point of the importer's solution, up to which the energies are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Point {
+struct Counted {
     time: Elapsed,
     u: f64,
     /// Voltage of the source in V.
@@ -108,7 +90,8 @@ impl Link {
         }
         let precharges = par.dc_link.R_precharge > 0.0;
         let u = if precharges { 0.0 } else { u_dc };
-        let mut link = Self { u, precharges, point: Point { u, source: u_dc, ..Point::default() }, ..Self::default() };
+        let mut link =
+            Self { u, precharges, point: Counted { u, source: u_dc, ..Counted::default() }, ..Self::default() };
         link.event(par);
         link
     }
@@ -202,13 +185,13 @@ impl Link {
     pub fn complete(&mut self, par: &LinkParameters, now: Elapsed, U: f64, taken: f64) {
         let h = now.since(self.point.time);
         if h > 0.0 {
-            let Point { u, source, taken: before, .. } = self.point;
+            let Counted { u, source, taken: before, .. } = self.point;
             let LinkEnergy { resistor, chopper, .. } =
                 self.circuit(par, 0.5 * (source + U)).over(u, h, taken - before).energy;
             let stored = 0.5 * par.dc_link.C * (self.u * self.u - u * u);
             self.energy.add(&LinkEnergy { source: resistor + chopper + taken - before + stored, resistor, chopper });
         }
-        self.point = Point { time: now, u: self.u, source: U, taken };
+        self.point = Counted { time: now, u: self.u, source: U, taken };
     }
 
     /// Model Exchange: keeps the counts at the points of the solution, or takes them back.

@@ -1,4 +1,4 @@
-//! The model `PmsmDriveMean`: the drive for system models, a replacement for `PmsmDrive` with the same interface.
+//! The model `PmsmDriveMean`: the drive for system models, a drop-in replacement for `PmsmDrive`.
 //!
 //! It has the variables of [`PmsmDrive`](crate::PmsmDrive) and, at every instant, the [steady state](crate::steady) of that
 //! drive; only the torque takes time. With the torque reference t of torque mode or speed loop:
@@ -34,20 +34,20 @@ use drive_control::signals::ControllerOutputs;
 use drive_control::tables as control;
 use drive_plant::PmsmPlant;
 use drive_plant::power::{Energy, Powers};
+use drive_plant::rules::check_temperatures;
 use drive_plant::tables as plant;
-use drive_plant::thermal::{self, Temperatures, ThermalMode};
+use drive_plant::thermal::{Temperatures, ThermalMode};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, SPEED};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal, Warns, table,
 };
-use motion::Passed;
 use serde::{Deserialize, Serialize};
 
 /// A drive of which only the torque and the shaft take time.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PmsmDriveMean {
-    /// Inputs, held over a communication step.
+    /// Inputs, constant over a communication step.
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub drive: Steady,
@@ -111,6 +111,13 @@ struct State {
     speed: f64,
     /// Mechanical angle in rad, not wrapped.
     angle: f64,
+}
+
+/// Result of a step: state and point at its end, and the mean powers.
+struct Passed {
+    state: State,
+    powers: Powers,
+    point: Point,
 }
 
 /// Inputs of a point: the condition, the torque in N.m, and whether the drive is enabled.
@@ -288,7 +295,12 @@ impl Model for PmsmDriveMean {
         let thermal = &self.drive.plant.thermal;
         if thermal.mode == ThermalMode::Imposed {
             let names = ["T_winding_imposed", "T_magnet_imposed"];
-            thermal::check(&self.drive.plant, &temperatures, names, "temperatures are in K (20 degC are 293.15 K)")?;
+            check_temperatures(
+                &self.drive.plant,
+                &temperatures,
+                names,
+                "temperatures are in K (20 degC are 293.15 K)",
+            )?;
         }
         let Passed { state, powers, point } = self.pass(step.h, temperatures)?;
         if !all_finite([state.tau, state.integral, state.speed, state.angle, powers.p_in, powers.p_loss]) {
@@ -303,7 +315,7 @@ impl Model for PmsmDriveMean {
         if thermal.mode == ThermalMode::Network {
             let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
             let next = thermal.network.step(&self.network, &heat, coolant, step.h);
-            thermal::check(&self.drive.plant, &next, ["T_winding", "T_magnet"], REMEDY)?;
+            check_temperatures(&self.drive.plant, &next, ["T_winding", "T_magnet"], REMEDY)?;
             self.network = next;
         }
         Ok(())

@@ -17,7 +17,7 @@
 //! the sum of the losses, the power to the load and the change of the kinetic energy, so that the energies balance: the mean of
 //! the stages would miss the change of the kinetic energy by the error of the speed, which accumulates on a ramp.
 
-use super::{PmsmDriveMean, State};
+use super::{Passed, PmsmDriveMean, State};
 use crate::pmsm_drive::DriveInputs;
 use crate::steady::{Point, Steady, within};
 use drive_base::math::exp;
@@ -37,13 +37,6 @@ const MAX_PARTS: u32 = 100_000;
 
 /// Width of the band above the limit, as a share of it, over which the integrator is brought to a stop.
 const BAND: f64 = 0.01;
-
-/// Result of a step: state and point at its end, and the mean powers.
-pub(super) struct Passed {
-    pub(super) state: State,
-    pub(super) powers: Powers,
-    pub(super) point: Point,
-}
 
 /// An instant: rates of torque (N.m/s), integral part (A/s) and speed (rad/s2), and the point.
 pub(super) struct Rates {

@@ -6,7 +6,8 @@
 //!
 //! [`Network::steady`]: drive_plant::thermal::network::Network::steady
 
-use super::{At, Condition, Point, Steady};
+use super::drive::{Condition, Steady};
+use super::operating::{At, Point};
 use drive_plant::thermal::Temperatures;
 
 /// Maximum number of iterations, and the change in K at which they end.

@@ -1,7 +1,8 @@
 //! A point in steady state: the controller's currents, the machine's response, and the powers.
 
+use super::drive::{Condition, SQRT_3, Steady, within};
+use super::flux;
 use super::sampling::HeldVoltage;
-use super::{Condition, SQRT_3, Steady, flux, within};
 use drive_base::frame::Dq;
 use drive_base::motor::Motor;
 use drive_control::settled::SettledAt;
@@ -90,13 +91,21 @@ pub struct At<'a> {
     settled: SettledAt<'a>,
 }
 
+impl Steady {
+    /// The drive under a condition.
+    #[inline]
+    pub fn at(&self, condition: &Condition) -> At<'_> {
+        At::new(self, condition)
+    }
+}
+
 impl<'a> At<'a> {
-    pub(super) fn new(drive: &'a Steady, condition: &Condition) -> Self {
+    fn new(drive: &'a Steady, condition: &Condition) -> Self {
         let Steady { plant, controller, settled, sampled } = drive;
         let &Condition { speed, u_dc, temperatures } = condition;
         let motor = plant.thermal.motor(&plant.motor, &temperatures);
         let w = f64::from(motor.n_p) * speed;
-        let Dissipation { R, G } = Dissipation::at(plant, motor.R_s, w);
+        let Dissipation { R, G } = plant.dissipation(motor.R_s, w);
         let inverter = &plant.inverter;
         let sw = switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) * switching::MEAN_OF_MAGNITUDES;
         Self {

@@ -20,8 +20,7 @@
 //! The model of a device (threshold and resistance) is that of the data sheets, and the closed form is the usual one; a test
 //! compares [`mean`] with the legs. u in V, i in A.
 
-use crate::losses::sides::{Affine, symmetric};
-use drive_base::frame::{AlphaBeta, Phases, Stator, Vector};
+use drive_base::frame::{AlphaBeta, Phases, SQRT_3, Stator, Vector};
 use drive_base::modulation::clamp_unit;
 use fmu_core::Scalar;
 use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
@@ -96,6 +95,30 @@ pub fn mean(devices: &Devices, m: f64, cos_phi: f64, i: f64) -> f64 {
     let thresholds = (u_transistor + u_diode) * (0.5 * FRAC_1_PI) + (u_transistor - u_diode) * u;
     let resistances = (r_transistor + r_diode) * 0.125 + (r_transistor - r_diode) * r;
     6.0 * (thresholds + resistances * i) * i
+}
+
+/// A vector that is affine in the current (A).
+#[derive(Clone, Copy, Debug)]
+pub struct Affine {
+    /// Without current.
+    pub at_0: AlphaBeta,
+    /// Symmetric matrix per ampere: alpha alpha, alpha beta, beta beta.
+    pub by: [f64; 3],
+}
+
+impl Affine {
+    /// At the current `i` (A).
+    #[inline]
+    pub fn at(&self, i: AlphaBeta) -> AlphaBeta {
+        let Self { at_0, by: [x, y, z] } = self;
+        *at_0 + AlphaBeta::new(x * i.alpha() + y * i.beta(), y * i.alpha() + z * i.beta())
+    }
+}
+
+/// The matrix of resistances of the legs (Ohm) in stator axes: alpha alpha, alpha beta, beta beta.
+#[inline]
+fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
+    [(4.0 * a + b + c) * (1.0 / 6.0), (c - b) * (0.5 / SQRT_3), 0.5 * (b + c)]
 }
 
 /// Voltage drop of the conducting devices over an integration step.

@@ -5,10 +5,11 @@
 mod lossy;
 
 use crate::circuit::{Circuit, Rates};
+use crate::inverter::Gates;
 use crate::legs::Legs;
 use crate::losses::conduction::Conduction;
 use crate::losses::efficiency;
-use crate::losses::flow::{Dissipation, Path, Switches};
+use crate::losses::flow::{Path, Switches};
 use crate::machine::{Machine, flux};
 use crate::mechanics::{Shaft, Standstill};
 use crate::model::PmsmPlant;
@@ -28,7 +29,7 @@ impl Drive {
         let i = Dq::new(i_d, i_s.q() - g * (motor.psi_M + motor.L_d * i_d));
         let psi = flux(motor, i);
         let legs = Legs::switching(&par.inverter, *u_dc);
-        let switches = Switches::new(par, true, *u_dc, legs);
+        let switches = Switches::new(&par.inverter, Gates::Switch, *u_dc, legs);
         let conduction = Conduction::new(&par.inverter.devices, true, *u_dc, legs.i_zone()).unwrap();
         let count = 7200;
         let mut sum = [0.0; 7];
@@ -42,7 +43,7 @@ impl Drive {
             }
             let machine = Machine::<_>::new(motor, par.magnetics());
             let shaft = Shaft::new(&par.mechanics, 0.0, Standstill::new(&par.mechanics, speed));
-            let path = Path { u, dissipation: Dissipation::at(par, motor.R_s, w), drops: switches };
+            let path = Path { u, dissipation: par.dissipation(motor.R_s, w), drops: switches };
             let circuit = Circuit { machine, path, shaft };
             let Rates { p_in, tau_given, losses, d_psi, .. } = circuit.rates(axis, axis.to_stator(psi), speed);
             let p_mech = tau_given * speed;

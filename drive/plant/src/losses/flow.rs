@@ -11,12 +11,21 @@
 //! instead, the drops would be those of a current 10 % lower at a fifth of the torque, and diodes would block the wrong
 //! current.
 
+use crate::inverter::{Gates, Inverter};
+use crate::iron::Iron;
 use crate::legs::Legs;
 use crate::losses::conduction::Conduction;
 use crate::losses::{Losses, switching};
-use crate::tables::PlantParameters;
 use drive_base::frame::{AlphaBeta, Stator, Vector};
 use fmu_core::Scalar;
+use serde::{Deserialize, Serialize};
+
+/// The winding beyond its resistance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Winding {
+    /// Growth of the resistance with the square of the electrical speed, in s2/rad2: R = R_s (1 + k_ac w^2), >= 0.
+    pub k_ac: f64,
+}
 
 /// Dissipation at a speed: the resistance of the winding and the conductance of the iron.
 #[derive(Clone, Copy, Debug)]
@@ -30,9 +39,8 @@ pub struct Dissipation<S = f64> {
 impl<S: Scalar> Dissipation<S> {
     /// With the resistance `R_s` (Ohm) at standstill, at the electrical speed `w` (rad/s).
     #[inline]
-    pub fn at(parameters: &PlantParameters, R_s: S, w: S) -> Self {
-        let (iron, k_ac) = (&parameters.iron, parameters.winding.k_ac);
-        let R = (w * w * k_ac + S::from(1.0)) * R_s;
+    pub fn at(winding: &Winding, iron: &Iron, R_s: S, w: S) -> Self {
+        let R = (w * w * winding.k_ac + S::from(1.0)) * R_s;
         Self { R, G: (!iron.is_none()).then(|| iron.conductance(w)) }
     }
 
@@ -104,11 +112,13 @@ pub struct Switches<S = f64> {
 }
 
 impl<S: Scalar> Switches<S> {
-    /// With these `legs` at the DC-link voltage `u_dc` (V), switching or with the gates off.
-    pub fn new(parameters: &PlantParameters, switching: bool, u_dc: S, legs: Legs<S>) -> Self {
-        let inverter = &parameters.inverter;
-        let sw = if switching { switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) } else { 0.0.into() };
-        Self { legs, conduction: Conduction::new(&inverter.devices, switching, u_dc, legs.i_zone()), sw }
+    /// With these `legs` and `gates` at the DC-link voltage `u_dc` (V). An active short circuit conducts through the transistors
+    /// of one side and their diodes; upper and lower ones alternate, so each leg has the mean drop of both.
+    #[inline]
+    pub fn new(inverter: &Inverter, gates: Gates, u_dc: S, legs: Legs<S>) -> Self {
+        let &Inverter { T_pwm, ref devices, .. } = inverter;
+        let sw = if gates == Gates::Switch { switching::per_ampere(devices, T_pwm, u_dc) } else { 0.0.into() };
+        Self { legs, conduction: Conduction::new(devices, gates != Gates::Off, u_dc, legs.i_zone()), sw }
     }
 
     /// Whether a voltage or a loss has a kink where a current changes its sign.
@@ -202,10 +212,10 @@ mod tests {
 
     #[test]
     fn in_steady_state_the_dead_time_follows_the_terminals() {
-        let mut par = PlantParameters::default();
-        (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-3, 0.3, 1e-7);
+        let (winding, iron) = (Winding { k_ac: 1e-7 }, Iron { G_e: 2e-3, G_h: 0.3, ..Iron::default() });
+        let inverter = Inverter::default();
         let (psi, i, w) = (AlphaBeta::new(0.12, -0.05), AlphaBeta::new(1.5, 3.0), 400.0);
-        let dissipation = Dissipation::at(&par, 2.0, w);
+        let dissipation = Dissipation::at(&winding, &iron, 2.0, w);
         // Voltage at which the flux linkage turns with the rotor.
         let steady = dissipation.steady(psi, i, w);
         let u = psi.turned() * w + steady * dissipation.R;
@@ -213,7 +223,7 @@ mod tests {
         assert!((flow.d_psi - psi.turned() * w).magnitude() < 1e-12, "{:?}", flow.d_psi);
         assert!((flow.i - steady).magnitude() < 1e-13 && (steady - i).magnitude() > 0.1, "{:?}, {steady:?}", flow.i);
         let none: Vector<_> = AlphaBeta::ZERO;
-        let switches = Switches::new(&par, true, 300.0, Legs::switching(&par.inverter, 300.0));
+        let switches = Switches::new(&inverter, Gates::Switch, 300.0, Legs::switching(&inverter, 300.0));
         let path = Path { u: none, dissipation: Dissipation { R: 2.0, G: None }, drops: switches };
         assert_eq!(path.guides(psi, i, w), [i; 2], "without iron, both are the current of the flux linkage");
     }

@@ -17,8 +17,6 @@ pub mod flow;
 pub mod sides;
 pub mod switching;
 
-use crate::inverter::Inverter;
-use crate::tables::{PlantParameters, Winding};
 use fmu_core::unit::WATT;
 use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
@@ -78,25 +76,6 @@ impl Losses {
             friction: f(self.friction, other.friction),
         }
     }
-}
-
-/// Whether the legs are ideal and the constant resistance of the winding is the only loss of the machine, which allows the
-/// fastest step. Every parameter is named, so a new one does not compile until it is considered here.
-pub fn ideal(parameters: &PlantParameters) -> bool {
-    let PlantParameters {
-        motor: _,
-        saturation: _,
-        flux_map: _,
-        inverter,
-        mechanics: _,
-        initial: _,
-        iron,
-        winding,
-        thermal: _,
-    } = parameters;
-    let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
-    let Winding { k_ac } = winding;
-    *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
 }
 
 /// Efficiency of a drive with the power `p_in` (W) from the link and `p_mech` (W) to the load.

@@ -11,8 +11,9 @@
 //! Runge-Kutta step that contains a kink closes the energy balance to second order only; one that ends at the kink, to the
 //! fourth.
 
+use crate::losses::conduction::Affine;
 use crate::losses::flow::{Drops, Switches};
-use drive_base::frame::{AlphaBeta, Phases, SQRT_3};
+use drive_base::frame::{AlphaBeta, Phases};
 
 /// The side of the zone for the current of each leg: 1 above, -1 below, 0 inside; first of the currents that determine the
 /// dead-time voltage, then of those that determine the drop of the devices ([`Path::guides`](super::flow::Path::guides)).
@@ -70,29 +71,6 @@ fn phases(signs: [i8; 3]) -> Phases {
     Phases { a, b, c }
 }
 
-/// A vector that is affine in the current (A).
-#[derive(Clone, Copy, Debug)]
-pub struct Affine {
-    /// Without current.
-    pub at_0: AlphaBeta,
-    /// Symmetric matrix per ampere: alpha alpha, alpha beta, beta beta.
-    pub by: [f64; 3],
-}
-
-impl Affine {
-    #[inline]
-    fn at(&self, i: AlphaBeta) -> AlphaBeta {
-        let Self { at_0, by: [x, y, z] } = self;
-        *at_0 + AlphaBeta::new(x * i.alpha() + y * i.beta(), y * i.alpha() + z * i.beta())
-    }
-}
-
-/// The matrix of resistances of the legs (Ohm) in stator axes: alpha alpha, alpha beta, beta beta.
-#[inline]
-pub fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
-    [(4.0 * a + b + c) * (1.0 / 6.0), (c - b) * (0.5 / SQRT_3), 0.5 * (b + c)]
-}
-
 /// Legs and devices while the currents keep their sides.
 #[derive(Clone, Copy, Debug)]
 pub struct OneSided {
@@ -146,9 +124,10 @@ impl Drops<f64> for OneSided {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverter::Gates;
     use crate::legs::Legs;
     use crate::losses::conduction::Devices;
-    use crate::losses::flow::{Dissipation, Path};
+    use crate::losses::flow::Path;
     use crate::tables::PlantParameters;
 
     #[test]
@@ -164,9 +143,9 @@ mod tests {
             E_sw: 1e-3,
             ..Devices::default()
         };
-        let switches = Switches::new(&par, true, 325.0, Legs::switching(&par.inverter, 325.0));
+        let switches = Switches::new(&par.inverter, Gates::Switch, 325.0, Legs::switching(&par.inverter, 325.0));
         let (u, w) = (AlphaBeta::new(70.0, -90.0), 300.0);
-        let dissipation = Dissipation::at(&par, 2.0, w);
+        let dissipation = par.dissipation(2.0, w);
         for k in 0..6_u32 {
             let angle = 0.2 + std::f64::consts::FRAC_PI_3 * f64::from(k);
             let i = AlphaBeta::new(5.0 * angle.cos(), 5.0 * angle.sin());

@@ -15,7 +15,7 @@
 //!
 //! Lumped networks of this size are usual; the equations are heat balances. T in K, C in J/K, G in W/K.
 
-use super::{Heat, Temperatures};
+use super::parts::{Heat, Temperatures};
 use fmu_core::unit::{JOULE_PER_KELVIN, WATT_PER_KELVIN};
 use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
