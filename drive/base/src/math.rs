@@ -87,7 +87,7 @@ const POWERS_OF_2: [f64; 64] = [
 
 /// e to the power of `x`, with an error below 1.3 units in the last place.
 ///
-/// e^x = 2^(n/64) e^r with |r| <= ln(2) / 128: a power from the table and a series, whose first term left out is below
+/// e^x = 2^(n/64) e^r with |r| <= ln(2) / 128: a power from the table and a series, whose first omitted term is below
 /// 4e-17. Tang 1989, ACM Trans. Math. Softw. 15 (2), without the tail of the table.
 #[inline]
 pub fn exp(x: f64) -> f64 {
@@ -133,7 +133,7 @@ pub fn tanh(x: f64) -> f64 {
 
 /// Sine and cosine of a small angle `d` (rad), by their series; larger angles go to [`sin_cos`].
 ///
-/// For |d| <= 0.3, the first term left out is below 3e-17.
+/// For |d| <= 0.3, the first omitted term is below 3e-17.
 #[inline]
 pub fn sin_cos_small(d: f64) -> (f64, f64) {
     if d.abs() > 0.3 {
@@ -150,7 +150,7 @@ pub fn sin_cos_small(d: f64) -> (f64, f64) {
 
 /// Sine and cosine of a tiny angle `d` (rad), by shorter series; larger angles go to [`sin_cos`].
 ///
-/// For |d| <= 0.004, the first term left out is below 6e-18.
+/// For |d| <= 0.004, the first omitted term is below 6e-18.
 #[inline]
 pub fn sin_cos_tiny(d: f64) -> (f64, f64) {
     if d.abs() > 0.004 {

@@ -6,7 +6,7 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
-// A unit test shares its machines with tests outside.
+// A unit test shares its machines with integration tests.
 #[cfg(test)]
 extern crate self as drive_plant;
 

@@ -1,5 +1,5 @@
-//! Rules across the parameters of the plant: a flux map that is a machine, a network with heat capacities, and temperatures at
-//! which the machine works.
+//! Rules across the parameters of the plant: a flux map describes a machine, a network has heat capacities, and the machine
+//! works at the temperatures.
 
 use crate::tables::{PARAMETERS, PlantParameters};
 use crate::thermal::{Temperatures, ThermalMode};

@@ -93,7 +93,7 @@ impl ThermalInputs {
 
 type I = Row<ThermalInputs>;
 
-/// The temperatures that the importer sets.
+/// Inputs: temperatures set by the importer.
 pub const THERMAL_INPUTS: &Table<ThermalInputs> = table![
     I::input("T_coolant", &KELVIN, "Temperature of the coolant", |i| &mut i.coolant)
         .at_least(0.0)
