@@ -382,9 +382,6 @@ const SMALL: &[(&str, &[&str])] = &[
 
 /// Circles of the drive that are still to be opened: the list may only become shorter.
 const OF_THE_DRIVE: &[(&str, &[&str])] = &[
-    ("drive", &["lib.rs", "pair.rs", "pmsm_drive.rs", "pmsm_drive_mean/mod.rs", "pmsm_drive_mean/motion.rs"]),
-    ("drive", &["dc_link/circuit.rs", "dc_link/mod.rs"]),
-    ("drive", &["steady/mod.rs", "steady/operating.rs"]),
     (
         "drive-control",
         &[
@@ -450,31 +447,6 @@ const OF_THE_DRIVE: &[(&str, &[&str])] = &[
             "estimator/tracker.rs",
             "estimator/voltage_feedback.rs",
             "estimator/voltage_model.rs",
-        ],
-    ),
-    (
-        "drive-plant",
-        &[
-            "circuit.rs",
-            "counters.rs",
-            "flux_map.rs",
-            "idle.rs",
-            "integration.rs",
-            "inverter.rs",
-            "legs.rs",
-            "losses/conduction.rs",
-            "losses/flow.rs",
-            "losses/mod.rs",
-            "losses/sides.rs",
-            "losses/switching.rs",
-            "machine.rs",
-            "model.rs",
-            "power.rs",
-            "signals.rs",
-            "tables.rs",
-            "thermal/mod.rs",
-            "thermal/network.rs",
-            "thermal/warm.rs",
         ],
     ),
     ("drive-study", &["atlas/map.rs", "atlas/mod.rs", "atlas/report.rs"]),
