@@ -100,17 +100,17 @@ pub enum Verdict {
 
 /// A verdict with what only a probe knows about it.
 #[derive(Clone, Debug)]
-pub(super) struct Judgement {
+pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
     /// The level of the finding, if it is lower than that of the check.
     pub(super) lower: Option<Level>,
-    /// A call crashed the process or did not return: an importer would have gone down with it.
+    /// A call crashed the process or did not return: an importer would have crashed or hung.
     pub(super) fatal: bool,
     /// The calls that led to the finding, with what they returned.
     pub(super) calls: Vec<String>,
 }
 
-impl From<Verdict> for Judgement {
+impl From<Verdict> for Conclusion {
     fn from(verdict: Verdict) -> Self {
         Self { verdict, lower: None, fatal: false, calls: Vec::new() }
     }
@@ -143,7 +143,7 @@ pub struct Finding {
     pub level: Level,
     /// A call of the FMU crashed the process or did not return.
     pub fatal: bool,
-    /// `--allow` or the baseline knows it: it does not count.
+    /// Accepted by `--allow` or listed in the baseline: it does not count.
     pub known: bool,
     /// The calls of a probe that led to the finding, with what they returned; `--replay` repeats them.
     #[serde(skip_serializing_if = "Vec::is_empty")]

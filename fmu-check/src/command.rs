@@ -19,7 +19,7 @@ use std::time::Duration;
 ///
 /// Exit status: 0 if no must is violated, 1 if one is, 2 if a file is not an FMU. With --strict, a violated should or hard
 /// and a check that is not determined count like a must. With --baseline, every violated check that the file does not have
-/// counts, whatever its level.
+/// counts, at every level.
 ///
 ///   fmu check target/fmu/fmi3/PmsmPlant.fmu
 ///   fmu check other.fmu --format html > report.html
@@ -184,8 +184,8 @@ fn news(baseline: Option<&Baseline>, reports: &[Report]) -> String {
     let mut out = String::new();
     for report in baseline.map_or(&[][..], |_| reports) {
         let new: Vec<_> = report.unknown().map(|f| f.id).collect();
-        let gone = baseline.map(|b| b.mended(report)).unwrap_or_default();
-        for (what, ids) in [("new", new.join(", ")), ("mended, no longer needed in the baseline", gone.join(", "))] {
+        let gone = baseline.map(|b| b.fixed(report)).unwrap_or_default();
+        for (what, ids) in [("new", new.join(", ")), ("fixed, no longer needed in the baseline", gone.join(", "))] {
             if !ids.is_empty() {
                 let _ = writeln!(out, "{}: {what}: {ids}", report.file);
             }

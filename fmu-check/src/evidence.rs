@@ -1,6 +1,6 @@
 //! What a probe has left: its findings, its calls, its console, and the verdict from them.
 
-use crate::check::{Judgement, Verdict};
+use crate::check::{Conclusion, Verdict};
 use crate::level::Level;
 use crate::session::{FOUND, Line};
 use fmu_import::guard::End;
@@ -64,7 +64,7 @@ pub(super) fn side_effects(folder: &Path, working_directory: &Path) -> Vec<Strin
 }
 
 /// The verdict from the lines of the probe and from its crashes (how, and in which call).
-pub(super) fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Judgement {
+pub(super) fn conclude(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Conclusion {
     let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), slow, None);
     let (mut lesser, mut lower, mut fatal) = (Vec::new(), None, false);
     for line in lines {
@@ -113,5 +113,5 @@ pub(super) fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, 
         (_, _, Some(why)) => Verdict::NotApplicable(why),
         _ => Verdict::Pass(notes),
     };
-    Judgement { verdict, lower, fatal, calls: Vec::new() }
+    Conclusion { verdict, lower, fatal, calls: Vec::new() }
 }

@@ -274,7 +274,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         })
     }
 
-    /// Goes on in Continuous-Time Mode.
+    /// Continues in Continuous-Time Mode.
     pub(super) fn resume(instance: &'a Instance<'b>, next: Option<f64>) -> Result<Self, NotDetermined> {
         Ok(Self::new(instance, next, instance.indicators()?))
     }
@@ -363,8 +363,8 @@ impl<'a, 'b> Importer<'a, 'b> {
     }
 }
 
-/// The least scale of a deviation: what is small beside it is noise about 0.
-const LEAST_SCALE: f64 = 1e-6;
+/// Minimum scale of a deviation: anything far below it is noise around 0.
+const MIN_SCALE: f64 = 1e-6;
 
 /// Whether two vectors differ by more than rounding.
 pub(super) fn differ(a: &[f64], b: &[f64]) -> bool {
@@ -383,7 +383,7 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
             if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
                 0.0
             } else {
-                (x - y).abs() / scale.max(LEAST_SCALE)
+                (x - y).abs() / scale.max(MIN_SCALE)
             }
         });
         let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
@@ -392,7 +392,7 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
 }
 
 impl Session {
-    /// A complete run of each interface that this binary has, which nobody judges.
+    /// A complete run of each interface of this binary, without findings.
     pub(super) fn complete_run(&self) -> Result<(), NotDetermined> {
         let d = &self.description;
         if d.co_simulation.is_some() {

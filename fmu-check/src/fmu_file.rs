@@ -178,7 +178,7 @@ impl FmuFile {
         let list = &self.root()?.child("ModelVariables")?.children;
         let places = self.places.get_or_init(|| {
             let key = |e: &Element| (e.line, e.get("name").unwrap_or_default().to_owned());
-            list.iter().enumerate().rev().map(|(place, e)| (key(e), place)).collect()
+            list.iter().enumerate().rev().map(|(index, e)| (key(e), index)).collect()
         });
         list.get(*places.get(&(v.line, v.name.clone()))?)
     }

@@ -8,7 +8,7 @@ use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Sim
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
-/// An instance. Dropping it does not free it: a probe of its own checks freeing.
+/// An instance. Dropping it does not free it: a separate probe checks freeing.
 pub(super) struct Instance<'b> {
     pub(super) session: &'b Session,
     pub(super) handle: Handle,
@@ -290,7 +290,7 @@ impl Instance<'_> {
         Ok(all.iter().map(|bits| bits.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
     }
 
-    /// Steps `n` times with held inputs and returns all watched variables after each step.
+    /// Steps `n` times with constant inputs and returns all watched variables after each step.
     pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
         let watched = self.session.watched();
         self.session.record_calls(

@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ids_are_unique_and_every_check_is_told() {
+    fn ids_are_unique_and_every_check_is_documented() {
         let checks: Vec<&Check> = GROUPS.iter().flat_map(|g| g.checks).collect();
         for (i, check) in checks.iter().enumerate() {
             assert!(checks[..i].iter().all(|c| c.id != check.id), "{} twice", check.id);

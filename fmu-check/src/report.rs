@@ -357,6 +357,19 @@ pub(super) fn explain(id: &str) -> Option<String> {
     ))
 }
 
+/// The index of the list: a Markdown table of the groups, each with its checks and a link to its table.
+pub fn index() -> String {
+    let mut out = String::from("| group | `--only` | checks |\n|---|---|---|\n");
+    for group in GROUPS {
+        let heading = format!("{} {}", group.title, group.name).to_lowercase();
+        let kept = heading.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-'));
+        let anchor = kept.collect::<String>().replace(' ', "-");
+        let ids: Vec<_> = group.checks.iter().map(|c| c.id).collect();
+        let _ = writeln!(out, "| [{}](#{anchor}) | `{}` | {} |", group.title, group.name, ids.join(", "));
+    }
+    out
+}
+
 /// The list of all checks: one Markdown table per group.
 pub fn list() -> String {
     let mut out = String::new();

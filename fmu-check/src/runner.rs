@@ -1,12 +1,12 @@
-//! Runs the probes: each check of the binary in a process of its own, with a time limit, on all cores.
+//! Runs the probes: each check of the binary in a separate process, with a time limit, on all cores.
 //!
 //! The parent starts the same program with the hidden command `probe`. The child appends its findings to a file, line by line,
 //! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
 //! call ended it. A probe with several cases is restarted after the case that ended it.
 
-use crate::check::{Check, Judgement, Options, Run, Verdict};
+use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
-use crate::evidence::{calls, is_of_second, judge, panic, read, side_effects};
+use crate::evidence::{calls, is_of_second, conclude, panic, read, side_effects};
 use crate::fmu_file::FmuFile;
 use crate::session::Line;
 use crate::watch::{Pace, Watch};
@@ -30,15 +30,15 @@ const WITHOUT_MINIMAL_RUN: [&str; 4] = ["B00", "L00", "E00", "X02b"];
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
-const OUT_OF_TIME: &str = "the time limit of the run was used up (see --timeout)";
+const OUT_OF_TIME: &str = "the run reached its time limit (see --timeout)";
 /// After this time a clock that counts seconds shows another one.
 const ANOTHER_SECOND: Duration = Duration::from_millis(1050);
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
 /// The verdicts of checks, in their order.
-pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) -> Vec<Judgement> {
-    let verdicts: Vec<Mutex<Option<Judgement>>> = checks.iter().map(|_| Mutex::new(None)).collect();
+pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) -> Vec<Conclusion> {
+    let verdicts: Vec<Mutex<Option<Conclusion>>> = checks.iter().map(|_| Mutex::new(None)).collect();
     let mut queue = VecDeque::new();
     let mut of_file = Vec::new();
     for (check, verdict) in checks.iter().zip(&verdicts) {
@@ -93,11 +93,10 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     found
 }
 
-/// A check of the file, and the place for its verdict.
-type OfFile<'a> = (fn(&FmuFile) -> Verdict, &'a Mutex<Option<Judgement>>);
+/// A check of the file, and the slot for its verdict.
+type OfFile<'a> = (fn(&FmuFile) -> Verdict, &'a Mutex<Option<Conclusion>>);
 
-/// Runs the checks of the file until the deadline, and for [`limits::STATIC_SECONDS`] at most, whatever an author of hostile files
-/// has thought of.
+/// Runs the checks of the file until the deadline, and for at most [`limits::STATIC_SECONDS`], even on hostile files.
 fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>], deadline: Option<Instant>) {
     if checks.is_empty() {
         return;
@@ -114,7 +113,7 @@ fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>], deadline: Option<Instan
         Ok(thread) => thread,
         Err(e) => {
             let why = format!("no thread can be started: {e}");
-            return checks.iter().for_each(|(_, place)| store(place, Verdict::NotDetermined(why.clone()).into()));
+            return checks.iter().for_each(|(_, slot)| store(slot, Verdict::NotDetermined(why.clone()).into()));
         }
     };
     drop(send);
@@ -124,17 +123,17 @@ fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>], deadline: Option<Instan
         _ => (end, format!("the checks of the file take more than {} s", limits::STATIC_SECONDS)),
     };
     let mut in_time = true;
-    for (_, place) in checks {
+    for (_, slot) in checks {
         let verdict = receive.recv_timeout(end.saturating_duration_since(Instant::now()));
         let why = |e| match e {
             RecvTimeoutError::Timeout => over.clone(),
             RecvTimeoutError::Disconnected => "the checker failed in this check or one before it".into(),
         };
         in_time &= verdict.is_ok();
-        store(place, verdict.unwrap_or_else(|e| Verdict::NotDetermined(why(e))).into());
+        store(slot, verdict.unwrap_or_else(|e| Verdict::NotDetermined(why(e))).into());
     }
     if in_time {
-        // Its hold on the file ends before the caller's: the last one removes the unpacked archive.
+        // It releases the file before the caller does: the last owner removes the unpacked archive.
         let _ = thread.join();
     }
 }
@@ -150,8 +149,8 @@ fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verd
     let runner = runner.as_ref().ok()?;
     let began = Instant::now();
     let verdict = runner.run(check).verdict;
-    let least = Duration::from_secs(1).min(runner.timeout);
-    let _ = runner.wild.set((20 * began.elapsed()).clamp(least, runner.timeout));
+    let minimum = Duration::from_secs(1).min(runner.timeout);
+    let _ = runner.wild.set((20 * began.elapsed()).clamp(minimum, runner.timeout));
     match verdict {
         Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
             "a minimal run fails ({id}): {}",
@@ -170,13 +169,13 @@ fn take<T>(queue: &Mutex<VecDeque<T>>) -> Option<T> {
     queue.lock().ok()?.pop_front()
 }
 
-fn store(place: &Mutex<Option<Judgement>>, verdict: Judgement) {
-    if let Ok(mut place) = place.lock() {
-        *place = Some(verdict);
+fn store(slot: &Mutex<Option<Conclusion>>, verdict: Conclusion) {
+    if let Ok(mut slot) = slot.lock() {
+        *slot = Some(verdict);
     }
 }
 
-/// Settings that all probes of a file share, and what they left behind.
+/// Settings that all probes of a file share, and the processes they left behind.
 pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
@@ -199,20 +198,20 @@ pub(super) struct Runner {
     deadline: Option<Instant>,
 }
 
-/// Checks whose calls have wild arguments: a hang shows sooner there.
+/// Checks whose calls have extreme arguments: they have a shorter time limit.
 const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
-/// Checks of what a second instance does; in all others, one that hangs is only in the way.
+/// Checks whose subject is a second instance; in all others, a second instance that hangs is no finding.
 const SEVERAL: [&str; 8] = ["L04a", "L04b", "L04c", "B05d", "G07a", "F03a", "F04a", "E14"];
 
-/// How a probe's process ended.
+/// How the process of a probe ended.
 enum Outcome {
     /// By itself.
     End(End),
     /// In a call that hangs, in this way.
     Hang(&'static str),
-    /// It was too slow, and no call hangs.
+    /// Too slow, although no call hangs.
     Slow,
-    /// The time of the whole run was over.
+    /// The time limit of the whole run was reached.
     OutOfTime,
 }
 
@@ -250,7 +249,7 @@ impl Runner {
         wild.copied().unwrap_or(self.timeout)
     }
 
-    fn run(&self, check: &Check) -> Judgement {
+    fn run(&self, check: &Check) -> Conclusion {
         if self.deadline.is_some_and(|end| Instant::now() > end) {
             return Verdict::NotDetermined(OUT_OF_TIME.into()).into();
         }
@@ -273,7 +272,7 @@ impl Runner {
 
     /// The first process of a check that compares two: nothing yet, if it passes. The second, after another second of the clock:
     /// the verdict.
-    fn once_more(&self, check: &Check) -> Option<Judgement> {
+    fn once_more(&self, check: &Check) -> Option<Conclusion> {
         let first = self.first.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some((began, first)) = first else {
             let (began, found) = (Instant::now(), self.run(check));
@@ -293,7 +292,7 @@ impl Runner {
         })
     }
 
-    fn attempt(&self, check: &Check, binary: &Path) -> io::Result<Judgement> {
+    fn attempt(&self, check: &Check, binary: &Path) -> io::Result<Conclusion> {
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
@@ -328,7 +327,7 @@ impl Runner {
         if let Some(step) = lines.iter().find_map(|l| if let Line::Integrator(step) = l { Some(*step) } else { None }) {
             let _ = self.integrator.set(step);
         }
-        let mut found = judge(check.id, lines, crashes, slow);
+        let mut found = conclude(check.id, lines, crashes, slow);
         if matches!(found.verdict, Verdict::Violated(_)) {
             found.calls = calls(&fs::read_to_string(out.with_extension("log")).unwrap_or_default());
         }
@@ -361,7 +360,7 @@ impl Runner {
     }
 
     /// Runs a probe, or one case of it, in a process that prints its calls; returns what was found.
-    pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> io::Result<Judgement> {
+    pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> io::Result<Conclusion> {
         let (exchange, simulation) = (self.exchange.as_deref(), self.simulation.as_deref());
         let Some(binary) = (if is_exchange(check) { exchange } else { simulation.or(exchange) }) else {
             return Ok(Verdict::NotApplicable("the FMU has no such interface".into()).into());
@@ -387,7 +386,7 @@ impl Runner {
                 Err(why) => slow = Some(why),
             }
         }
-        let mut found = judge(check.id, lines, crashes, slow);
+        let mut found = conclude(check.id, lines, crashes, slow);
         self.charge(check, &mut found);
         Ok(found)
     }
@@ -439,17 +438,17 @@ impl Runner {
         match end {
             Outcome::OutOfTime => Err(OUT_OF_TIME.into()),
             Outcome::Slow => Err(format!(
-                "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
+                "the probe is too slow on this machine for a limit of {limit} s per call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => Err(format!(
-                "{} {how} within {limit} s, and that of the first instance did: see L04a",
+                "{} {how} within {limit} s, unlike that of the first instance: see L04a",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
             // The limit is the checker's own.
             Outcome::End(end) if end.describe().contains("SIGXFSZ") => Err(format!(
-                "not tried to its end: a file of the probe reached the limit of {} bytes, in {}",
+                "incomplete: a file of the probe reached the limit of {} bytes, in {}",
                 limits::PROBE_FILE,
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
@@ -460,8 +459,8 @@ impl Runner {
         }
     }
 
-    /// Adds what outlived the probes, whichever it was, to the check that is about it.
-    fn charge(&self, check: &Check, found: &mut Judgement) {
+    /// Adds the processes that outlived any probe to the check that reports them.
+    fn charge(&self, check: &Check, found: &mut Conclusion) {
         let left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         if check.id != LEFT_BEHIND || left.is_empty() {
             return;

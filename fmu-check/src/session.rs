@@ -121,9 +121,9 @@ pub(super) struct Session {
 
 /// Below the environments of the instances.
 const ENVIRONMENT: usize = 0x5000;
-/// Stands in the log of calls where something was found.
+/// Marks a finding in the log of calls.
 pub(super) const FOUND: &str = "# found";
-/// How an end begins that the FMU asked for, as it may at any time.
+/// Start of the reason if the FMU ended the simulation, as it may at any time.
 pub(super) const ENDED: &str = "the FMU ended the simulation";
 /// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
@@ -352,7 +352,7 @@ impl Session {
         self.of_case.get()
     }
 
-    /// Tells the parent, from time to time, that calls without entries of their own return.
+    /// Shows the parent, from time to time, that calls without separate journal entries return.
     fn show_progress(&self) {
         if self.shown.get().elapsed() < Duration::from_millis(100) {
             return;
@@ -362,7 +362,7 @@ impl Session {
         let _ = journal.seek(SeekFrom::End(0)).and_then(|_| writeln!(journal, "and others"));
     }
 
-    /// Makes calls whose crash is of a lower level than the check, because the standard leaves open what they do.
+    /// Makes calls that the standard leaves undefined; a crash in them is reported at this lower level.
     pub(super) fn lenient<T>(&self, level: Level, work: impl FnOnce() -> T) -> T {
         let before = self.lower.replace(Some(level));
         let result = work();
@@ -423,8 +423,8 @@ impl Session {
         ENVIRONMENT + 0x10 * self.instances_made.get()
     }
 
-    /// The relative deviation below which two runs are the same to the standards, which nowhere say bit for bit: the
-    /// tolerance of the default experiment, at least 1e-6.
+    /// The relative deviation up to which two runs count as equal, because the standards nowhere require equal bits: the tolerance of
+    /// the default experiment, at least 1e-6.
     pub(super) fn tolerance(&self) -> f64 {
         self.description.default_experiment.tolerance.filter(|t| t.is_finite()).unwrap_or(0.0).max(1e-6)
     }

@@ -29,11 +29,11 @@ pub(super) struct Difference {
     pub(super) values: String,
 }
 
-/// So many times the tolerance may a run differ that starts anew, where an integrator chooses its own steps.
+/// Multiple of the tolerance by which a run may differ if an integrator with variable steps restarts.
 const INTEGRATOR: f64 = 5.0;
 
-/// The least scale of a deviation, for a variable without a nominal: what is small beside it is noise about 0.
-const LEAST_SCALE: f64 = 1e-9;
+/// Minimum scale of a deviation, for a variable without a nominal: anything far below it is noise around 0.
+const MIN_SCALE: f64 = 1e-9;
 
 /// A value of a floating-point type.
 fn number(base: BaseType, bits: u64) -> f64 {
@@ -58,7 +58,7 @@ pub(super) fn difference(variables: &[&ModelVariable], a: &[Vec<Vec<u64>>], b: &
         }
         let values = |x: &[u64]| x.iter().map(|bits| number(v.base, *bits)).collect::<Vec<_>>();
         // The largest value, which is at least half of the range over the run, or the nominal.
-        let (mut scale, mut gap) = (v.nominal.map_or(LEAST_SCALE, f64::abs).max(f64::MIN_POSITIVE), 0.0_f64);
+        let (mut scale, mut gap) = (v.nominal.map_or(MIN_SCALE, f64::abs).max(f64::MIN_POSITIVE), 0.0_f64);
         for (x, y) in pairs().flat_map(|(x, y)| values(x).into_iter().zip(values(y))) {
             if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
                 scale = scale.max(x.abs());
@@ -93,7 +93,7 @@ fn both(v: Option<&&ModelVariable>, a: &[u64], b: &[u64]) -> String {
 }
 
 impl Session {
-    /// Reports a difference between two runs that ought to be the same: below the tolerance it is a matter of robustness.
+    /// Reports a difference between two runs that ought to be the same; below the tolerance, at a lower level.
     pub(super) fn compare(&self, what: &str, a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) {
         let watched = self.watched();
         self.compare_variables(&watched, what, a, b);
@@ -144,7 +144,7 @@ impl Session {
         let (level, text) = if largest <= tolerance {
             (Some(Level::Hard), format!("{text}; relative deviation {largest:.1e}, within {tolerance:e}"))
         } else if largest <= INTEGRATOR * tolerance {
-            // What an integrator with its own steps may differ by, if it starts anew.
+            // The deviation of an integrator with variable steps that restarts.
             (
                 Some(Level::Should),
                 format!("{text}; relative deviation {largest:.1e}, within {INTEGRATOR} times {tolerance:e}"),

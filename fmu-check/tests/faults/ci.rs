@@ -55,7 +55,7 @@ fn known_findings_do_not_count() {
     let worse = archive(dir.path(), "worse.fmu", |xml| two_faults(xml).replace(" license=\"MIT\"", ""));
     let (code, text, _) = fmu_check(&[worse.to_str().unwrap(), "--only", STATIC, "--baseline", baseline]);
     assert!(code == Some(1) && text.contains("new: X06"), "{text}");
-    // What has been mended is named.
+    // A finding that no longer occurs is named.
     let better = archive(dir.path(), "better.fmu", |xml| {
         two_faults(xml).replace("<Outputs>", "<Outputs><Unknown index=\"4\"/>")
     });
@@ -206,7 +206,7 @@ fn the_whole_run_has_a_limit() {
     let Some(binary) = compile(2, "G07a") else { return };
     let path = pack(dir.path(), 2, "limit", &binary);
     let (_, text, _) = fmu_check(&[path.to_str().unwrap(), "--timeout", "0.2"]);
-    assert!(text.contains("the time limit of the run was used up (see --timeout)"), "{text}");
+    assert!(text.contains("the run reached its time limit (see --timeout)"), "{text}");
     assert_eq!(fmu_check(&[path.to_str().unwrap(), "--timeout", "-1"]).0, Some(2));
 }
 

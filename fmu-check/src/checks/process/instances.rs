@@ -52,17 +52,17 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     let mut expected = vec![(trajectory(&alone, 20)?, texts(&alone)?)];
     let own: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
     let before = alone.snapshot(&own)?;
-    // Every other instance has parameters of its own, where the FMU takes these values.
+    // Every other instance has different parameters, if the FMU accepts these values.
     let trial = session.initializing()?;
     if set_all(&trial, 1.0).is_ok() && trial.exit().is_ok() {
         expected.push((trajectory(&trial, 20)?, texts(&trial)?));
     }
     let kinds = expected.len();
-    // Creating them is part of the requirement.
+    // Creating the instances is part of the requirement.
     let mut all = Vec::new();
     for k in 0..8 {
         let Some(instance) = session.instantiate(&session.arguments(&format!("probe {k}")))? else {
-            session.violated(format!("instance {} could not be created beside {} others", all.len() + 1, k + kinds));
+            session.violated(format!("instance {} could not be created while {} others existed", all.len() + 1, k + kinds));
             return Ok(());
         };
         instance.enter()?;
@@ -81,7 +81,7 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     }
     for (v, (old, new)) in own.iter().zip(before.into_iter().zip(alone.snapshot(&own)?)) {
         if !old.is_empty() && !new.is_empty() {
-            session.compare_variables(&[*v], "an instance that nobody called meanwhile", &[vec![old]], &[vec![new]]);
+            session.compare_variables(&[*v], "an instance that was not called meanwhile", &[vec![old]], &[vec![new]]);
         }
     }
     for (k, (instance, rows)) in all.into_iter().enumerate() {
@@ -190,12 +190,12 @@ fn memory() -> Option<[u64; 2]> {
     Some([of("VmRSS:")?, of("VmData:")?])
 }
 
-/// Bytes that one of many may leave: the struct of callbacks that we keep for FMI 2.0, and our own tables.
+/// Bytes per repetition that are not a leak: the struct of callbacks kept for FMI 2.0, and the checker's tables.
 const LEFT: u64 = 300;
-/// Bytes that all may leave: pages that the allocator keeps.
-const LEAST: u64 = 300_000;
+/// Total bytes that are not a leak: pages that the allocator keeps.
+const MINIMUM: u64 = 300_000;
 
-/// Does the same many times and looks at what memory grows by.
+/// Repeats an action and measures the growth of memory.
 pub(crate) fn leak(
     session: &Session,
     what: &str,
@@ -222,7 +222,7 @@ pub(crate) fn leak(
     let growth =
         memory().unwrap_or_default().iter().zip(before).map(|(after, before)| after.saturating_sub(before)).max();
     let growth = growth.unwrap_or(0);
-    session.require(growth < (LEFT * n).max(LEAST), || format!("{n} {what} leaked {} kB", growth / 1000));
+    session.require(growth < (LEFT * n).max(MINIMUM), || format!("{n} {what} leaked {} kB", growth / 1000));
     session.note(format!("{} kB more after {n} {what}", growth / 1000));
     Ok(())
 }
@@ -251,7 +251,7 @@ fn leaks(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn reloads(session: &Session) -> Result<(), NotDetermined> {
-    // Another path, so that the session's own copy does not keep it loaded.
+    // Another path, because the session keeps its copy loaded.
     let binary = second_binary(session, "reloaded")?;
     for k in 0..20 {
         session.record_call(&format!("loading the binary, round {}", k + 1));

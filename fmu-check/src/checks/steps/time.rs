@@ -21,9 +21,9 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6, and the independent variable has the time of the step.",
         tried: "Runs 20 steps from each start time.", fix: "Use startTime instead of 0." },
     Check { id: "T01b", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap),
-        requirement: "A communication point other than the end of the last step gives Error.",
+        requirement: "A step that does not start at the end of the last step gives Error.",
         tried: "Makes a step that does not begin where the last ended.",
-        fix: "Compare currentCommunicationPoint with the time of the FMU, with room for rounding." },
+        fix: "Compare currentCommunicationPoint with the time of the FMU, with a tolerance for rounding." },
     Check { id: "T01c", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated),
         requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps, and so is t = t_0 + k h.",
         tried: "Makes up to 100000 steps within the default experiment, with t = t + h.",
@@ -36,7 +36,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.",
         fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit)." },
     Check { id: "T03", clause: STEP, levels: Levels::HARD, run: Run::Probe(step_sizes),
-        requirement: "Halving or doubling the communication step gives approximately the same results with inputs held.",
+        requirement: "Halving or doubling the communication step gives approximately the same results with constant inputs.",
         tried: "Runs 40 steps whole, in halves and in pairs, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean." },
     Check { id: "T04", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, run: Run::Probe(variable),
         requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.",
@@ -44,12 +44,12 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "T05", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before),
         requirement: "With noSetFMUStatePriorToCurrentPoint, steps succeed, and the state at the current point can still be saved and set (should: no \
             result changes).",
-        tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only." },
+        tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Use the flag only as a hint for result buffers." },
     Check { id: "T06a", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results),
         requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has neither returned early \
         nor asked for events without permission (should: \
             lastSuccessfulTime is less than a step from t + h).",
-        tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK." },
+        tried: "Makes 20 steps and checks the four results.", fix: "Write all four results before returning OK." },
     Check { id: "T06b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent),
         requirement: "The independent variable equals the time of the last communication point.",
         tried: "Reads the independent variable after steps.", fix: "Assign t + h to it at the end of a step." },
@@ -58,7 +58,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Passes NULL for each result.", fix: "Check the pointers before writing." },
     Check { id: "T07", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses),
         requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.",
-        tried: "Asks each function for each kind of status.", fix: "Return Discard for what is not available." },
+        tried: "Asks each function for each kind of status.", fix: "Return Discard for unavailable information." },
     Check { id: "T09", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives),
         requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.",
         tried: "Reads first derivatives of all continuous outputs.", fix: "Implement the function, or set maxOutputDerivativeOrder to 0." },
@@ -123,7 +123,7 @@ fn gap(session: &Session) -> Result<(), NotDetermined> {
 
 fn accumulated(session: &Session) -> Result<(), NotDetermined> {
     many_steps(session)?;
-    // Nor is it a matter of rounding: another importer multiplies.
+    // Rounding must not matter either: another importer multiplies.
     let (instance, h, start) = (session.stepping()?, session.h(), session.start());
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
     for k in 0..200 {
@@ -142,7 +142,7 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
 
 fn many_steps(session: &Session) -> Result<(), NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
-    // Beyond its default experiment, an FMU may lack data: what happens there shows nothing.
+    // Beyond its default experiment, an FMU may lack data: a failure there proves nothing.
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
     let began = Instant::now();
     session.record_calls(&format!("up to 100000 steps of {h}, t = t + h"), || {
@@ -156,7 +156,7 @@ fn many_steps(session: &Session) -> Result<(), NotDetermined> {
                 session.note(format!("the FMU ended the simulation after {k} steps"));
                 return Ok(());
             }
-            // A part of a step may be all that the model can do (Discard).
+            // The model may be able to complete only a part of a step (Discard).
             if !status.is_ok() && status != Status::DISCARD {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());

@@ -11,7 +11,7 @@ use crate::state::State;
 use fmu_import::raw::{Arguments, Interface, Simple};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 
-/// States near those given, one of them or all moved a little.
+/// States near those given: one of them, or all, moved slightly.
 pub(crate) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
     let nominal = session.description.states();
     let size = |i: usize| nominal.get(i).and_then(|v| v.nominal).unwrap_or(1.0).abs().max(x[i].abs());
@@ -21,7 +21,7 @@ pub(crate) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
 /// Values at one point, each evaluated after something else has happened: what, the derivatives, and the event indicators.
 type Evaluations = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
-/// Values at a point; nothing, if time cannot go back to it: then the reason.
+/// Values at a point, or the reason why time cannot be set back to it.
 fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDetermined> {
     let begin = || -> Result<_, NotDetermined> {
         let instance = session.excited()?;
@@ -62,7 +62,7 @@ fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDete
         let _ = read(&instance)?;
         Ok(())
     };
-    // As an integrator does that tries a shorter step.
+    // Like an integrator that retries with a shorter step.
     away(usize::MAX)?;
     let back = instance.set_time(t)?;
     if !back.is_ok() {
@@ -124,7 +124,7 @@ pub(crate) fn same_bits(session: &Session) -> Result<(), NotDetermined> {
 }
 
 /// Inputs, parameters and the time, with their values.
-struct Held<'a, 'b> {
+struct Snapshot<'a, 'b> {
     instance: &'a Instance<'b>,
     variables: Vec<&'b ModelVariable>,
     values: Vec<Vec<u64>>,
@@ -132,7 +132,7 @@ struct Held<'a, 'b> {
     vectors: [Vec<f64>; 2],
 }
 
-impl<'a, 'b> Held<'a, 'b> {
+impl<'a, 'b> Snapshot<'a, 'b> {
     fn read(instance: &'a Instance<'b>) -> Result<Self, NotDetermined> {
         let fits = |v: &&ModelVariable| {
             v.clocks.is_empty()
@@ -174,7 +174,7 @@ pub(crate) fn completed_step(session: &Session) -> Result<(), NotDetermined> {
     }
     for _ in 0..5 {
         instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         let (status, flags) = instance.completed()?;
         session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
             format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
@@ -194,7 +194,7 @@ pub(crate) fn independent(session: &Session) -> Result<(), NotDetermined> {
     };
     let instance = session.exchange(State::Continuous)?;
     for _ in 0..3 {
-        // Forth and back, as an integrator does that tries a shorter step.
+        // Forward and back, like an integrator that retries with a shorter step.
         let t = instance.time.get() + 0.1 * session.integrator_step();
         instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
         instance.must("SetTime", instance.set_time(t)?)?;
@@ -210,19 +210,19 @@ pub(crate) fn independent(session: &Session) -> Result<(), NotDetermined> {
 pub(crate) fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.excited()?;
     for _ in 0..3 {
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         let event = instance.iterate()?;
         before.require_but_states("the updates of an event")?;
         if event.terminates() || !event.ended() {
             return Ok(());
         }
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         instance.perform(Simple::EnterContinuousTimeMode)?;
         before.require("EnterContinuousTimeMode")?;
         let t = instance.time.get() + session.integrator_step();
         let next = event.next().unwrap_or(f64::INFINITY);
         instance.must("SetTime", instance.set_time(t.min(next))?)?;
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         instance.perform(Simple::EnterEventMode)?;
         before.require("EnterEventMode")?;
     }
@@ -239,7 +239,7 @@ pub(crate) fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     for k in 0..3 {
         let interface = Interface::ModelExchange;
         let Some(instance) = session.instantiate(&Arguments { interface, ..session.arguments("probe") })? else {
-            session.violated(format!("instance {} could not be created beside {} others", k + 2, k + 1));
+            session.violated(format!("instance {} could not be created while {} others existed", k + 2, k + 1));
             return Ok(());
         };
         instance.bring_to(State::Event)?;

@@ -115,7 +115,7 @@ pub(crate) fn kinds(fmu: &FmuFile) -> Verdict {
             found.push(format!("is a clock with causality {causality}"));
         }
         if causality != "input" && kind != "triggered" {
-            found.push(format!("is a {kind} {causality} clock: who makes it tick is the FMU, so it is triggered"));
+            found.push(format!("is a {kind} {causality} clock: the FMU makes it tick, so it must be triggered"));
         }
         found
     })
@@ -153,7 +153,7 @@ pub(crate) fn names_of_types(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// Lists of the model structure: each entry once, and event indicators that are continuous and the FMU's own.
+/// Lists of the model structure: each entry once, and event indicators that are continuous outputs or local variables.
 pub(crate) fn lists(fmu: &FmuFile) -> Verdict {
     let Some(root) = fmu.root() else { return Verdict::NotDetermined("the description is not well-formed XML".into()) };
     let Some(structure) = root.child("ModelStructure") else {
@@ -187,7 +187,7 @@ pub(crate) fn lists(fmu: &FmuFile) -> Verdict {
         if !continuous || parameter {
             let name = v.get("name").unwrap_or_default();
             found.push(format!(
-                "line {}: the event indicator {name} is not a continuous variable of the FMU's own",
+                "line {}: the event indicator {name} is not a continuous output or local variable",
                 indicator.line
             ));
         }

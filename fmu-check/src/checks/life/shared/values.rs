@@ -32,7 +32,7 @@ pub(crate) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         let Some(values) = session.different_value(v, 1.0) else { continue };
         let status = instance.set(v, &values)?;
         if !status.is_ok() {
-            // The model may refuse a value; other checks judge refusals. The variables that follow are looked at all the same.
+            // The model may refuse a value, which other checks report; the remaining variables are still checked.
             if status == Status::ERROR {
                 refused.push(format!(
                     "Set({} = {}) returned {status}",
@@ -81,7 +81,7 @@ fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64
     let instance = session.fresh()?;
     let kept: Vec<_> = kept.iter().filter(|(v, _)| fits(v)).collect();
     for (v, values) in &kept {
-        // L07 looks at the call. All these values together may be none that the model takes.
+        // L07 checks the call. The model may reject these values in combination.
         if !instance.set(v, values)?.is_ok() {
             return Ok(());
         }
@@ -136,7 +136,7 @@ pub(crate) fn strings(session: &Session) -> Result<(), NotDetermined> {
         }
         if back.first().is_none_or(|b| b.as_deref() != Some(text)) {
             let finding = format!("{}: a string of {} bytes did not read back", v.name, text.len());
-            // The standards set no limit, but nobody needs a text of this length.
+            // The standards set no limit, but no application needs a text of this length.
             if text.len() > LONG { session.lesser(Level::Should, finding) } else { session.violated(finding) }
         }
         Ok(())
@@ -167,7 +167,7 @@ pub(crate) fn binaries(session: &Session) -> Result<(), NotDetermined> {
         if !status.is_ok() {
             return Err(NotDetermined(format!("GetBinary({}) returned {status}", v.name)));
         }
-        // Where there are no bytes, there need be no place.
+        // Without bytes, the pointer may be NULL.
         let back = back.first().map(|found| found.as_deref().unwrap_or_default());
         session.require(back == Some(&bytes[..]), || format!("{}: {size} bytes did not read back", v.name));
         Ok(())
@@ -305,7 +305,7 @@ pub(crate) fn iterated_initialization(session: &Session) -> Result<(), NotDeterm
         let (Some(first), Some(last)) = (session.different_value(v, 3.0), session.different_value(v, 1.0)) else {
             continue;
         };
-        // This check does not judge refusals.
+        // Refusals are not the subject of this check.
         if iterated.set(v, &first)?.is_ok() && iterated.set(v, &last)?.is_ok() {
             let _ = iterated.snapshot(&watched)?;
             let _ = plain.set(v, &last)?;
