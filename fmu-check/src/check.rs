@@ -1,5 +1,6 @@
 //! The vocabulary of the checker: levels, checks, groups, verdicts and options.
 
+use super::confidence::Confidence;
 use super::fmu_file::FmuFile;
 use super::level::Level;
 use super::session::{NotDetermined, Session};
@@ -104,6 +105,8 @@ pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
     /// The level of the finding, if it is lower than that of the check.
     pub(super) lower: Option<Level>,
+    /// How sure the finding is.
+    pub(super) confidence: Confidence,
     /// A call crashed the process or did not return: an importer would have crashed or hung.
     pub(super) fatal: bool,
     /// The calls that led to the finding, with what they returned.
@@ -112,7 +115,7 @@ pub(super) struct Conclusion {
 
 impl From<Verdict> for Conclusion {
     fn from(verdict: Verdict) -> Self {
-        Self { verdict, lower: None, fatal: false, calls: Vec::new() }
+        Self { verdict, lower: None, confidence: Confidence::Certain, fatal: false, calls: Vec::new() }
     }
 }
 
@@ -141,6 +144,8 @@ pub struct Finding {
     pub clause: &'static str,
     /// Level of the check for the standard of this FMU, or of the finding, if that is lower.
     pub level: Level,
+    /// How sure it is.
+    pub confidence: Confidence,
     /// A call of the FMU crashed the process or did not return.
     pub fatal: bool,
     /// Accepted by `--allow` or listed in the baseline: it does not count.

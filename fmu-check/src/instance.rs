@@ -231,7 +231,7 @@ impl Instance<'_> {
         Ok(())
     }
 
-    /// A variable's values.
+    /// A variable's values; none if the getter returned OK and wrote nothing.
     pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), NotDetermined> {
         let n = self.session.elements(v);
         let version = self.session.description.version;
@@ -249,7 +249,8 @@ impl Instance<'_> {
         if !buffer.intact() {
             return Err(NotDetermined(format!("getting {} wrote past its {n} values", v.name)));
         }
-        Ok((status, buffer.bits()))
+        // The pattern that the buffer was filled with is no value of the FMU.
+        Ok((status, if not_written { Vec::new() } else { buffer.bits() }))
     }
 
     /// A variable's values after it was set; `None` where they cannot be read. FMI 2.0 lets an importer read few variables in

@@ -8,9 +8,11 @@ mod ci;
 mod description;
 mod exchange;
 mod findings;
+mod machine;
 mod sizes;
 mod starts;
 mod ticks;
+mod varying;
 mod zip;
 
 use findings::{check, check_within, listed, violated};

@@ -165,6 +165,7 @@ fn discrete(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| {
         v.variability == Variability::Discrete
             && v.clocks.is_empty()
+            && session.is_steady(v)
             && matches!(v.causality, Causality::Output | Causality::Local)
     };
     let variables: Vec<_> = session.numeric().filter(fits).take(60).collect();

@@ -8,10 +8,11 @@ use crate::checks::exchange::shared::evaluation::{
 use crate::checks::life::shared::calls::attempt;
 use crate::checks::life::shared::kept::set_all;
 use crate::checks::life::state::in_initialization;
-use crate::exchange::{Importer, UNSTABLE, deviation, differ};
+use crate::exchange::{Importer, UNSTABLE, UNTOUCHED, deviation, differ};
 use crate::instance::Instance;
 use crate::level::Level;
-use crate::session::{Line, NotDetermined, Session};
+use crate::lines::Line;
+use crate::session::{NotDetermined, Session};
 use crate::state::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
@@ -35,7 +36,8 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "E02", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused),
         requirement: "Every call that the state of a Model Exchange instance does not allow returns Error (Discard if it sets a variable in \
             Continuous-Time Mode), or is accepted with a message of status Warning.",
-        tried: "Makes every call in every state that does not allow the call.", fix: "Check the state at the beginning of every function, log and return Error." },
+        tried: "Makes every call in every state that does not allow the call.",
+        fix: "Check the state at the beginning of every function, log and return Error." },
     Check { id: "E03", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts),
         requirement: "The vectors of states, derivatives, event indicators and nominals have the lengths of the description, and nothing is written past them.",
         tried: "Reads the vectors into buffers with guard values behind them, and in FMI 3.0 their lengths.",
@@ -52,7 +54,7 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
         requirement: "Derivatives and event indicators depend only on time, states and inputs: not on earlier evaluations, nor on the order of \
             the Set calls (should: event indicators, and a time set back to the last completed step).",
-        tried: "Evaluates both in other orders, repeatedly and in another instance, and compares.",
+        tried: "Evaluates both in other orders, repeatedly, after other states at the same time, and in another instance, and compares.",
         fix: "Invalidate cached results in every Set function." },
     Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
         requirement: "Equal time, states and inputs give equal derivatives, bit for bit.",
@@ -179,7 +181,6 @@ fn counts(session: &Session) -> Result<(), NotDetermined> {
             });
         }
     }
-    let untouched = 0xc5c5_c5c5_c5c5_c5c5;
     for (name, n) in [
         (Vector::GetContinuousStates, states),
         (instance.derivatives_name(), states),
@@ -191,7 +192,7 @@ fn counts(session: &Session) -> Result<(), NotDetermined> {
         }
         let (status, values, intact) = instance.vector(name, n)?;
         session.require(intact, || format!("{} wrote past the {n} values", name.as_str()));
-        session.require(!status.is_ok() || values.iter().all(|v| v.to_bits() != untouched), || {
+        session.require(!status.is_ok() || values.iter().all(|v| v.to_bits() != UNTOUCHED.to_bits()), || {
             format!("{} did not write all of the {n} values", name.as_str())
         });
     }

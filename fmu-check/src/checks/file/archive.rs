@@ -1,7 +1,7 @@
 //! The archive, by its raw headers (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
 use crate::check::{Check, Levels, Run, Verdict};
-use crate::checks::file::shared::clock_rules::build_description;
+use crate::checks::file::shared::clock_rules::{build_description, source_files};
 use crate::checks::file::shared::layered::manifests;
 use crate::fmu_file::FmuFile;
 use crate::level::Level;
@@ -86,8 +86,12 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the names of the entries below sources/.",
         fix: "Add buildDescription.xml, and leave out the headers of the standard, which the importer has." },
     Check { id: "Z08", clause: "3.0.2, 2.4.10", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(build_description),
-        requirement: "sources/buildDescription.xml is well-formed, of the version of the FMU, and names existing files, with one build configuration per model and platform.",
+        requirement: "sources/buildDescription.xml is well-formed, of the version of the FMU, and names existing files, with one build configuration \
+            per model and platform.",
         tried: "Reads the file and looks up the files that it names.", fix: "Generate it with the list of the sources." },
+    Check { id: "Z10", clause: "2.0.5, 4.3.1", levels: Levels(Some(Level::Must), None), run: Run::File(source_files),
+        requirement: "Every file in SourceFiles is in the folder sources/.",
+        tried: "Looks each file of SourceFiles up in the archive.", fix: "Pack the file, or remove it from SourceFiles." },
     Check { id: "I03", clause: "3.0.2, 2.6", levels: Levels(None, Some(Level::Should)), run: Run::File(manifests),
         requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its \
             namespace.",

@@ -24,6 +24,9 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "B10", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format),
         requirement: "Every binary is a shared library for the platform of its folder.",
         tried: "Reads the format and the processor of every library.", fix: "Build each platform with its own compiler target, as a shared library." },
+    Check { id: "B13", clause: "2.0.5, 2.3", levels: Levels(Some(Level::Should), None), run: Run::File(expected_processor),
+        requirement: "Libraries in linux64 and win64 are for x86-64, which importers expect there.",
+        tried: "Reads the processor of every library in these folders.", fix: "Use a folder with the platform name of FMI 3.0, such as aarch64-linux." },
     Check { id: "B01", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports),
         requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.",
         tried: "Compares the exported symbols with the functions of the interfaces.",
@@ -169,6 +172,15 @@ fn format(fmu: &FmuFile) -> Verdict {
         }
     }
     Verdict::of(findings)
+}
+
+/// FMI 2.0 names no processor, but importers take linux64 and win64 for x86-64; universal libraries of macOS are common.
+fn expected_processor(fmu: &FmuFile) -> Verdict {
+    each(fmu, |binary, file| {
+        let other = file.architecture() != Architecture::X86_64;
+        let found = other && ["linux64", "win64"].contains(&binary.folder.as_str());
+        if found { vec![format!("is for {:?}", file.architecture())] } else { Vec::new() }
+    })
 }
 
 /// 64-bit processors that FMUs are built for.

@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::checks::file::shared::clock_rules::{
-    intervals, kinds, names_of_types, references as references_of_clocks, reinit,
+    intervals, kinds, long_intervals, names_of_types, references as references_of_clocks, reinit,
 };
 use crate::checks::file::shared::clocked::alias_units;
 use crate::checks::file::shared::names::grammar;
@@ -53,8 +53,9 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads variability of all variables that are not floating-point.",
         fix: "Write variability=\"discrete\" (or fixed, tunable, constant) at Integer, Boolean, String and Enumeration." },
     Check { id: "V06a", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::SHOULD, run: Run::File(ranges),
-        requirement: "min <= start <= max, and nominal is not 0.",
-        tried: "Compares min, start, max and nominal.", fix: "Correct the limits or the start value; leave nominal out if it is not known." },
+        requirement: "min <= start <= max, the start value of an enumeration is one of its items, and nominal is not 0.",
+        tried: "Compares min, start, max, items and nominal.",
+        fix: "Correct the limits or the start value; leave nominal out if it is not known." },
     Check { id: "V08a", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::File(types),
         requirement: "declaredType names a type definition of the same base type; every enumeration has one.",
         tried: "Looks declaredType up in TypeDefinitions.", fix: "Define the type with the base type of the variable." },
@@ -73,9 +74,9 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Compares the base units of about 100 common names with their meaning.",
         fix: "Correct exponents, factor and offset: value in base units = factor * value + offset." },
     Check { id: "V09d", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays),
-        requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).",
-        tried: "Compares the factors of common display units with their meaning.",
-        fix: "Correct the factor: display value = factor * value + offset, the opposite direction to BaseUnit." },
+        requirement: "A common display unit has the factor and offset that its name implies (display = factor * value + offset).",
+        tried: "Compares the factors of common display units, and the offsets of temperatures, with their meaning.",
+        fix: "Correct factor and offset: display value = factor * value + offset, the opposite direction to BaseUnit." },
     Check { id: "V10", clause: "3.0.2, 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units),
         requirement: "Only aliases of floating-point variables have a display unit, and it belongs to the unit of the variable.",
         tried: "Looks at the attribute displayUnit of aliases.", fix: "Define the display unit in the unit of the variable, or drop it." },
@@ -92,6 +93,9 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Periodic clocks, and no others, have an interval above 0 and no negative shift, and output clocks have no priority.",
         tried: "Reads the attributes of all clocks.",
         fix: "Give constant, fixed and tunable clocks an interval; drop what does not belong to the kind of clock." },
+    Check { id: "V19", clause: "3.0.2, 2.4.4", levels: Levels(None, Some(Level::Hard)), run: Run::File(long_intervals),
+        requirement: "A periodic clock ticks within the default experiment: its interval is in seconds.",
+        tried: "Compares intervalDecimal with the default experiment.", fix: "Give intervals in seconds, not in milliseconds." },
     Check { id: "V17", clause: "3.0.2, 2.2.8.2", levels: Levels(None, Some(Level::Should)), run: Run::File(kinds),
         requirement: "A clock is an input, an output or a local variable, and triggered if it is not an input.",
         tried: "Reads causality and intervalVariability of all clocks.", fix: "Make a clock that the FMU ticks a triggered output." },
@@ -300,7 +304,7 @@ fn continuous(fmu: &FmuFile) -> Verdict {
 }
 
 fn ranges(fmu: &FmuFile) -> Verdict {
-    each(fmu, |_, v| {
+    each(fmu, |d, v| {
         if v.min.zip(v.max).is_some_and(|(min, max)| min > max) {
             return Some(format!("min = {} is greater than max = {}", v.min?, v.max?));
         }
@@ -309,6 +313,13 @@ fn ranges(fmu: &FmuFile) -> Verdict {
         }
         if matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Boolean | BaseType::Clock) {
             return None;
+        }
+        let items = v.declared_type.as_deref().and_then(|name| d.type_definition(name)).map(|t| &t.items);
+        if let Some(items) = items.filter(|_| v.base == BaseType::Enumeration) {
+            let is_item = |word: &&str| items.iter().any(|item| item.value.to_string() == *word);
+            if let Some(word) = v.start.as_deref()?.split_whitespace().find(|word| !is_item(word)) {
+                return Some(format!("start = {word} is not among the items of its type"));
+            }
         }
         let numbers = v.start.as_deref()?.split_whitespace().filter_map(parse_number);
         let outside = |x: &f64| v.min.is_some_and(|min| *x < min) || v.max.is_some_and(|max| *x > max);

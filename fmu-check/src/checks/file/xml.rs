@@ -36,8 +36,8 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Every capability flag that requires another flag is accompanied by it.",
         tried: "Reads the capability flags of the interfaces.", fix: "Set the required flag too, or drop the flag that requires it." },
     Check { id: "X10", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment),
-        requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, the tolerance is not \
-            negative, and fixedInternalStepSize is positive.",
+        requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, the tolerance is finite \
+            and not negative, and fixedInternalStepSize is positive.",
         tried: "Reads DefaultExperiment and fixedInternalStepSize.", fix: "Correct the numbers, or leave out those that are not known." },
     Check { id: "X11", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit),
         requirement: "An FMU without model exchange does not use the attribute reinit.",
@@ -198,7 +198,11 @@ fn experiment(fmu: &FmuFile) -> Verdict {
             }
         }
         wrong(x.step.is_some_and(|h| h <= 0.0), "stepSize is not positive".into());
-        wrong(x.tolerance.is_some_and(|t| t < 0.0), "tolerance is negative".into());
+        let tolerance = x.tolerance.unwrap_or(0.0);
+        wrong(
+            !(tolerance >= 0.0 && tolerance.is_finite()),
+            format!("tolerance = {tolerance} is negative or not finite"),
+        );
         findings
     })
 }

@@ -59,11 +59,12 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "A value set before the end of initialization reads back unchanged.",
         tried: "Sets every settable number in Initialization Mode, then all before it, and reads them in it.", fix: "Store the value unchanged." },
     Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Any(strings),
-        requirement: "The FMU copies strings that are set: the importer may overwrite its own.",
-        tried: "Sets strings, overwrites them, and reads back.", fix: "Copy the string." },
+        requirement: "A string that is set reads back unchanged, at any length, after the importer has overwritten its own copy.",
+        tried: "Sets strings of up to 1 MiB, and several strings in one call, overwrites them, and reads them back.",
+        fix: "Allocate memory for the length of each string, and copy it there." },
     Check { id: "G05b", clause: "3.0.2, 2.2.7.2", levels: Levels(None, Some(Level::Must)), run: Run::Any(binaries),
-        requirement: "The FMU copies bytes that are set, also none and as many as maxSize: the importer may overwrite its own.",
-        tried: "Sets bytes, overwrites them, and reads back.", fix: "Copy the bytes with their size." },
+        requirement: "Bytes that are set, from none to maxSize, read back unchanged after the importer has overwritten its own copy.",
+        tried: "Sets bytes, overwrites them, and reads them back.", fix: "Copy the bytes with their size." },
     Check { id: "G05m", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Any(too_many_bytes),
         requirement: "More bytes than maxSize are refused.",
         tried: "Sets one byte more.", fix: "Compare the size with maxSize before copying." },
@@ -74,10 +75,10 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Initialization can be iterated: values set and read on the way do not affect the result.",
         tried: "Sets values once in one instance, sets other values and reads outputs first in another, and compares.",
         fix: "Compute outputs from the current values when they are read, without changing the state." },
-    Check { id: "G09", clause: "2.0.5, 4.2.4; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Probe(stand),
+    Check { id: "G09", clause: "2.0.5, 4.2.4; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Any(stand),
         requirement: "The start value of an output or a local variable with initial=exact can be set, is kept during the initialization, and is \
             restored by Reset.",
-        tried: "Sets each after the instantiation, reads it in Initialization Mode and at its end, and after Reset.",
+        tried: "Sets each after the instantiation, in each interface, reads it in Initialization Mode and at its end, and after Reset.",
         fix: "Do not overwrite the variable when the initialization computes others, and restore all start values in Reset." },
     Check { id: "G10", clause: GET, levels: Levels::MUST, run: Run::Probe(several),
         requirement: "Several variables read or set in one call have the same values as when each is read or set alone.",
@@ -406,7 +407,7 @@ fn not_settable(session: &Session) -> Result<(), NotDetermined> {
                 format!("Set({}), {} {}, in step mode returned {status}", v.name, v.variability, v.causality)
             });
             let (status, after) = instance.get(v)?;
-            session.require(!status.is_ok() || before == after, || {
+            session.require(!status.is_ok() || before == after || !session.is_steady(v), || {
                 format!("Set({}) in step mode changed the value", v.name)
             });
             Ok(())

@@ -29,7 +29,8 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Instantiates with a wrong token.", fix: "Log the reason before returning NULL." },
     Check { id: "G-L3b", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts),
         requirement: "Messages are UTF-8, not empty, and have no trailing line break.",
-        tried: "Reads the messages of a run with an Error.", fix: "Write UTF-8 without a line break at the end." },
+        tried: "Reads the messages of a run with an Error.",
+        fix: "Write UTF-8 without a line break at the end; in FMI 2.0 a message is a printf format, so pass text with a % as the argument of \"%s\"." },
     Check { id: "G-L4", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity),
         requirement: "Messages have the environment, and in FMI 2.0 the instance name, that were passed on instantiation.",
         tried: "Reads environment and name of all messages, also of the first of two instances.", fix: "Store both per instance." },
@@ -66,7 +67,11 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
 
 fn show(event: &LogCall) -> String {
     let category = event.category.as_deref().unwrap_or("NULL");
-    format!("{} [{category}] {:?}", Status(event.status), event.text.as_deref().unwrap_or("(none, or not UTF-8)"))
+    let text = event.text.as_deref().map_or_else(
+        || "(NULL, not UTF-8, or in FMI 2.0 a printf format with a % whose argument is missing)".into(),
+        |text| format!("{text:?}"),
+    );
+    format!("{} [{category}] {text}", Status(event.status))
 }
 
 fn categories(session: &Session) -> Result<(), NotDetermined> {

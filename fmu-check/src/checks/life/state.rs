@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::kept::{set_all, texts};
-use crate::checks::process::instances::leak;
+use crate::checks::process::instances::{LEFT_BY_STATE, leak};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
@@ -11,13 +11,15 @@ use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
 use model_description::{Causality, CoSimulation, ModelVariable};
+use std::cell::Cell;
 
 const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "F01a", clause: STATE, levels: Levels::MUST, run: Run::Probe(in_every_state),
-        requirement: "A state can be saved, restored repeatedly and freed in every state of the life cycle, and the life cycle continues; freeing sets the pointer to NULL.",
+        requirement: "A state can be saved, restored repeatedly and freed in every state of the life cycle, and the life cycle continues; freeing \
+            sets the pointer to NULL.",
         tried: "Gets, sets twice and frees a state in each state of the life cycle, and makes the next call.",
         fix: "Allow the calls in all these states, and set the pointer to NULL after freeing." },
     Check { id: "F01b", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite),
@@ -25,8 +27,9 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Gets a state into an existing one, runs, restores, and compares; the same with the first of two states; frees NULL.",
         fix: "Overwrite the memory behind the pointer; return OK for NULL." },
     Check { id: "F01l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(state_leaks),
-        requirement: "Saving and freeing states leaks no memory.",
-        tried: "Saves and frees some thousand states and measures memory.", fix: "Free in FreeFMUState what GetFMUState allocated." },
+        requirement: "Saving and freeing states, and saving into an existing state, leak no memory.",
+        tried: "Saves and frees some thousand states, saves some thousand times into the same one, and measures memory.",
+        fix: "Free in FreeFMUState what GetFMUState allocated, and let GetFMUState reuse the memory of a state that it is given." },
     Check { id: "F02a", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state),
         requirement: "A run from a restored state equals the run from the time of saving.",
         tried: "Saves, runs 50 steps, restores twice, and compares.",
@@ -258,10 +261,18 @@ fn state_leaks(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let instance = session.stepping()?;
     instance.steps(1, session.h())?;
-    leak(session, "states", &|| {
+    leak(session, ("states", LEFT_BY_STATE), &|| {
         let mut state = instance.save()?;
         let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut state)))?;
         instance.must("FreeFMUState", status)
+    })?;
+    let state = Cell::new(instance.save()?);
+    leak(session, ("states saved into an existing one", LEFT_BY_STATE), &|| {
+        let mut again = state.get();
+        let status = instance
+            .call("GetFMUState(a state read before)", |raw| raw.get_state(instance.handle, Some(&mut again)))?;
+        state.set(again);
+        instance.must("GetFMUState", status)
     })
 }
 

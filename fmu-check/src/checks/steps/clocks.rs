@@ -29,7 +29,8 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Calls GetIntervalDecimal and GetShiftDecimal in Initialization Mode; sets the intervals of fixed and tunable clocks.",
         fix: "Use one value for the description and the functions." },
     Check { id: "K04", clause: "3.0.2, 2.2.8.4", levels: MUST, run: Run::Probe(qualified),
-        requirement: "The qualifier of an interval is one of the three values; Changed is returned once; only a countdown clock has an interval that is not yet known.",
+        requirement: "The qualifier of an interval is one of the three values; Changed is returned once; only a countdown clock has an interval \
+            that is not yet known.",
         tried: "Calls GetIntervalDecimal twice after each update of a run.", fix: "Return fmi3IntervalChanged at the first call after a change, then \
             fmi3IntervalUnchanged." },
     Check { id: "K05", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(counted),

@@ -18,7 +18,8 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "N01", clause: STEP, levels: MUST, run: Run::Probe(combinations),
-        requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed; after an early return, the next step starts at lastSuccessfulTime.",
+        requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed; after an early return, the next step \
+            starts at lastSuccessfulTime.",
         tried: "Runs with each combination of the two flags, with steps of 1 and 5 communication steps.",
         fix: "Start a step at the time that the importer passes: lastSuccessfulTime after an early return, otherwise the end of the last step." },
     Check { id: "N02", clause: STEP, levels: MUST, run: Run::Probe(permitted),

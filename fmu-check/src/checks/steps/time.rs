@@ -4,6 +4,8 @@ use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::kept::derivatives_are_slopes;
 use crate::checks::life::shared::starts::{ended, no_step_after};
 use crate::checks::steps::shared::derivatives::{input_derivatives, output_derivatives, slopes};
+use crate::checks::steps::shared::plain_runs::determinism;
+use crate::checks::steps::shared::step_sizes::step_sizes;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{ENDED, NotDetermined, Session};
@@ -36,8 +38,9 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.",
         fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit)." },
     Check { id: "T03", clause: STEP, levels: Levels::HARD, run: Run::Probe(step_sizes),
-        requirement: "Halving or doubling the communication step gives approximately the same results with constant inputs.",
-        tried: "Runs 40 steps whole, in halves and in pairs, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean." },
+        requirement: "Communication steps of 1/2, 3/2 and 2 times the usual size give approximately the same results with constant inputs.",
+        tried: "Runs with both sizes to the same times, and compares: to 10 % of the largest value, and to half of the change over the run.",
+        fix: "Divide each communication step into internal steps, the last one shorter, and lose no remainder." },
     Check { id: "T04", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, run: Run::Probe(variable),
         requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.",
         tried: "Makes 200 steps of random sizes.", fix: "Divide the step into internal ones, the last of them shorter." },
@@ -80,9 +83,11 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "T12s", clause: "hardening", levels: Levels::HARD, run: Run::Probe(no_step_after),
         requirement: "No step succeeds after the FMU has ended the simulation.",
         tried: "Steps on after the end.", fix: "Return Error until the FMU is reset." },
-    Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism),
-        requirement: "Two consecutive runs with the same inputs are equal bit for bit.",
-        tried: "Runs twice in one process and compares bits.", fix: "Initialize all memory." },
+    Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Any(determinism),
+        requirement: "Two instances with the same inputs give the same results bit for bit.",
+        tried: "Runs two instances one after the other, in each interface, and compares all variables; no other check compares a variable in which \
+            they differ.",
+        fix: "Initialize all memory, share no data between instances, and give random numbers a seed; a measured time always differs." },
     Check { id: "T10p", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes),
         requirement: "Two processes with different addresses give the same results bit for bit.",
         tried: "Runs in two processes and compares hashes.", fix: "Let nothing depend on addresses, time or the process." },
@@ -197,47 +202,6 @@ fn non_finite_step(session: &Session) -> Result<(), NotDetermined> {
         });
         Ok(())
     })
-}
-
-fn step_sizes(session: &Session) -> Result<(), NotDetermined> {
-    if !session.flag("canHandleVariableCommunicationStepSize") {
-        return session.not_applicable("the communication step may not change");
-    }
-    compare_steps(session, false)?;
-    compare_steps(session, true)
-}
-
-/// Compares a run with one in steps of half the size, or of twice the size.
-fn compare_steps(session: &Session, longer: bool) -> Result<(), NotDetermined> {
-    let (h, n) = (session.h(), if longer { 20 } else { 40 });
-    let fits = |v: &&&ModelVariable| v.base == BaseType::Float64 && !v.is_array();
-    let all = session.watched();
-    let watched: Vec<_> = all.iter().filter(fits).copied().collect();
-    let run = |steps: usize, h: f64| {
-        let instance = session.stepping()?;
-        instance.change_inputs(3)?;
-        (0..n)
-            .map(|_| {
-                instance.steps(steps, h)?;
-                instance.snapshot(&watched)
-            })
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let other = if longer { 2.0 * h } else { h / 2.0 };
-    let (whole, half) = if longer { (run(2, h)?, run(1, other)?) } else { (run(1, h)?, run(2, other)?) };
-    let number = |bits: &[u64]| bits.first().map_or(0.0, |b| f64::from_bits(*b));
-    for (i, v) in watched.iter().enumerate() {
-        let scale = whole.iter().map(|row| number(&row[i]).abs()).fold(v.nominal.unwrap_or(0.0).abs(), f64::max);
-        let largest_difference =
-            whole.iter().zip(&half).map(|(a, b)| (number(&a[i]) - number(&b[i])).abs()).fold(0.0, f64::max);
-        session.require(largest_difference <= 0.1 * scale + 1e-9, || {
-            format!(
-                "{} ({}): results with steps of {h} and {other} differ by {largest_difference}; the scale is {scale}",
-                v.name, v.variability
-            )
-        });
-    }
-    Ok(())
 }
 
 fn variable(session: &Session) -> Result<(), NotDetermined> {
@@ -369,13 +333,6 @@ fn statuses(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-fn determinism(session: &Session) -> Result<(), NotDetermined> {
-    let run = || trajectory(&session.stepping()?, 30);
-    let (first, second) = (run()?, run()?);
-    session.compare("the second run", &first, &second);
-    Ok(())
-}
-
 /// Notes a hash of all outputs, which the parent process compares.
 fn two_processes(session: &Session) -> Result<(), NotDetermined> {
     let values = trajectory(&session.stepping()?, 30)?.into_iter().flatten().flatten();
@@ -412,7 +369,7 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     let (a, b) = (run(&unrestricted, 0, false)?, run(&restricted, 0, true)?);
     // For the text the flag is a hint: that it changes no result is not said.
     if let Some(found) = difference(&session.watched(), &a, &b) {
-        let text = format!("with noSetFMUStatePriorToCurrentPoint an output differs after {} steps", found.step + 1);
+        let text = format!("with noSetFMUStatePriorToCurrentPoint an output differs{}", found.text());
         session.deviates_at(Some(Level::Should), found.largest, &text);
     }
     if !saves {

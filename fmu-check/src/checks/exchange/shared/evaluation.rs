@@ -54,7 +54,10 @@ fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDete
         }
         Ok(())
     };
-    let read = |instance: &Instance<'_>| Ok::<_, NotDetermined>((instance.derivatives()?, instance.indicators()?));
+    let of = session.derivative_variables();
+    let read = |instance: &Instance<'_>| {
+        Ok::<_, NotDetermined>((session.steady(&of, instance.derivatives()?), instance.indicators()?))
+    };
     let away = |k: usize| -> Result<(), NotDetermined> {
         instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, k))?)?;
         let _ = read(&instance)?;
@@ -80,6 +83,13 @@ fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDete
         point(&instance, [1, 2, 0])?;
         add(what, read(&instance)?);
     }
+    // Other states at the same time, as an integrator of several stages sets them.
+    away(usize::MAX)?;
+    point(&instance, [0, 1, 2])?;
+    instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, usize::MAX))?)?;
+    let _ = read(&instance)?;
+    instance.must("SetContinuousStates", instance.set_states(&x)?)?;
+    add("after other states at the same time", read(&instance)?);
     let (other, _) = begin()?;
     point(&other, [2, 1, 0])?;
     add("in another instance, set in another order", read(&other)?);
@@ -123,6 +133,13 @@ pub(crate) fn same_bits(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
+/// The states and the derivatives that can be compared.
+fn vectors(instance: &Instance<'_>) -> Result<[Vec<f64>; 2], NotDetermined> {
+    let session = instance.session;
+    let states = session.steady(&session.description.states(), instance.states()?);
+    Ok([states, session.steady(&session.derivative_variables(), instance.derivatives()?)])
+}
+
 /// Inputs, parameters and the time, with their values.
 struct Snapshot<'a, 'b> {
     instance: &'a Instance<'b>,
@@ -140,13 +157,13 @@ impl<'a, 'b> Snapshot<'a, 'b> {
         };
         let variables: Vec<_> = instance.session.numeric().filter(fits).take(200).collect();
         let values = instance.snapshot(&variables)?;
-        Ok(Self { instance, variables, values, vectors: [instance.states()?, instance.derivatives()?] })
+        Ok(Self { instance, variables, values, vectors: vectors(instance)? })
     }
 
     /// Requires that a call has changed nothing of it.
     fn require(&self, call: &str) -> Result<(), NotDetermined> {
         let session = self.instance.session;
-        let now = [self.instance.states()?, self.instance.derivatives()?];
+        let now = vectors(self.instance)?;
         for (what, (before, after)) in ["states", "derivatives"].iter().zip(self.vectors.iter().zip(&now)) {
             session
                 .require(!differ(before, after), || format!("{call}: the {what} were {before:?}, and are {after:?}"));

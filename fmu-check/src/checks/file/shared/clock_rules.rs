@@ -244,3 +244,35 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
     }
     Verdict::of(found)
 }
+
+/// Files that modelDescription.xml of FMI 2.0 lists.
+pub(crate) fn source_files(fmu: &FmuFile) -> Verdict {
+    let Some(root) = fmu.root() else { return Verdict::NotDetermined("the description is not well-formed XML".into()) };
+    let interfaces = ["CoSimulation", "ModelExchange"].into_iter().filter_map(|name| root.child(name));
+    let lists: Vec<_> = interfaces.filter_map(|interface| interface.child("SourceFiles")).collect();
+    if lists.is_empty() {
+        return Verdict::NotApplicable("there are no SourceFiles".into());
+    }
+    let files = lists.iter().flat_map(|list| list.all("File"));
+    let missing = files.filter_map(|file| {
+        let name = file.get("name").unwrap_or_default();
+        let there = fmu.zip.find(&format!("sources/{name}")).is_some();
+        (!there).then(|| format!("line {}: the file sources/{name} is missing", file.line))
+    });
+    Verdict::of(missing.collect())
+}
+
+/// Intervals that no default experiment reaches, as milliseconds give them.
+pub(crate) fn long_intervals(fmu: &FmuFile) -> Verdict {
+    let experiment = fmu.description.as_ref().ok().map(|d| d.default_experiment);
+    let Some(span) = experiment.and_then(|x| Some(x.stop? - x.start.unwrap_or(0.0))) else {
+        return Verdict::NotApplicable("the default experiment has no stopTime".into());
+    };
+    each(fmu, |v, _| {
+        let interval = v.get("intervalDecimal").and_then(|text| parse_number(text.trim()));
+        let long = interval.filter(|x| v.name == "Clock" && *x > span);
+        long.map(|x| format!("has an interval of {x} s, and the default experiment takes {span} s"))
+            .into_iter()
+            .collect()
+    })
+}

@@ -14,7 +14,8 @@ use std::ffi::CString;
 const STEPS: u32 = 20;
 
 fn scalars(session: &Session, base: BaseType, fits: impl Fn(&ModelVariable) -> bool) -> Vec<&ModelVariable> {
-    session.numeric().filter(|v| v.base == base && !v.is_array() && v.clocks.is_empty() && fits(v)).take(12).collect()
+    let fits = |v: &&ModelVariable| v.base == base && !v.is_array() && v.clocks.is_empty() && fits(v);
+    session.numeric().filter(|v| session.is_steady(v)).filter(fits).take(12).collect()
 }
 
 /// The values of several variables, each alone and all in one call, in both orders.
@@ -26,7 +27,7 @@ pub(crate) fn several(session: &Session) -> Result<(), NotDetermined> {
     let mut tried = 0;
     for &base in BaseType::ALL {
         let mut list = scalars(session, base, |_| true);
-        list.retain(|v| instance.get(v).is_ok_and(|(status, _)| status.is_ok()));
+        list.retain(|v| instance.get(v).is_ok_and(|(status, bits)| status.is_ok() && !bits.is_empty()));
         if list.len() < 2 {
             continue;
         }
@@ -35,12 +36,14 @@ pub(crate) fn several(session: &Session) -> Result<(), NotDetermined> {
             let turned = |n: usize| if order == "in order" { n } else { list.len() - 1 - n };
             let references: Vec<u32> = (0..list.len()).map(|n| list[turned(n)].value_reference).collect();
             let mut buffer = Buffer::room(base, version, list.len());
+            let untouched = buffer.clone();
             let call = format!("Get({} variables of the type {base}, {order})", list.len());
             let status = instance.call(&call, |raw| {
                 raw.get(instance.handle, base, Some(&references), list.len(), Some(&mut buffer), list.len())
             })?;
             session.require(status.is_ok(), || format!("{call} returned {status}"));
-            if !status.is_ok() {
+            session.require(!status.is_ok() || buffer != untouched, || format!("{call} returned OK and wrote nothing"));
+            if !status.is_ok() || buffer == untouched {
                 return Ok(());
             }
             tried += 1;
@@ -249,6 +252,7 @@ pub(crate) fn parameters_keep(session: &Session) -> Result<(), NotDetermined> {
         v.causality == Causality::Parameter
             && matches!(v.variability, Variability::Fixed | Variability::Tunable)
             && v.clocks.is_empty()
+            && session.is_steady(v)
     };
     let all: Vec<_> = session.numeric().filter(fits).collect();
     if all.is_empty() {
@@ -277,7 +281,8 @@ pub(crate) fn parameters_keep(session: &Session) -> Result<(), NotDetermined> {
 /// Derivatives that are variables, and their states, against the slope over steps in which the derivative hardly changes.
 pub(crate) fn derivatives_are_slopes(session: &Session) -> Result<(), NotDetermined> {
     let d = &session.description;
-    let real = |v: &ModelVariable| v.base == BaseType::Float64 && !v.is_array() && v.clocks.is_empty();
+    let real =
+        |v: &ModelVariable| v.base == BaseType::Float64 && !v.is_array() && v.clocks.is_empty() && session.is_steady(v);
     let pairs: Vec<(&ModelVariable, &ModelVariable)> = d
         .variables
         .iter()
@@ -338,7 +343,7 @@ pub(crate) fn texts(instance: &Instance<'_>) -> Result<Vec<(String, Option<Strin
         .description
         .variables
         .iter()
-        .filter(|v| v.base == BaseType::String && !v.is_array() && v.clocks.is_empty());
+        .filter(|v| v.base == BaseType::String && !v.is_array() && v.clocks.is_empty() && session.is_steady(v));
     let mut all = Vec::new();
     for v in strings {
         let call = format!("GetString({})", v.name);
