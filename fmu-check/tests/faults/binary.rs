@@ -50,7 +50,8 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("T04", &["T04"]),
     ("T06b", &["T01a", "T06b"]),
     ("T07", &["T07"]),
-    ("F01a", &["F01a"]),
+    // It does not free the state either.
+    ("F01a", &["F01a", "F01l"]),
     ("F01b", &["F01b"]),
     // A state that lacks a variable; the checks that take F02a for granted are not determined.
     ("F02", &["F02a", "F02b"]),

@@ -61,7 +61,7 @@ static double slope(M *m) {
         dx += 1e-4 * (m->x - m->last_x);
         m->last_x = m->x;
     }
-    if (FAULT(E06t)) {
+    if (FAULT(E06k)) {
         if (m->t == m->last_t && m->last_t) return m->last_dx;
         m->last_t = m->t, m->last_dx = dx;
     }

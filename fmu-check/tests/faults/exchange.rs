@@ -139,7 +139,7 @@ fn faults_of_a_time_and_of_a_start() {
     assert!(exact != xml);
     let rows: [(&str, &str, &str, &[&str]); 4] = [
         (xml, "NONE", "E06a", &[]),
-        (xml, "E06t", "E06a", &["E06a"]),
+        (xml, "E06k", "E06a", &["E06a"]),
         (&exact, "STARTS", "G09", &[]),
         (&exact, "STARTS G09m", "G09", &["G09"]),
     ];

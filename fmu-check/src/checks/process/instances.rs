@@ -100,7 +100,7 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
 
 /// Frees all instances but two, whose values must stay and which must run on.
 fn free_others(session: &Session, mut all: Vec<Instance<'_>>) -> Result<(), NotDetermined> {
-    let own: Vec<_> = session.numeric().filter(|v| v.clocks.is_empty()).collect();
+    let own = session.watched();
     let left = all.split_off(all.len().saturating_sub(2));
     let before = left.iter().map(|instance| instance.snapshot(&own)).collect::<Result<Vec<_>, _>>()?;
     let what = format!("after {} other instances were freed", all.len());

@@ -52,22 +52,19 @@ impl<'b> Varying<'b> {
     /// Steps with changing inputs.
     fn simulate(&self) -> Result<Plain<'b>, NotDetermined> {
         let (session, instance, mut rows) = (self.session, self.session.stepping()?, Vec::new());
-        let what =
-            format!("{STEPS} steps with changing inputs, each followed by getting {} variables", self.variables.len());
-        session.record_calls(&what, || {
-            for k in 0..STEPS {
-                instance.change_inputs(k)?;
-                let status = instance.step(session.h())?;
-                if instance.over.get() {
-                    break;
-                }
+        let mut step = |k| {
+            instance.change_inputs(k)?;
+            let status = instance.step(session.h())?;
+            if !instance.over.get() {
                 instance.must("DoStep", status)?;
                 rows.push(instance.snapshot(&self.variables)?);
-                if session.half_time_used() {
-                    break;
-                }
             }
             Ok(())
+        };
+        // The first step is recorded call by call: a second instance may hang in it.
+        step(0)?;
+        session.record_calls(&self.what("steps with changing inputs"), || {
+            (1..STEPS).take_while(|_| !instance.over.get() && !session.half_time_used()).try_for_each(step)
         })?;
         let words = texts(&instance)?;
         Ok((instance, rows, words))
@@ -77,22 +74,23 @@ impl<'b> Varying<'b> {
     fn exchange(&self) -> Result<Plain<'b>, NotDetermined> {
         let (session, instance, mut rows) = (self.session, self.session.exchange(State::Event)?, Vec::new());
         let mut importer = Importer::start(&instance)?;
-        let what = format!("{STEPS} integrator steps, each followed by getting {} variables", self.variables.len());
-        session.record_calls(&what, || {
-            for _ in 0..STEPS {
-                if importer.over {
+        session.record_calls(&self.what("integrator steps"), || {
+            for k in 0..STEPS {
+                if importer.over || (k > 0 && session.half_time_used()) {
                     break;
                 }
                 importer.step(session.integrator_step(), &mut |_, _| ())?;
                 rows.push(instance.snapshot(&self.variables)?);
-                if session.half_time_used() {
-                    break;
-                }
             }
             Ok(())
         })?;
         let words = texts(&instance)?;
         Ok((instance, rows, words))
+    }
+
+    /// The entry for the log of calls.
+    fn what(&self, steps: &str) -> String {
+        format!("{STEPS} {steps}, each followed by getting {} variables", self.variables.len())
     }
 
     fn compare(
