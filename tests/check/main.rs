@@ -44,13 +44,14 @@ fn the_page_has_the_list() {
     let page = std::fs::read_to_string(&path).unwrap();
     let (before, after) = page.split_once("<!-- list -->\n").unwrap();
     let (_, after) = after.split_once("<!-- end of list -->").unwrap();
-    let expected = format!("{before}<!-- list -->\n{}<!-- end of list -->{after}", fmu_check::report::list());
+    let [index, list] = [fmu_check::report::index(), fmu_check::report::list()];
+    let expected = format!("{before}<!-- list -->\n{index}\n{list}<!-- end of list -->{after}");
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
         std::fs::write(&path, expected).unwrap();
     } else {
         assert!(page == expected, "docs/check.md is old: UPDATE_GOLDEN=1 cargo test --test check writes it");
     }
-    let checks = fmu_check::report::list().lines().filter(|l| l.starts_with("| ") && !l.starts_with("| id")).count();
+    let checks = list.lines().filter(|l| l.starts_with("| ") && !l.starts_with("| id")).count();
     for (file, text) in
         [("README.md", include_str!("../../README.md")), ("CHANGELOG.md", include_str!("../../CHANGELOG.md"))]
     {
