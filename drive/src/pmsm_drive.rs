@@ -25,6 +25,7 @@ use crate::{PmsmPlant, SensorlessController};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
 use drive_control::commissioning::IDENTIFIED;
+use drive_control::model::TAU_REF;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
 use drive_plant::signals::{PlantInputs, PlantOutputs};
@@ -389,7 +390,7 @@ type I = Row<DriveInputs>;
 /// The inputs, of `PmsmDrive` and of `PmsmDriveMean`.
 pub(crate) const INPUTS: &Table<DriveInputs> = table![
             I::input("speed_ref", &SPEED, "Mechanical speed reference", |i| &mut i.speed_ref),
-            I::input("tau_ref", &NEWTON_METER, "Torque reference", |i| &mut i.tau_ref)
+            I::input("tau_ref", &NEWTON_METER, TAU_REF, |i| &mut i.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
             I::boolean_input(
                 "enable",
