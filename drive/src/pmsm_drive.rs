@@ -25,6 +25,7 @@ use drive_base::frame::Phases;
 use drive_control::commissioning::IDENTIFIED;
 #[cfg(doc)]
 use drive_control::model::SensorlessController;
+use drive_control::model::TAU_REF;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
 #[cfg(doc)]
@@ -391,7 +392,7 @@ type I = Row<DriveInputs>;
 /// The inputs, of `PmsmDrive` and of `PmsmDriveMean`.
 pub(crate) const INPUTS: &Table<DriveInputs> = table![
             I::input("speed_ref", &SPEED, "Mechanical speed reference", |i| &mut i.speed_ref),
-            I::input("tau_ref", &NEWTON_METER, "Torque reference", |i| &mut i.tau_ref)
+            I::input("tau_ref", &NEWTON_METER, TAU_REF, |i| &mut i.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
             I::boolean_input(
                 "enable",

@@ -6,7 +6,7 @@
 mod importer;
 
 use drive::control::current::CurrentLoop;
-use drive::control::tables::Limits;
+use drive::control::limits::Limits;
 use drive::estimator::Kind as Estimator;
 use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;

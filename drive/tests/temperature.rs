@@ -7,7 +7,7 @@
 
 use drive::control::current::CurrentLoop;
 use drive::control::envelope::{Envelope, Limit, WarmStart};
-use drive::control::tables::Limits;
+use drive::control::limits::Limits;
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;
