@@ -174,14 +174,13 @@ fn moved(share: f64, i_q: f64, set: impl FnOnce(&mut Pair)) -> (f64, bool) {
 #[test]
 fn a_small_torque_that_moves_nothing_is_said() {
     let i_0 = 5.0_f64;
-    for (share, c_1) in [(0.9, 50.0)] {
-        let threshold = (2.0 - 2.0_f64.sqrt()) * i_0 * ((1.0 - share) * 2.0 * i_0 / (0.15 * c_1)).sqrt();
-        let set = |pair: &mut Pair| pair.controller.model.parameters.estimators.rasmussen.c_1 = c_1;
-        let (below, said) = moved(share, 0.35 * threshold, set);
-        assert!(below < 0.5 && said, "R^ = {share} R: {below} of the speed at 0.35 of {threshold} A, said: {said}");
-        let (above, said) = moved(share, threshold, set);
-        assert!(above > 0.8 && !said, "R^ = {share} R: {above} of the speed at {threshold} A, said: {said}");
-    }
+    let (share, c_1) = (0.9, 50.0);
+    let threshold = (2.0 - 2.0_f64.sqrt()) * i_0 * ((1.0 - share) * 2.0 * i_0 / (0.15 * c_1)).sqrt();
+    let set = |pair: &mut Pair| pair.controller.model.parameters.estimators.rasmussen.c_1 = c_1;
+    let (below, said) = moved(share, 0.35 * threshold, set);
+    assert!(below < 0.5 && said, "R^ = {share} R: {below} of the speed at 0.35 of {threshold} A, said: {said}");
+    let (above, said) = moved(share, threshold, set);
+    assert!(above > 0.8 && !said, "R^ = {share} R: {above} of the speed at {threshold} A, said: {said}");
     let (exact, said) = moved(1.0, 0.3, |_| ());
     assert!(exact > 0.8 && !said, "R^ = R: {exact} of the speed");
 }
