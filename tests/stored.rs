@@ -21,9 +21,9 @@ use std::time::{Duration, Instant};
 
 /// Step in s.
 const H: f64 = 1e-4;
-/// Bytes before the content, and of them those that are the same in every state of a model.
+/// Bytes before the content, and the part of them that is the same in every state of a model.
 const HEADER: usize = 32;
-/// Longer than any trial may take on any machine. A step of our models has at most 1e7 substeps, which take seconds.
+/// Maximum duration of a trial on any machine. A step of our models has at most 1e7 substeps, which take seconds.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 struct Silent;
@@ -62,7 +62,7 @@ fn asked(name: &str, otherwise: u64) -> u64 {
     number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is no whole number")))
 }
 
-/// Follows the trials and ends the process with a word when one takes too long: a hang is a finding too.
+/// Watches the trials and ends the process with a message when one takes too long: a hang is a finding too.
 fn watch(name: &'static str) -> Arc<AtomicU64> {
     let trial = Arc::new(AtomicU64::new(0));
     let seen = Arc::downgrade(&trial);
@@ -147,7 +147,7 @@ fn damaged(seeds: &[Vec<u8>], dice: &mut Dice) -> (Vec<u8>, bool) {
             // The longest integers of the encoding.
             6 => bytes[at..body.min(at + 10)].fill(0xff),
             7 => {
-                // The beginning of one and the rest of another, not always in its place.
+                // The beginning of one and the rest of another, not always at its offset.
                 let other = dice.of(seeds);
                 let from = HEADER + dice.below(length);
                 let end = body.min(at + (other.len() - 4).saturating_sub(from));
@@ -177,7 +177,7 @@ fn damaged(seeds: &[Vec<u8>], dice: &mut Dice) -> (Vec<u8>, bool) {
     (bytes, shows)
 }
 
-/// Gives the bytes back; whether they were taken, and for how long the longest step ran then.
+/// Restores the bytes; returns whether they were accepted, and the duration of the longest step.
 fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
     let mut instance = instance::<M>(Snapshot::default());
     let before = blob::write(&instance.current).unwrap();
@@ -249,7 +249,7 @@ fn damage<M: Model>(seeds: &[Vec<u8>], trials: u64) {
 }
 
 thread_local! {
-    /// A panic of the model is under way that the gate would make an error of.
+    /// A panic of the model is in progress that the gate would turn into an error.
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 

@@ -17,7 +17,7 @@ from ._error import FmuError
 from ._simulate import SimulationResult
 
 _LOCK = threading.Lock()
-# Plans of this process by their arguments: a task of Dask unpickles its plan and finds it here.
+# Plans of this process by their arguments: a Dask task unpickles its plan and finds it here.
 _MADE = OrderedDict()
 _KEPT = 16
 
@@ -120,7 +120,7 @@ class Plan:
     def _open(self):
         if not self._embed:
             return _core.Plan(json.dumps(self._definition), self._folder)
-        # The archives are files only until they are open.
+        # Archives are needed as files only until they are open.
         folder = tempfile.mkdtemp(prefix="fmurun-")
         try:
             paths, copies = _core.paths(json.dumps(self._definition)), []
@@ -141,7 +141,7 @@ class Plan:
             for path, expected in zip(_core.paths(json.dumps(self._definition)), self._hashes):
                 path = os.path.join(self._folder, path)
                 if hashlib.sha256(_read(path)).hexdigest() != expected:
-                    raise FmuError(None, None, None, f"{path}: is another file than the one that the plan was made of")
+                    raise FmuError(None, None, None, f"{path}: differs from the file with which the plan was created")
         self._core = self._opened()
 
     def _name(self, name):
@@ -276,7 +276,7 @@ class Plan:
 
 @contextmanager
 def _bar(progress, total):
-    """A function that gets the number of rows done, or None."""
+    """A function of the number of rows done, or None."""
     if progress is None or progress is False:
         yield None
     elif callable(progress):
@@ -299,11 +299,11 @@ def _named(items, column):
 
 
 def _integration(fmi_type, solver, tolerance, names, ssp):
-    """How the FMUs run, as a definition has it."""
+    """How to run the FMUs, in the form of a definition."""
     one = fmi_type if isinstance(fmi_type, dict) else dict.fromkeys(names, fmi_type)
     for name, kind in one.items():
         if name not in names and not ssp:
-            raise ValueError(f"fmi_type: {name} is the name of no FMU; expected one of {', '.join(names)}")
+            raise ValueError(f"fmi_type: {name} is not the name of an FMU; expected one of {', '.join(names)}")
         if kind not in (None, "CoSimulation", "ModelExchange"):
             raise ValueError(f"fmi_type of {name} must be CoSimulation or ModelExchange, not {kind!r}")
     if solver not in (None, "Dopri", "RK4"):
@@ -363,7 +363,7 @@ def _number(what, value):
 
 
 def _scalar(name, value):
-    """A start value as a definition has it."""
+    """A start value in the form of a definition."""
     value = value.item() if isinstance(value, (np.generic, np.ndarray)) and np.ndim(value) == 0 else value
     if isinstance(value, float) and not np.isfinite(value):
         raise ValueError(f"the start value of {name} must be finite, not {value}")
@@ -373,7 +373,7 @@ def _scalar(name, value):
 
 
 def _schedule(name, value):
-    """An input as `fmu simulate --input` has it."""
+    """An input in the form of `fmu simulate --input`."""
     if isinstance(value, str):
         return value
     try:
@@ -385,7 +385,7 @@ def _schedule(name, value):
 
 
 def _measure(key, value, name):
-    """A measure as a definition has it."""
+    """A measure in the form of a definition."""
     if isinstance(value, str):
         value = {"of": value, "is": "final"}
     elif isinstance(value, (tuple, list)) and len(value) == 2:
@@ -405,7 +405,7 @@ def _is_float(word):
 
 
 def _columns(table):
-    """Columns by name, of anything tabular."""
+    """Columns by name, from any table."""
     if isinstance(table, dict):
         return table
     if isinstance(table, np.ndarray) and table.dtype.names:
@@ -425,7 +425,7 @@ def _values(name, column, core, full):
         raise ValueError(f"the column {name} has {array.ndim} dimensions; expected one")
     if array.dtype.kind in "OUS" and all(isinstance(x, str) for x in array.tolist()):
         return np.array([core.number(full, x) for x in array.tolist()])
-    # NumPy also makes numbers from other kinds, for example NaN from None.
+    # NumPy also converts other kinds to numbers, for example None to NaN.
     bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
     if bad:
         raise TypeError(f"the column {name} must have numbers, not {bad[0]!r}")

@@ -7,7 +7,7 @@ use model_description::Area;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// What begins the groups of the estimators: the controller's own groups would be lost among them in one tab.
+/// Prefix of the groups of the estimators: in a common tab, they would bury the controller's other groups.
 pub(super) const ESTIMATORS: [&str; 14] = [
     "adaptation",
     "carrier",
@@ -210,7 +210,7 @@ fn outputs(interface: &Interface) -> String {
     // Below each other, without the middle, where the flange is.
     let row = |i: u32| f64::from(if i < 3 { 80 } else { 20 }) - 20.0 * f64::from(i);
     let rows: Vec<(&&str, f64)> = sent.iter().zip((0..).map(row)).collect();
-    // The type of an enumeration is the block's: read it there, as fmu.tripped.
+    // The type of an enumeration belongs to the block: read it there, as fmu.tripped.
     for v in interface.outputs.iter().filter(|v| !matches!(v.kind, Kind::Enumeration { .. })) {
         let units: Vec<String> = v.modifiers().into_iter().filter(|m| !m.starts_with('m')).collect();
         let value = match &v.kind {

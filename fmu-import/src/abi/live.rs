@@ -49,14 +49,14 @@ unsafe extern "C" fn log_message(
     Log::receive(environment, Message { status, category, text });
 }
 
-/// A pointer that an FMU gave out, to an instance or to a saved state. Only the FMU follows it.
+/// A pointer from an FMU to an instance or to a saved state. Only the FMU dereferences it.
 #[derive(Clone, Copy)]
 pub(crate) struct Pointer(*mut c_void);
 
 // SAFETY: an instance and its states go from thread to thread together, and every call takes the instance by `&mut`, so that
-// calls follow one another. More than that neither standard lets an FMU ask for: "FMI functions of one instance do not need to
-// be thread-safe", and the importer that calls them from several threads guarantees the calling sequence (FMI 2.0.5, 2.1;
-// FMI 3.0.2, 2.2.1).
+// calls follow one another. Neither standard lets an FMU require more: "FMI functions of one instance do not need to be
+// thread-safe", and the importer that calls them from several threads guarantees the calling sequence (FMI 2.0.5, 2.1; FMI
+// 3.0.2, 2.2.1).
 unsafe impl Send for Pointer {}
 
 /// An instance.
@@ -106,7 +106,7 @@ impl Live {
             environment,
             updates: Updates::default(),
         };
-        // SAFETY: the callbacks outlive the instance; the environment is a number that no one follows.
+        // SAFETY: the callbacks outlive the instance; the environment is a number that is never dereferenced.
         let (name, pointer) = unsafe { calls.instantiate(&request) };
         let missing = || Refusal::Impossible(format!("the function {name} is missing"));
         trace::note(name, || if pointer.is_some_and(|p| !p.is_null()) { "an instance" } else { "no instance" }.into());
@@ -349,7 +349,7 @@ impl Live {
         self.calls.activate(self.given(), clock).outcome()
     }
 
-    /// The interval of a clock, if it has changed or was not told before.
+    /// The interval of a clock, if it has changed or was not yet reported.
     pub(crate) fn interval(&mut self, clock: u32) -> Outcome<Option<f64>> {
         /// `fmi3IntervalChanged`.
         const CHANGED: i32 = 2;
@@ -386,7 +386,7 @@ impl Live {
         self.vector(if self.is_v2() { Vector::GetDerivatives } else { Vector::GetContinuousStateDerivatives }, dx)
     }
 
-    /// Numbers of continuous states and event indicators; `None` where only the description has them.
+    /// Numbers of continuous states and event indicators; `None` if only the description has them.
     pub(crate) fn counts(&mut self) -> Outcome<Option<(usize, usize)>> {
         if self.is_v2() {
             return Ok(None);
@@ -439,7 +439,7 @@ impl Drop for Live {
     }
 }
 
-/// Integers as values of so many bits; `None` if one does not fit.
+/// Integers converted to the given number of bits; `None` if one does not fit.
 fn integers(base: BaseType, bits: usize, values: &[i128]) -> Option<Vec<u64>> {
     let unsigned = matches!(base, BaseType::UInt8 | BaseType::UInt16 | BaseType::UInt32 | BaseType::UInt64);
     let range = if unsigned { 0..1_i128 << bits } else { -1_i128 << (bits - 1)..1_i128 << (bits - 1) };
@@ -447,20 +447,20 @@ fn integers(base: BaseType, bits: usize, values: &[i128]) -> Option<Vec<u64>> {
     values.iter().map(|x| range.contains(x).then_some(*x as u64)).collect()
 }
 
-/// Largest serialized state in bytes, 1 GiB. The size is what an FMU says, and memory for it must not take the process down.
+/// Largest serialized state in bytes, 1 GiB. The FMU states the size, and reserving memory for it must not end the process.
 const LARGEST_STATE: usize = 1 << 30;
 
-/// What fills room for bytes.
+/// The fill byte of buffers.
 pub(super) const FILL: u8 = 0xc5;
 
-/// Room for a serialized state of this `size` with `more` bytes behind it.
+/// A buffer for a serialized state of this `size`, followed by `more` bytes.
 ///
 /// # Errors
 /// The size is more than [`LARGEST_STATE`], or there is no memory for it.
 pub(super) fn room(size: usize, more: usize) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     if size > LARGEST_STATE || bytes.try_reserve_exact(size + more).is_err() {
-        return Err(format!("the FMU state has {size} bytes, more than {LARGEST_STATE} or than there is memory for"));
+        return Err(format!("the FMU state has {size} bytes, more than {LARGEST_STATE} or than the available memory"));
     }
     bytes.resize(size + more, FILL);
     Ok(bytes)

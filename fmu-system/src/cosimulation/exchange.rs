@@ -1,4 +1,4 @@
-//! Moving values between FMUs: what is read from each, and where what is set comes from.
+//! Moving values between FMUs: the variables read from each FMU, and the sources of those set.
 
 use super::parts::Port;
 use super::sequence::Held;
@@ -15,12 +15,12 @@ pub(super) enum Source {
     Schedule(Schedule),
 }
 
-/// An input and what feeds it.
+/// An input and its source.
 #[derive(Clone)]
 struct Feed {
     target: Port,
     source: Source,
-    /// The input is continuous: in Model Exchange it is set all the time, a discrete one at events.
+    /// The input is continuous: in Model Exchange it is set at every evaluation, a discrete one at events.
     continuous: bool,
 }
 
@@ -28,7 +28,7 @@ struct Feed {
 #[derive(Clone, Default)]
 pub(super) struct Wiring {
     feeds: Vec<Feed>,
-    /// Inputs that are not one number, with their values over time.
+    /// Inputs other than single numbers, with their values over time.
     held: Vec<(Port, Held)>,
 }
 
@@ -41,7 +41,7 @@ impl Wiring {
         self.held.push((target, values));
     }
 
-    /// These connections and schedules, and those of a copy of the instances, which are numbered from `instances` on.
+    /// These connections and schedules, together with those of a copy of the instances, numbered from `instances` on.
     pub(super) fn with_copy(&self, instances: usize) -> Self {
         let mut both = self.clone();
         both.feeds.extend(self.feeds.iter().map(|feed| Feed {
@@ -79,31 +79,31 @@ impl Wiring {
     }
 }
 
-/// Where a number is found during the run.
+/// Location of a number during the run.
 #[derive(Clone)]
 enum Place {
     Read { instance: usize, slot: usize, conversion: Option<Conversion> },
     Schedule(Schedule),
 }
 
-/// What crosses the interface of one instance. Double-precision numbers go in one call, the rest one by one.
+/// Traffic of one instance. Double-precision numbers are passed in one call, other values one by one.
 #[derive(Clone, Default)]
 struct Traffic {
     read: Vec<u32>,
     read_singly: Vec<Port>,
-    /// How many of `read` and of `read_singly` feed inputs: these come first.
+    /// Numbers of variables in `read` and `read_singly` that feed inputs: these come first.
     feeding: [usize; 2],
     /// Values read last: those of `read`, then those of `read_singly`.
     values: Vec<f64>,
     write: Vec<(u32, Place)>,
     write_singly: Vec<(Port, Place)>,
-    /// How many of `write` and of `write_singly` are continuous: these come first.
+    /// Numbers of variables in `write` and `write_singly` that are continuous: these come first.
     continuous: [usize; 2],
     references: Vec<u32>,
     /// Values written last: those of `write`, then those of `write_singly`.
     buffer: Vec<f64>,
     singles: Vec<f64>,
-    /// Inputs that are not one number, and which of their values was written last.
+    /// Inputs other than single numbers, and the index of the value written last.
     held: Vec<(Port, Held, Option<usize>)>,
 }
 
@@ -114,24 +114,24 @@ pub(super) struct Exchange {
     row: Vec<Place>,
     /// Number of inputs that are fed.
     fed: usize,
-    /// Time (s) from which on steps of schedules are held; `None` where every exchange reads them.
+    /// Time (s) since which step schedules are held; `None` if they are read at every exchange.
     pub(super) since: Option<f64>,
 }
 
-/// An input that a pass changes.
+/// An input changed by a pass.
 pub(super) struct Unsettled {
     /// Its instance.
     pub(super) index: usize,
-    /// Where its value stands among those that are written in one call.
+    /// Position of its value among those written in one call.
     slot: usize,
     pub(super) reference: u32,
-    /// Instance and reference of what feeds it, if both are continuous double-precision numbers.
+    /// Instance and reference of its source, if both are continuous double-precision numbers.
     pub(super) source: Option<(usize, u32)>,
     /// Change of the input for a change of what feeds it: not 1 between different units.
     pub(super) factor: f64,
 }
 
-/// Which inputs are set.
+/// The inputs to be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Inputs {
     /// In event mode.
@@ -234,7 +234,7 @@ impl Exchange {
         self.hold(index, instance, t).map(drop)
     }
 
-    /// Sets the inputs that are not one number where they have another value; returns whether any has.
+    /// Sets changed inputs other than single numbers; returns whether any has changed.
     fn hold(&mut self, index: usize, instance: &mut Instance, t: f64) -> Result<bool, Error> {
         let (mut changed, t) = (false, self.since.unwrap_or(t));
         for (port, values, last) in &mut self.traffic[index].held {
@@ -255,7 +255,7 @@ impl Exchange {
             return Ok(false);
         }
         let mut discrete = false;
-        // Without a loop, each pass settles one more input at least.
+        // Without a loop, each pass settles at least one more input.
         for _ in 0..self.fed + 2 {
             let (settled, some) = self.pass(instances, t, inputs)?;
             discrete |= some;
@@ -266,7 +266,8 @@ impl Exchange {
         loops::solve(self, instances, t).map(|()| discrete)
     }
 
-    /// Reads what feeds inputs, and sets the inputs that have changed; returns whether none has, and whether a discrete one has.
+    /// Reads the sources of inputs, and sets the inputs that have changed; returns whether none has changed, and whether a
+    /// discrete one has.
     fn pass(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<(bool, bool), Error> {
         let (mut settled, mut discrete) = (true, false);
         self.read_feeding(instances)?;
@@ -314,7 +315,7 @@ impl Exchange {
         Ok(all)
     }
 
-    /// Sets inputs to these values, and returns what would be set next.
+    /// Sets inputs to these values, and returns the values that would be set next.
     pub(super) fn try_values(
         &mut self,
         instances: &mut [Instance],
@@ -330,7 +331,7 @@ impl Exchange {
         Ok(inputs.iter().map(|input| self.value(&self.traffic[input.index].write[input.slot].1, t)).collect())
     }
 
-    /// The values that these inputs have.
+    /// The present values of these inputs.
     pub(super) fn values_of(&self, inputs: &[Unsettled]) -> Vec<f64> {
         inputs.iter().map(|input| self.traffic[input.index].buffer[input.slot]).collect()
     }
@@ -347,7 +348,7 @@ impl Exchange {
         Ok(discrete)
     }
 
-    /// Sets the inputs of an instance that have changed; returns whether any has, and whether a discrete one has.
+    /// Sets the changed inputs of an instance; returns whether any has changed, and whether a discrete one has.
     fn pass_on(
         &mut self,
         index: usize,
@@ -448,7 +449,7 @@ impl Traffic {
         Ok(())
     }
 
-    /// Where the value of a port is found among those that are read; the port is one of them.
+    /// Location of a port's value among those read; the port is one of them.
     fn slot(&self, port: &Port) -> usize {
         let fast = || self.read.iter().position(|reference| *reference == port.reference);
         let slow = || self.read_singly.iter().position(|p| p == port).map(|i| i + self.read.len());

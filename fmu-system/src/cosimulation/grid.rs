@@ -3,7 +3,7 @@
 use super::schedule::SAME;
 use fmu_import::limits::STEPS;
 
-/// When to start and stop, and how to step.
+/// Start, stop and step of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Start time in s.
@@ -74,7 +74,7 @@ impl Grid {
         if k == self.steps { stop } else { start + f64::from(k) * step }
     }
 
-    /// The communication point after the time `t` (s), which is none itself and within the simulation.
+    /// The communication point after the time `t` (s), if `t` lies within the simulation and is not a communication point.
     pub(super) fn after(&self, t: f64) -> Option<f64> {
         let Settings { start, stop, step, .. } = self.settings;
         let nearest = start + ((t - start) / step).round() * step;
@@ -88,7 +88,7 @@ impl Grid {
         (self.size(last) < self.settings.step).then(|| Settings { stop: self.time(last), ..self.settings })
     }
 
-    /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, but for a short last one.
+    /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, except for a short last one.
     pub(super) fn size(&self, k: u32) -> f64 {
         let rest = self.settings.stop - self.time(k);
         if k + 1 == self.steps && (rest - self.settings.step).abs() > 1e-3 * self.settings.step {
@@ -133,8 +133,8 @@ mod tests {
         {
             assert!(grid(start, stop, step).is_err(), "{start} {stop} {step}");
         }
-        let told = |step| grid(0.0, 1.0, step).unwrap_err();
-        assert_eq!(told(1e308), "the step 1e308 s is longer than the simulation of 1 s; give a shorter one");
-        assert!(told(1e-10).ends_with("takes 1e10 steps; the limit is 2147483648"), "{}", told(1e-10));
+        let refused = |step| grid(0.0, 1.0, step).unwrap_err();
+        assert_eq!(refused(1e308), "the step 1e308 s is longer than the simulation of 1 s; give a shorter one");
+        assert!(refused(1e-10).ends_with("takes 1e10 steps; the limit is 2147483648"), "{}", refused(1e-10));
     }
 }

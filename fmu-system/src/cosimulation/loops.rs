@@ -9,9 +9,9 @@ use model_description::Interface;
 
 /// Most iterations.
 const ITERATIONS: u32 = 40;
-/// Residual relative to the inputs at which a loop is solved at once.
+/// Residual relative to the inputs at which a loop counts as solved.
 const SOLVED: f64 = 1e-14;
-/// Residual at which a loop is solved if an iteration does not improve it.
+/// Residual at which a loop counts as solved if an iteration does not improve it.
 const NEARLY: f64 = 1e-11;
 
 /// Solves the loop among the inputs that are not settled.

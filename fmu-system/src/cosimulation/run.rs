@@ -3,22 +3,22 @@
 use super::exchange::Exchange;
 use super::grid::{Grid, Settings};
 use super::method::Method;
-use super::point::{Ended, Point, end};
+use super::point::{CommunicationPoint, Ended, end};
 use super::recording::{Recording, TextColumn};
 use super::system::System;
 use super::{continuous, events};
 use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;
 
-/// Simulates instances that have their values, from start to stop. `hook` sees every communication point, the last one
-/// included, and may end the run. All runs begin and end here.
+/// Simulates instances whose values are set, from start to stop. `hook` sees every communication point, the last one included,
+/// and may end the run. All runs begin and end here.
 pub(super) fn simulate(
     method: &Method,
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
     let kinds: Vec<Kind> = instances.iter().map(Instance::kind).collect();
@@ -35,7 +35,7 @@ pub(super) fn simulate(
         instance.setup_with(settings.start, Some(settings.stop), tolerance)?;
         instance.enter_initialization()?;
     }
-    // An initial output may depend on an input, through as many FMUs as there are.
+    // An initial output may depend on an input through any number of FMUs.
     for _ in 0..instances.len() {
         exchange.read_all(instances)?;
         exchange.write_all(instances, settings.start)?;
@@ -62,7 +62,7 @@ fn step(
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
     let (mut ended, mut last) = (Ended { time: settings.start, by: None }, f64::INFINITY);
@@ -74,7 +74,7 @@ fn step(
         if index < grid.steps() {
             exchange.write_all(instances, time)?;
         }
-        let flow = hook(&mut Point { index, time, values: row, instances, touched: false })?;
+        let flow = hook(&mut CommunicationPoint { index, time, values: row, instances, touched: false })?;
         if flow.is_break() || index == grid.steps() {
             break;
         }
@@ -103,21 +103,21 @@ impl System {
     /// Simulates from start to stop. `hook` sees every communication point, the last one included, and may end the run.
     ///
     /// # Errors
-    /// The settings make no sense, or an FMU refuses.
+    /// The settings are invalid, or an FMU refuses.
     pub fn run(
         &mut self,
         settings: &Settings,
-        hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+        hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> Result<Recording, Error> {
         let (recording, outcome) = self.run_keeping(settings, hook);
         outcome.map(|()| recording)
     }
 
-    /// As [`run`](Self::run); the recording ends before an error.
+    /// Like [`run`](Self::run); the recording ends before an error.
     pub fn run_keeping(
         &mut self,
         settings: &Settings,
-        mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+        mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> (Recording, Result<(), Error>) {
         let mut recording = Recording::new(self.columns());
         recording.texts =

@@ -1,4 +1,4 @@
-//! Values over time as a user writes them: of an input of any type, each held from its time on.
+//! User input of values over time, for an input of any type; each value is held from its time on.
 
 use super::schedule::{SAME, Schedule, last_before};
 use fmu_import::Values;
@@ -6,12 +6,12 @@ use model_description::{ModelDescription, ModelVariable};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Texts over time: values of a variable whose type is not known yet.
+/// Texts over time: values of a variable whose type is not yet known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sequence {
-    /// Time (s), text, and where it stands.
+    /// Time (s), text, and its location in the file.
     points: Vec<(f64, String, String)>,
-    /// Unit of all values; empty is that of the variable.
+    /// Unit of all values; empty means that of the variable.
     unit: String,
 }
 
@@ -20,7 +20,7 @@ impl Sequence {
     /// only if a time and a colon follow it.
     ///
     /// # Errors
-    /// Names what is not a point; times that do not rise.
+    /// Names the text that is not a point, or the times that do not increase.
     pub fn parse(text: &str) -> Result<Self, String> {
         let time = |part: &str| part.split_once(':').and_then(|(t, _)| t.trim().parse::<f64>().ok());
         if time(text).is_none() {
@@ -98,7 +98,7 @@ impl Sequence {
         }
     }
 
-    /// The texts as numbers, which lines connect; a time that comes twice is a jump.
+    /// The texts as numbers, connected by lines; a time that occurs twice is a jump.
     ///
     /// # Errors
     /// Names the first text that is not a number, and its line.
@@ -121,7 +121,7 @@ impl Sequence {
         let value = |(t, text, at): &(f64, String, String)| {
             let number = |_: &String| Values::from_number(text.trim().parse().ok()?, variable.base).ok();
             let read = Values::read(text, variable, description);
-            // Tools write integers and truth values as 1.0 too.
+            // Tools also write integers and truth values as 1.0.
             let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));
             values.map(|values| (*t, values))
         };

@@ -42,7 +42,7 @@ pub struct System {
     /// One of each part.
     pub(super) instances: Vec<Instance>,
     pub(super) wiring: Wiring,
-    /// Values that were set from outside.
+    /// Values set by the user.
     pub(super) set: Vec<(Port, Values)>,
     pub(super) records: Vec<Port>,
     /// Names of the recorded columns.
@@ -55,7 +55,7 @@ pub struct System {
 }
 
 impl System {
-    /// A system that is run by this method.
+    /// A system to be run by this method.
     pub fn new(method: Method) -> Self {
         Self { method, ..Self::default() }
     }
@@ -182,11 +182,11 @@ impl System {
         Ok(self.parts.causality(&self.parts.port(port)?) == Causality::StructuralParameter)
     }
 
-    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode. Arrays
-    /// have other sizes then, so this comes before everything that names variables; values that were set are set again.
+    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode.
+    /// Arrays then have other sizes, so call this before anything that names variables; values already set are set again.
     ///
     /// # Errors
-    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, an array that was set has
+    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, an array already set has
     /// another size now, or the FMU refuses.
     pub fn configure<'a>(&mut self, sizes: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<(), Error> {
         let mut changed = vec![false; self.instances.len()];
@@ -208,8 +208,9 @@ impl System {
         Ok(())
     }
 
-    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. An element of an array
-    /// leaves the others as they were set, or as they start. [`configure`](Self::configure) sets several structural parameters.
+    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. Setting an element
+    /// of an array keeps the set or start values of the others. [`configure`](Self::configure) sets several structural
+    /// parameters.
     ///
     /// # Errors
     /// The variable does not exist, the text is not a value of its type, or the FMU refuses.
@@ -244,7 +245,7 @@ impl System {
     /// (see [`with_units`](Self::with_units)); without a unit on one side it passes unchanged, with a [note](Self::take_notes).
     ///
     /// # Errors
-    /// A variable does not exist, causalities, types or units do not fit, or the input is fed already.
+    /// A variable does not exist, causalities, types or units do not fit, or the input is already fed.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
         self.connect_by(from, to, &Crossing { units: self.units, ..Crossing::default() })
     }
@@ -338,7 +339,7 @@ impl System {
         self.feed(target, port, Source::Schedule(schedule))
     }
 
-    /// Records a variable at every communication point. A connected input is recorded as what it is connected to.
+    /// Records a variable at every communication point. A connected input is recorded as its source.
     ///
     /// # Errors
     /// The variable does not exist or is not a number.
@@ -426,7 +427,7 @@ impl System {
         Ok(self.wiring.feeds(port.instance, &port.name))
     }
 
-    /// The inputs of an instance that must be fed and are neither fed nor set: they keep their start values.
+    /// The inputs of an instance that must be fed but are neither fed nor set: they keep their start values.
     pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
         let reference = |name: &str| self.parts.variable(instance, name).map(|v| v.value_reference).ok();
         let touched =
@@ -441,7 +442,7 @@ impl System {
         self.instances[instance].description().variables.iter().filter(is_free).filter(needed).collect()
     }
 
-    /// The elements of an array of which `port` is one, if sizes were set: its start values are gone.
+    /// The elements of the array of `port`, if sizes were set: its start values are lost.
     fn present(&mut self, port: &Port) -> Result<Option<Values>, Error> {
         let part = &self.parts.0[port.instance];
         if part.sizes.is_empty() || port.element.is_none() {
@@ -451,7 +452,7 @@ impl System {
         self.instances[port.instance].get(name).map(Some)
     }
 
-    /// The value that was set last.
+    /// The value set last.
     fn value_set(&self, instance: usize, name: &str) -> Option<&Values> {
         let of = |(port, _): &&(Port, Values)| port.instance == instance && port.name == name;
         self.set.iter().rev().find(of).map(|(_, values)| values)

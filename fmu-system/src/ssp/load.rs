@@ -19,11 +19,11 @@ use zip::ZipArchive;
 pub struct Loaded {
     /// Its FMUs, connected and with their values.
     pub system: System,
-    /// Default experiments: its own times, the FMUs' steps.
+    /// Default experiments: the times of the file, the steps of the FMUs.
     pub experiments: Vec<Experiment>,
     /// The connectors of an SSP's system.
     pub connectors: Connectors,
-    /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
+    /// Values for unknown names, which SSP 1.0 allows (4.4, ParameterBindings).
     pub notes: Vec<String>,
 }
 
@@ -32,15 +32,15 @@ pub struct Loaded {
 pub struct Connectors {
     /// Names of the inputs, each with the inputs `component.variable` that it feeds.
     pub inputs: Vec<(String, Vec<String>)>,
-    /// Names of the outputs, each with the output `component.variable` that it is.
+    /// Names of the outputs, each with its source `component.variable`.
     pub outputs: Vec<(String, String)>,
 }
 
 impl Connectors {
-    /// The ports that a name to set stands for: the inputs that one of the system feeds, or the name itself.
+    /// The ports denoted by a name to set: the inputs that an input of the system feeds, or the name itself.
     ///
     /// # Errors
-    /// The system has no input of this name, which has no dot.
+    /// The name has no dot, and the system has no such input.
     pub fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
         if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
             return Ok(targets.clone());
@@ -53,8 +53,7 @@ impl Connectors {
         Ok(vec![name.to_owned()])
     }
 
-    /// The port that a name to record stands for: an output of the system, one of the inputs that one of the system feeds, or
-    /// the name itself.
+    /// The port denoted by a name to record: an output of the system, an input fed by one of the system, or the name itself.
     ///
     /// # Errors
     /// As for [`ports`](Self::ports).
@@ -76,7 +75,7 @@ impl Package<'_> {
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>, Error> {
         let of = || self.path.display();
         let mut bytes = Vec::new();
-        // What the headers claim is within the limits: see `check_entries`.
+        // The sizes in the headers are within the limits: see `check_entries`.
         match self.zip.by_name(name) {
             Ok(entry) => {
                 let read = entry.take(limits::UNPACKED.most).read_to_end(&mut bytes);
@@ -98,7 +97,7 @@ impl Package<'_> {
 }
 
 impl Loaded {
-    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Paths that are relative begin in `folder`.
+    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Relative paths begin in `folder`.
     ///
     /// # Errors
     /// As [`open`](Self::open), or an SSP file is not alone.
@@ -136,8 +135,7 @@ impl Loaded {
         Ok(loaded)
     }
 
-    /// Times that are not given come from the files: the latest stop, the shortest step. After a later start, the simulation takes as
-    /// long as it does there.
+    /// Missing times come from the files: the latest stop, the shortest step. A later start keeps the duration of the files.
     pub fn settings(&self, start: Option<f64>, stop: Option<f64>, step: Option<f64>, sequential: bool) -> Settings {
         let usual = self.experiments.iter().find_map(|x| x.start).unwrap_or(0.0);
         let start = start.unwrap_or(usual);
@@ -152,7 +150,7 @@ impl Loaded {
     /// Opens an SSP file.
     ///
     /// # Errors
-    /// Names the file, the place in it, what is wrong and what to do.
+    /// Names the file, the location in it, the fault and the remedy.
     pub fn open(path: &Path, logging: bool) -> Result<Self, Error> {
         Self::open_with(path, DESCRIPTION, logging, |_| System::default())
     }
@@ -206,7 +204,7 @@ impl Loaded {
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
         for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
             let experiment = fmu.description().default_experiment;
-            // The system's times go before those of its parts.
+            // The system's times take precedence over those of its parts.
             let times = structure.start.or(structure.stop).is_some();
             let part = Experiment { step: experiment.step, ..Experiment::default() };
             loaded.experiments.push(if times { part } else { experiment });
@@ -236,7 +234,7 @@ impl Loaded {
     /// Feeds an input over time: one of the system's, or `component.variable`.
     ///
     /// # Errors
-    /// There is none of this name, or it is fed already.
+    /// There is none of this name, or it is already fed.
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
@@ -244,10 +242,10 @@ impl Loaded {
         Ok(())
     }
 
-    /// Feeds an input of any type over time, as [`input`](Self::input), from the texts that a user or a file has.
+    /// Feeds an input of any type over time, as [`input`](Self::input), from texts of a user or a file.
     ///
     /// # Errors
-    /// There is none of this name, it is fed already, or a text is not a value of its type.
+    /// There is none of this name, it is already fed, or a text is not a value of its type.
     pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.sequence(&port, texts)?;
@@ -255,8 +253,8 @@ impl Loaded {
         Ok(())
     }
 
-    /// Feeds an input over time from what a user writes: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input
-    /// of another type.
+    /// Feeds an input over time from user input: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input of
+    /// another type.
     ///
     /// # Errors
     /// As [`input`](Self::input), or the text has another form.
@@ -295,7 +293,7 @@ impl Loaded {
         Ok(self.system.record_as(&port, name)?)
     }
 
-    /// Records all outputs of the system, or those of all FMUs where it has none.
+    /// Records all outputs of the system, or those of all FMUs if it has none.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -334,7 +332,7 @@ impl Loaded {
     }
 
     fn connect(&mut self, structure: &Structure, c: &Connection) -> Result<(), String> {
-        // `flat` has given it its direction.
+        // `flat` has determined the direction.
         let (from, to) = (&c.start, &c.end);
         let (start, end) = (find(structure, from)?, find(structure, to)?);
         let units = if c.no_conversion { Units::PassOn } else { self.system.units() };
@@ -397,7 +395,7 @@ impl Loaded {
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
-    /// The values of a binding; names begin with `prefix`, and those of a system's connectors stand for what they reach.
+    /// The values of a binding; names begin with `prefix`; those of a system's connectors mean the variables behind them.
     fn bound(
         &mut self,
         file: &str,
@@ -470,7 +468,7 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
         None => (format!("the system {}", structure.name), &structure.connectors),
         Some(element) => {
             let names: Vec<&str> = structure.components.iter().map(|c| c.name.as_str()).collect();
-            let none = || format!("there is no component {element}; there are {}", names.join(", "));
+            let none = || format!("there is no component {element}; available: {}", names.join(", "));
             (element.clone(), &structure.component(element).ok_or_else(none)?.connectors)
         }
     };
@@ -480,7 +478,7 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
 }
 
 impl Package<'_> {
-    /// The values of a binding, its prefix before every name, with what to call their file.
+    /// The values of a binding, its prefix before every name, with a name for their file.
     fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
         let path = self.path.display().to_string();
         let (file, parameters) = match &binding.values {

@@ -1,6 +1,6 @@
 //! Systems of FMUs as one file: System Structure and Parameterization, SSP 1.0.
 //!
-//! [`structure`]: the structure of any system; [`load`]: a system made ready for co-simulation; [`values`], [`ssv`] and [`ssm`]:
+//! [`structure`]: the structure of any system; [`load`]: a system prepared for co-simulation; [`values`], [`ssv`] and [`ssm`]:
 //! parameter values from SSV files and their mappings.
 
 mod component;

@@ -8,9 +8,9 @@ use model_description::{BaseUnit, Element};
 pub struct Parameter {
     /// Name of the variable.
     pub name: String,
-    /// Its value, as a user writes it.
+    /// Its value, as in user input.
     pub value: String,
-    /// Its unit, if the file names one.
+    /// Its unit, if the file gives one.
     pub unit: Option<String>,
     /// The relation of the unit to the SI base units, if the file defines it.
     pub base: Option<BaseUnit>,

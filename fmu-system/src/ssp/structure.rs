@@ -23,11 +23,11 @@ pub struct Structure {
     pub connectors: Vec<Connector>,
     /// Connections between connectors.
     pub connections: Vec<Connection>,
-    /// Values by names `component.variable`, and of the system's own connectors.
+    /// Values by names `component.variable`, and of the system's connectors.
     pub bindings: Vec<Binding>,
     /// Units that the file defines.
     pub units: Vec<(String, BaseUnit)>,
-    /// Parameters of systems, and connectors of inner systems: what each reaches.
+    /// Parameters of systems, and connectors of inner systems: the variables behind them.
     pub(super) reach: Reach,
 }
 
@@ -40,7 +40,7 @@ impl Structure {
     /// Reads the text of a SystemStructure.ssd.
     ///
     /// # Errors
-    /// The line, and what is missing, wrong or not supported there.
+    /// The line, and the element that is missing, wrong or not supported.
     pub fn read(text: &str) -> Result<Self, String> {
         let root = Element::parse(text).map_err(|e| e.to_string())?;
         if local(&root) != "SystemStructureDescription" {

@@ -29,8 +29,8 @@ impl Given {
     }
 }
 
-/// Sets the values in their order, each judged by its FMU; before them the structural parameters of all files, those of an instance
-/// in one Configuration Mode.
+/// Sets the values in their order, each checked by its FMU; first come the structural parameters of all files, those of an
+/// instance in one Configuration Mode.
 ///
 /// # Errors
 /// Names file and line: the variable does not exist, has another unit or type, or the FMU refuses the value.
@@ -101,7 +101,7 @@ fn in_unit_of(
     }
 }
 
-/// The variable of this name, or the array before its brackets, whose size may be one that was set.
+/// The variable of this name, or the array before its brackets, whose size may have been set.
 pub(super) fn find<'a>(description: &'a ModelDescription, name: &str) -> Option<&'a ModelVariable> {
     description.variable(name).or_else(|| description.variable(name.rsplit_once('[')?.0))
 }

@@ -38,7 +38,7 @@ static M *make(bool exchange, bool events, bool early, void *environment, Log3 l
 
 /* A run of these models makes some thousand calls: an importer that goes round in a circle ends here, and does not hang. */
 static void count(M *m) {
-    if (++m->calls > 1000000) fputs("the importer makes calls without end\n", stderr), abort();
+    if (++m->calls > 1000000) fputs("the importer makes an endless number of calls\n", stderr), abort();
 }
 
 static bool fault(M *m, int which) { return m->v[FAULT] == which; }

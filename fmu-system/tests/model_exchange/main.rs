@@ -109,7 +109,7 @@ fn a_sampled_loop_has_its_solution_in_every_order_of_exchange() {
     }
 }
 
-/// An input that jumps, in the middle of one long step: the integrator lands on it and does not see it before.
+/// An input that jumps in the middle of one long step: the integrator hits the jump exactly and does not use it earlier.
 #[test]
 fn inputs_jump_at_their_time() {
     let workshop = Workshop::new();
@@ -148,7 +148,7 @@ fn state_events_are_located_and_step_events_handled() {
     }
 }
 
-/// With event mode, early return or both, the sampler samples at k T whatever the communication step is.
+/// With event mode, early return or both, the sampler samples at k T for any communication step.
 #[test]
 fn events_of_cosimulation_come_at_their_time() {
     let workshop = Workshop::new();
@@ -275,7 +275,7 @@ fn faults_are_named() {
         assert_eq!((recording.ended_by.as_deref(), times.len()), (Some("p"), 6), "{times:?}");
         assert!(times[5] > times[4] && times[5] <= 0.5, "{times:?}");
 
-        // Outputs that change with every update of the other: who is connected to whom never settles.
+        // Outputs that change with every update of the other FMU: connected to each other, they never settle.
         let mut system = System::new(exchange(Solver::Rk4));
         for name in ["a", "b"] {
             system.add(name, &sampler, false).unwrap();
@@ -315,9 +315,9 @@ fn algebraic_loops_are_solved_or_named() {
                 let expected = 1.0 / 3.0 + 2.0 / 3.0 * (-1.0_f64).exp();
                 assert!((recording.columns[0].values[10] - expected).abs() < 1e-6, "{:?}", recording.columns[0].values);
             } else {
-                let told = refused(&mut system, &settings(1.0, 0.1));
+                let said = refused(&mut system, &settings(1.0, 0.1));
                 let expected = "a.u, b.u: the algebraic loop of these inputs does not converge at t = 0 s";
-                assert!(told.starts_with(expected), "{told}");
+                assert!(said.starts_with(expected), "{said}");
             }
         }
     }
@@ -349,8 +349,8 @@ fn settings_that_make_no_sense_are_refused() {
     for (fmu, method, part) in [
         (&plant, method(true, false), "no FMU has event mode"),
         (&plant, method(false, true), "no FMU returns early"),
-        (&sampler, method(true, true), "in plain Co-Simulation alone"),
-        (&sampler, exchange(Solver::Rk4), "in plain Co-Simulation alone"),
+        (&sampler, method(true, true), "only in plain Co-Simulation"),
+        (&sampler, exchange(Solver::Rk4), "only in plain Co-Simulation"),
         (&sampler, exchange(Solver::Dopri { rtol: 0.0 }), "the relative tolerance 0 must be between 1e-14 and 0.1"),
         (&sampler, exchange(Solver::Dopri { rtol: f64::NAN }), "the relative tolerance NaN must be"),
     ] {
@@ -379,7 +379,7 @@ fn what_an_fmu_lacks_is_named() {
     let error = fmu.instantiate_as(Kind::CoSimulation { event_mode: true, early_return: false }, "a", false);
     let error = error.err().unwrap().to_string();
     assert_eq!(error, "a: has no event mode; it has Co-Simulation and Model Exchange (FMI 3.0)");
-    // A function that the description promises: the other interface runs all the same.
+    // A missing function of the description: the other interface still runs.
     let fmu = workshop.fmu("plant", 3, &["-DWITHOUT_EXCHANGE"], |xml| xml);
     assert!(fmu.instantiate("a", false).is_ok());
     let error = fmu.instantiate_as(Kind::ModelExchange, "a", false).err().unwrap().to_string();
