@@ -1,4 +1,4 @@
-//! One update of each estimator beside the 2.2 kW machine at its rated point, with what it injects.
+//! One update of each estimator with the 2.2 kW machine at its rated point, including its injection.
 //!
 //! Goals: 150 ns for Rasmussen and those on the EMF, 250 ns for injection, 1 us for the Kalman filter.
 #![allow(missing_docs, non_snake_case)]
@@ -22,7 +22,7 @@ fn context(par: &drive::control::tables::ControllerParameters) -> Context<'_> {
     Context { par: &par.estimators, motor: &par.motor, J: par.J, T_s: T_S }
 }
 
-/// Samples of a machine that turns steadily at its rated current, its estimator's injection one sample late.
+/// Samples of a machine that turns steadily at its rated current, with the injection of its estimator delayed by one sample.
 fn record(kind: Kind, context: &Context) -> Vec<Sample> {
     let (motor, i) = (runner::machine(), Dq::new(-0.84, 5.59));
     let at = |theta: f64, v: Dq| -> AlphaBeta { Axis::<Rotor>::at(theta).to_stator(v) };

@@ -27,7 +27,7 @@ fn main() {
     let read: unsafe extern "C" fn(InstancePointer, *mut f64, usize) -> c_int = black_box(fmi::fmi2GetDerivatives);
     // u_a, u_b, u_c.
     let (inputs, u, x, mut dx) = ([1, 2, 3], [20.0, -5.0, -15.0], [0.16, 0.02, 30.0, 0.4], [0.0; 4]);
-    // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.
+    // SAFETY: used as the standard requires: one thread, arrays of the given lengths, freed once.
     unsafe {
         let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 0, token.as_ptr(), null(), null(), no, no);
         assert_eq!(fmi::fmi2SetupExperiment(it, no, 0.0, 0.0, no, 0.0), 0);

@@ -1,5 +1,5 @@
-//! One 10 kHz period of plant and controller: natively, through the C interface of both standards with its gets and sets,
-//! and 1 s of PmsmDrive; as a ratio to a loop that is written by hand in C (`c_period.c`), if a C compiler `cc` is there.
+//! One 10 kHz period of plant and controller: natively, through the C interface of both standards with its gets and sets, and 1
+//! s of PmsmDrive; as a ratio to a loop written by hand in C (`c_period.c`), if a C compiler `cc` is available.
 //!
 //! The candidates take turns in one run, so that other load on the computer affects all of them; the figures are
 //! medians. `PERIOD_BASELINE=DIR` adds the FMUs of another build from `DIR/fmi2` and `DIR/fmi3`. Then PmsmDrive with each effect of the
@@ -36,11 +36,11 @@ struct Point {
 const POINTS: [Point; 2] =
     [Point { name: "1000 rpm", speed: 1000.0 * RPM, load: 1.0 }, Point { name: "3 rpm", speed: 3.0 * RPM, load: 0.1 }];
 
-/// A name and what runs [`PERIODS`] periods.
+/// A name and the function that runs [`PERIODS`] periods.
 struct Candidate {
     name: String,
     turn: Box<dyn FnMut()>,
-    /// Time of a period in ns, one of each turn.
+    /// Time of a period in ns, one value for each turn.
     times: Vec<f64>,
 }
 
@@ -55,7 +55,7 @@ impl Candidate {
     }
 }
 
-/// The loop in C as a library, or why there is none.
+/// The loop in C as a library, or the reason why there is none.
 fn c_loop() -> Result<Library, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let (source, library) =

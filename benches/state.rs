@@ -1,5 +1,5 @@
-//! Saving and restoring the FMU state of the controller through the C functions, with a handle that is used again:
-//! `cargo bench --bench state`. The goal is 200 ns each.
+//! Saving and restoring the FMU state of the controller through the C functions, with a reused handle: `cargo bench --bench
+//! state`. The goal is 200 ns each.
 #![allow(missing_docs)]
 
 #[path = "../fmu-export/benches/timing/mod.rs"]
@@ -23,7 +23,7 @@ fn main() {
     let save: unsafe extern "C" fn(InstancePointer, *mut FmuState) -> c_int = black_box(fmi::fmi2GetFMUstate);
     let restore: unsafe extern "C" fn(InstancePointer, FmuState) -> c_int = black_box(fmi::fmi2SetFMUstate);
     let step: unsafe extern "C" fn(InstancePointer, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);
-    // SAFETY: used as the standard demands: one thread, freed once.
+    // SAFETY: used as the standard requires: one thread, freed once.
     unsafe {
         let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 1, token.as_ptr(), null(), null(), no, no);
         assert_eq!(fmi::fmi2SetupExperiment(it, no, 0.0, 0.0, no, 0.0), 0);

@@ -14,7 +14,7 @@ from fmpy import simulate_fmu
 
 folder = sys.argv[1] if len(sys.argv) > 1 else "target/fmu/fmi3"
 
-# Time in s, speed reference in rad/s, load in N.m: straight lines between the rows, a step where two have one time.
+# Time in s, speed reference in rad/s, load in N.m: straight lines between the rows, a step where two rows have the same time.
 w = 1000 * np.pi / 30
 rows = [(0, 0, 0), (0.1, 0, 0), (0.1, w, 0), (0.5, w, 0), (0.6, w, 2), (1, w, 2), (1.2, w, -2), (1.5, w, -2)]
 inputs = np.array(rows, dtype=[("time", float), ("speed_ref", float), ("tau_load", float)])

@@ -1,4 +1,4 @@
-//! An FMU of your own in one file: a capacitor charged through a resistor, for Co-Simulation and Model Exchange.
+//! Your FMU in one file: a capacitor charged through a resistor, for Co-Simulation and Model Exchange.
 //!
 //! ```sh
 //! cargo run --release -- build --package own-fmu
@@ -13,11 +13,11 @@ use fmu_core::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A quantity of your own: a name, a unit, its SI base exponents (kg, m, s, A).
+/// A new quantity: a name, a unit, its SI base exponents (kg, m, s, A).
 const FARAD: Quantity = Quantity::new("Capacitance", Unit::si("F", Exponents::mechanical(-1, -2, 4, 2)));
 const VOLT_PER_S: Quantity = Quantity::new("VoltageRate", Unit::si("V/s", Exponents::mechanical(1, 2, -4, -1)));
 
-/// Inputs, parameters and state are plain data: this is all that a saved FMU state has to hold.
+/// Inputs, parameters and state are plain data: the content of a saved FMU state.
 #[derive(Clone, Serialize, Deserialize)]
 struct RcCircuit {
     u: f64,
@@ -28,7 +28,7 @@ struct RcCircuit {
     u_c: f64,
 }
 
-/// Start values come from here and from nowhere else.
+/// Start values come only from here.
 impl Default for RcCircuit {
     fn default() -> Self {
         Self { u: 0.0, resistance: 1e3, capacitance: 1e-3, u_start: 0.0, u_rated: 16.0, u_c: 0.0 }
@@ -58,7 +58,7 @@ impl Model for RcCircuit {
         ..Info::DEFAULT
     };
 
-    // Name, unit, range and place of every variable; names must differ, or this does not compile.
+    // Name, unit, range and location of every variable; duplicate names do not compile.
     const TABLE: &'static Table<Block<Self>> = table![
         V::input("u", &VOLT, "Source voltage", |m| &mut m.model.u),
         V::output("u_c", &VOLT, "Voltage of the capacitor", |m| &mut m.out.u_c),
@@ -93,7 +93,7 @@ impl ContinuousTime for RcCircuit {
     }
 }
 
-// Goes to the importer's log, at most once a second, if the importer wants warnings.
+// Goes to the importer's log, at most once a second, if warnings are enabled.
 impl Warns for RcCircuit {
     fn warn(&self, log: &mut Warnings<'_>) {
         if self.u_c.abs() > self.u_rated {

@@ -41,7 +41,7 @@ enum Command {
     Preset(preset::Preset),
     Page(page::Page),
     Prove(prove::Prove),
-    /// Writes what a shell needs to complete this command
+    /// Writes a shell's completion script for this command
     ///
     /// For bash and for PowerShell:
     ///

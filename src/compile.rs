@@ -11,7 +11,7 @@ use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// A library, and the package that it belongs to.
+/// A library and its package.
 pub type Library = (String, PathBuf);
 
 #[derive(Deserialize)]
@@ -28,8 +28,8 @@ struct ArtifactTarget {
     crate_types: Vec<String>,
 }
 
-/// Compiles the cdylibs of these packages, optimized, in a separate target folder (a `cargo` that waits for this program
-/// holds the usual one). Paths of this machine stay out of the binaries, so that builds at two places agree byte for byte.
+/// Compiles the cdylibs of these packages, optimized, in a separate target folder (a `cargo` that waits for this program locks
+/// the usual one). Local paths are removed from the binaries, so that builds in two folders agree byte for byte.
 ///
 /// # Errors
 /// Cargo fails; it has then printed the reason.
@@ -62,7 +62,7 @@ pub fn module(workspace: &Workspace, package: &str) -> Result<PathBuf> {
     rustc.args(["--target", MODULE, "--lib"]);
     // A panic ends the call in the host; `fmu_fault` has its text.
     rustc.env("CARGO_PROFILE_RELEASE_PANIC", "abort");
-    // A page travels by mail: a tenth smaller, a fifth slower.
+    // Optimized for size, because a page is sent by mail: a tenth smaller, a fifth slower.
     if env::var_os("CARGO_PROFILE_RELEASE_OPT_LEVEL").is_none() {
         rustc.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "s");
     }
@@ -118,7 +118,7 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
         Linker::Usual if target.is_host => &mut build,
         _ => build.args(["--target", &target.triple]),
     };
-    // The C interface turns a panic into a status, whatever panic strategy the workspace sets for its programs.
+    // The C interface turns a panic into a status, so the workspace's panic strategy must not apply.
     build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
     if target.is_host {
         // The host has a standard library; building one would require --target.
@@ -131,7 +131,7 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
     build
 }
 
-/// An optimized build of these packages, as it is for every target.
+/// An optimized build of these packages, with the options common to all targets.
 fn release(mut build: Command, verb: &str, workspace: &Workspace, packages: &[String], triple: &str) -> Command {
     build.args([verb, "--release", "--message-format", "json-render-diagnostics", "--target-dir"]);
     build.arg(workspace.target.join("fmu-build"));
@@ -147,12 +147,12 @@ fn release(mut build: Command, verb: &str, workspace: &Workspace, packages: &[St
     build
 }
 
-/// Runs the command; returns the cdylibs that it made.
+/// Runs the command; returns the cdylibs that it built.
 fn run(workspace: &Workspace, build: Command, packages: &[String], target: &Target) -> Result<Vec<Library>> {
     artifacts(workspace, build, packages, &target.triple, target.platform.extension())
 }
 
-/// Runs the command; returns the files with this extension that it made of the packages' cdylibs.
+/// Runs the command; returns the files with this extension that it built from the packages' cdylibs.
 fn artifacts(
     workspace: &Workspace,
     mut build: Command,

@@ -60,7 +60,7 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     document(d.model_name(), "", STYLE, &format!("{header}{contents}<main>\n{body}</main>\n"))
 }
 
-/// The icon of the FMU as part of the page: an SVG document without its declaration, which the name beside it describes.
+/// The icon of the FMU as part of the page: an SVG document without its declaration, described by the name beside it.
 fn icon(svg: &str) -> String {
     let svg = svg.find("<svg").map_or(svg, |at| &svg[at..]);
     format!("<div class=\"icon\" aria-hidden=\"true\">{}</div>\n", svg.trim())
@@ -99,13 +99,13 @@ fn anchor(title: &str) -> String {
     words.map(str::to_lowercase).collect::<Vec<_>>().join("-")
 }
 
-/// The recommended experiment, and what happens at other steps.
+/// The recommended experiment, and the behavior at other steps.
 fn timing(d: &Description) -> String {
     let x = d.experiment;
     let discrete =
         d.variables.iter().any(|v| v.causality == Causality::Output && v.variability == Variability::Discrete);
     let outputs = if discrete {
-        "Outputs marked “sampled” change at the model's own sample instants, whatever the communication step is."
+        "Outputs marked “sampled” change at the model's own sample instants, independent of the communication step."
     } else {
         "Outputs are those of the end of the step."
     };

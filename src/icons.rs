@@ -1,9 +1,9 @@
 //! The folder `terminalsAndIcons/` of an FMU: its XML, and every picture as SVG and as PNG (FMI 3.0.2, 2.4.9).
 //!
-//! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here, in
-//! the size that the SVG gives itself.
+//! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here,
+//! in the size stated by the SVG.
 
-use crate::pack::Entry;
+use crate::pack::PackedFile;
 use crate::picture;
 use anyhow::{Context, Result};
 use fmu_core::Description;
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 const FOLDER: &str = "terminalsAndIcons";
 
-/// Folder of the layered standard that says what terminals with maps mean.
+/// Folder of the layered standard that defines terminals with maps.
 const STRUCT: &str = "extra/org.fmi-standard.fmi-ls-struct/";
 
 const MANIFEST: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
@@ -26,9 +26,9 @@ const MANIFEST: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
 ///
 /// # Errors
 /// A picture is not an SVG document, or contains text.
-pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, Entry>> {
+pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, PackedFile>> {
     let mut files = BTreeMap::new();
-    let file = |bytes: Vec<u8>| Entry { bytes, executable: false };
+    let file = |bytes: Vec<u8>| PackedFile { bytes, executable: false };
     if let Some(xml) = write_terminals(description, version) {
         files.insert(format!("{FOLDER}/terminalsAndIcons.xml"), file(xml.into_bytes()));
     }
@@ -61,7 +61,7 @@ mod tests {
         files(&Description::of::<M>().unwrap(), version).unwrap().into_keys().collect()
     }
 
-    /// Every picture is there as PNG and SVG, once, and never empty: each of ours covers a fifth of its square at least.
+    /// Every picture exists once as PNG and SVG and is not empty: each of ours covers at least a fifth of its square.
     #[test]
     fn every_picture_of_the_models_is_drawn() {
         assert_eq!(

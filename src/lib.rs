@@ -32,7 +32,7 @@ pub mod target;
 pub mod vendor;
 pub mod workspace;
 
-/// The tool, as `generationTool` names it.
+/// The name of the tool in `generationTool`.
 pub const TOOL: &str = concat!("fmu ", env!("CARGO_PKG_VERSION"));
 
 /// The work failed although the command and its files were valid: exit status 1 instead of 2.

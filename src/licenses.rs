@@ -10,7 +10,7 @@ use std::path::Path;
 /// Licenses to pack with an FMU.
 #[derive(Clone, Debug, Default)]
 pub struct Licenses {
-    /// Texts of the workspace's own license.
+    /// Texts of the workspace's license.
     own: Vec<String>,
     /// The packages linked into the binary; `None` if unknown.
     crates: Option<Vec<Crate>>,
@@ -29,7 +29,7 @@ impl Licenses {
     /// The licenses of everything that is linked into the library of a package.
     pub fn of_package(workspace: &Workspace, package: &str) -> Self {
         let mut linked = workspace.linked(package);
-        // The description has the FMU's own license.
+        // The description has the FMU's license.
         linked.retain(|p| p.name != package || p.license.is_some());
         let crates = linked.into_iter().map(|p| Crate::of(p, workspace.is_member(p))).collect();
         Self { own: texts_in(&workspace.root, ""), crates: Some(crates) }

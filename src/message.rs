@@ -1,5 +1,5 @@
-//! Messages on standard error, with a colored first word on a terminal. `NO_COLOR` takes the color away, `CLICOLOR_FORCE` gives it
-//! to files and pipes too.
+//! Messages on standard error, with a colored first word on a terminal. `NO_COLOR` disables the color, `CLICOLOR_FORCE` enables
+//! it for files and pipes too.
 
 use clap::builder::Styles;
 use clap::builder::styling::{AnsiColor, Style};
@@ -11,17 +11,17 @@ pub const HELP: Styles = Styles::styled()
     .literal(AnsiColor::Cyan.on_default().bold())
     .placeholder(AnsiColor::Cyan.on_default());
 
-/// Why the command ends.
+/// The reason why the command ends.
 pub fn error(text: &str) {
     say(AnsiColor::Red, "error", text);
 }
 
-/// What may make a result wrong.
+/// Something that may invalidate a result.
 pub fn warning(text: &str) {
     say(AnsiColor::Yellow, "warning", text);
 }
 
-/// What is good to know.
+/// Useful information.
 pub fn note(text: &str) {
     say(AnsiColor::Cyan, "note", text);
 }

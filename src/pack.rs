@@ -18,27 +18,27 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 /// A file of an archive.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct PackedFile {
     /// Its contents.
     pub bytes: Vec<u8>,
-    /// Whether it gets the permission to be executed.
+    /// Whether it is executable.
     pub executable: bool,
 }
 
-impl Entry {
+impl PackedFile {
     fn text(text: String) -> Self {
         Self { bytes: text.into_bytes(), executable: false }
     }
 }
 
-/// The time at which the FMU is made: `SOURCE_DATE_EPOCH`, or now.
+/// The time of generation: `SOURCE_DATE_EPOCH`, or now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Moment {
+pub struct GenerationTime {
     seconds: i64,
     fixed: bool,
 }
 
-impl Moment {
+impl GenerationTime {
     /// The time from the environment, or from the clock.
     ///
     /// # Errors
@@ -90,27 +90,27 @@ pub fn contents(
     binaries: &[(Platform, Vec<u8>)],
     licenses: &Licenses,
     version: FmiVersion,
-    moment: Moment,
+    moment: GenerationTime,
     linux64: Platform,
-) -> Result<BTreeMap<String, Entry>> {
+) -> Result<BTreeMap<String, PackedFile>> {
     let generation = Generation { tool: TOOL.into(), date_and_time: moment.date_and_time() };
     let mut files = BTreeMap::from([
-        ("modelDescription.xml".into(), Entry::text(model_description::write(description, version, &generation))),
-        ("documentation/index.html".into(), Entry::text(documentation::page(description, version))),
-        ("documentation/licenses/license.txt".into(), Entry::text(licenses.text(description))),
+        ("modelDescription.xml".into(), PackedFile::text(model_description::write(description, version, &generation))),
+        ("documentation/index.html".into(), PackedFile::text(documentation::page(description, version))),
+        ("documentation/licenses/license.txt".into(), PackedFile::text(licenses.text(description))),
     ]);
     if version == FmiVersion::V3 {
         let spdx = licenses.spdx(description, &generation.date_and_time);
-        files.insert("documentation/licenses/license.spdx".into(), Entry::text(spdx));
+        files.insert("documentation/licenses/license.spdx".into(), PackedFile::text(spdx));
     }
     let libraries = binaries.iter().map(|(platform, bytes)| (*platform, bytes.as_slice())).collect();
     for (path, bytes) in libraries_of(&description.name, &libraries, version, linux64)? {
-        files.insert(path, Entry { bytes, executable: true });
+        files.insert(path, PackedFile { bytes, executable: true });
     }
     Ok(files)
 }
 
-/// Where the libraries of a model identifier lie in an archive. In FMI 2.0 `darwin64` receives those of macOS, both as one
+/// Paths of the libraries of a model identifier in an archive. In FMI 2.0 `darwin64` receives those of macOS, both as one
 /// universal library, and `linux64` that of the platform `linux64`.
 ///
 /// # Errors
@@ -142,17 +142,17 @@ pub fn libraries_of(
     folders.into_iter().map(one).collect()
 }
 
-/// The files of a folder, with those of its folders, as `resources/` of an FMU. Hidden files stay out: systems and editors make
+/// The files of a folder and its subfolders, as `resources/` of an FMU. Hidden files are omitted: systems and editors create
 /// them.
 ///
 /// # Errors
-/// A file cannot be read, is neither file nor folder (links are followed), or has a name that some system cannot write.
-pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
+/// A file cannot be read, is neither file nor folder (links are followed), or has a name that is invalid on some system.
+pub fn resources(folder: &Path) -> Result<BTreeMap<String, PackedFile>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(folder.to_owned(), "resources".to_owned(), 0)];
     while let Some((folder, prefix, depth)) = folders.pop() {
         // A link may lead back to where it is.
-        ensure!(depth < 32, "{}: more than 32 folders inside each other", folder.display());
+        ensure!(depth < 32, "{}: folders are nested more than 32 deep", folder.display());
         for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
             let path = entry?.path();
             let of = || path.display().to_string();
@@ -168,7 +168,7 @@ pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
                 folders.push((path, name, depth + 1));
             } else {
                 ensure!(kind.is_file(), "{}: is neither a file nor a folder", of());
-                files.insert(name, Entry { bytes: fs::read(&path).with_context(of)?, executable: false });
+                files.insert(name, PackedFile { bytes: fs::read(&path).with_context(of)?, executable: false });
             }
         }
     }
@@ -180,9 +180,9 @@ pub fn resources(folder: &Path) -> Result<BTreeMap<String, Entry>> {
 ///
 /// # Errors
 /// A file is larger than 4 GiB.
-pub fn archive(files: &BTreeMap<String, Entry>, moment: Moment) -> Result<Vec<u8>> {
+pub fn archive(files: &BTreeMap<String, PackedFile>, moment: GenerationTime) -> Result<Vec<u8>> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    for (name, Entry { bytes, executable }) in files {
+    for (name, PackedFile { bytes, executable }) in files {
         let options = SimpleFileOptions::default()
             .compression_method(CompressionMethod::Deflated)
             .compression_level(Some(9))
@@ -218,8 +218,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 mod tests {
     use super::*;
 
-    fn sample() -> BTreeMap<String, Entry> {
-        let file = |bytes: &[u8], executable| Entry { bytes: bytes.into(), executable };
+    fn sample() -> BTreeMap<String, PackedFile> {
+        let file = |bytes: &[u8], executable| PackedFile { bytes: bytes.into(), executable };
         BTreeMap::from([
             ("modelDescription.xml".into(), file(b"<x/>", false)),
             ("binaries/linux64/X.so".into(), file(&[7; 5000], true)),
@@ -228,7 +228,7 @@ mod tests {
 
     #[test]
     fn the_same_files_give_the_same_bytes() {
-        let make = |seconds| archive(&sample(), Moment::fixed(seconds)).unwrap();
+        let make = |seconds| archive(&sample(), GenerationTime::fixed(seconds)).unwrap();
         assert_eq!(make(1_700_000_000), make(1_700_000_000));
         assert_ne!(make(1_700_000_000), make(1_800_000_000));
         assert_eq!(make(0), make(5), "before 1980");
@@ -237,7 +237,7 @@ mod tests {
     /// Reads the raw headers, because `zip`'s own reader is too lenient.
     #[test]
     fn headers_are_plain() {
-        let bytes = archive(&sample(), Moment::fixed(1_700_000_000)).unwrap();
+        let bytes = archive(&sample(), GenerationTime::fixed(1_700_000_000)).unwrap();
         let u16_at = |i: usize| u16::from_le_bytes([bytes[i], bytes[i + 1]]);
         let starts = |magic: &[u8]| {
             bytes.windows(4).enumerate().filter(|(_, w)| *w == magic).map(|(i, _)| i).collect::<Vec<_>>()

@@ -4,17 +4,17 @@ use anyhow::{Result, anyhow, bail};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
-/// Widest and highest picture that is drawn, in pixels.
+/// Maximum width and height of a picture, in pixels.
 const LARGEST: f32 = 8192.0;
 
-/// Draws an SVG document without text on a transparent ground, in its own size; equal documents give equal bytes.
+/// Draws an SVG document without text on a transparent ground, in the size of the document; equal documents give equal bytes.
 ///
 /// # Errors
 /// It is not an SVG document, is too large, or contains text.
 pub fn without_text(svg: &str) -> Result<Vec<u8>> {
     // Without fonts, the renderer silently omits text.
     if svg.contains("<text") {
-        bail!("has <text>, which is drawn differently wherever the fonts differ: draw paths instead");
+        bail!("has <text>, which looks different with other fonts: draw paths instead");
     }
     draw(svg, &Options::default(), 1.0)
 }

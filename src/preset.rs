@@ -1,10 +1,10 @@
-//! An FMU with other start values, made from its archive: the same binaries with a [`preset`] among their
-//! resources, and a description that says so.
+//! An FMU with other start values, made from its archive: the same binaries with a [`preset`] among their resources, and a
+//! matching description.
 
 use crate::TOOL;
 use crate::documentation;
 use crate::message;
-use crate::pack::{self, Entry, Moment};
+use crate::pack::{self, GenerationTime, PackedFile};
 use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmu_core::description::{Value, Variable, VariableKind};
@@ -22,25 +22,25 @@ const PAGE: &str = "documentation/index.html";
 const BINARIES: &str = "binaries/";
 
 /// The default experiment of the new FMU: its inputs, and its times in s.
-pub struct Course {
+pub struct NewExperiment {
     /// CSV with time first and a column for each input.
     pub stimuli: String,
     /// Stop time.
     pub stop: f64,
-    /// Communication step, if it is not that of the archive.
+    /// Communication step, if it differs from that of the archive.
     pub step: Option<f64>,
 }
 
-/// An FMU, and the start values that it will have.
+/// An FMU, and its new start values.
 pub struct PresetFmu {
     /// The archive, for messages.
     file: PathBuf,
     md: ModelDescription,
     files: BTreeMap<String, Vec<u8>>,
     unpacked: Unpacked,
-    /// The model as it is without a preset.
+    /// The model without a preset.
     own: Description,
-    /// The model as FMI 3.0 describes it, with arrays, to read what users write.
+    /// The model as described by FMI 3.0, with arrays, to parse user input.
     reader: ModelDescription,
     /// Names and values by value reference, which is the order of the table.
     values: BTreeMap<u32, (String, String)>,
@@ -49,7 +49,7 @@ pub struct PresetFmu {
 }
 
 impl PresetFmu {
-    /// Opens an FMU of this exporter, with the values that it already presets.
+    /// Opens an FMU of this exporter, with the values of its preset, if it is one.
     ///
     /// # Errors
     /// The file is not an FMU of this exporter with a binary for this computer.
@@ -68,14 +68,14 @@ impl PresetFmu {
         let suffix = preset::suffix_of(&md.token, &own.token).with_context(|| {
             format!("{name}: {DESCRIPTION} and binary are of different builds: build the FMU again")
         })?;
-        let reader = model_description::write(&own, FmiVersion::V3, &generation(Moment::fixed(0)));
+        let reader = model_description::write(&own, FmiVersion::V3, &generation(GenerationTime::fixed(0)));
         let reader = model_description::read(reader)?;
         let mut values = BTreeMap::new();
         if !suffix.is_empty() {
             let old = old.filter(|bytes| preset::suffix(bytes) == suffix);
             let old =
                 old.with_context(|| format!("{name}: resources/{FILE} is missing, or not that of {DESCRIPTION}"))?;
-            for preset::Entry { name, value, .. } in
+            for preset::PresetValue { name, value, .. } in
                 preset::read(&old).map_err(|e| anyhow!("{}: {e}", file.display()))?
             {
                 let (variable, element) =
@@ -87,15 +87,15 @@ impl PresetFmu {
         Ok(Self { file: file.into(), md, files, unpacked, own, reader, values, earlier })
     }
 
-    /// The model as it is without a preset.
+    /// The model without a preset.
     pub fn own(&self) -> &Description {
         &self.own
     }
 
-    /// The model as the archive has it, with its default experiment, and the file that feeds it.
+    /// The model of the archive, with its default experiment and the file of inputs.
     ///
     /// # Errors
-    /// The binary knows no presets.
+    /// The binary does not support presets.
     pub fn archived(&self) -> Result<(Description, Option<Vec<u8>>)> {
         let mut description = if self.values.is_empty() { self.own.clone() } else { self.described(None)? };
         description.title = (self.md.model_name != description.name).then(|| self.md.model_name.clone());
@@ -104,7 +104,7 @@ impl PresetFmu {
     }
 
     /// The default experiment of the archive, or another course.
-    fn take_experiment(&self, description: &mut Description, course: Option<&Course>) {
+    fn take_experiment(&self, description: &mut Description, course: Option<&NewExperiment>) {
         let of_archive = &self.md.default_experiment;
         let experiment = &mut description.experiment;
         let stop = course.map(|course| course.stop).or(of_archive.stop);
@@ -112,19 +112,18 @@ impl PresetFmu {
         (experiment.stop, experiment.step) = (stop.unwrap_or(experiment.stop), step.unwrap_or(experiment.step));
     }
 
-    /// The file that feeds the default experiment of the archive.
+    /// The file with the inputs of the archive's default experiment.
     fn stimuli(&self) -> Option<&[u8]> {
         let packed = self.files.iter().find(|(name, _)| name.starts_with(FOLDER) && name.ends_with("_in.csv"));
         packed.map(|(_, bytes)| bytes.as_slice())
     }
 
-    /// The names that an earlier preset has set and this one has not.
+    /// The names set by an earlier preset but not by this one.
     pub fn earlier(&self) -> Vec<&str> {
         self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
     }
 
-    /// Sets the start value of a variable, of a whole array, or of an element, from the text of a user, in `unit` if that is
-    /// given.
+    /// Sets the start value of a variable, of a whole array, or of an element, from user input, in `unit` if that is given.
     ///
     /// # Errors
     /// Names the variable and the value, and what is expected.
@@ -146,7 +145,7 @@ impl PresetFmu {
         let read = self.reader.variable(&variable.name).context(variable.name.clone())?;
         let own_unit = read.unit.as_deref().unwrap_or("1");
         if let Some(unit) = unit.filter(|unit| *unit != own_unit) {
-            bail!("{name} is given in {unit}, and {model} has it in {own_unit}: convert the value");
+            bail!("{name} is given in {unit}, but {model} has it in {own_unit}: convert the value");
         }
         let elements = texts(&Values::read(text, read, &self.reader).map_err(anyhow::Error::msg)?, variable);
         let places: Vec<usize> = element.map_or_else(|| (0..variable.elements()).collect(), |one| vec![one]);
@@ -158,18 +157,19 @@ impl PresetFmu {
         Ok(())
     }
 
-    /// Writes the FMU with these start values to `out`; nothing is written unless all of them are allowed. `title` is the name
-    /// that users see; without it and without `course`, those of the archive stay. Returns a line for every start value that
-    /// differs from the model's own.
+    /// Writes the FMU with these start values to `out`; nothing is written unless all are allowed. `title` is the name that
+    /// users see; by default, name and experiment are those of the archive. Returns a line for every start value that differs
+    /// from the model's.
     ///
     /// # Errors
-    /// The binary knows no presets; a value is not allowed, or the FMU refuses them together; the file cannot be written.
-    pub fn write(self, title: Option<&str>, course: Option<&Course>, out: &Path) -> Result<Vec<String>> {
-        let moment = Moment::of_environment()?;
+    /// The binary does not support presets; a value is not allowed, or the FMU refuses them together; the file cannot be
+    /// written.
+    pub fn write(self, title: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Vec<String>> {
+        let moment = GenerationTime::of_environment()?;
         let mut description = self.described(title)?;
         self.take_experiment(&mut description, course);
         let changes = changes(&description, &self.own);
-        let mut files: BTreeMap<String, Entry> = self
+        let mut files: BTreeMap<String, PackedFile> = self
             .files
             .iter()
             .filter(|(name, _)| !name.starts_with(FOLDER))
@@ -195,7 +195,7 @@ impl PresetFmu {
         preset::write(self.values.values().map(|(name, value)| (name.as_str(), value.as_str())))
     }
 
-    /// The description that the binary gives of itself with the preset: it judges every name and value.
+    /// The description that the binary returns with the preset: it checks every name and value.
     fn described(&self, title: Option<&str>) -> Result<Description> {
         let (name, text) = (self.file.display(), self.text());
         fs::write(self.unpacked.resources().join(FILE), &text)?;
@@ -204,7 +204,7 @@ impl PresetFmu {
         let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
         ensure!(
             description.token == token,
-            "{name}: its binary knows no presets, because an earlier version made it: build the FMU again"
+            "{name}: its binary does not support presets, because an earlier version built it: build the FMU again"
         );
         let title = title.unwrap_or(&self.md.model_name);
         description.title = (title != description.name).then(|| title.to_owned());
@@ -212,7 +212,7 @@ impl PresetFmu {
         Ok(description)
     }
 
-    /// Requires that the FMU initializes with the preset, where it does without.
+    /// Requires that the FMU initializes with the preset if it does so without.
     fn starts(&self, archive: &Path) -> Result<()> {
         let (fmu, name) = (Fmu::open(archive)?, self.file.display());
         for (kind, what) in [(Kind::default(), "Co-Simulation"), (Kind::ModelExchange, "Model Exchange")] {
@@ -234,9 +234,9 @@ impl PresetFmu {
         &self,
         archive: &Path,
         description: &Description,
-        course: Option<&Course>,
+        course: Option<&NewExperiment>,
         dir: &Path,
-    ) -> Result<BTreeMap<String, Entry>> {
+    ) -> Result<BTreeMap<String, PackedFile>> {
         let stimuli = dir.join(reference::STIMULI);
         // Without a file, the inputs keep their start values.
         if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(self.stimuli()) {
@@ -258,15 +258,15 @@ fn initialized(fmu: &Fmu, kind: Kind) -> Result<(), fmu_import::Error> {
     instance.exit_initialization()
 }
 
-fn generation(moment: Moment) -> Generation {
+fn generation(moment: GenerationTime) -> Generation {
     Generation { tool: TOOL.into(), date_and_time: moment.date_and_time() }
 }
 
-fn entry(name: &str, bytes: Vec<u8>) -> Entry {
-    Entry { bytes, executable: name.starts_with(BINARIES) }
+fn entry(name: &str, bytes: Vec<u8>) -> PackedFile {
+    PackedFile { bytes, executable: name.starts_with(BINARIES) }
 }
 
-/// Why a library cannot be described, without the path where it was unpacked and without the line of the preset.
+/// The reason why a library cannot be described, without the unpacked path and without the line of the preset.
 fn cause(error: &str, unpacked: &Unpacked) -> String {
     let library = unpacked.library.display().to_string();
     let rest = error.strip_prefix(&library).map_or(error, |rest| rest.trim_start_matches([':', ' ']));
@@ -329,7 +329,7 @@ fn shown(variable: &Variable) -> String {
     variable.start.iter().flatten().map(one).collect::<Vec<_>>().join(", ")
 }
 
-/// The elements as the file has them, rounded to the type of the variable.
+/// The elements as in the file, rounded to the type of the variable.
 fn texts(values: &Values, variable: &Variable) -> Vec<String> {
     #[expect(clippy::cast_possible_truncation, reason = "rounds")]
     let real = |x: &f64| match variable.kind {

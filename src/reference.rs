@@ -1,11 +1,11 @@
-//! The result of an FMU's default experiment: reference files in its archive, as the layered standard FMI-LS-REF
-//! 1.0.0-beta.1 names them (<https://github.com/modelica/fmi-ls-ref>). The experiment has the format of its release 1.0.0-alpha.1,
-//! which <https://github.com/modelica/ma-hs-experiments> continues.
+//! The result of an FMU's default experiment: reference files in its archive, named as in the layered standard FMI-LS-REF
+//! 1.0.0-beta.1 (<https://github.com/modelica/fmi-ls-ref>). The experiment has the format of its release 1.0.0-alpha.1, which
+//! <https://github.com/modelica/ma-hs-experiments> continues.
 //!
 //! The CSV files follow the rules for the examples that the FMI tools page lists: names in quotes, time first, at most ten
 //! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
-use crate::pack::Entry;
+use crate::pack::PackedFile;
 use anyhow::{Context, Result, bail};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
@@ -20,15 +20,15 @@ use std::path::Path;
 /// Folder of the layered standard in an archive.
 pub const FOLDER: &str = "extra/org.fmi-standard.fmi-ls-ref/";
 
-/// File of a package that feeds its FMU: CSV with time first and a column per input; lines join the points of a real number, other
-/// values are held.
+/// File of a package with the inputs of its FMU: CSV with time first and a column per input; real numbers are interpolated
+/// linearly, other values are held.
 pub const STIMULI: &str = "stimuli.csv";
 
-/// Greatest number of variables, and of intervals.
+/// Maximum number of variables, and of intervals.
 const VARIABLES: usize = 10;
 const INTERVALS: f64 = 200.0;
 
-/// Greatest number of communication steps, so that a build takes seconds.
+/// Maximum number of communication steps, so that a build takes seconds.
 const MOST_STEPS: f64 = 1e6;
 
 /// Runs a packed FMU through its default experiment, fed with the file `stimuli` if there is one; returns the files for its
@@ -41,7 +41,7 @@ pub fn files(
     description: &Description,
     stimuli: &Path,
     parameters: Option<(&str, &str)>,
-) -> Result<BTreeMap<String, Entry>> {
+) -> Result<BTreeMap<String, PackedFile>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
     let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
     let system = system(archive, &fed).with_context(|| stimuli.display().to_string())?;
@@ -91,7 +91,7 @@ pub fn files(
     }
     texts.push(("fmi-ls-manifest.xml".into(), manifest + "</fmiReferences>\n"));
     let entry = |(file, text): (String, String)| {
-        (format!("{FOLDER}{file}"), Entry { bytes: text.into_bytes(), executable: false })
+        (format!("{FOLDER}{file}"), PackedFile { bytes: text.into_bytes(), executable: false })
     };
     Ok(texts.into_iter().map(entry).collect())
 }
@@ -109,7 +109,7 @@ pub fn run(archive: &Path, experiment: &Experiment, fed: &[(String, Sequence)]) 
     simulate(system(archive, fed)?, experiment)
 }
 
-/// The FMU, fed, with the outputs that are recorded.
+/// The FMU with its inputs and the recorded outputs.
 fn system(archive: &Path, fed: &[(String, Sequence)]) -> Result<System> {
     let fmu = Fmu::open(archive)?;
     let mut system = System::default();
@@ -144,7 +144,7 @@ fn simulate(mut system: System, experiment: &Experiment) -> Result<Recording> {
 enum Feed {
     /// A real number.
     Lines(Schedule),
-    /// Anything else: an integer, a text, bytes, a whole array.
+    /// Any other value: an integer, a text, bytes, a whole array.
     Held(Sequence),
 }
 
@@ -163,11 +163,11 @@ impl Feed {
     }
 }
 
-/// Share of a step that a change of the inputs takes, and the time from there to the communication point.
+/// Duration of a change of the inputs, as a share of the step; it ends the same time before the communication point.
 const EDGE: f64 = 1e-3;
 
-/// Rows of the inputs as the run feeds them: held over its communication steps. A change is over just before its communication
-/// point, so an importer with shorter steps feeds the same, and straight lines connect the rows.
+/// Rows of the inputs as in the run: held over its communication steps. A change ends just before its communication point, so
+/// an importer with shorter steps feeds the same values; straight lines connect the rows.
 fn held(fed: &[Feed], experiment: &Experiment) -> String {
     let Experiment { start, stop, step, .. } = *experiment;
     let at = |t: f64| fed.iter().map(|feed| feed.at(t)).collect::<Vec<String>>();
@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     /// A ramp over two steps and a jump: at every communication point of the reference and between them, lines through the rows
-    /// give what the run held.
+    /// give the values of the run.
     #[test]
     fn the_inputs_say_the_steps_of_their_reference() {
         let experiment = Experiment { stop: 1.0, step: 0.25, ..Experiment::DEFAULT };

@@ -1,7 +1,7 @@
 //! Checksums and bill of materials of a release.
 
 use crate::TOOL;
-use crate::pack::{self, Moment};
+use crate::pack::{self, GenerationTime};
 use crate::workspace::{Package, Workspace};
 use anyhow::{Context, Result};
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// File of the checksums, as `sha256sum --check` reads it.
+/// File of the checksums, in the format of `sha256sum --check`.
 const SUMS: &str = "SHA256SUMS";
 /// File of the bill of materials.
 const MATERIALS: &str = "sbom.cdx.json";
@@ -26,7 +26,7 @@ pub fn finish(
     packages: &[String],
     folder: &Path,
     written: &[PathBuf],
-    moment: Moment,
+    moment: GenerationTime,
 ) -> Result<[PathBuf; 2]> {
     let materials = folder.join(MATERIALS);
     let text = serde_json::to_string_pretty(&bill(workspace, packages, moment))? + "\n";
@@ -48,7 +48,7 @@ pub fn finish(
 }
 
 /// The packages and the crates linked into each, in the format CycloneDX 1.6 (<https://cyclonedx.org/docs/1.6/json/>).
-fn bill(workspace: &Workspace, packages: &[String], moment: Moment) -> Value {
+fn bill(workspace: &Workspace, packages: &[String], moment: GenerationTime) -> Value {
     let reference = |p: &Package| format!("pkg:cargo/{}@{}", p.name, p.version);
     let mut components = BTreeMap::new();
     let mut dependencies = Vec::new();

@@ -3,7 +3,7 @@
 //! support are optional.
 
 use crate::TOOL;
-use crate::pack::{Entry, Moment};
+use crate::pack::{GenerationTime, PackedFile};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_study::tune::setting::Value;
@@ -23,7 +23,7 @@ use std::path::Path;
 /// Name of the system.
 const NAME: &str = "SensorlessDrive";
 
-/// Names of the components, the FMUs, and where a diagram shows them: lower left corner and width in the system's geometry.
+/// Names of the components, the FMUs, and their position in a diagram: lower left corner and width in the system's geometry.
 pub const COMPONENTS: [(&str, &str, [f64; 2]); 2] =
     [("controller", "SensorlessController", [60.0, 50.0]), ("plant", "PmsmPlant", [240.0, 50.0])];
 
@@ -33,8 +33,8 @@ const TERMINALS: [&str; 2] = ["phases", "sensor"];
 /// Width and height of a component in a diagram.
 const SIZE: f64 = 100.0;
 
-/// Parameter values for one of the components, with the file that they come from.
-pub struct Values {
+/// Parameter values for one of the components, with their file.
+pub struct ComponentValues {
     /// Name of the component.
     pub component: String,
     /// Name of the file for errors.
@@ -58,24 +58,24 @@ pub struct Options {
 struct Outside<'a> {
     name: String,
     variable: &'a ModelVariable,
-    /// The connectors of components that it belongs to, with their components.
+    /// The connectors of components that it represents, with their components.
     inner: Vec<(&'static str, &'a str)>,
 }
 
 /// The files of an SSP around the FMUs in `folder`.
 ///
 /// # Errors
-/// An FMU cannot be read, or values do not fit; the error has file, line and remedy. The system is started once, so that the
-/// file runs.
+/// An FMU cannot be read, or values do not fit; the error has file, line and remedy. The system is started once, to verify that
+/// the file runs.
 pub fn files(
     folder: &Path,
-    parameters: &[Values],
+    parameters: &[ComponentValues],
     options: Options,
-    moment: Moment,
-) -> Result<BTreeMap<String, Entry>> {
+    moment: GenerationTime,
+) -> Result<BTreeMap<String, PackedFile>> {
     let mut system = System::default();
     let mut files = BTreeMap::new();
-    let mut put = |name: String, bytes: Vec<u8>| files.insert(name, Entry { bytes, executable: false });
+    let mut put = |name: String, bytes: Vec<u8>| files.insert(name, PackedFile { bytes, executable: false });
     let mut descriptions = Vec::new();
     for (name, fmu, _) in COMPONENTS {
         let path = folder.join(fmu).with_extension("fmu");
@@ -118,8 +118,7 @@ pub fn files(
     Ok(files)
 }
 
-/// The values, each in the type of its variable, whatever type the file gave it: OMSimulator converts none, and ignores
-/// a value of another type.
+/// The values, each converted to the type of its variable: OMSimulator does not convert, and ignores a value of another type.
 fn typed(system: &System, component: &str, given: &[Parameter], names: bool) -> Result<Vec<(String, Value)>> {
     let Some(instance) = system.instances().iter().find(|i| i.name() == component) else { return Ok(Vec::new()) };
     let md = instance.description();
@@ -154,8 +153,8 @@ fn start(system: &mut System, descriptions: &[(&str, ModelDescription)]) -> Resu
     Ok(())
 }
 
-/// Numbers that no terminal feeds; one of a name in both components is one of the system. Truth values (`enable`) stay at
-/// the start values of the FMUs: an importer that sets every input of a system to 0 would switch the drive off.
+/// Numeric inputs that no terminal feeds; inputs of the same name in both components become one of the system. Truth values
+/// (`enable`) keep the start values of the FMUs: an importer that sets every input of a system to 0 would switch the drive off.
 fn inputs<'a>(
     descriptions: &'a [(&'static str, ModelDescription)],
     connections: &[(String, String)],
@@ -210,8 +209,8 @@ fn step(descriptions: &[(&str, ModelDescription)], given: &[(&str, Parameter)]) 
     given.or_else(start).and_then(parse_number).unwrap_or(1e-4)
 }
 
-/// For OMSimulator: its master with a fixed step (Jacobi), which reads all outputs before it sets any input. The command line reads the
-/// element inside (oms.xsd, SystemWC.cpp), the Python package the attributes under the name of its own choice (system.py).
+/// For OMSimulator: its master with a fixed step (Jacobi), which reads all outputs before it sets any input. The command line
+/// reads the element inside (oms.xsd, SystemWC.cpp), the Python package the attributes under a different name (system.py).
 fn master(step: f64) -> Element {
     let master = Element::new("oms:FixedStepMaster")
         .with("description", "oms-ma")
@@ -250,7 +249,7 @@ fn description(
     outputs: &[Outside<'_>],
     of_components: &[&str],
     (options, step): (Options, f64),
-    moment: Moment,
+    moment: GenerationTime,
 ) -> String {
     let outside = |kind: &str, all: &[Outside<'_>]| -> Vec<Element> {
         all.iter().map(|o| connector(&o.name, kind, o.variable)).collect()
@@ -329,8 +328,8 @@ fn binding(name: &str) -> Element {
     Element::new("ssd:ParameterBindings").children([one])
 }
 
-/// Whether a connector can say the type of the variable. OMSimulator stops at a connector without one, and an enumeration needs
-/// its items in a file besides.
+/// Whether a connector can express the type of the variable. OMSimulator stops at a connector without one, and an enumeration
+/// needs its items in a file besides.
 fn has_type(variable: &ModelVariable) -> bool {
     !matches!(variable.base, BaseType::Enumeration | BaseType::String | BaseType::Binary | BaseType::Clock)
 }

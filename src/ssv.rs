@@ -27,7 +27,7 @@ pub fn text_of<'a>(name: &str, values: impl IntoIterator<Item = (&'a str, &'a Va
     for (name, value) in values {
         match value {
             Value::Real(x) => put(name, "Real", &x.to_string()),
-            // SSP 1.0 has no arrays: one parameter for each element, with the name that it has in FMI 2.0.
+            // SSP 1.0 has no arrays: one parameter for each element, with its name in FMI 2.0.
             Value::Reals(all) => all.iter().enumerate().for_each(|(element, x)| {
                 put(&format!("{name}{}", position(&[all.len()], element)), "Real", &x.to_string());
             }),

@@ -1,4 +1,4 @@
-//! The Rust targets that FMUs are built for, and a check that this machine has what a build needs.
+//! The Rust targets of FMUs, and a check that this machine can build for them.
 
 use anyhow::{Context, Result, anyhow, bail};
 use fmu_import::platform::Platform;
@@ -6,13 +6,13 @@ use std::env;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// How to get zig as a linker.
+/// How to install zig as a linker.
 pub const ZIG: &str = "pip install cargo-zigbuild ziglang";
 
 /// Makes Cargo build the standard library from source.
 pub(crate) const BUILD_STD: &str = "CARGO_UNSTABLE_BUILD_STD";
 
-/// The target of the modules that pages run. It has no platform of FMI: nothing here loads them natively.
+/// The target of the modules that pages run. It is not a platform of FMI: modules are not loaded natively.
 pub const MODULE: &str = "wasm32-unknown-unknown";
 
 /// A target that can be built here.
@@ -61,7 +61,7 @@ impl Tools {
         Target { triple: self.host.clone(), platform, is_host: true, linker }
     }
 
-    /// A target by its name, with everything that its build needs.
+    /// A target by its name, with the tools for its build.
     ///
     /// # Errors
     /// rustc does not know it, FMI has no platform for it, or its standard library or a linker is missing; the error says how
@@ -72,7 +72,7 @@ impl Tools {
         rustc.args(["--print", "cfg", "--print", "target-libdir", "--target", triple]);
         let output = rustc.stdin(Stdio::null()).output().context("rustc cannot be run")?;
         if !output.status.success() {
-            return Err(wrong("rustc has no such target; rustc --print target-list names all".into()));
+            return Err(wrong("rustc has no such target; rustc --print target-list lists all".into()));
         }
         let text = String::from_utf8_lossy(&output.stdout);
         let value = |key: &str| {
@@ -82,11 +82,11 @@ impl Tools {
         let (os, processor, environment) = (value("target_os"), value("target_arch"), value("target_env"));
         let known = || Platform::ALL.map(Platform::tuple).join(", ");
         let platform = Platform::of(os, processor)
-            .ok_or_else(|| wrong(format!("is not a platform of FMUs here; there are {}", known())))?;
+            .ok_or_else(|| wrong(format!("is not a supported platform of FMUs; available: {}", known())))?;
         if os == "linux" && environment != "gnu" {
             // A process has one C library, and importers use the GNU one.
             let instead = format!("{processor}-unknown-linux-gnu");
-            return Err(wrong(format!("importers on Linux do not load a library for {environment}; take {instead}")));
+            return Err(wrong(format!("importers on Linux do not load a library for {environment}; use {instead}")));
         }
         let linker = self.linker(triple, platform, environment).map_err(wrong)?;
         has_std(&text, triple).map_err(wrong)?;
@@ -111,7 +111,7 @@ impl Tools {
             Platform::X64Darwin | Platform::ArmDarwin => self.zig.clone().map(|()| Linker::Zig),
             Platform::X64Windows | Platform::ArmWindows if cfg!(windows) => Ok(Linker::Usual),
             Platform::X64Windows | Platform::ArmWindows if environment == "msvc" => {
-                Err("is linked on Windows only; take x86_64-pc-windows-gnu".into())
+                Err("can be linked only on Windows; use x86_64-pc-windows-gnu".into())
             }
             Platform::X64Windows if find("x86_64-w64-mingw32-gcc").is_none() => {
                 Err("its linker x86_64-w64-mingw32-gcc is missing: apt install gcc-mingw-w64-x86-64-win32".into())
@@ -124,7 +124,7 @@ impl Tools {
 /// Checks that the modules of pages can be built here.
 ///
 /// # Errors
-/// The standard library for them is missing; the error says how to get it.
+/// The standard library for them is missing; the error explains how to install it.
 pub fn has_modules() -> Result<()> {
     let mut rustc = rustc();
     rustc.args(["--print", "target-libdir", "--target", MODULE]);
@@ -142,7 +142,7 @@ pub fn cargo() -> Command {
     Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// The target that the compiler itself is for.
+/// The target of the compiler itself.
 ///
 /// # Errors
 /// rustc cannot be run.
@@ -167,8 +167,8 @@ fn zig() -> Result<(), String> {
     }
 }
 
-/// Checks that there is a standard library for a target, or that Cargo builds one. `printed` has its folder in a line of what
-/// rustc prints.
+/// Checks that there is a standard library for a target, or that Cargo builds one. `printed` is the output of rustc, with the
+/// folder in one line.
 fn has_std(printed: &str, triple: &str) -> Result<(), String> {
     let libraries = printed.lines().find(|line| Path::new(line).is_absolute()).unwrap_or_default();
     let is_std = |name: &str| name.starts_with("libstd-");

@@ -1,16 +1,16 @@
-//! The sources of the crates that an FMU links. This program carries them until they are published, for projects of `fmu new`.
+//! The sources of the crates that an FMU links. Until they are published, this program contains them for projects of `fmu new`.
 
 use anyhow::{Context, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
-/// Files of the workspace by name; empty if this program comes from a registry, which then has the crates too.
+/// Files of the workspace by name; empty if this program comes from a registry, which then also has the crates.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/vendored.rs"));
 
 /// The crates, each after those that it needs.
 pub const CRATES: [&str; 2] = ["fmu-core", "fmu-export"];
 
-/// Whether this program carries the crates.
+/// Whether this program contains the crates.
 pub fn are_carried() -> bool {
     !FILES.is_empty()
 }
@@ -28,7 +28,7 @@ pub fn files() -> Result<BTreeMap<String, String>> {
     FILES.iter().filter(inside).map(file).collect()
 }
 
-/// A crate's manifest with what it inherits from the workspace.
+/// A crate's manifest with the values inherited from the workspace.
 fn standalone(text: &str) -> Result<String> {
     let root: Table = file("Cargo.toml")?.parse()?;
     let workspace = root["workspace"].as_table().context("workspace")?;
@@ -50,7 +50,7 @@ fn standalone(text: &str) -> Result<String> {
     Ok(manifest.to_string())
 }
 
-/// `Cargo.lock` of a package that depends on the crates and on serde: the versions that these crates are tested with.
+/// `Cargo.lock` of a package that depends on the crates and on serde: the versions with which these crates are tested.
 ///
 /// # Errors
 /// The lock file of the workspace cannot be read.

@@ -31,7 +31,7 @@ pub struct Package {
     pub license: Option<String>,
     /// Source of the package.
     pub repository: Option<String>,
-    /// The registry or repository that Cargo has it from; `None` for a folder.
+    /// The registry or repository of its source; `None` for a folder.
     source: Option<String>,
     manifest_path: PathBuf,
     targets: Vec<Target>,
@@ -105,7 +105,7 @@ impl Package {
             .any(|t| t.kind.iter().all(|k| k != "example") && t.crate_types.iter().any(|c| c == "cdylib"))
     }
 
-    /// Whether it is a procedural macro, which runs in the compiler and leaves nothing in the binary.
+    /// Whether it is a procedural macro, which runs in the compiler and is not part of the binary.
     fn is_linked(&self) -> bool {
         !self.targets.iter().any(|t| t.kind.iter().any(|k| k == "proc-macro"))
     }
@@ -120,8 +120,7 @@ impl Workspace {
         let here = std::env::current_dir().context("the current folder")?;
         if !has_manifest(&here) {
             bail!(
-                "no Cargo package here: expected a Cargo.toml in {} or above it; change to the folder of a package, or make one \
-                 with fmu new my-model",
+                "no Cargo package here: expected a Cargo.toml in {} or above it; change to the folder of a package, or create one with fmu new my-model",
                 here.display()
             );
         }
@@ -155,13 +154,13 @@ impl Workspace {
         self.packages.iter().filter(|p| self.is_member(p)).filter(is_fmu).collect()
     }
 
-    /// The package of this name, a member of the workspace if several have it.
+    /// The package of this name; if there are several, a member of the workspace.
     pub fn package(&self, name: &str) -> Option<&Package> {
         let member = self.packages.iter().find(|p| p.name == name && self.is_member(p));
         member.or_else(|| self.packages.iter().find(|p| p.name == name))
     }
 
-    /// Whether the package is one of the workspace's own.
+    /// Whether the package is a member of the workspace.
     pub fn is_member(&self, package: &Package) -> bool {
         self.members.contains(&package.id)
     }

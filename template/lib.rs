@@ -6,7 +6,7 @@ use fmu_core::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A quantity of your own: a name, a unit, its exponents of kg, m, s, A, and K.
+/// A new quantity: a name, a unit, its exponents of kg, m, s, A, and K.
 const KELVIN_PER_SECOND: Quantity =
     Quantity::new("TemperatureRate", Unit::si("K/s", Exponents::mechanical(0, 0, -1, 0).with_kelvin(1)));
 
@@ -51,7 +51,7 @@ impl Model for Body {
         ..Info::DEFAULT
     };
 
-    // Every variable once: name, unit, description, place, range.
+    // Every variable once: name, unit, description, location, range.
     const TABLE: &'static Table<Block<Self>> = table![
         V::input("heat", &WATT, "Power of the heater", |m| &mut m.model.heat),
         V::input("T_ambient", &KELVIN, "Temperature of the surroundings", |m| &mut m.model.ambient),

@@ -1,8 +1,8 @@
 //! The clauses of the FMI standards that the sources cite exist in the version that they name.
 //!
-//! A citation is a version and its clauses, with ", " or " and " between them: FMI 2.0.5, 2.2.7 and 4.2.4; FMI 3.0.2,
-//! 2.4.7.4. "FMI" may be missing. A clause without a version is a fault as well. Whether a clause says what the
-//! sentence claims takes a reader: `tests/data/fmi-clauses.txt` has the titles.
+//! A citation is a version and its clauses, with ", " or " and " between them: FMI 2.0.5, 2.2.7 and 4.2.4; FMI 3.0.2, 2.4.7.4.
+//! "FMI" may be missing. A clause without a version is a fault as well. Only a reader can verify that a clause supports a
+//! sentence: `tests/data/fmi-clauses.txt` has the titles.
 #![allow(missing_docs)]
 
 use std::collections::BTreeSet;
@@ -17,7 +17,7 @@ struct Citation {
     clause: String,
 }
 
-/// The numbers with dots and where they begin, but not those of names, ranges and requirements (`v1.2`, `==1.2`).
+/// The numbers with dots and their positions, except those of names, ranges and requirements (`v1.2`, `==1.2`).
 fn numbers(text: &str) -> Vec<(usize, &str)> {
     let (mut found, mut end) = (Vec::new(), 0);
     while let Some(digit) = text[end..].find(|c: char| c.is_ascii_digit()) {
@@ -46,7 +46,7 @@ fn is_bare_clause(before: &str, number: &str, after: &str) -> bool {
 }
 
 fn citations(source: &str) -> Vec<Citation> {
-    // One text without the signs of comments, because a citation may go on in the next line.
+    // One text without comment markers, because a citation may continue on the next line.
     let (mut text, mut starts) = (String::new(), Vec::new());
     for line in source.lines() {
         starts.push(text.len());
@@ -70,7 +70,7 @@ fn citations(source: &str) -> Vec<Citation> {
     found
 }
 
-/// How many clauses the source cites, and the line and reason of each that is wrong.
+/// The number of clauses that the source cites, and the line and reason of each wrong one.
 fn faults(source: &str) -> (usize, Vec<(usize, String)>) {
     let listed = |version: &str, clause: &str| {
         LIST.lines().any(|l| l.split(' ').take(2).eq([version, clause]) && !l.starts_with('#'))

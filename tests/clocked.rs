@@ -27,7 +27,7 @@ fn inputs(k: u32) -> (f64, f64) {
 
 const SAMPLES: u32 = 100_000;
 
-/// The pair as its importer steps it today: commands and measurements, as bits.
+/// The pair as stepped by its importer: commands and measurements, as bits.
 fn jacobi(T_s: f64) -> Vec<[u64; 6]> {
     let mut pair = Pair::default();
     pair.controller.model.parameters.T_s = T_s;

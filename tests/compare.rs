@@ -17,7 +17,7 @@ use std::path::Path;
 use std::process::{Command, Output};
 use std::sync::OnceLock;
 
-/// The reduced grid, run once a test program.
+/// The reduced grid, run once for each test program.
 fn grid() -> &'static [Run] {
     static GRID: OnceLock<Vec<Run>> = OnceLock::new();
     GRID.get_or_init(|| compare::run(&Selection::all(Effort::Reduced), || ()))
@@ -41,7 +41,7 @@ fn values(csv: &str) -> BTreeMap<String, String> {
     csv.lines().skip(1).map(line).collect()
 }
 
-/// Equal, or numbers that differ by less than an engineer would see.
+/// Equal, or numbers with a negligible difference.
 fn alike(a: &str, b: &str) -> bool {
     let numbers = a.parse::<f64>().ok().zip(b.parse::<f64>().ok());
     a == b || numbers.is_some_and(|(a, b)| (a - b).abs() <= 1e-3 * a.abs().max(b.abs()) + 1e-3)
@@ -197,7 +197,7 @@ fn what_is_outside_is_marked() {
     assert!(html.contains(" out\" title=\"expected 0.093") && html.contains(">0.200 ✗</td>"), "{html}");
 }
 
-/// Rasmussen's row is of another machine, and every table says so.
+/// Rasmussen's row is for another machine, and every table says so.
 #[test]
 fn another_machine_is_told_in_its_row() {
     let cells = of(grid(), &["Rasmussen", "ExtendedEmf"], &["generating-0.1"]);

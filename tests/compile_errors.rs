@@ -1,11 +1,11 @@
-//! What the compiler says of rows and models that contradict themselves: Cargo builds a separate crate for each.
+//! The compiler's messages about contradictory rows and models: Cargo builds a separate crate for each.
 #![allow(missing_docs)]
 
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-/// A wrong program: its name, its source, what the error says, and the line that the error is at.
+/// A wrong program: its name, its source, the text of the error, and its line.
 struct Wrong {
     name: &'static str,
     source: String,
@@ -131,7 +131,7 @@ fn rows() -> Vec<Wrong> {
         ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
-        // These two show in the table, whose start is in line 3.
+        // These two are reported at the table, which starts in line 3.
         row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
         row("empty_array", r#"V::array_input("a", &VOLT, "", 0, |m| &mut m.a)"#, "a: an array needs an element", 3),
     ]
@@ -245,7 +245,7 @@ fn sizes() -> Vec<Wrong> {
             "wrong_size",
             r#"V::structural("n", "", |_| unreachable!()).at_most(3.0),
                V::array_input("a", &VOLT, "", 4, |m| &mut m.a).sized(&["n"])"#,
-            "a: the product of the greatest sizes is not the number of elements",
+            "a: the product of the maximum sizes is not the number of elements",
             3,
         ),
         row(
@@ -260,7 +260,12 @@ fn sizes() -> Vec<Wrong> {
             "a: State::array and its row have different numbers of elements",
             EXPORT,
         ),
-        model("sizeless", ("Ball: ContinuousTime", "Ball: ContinuousTime + Resizable"), "`Ball` has no sizes", EXPORT),
+        model(
+            "sizeless",
+            ("Ball: ContinuousTime", "Ball: ContinuousTime + Resizable"),
+            "`Ball` has no structural parameters",
+            EXPORT,
+        ),
         model(
             "unsized",
             structural("V::structural(\"n\", \"\", |_| unreachable!()).at_most(2.0),\n        V::state(\"h\","),
@@ -347,7 +352,7 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
     for wrong in &cases {
         fs::write(sources.join(format!("{}.rs", wrong.name)), &wrong.source).unwrap();
     }
-    // The number of the states shows only where code is made.
+    // The number of states is checked only when code is generated.
     let build = |arguments: &[&str]| {
         let mut cargo = Command::new(env!("CARGO"));
         cargo.args(["build", "--offline"]).args(arguments).current_dir(&folder);
@@ -360,7 +365,7 @@ fn a_wrong_row_or_model_is_an_error_at_its_place() {
         let place = Path::new("src/bin").join(format!("{name}.rs:{line}:")).display().to_string();
         assert!(said.lines().any(|l| l.starts_with(&place) && l.contains(why)), "{place} {why}: {said}");
     }
-    // What the compiler adds in its long form suggests no other trait.
+    // The compiler's long form suggests no other trait.
     let said = build(&["--bin", "events"]);
     assert!(said.contains("`Ball` has no events") && !said.contains("Sampled"), "{said}");
 }

@@ -83,7 +83,7 @@ fn bits([a, b, c, d]: [f64; 4], enabled: bool) -> [u64; 5] {
     [a.to_bits(), b.to_bits(), c.to_bits(), d.to_bits(), enabled.into()]
 }
 
-/// What the plain controller in a closed loop measures at each sample, and what it commands one sample later, as bits.
+/// Measurements of the plain controller in a closed loop at each sample, and its commands one sample later, as bits.
 fn plain(T_s: f64) -> Vec<([f64; 7], [u64; 5])> {
     let mut pair = Pair::default();
     pair.controller.model.parameters.T_s = T_s;
@@ -101,7 +101,7 @@ fn plain(T_s: f64) -> Vec<([f64; 7], [u64; 5])> {
         .collect()
 }
 
-/// The instance, and the interval (s) that it gave in its last `clockUpdate`.
+/// The instance, and the interval (s) from its last `clockUpdate`.
 struct Announced {
     it: Cell<InstancePointer>,
     interval: Cell<Option<f64>>,
@@ -121,8 +121,8 @@ fn interval(it: InstancePointer) -> f64 {
     interval
 }
 
-/// Feeds an instance with these measurements, each at the tick that it asks for; its commands one tick later, and the times (s) of
-/// the ticks.
+/// Feeds an instance with these measurements, each at the requested tick; returns its commands one tick later, and the times
+/// (s) of the ticks.
 fn counted(kind: Kind, T_s: f64, start: f64, measured: &[[f64; 7]]) -> (Vec<[u64; 5]>, Vec<f64>) {
     let announced = Box::new(Announced { it: Cell::new(null_mut()), interval: Cell::new(None) });
     let environment = std::ptr::from_ref(&*announced).cast_mut().cast();
@@ -142,7 +142,7 @@ fn counted(kind: Kind, T_s: f64, start: f64, measured: &[[f64; 7]]) -> (Vec<[u64
         } else {
             assert_eq!(unsafe { fmi3SetClock(it, &PWM, 1, &Fmi3Boolean(1)) }, OK);
         }
-        // What shows at a tick is of the tick before.
+        // Outputs at a tick belong to the tick before.
         let ([a, b, c, d], [enabled]) = (outputs.map(|vr| controller.get(&[vr])[0]), controller.get_booleans(gates));
         if k > 0 {
             commands.push(bits([a, b, c, d], enabled));
@@ -172,7 +172,7 @@ fn a_countdown_on_the_grid_gives_the_same_controller_bits() {
                 panic!("{kind:?}, T_s = {T_s}: sample {k}: {:?} and {:?}", ours[k], expected[k]);
             }
             assert_eq!((ours.len(), times.len()), (expected.len(), expected.len() + 1));
-            // No rounding accumulates: each tick is where the grid has it, but for the rounding of one sum.
+            // Rounding does not accumulate: each tick is at its grid point, except for the rounding of one sum.
             let off = times.iter().zip(0..).map(|(t, k)| (t - (start + f64::from(k) * T_s)).abs()).fold(0.0, f64::max);
             println!("{kind:?}, T_s = {T_s} s, from {start} s: {} ticks, off the grid by {off:e} s", times.len());
             assert!(off <= 2.0 * f64::EPSILON * times[times.len() - 1], "{off}");

@@ -1,4 +1,4 @@
-//! What a user reads: the page inside each FMU, its plots, and the links of the Markdown pages.
+//! Texts for users: the page inside each FMU, its plots, and the links of the Markdown pages.
 #![allow(missing_docs)]
 
 mod common;
@@ -24,8 +24,8 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The plots in the models' `docs`, shown by the README and by the pages, are those that a run gives today.
-/// `UPDATE_GOLDEN=1 cargo test --test documentation` accepts others.
+/// The plots in the models' `docs`, shown by the README and by the pages, are those of a run today. `UPDATE_GOLDEN=1 cargo test
+/// --test documentation` accepts others.
 #[test]
 fn the_plots_are_those_of_a_run() {
     let run = |s: &Experiment| -> Record { Native.run(s, 1e-4).unwrap() };
@@ -104,7 +104,7 @@ fn the_losses_are_those_of_the_running_drive() {
     keep_in(&[fragments::DRIVE], "drive/docs/losses.svg", &svg::draw(&plane::figure(motoring.panels.into())).unwrap());
 }
 
-/// The efficiency map on the pages of the drives is the one that the algebra gives today, and the page names its best point.
+/// The efficiency map on the pages of the drives is the one computed today, and the page names its best point.
 #[test]
 fn the_map_is_that_of_the_steady_state() {
     let chart = plane::map();
@@ -119,12 +119,12 @@ fn the_map_is_that_of_the_steady_state() {
     keep_in(&[fragments::DRIVE, fragments::MEAN], "drive/docs/map.svg", &drawn);
 }
 
-/// The plot `drawn` is the one that the controller's `docs` keep, and in the pages of controller and drive.
+/// Checks that the plot `drawn` is the one in the controller's `docs`, and in the pages of controller and drive.
 fn keep(name: &str, drawn: &str) {
     keep_in(&[fragments::CONTROLLER, fragments::DRIVE], &format!("drive/control/docs/{name}"), drawn);
 }
 
-/// The plot `drawn` is the one in the file `name`, and in these pages.
+/// Checks that the plot `drawn` is the one in the file `name`, and in these pages.
 fn keep_in(pages: &[&str], name: &str, drawn: &str) {
     let path = root().join(name);
     if std::env::var_os("UPDATE_GOLDEN").is_some() {
@@ -140,7 +140,7 @@ fn keep_in(pages: &[&str], name: &str, drawn: &str) {
     assert!(pages.iter().all(|page| page.contains(drawn)), "a page does not include {name}");
 }
 
-/// A page opens without a network: no address but those of the SVG name space and of the licenses beside it.
+/// A page works offline: no address except those of the SVG name space and of the licenses beside it.
 #[test]
 fn pages_need_nothing_from_outside() {
     fn check<M: Model>() {
@@ -158,7 +158,7 @@ fn pages_need_nothing_from_outside() {
     check::<PmsmDrive>();
 }
 
-/// The floor of the C library stands in `elf.rs`; a page or a help that names one names that.
+/// The minimum version of the C library is in `elf.rs`; pages and helps name the same.
 #[test]
 fn one_floor_of_glibc() {
     let floor = format!("glibc {}.{}", FLOOR.0, FLOOR.1);
@@ -175,7 +175,7 @@ fn one_floor_of_glibc() {
 }
 
 /// The head of every estimator's file has the numbers of the table in `limits.html`, which `fmu compare` prints and whose test
-/// runs the cells; so have the words about all methods without the frame-speed term.
+/// runs the cells; the text about all methods without the frame-speed term has them too.
 #[test]
 fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();
@@ -228,8 +228,8 @@ fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     assert!(head("emf").contains(&range) && page.contains(&range), "{range}");
 }
 
-/// A page stands alone: it sends its reader to no page of another FMU, its diagram names every input, and no two of its anchors are
-/// equal; its head names the interfaces of the archive.
+/// A page is self-contained: it does not refer to pages of other FMUs, its diagram names every input, its anchors are unique,
+/// and its head names the interfaces of the archive.
 #[test]
 fn pages_stand_alone() {
     use std::io::Read as _;
@@ -271,15 +271,15 @@ fn pages_stand_alone() {
         };
         let inputs = description.unwrap().variables;
         for input in inputs.iter().filter(|v| v.causality == fmu_core::Causality::Input) {
-            // T_winding_imposed stands for the four of its kind.
+            // T_winding_imposed represents the four of its kind.
             let shown = input.name.strip_suffix("_imposed").map_or(input.name.as_str(), |_| "T_winding_imposed");
             assert!(drawn(svg, shown), "the diagram of {name} lacks {}", input.name);
         }
     }
 }
 
-/// Every page in a browser at three widths, on light and dark paper: nothing wider than the page, nothing from a network, curves drawn;
-/// zoom, legend and keyboard of the page of a run. Pictures stay in `target/tmp/pages`.
+/// Every page in a browser at three widths, on light and dark paper: nothing wider than the page, no network access, curves
+/// drawn; zoom, legend and keyboard of the page of a run. Pictures stay in `target/tmp/pages`.
 #[test]
 #[ignore = "opt-in: cargo test --test documentation browser -- --ignored (needs Chromium; CHROMIUM names it)"]
 fn pages_in_a_browser() {
@@ -326,7 +326,8 @@ fn pages_in_a_browser() {
     common::python::pytest("pages", "pages", &["test_browser.py"], &[("FMU_PAGES", &folder)]);
 }
 
-/// The lines of `docs/reference-fmus.md`, counted as the page says; each file has at most 60 % of the lines of its original.
+/// The lines of `docs/reference-fmus.md`, counted as described on the page; each file has at most 60 % of the lines of its
+/// original.
 #[test]
 fn the_reference_fmus_have_the_lines_that_the_page_says() {
     let page = std::fs::read_to_string(root().join("docs/reference-fmus.md")).unwrap();
@@ -371,7 +372,7 @@ fn links_lead_somewhere() {
                 continue;
             }
             let file = page.with_file_name(path);
-            // A name as the text of a link to a source stands in that source.
+            // A name as the text of a link to a source must occur in that source.
             let name = before.rsplit('[').next().and_then(|t| t.strip_prefix('`')?.strip_suffix('`'));
             let source = file.extension().is_some_and(|e| e == "rs");
             let named = |name: &str| !source || std::fs::read_to_string(&file).is_ok_and(|s| s.contains(name));
@@ -383,7 +384,7 @@ fn links_lead_somewhere() {
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
-/// Doc comments, messages and pages are written in plain sentences: what each pattern stands for has a better word.
+/// Doc comments, messages and pages are written in plain sentences: for each pattern there is a better wording.
 #[test]
 fn sentences_have_no_pattern_of_the_list() {
     let mut wrong = Vec::new();
@@ -396,7 +397,7 @@ fn sentences_have_no_pattern_of_the_list() {
     assert!(wrong.is_empty(), "rewrite these sentences:\n{}", wrong.join("\n"));
 }
 
-/// The patterns are found where they stumble, and not where they are plain English.
+/// The patterns match awkward sentences, but not plain English.
 #[test]
 fn patterns_are_found() {
     for wrong in [

@@ -1,5 +1,5 @@
-//! The packed FMUs in a drive train, in both standards: what it integrates of the torque is what the energies count, Model
-//! Exchange says the same as Co-Simulation, and a coupling that diverges ends with an error that says so.
+//! The packed FMUs in a drive train, in both standards: the integrated torque equals the counted energies, Model Exchange
+//! agrees with Co-Simulation, and a diverging coupling ends with an error that says so.
 #![allow(missing_docs)]
 
 mod common;
@@ -149,7 +149,7 @@ fn the_energies_of_a_start_agree() {
     }
 }
 
-/// The plant alone, its commands from the controller's FMU: its events come with those of the controller.
+/// Only the plant, with commands from the controller's FMU: its events come with those of the controller.
 #[test]
 fn the_plant_of_a_pair_counts_too() {
     let pair = |standard: &str, method: Method, h: f64| {
@@ -180,7 +180,7 @@ fn the_plant_of_a_pair_counts_too() {
 
 #[test]
 fn a_diverging_coupling_is_an_error() {
-    // 1e7 N.m on the shaft, as a coupling gives it that has just diverged.
+    // 1e7 N.m on the shaft, as from a coupling that has just diverged.
     let run = |standard: &str, name: &str, method: Method| {
         let mut system = System::new(method);
         system.add("d", &open(standard, name), true).unwrap();

@@ -182,7 +182,7 @@ fn f02_starts_from_every_angle_to_every_speed() {
                         for step in 0..73 {
                             let (theta, reference) = (-180.0 + 5.0 * f64::from(step), sign * speed);
                             let (n, angle) = start(theta, reference, 1.8);
-                            // The creep error at low speed is the resistance error's, and right.
+                            // The creep error at low speed is due to the resistance error, and has the expected size.
                             let wanted = creep.get(k).map_or(0.0, |c| sign * c);
                             if (n - reference).abs() > (0.02 * speed).max(3.0) || (angle - wanted).abs() > 1.5 {
                                 failed.push((theta, reference, n, angle));
@@ -275,7 +275,7 @@ fn communication_step_of_ten_samples_loses_the_drive() {
     assert!((p.plant.out.speed / RPM - 1000.0).abs() > 50.0);
 }
 
-/// An importer that hands this step's command to the plant in the same step.
+/// An importer that passes the command of this step to the plant in the same step.
 fn sequential(delay: f64, speed: f64) -> f64 {
     let mut p = pair(&[], &[("timing.delay", delay)]);
     p.start().unwrap();

@@ -1,5 +1,5 @@
-//! The packed FMUs in a foreign importer: FMPy validates and co-simulates them, and a suite of host sins calls their C
-//! interface through ctypes. The tests themselves are in `tests/fmpy/`; this runs them with pytest.
+//! The packed FMUs in a foreign importer: FMPy validates and co-simulates them, and a misuse suite calls their C interface
+//! through ctypes. The tests themselves are in `tests/fmpy/`; this runs them with pytest.
 #![allow(missing_docs)]
 
 mod common;
@@ -119,13 +119,13 @@ fn misuse_under_asan() {
 
 #[test]
 fn every_estimator_as_natively() {
-    // The file with the estimators' experiments and what came out natively.
+    // The file with the estimators' experiments and their native results.
     let file = scratch().join(format!("estimators-{}.json", process::id()));
     fs::write(&file, common::estimators::experiments().to_string()).expect("a file below the target folder");
     pytest("fmpy", "estimators", &["test_estimators.py"], &[("FMU_ESTIMATORS", &file)]);
 }
 
-/// Systems as SSP files, and what `fmu simulate` makes of them when their inputs come one step late.
+/// Systems as SSP files, and the results of `fmu simulate` when their inputs come one step late.
 #[test]
 fn the_closed_loop_as_an_ssp() {
     let folder = scratch().join(format!("fmpy-ssp-{}", process::id()));
@@ -148,7 +148,7 @@ fn the_closed_loop_as_an_ssp() {
     pytest("fmpy", "ssp", &["test_ssp.py"], &[("FMU_SSP", &folder)]);
 }
 
-/// A drive commissions itself at standstill, then turning, natively: the bits that the packed one must have.
+/// A drive commissions itself at standstill, then turning, natively: the expected bits of the packed one.
 #[test]
 fn self_commissioning() {
     let modes = [CommissionMode::Standstill, CommissionMode::Spin];

@@ -1,12 +1,12 @@
-//! The modelDescription.xml of every packed FMU, as it was last looked at and accepted: a changed name, unit, range, start
-//! value, dependency, capability or token shows as a difference. `UPDATE_GOLDEN=1 cargo test --test golden_xml` accepts.
+//! The modelDescription.xml of every packed FMU, as last reviewed and accepted: a changed name, unit, range, start value,
+//! dependency, capability or token shows as a difference. `UPDATE_GOLDEN=1 cargo test --test golden_xml` accepts.
 #![allow(missing_docs)]
 
 mod common;
 
 use std::path::Path;
 
-/// The file without what differs from build to build.
+/// The file without the parts that differ from build to build.
 fn lasting(xml: &str) -> String {
     let mut xml = xml.to_owned();
     for (attribute, value) in [("generationTool", "fmu"), ("generationDateAndTime", "2000-01-01T00:00:00Z")] {

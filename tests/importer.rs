@@ -4,6 +4,8 @@
 mod common;
 
 use fmu_import::{Error, Fmu, Instance, Values};
+use fmu_system::cosimulation::{Integration, Method, Settings, System, Units};
+use std::ops::ControlFlow;
 
 fn open(standard: &str, name: &str) -> Fmu {
     Fmu::open(common::archives().join(standard).join(name).with_extension("fmu")).unwrap()
@@ -116,4 +118,51 @@ fn instances_and_standards_do_not_disturb_each_other() {
     // Instances keep the binary: the FMUs may go first.
     drop((two, three));
     assert!(all.iter_mut().all(|plant| steps(plant, 100, 100).unwrap() == alone));
+}
+
+/// The controller, whose unit rad/s has another BaseUnit.
+fn controller_with(base: &str) -> Fmu {
+    let file = common::python::scratch().join(format!("units-{}.fmu", base.len()));
+    common::rewrite(&common::archives().join("fmi2/SensorlessController.fmu"), &file, |name, bytes| {
+        let text = |bytes| String::from_utf8(bytes).unwrap().replacen("<BaseUnit s=\"-1\" rad=\"1\"/>", base, 1);
+        Some(if name == "modelDescription.xml" { text(bytes).into_bytes() } else { bytes })
+    });
+    Fmu::open(&file).unwrap()
+}
+
+/// The last speed of the plant, and what of it arrives in the controller.
+fn passed(base: &str, units: Units, method: Method) -> Result<([f64; 2], Vec<String>), Error> {
+    let mut system = System::new(method).with_units(units);
+    system.add("p", &open("fmi2", "PmsmPlant"), false)?;
+    system.add("c", &controller_with(base), false)?;
+    system.set("p.initial.speed", "30")?;
+    system.connect("p.speed", "c.speed_meas")?;
+    ["p.speed", "c.speed_meas"].iter().try_for_each(|port| system.record(port))?;
+    let notes = system.take_notes();
+    let settings = Settings { start: 0.0, stop: 1e-3, step: 1e-4, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(())))?;
+    let last = |name: &str| *recording.column(name).unwrap().values.last().unwrap();
+    Ok(([last("p.speed"), last("c.speed_meas")], notes))
+}
+
+#[test]
+fn connected_numbers_are_converted_by_their_base_units() {
+    const HALF: &str = "<BaseUnit s=\"-1\" rad=\"1\" factor=\"0.5\"/>";
+    for method in [Method::default(), Method::ModelExchange(Integration::default())] {
+        let ([speed, arrived], notes) = passed(HALF, Units::Convert, method.clone()).unwrap();
+        assert!(speed > 20.0 && arrived == 2.0 * speed, "{speed}, {arrived}");
+        assert!(notes.is_empty(), "{notes:?}");
+        let ([speed, arrived], _) = passed(HALF, Units::PassOn, method.clone()).unwrap();
+        assert_eq!(speed, arrived);
+        let ([speed, arrived], notes) =
+            passed("<BaseUnit s=\"-1\" rad=\"1\"/>", Units::Convert, method.clone()).unwrap();
+        assert!(speed == arrived && notes.is_empty(), "{notes:?}");
+        let ([speed, arrived], _) =
+            passed("<BaseUnit s=\"-1\" rad=\"1\" offset=\"5\"/>", Units::Convert, method).unwrap();
+        assert_eq!(speed - 5.0, arrived);
+    }
+    let radian = passed("<BaseUnit s=\"-1\"/>", Units::Convert, Method::default()).unwrap_err().to_string();
+    assert!(radian.contains("c.speed_meas") && radian.contains("counts the radian as a base unit"), "{radian}");
+    let force = passed("<BaseUnit kg=\"1\" m=\"1\" s=\"-2\"/>", Units::Convert, Method::default()).unwrap_err();
+    assert!(force.to_string().contains("rad/s = s-1.rad, the target in rad/s = kg.m.s-2"), "{force}");
 }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::{env, fs, process};
 
-/// The file with the experiments and what came out natively.
+/// The file with the experiments and their native results.
 fn references() -> PathBuf {
     let file = scratch().join(format!("importers-{}-{:?}.json", process::id(), std::thread::current().id()));
     fs::write(&file, importers::references().to_string()).expect("a file below the target folder");
@@ -25,7 +25,7 @@ fn ecos_libcosim_fmucontainer_pathsim_and_fmuloader() {
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
 }
 
-/// PathSim integrates the template of an FMU of one's own; the test says why the motor FMUs do not run there.
+/// PathSim integrates the template for users' FMUs; the test explains why the motor FMUs do not run there.
 #[test]
 #[ignore = "opt-in: cargo test --test importers pathsim_in_model_exchange -- --ignored (half a minute)"]
 fn pathsim_in_model_exchange() {
@@ -179,7 +179,7 @@ fn without_units(xml: &str) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The drive's speed at every step, or what fmi-sim says.
+/// The drive's speed at every step, or fmi-sim's message.
 fn run_fmi_sim(program: &Path, archive: &Path, experiment: &Experiment) -> Result<Vec<f64>, String> {
     let folder = tempfile::tempdir().unwrap();
     let (input, output) = (folder.path().join("in.csv"), folder.path().join("out.csv"));
@@ -213,7 +213,7 @@ fn assert_same(speed: &[f64], native: &[f64], standard: &str, experiment: &Exper
     println!("fmi-sim, {standard}, {name}: {} points equal, bit for bit", speed.len());
 }
 
-/// The experiment's inputs as fmi-sim reads them: interpolated between rows, with two rows at the time of a jump.
+/// The experiment's inputs in the form for fmi-sim: interpolated between rows, with two rows at the time of a jump.
 fn steps_as_csv(experiment: &Experiment) -> String {
     let inputs = |t: f64| (importers::at(&experiment.speed_ref, t), importers::at(&experiment.load, t));
     let jumps = experiment.speed_ref.iter().chain(&experiment.load).map(|(t, _)| *t);

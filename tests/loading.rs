@@ -1,5 +1,5 @@
-//! A thousand times loaded, lived in and unloaded, by eight threads with a hundred instances at once: nothing is left
-//! behind. A separate test program: it measures the whole process.
+//! A thousand times loaded, run and unloaded, by eight threads with a hundred instances at once: nothing is left behind. A
+//! separate test program: it measures the whole process.
 #![cfg(target_os = "linux")]
 #![allow(missing_docs)]
 
@@ -13,7 +13,7 @@ use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 const THREADS: u32 = 8;
 const INSTANCES: u32 = 100;
 const CYCLES: u32 = 1000;
-/// Cycles after which the memory of a process is what it will be: arenas of the threads, tables of the loader.
+/// Cycles after which the memory of a process is stable: arenas of the threads, tables of the loader.
 const WARM: u32 = 300;
 /// Bytes that may be added afterwards; ten thousands of instances live in this time, so a kilobyte each would be 10 MB.
 const GROWTH: u64 = 2 << 20;
@@ -80,7 +80,7 @@ fn a_thousand_loadings_leave_nothing_behind() {
     let maps = std::fs::read_to_string("/proc/self/maps").unwrap();
     let left: Vec<_> = maps.lines().filter(|line| line.contains("SensorlessController")).collect();
     assert!(left.is_empty(), "still loaded: {left:?}");
-    // The measure can see: a binary that is loaded is in the list.
+    // The measurement works: a loaded binary is in the list.
     let fmu = Fmu::open(&path).unwrap();
     assert!(std::fs::read_to_string("/proc/self/maps").unwrap().contains("SensorlessController"));
     drop(fmu);

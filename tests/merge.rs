@@ -1,11 +1,11 @@
-//! `fmu merge`: one archive out of several, or a line that says why not.
+//! `fmu merge`: one archive from several, or a line with the reason why not.
 #![allow(missing_docs)]
 
 mod common;
 
 use fmu::commands::build::Linux64;
 use fmu::commands::merge::{self, Merge};
-use fmu::pack::{Entry, Moment, archive, write};
+use fmu::pack::{GenerationTime, PackedFile, archive, write};
 use fmu_check as check;
 use fmu_import::platform::Platform;
 use fmu_import::{Fmu, contents, machine};
@@ -17,14 +17,14 @@ use std::path::{Path, PathBuf};
 type Files = BTreeMap<String, Vec<u8>>;
 
 const STANDARDS: [(&str, FmiVersion); 2] = [("fmi2", FmiVersion::V2), ("fmi3", FmiVersion::V3)];
-/// A folder for a platform that no importer of today is on; nothing is known of what its binaries must be.
+/// A folder for an unknown platform; there are no rules for its binaries.
 const ELSEWHERE: &str = "binaries/riscv64-linux/PmsmPlant.so";
 
 fn plant(standard: &str) -> PathBuf {
     common::archives().join(standard).join("PmsmPlant.fmu")
 }
 
-/// The plant's own binary in the archive.
+/// The plant's binary in the archive.
 fn own(version: FmiVersion) -> String {
     let host = Platform::host();
     format!("binaries/{}/PmsmPlant.{}", host.folders(version)[0], host.extension())
@@ -36,10 +36,10 @@ fn changed(standard: &str, path: &Path, change: impl Fn(&mut Files)) {
     change(&mut files);
     let entry = |(name, bytes): (String, Vec<u8>)| {
         let executable = name.starts_with("binaries/");
-        (name, Entry { bytes, executable })
+        (name, PackedFile { bytes, executable })
     };
     let files = files.into_iter().map(entry).collect();
-    write(path, &archive(&files, Moment::fixed(0)).unwrap()).unwrap();
+    write(path, &archive(&files, GenerationTime::fixed(0)).unwrap()).unwrap();
 }
 
 fn replace(files: &mut Files, name: &str, from: &str, to: &str) {
@@ -96,7 +96,7 @@ fn two_platforms_become_one_archive() {
     }
 }
 
-/// What must not be merged is refused in one line with both files, what and where, and what to do; nothing is written.
+/// FMUs that must not be merged are refused in one line with both files, the difference and the remedy; nothing is written.
 #[test]
 fn what_does_not_fit_is_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -183,7 +183,7 @@ fn shared_object(platform: Platform) -> Vec<u8> {
     bytes
 }
 
-/// A copy of the plant with other libraries than its own.
+/// A copy of the plant with foreign libraries.
 fn with_libraries(standard: &str, version: FmiVersion, path: &Path, libraries: &[(&str, &[u8])]) {
     changed(standard, path, |files| {
         files.remove(&own(version)).unwrap();
@@ -211,7 +211,7 @@ fn libraries_for_macos_become_a_universal_one() {
         merged(&parts, &out).unwrap();
         assert!(binaries(&out) == expected, "{parts:?}: {:?}", binaries(&out).keys());
     }
-    // What is merged merges again with one of its parts, and not with another build for one of its processors.
+    // A merged archive can be merged again with one of its parts, but not with another build for one of its processors.
     let both = dir.path().join("both");
     merged(&[&intel, &arm], &both).unwrap();
     merged(&[&both, &intel, &plant("fmi2")], &out).unwrap();
@@ -245,7 +245,7 @@ fn libraries_for_macos_become_a_universal_one() {
     assert!(binaries(&out) == tuples.map(|(name, bytes)| (format!("binaries/{name}"), bytes.to_vec())).into());
 }
 
-/// `linux64` of FMI 2.0 is for the processor that `--linux64` names; an importer here finds the other one all the same.
+/// `linux64` of FMI 2.0 is for the processor that `--linux64` names; an importer here still finds the other one.
 #[test]
 fn linux64_is_for_one_processor() {
     use Platform::{ArmLinux, X64Linux};
@@ -266,7 +266,7 @@ fn linux64_is_for_one_processor() {
         let expected = [("linux64", ArmLinux), ("x86_64-linux", X64Linux)];
         assert_eq!(place(Some(Linux64::Arm)), expected.map(named));
     }
-    // The plant's own library, for this machine, in either place.
+    // The plant's library for this machine, in either folder.
     if Platform::host() == X64Linux {
         let bytes = contents(&plant("fmi2")).unwrap().1.remove(&own(FmiVersion::V2)).unwrap();
         let libraries = [("linux64/PmsmPlant.so", &arm64[..]), ("x86_64-linux/PmsmPlant.so", &bytes)];
@@ -317,7 +317,10 @@ fn build_places_libraries_as_merge_does() {
     assert_eq!(info("fmi3"), "aarch64-darwin, aarch64-linux, x86_64-darwin, x86_64-linux");
     let (code, _, said) = run(&[&arguments[..], &["--linux64".into(), "aarch64".into()]].concat());
     assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("note: linux64 of FMI 2.0 holds the libraries for aarch64: an importer on x86_64"), "{said}");
+    assert!(
+        said.contains("note: linux64 of FMI 2.0 contains the libraries for aarch64: an importer on x86_64"),
+        "{said}"
+    );
     assert_eq!(info("fmi2"), "darwin64 (x86_64-darwin and aarch64-darwin), linux64 (aarch64-linux), x86_64-linux");
     let (code, _, said) = run(&[&arguments[..5], &["--linux64".into(), "aarch64".into()]].concat());
     assert_eq!(code, Some(2));

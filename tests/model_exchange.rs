@@ -1,5 +1,5 @@
-//! The packed motor FMUs in our own importer, in Model Exchange and with Event Mode, against co-simulation at T_s: the judge of
-//! the events, regardless of what else happens around them.
+//! The packed motor FMUs in our own importer, in Model Exchange and with Event Mode, against co-simulation at T_s: the
+//! reference for events, regardless of other actions around them.
 #![allow(missing_docs)]
 
 mod common;
@@ -100,7 +100,7 @@ fn pair_and_drive_in_model_exchange() {
     }
 }
 
-/// The order of the updates, an importer that arrives late at events, and events that another FMU asked for change nothing.
+/// The order of the updates, an importer that is late at events, and events that another FMU requested change nothing.
 #[test]
 fn events_in_any_order_late_and_between_others() {
     let reference = pair("fmi3", Method::default(), T_S);
@@ -119,7 +119,7 @@ fn events_in_any_order_late_and_between_others() {
     }
 }
 
-/// A fixed step that neither T_s nor the communication points know lands on the events too.
+/// A fixed step unrelated to T_s and to the communication points also hits the events.
 #[test]
 fn a_fixed_step_lands_on_events() {
     let reference = pair("fmi3", Method::default(), T_S);
@@ -144,7 +144,7 @@ fn controller(method: Method, step: f64) -> Recording {
 fn the_controller_with_event_mode_is_the_controller_at_its_period() {
     let reference = controller(Method::default(), T_S);
     let columns = ["u_a", "theta_est", "speed_est", "i_q_ref"];
-    // Without Event Mode, samples inside a step read what was set before it.
+    // Without Event Mode, samples inside a step read the values set before it.
     let plain = controller(Method::default(), 1e-3);
     assert!(columns.iter().any(|name| held(&plain, &reference, name) > 0), "the ramps show nothing");
     for step in [0.7 * T_S, T_S, 1e-3, 7.3e-3] {
@@ -157,7 +157,7 @@ fn the_controller_with_event_mode_is_the_controller_at_its_period() {
     }
 }
 
-/// Number of rows that differ in a bit from what the reference holds at their time.
+/// Number of rows that differ in a bit from the reference at their time.
 fn held(one: &Recording, reference: &Recording, name: &str) -> usize {
     let (times, column) = (&one.time, &one.column(name).unwrap().values);
     let (all, other) = (&reference.time, &reference.column(name).unwrap().values);

@@ -1,4 +1,4 @@
-//! `fmu modelica`: the package around our FMUs, in two Modelica compilers, and what it refuses.
+//! `fmu modelica`: the package around our FMUs, in two Modelica compilers, and its refusals.
 #![allow(missing_docs)]
 
 mod common;
@@ -22,7 +22,7 @@ fn few() -> Vec<PathBuf> {
     ["ipmsm-2.2kw.toml", "pmsyrm-5.5kw.toml"].map(|name| folder.join(name)).into()
 }
 
-/// A folder of one test that does not exist.
+/// A folder for one test, not yet existing.
 fn fresh(name: &str) -> PathBuf {
     let folder = scratch().join(format!("modelica-{name}-{}", process::id()));
     let _ = fs::remove_dir_all(&folder);
@@ -41,6 +41,9 @@ fn two_compilers_take_every_package_and_run_its_examples() {
         let args = Modelica { motor, ..request(archive("fmi2", name), &folder.join(name)) };
         modelica::run(&args).unwrap();
     }
+    let (drive, block, out) = (archive("fmi3", "PmsmDrive"), Some("FMUs.PmsmDrive".into()), folder.join("OtherImport"));
+    modelica::run(&Modelica { block, motor: few(), ..request(drive.clone(), &out) }).unwrap();
+    fs::copy(drive, out.join("PmsmDrive.fmu")).unwrap();
     pytest("modelica", "modelica", &["test_judges.py"], &[("MODELICA_PACKAGES", &folder)]);
 }
 
@@ -79,7 +82,7 @@ fn the_package_has_what_the_import_lacks() {
         assert!(script.contains(wanted), "{script}");
     }
     assert_eq!(fs::read(out.join("PmsmDrive.fmu")).unwrap(), fs::read(archive("fmi2", "PmsmDrive")).unwrap());
-    // The load overshoots before its torque steps, because the speed loop is tuned for the rotor alone, and settles at the end.
+    // The load overshoots before its torque steps, because the speed loop is tuned only for the rotor, and settles at the end.
     let figures: Vec<[f64; 3]> = script.lines().filter_map(figure).collect();
     assert_eq!(figures.len(), 4, "{script}");
     let [_, before, _, end] = figures[..] else { unreachable!() };
@@ -117,7 +120,7 @@ fn what_is_wrong_is_named_and_nothing_is_written() {
     assert!(no_shaft.contains("SensorlessController.fmu: has no shaft for a flange"), "{no_shaft}");
     assert!(no_shaft.contains("it has the terminals phases, sensor"), "{no_shaft}");
     let three = why(&request(archive("fmi3", "PmsmDrive"), &out));
-    assert!(three.contains("PmsmDrive.fmu: the import of OpenModelica reads FMI 2.0"), "{three}");
+    assert!(three.contains("PmsmDrive.fmu: OpenModelica imports FMI 2.0"), "{three}");
     let missing = why(&request("nothing.fmu".into(), &out));
     assert!(missing.contains("nothing.fmu"), "{missing}");
     let no_fmu = why(&request(Path::new(env!("CARGO_MANIFEST_DIR")).join("Cargo.toml"), &out));

@@ -1,4 +1,4 @@
-//! Every machine in motors/ with the values that `fmu tune` gives it: no chatter, and power that is accounted for.
+//! Every machine in motors/ with the values of `fmu tune`: no chatter, and a balanced power.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::plant::power::Powers;
@@ -36,8 +36,8 @@ fn machines() -> Vec<Machine> {
     files.iter().map(|path| read(path)).collect()
 }
 
-/// Most samples within 10 ms at which a voltage changes by more than a tenth of u_dc: a jump of a reference has some of them,
-/// a loop that oscillates has no end of them.
+/// Maximum number of samples within 10 ms at which a voltage changes by more than a tenth of u_dc: a jump of a reference causes
+/// some, an oscillating loop never stops.
 fn most_jumps(machine: &Machine, theta_e: f64) -> usize {
     let (mut pair, u_dc) = (machine.tuned.pair(), machine.u_dc());
     pair.plant.model.parameters.initial.theta_e = theta_e;
@@ -69,7 +69,8 @@ fn no_voltage_chatters() {
     }
 }
 
-/// Mean of p_in (W), and of what it lacks of p_mech + p_loss and the change of the stored energy (W), from 4 s on, for one second.
+/// Mean of p_in (W), and of its difference from p_mech + p_loss and the change of the stored energy (W), from 4 s on, for one
+/// second.
 struct Balance {
     p_in: f64,
     missing: f64,

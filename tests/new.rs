@@ -1,4 +1,4 @@
-//! `fmu new`: the whole way from an empty folder to a checked FMU in FMPy, and names that cannot be.
+//! `fmu new`: all steps from an empty folder to a checked FMU in FMPy, and invalid names.
 #![allow(missing_docs)]
 
 mod common;
@@ -43,7 +43,7 @@ for path in sys.argv[1:]:
         print(path, kind, error)
 ";
 
-/// Outside of any checkout: `cargo fmu new`, then what the project's own file for CI says.
+/// Outside of any checkout: `cargo fmu new`, then the steps of the project's file for CI.
 #[test]
 fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let requirements = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fmpy/requirements.txt");
@@ -86,7 +86,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let last: f64 = last.split(',').nth(1).unwrap().parse().unwrap();
     assert!((last - (333.15 - 40.0 * (-4.0_f64).exp())).abs() < 1e-6, "{last}");
 
-    // A release: sums that hold, and the crates with their licenses.
+    // A release: correct checksums, and the crates with their licenses.
     let host = fmu::target::host_triple().unwrap();
     succeeds(command("fmu", &folder).args(["build", "--release-dir", "release", "--target", &host]));
     let release = folder.join("release");
@@ -104,7 +104,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     assert!(of("serde")["purl"].as_str().unwrap().starts_with("pkg:cargo/serde@1."), "{bill}");
     assert_eq!(bill["dependencies"][0]["dependsOn"].as_array().unwrap().len() + 1, components.len());
 
-    // The licenses of what is linked, the two crates included; no license for the model that nobody gave.
+    // The licenses of all linked crates, the two included; no license for the model that its author did not choose.
     let files = fmu_import::contents(&folder.join(archives[1])).unwrap().1;
     for file in ["MyModel_ref.csv", "MyModel_in.csv", "smoke-test.exp", "fmi-ls-manifest.xml"] {
         assert!(files.contains_key(&format!("extra/org.fmi-standard.fmi-ls-ref/{file}")), "{file}");
@@ -114,7 +114,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
         assert!(licenses.contains(part), "{part}: {licenses}");
     }
     assert!(!licenses.contains("my-model 0.1.0"), "{licenses}");
-    // No place of the checkout, nor of the project, is in what was written.
+    // The written files contain no path of the checkout or of the project.
     let root = env!("CARGO_MANIFEST_DIR");
     for file in walk(&folder).iter().filter(|f| !f.starts_with(folder.join("target"))) {
         assert!(!String::from_utf8_lossy(&fs::read(file).unwrap()).contains(root), "{}", file.display());
@@ -122,7 +122,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let binary = files.iter().find(|(name, _)| name.starts_with("binaries/")).unwrap().1;
     assert!(!binary.windows(root.len()).any(|w| w == root.as_bytes()), "the binary names a folder of this machine");
 
-    // A mistake of the model that shows while `fmu build` tries its parameters is reported in the model's own words.
+    // A mistake of the model found while `fmu build` varies its parameters is reported with the model's message.
     let source = folder.join("src/lib.rs");
     let right = fs::read_to_string(&source).unwrap();
     let mistake =
@@ -143,7 +143,7 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
 }
 
-/// What is neither the model nor blank: the manifest, imports, derives, the line that exports, the module of tests.
+/// Lines other than the model and blank ones: the manifest, imports, derives, the line that exports, the module of tests.
 #[test]
 fn at_most_20_lines_are_not_the_model() {
     let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("template");
@@ -172,12 +172,12 @@ fn what_cannot_be_made_is_refused_in_one_line() {
         ("größe", "has the character 'ö'"),
         ("a/b", "is a path: change to a and run fmu new b"),
         ("/b", "is a path: change to / and run fmu new b"),
-        ("match", "is a keyword of Rust: take another name, for example match-model"),
-        ("test", "is a name of Rust or Cargo: take another name, for example test-model"),
-        ("serde", "is a package that the FMU itself needs: take another name, for example serde-model"),
+        ("match", "is a keyword of Rust: choose another name, for example match-model"),
+        ("test", "is a name of Rust or Cargo: choose another name, for example test-model"),
+        ("serde", "is a package that the FMU itself needs: choose another name, for example serde-model"),
         ("syn", "is a package that the FMU itself needs"),
-        ("there", "already exists: take another name, or remove it"),
-        (&"x".repeat(65), "has 65 characters: 64 are allowed"),
+        ("there", "already exists: choose another name, or remove it"),
+        (&"x".repeat(65), "has 65 characters: at most 64 are allowed"),
     ] {
         refused(dir.path(), name, part);
     }
@@ -205,7 +205,7 @@ fn cargo_fmu_is_the_command() {
     };
     let here = dir.path().display().to_string();
     refused(&["error: no Cargo package here: expected a Cargo.toml in ", &here, "fmu new my-model"]);
-    // A package that is no FMU.
+    // A package that is not an FMU.
     let manifest = "[package]\nname = \"plain\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n";
     fs::write(dir.path().join("Cargo.toml"), manifest).unwrap();
     fs::create_dir(dir.path().join("src")).unwrap();

@@ -1,4 +1,4 @@
-//! The example of an FMU of one's own: built as its first lines say, run, and checked.
+//! The example of a user's FMU: built with the commands of its first lines, run, and checked.
 #![allow(missing_docs)]
 
 use fmu::commands::build::{self, Build};
@@ -54,7 +54,7 @@ fn it_has_model_exchange_besides() {
     }
 }
 
-/// A value comes through a chain of FMUs within initialization, in any order.
+/// A value passes through a chain of FMUs within initialization, in any order.
 #[test]
 fn a_chain_is_consistent_at_the_start() {
     for file in archives() {

@@ -1,10 +1,10 @@
-//! The pages that run FMUs in a browser: what `page.toml` says, what a page holds, and its runs.
+//! The pages that run FMUs in a browser: `page.toml`, the content of a page, and its runs.
 #![allow(missing_docs)]
 
 mod common;
 
 use drive::PmsmDrive;
-use fmu::page::own::{Own, Run};
+use fmu::page::own::{Own, PresetRun};
 use fmu::page::{Source, judged, page};
 use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
 use serde_json::{Value, json};
@@ -18,7 +18,7 @@ fn drive() -> Description {
     Description::of::<PmsmDrive>().unwrap()
 }
 
-fn presets() -> Vec<Run> {
+fn presets() -> Vec<PresetRun> {
     judged(&drive(), Some((Path::new("page.toml"), OWN))).unwrap().presets
 }
 
@@ -47,7 +47,7 @@ fn values<M: Model>(block: &mut Block<M>, names: &[String]) -> Vec<f64> {
 }
 
 /// A run of the page, natively: a row at the start and after every step.
-fn run<M: Model>(run: &Run, names: &[String]) -> Vec<Vec<f64>> {
+fn run<M: Model>(run: &PresetRun, names: &[String]) -> Vec<Vec<f64>> {
     let mut block = Block::<M>::default();
     run.set.iter().for_each(|(name, value)| set(&mut block, name, value));
     block.initialize();
@@ -103,7 +103,7 @@ fn the_presets_show_what_their_texts_say() {
     near("share of the voltage", rows.last().unwrap()[4], 0.949);
 }
 
-/// A page of this text, or why there is none.
+/// A page of this text, or the reason why there is none.
 fn refused(own: &str) -> String {
     judged(&drive(), Some((Path::new("page.toml"), own))).err().map(|e| e.to_string()).unwrap_or_default()
 }
@@ -152,11 +152,11 @@ fn what_is_wrong_in_a_page_toml_is_named() {
         assert!(got.starts_with("page.toml: ") && got.contains(why) && !got.contains('\n'), "{own}\n{got}\nnot {why}");
     }
     let many = (0..51).fold(String::new(), |all, k| all + &format!("[[preset]]\ntitle = \"{k}\"\n"));
-    assert!(refused(&many).contains("51 presets, and 50 are the most"));
-    assert!(Own::read(&" ".repeat(1 << 21)).unwrap_err().contains("are the most"));
+    assert!(refused(&many).contains("51 presets; the maximum is 50"));
+    assert!(Own::read(&" ".repeat(1 << 21)).unwrap_err().contains("; the maximum is "));
 }
 
-/// A module as far as a page judges it.
+/// A module with the parts that a page checks.
 fn module(of: &Description) -> Vec<u8> {
     [b"\0asm\x01\0\0\0", "fmi3DoStep __indirect_function_table ".as_bytes(), of.token.as_bytes()].concat()
 }
@@ -182,7 +182,7 @@ fn a_page_stands_alone_and_knows_the_model() {
     assert_eq!(variable("controller.estimator")["type"], "Estimator");
     assert_eq!((json["presets"].as_array().unwrap().len(), &json["starts"]), (6, &json!([])));
     assert_eq!(json["differences"][0]["like"]["display"][0], "deg");
-    // Start values of a preset archive travel in the page; the author's presets are for other ones.
+    // The page contains the start values of a preset archive; the author's presets are for other values.
     let mut other = of.clone();
     let at = other.variables.iter().position(|v| v.name == "plant.motor.R_s").unwrap();
     other.variables[at].start = Some(vec![fmu_core::description::Value::Real(0.775)]);
@@ -196,10 +196,10 @@ fn a_model_without_co_simulation_has_no_page() {
     fmu::page::is_possible(&of).unwrap();
     of.model_exchange = Description::exported::<Alone>().unwrap().model_exchange;
     let said = fmu::page::is_possible(&of).unwrap_err().to_string();
-    assert!(said.contains("for Model Exchange alone"), "{said}");
+    assert!(said.contains("for Model Exchange only"), "{said}");
 }
 
-/// The drive for Model Exchange alone.
+/// The drive for Model Exchange only.
 struct Alone;
 
 impl Exported for Alone {
@@ -223,7 +223,7 @@ fn another_module_is_refused() {
 }
 
 /// The serialized state of the packed FMU at the end of a run, in hexadecimal digits.
-fn state(run: &Run) -> String {
+fn state(run: &PresetRun) -> String {
     let fmu = fmu_import::Fmu::open(common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();
     let mut instance = fmu.instantiate("instance", false).unwrap();
     let set = |instance: &mut fmu_import::Instance, (name, value): &(String, Value)| {
@@ -264,7 +264,7 @@ fn pages_in_a_browser() {
     println!("PmsmDrive.html {} bytes, RcCircuit.html {} bytes", bytes("PmsmDrive.html"), bytes("RcCircuit.html"));
     assert!(bytes("PmsmDrive.html") <= 600_000 && bytes("RcCircuit.html") <= 260_000);
     // The experiment of the reference: start angle, speed step, load step, in all real outputs.
-    let experiment = Run {
+    let experiment = PresetRun {
         title: "bits".into(),
         text: String::new(),
         set: vec![("plant.initial.theta_e".into(), json!(3.0))],

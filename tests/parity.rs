@@ -1,4 +1,4 @@
-//! The packed FMUs give what the Rust types give, in both standards, bit for bit.
+//! The packed FMUs give the results of the Rust types, in both standards, bit for bit.
 #![allow(missing_docs)]
 
 mod common;

@@ -1,5 +1,5 @@
 //! One archive for three platforms, run on all of them from one Linux machine on x86_64: Windows through Wine, 64-bit ARM
-//! through QEMU. What it needs is in CONTRIBUTING.md; what is missing is printed, a line each.
+//! through QEMU. Its requirements are in CONTRIBUTING.md; missing ones are printed, a line each.
 #![allow(missing_docs)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -69,7 +69,7 @@ impl Machines {
         loader
     }
 
-    /// What the loader prints.
+    /// The output of the loader.
     fn run(&self, platform: Platform, loader: &Path, arguments: &[String]) -> String {
         let mut command = match platform {
             Platform::X64Windows => Command::new(&self.wine),
@@ -91,7 +91,7 @@ impl Machines {
     }
 }
 
-/// Standard output, with the line ends of Unix, of a command that succeeds and lets no panic be seen.
+/// Standard output, with the line ends of Unix, of a command that succeeds without a panic.
 fn said(command: &mut Command) -> String {
     let output = command.output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
     let [out, error] = [output.stdout, output.stderr].map(|b| String::from_utf8_lossy(&b).replace("\r\n", "\n"));

@@ -1,4 +1,4 @@
-//! `fmu prove`: what every archive holds of FMI-LS-REF is what the FMU gives, in this program and in FMPy.
+//! `fmu prove`: the FMI-LS-REF data in every archive are reproduced by the FMU, in this program and in FMPy.
 #![allow(missing_docs)]
 
 mod common;
@@ -24,7 +24,7 @@ fn archives() -> Vec<PathBuf> {
     ["fmi2", "fmi3"].into_iter().flat_map(of).collect()
 }
 
-/// Every importer gives the reference results again, and the folders are those that the FMI tools page asks for.
+/// Every importer gives the reference results again, and the folders are those required by the FMI tools page.
 #[test]
 fn the_reference_results_are_replayed() {
     let dir = tempfile::tempdir().unwrap();
@@ -69,7 +69,7 @@ fn the_reference_results_are_replayed() {
     }
 }
 
-/// The manifest names the files that are there, with the roles of the standard, and the set of values fits the FMU.
+/// The manifest names the existing files, with the roles of the standard, and the set of values fits the FMU.
 #[test]
 fn the_manifest_names_what_is_there() {
     for archive in archives() {
@@ -95,7 +95,7 @@ fn the_manifest_names_what_is_there() {
     }
 }
 
-/// A reference that the FMU does not give is found, by each importer.
+/// A wrong reference is found, by each importer.
 #[test]
 fn a_wrong_reference_is_found() {
     let dir = tempfile::tempdir().unwrap();

@@ -10,7 +10,7 @@ use std::process::Command;
 use std::{env, fs, iter, process};
 
 const TESTS: &str = "../python/tests";
-/// One environment with the tests of FMPy: it is made once.
+/// One environment with the tests of FMPy: it is created once.
 const REQUIREMENTS: &str = "../../tests/fmpy/requirements.txt";
 
 /// Installs the package into its own folder.
@@ -113,7 +113,7 @@ fn engines() {
     );
 }
 
-/// `pip install ./python` as a user calls it, from an empty target folder: what it takes, and the size of the wheel.
+/// `pip install ./python` as called by a user, from an empty target folder: its time, and the size of the wheel.
 #[test]
 #[ignore = "opt-in: cargo test --test python install -- --ignored --nocapture"]
 fn install() {

@@ -1,4 +1,4 @@
-//! The closed loop as an SSP file: written by `fmu ssp`, run by `fmu simulate`, and what is said of files that are wrong.
+//! The closed loop as an SSP file: written by `fmu ssp`, run by `fmu simulate`, and the messages about wrong files.
 #![allow(missing_docs)]
 
 mod common;
@@ -22,7 +22,7 @@ fn done(arguments: &[&str]) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The arguments fail with this status and one line that has all the parts; before it the compiler may say that it is done.
+/// The arguments fail with this status and one line that has all the parts; before it the compiler may report that it is done.
 fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
     let output = fmu(arguments);
     let said = String::from_utf8(output.stderr).unwrap();
@@ -104,8 +104,8 @@ fn its_connectors_are_those_of_pmsm_drive() {
         fmu_core::Description::of::<drive::SensorlessController>().unwrap(),
     ];
     for (kind, causality) in [("input", fmu_core::Causality::Input), ("output", fmu_core::Causality::Output)] {
-        // Switches stay inside, at their start values; means over T_s and the DC link are the drive's own; an enumeration has no
-        // connector.
+        // Switches are not connectors and keep their start values; means over T_s and the DC link exist only in the drive; an
+        // enumeration has no connector.
         let shared = |v: &fmu_core::description::Variable| match v.kind {
             VariableKind::Boolean if causality == fmu_core::Causality::Input => false,
             VariableKind::Enumeration { .. } => false,
@@ -118,7 +118,7 @@ fn its_connectors_are_those_of_pmsm_drive() {
     }
 }
 
-/// What some importer refuses or cannot do is there on demand only, and how OMSimulator steps the system stands in it.
+/// Features that some importers refuse are written only on demand, and the file contains the stepping method for OMSimulator.
 #[test]
 fn what_not_every_importer_takes_is_an_option() {
     let folder = folder();
@@ -140,7 +140,7 @@ fn what_not_every_importer_takes_is_an_option() {
     assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Integer value=\"4\"/>"));
     done(&["ssp", "--motor", motor, "--integers", "--out", &path("integers.ssp")]);
     assert!(values(&path("integers.ssp")) == values(&plain), "the default");
-    // Nothing of it changes what comes out.
+    // None of it changes the results.
     let run = |path: &str| {
         let time = ["--input", "speed_ref=0:0,0.02:52.36", "--stop", "0.3", "--csv", "-"];
         done(&[&["simulate", path][..], &time].concat())
@@ -153,8 +153,8 @@ fn what_not_every_importer_takes_is_an_option() {
     assert!(structure(&ssp("slower.ssp")).contains("stepSize=\"0.0002\""));
 }
 
-/// What OMSimulator reads, from its sources: it stops at any other element, at a name that is no identifier and at a connector
-/// without a type, and it ignores a value of another type than the variable has.
+/// The input that OMSimulator accepts, from its sources: it stops at any other element, at a name that is not an identifier and
+/// at a connector without a type, and it ignores a value whose type differs from the variable's.
 #[test]
 fn omsimulator_runs_it_as_it_is() {
     let folder = folder();
@@ -170,7 +170,7 @@ fn omsimulator_runs_it_as_it_is() {
         assert_eq!(refusals(&ssp(name)), Vec::<String>::new(), "{name}");
     }
     assert_eq!(refusals(&ssp("geometry.ssp")), ["System.cpp: ssd:SystemGeometry in ssd:System"]);
-    // The values of a motor are the same, whichever way they come.
+    // The values of a motor are the same by every route.
     for component in ["plant", "controller"] {
         let file = format!("resources/{component}.ssv");
         assert!(entry(&ssp("motor.ssp"), &file) == entry(&ssp("bound.ssp"), &file), "{component}");
@@ -193,7 +193,7 @@ fn omsimulator_runs_it_as_it_is() {
     assert_eq!(refusals(&path), ["Values.cpp: controller.estimator is ssv:Enumeration, not ssv:Integer"]);
 }
 
-/// What OMSimulator refuses or ignores of an SSP, with its file that says so.
+/// Parts of an SSP that OMSimulator refuses or ignores, with the source file.
 fn refusals(path: &str) -> Vec<String> {
     let mut found = Vec::new();
     let mut refuse = |file: &str, what: String| found.push(format!("{file}: {what}"));
@@ -280,7 +280,7 @@ fn component_description(path: &str, source: &str) -> ModelDescription {
     model_description::read(&xml).unwrap()
 }
 
-/// A machine's values are in the file and in what the system does.
+/// A machine's values are in the file and in the behavior of the system.
 #[test]
 fn a_motor_comes_with_it() {
     let path = ssp("motor.ssp");
@@ -365,7 +365,11 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
             "startConnector=\"enabled\" endConnector=\"lock_lost\"".into(),
             &["the output lock_lost is connected twice: remove one of the connections"],
         ),
-        (&*good, good.replace("\"plant\"", "\"motor\""), &["there is no component motor; there are controller, plant"]),
+        (
+            &*good,
+            good.replace("\"plant\"", "\"motor\""),
+            &["there is no component motor; available: controller, plant"],
+        ),
         (
             "source=\"resources/PmsmPlant.fmu\"",
             "source=\"resources/Motor.fmu\"".into(),
@@ -379,7 +383,12 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", "</ssd:System>", "</ssd:Systm>");
     fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "not well-formed XML"]);
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", "unit=\"rad/s\"", "unit=\"rpm\"");
-    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "units are not converted"]);
+    let output = fmu(&["simulate", &path, "--stop", "0.001"]);
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && said.contains("and rpm has no BaseUnit: the number passes unchanged"), "{said}");
+    let units = "</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit rad=\"1\" s=\"-1\" factor=\"0.1047\"/></ssc:Unit></ssd:Units>";
+    let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", units);
+    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "the connector of the system is in rpm"]);
     let (old, new) = ("implementation=\"CoSimulation\"", "implementation=\"ModelExchange\"");
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
     fails(
@@ -413,7 +422,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     let out = out.to_str().unwrap();
     for (old, new, status, part) in [
         ("motor.R_s", "motor.R", 2, "PmsmPlant has no variable motor.R: correct the name, or remove the parameter"),
-        ("value=\"3.6\"", "value=\"3.6\" unit=\"mOhm\"", 2, "motor.R_s is given in mOhm, and PmsmPlant has it in Ohm"),
+        ("value=\"3.6\"", "value=\"3.6\" unit=\"mOhm\"", 2, "motor.R_s is given in mOhm, but PmsmPlant has it in Ohm"),
         ("value=\"3.6\"", "value=\"much\"", 2, "motor.R_s = much"),
         ("value=\"3.6\"", "value=\"-1\"", 1, "motor.R_s = -1 is not allowed"),
     ] {
@@ -424,7 +433,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     fails(
         &["ssp", "--parameters", &format!("p={path}"), "--out", out],
         2,
-        &["no component p; there are controller and plant"],
+        &["no component p; available: controller, plant"],
     );
     fails(&["ssp", "--parameters", "plant=nothing.ssv", "--out", out], 2, &["nothing.ssv: No such file"]);
     let dir = tempfile::tempdir().unwrap();
@@ -433,7 +442,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     std::fs::write(&motor, text.replacen("R_s", "R", 1)).unwrap();
     fails(&["ssp", "--motor", motor.to_str().unwrap(), "--out", out], 2, &["m.toml:7:1: unknown field `R`", "R_s"]);
     assert!(!Path::new(out).exists());
-    // In an SSP a value for a name that is not there is ignored (SSP 1.0) with a note; a value that is wrong is an error.
+    // In an SSP a value for an unknown name is ignored (SSP 1.0) with a note; a wrong value is an error.
     let (_dir, path) = changed(&ssp("motor.ssp"), "resources/plant.ssv", "motor.R_s", "motor.R");
     let output = fmu(&["simulate", &path, "--stop", "0.001"]);
     let said = String::from_utf8(output.stderr).unwrap();
@@ -451,7 +460,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     );
 }
 
-/// Without sources: a folder with the FMUs is enough, and one line names what is expected and where.
+/// Without sources: a folder with the FMUs suffices, and one line names the expected files and folders.
 #[test]
 fn packed_fmus_are_enough_outside_a_checkout() {
     let dir = tempfile::tempdir().unwrap();

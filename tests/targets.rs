@@ -1,4 +1,4 @@
-//! `fmu build --target`: what is missing is reported before anything is compiled, in one line with what to do.
+//! `fmu build --target`: missing tools are reported before anything is compiled, in one line with the remedy.
 #![allow(missing_docs)]
 
 use std::ffi::OsStr;
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A program of the toolchain, which is not looked for in `PATH`.
+/// A program of the toolchain, which is not searched in `PATH`.
 fn toolchain(program: &str) -> PathBuf {
     let output = Command::new("rustc").args(["--print", "sysroot"]).output().unwrap();
     let root = String::from_utf8(output.stdout).unwrap();
@@ -40,7 +40,7 @@ fn fails(targets: &str, path: &str, environment: &[(&str, &str)], parts: &[&str]
 #[test]
 fn targets_that_are_none() {
     fails("x86_64-plan9", "", &[], &["x86_64-plan9: rustc has no such target", "rustc --print target-list"]);
-    fails("wasm32-unknown-unknown", "", &[], &["is not a platform of FMUs here; there are x86_64-linux, "]);
+    fails("wasm32-unknown-unknown", "", &[], &["is not a supported platform of FMUs; available: x86_64-linux, "]);
     fails("x86_64-unknown-linux-musl", "", &[], &["for musl", "take x86_64-unknown-linux-gnu"]);
     // The second of several, in either spelling.
     fails("x86_64-plan9,wasm32-unknown-unknown", "", &[], &["x86_64-plan9"]);
@@ -56,7 +56,7 @@ fn tools_that_are_missing() {
     fails("aarch64-apple-darwin", "", &[], &["aarch64-apple-darwin", install]);
     let mingw = ["x86_64-w64-mingw32-gcc is missing", "apt install gcc-mingw-w64-x86-64-win32"];
     fails("x86_64-pc-windows-gnu", "", &[], &mingw);
-    fails("x86_64-pc-windows-msvc", "", &[], &["on Windows only", "take x86_64-pc-windows-gnu"]);
+    fails("x86_64-pc-windows-msvc", "", &[], &["only on Windows", "use x86_64-pc-windows-gnu"]);
     // Nothing is compiled for the first when something is missing for the second.
     fails(&format!("{}-unknown-linux-gnu,x86_64-pc-windows-gnu", std::env::consts::ARCH), "", &[], &mingw);
     // A target without a separate linker that could be missing, and hardly ever a standard library here.
@@ -76,10 +76,10 @@ fn a_cargo_zigbuild_without_zig() {
     fails("x86_64-apple-darwin", path, &[], &["cargo-zigbuild finds none", "pip install cargo-zigbuild ziglang"]);
 }
 
-/// Without zig the C library that a build needs is named, and it is what the checks find.
+/// Without zig, the build names the C library that it needs, in agreement with the checks.
 #[test]
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
-fn a_plain_build_tells_what_it_needs() {
+fn a_plain_build_names_its_requirements() {
     let path = std::env::var_os("PATH").unwrap();
     let plain = std::env::split_paths(&path).filter(|folder| !folder.join("cargo-zigbuild").is_file());
     let target = format!("{}-unknown-linux-gnu", std::env::consts::ARCH);
@@ -87,7 +87,7 @@ fn a_plain_build_tells_what_it_needs() {
     let [files, printed] = [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap());
     assert!(output.status.success(), "{printed}");
     let platform = format!("{}-linux", std::env::consts::ARCH);
-    let start = format!("note: PmsmPlant for {platform} needs ");
+    let start = format!("note: PmsmPlant for {platform} requires ");
     let note = printed.lines().find_map(|line| line.strip_prefix(&start));
     for file in files.lines() {
         let check =
@@ -95,7 +95,7 @@ fn a_plain_build_tells_what_it_needs() {
         let found = String::from_utf8(check.stdout).unwrap();
         let needs = found.lines().filter_map(|line| line.rsplit_once(": needs ")).map(|(_, what)| what);
         let needs: Vec<&str> = needs.collect();
-        let note = note.map(|n| n.split_once(" where it runs; built with cargo-zigbuild (pip install ").unwrap().0);
+        let note = note.map(|n| n.split_once("; built with cargo-zigbuild (pip install ").unwrap().0);
         assert_eq!(note.is_some(), !needs.is_empty(), "{printed}{found}");
         for what in needs {
             assert!(note.is_some_and(|n| n.contains(what)), "{printed}{found}");

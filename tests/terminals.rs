@@ -1,4 +1,4 @@
-//! Terminals of the packed FMUs: the pair connected by them alone, and what is said of those that do not fit.
+//! Terminals of the packed FMUs: the pair connected only by them, and the messages about incompatible ones.
 #![allow(missing_docs)]
 
 mod common;
@@ -112,7 +112,7 @@ fn what_does_not_fit_is_told_in_one_line() {
     }
 }
 
-/// Without the folder, and even with a broken one, the FMU does the same.
+/// Without the folder, and even with a broken one, the FMU behaves the same.
 #[test]
 fn terminals_are_for_wiring_only() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! FMUs with clocks in our importer, which makes their ticks: Co-Simulation with Event Mode and Model Exchange.
+//! FMUs with clocks in our importer, which generates their ticks: Co-Simulation with Event Mode and Model Exchange.
 #![allow(missing_docs, clippy::float_cmp)]
 
 use fmu::commands::build::{self, Build};
@@ -42,7 +42,7 @@ fn bits(recording: &Recording, name: &str) -> Vec<u64> {
     recording.column(name).unwrap().values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// The plant sees the same commands at the same instants, whether the controller has its own grid or a clock.
+/// The plant receives the same commands at the same instants, whether the controller has its own grid or a clock.
 #[test]
 fn the_clocked_pair_is_the_pair() {
     let (plain, clocked) = (archive("SensorlessController"), archive("SensorlessControllerClocked"));
@@ -89,7 +89,7 @@ fn ticks(fmu: &Fmu, method: &Method, order: [&str; 2], step: f64) -> [Vec<Vec<f6
 fn every_kind_ticks_at_its_times() {
     let out = common::python::scratch().join("ticks");
     let files = build::run(&Build { package: vec!["ticks-fmu".into()], out: Some(out), ..Build::default() }).unwrap();
-    // The fraction alone says when its clock ticks.
+    // Only the fraction determines when its clock ticks.
     let file = files[0].with_file_name("fractions.fmu");
     let decimals = r#" intervalDecimal="0.3333333333333333" shiftDecimal="0.3333333333333333""#;
     common::rewrite(&files[0], &file, |name, bytes| {

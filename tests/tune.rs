@@ -76,7 +76,8 @@ fn every_machine_starts_and_reaches_its_speed() {
     }
 }
 
-/// The parameters in examples/drive-train are what `fmu tune` writes today; `UPDATE_GOLDEN=1 cargo test --test tune` accepts others.
+/// The parameters in examples/drive-train are those that `fmu tune` writes today; `UPDATE_GOLDEN=1 cargo test --test tune`
+/// accepts others.
 #[test]
 fn the_examples_have_the_parameters_of_today() {
     let dir = tempfile::tempdir().unwrap();
@@ -134,7 +135,7 @@ fn values_are_those_of_the_rules() {
     }
 }
 
-/// Only what differs from the start values is written, and all of that; enumerations as integers on demand.
+/// Exactly the values that differ from the start values are written; enumerations as integers on demand.
 #[test]
 fn files_have_what_differs_from_the_start_values() {
     let starts = [
@@ -347,7 +348,7 @@ fn a_record_and_a_commissioning_become_running_drives() {
     copy(&common::archives().join("fmi3/PmsmDrive.fmu"), "target/fmu/fmi3/PmsmDrive.fmu");
     let page = std::fs::read_to_string(root.join("docs/identify.md")).unwrap();
     let (record, table) = page.split_once("## A motor on the table").unwrap();
-    // A commissioning of the example does not tell B from the Coulomb friction.
+    // A commissioning of the example does not separate B from the Coulomb friction.
     for (section, name, status) in [(record, "bench", 0), (table, "table", 1)] {
         let block =
             |language: &str| section.split_once(&format!("```{language}\n")).unwrap().1.split_once("\n```").unwrap().0;

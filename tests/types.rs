@@ -1,4 +1,4 @@
-//! An FMU with a variable of every type and causality, and with its own file, packed for both standards: tests/types.
+//! An FMU with a variable of every type and causality, and with a resource file, packed for both standards: tests/types.
 #![allow(missing_docs)]
 
 mod common;
@@ -97,7 +97,7 @@ fn what_does_not_fit_says_why() {
         let error = fresh(version).set(name, &integer(value)).unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
     }
-    // FMI 2.0 cannot carry what a variable of 64 bits grows to.
+    // FMI 2.0 cannot carry the final value of a 64-bit variable.
     for version in [V2, V3] {
         let mut instance = entered(version);
         instance.set("fixed.uint64", &integer(100_000)).unwrap();
@@ -105,7 +105,7 @@ fn what_does_not_fit_says_why() {
         match instance.get("local.uint64") {
             Ok(value) => assert!(version == V3 && value == integer(10_000_000_000_i128)),
             Err(error) => {
-                let why = "local.uint64 = 10000000000 does not fit: an Integer of FMI 2.0 has 32 bits; FMI 3.0 has it as UInt64";
+                let why = "local.uint64 = 10000000000 does not fit a 32-bit FMI 2.0 Integer; in FMI 3.0 it is UInt64";
                 assert!(version == V2 && error.to_string().contains(why), "{error}");
             }
         }
@@ -121,7 +121,7 @@ fn single_precision_rounds_once() {
         assert_eq!(v.start.unwrap(), if version == V2 { "0.10000000149011612" } else { "0.1" });
         instance.set("in.single", &Values::Reals(vec![0.2])).unwrap();
         assert_eq!(instance.get("out.single").unwrap(), Values::Reals(vec![f64::from(0.2_f32)]));
-        // The bound is rounded too, and what is beyond single precision is no number.
+        // The bound is rounded too, and a value beyond single precision is not a number.
         instance.set("in.single", &Values::Reals(vec![0.3])).unwrap();
         for (beyond, said) in [(0.301, "0.301"), (-1e39, "-")] {
             let error = fresh(version).set("in.single", &Values::Reals(vec![beyond])).unwrap_err().to_string();
@@ -203,7 +203,7 @@ fn derivatives_have_a_number_for_each_element() {
     }
 }
 
-/// A state from bytes has the data again that the instance read, without a look at its file; so has a reset instance.
+/// A state from bytes has the data that the instance read, without reading its file again; so has a reset instance.
 #[test]
 fn resources_are_there_after_every_way_back() {
     for version in [V2, V3] {
@@ -291,7 +291,7 @@ fn a_parameter_file_sets_texts() {
     }
 }
 
-/// `fmu simulate` feeds and records variables of every type, and says what it cannot do.
+/// `fmu simulate` feeds and records variables of every type, and names its limits.
 #[test]
 fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
     let run = |arguments: &[&str]| {
@@ -317,7 +317,7 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
         let (done, said) = run(&["simulate", three, option, value]);
         assert!(!done && said.contains(why), "{said}");
     }
-    // An element of an array has the name that it has in FMI 2.0; spaces or commas separate the elements of the whole.
+    // An element of an array has its name of FMI 2.0; spaces or commas separate the elements of the whole array.
     for file in archives() {
         let file = file.to_str().unwrap();
         let elements =
@@ -364,7 +364,7 @@ fn the_documentation_shows_types_and_extents() {
     }
 }
 
-/// What the binary needs from the system is the linker's matter.
+/// The system requirements of the binary depend on the linker.
 #[test]
 fn the_checker_finds_nothing() {
     let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));

@@ -1,4 +1,4 @@
-//! The folders of unpacked archives: a process removes its own, whoever comes later those of killed processes.
+//! The folders of unpacked archives: a process removes its own; a later one removes those of killed processes.
 #![allow(missing_docs)]
 #![cfg(unix)]
 
@@ -41,7 +41,7 @@ fn users(temporary: &Path) -> Vec<String> {
     all.map(|e| e.file_name().into_string().unwrap()).collect()
 }
 
-/// `fmu simulate` is killed: its worker ends, and what they have unpacked is gone.
+/// `fmu simulate` is killed: its worker ends, and the unpacked files are removed.
 #[test]
 #[cfg(target_os = "linux")]
 fn a_worker_ends_with_its_command() {

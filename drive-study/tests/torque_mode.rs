@@ -5,6 +5,7 @@ use drive::Pair;
 use drive::estimator::Kind;
 use drive::motor::Motor;
 use drive_study::runner;
+use fmu_core::Warns;
 
 const T_S: f64 = 1e-4;
 
@@ -144,4 +145,42 @@ fn a_pulsating_shaft() {
             assert!(error > 60.0 && lost > 1.0, "{error} deg: {lost}");
         }
     }
+}
+
+/// The reference drive with R^ = `share` R and without a load, 2.7 s after `i_q` (A) of torque: the speed as a share of that of the
+/// whole torque, and whether it was said that nothing moves.
+fn moved(share: f64, i_q: f64, set: impl FnOnce(&mut Pair)) -> (f64, bool) {
+    let mut pair = Pair::default();
+    let mechanics = &mut pair.plant.model.parameters.mechanics;
+    (mechanics.J, mechanics.B, mechanics.tau_coulomb) = (0.05, 0.0, 0.0);
+    let R = pair.plant.model.parameters.motor.R_s;
+    let par = &mut pair.controller.model.parameters;
+    (par.motor.R_s, par.J, par.speed_loop.torque_mode) = (share * R, 0.05, true);
+    set(&mut pair);
+    pair.start().unwrap();
+    let (tau, mut said) = (i_q * pair.plant.model.parameters.motor.torque_constant(), false);
+    for k in 0..30_000 {
+        pair.controller.model.inputs.tau_ref = if k < 3000 { 0.0 } else { tau };
+        pair.set_inputs(0.0, 0.0, 325.0);
+        pair.step(T_S).unwrap();
+        let mut hear = |(_, key, _): fmu_core::log::Said<'_>| said |= key == "stands";
+        pair.controller.model.warn(&mut fmu_core::log::Warnings::to(&mut hear));
+    }
+    (pair.plant.out.speed / (2.7 * tau / 0.05), said)
+}
+
+/// R^ < R swallows a torque below 0.4 of (2 - sqrt 2) i_0 sqrt((R - R^) i_0 / (psi_M c_1)), and says so; above the whole, and with
+/// R^ = R, the rotor turns.
+#[test]
+fn a_small_torque_that_moves_nothing_is_said() {
+    let i_0 = 5.0_f64;
+    let (share, c_1) = (0.9, 50.0);
+    let threshold = (2.0 - 2.0_f64.sqrt()) * i_0 * ((1.0 - share) * 2.0 * i_0 / (0.15 * c_1)).sqrt();
+    let set = |pair: &mut Pair| pair.controller.model.parameters.estimators.rasmussen.c_1 = c_1;
+    let (below, said) = moved(share, 0.35 * threshold, set);
+    assert!(below < 0.5 && said, "R^ = {share} R: {below} of the speed at 0.35 of {threshold} A, said: {said}");
+    let (above, said) = moved(share, threshold, set);
+    assert!(above > 0.8 && !said, "R^ = {share} R: {above} of the speed at {threshold} A, said: {said}");
+    let (exact, said) = moved(1.0, 0.3, |_| ());
+    assert!(exact > 0.8 && !said, "R^ = R: {exact} of the speed");
 }

@@ -1,4 +1,4 @@
-//! When the variables of the drive act: those of its plant, its controller and its DC link.
+//! Conditions under which the variables of the drive have an effect: those of plant, controller and DC link.
 
 use crate::dc_link::LinkParameters;
 use drive_control::idle as control;
@@ -7,7 +7,7 @@ use drive_plant::idle as plant;
 use drive_plant::tables::PlantParameters;
 use fmu_core::idle::{Acts, why};
 
-/// The DC link's.
+/// Conditions of the DC link.
 const LINK: &[Acts<LinkParameters>] = &[
     Acts { names: &["dc_link.use", "chopper.use"], when: |_| true, why: "" },
     Acts {
@@ -51,7 +51,7 @@ mod tests {
     use fmu_core::idle::unstated;
     use fmu_core::{Causality, Model};
 
-    /// Every input is one of the plant's or of the controller's, and so their lists have it.
+    /// Every input belongs to the plant or the controller, so their lists contain it.
     #[test]
     fn no_variable_is_forgotten() {
         let missing = unstated(LINK, dc_link::LINK);

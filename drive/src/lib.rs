@@ -1,6 +1,6 @@
-//! Permanent-magnet synchronous machine drives: the whole drive, built from its plant and its controller.
+//! Permanent-magnet synchronous machine drives: the whole drive, built from plant and controller.
 //!
-//! | crate | folder | holds |
+//! | crate | folder | contents |
 //! |---|---|---|
 //! | `drive-base` | `drive/base/` | frames, elementary functions, the data of a machine, modulation; the conventions |
 //! | `drive-plant` | `drive/plant/` | [`PmsmPlant`]: machine, inverter, losses, temperatures, mechanics |

@@ -1,7 +1,8 @@
-//! Plant and controller side by side. They exchange values as an importer does: read all outputs, set all inputs, step
-//! both (Jacobi). The packed FMUs must match this native reference bit for bit.
+//! Plant and controller as a pair. They exchange values as an importer does: read all outputs, set all inputs, step both
+//! (Jacobi). The packed FMUs must match this native reference bit for bit.
 
-use crate::{PmsmPlant, SensorlessController};
+use drive_control::model::SensorlessController;
+use drive_plant::PmsmPlant;
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 use serde::{Deserialize, Serialize};
 
@@ -54,7 +55,7 @@ impl Pair {
         Ok(())
     }
 
-    /// Passes the outputs of each on to the other.
+    /// Passes the outputs of each to the other.
     #[inline]
     pub(crate) fn exchange(&mut self) {
         let Self { plant, controller, .. } = self;
@@ -62,7 +63,7 @@ impl Pair {
         controller.model.inputs.measure(plant.out.measured());
     }
 
-    /// Passes the present outputs on, where the blocks still hold those of an earlier step.
+    /// Passes the present outputs, where the blocks still contain those of an earlier step.
     #[inline]
     pub(crate) fn exchange_present(&mut self) {
         let Self { plant, controller, .. } = self;
@@ -70,7 +71,7 @@ impl Pair {
         controller.model.inputs.measure(plant.model.measured());
     }
 
-    /// The voltage `u_dc` (V) of the link, and whether the controller operates, from this instant on.
+    /// Sets the voltage `u_dc` (V) of the link, and whether the controller operates, from this instant on.
     #[inline]
     pub(crate) fn supply(&mut self, u_dc: f64, enable: bool) {
         let controller = &mut self.controller.model.inputs;

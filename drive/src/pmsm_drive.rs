@@ -1,13 +1,13 @@
 //! The model `PmsmDrive`: plant and controller in one closed-loop block, for drive-train models with steps of 1 ms or
 //! more.
 //!
-//! It combines [`PmsmPlant`] and [`SensorlessController`], which exchange values at every sample instant. For a
-//! communication step that is a multiple of T_s, it gives the results of the pair bit for bit. With any other step,
-//! plant and controller also stop at the sample instants in between; an importer's exchange cannot do this.
+//! It combines [`PmsmPlant`] and [`SensorlessController`], which exchange values at every sample instant. With a
+//! communication step that is a multiple of T_s, it gives the results of the pair bit for bit. With any other step, plant and
+//! controller also stop at the sample instants in between, which an importer's exchange cannot do.
 //!
 //! In Model Exchange, the importer integrates the plant's states. At every sample instant, an event passes the voltages
-//! of the last sample to the plant and its currents to the controller, in the order of [`Pair::step`]. Means over T_s
-//! are the same in both interfaces ([`Means`]).
+//! of the last sample to the plant and the plant's currents to the controller, in the order of [`Pair::step`]. Means over
+//! T_s are the same in both interfaces ([`Means`]).
 
 mod exchange;
 mod period;
@@ -20,13 +20,16 @@ use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::idle;
 use crate::pair::Pair;
-#[cfg(doc)]
-use crate::{PmsmPlant, SensorlessController};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
 use drive_control::commissioning::IDENTIFIED;
+#[cfg(doc)]
+use drive_control::model::SensorlessController;
+use drive_control::model::TAU_REF;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
+#[cfg(doc)]
+use drive_plant::PmsmPlant;
 use drive_plant::signals::{PlantInputs, PlantOutputs};
 use drive_plant::tables::{self as plant, PlantParameters};
 use drive_plant::thermal::{THERMAL_INPUTS, ThermalInputs};
@@ -42,7 +45,7 @@ use serde::{Deserialize, Serialize};
 /// Maximum number of samples in one communication step.
 const MAX_SAMPLES: f64 = 1e6;
 
-/// Inputs, held over a communication step.
+/// Inputs, constant over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a variable")]
 pub struct DriveInputs {
@@ -104,7 +107,7 @@ pub struct DriveOutputs {
 /// A complete sensorless drive.
 #[derive(Clone, Default, Serialize, Deserialize)]
 pub struct PmsmDrive {
-    /// Inputs, held over a communication step.
+    /// Inputs, constant over a communication step.
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub pair: Pair,
@@ -112,25 +115,25 @@ pub struct PmsmDrive {
     pub link_parameters: LinkParameters,
     /// The DC link.
     link: Link,
-    /// Model Exchange: the command that acts in the plant since the last sample.
+    /// Model Exchange: the command that has been active in the plant since the last sample.
     before: Commanded,
     period: Period,
     overload: Happened,
 }
 
-/// Whether something has been that is said once, such as a load far above the torque that the drive gives.
+/// Occurrence of a condition that is reported once, such as a load far above the torque of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Happened {
     #[default]
     Never,
-    /// For the first time, at the last step.
+    /// First occurrence, at the last step.
     Now,
-    /// Before.
+    /// Occurred earlier.
     Before,
 }
 
 impl Happened {
-    /// After a step in which it `is` so.
+    /// The next value, after a step in which the condition `is` met or not.
     pub(crate) fn followed_by(self, is: bool) -> Self {
         match self {
             Self::Never if is => Self::Now,
@@ -140,7 +143,7 @@ impl Happened {
     }
 }
 
-/// Load in units of `tau_max` above which it is reported.
+/// Load, as a multiple of `tau_max`, above which it is reported.
 const FAR: f64 = 2.0;
 
 impl PmsmDrive {
@@ -153,7 +156,7 @@ impl PmsmDrive {
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
         (controller.tau_ref, controller.asc) = (inputs.tau_ref, inputs.asc);
-        // There is no voltage to control with.
+        // During the precharge there is no voltage for control.
         controller.enable = inputs.enable && !link.precharges;
         controller.sensor_valid = inputs.sensor_valid;
         controller.commission_start = inputs.commission_start;
@@ -167,7 +170,7 @@ impl PmsmDrive {
     /// Voltage (V) of inverter and controller.
     #[inline]
     fn link_voltage(&self) -> f64 {
-        // A solver may try voltages below 0, which the diodes of the inverter do not let pass.
+        // A solver may try voltages below 0, which the diodes of the inverter prevent.
         if self.link_parameters.dc_link.used { self.link.u.max(0.0) } else { self.inputs.u_dc }
     }
 
@@ -177,7 +180,7 @@ impl PmsmDrive {
         ripple(inputs.voltage(), currents.to_stator(), p_in, inputs.u_dc)
     }
 
-    /// The plant's inputs: those of the drive, and the voltages that the controller shows.
+    /// The plant's inputs: those of the drive, and the controller's voltages.
     fn plant_inputs(&self) -> PlantInputs {
         let DriveInputs { tau_load, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
         let u_dc = self.link_voltage();
@@ -283,7 +286,7 @@ impl Model for PmsmDrive {
             }
             let next = if at_sample { grid.period } else { to_next_sample(grid, pair.now) };
             let before = pair.now;
-            // An imposed shaft keeps turning at the held speed over all samples of the step.
+            // An imposed shaft turns at constant speed over all samples of the step.
             pair.plant.model.inputs.angle_shaft = inputs.angle_shaft + inputs.speed_shaft * before.since(step.start);
             let ends = next <= left + grid.width();
             let h = if ends { next } else { left };
@@ -293,7 +296,7 @@ impl Model for PmsmDrive {
             } else {
                 (h, ends)
             };
-            // Between the samples of a step, nobody reads the outputs.
+            // Between the samples of a step, the outputs are not read.
             if std::mem::take(&mut outputs_are_present) {
                 pair.exchange();
             } else {
@@ -318,7 +321,7 @@ impl Model for PmsmDrive {
     }
 }
 
-/// The `link` supplies the `pair` over a piece of `h` (s), at whose end a sample period may end.
+/// Supplies the `pair` from the `link` over an interval of `h` (s), at whose end a sample period may end.
 #[inline(never)]
 fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mut Pair, (h, ends): (f64, bool)) {
     link.advance(par, inputs.u_dc, h, pair.plant.model.powers().p_in * h);
@@ -328,13 +331,13 @@ fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mu
     pair.supply(link.u, inputs.enable && !link.precharges);
 }
 
-/// Refuses a controller with another number of pole pairs than the machine.
+/// Refuses a controller whose number of pole pairs differs from the machine's.
 pub(crate) fn same_pole_pairs(plant: &PlantParameters, controller: &ControllerParameters) -> Result<(), Fault> {
     if plant.motor.n_p == controller.motor.n_p {
         return Ok(());
     }
     Err(Fault::new(format!(
-        "plant.{} and controller.{}: the drive would run at another speed than its reference; set both to the same number of pole \
+        "plant.{} and controller.{}: the speed of the drive would differ from its reference; set both to the same number of pole \
          pairs",
         plant::PARAMETERS.tell(plant, |p| &mut p.motor.n_p),
         control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
@@ -345,7 +348,7 @@ pub(crate) fn in_part(part: &str, fault: &Fault) -> Fault {
     Fault::new(format!("{part}.{fault}"))
 }
 
-/// Back EMF over the voltage of the DC link above which the drive does not decide on the speed of its shaft.
+/// Back EMF, as a multiple of the DC-link voltage, above which the drive cannot control the speed of the shaft.
 const DRIVEN: f64 = 3.0;
 
 impl Warns for PmsmDrive {
@@ -368,7 +371,7 @@ impl Warns for PmsmDrive {
             let tau_load = self.inputs.tau_load;
             log.warn("tau_load", || {
                 format!(
-                    "tau_load = {tau_load} N.m is more than {FAR} times the torque that the drive gives, {tau_min} to {tau_max} N.m \
+                    "tau_load = {tau_load} N.m is more than {FAR} times the torque of the drive, {tau_min} to {tau_max} N.m \
                      (tau_min, tau_max): the load turns the shaft; lower it, check its unit, or raise controller.limit.i, \
                      controller.limit.i_q and controller.limit.tau"
                 )
@@ -389,7 +392,7 @@ type I = Row<DriveInputs>;
 /// The inputs, of `PmsmDrive` and of `PmsmDriveMean`.
 pub(crate) const INPUTS: &Table<DriveInputs> = table![
             I::input("speed_ref", &SPEED, "Mechanical speed reference", |i| &mut i.speed_ref),
-            I::input("tau_ref", &NEWTON_METER, "Torque reference", |i| &mut i.tau_ref)
+            I::input("tau_ref", &NEWTON_METER, TAU_REF, |i| &mut i.tau_ref)
                 .read_with("speed_loop.torque_mode", "true"),
             I::boolean_input(
                 "enable",
@@ -399,7 +402,7 @@ pub(crate) const INPUTS: &Table<DriveInputs> = table![
             .optional(),
             I::boolean_input(
                 "asc",
-                "Active short circuit, whatever enable says: all upper or all lower transistors conduct once short_circuit is true, and \
+                "Active short circuit, regardless of enable: all upper or all lower transistors conduct once short_circuit is true, and \
                  the controller stays in its initial state",
                 |i| &mut i.asc,
             )

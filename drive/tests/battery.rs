@@ -1,5 +1,5 @@
-//! Limits of the current of the DC link: kept within 5 % in steady state with exact parameters, without hunting, in
-//! Co-Simulation and in Model Exchange.
+//! Limits of the DC-link current: kept within 5 % in steady state with exact parameters, without hunting, in Co-Simulation
+//! and in Model Exchange.
 #![allow(missing_docs, non_snake_case)]
 
 mod importer;
@@ -95,7 +95,7 @@ fn full_torque_keeps_the_limits_in_both_directions() {
                     let free =
                         if weakening { machine.limit(rpm.abs(), s)[1].tau } else { machine.limit(1.0, s)[1].tau };
                     let allowed = if s > 0.0 { dc.max } else { dc.min };
-                    // Where the drive cannot take that much, its own limits act.
+                    // Where the drive cannot take that much, its other limits are active.
                     if tau.abs() < 0.98 * free {
                         let off = sum / allowed - 1.0;
                         assert!(off.abs() < 0.05, "{rpm} rpm, {s}: {sum} A of {allowed} A");
@@ -104,7 +104,7 @@ fn full_torque_keeps_the_limits_in_both_directions() {
                         assert!(sum / allowed < 1.05, "{rpm} rpm, {s}: {sum} A of {allowed} A");
                     }
                     let mean = 0.5 * (low + high);
-                    assert!((mean / tau - 1.0).abs() < 0.02, "{rpm} rpm, {s}: {mean} N.m, told {tau} N.m");
+                    assert!((mean / tau - 1.0).abs() < 0.02, "{rpm} rpm, {s}: {mean} N.m, announced {tau} N.m");
                     assert!(high - low < 0.01 * mean.abs() + 0.01, "{rpm} rpm, {s}: hunting, {low} to {high} N.m");
                 }
             }
@@ -112,7 +112,7 @@ fn full_torque_keeps_the_limits_in_both_directions() {
     }
 }
 
-/// In speed control, with the link and its source inside the drive: the source's current is kept, too.
+/// In speed control, with the link and its source inside the drive: the limit applies to the source's current.
 #[test]
 fn an_acceleration_keeps_the_current_of_the_source() {
     for exchange in [false, true] {
@@ -125,7 +125,7 @@ fn an_acceleration_keeps_the_current_of_the_source() {
         for k in 0..6000 {
             run.step();
             let out = run.out();
-            // At first the magnetic field takes power, too.
+            // At first the magnetic field also takes power.
             most = most.max(if k < 200 { 0.0 } else { out.link.i_source });
             at_limit += u32::from((out.link.i_source / 50.0 - 1.0).abs() < 0.05);
             overshoot = overshoot.max(out.plant.speed / (4000.0 * RPM) - 1.0);
@@ -162,7 +162,7 @@ fn limits_of_the_wrong_sign_are_refused() {
     drive.validate().unwrap();
 }
 
-/// i_0 = 5 A alone would take 1.5 * 2 Ohm * 25 A2 / 325 V = 0.231 A.
+/// i_0 = 5 A alone takes 1.5 * 2 Ohm * 25 A2 / 325 V = 0.231 A.
 #[test]
 fn the_current_of_standstill_is_within_the_limit_and_the_drive_starts() {
     for (max, i_0) in [(0.1, (0.1_f64 * 325.0 / 6.0).sqrt()), (0.2, (0.2_f64 * 325.0 / 6.0).sqrt()), (1.0, 5.0)] {
@@ -184,13 +184,13 @@ fn the_current_of_standstill_is_within_the_limit_and_the_drive_starts() {
                     &mut Warnings::to(&mut |(_, key, text)| warned.push((key, text()))),
                 );
             }
-            // While the current rises, the magnetic field takes power, too.
+            // While the current rises, the magnetic field also takes power.
             most = most.max(if k % 5000 < 200 { 0.0 } else { out.means.p_in / 325.0 });
         }
         assert!(most < 1.05 * max, "{max} A: {most} A");
         let speed = importer.block.out.plant.speed;
         assert!((speed / (300.0 * RPM) - 1.0).abs() < 0.01, "{max} A: {speed} rad/s");
-        let told = warned.iter().any(|(key, text)| *key == "limit.i_dc_max" && text.contains("= 0.231 A"));
-        assert!(told == (i_0 < 5.0) && warned.len() < 2, "{warned:?}");
+        let named = warned.iter().any(|(key, text)| *key == "limit.i_dc_max" && text.contains("= 0.231 A"));
+        assert!(named == (i_0 < 5.0) && warned.len() < 2, "{warned:?}");
     }
 }

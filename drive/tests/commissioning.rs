@@ -1,19 +1,19 @@
-//! Self-commissioning inside the controller: when it runs and when it ends, the drive that has the bits of the pair, and states
-//! that are saved and restored on the way.
+//! Self-commissioning inside the controller: start and end, the drive with the bits of the pair, and states that are saved and
+//! restored during the sequence.
 #![allow(missing_docs, non_snake_case, clippy::float_cmp)]
 
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Results};
 use drive::control::commissioning::{CommissionMode, CommissionParameters};
 use drive::control::trip::Cause;
 use drive::motor::Motor;
-use drive::plant::signals::Gates;
+use drive::plant::inverter::Gates;
 use drive::{Pair, PmsmDrive, SensorlessController};
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Slot, Step, Warns, integrate};
 
 const T_S: f64 = 1e-4;
 
-/// The 2.2 kW machine with the estimator of the default, whose controller waits for `commission_start`.
+/// The 2.2 kW machine with the default estimator; the controller waits for `commission_start`.
 fn set(controller: &mut SensorlessController) {
     let par = &mut controller.parameters;
     (par.motor, par.J, par.s_2) = (Motor::IPMSM_2_2_KW, 0.015, 40.0);
@@ -71,7 +71,7 @@ fn until(pair: &mut Pair, state: State) {
         }
         pair.step(T_S).unwrap();
     }
-    panic!("{state:?} does not come: {:?}", status(pair));
+    panic!("{state:?} is not reached: {:?}", status(pair));
 }
 
 const STATES: [State; 9] = [
@@ -98,17 +98,17 @@ fn it_ends_with_results_that_stay_until_the_next_start() {
     {
         assert!(value.u < 0.05 && (value.value / truth - 1.0).abs() < 0.01, "{value:?} {truth}");
     }
-    // As long as it is asked for, nothing else happens.
+    // While the request lasts, nothing else happens.
     pair.set_inputs(50.0, 0.0, 540.0);
     steps(&mut pair, 2000);
     assert!(gates(&pair) == Gates::Off && !pair.controller.out.enabled);
     assert!(pair.plant.out.speed.abs() < 0.1, "{} rad/s: the machine coasts", pair.plant.out.speed);
-    // Then the controller works, and the values stay.
+    // Then the controller operates, and the values stay.
     pair.controller.model.inputs.commission_start = false;
     steps(&mut pair, 20_000);
     assert!(gates(&pair) == Gates::Switch && (pair.plant.out.speed / 50.0 - 1.0).abs() < 0.05);
     assert_eq!((status(&pair), results(&mut pair)), ((State::Done, Fault::None), found));
-    // A start while it turns is refused. Another one forgets the values.
+    // A start of a turning machine is refused. A further one discards the values.
     pair.controller.model.inputs.commission_start = true;
     steps(&mut pair, 3);
     assert_eq!((status(&pair).0, results(&mut pair), gates(&pair)), (State::Offsets, Results::default(), Gates::Off));
@@ -120,7 +120,7 @@ fn it_ends_with_results_that_stay_until_the_next_start() {
     assert!(said.contains("commission_fault = NotFollowing: The rotor turns at the start"), "{said}");
 }
 
-/// The rotor turns in the positive direction, at up to half of commission.speed, and the machine is known whole.
+/// The rotor turns in the positive direction, at up to half of commission.speed, and all values are found.
 #[test]
 fn a_turning_machine_tells_its_flux_linkage_inertia_and_friction() {
     let mut pair = started_in(CommissionMode::Spin);
@@ -144,7 +144,7 @@ fn a_turning_machine_tells_its_flux_linkage_inertia_and_friction() {
     assert!(w < 0.12 * 157.0 && (0.0..=w).contains(&pair.plant.out.speed) && gates(&pair) == Gates::Off);
 }
 
-/// A blocked rotor cannot spin: it is refused, with the values of standstill.
+/// A blocked rotor is refused, with the values of standstill.
 #[test]
 fn a_blocked_rotor_keeps_the_values_of_standstill() {
     let mut pair = pair();
@@ -159,7 +159,7 @@ fn a_blocked_rotor_keeps_the_values_of_standstill() {
     assert!(r.R_s.u < 0.01 && r.L_q.u < 0.05 && [r.psi_M, r.J, r.tau_friction].iter().all(|x| x.u >= 1.0), "{r:?}");
 }
 
-/// The current that the controller has held at rest does not count as an offset.
+/// The current of the controller at rest does not count as an offset.
 #[test]
 fn the_current_before_the_start_is_no_offset() {
     let mut pair = pair();
@@ -190,7 +190,7 @@ fn an_abort_opens_the_gates_at_once_in_every_state() {
                 2 => model.inputs.asc = true,
                 _ => (model.parameters.trip.used, model.parameters.trip.u_dc, model.inputs.u_dc) = (true, 550.0, 551.0),
             }
-            // The sample that sees it, and the exchange that brings its command to the plant.
+            // The sample that detects it, and the exchange of the command with the plant.
             steps(&mut aborted, 1);
             assert_eq!(status(&aborted), (State::Refused, Fault::Aborted), "{state:?} {how}");
             assert!(!aborted.controller.out.enabled && aborted.controller.out.u == drive::frame::Phases::default());
@@ -199,7 +199,7 @@ fn an_abort_opens_the_gates_at_once_in_every_state() {
             let tripped = if how == 3 { Cause::OverVoltage } else { Cause::None };
             assert_eq!(aborted.controller.out.tripped, tripped);
             if how == 1 {
-                // Enabled again, it does not begin by itself, and the controller waits for the end of the request.
+                // Enabled again, it does not restart, and the controller waits for the end of the request.
                 aborted.controller.model.inputs.enable = true;
                 steps(&mut aborted, 10);
                 assert_eq!((status(&aborted), gates(&aborted)), ((State::Refused, Fault::Aborted), Gates::Off));
@@ -248,7 +248,7 @@ fn a_rising_edge_counts_while_the_controller_is_enabled() {
     assert_eq!(status(&pair).0, State::Offsets);
 }
 
-/// Without a mode, the input has no effect, nothing is allocated, and the outputs say that nothing is known.
+/// Without a mode, the input has no effect, nothing is allocated, and the outputs report no result.
 #[test]
 fn off_it_is_not_there() {
     let mut off = pair();
@@ -321,7 +321,7 @@ fn the_drive_is_the_pair() {
     assert!(done > 1000 && status(&pair).0 != State::Done, "a second start");
 }
 
-/// In Model Exchange the sequence comes to the same values.
+/// In Model Exchange the sequence finds the same values.
 #[test]
 fn model_exchange_finds_the_same_resistance() {
     let (mut pair, mut drive, mut now) = (started(), drive(), Elapsed::ZERO);
@@ -338,7 +338,7 @@ fn model_exchange_finds_the_same_resistance() {
     assert!((here / there - 1.0).abs() < 1e-5, "{here} {there}");
 }
 
-/// Stored in the middle of each state and restored, the drive has the same bits.
+/// A drive that is stored in the middle of each state and restored has the same bits.
 #[test]
 fn a_restored_drive_is_the_same_drive() {
     let (mut whole, mut restored) = (started_in(CommissionMode::Spin), started_in(CommissionMode::Spin));
@@ -361,7 +361,7 @@ fn a_restored_drive_is_the_same_drive() {
     assert!(STATES.iter().all(|state| seen.contains(state)), "{seen:?}");
 }
 
-/// A controller without commissioning is hardly larger than before.
+/// A controller without commissioning is hardly larger.
 #[test]
 fn the_default_is_small() {
     let (with, without) = (size_of::<drive::control::commission::Commission>(), size_of::<SensorlessController>());

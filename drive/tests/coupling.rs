@@ -1,4 +1,4 @@
-//! A coupling that diverges: the work of a step stays bounded, and the error says what to do.
+//! A diverging coupling: the work of a step stays bounded, and the error names the remedy.
 #![allow(missing_docs)]
 
 use drive::{PmsmDrive, PmsmPlant};
@@ -7,8 +7,8 @@ use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns};
 
 const REMEDY: &str = "the coupling is unstable; shorten the communication step";
 
-/// The mechanical speed in rad/s that the error tells.
-fn told(message: &str) -> f64 {
+/// The mechanical speed in rad/s in an error message.
+fn speed_in(message: &str) -> f64 {
     message.split("turns at ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap()
 }
 
@@ -26,7 +26,7 @@ fn compliant(h: f64, set: impl Fn(&mut PmsmDrive)) -> (u32, String) {
         let step = Step { start: now, h };
         let before = drive.model.pair.plant.clone();
         if let Err(fault) = drive.step(&step) {
-            // The plant stands where its last step ended.
+            // The plant is in the state at the end of its last step.
             assert!(drive.out.plant.speed.abs() < 1e6 && before.out == drive.out.plant);
             return (k, fault.message().to_owned());
         }
@@ -48,14 +48,14 @@ fn a_diverging_coupling_ends_with_its_cause() {
         });
         println!("h = {h} s: step {k}: {message}");
         assert!((10..200).contains(&k) && message.contains(REMEDY) && message.contains("use mechanics.imposed"));
-        assert!(told(&message).abs() < 1e7, "well before 1e9 rad/s: {message}");
+        assert!(speed_in(&message).abs() < 1e7, "well before 1e9 rad/s: {message}");
     }
-    // The same shaft at 1 ms is a drive train like any other.
+    // The same shaft is stable at 1 ms.
     let (k, message) = compliant(1e-3, |_| ());
     assert_eq!((k, message.as_str()), (2000, ""));
 }
 
-/// A name, and what it changes.
+/// A name and a change.
 type Kind = (&'static str, fn(&mut PmsmPlant));
 
 const KINDS: [Kind; 5] = [
@@ -103,7 +103,7 @@ fn an_imposed_speed_beyond_any_machine_is_refused() {
                 let fault = plant.step(&Step { start: Elapsed::ZERO, h }).unwrap_err();
                 let message = fault.message();
                 assert!(message.contains(REMEDY) && !message.contains("imposed"), "{name}, {h} s: {message}");
-                assert_eq!(told(message).to_bits(), f64::to_bits(speed));
+                assert_eq!(speed_in(message).to_bits(), f64::to_bits(speed));
             }
         }
     }
@@ -142,7 +142,7 @@ fn a_lost_rotor_at_speed_is_not_blamed_on_the_resistance() {
     let mut drive = Block::<PmsmDrive>::default();
     drive.model.inputs.speed_ref = 100.0;
     drive.initialize();
-    let mut told = Vec::new();
+    let mut logged = Vec::new();
     let (mut now, mut speed, mut angle) = (Elapsed::ZERO, 0.0, 0.0);
     let mut result = Ok(());
     while result.is_ok() {
@@ -153,13 +153,13 @@ fn a_lost_rotor_at_speed_is_not_blamed_on_the_resistance() {
         now = step.end();
         speed += tau / 0.01 * step.h;
         angle += speed * step.h;
-        let mut sink = |(_, key, text): fmu_core::log::Said<'_>| told.push((key, text()));
+        let mut sink = |(_, key, text): fmu_core::log::Said<'_>| logged.push((key, text()));
         drive.model.warn(&mut Warnings::to(&mut sink));
     }
-    println!("{:?} {:?}", told.first(), told.last());
-    let keys: Vec<_> = told.iter().map(|(key, _)| *key).collect();
+    println!("{:?} {:?}", logged.first(), logged.last());
+    let keys: Vec<_> = logged.iter().map(|(key, _)| *key).collect();
     assert!(keys.contains(&"lock_lost") && keys.contains(&"driven"), "{keys:?}");
-    assert!(told.iter().all(|(_, text)| !text.contains("R_s")), "{told:?}");
-    let driven: Vec<_> = told.iter().filter(|(key, _)| *key == "driven").collect();
+    assert!(logged.iter().all(|(_, text)| !text.contains("R_s")), "{logged:?}");
+    let driven: Vec<_> = logged.iter().filter(|(key, _)| *key == "driven").collect();
     assert!(driven.iter().all(|(_, text)| text.contains("shorten the communication step")), "{driven:?}");
 }

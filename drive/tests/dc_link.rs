@@ -82,7 +82,7 @@ impl Run {
         self.in_capacitor() + magnetic_energy(&par.motor, par.magnetics(), flux(&par.motor, i)) + kinetic
     }
 
-    /// Checks the energy balance from the source to the shaft since the start; returns the energy in J that passed.
+    /// Checks the energy balance from the source to the shaft since the start; returns the transferred energy in J.
     fn balance(&self, name: &str) -> f64 {
         let (link, plant) = (self.out().link.energy, self.out().plant.energy);
         let change = self.stored() - self.start;
@@ -109,7 +109,7 @@ fn at_rest_the_voltage_is_that_of_the_closed_form() {
                 imposed(drive, 3000.0, tau);
                 drive.link_parameters.dc_link.R_source = R;
                 if exchange {
-                    // A stiff source asks the importer's solver for short steps: this one takes 10 us.
+                    // A stiff source requires short steps of the importer's solver: 10 us here.
                     drive.link_parameters.dc_link.C = (2e-5 / R).max(5e-4);
                 }
             });
@@ -155,7 +155,7 @@ fn the_precharge_loses_what_the_capacitor_holds() {
     }
 }
 
-/// Braking from 1500 rpm into a source that takes little: the chopper keeps the voltage.
+/// Braking from 1500 rpm into a source with a high resistance: the chopper limits the voltage.
 fn braking(exchange: bool) -> Run {
     let mut run = Run::new(&b(), exchange, |drive| {
         let LinkParameters { dc_link, chopper } = &mut drive.link_parameters;
@@ -217,7 +217,7 @@ fn the_energies_are_balanced_in_every_case() {
         run.run(0.6);
         assert!(run.out().plant.speed > 1500.0 * RPM, "{} rad/s", run.out().plant.speed);
         balance(&run, "precharge and start");
-        // Beyond the speed of the diodes the gates open, and the chopper takes a part.
+        // Above the diode speed the gates open, and the chopper takes part of the power.
         let mut run = Run::new(&c(240.0), exchange, |drive| {
             imposed(drive, 13_500.0, -20.0);
             let LinkParameters { dc_link, chopper } = &mut drive.link_parameters;
@@ -232,7 +232,7 @@ fn the_energies_are_balanced_in_every_case() {
         run.run(0.1);
         balance(&run, "short circuit");
     }
-    // In Model Exchange the source's energy follows from the balance: it is that of Co-Simulation.
+    // In Model Exchange the source's energy follows from the balance and equals that of Co-Simulation.
     let [stepped, exchanged] = passed;
     for ((a, all), (b, _)) in stepped.iter().zip(&exchanged) {
         let off = [a.source - b.source, a.resistor - b.resistor, a.chopper - b.chopper];
@@ -241,7 +241,7 @@ fn the_energies_are_balanced_in_every_case() {
     }
 }
 
-/// A source with a time constant of 10 ns costs no steps, and is as good as none.
+/// A source with a time constant of 10 ns costs no steps and acts as an ideal one.
 #[test]
 fn a_stiff_source_is_an_ideal_one() {
     let run = |used: bool| {
@@ -277,7 +277,7 @@ fn the_communication_step_does_not_matter() {
     assert!((fine.0 - odd.0).abs() < 0.5 && (fine.1.chopper / odd.1.chopper - 1.0).abs() < 0.02, "{fine:?} {odd:?}");
 }
 
-/// More power than the source can give: the link collapses, and nothing is lost or won.
+/// More power than the source can supply: the link collapses, and no energy is lost or gained.
 #[test]
 fn a_link_that_collapses_stays_finite() {
     let mut run = Run::new(&c(240.0), false, |drive| {
@@ -372,7 +372,7 @@ fn what_cannot_be_is_refused() {
         drive.derive();
         drive.validate().unwrap_err().message().to_owned()
     };
-    for (set, told) in [
+    for (set, parts) in [
         ((|p| p.dc_link.C = 0.0) as fn(&mut LinkParameters), ["dc_link.C = 0 F", "above 0 F"]),
         (|p| p.dc_link.C = f64::NAN, ["dc_link.C = NaN", "above 0 F"]),
         (|p| p.dc_link.R_source = 0.0, ["dc_link.R_source = 0 Ohm", "above 0 Ohm"]),
@@ -386,9 +386,9 @@ fn what_cannot_be_is_refused() {
         (|p| (p.chopper.used, p.dc_link.used) = (true, false), ["chopper.use", "dc_link.use"]),
     ] {
         let message = refused(set);
-        assert!(told.iter().all(|part| message.contains(part)), "{message}");
+        assert!(parts.iter().all(|part| message.contains(part)), "{message}");
     }
-    // Off, nothing is checked.
+    // Parts that are not in use are not checked.
     let mut drive = PmsmDrive::default();
     (drive.link_parameters.dc_link.C, drive.link_parameters.chopper.u_off) = (0.0, 1e3);
     drive.derive();
@@ -396,7 +396,7 @@ fn what_cannot_be_is_refused() {
     assert_eq!(PmsmDrive::INDICATORS.len(), 3);
 }
 
-/// Dependencies are found by trying; among the points tried, the chopper is on somewhere.
+/// Dependencies are found by probing; the chopper is on at some of the points.
 #[test]
 fn the_choppers_power_depends_on_the_voltage() {
     struct Drive;

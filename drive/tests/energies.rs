@@ -1,12 +1,12 @@
-//! Torque of an imposed shaft and energies: what a drive train integrates is what the energies count, in Co-Simulation and in
-//! Model Exchange.
+//! Torque of an imposed shaft and energies: the work that a drive train integrates equals the counted energy, in
+//! Co-Simulation and in Model Exchange.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
 mod importer;
 
 use drive::control::current::CurrentLoop;
-use drive::control::tables::Limits;
+use drive::control::limits::Limits;
 use drive::estimator::Kind as Estimator;
 use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;
@@ -19,7 +19,7 @@ use importer::Importer;
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 
-/// A traction drive in torque mode on a shaft that is imposed.
+/// A traction drive in torque mode on an imposed shaft.
 fn traction() -> PmsmDrive {
     let motor = Motor { n_p: 6, R_s: 5.5e-3, L_d: 0.09e-3, L_q: 0.25e-3, psi_M: 0.038 };
     let mut drive = PmsmDrive::default();
@@ -34,8 +34,8 @@ fn traction() -> PmsmDrive {
     drive
 }
 
-/// Work in J of `tau_shaft` on the shaft at the `speed` (rad/s) over 0.1 s of steady state in steps of `h` (s), and what
-/// `energy_mech` counted.
+/// Work in J of `tau_shaft` on the shaft at the `speed` (rad/s) over 0.1 s of steady state in steps of `h` (s), and the change
+/// of `energy_mech`.
 fn work(speed: f64, h: f64) -> (f64, f64) {
     let mut drive = Block::<PmsmDrive> { model: traction(), ..Block::default() };
     drive.model.inputs.speed_shaft = speed;
@@ -66,7 +66,7 @@ fn the_torque_of_the_shaft_does_the_work_that_the_energy_counts() {
     }
 }
 
-/// A plant with what `set` changes, under a voltage that holds some current at 150 rad/s.
+/// A plant after `set`, under a voltage that drives some current at 150 rad/s.
 fn plant(set: impl Fn(&mut PmsmPlant)) -> Block<PmsmPlant> {
     let mut plant = Block::<PmsmPlant>::default();
     plant.model.parameters.mechanics.imposed = true;
@@ -75,10 +75,10 @@ fn plant(set: impl Fn(&mut PmsmPlant)) -> Block<PmsmPlant> {
     plant
 }
 
-/// A name, and what it changes.
+/// A name and a change.
 type Kind = (&'static str, fn(&mut PmsmPlant));
 
-/// Machines and inverters of every kind that has equations of its own.
+/// Machines and inverters of every kind with separate equations.
 const KINDS: [Kind; 5] = [
     ("linear", |_| ()),
     ("saturated", |plant| {
@@ -140,7 +140,7 @@ fn the_torque_of_every_kind_of_machine_is_the_mean() {
 
 #[test]
 fn a_shaft_that_accelerates_receives_the_energy() {
-    // The angle of the drive train goes on by more than the held speed says; so does the energy.
+    // The angle of the drive train advances by more than the constant speed gives; so does the energy.
     let (mut now, mut angle, mut work, h) = (Elapsed::ZERO, 0.0, 0.0, 1e-3);
     let mut plant = plant(|_| ());
     for k in 0..200 {
@@ -170,7 +170,7 @@ fn a_free_shaft_has_the_torque_of_the_load() {
 
 #[test]
 fn the_plant_counts_the_same_in_model_exchange() {
-    // The importer's steps are fine; it tells each, every tenth, or none but the events at T_s.
+    // The importer's steps are fine; it reports each, every tenth, or only the events at T_s.
     let T_s = 1e-4;
     for (name, set) in KINDS {
         for imposed in [false, true] {
@@ -180,11 +180,11 @@ fn the_plant_counts_the_same_in_model_exchange() {
                 plant.inputs.tau_load = 0.7;
                 plant
             };
-            for told in [1, 10, 0] {
+            for reported in [1, 10, 0] {
                 let mut stepped = Block { model: model(), ..Block::default() };
                 voltage(&mut stepped.model, 0.0, 150.0);
                 stepped.initialize();
-                let mut exchanged = Importer::new(stepped.model.clone(), 2e-6, told);
+                let mut exchanged = Importer::new(stepped.model.clone(), 2e-6, reported);
                 for k in 0..300 {
                     let t = T_s * f64::from(k);
                     let ahead = |t: f64| 150.0 * t;
@@ -199,24 +199,24 @@ fn the_plant_counts_the_same_in_model_exchange() {
                 let (ours, theirs) = (exchanged.block.out.energy, stepped.out.energy);
                 let passed = theirs.r#in.abs().max(theirs.loss).max(theirs.mech.abs());
                 let off = [ours.r#in - theirs.r#in, ours.mech - theirs.mech, ours.loss - theirs.loss];
-                println!("{name}, imposed {imposed}, told {told}: {off:?} J of {theirs:?}");
+                println!("{name}, imposed {imposed}, reported {reported}: {off:?} J of {theirs:?}");
                 let allowed = if name == "dead time" || name == "losses" { 1e-4 } else { 1e-6 };
                 assert!(
                     off.iter().all(|x| x.abs() < allowed * passed),
-                    "{name} {imposed} {told}: {off:?} J of {theirs:?}"
+                    "{name} {imposed} {reported}: {off:?} J of {theirs:?}"
                 );
             }
         }
     }
 }
 
-/// Energies in J of a free plant after 20 ms in Model Exchange under the input `u` (V) of the time (s), of which every `told`th
-/// integration step of 2 us is told.
-fn counted(told: u32, u: impl Fn(f64) -> AlphaBeta) -> [f64; 3] {
+/// Energies in J of a free plant after 20 ms in Model Exchange under the input `u` (V) of the time (s), with every
+/// `reported`th integration step of 2 us reported.
+fn counted(reported: u32, u: impl Fn(f64) -> AlphaBeta) -> [f64; 3] {
     let mut model = plant(|_| ()).model;
     (model.parameters.mechanics.imposed, model.parameters.initial.speed) = (false, 150.0);
     model.inputs.u = Phases::from_stator(u(0.0));
-    let mut importer = Importer::new(model, 2e-6, told);
+    let mut importer = Importer::new(model, 2e-6, reported);
     importer.run(0.02, |plant, t| plant.inputs.u = Phases::from_stator(u(t)));
     importer.event(|_| ());
     importer.block.model.observe(importer.now, &mut importer.block.out);
@@ -227,12 +227,12 @@ fn counted(told: u32, u: impl Fn(f64) -> AlphaBeta) -> [f64; 3] {
 #[test]
 fn inputs_between_completed_steps_are_straight_lines() {
     let turning = |t: f64| AlphaBeta::new(75.0 * (450.0 * t + 1.7).cos(), 75.0 * (450.0 * t + 1.7).sin());
-    let apart = |told: u32, u: &dyn Fn(f64) -> AlphaBeta| {
-        let (ours, fine) = (counted(told, u), counted(1, u));
+    let apart = |reported: u32, u: &dyn Fn(f64) -> AlphaBeta| {
+        let (ours, fine) = (counted(reported, u), counted(1, u));
         assert!(fine[0].abs() > 1.0, "{fine:?}");
         ours.iter().zip(fine).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) / fine[0].abs()
     };
-    // Lines: as exact in one step of 20 ms as in 10 000 of 2 us.
+    // Straight lines: as exact in one step of 20 ms as in 10 000 of 2 us.
     let line = |t: f64| AlphaBeta::new(20.0 - 3000.0 * t, 60.0 + 2000.0 * t);
     let held = |_: f64| AlphaBeta::new(5.0, 60.0);
     for u in [&line as &dyn Fn(f64) -> AlphaBeta, &held] {
@@ -240,7 +240,7 @@ fn inputs_between_completed_steps_are_straight_lines() {
         assert!(off < 1e-6, "{off}");
     }
     // Curves: of second order in the step for the power of the chord, of third for the current that it drives.
-    let [coarse, fine] = [20, 10].map(|told| apart(told, &turning));
+    let [coarse, fine] = [20, 10].map(|reported| apart(reported, &turning));
     println!("curved inputs: {coarse} at 40 us, {fine} at 20 us");
     assert!((3.9..8.1).contains(&(coarse / fine)), "{coarse}, {fine}");
     assert!(fine < 2.0 * (450.0_f64 * 2e-5).powi(2) / 12.0, "{fine}");
@@ -252,7 +252,7 @@ fn what_a_solver_tries_is_not_counted() {
     voltage(&mut importer.block.model, 0.0, 150.0);
     importer.run(1e-3, |plant, t| plant.inputs.angle_shaft = 150.0 * t);
     let mut tried = importer.block.clone();
-    // Other states, inputs and times, and back: a step that is rejected, or an event that is searched for.
+    // Other states, inputs and times, and back: as for a rejected step or the search for an event.
     let (before, inputs) = (tried.model.clone(), tried.model.inputs.clone());
     for k in 1..50 {
         *PmsmPlant::STATES[0].at(&mut tried.model) = 0.01 * f64::from(k);
@@ -269,7 +269,7 @@ fn what_a_solver_tries_is_not_counted() {
     tried.model.settle();
     tried.model.inputs = inputs;
     assert_eq!(tried.model, before);
-    // Told twice, or told without the time going on, is told once.
+    // A point that is reported twice counts once.
     tried.model.complete(importer.now).unwrap();
     tried.model.complete(importer.now).unwrap();
     assert_eq!(tried.model, before);
@@ -277,12 +277,12 @@ fn what_a_solver_tries_is_not_counted() {
 
 #[test]
 fn blocking_diodes_lose_what_remains() {
-    // 2 A at 20 rad/s when the gates open: what is stored returns to the link, and the rest is lost in the event.
-    let run = |told: u32| {
+    // 2 A at 20 rad/s when the gates open: the stored energy returns to the link, and the rest is lost in the event.
+    let run = |reported: u32| {
         let mut model = plant(|_| ()).model;
         (model.parameters.mechanics.imposed, model.parameters.initial.speed) = (false, 20.0);
         model.inputs.u = Phases { a: 30.0, b: 20.0, c: -50.0 };
-        let mut importer = Importer::new(model, 1e-7, told);
+        let mut importer = Importer::new(model, 1e-7, reported);
         importer.run(1e-3, |_, _| ());
         importer.event(|plant| plant.inputs.enable = false);
         let mut z = [0.0; 2];
@@ -298,19 +298,19 @@ fn blocking_diodes_lose_what_remains() {
         importer.block.model.observe(importer.now, &mut importer.block.out);
         importer.block
     };
-    for told in [1, 10, 0] {
-        let block = run(told);
+    for reported in [1, 10, 0] {
+        let block = run(reported);
         let PlantParameters { mechanics, .. } = &block.model.parameters;
         let Energy { r#in, mech, loss } = block.out.energy;
         let kinetic = 0.5 * mechanics.J * (block.out.speed * block.out.speed - 400.0);
         assert!(block.out.i == Phases::default(), "{:?}", block.out.i);
         let rest = r#in - mech - loss - kinetic;
-        println!("told {told}: {rest} J of {in} J, {loss} J lost");
-        assert!(rest.abs() < 2e-6 * r#in && loss > 1e-3, "told {told}: {rest} J of {in} J, {loss} J lost");
+        println!("reported {reported}: {rest} J of {in} J, {loss} J lost");
+        assert!(rest.abs() < 2e-6 * r#in && loss > 1e-3, "reported {reported}: {rest} J of {in} J, {loss} J lost");
     }
 }
 
-/// The means, and the powers and the torque that the outputs show.
+/// The means, and the powers and the torque of the outputs.
 fn shown(drive: &Block<PmsmDrive>) -> ([f64; 4], [f64; 4]) {
     let (Means { p_in, p_mech, p_loss, tau_shaft }, now) = (drive.out.means, &drive.out.plant.powers);
     ([p_in, p_mech, p_loss, tau_shaft], [now.p_in, now.p_mech, now.p_loss, now.tau_shaft])
@@ -324,9 +324,9 @@ fn the_means_of_both_interfaces_agree() {
         let mut stepped = Block { model: traction(), ..Block::default() };
         stepped.model.inputs.speed_shaft = speed;
         stepped.initialize();
-        let exchanged = [1, 0].map(|told| Importer::new(stepped.model.clone(), 12.5e-6, told));
+        let exchanged = [1, 0].map(|reported| Importer::new(stepped.model.clone(), 12.5e-6, reported));
         let mut exchanged = exchanged;
-        assert_eq!(shown(&stepped).0, [0.0; 4], "before the first period is over");
+        assert_eq!(shown(&stepped).0, [0.0; 4], "before the end of the first period");
         let mut now = Elapsed::ZERO;
         let mut ripple = 0.0_f64;
         for k in 0..3000 {
@@ -339,7 +339,7 @@ fn the_means_of_both_interfaces_agree() {
             for importer in &mut exchanged {
                 importer.block.model.observe(importer.now, &mut importer.block.out);
                 let early = shown(&importer.block).0;
-                assert!(k > 0 || early == [0.0; 4], "before the first period is over: {early:?}");
+                assert!(k > 0 || early == [0.0; 4], "before the end of the first period: {early:?}");
                 importer.run(T_s, |drive, t| drive.inputs.angle_shaft = speed * t);
                 let (ours, instant) = shown(&importer.block);
                 for (a, b) in ours.iter().zip(theirs) {

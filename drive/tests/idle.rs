@@ -1,4 +1,4 @@
-//! A value without effect is reported by name, once; and what is reported has none.
+//! A value without effect is reported by name, once, and only such values are reported.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::control::start::StartMode;
@@ -9,7 +9,7 @@ use fmu_core::idle::Watch;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Causality, Elapsed, Model, Slot, Step, Warns};
 
-/// Messages of a watch that looks for the first time.
+/// Messages of a watch at its first check.
 fn said<M: Model>(block: &mut Block<M>, watch: &mut Watch) -> Vec<String> {
     let mut all = Vec::new();
     watch.look(block, |message| all.push(message.to_owned()));
@@ -67,7 +67,7 @@ fn the_models_name_what_has_no_effect() {
     }
 }
 
-/// An input is looked at until it is set, and reported once.
+/// An input is checked until it is set, and reported once.
 #[test]
 fn an_input_that_is_set_later_is_named_then() {
     let (mut block, mut watch) = (Block::<PmsmDrive>::default(), Watch::default());
@@ -77,7 +77,7 @@ fn an_input_that_is_set_later_is_named_then() {
     assert!(said(&mut block, &mut watch).is_empty());
 }
 
-/// Values of a drive at work: an electrical period, with a load, over a start of each kind.
+/// Outputs of a drive over an electrical period with a load, after a start of each kind.
 fn outputs(block: &mut Block<PmsmDrive>) -> Option<Vec<u64>> {
     block.model.derive();
     block.model.validate().ok()?;
@@ -99,7 +99,7 @@ fn outputs(block: &mut Block<PmsmDrive>) -> Option<Vec<u64>> {
     Some(bits)
 }
 
-/// Moves a value to another one that is allowed.
+/// Changes a value to another allowed one.
 fn moved(block: &mut Block<PmsmDrive>, index: usize) {
     match PmsmDrive::TABLE.entry(block, index) {
         Some((meta, Slot::Real(x))) => {
@@ -113,7 +113,7 @@ fn moved(block: &mut Block<PmsmDrive>, index: usize) {
     }
 }
 
-/// With every estimator, and in both modes: what is reported as without effect changes no bit.
+/// With every estimator and in both modes, a value that is reported as without effect changes no bit.
 #[test]
 fn what_is_reported_has_no_effect() {
     let (mut tried, mut wrong) = (0, Vec::new());
@@ -156,7 +156,7 @@ fn what_is_reported_has_no_effect() {
     assert!(wrong.is_empty() && tried > 1000, "have an effect: {wrong:#?}");
 }
 
-/// `PmsmDriveMean` has no diodes: beyond its limits it says so, once.
+/// `PmsmDriveMean` has no diodes, and reports once that they would conduct.
 #[test]
 fn a_drive_that_cannot_be_is_named_once() {
     for enable in [true, false] {

@@ -1,4 +1,4 @@
-//! `voltage_limited` and `current_limited` say that the drive is at a limit, and only then.
+//! `voltage_limited` and `current_limited` are true exactly when the drive is at a limit.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::{Pair, PmsmDrive};
@@ -41,7 +41,7 @@ fn a_speed_step_runs_at_the_current_limit() {
 
 #[test]
 fn a_load_above_the_limit_stays_there() {
-    // 6 A give 4.05 N.m; the torque limit acts as well.
+    // 6 A give 4.05 N.m; the torque limit is also active.
     assert!(shares(1000.0, 4.5, 325.0, 0.35, |_| ()).1 > 0.95);
     assert!(shares(1000.0, 2.0, 325.0, 0.5, |p| p.controller.model.parameters.limit.tau = 1.5).1 > 0.95);
     let torque_mode = |tau_ref: f64| {
@@ -67,27 +67,27 @@ fn warnings(tau: f64, set: impl FnOnce(&mut PmsmDrive)) -> Vec<(&'static str, St
     set(&mut drive.model);
     drive.initialize();
     drive.model.validate().unwrap();
-    let (mut now, mut told) = (Elapsed::ZERO, Vec::new());
+    let (mut now, mut logged) = (Elapsed::ZERO, Vec::new());
     for k in 0..1000_u32 {
         drive.model.inputs.speed_ref = 50.0;
         drive.model.inputs.tau_load = if k >= 500 { tau } else { 0.0 };
         let step = Step { start: now, h: 1e-3 };
         drive.step(&step).unwrap();
         now = step.end();
-        let mut sink = |(_, key, message): fmu_core::log::Said<'_>| told.push((key, message()));
+        let mut sink = |(_, key, message): fmu_core::log::Said<'_>| logged.push((key, message()));
         drive.model.warn(&mut Warnings::to(&mut sink));
     }
-    told
+    logged
 }
 
-/// A load of twice what the drive gives is reported once, by name, in either direction; one that it can carry is not, nor one
-/// that an imposed shaft does not have.
+/// A load of more than twice the torque of the drive is reported once, by name, in either direction; a smaller one is not, nor
+/// the load of an imposed shaft.
 #[test]
 fn a_load_far_above_the_torque_is_reported_once() {
     for (tau, reported) in [(100.0, true), (-100.0, true), (3.0, false), (-3.0, false)] {
-        let told = warnings(tau, |_| ());
-        let loads: Vec<_> = told.iter().filter(|(key, _)| *key == "tau_load").collect();
-        assert_eq!(loads.len(), usize::from(reported), "{tau} N.m: {told:?}");
+        let logged = warnings(tau, |_| ());
+        let loads: Vec<_> = logged.iter().filter(|(key, _)| *key == "tau_load").collect();
+        assert_eq!(loads.len(), usize::from(reported), "{tau} N.m: {logged:?}");
         for (_, message) in loads {
             for part in [&format!("tau_load = {tau} N.m"), "tau_min", "4.05 N.m", "controller.limit.i"] {
                 assert!(message.contains(part), "{part}: {message}");
@@ -99,7 +99,7 @@ fn a_load_far_above_the_torque_is_reported_once() {
     );
 }
 
-/// At the greatest bandwidth, the current stays near its limit; the drive that is refused leaves it by far.
+/// At the maximum bandwidth, the current stays near its limit; a refused drive exceeds it by far.
 #[test]
 fn the_current_loop_holds_its_limit_at_the_bound() {
     let greatest = |T_s: f64, active: bool| {

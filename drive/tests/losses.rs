@@ -1,5 +1,5 @@
-//! The power balance with all losses on: at drawn instants and over 20 ms; Model Exchange against co-simulation; which
-//! variables the currents depend on.
+//! The power balance with all losses on, at random instants and over 20 ms; Model Exchange against Co-Simulation; dependencies
+//! of the currents.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::frame::{AlphaBeta, Phases};
@@ -11,7 +11,7 @@ use drive::{PmsmDrive, PmsmPlant};
 use fmu_core::{Block, Capabilities, ContinuousTime, Description, Elapsed, Events, Exported, Step, integrate};
 use std::f64::consts::PI;
 
-/// Every loss, of a machine with 2.2 kW.
+/// Sets every loss, for a machine of 2.2 kW.
 fn lossy(par: &mut PlantParameters) {
     par.motor = Motor::IPMSM_2_2_KW;
     (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2.7e-4, 0.127, 1e-7);
@@ -22,7 +22,7 @@ fn lossy(par: &mut PlantParameters) {
     (par.inverter.dead_time, par.inverter.i_zero) = (2e-6, 0.1);
 }
 
-/// The same machine, warm.
+/// The same, with a warm machine.
 fn warm(par: &mut PlantParameters) {
     (par.thermal.alpha_R, par.thermal.alpha_psi, par.thermal.T_start) = (3.93e-3, -1.1e-3, 393.15);
 }
@@ -86,7 +86,7 @@ fn the_powers_are_balanced_at_every_instant() {
     assert!(worst < 1e-12 && (200..300).contains(&conducting), "{worst}, {conducting}");
 }
 
-/// The plant at 1500 rpm under the voltage that turns with it, with steps of `h` (s).
+/// The plant at 1500 rpm under a voltage that turns with it, in steps of `h` (s).
 fn turning(h: f64, steps: u32, set: impl Fn(&mut PlantParameters)) -> Block<PmsmPlant> {
     let mut block = Block::<PmsmPlant>::default();
     let par = &mut block.model.parameters;
@@ -212,7 +212,7 @@ fn a_machine_that_coasts_is_braked_by_its_iron() {
     let (lost, energy) = (before - kinetic(&block), block.out.energy);
     println!("{lost} J, {energy:?}, {:?}", block.out.powers);
     assert!((lost / energy.loss - 1.0).abs() < 1e-6 && block.out.powers.losses.iron > 40.0, "{lost} J of {energy:?}");
-    // In Model Exchange the same brake acts.
+    // In Model Exchange the braking torque is the same.
     let mut dx = [0.0; 4];
     block.model.event(Elapsed::ZERO).unwrap();
     block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();

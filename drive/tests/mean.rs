@@ -66,7 +66,7 @@ fn traction() -> (PlantParameters, ControllerParameters) {
     (lossy::c().par, controller)
 }
 
-/// Runs a drive for `seconds` in steps of `h` (s); `set` sees the inputs before each with the time, `each` the outputs after.
+/// Runs a drive for `seconds` in steps of `h` (s); `set` gets the inputs and the time before each, `each` the outputs after.
 fn run<D: Drive>(
     block: &mut Block<D>,
     seconds: f64,
@@ -87,7 +87,7 @@ fn run<D: Drive>(
     }
 }
 
-/// Torque references that give the cycle's torque at the shaft, at the middle of each step of 10 ms, with the speed there.
+/// Torque references for the cycle's torque at the shaft in the middle of each step of 10 ms, with the speed there.
 fn references() -> Vec<[f64; 2]> {
     let (plant, controller) = traction();
     let (drive, vehicle) = (Steady::new(plant, controller).sampled(), Vehicle::new());
@@ -251,14 +251,14 @@ fn the_speed_loop_is_that_of_the_drive() {
     }
 }
 
-/// What comes from the link is in the shaft, the load or the losses, whatever step and mode; and it is as much as with small steps.
+/// The energy from the link equals that of shaft, load and losses at any step and in both modes, and that with small steps.
 #[test]
 fn the_energy_is_balanced_at_every_step() {
     let (plant, mut controller) = traction();
     let mut plant = plant;
     (plant.mechanics.imposed, plant.mechanics.J) = (false, 1.5);
     controller.speed_loop.bandwidth = 5.0;
-    // Up and down, with and without the gates.
+    // Acceleration and deceleration, with and without the gates.
     let ramp = |t: f64| 20.0 * t.min(20.0).min((40.0 - t).max(0.0));
     for (torque_mode, coasts) in [(false, false), (true, false), (false, true)] {
         controller.speed_loop.torque_mode = torque_mode;
@@ -280,13 +280,13 @@ fn the_energy_is_balanced_at_every_step() {
             }
             println!("torque mode {torque_mode}, coasts {coasts}, h = {h}: {worst:.3e} J of {most} J ({reference} J)");
             assert!(worst < 1e-9 * most, "h = {h}: {worst} J of {most} J");
-            // The reference on its ramp is held over a step: with 50 ms, the shaft is 0.5 rad/s behind.
+            // The reference on its ramp is constant over a step: with 50 ms, the shaft is 0.5 rad/s behind.
             assert!(h > 0.02 || (most / reference - 1.0).abs() < 1e-3, "h = {h}: {most} J, not {reference} J");
         }
     }
 }
 
-/// Gates off: the shaft coasts under friction and iron, and the link gives nothing.
+/// With the gates off, the shaft coasts under friction and iron loss, and the link supplies nothing.
 #[test]
 fn without_enable_the_shaft_coasts() {
     let (mut plant, controller) = (lossy::b().par, machines::b().parameters());
@@ -338,7 +338,7 @@ fn the_temperatures_are_those_of_the_drive() {
     assert!((ours.plant.heat.coolant / theirs.plant.heat.coolant - 1.0).abs() < 1e-3);
 }
 
-/// Model Exchange: the classical Runge-Kutta method on the derivatives gives what Co-Simulation gives.
+/// Model Exchange: the classical Runge-Kutta method on the derivatives gives the results of Co-Simulation.
 #[test]
 fn both_interfaces_agree() {
     let (mut plant, mut controller) = (lossy::b().par, machines::b().parameters());
@@ -391,7 +391,7 @@ fn both_interfaces_agree() {
     assert!(network.validate_for(fmu_core::Interface::ModelExchange).is_err(), "the network needs Co-Simulation");
 }
 
-/// One replaces the other: all variables of `PmsmDrive` under their names, with kind, unit, range and start value.
+/// All variables of `PmsmDrive` exist with the same name, kind, unit, range and start value.
 #[test]
 fn it_has_the_variables_of_the_drive() {
     let [whole, mean] = [Description::of::<PmsmDrive>(), Description::of::<PmsmDriveMean>()].map(Result::unwrap);
@@ -413,7 +413,7 @@ fn it_has_the_variables_of_the_drive() {
     assert!(without > 60 && with > 60 && mean.variables.len() == whole.variables.len() + 3);
 }
 
-/// All outputs as bits after a run with the parameter `index` moved, or `None` if the value is refused.
+/// All outputs as bits after a run with the parameter `index` changed, or `None` if the value is refused.
 fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let (mut plant, mut controller) = traction();
     if case == 3 {
@@ -440,7 +440,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let moved = index.and_then(|index| PmsmDriveMean::TABLE.locate(index));
     let map = &mut block.model.drive.plant.flux_map;
     match moved.as_ref().map_or("", |(name, ..)| name) {
-        // A machine of other inductances; with one of these alone it would not be a machine.
+        // A machine with other inductances; one of these values alone would be no valid machine.
         "plant.flux_map.w" => map.w.iter_mut().flatten().for_each(|w| *w *= 1.2),
         "plant.flux_map.d_min" | "plant.flux_map.d_max" => (map.d_min, map.d_max) = (1.2 * map.d_min, 1.2 * map.d_max),
         _ => (),
@@ -450,7 +450,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
         match PmsmDriveMean::TABLE.entry(&mut block, index)? {
             (meta, Slot::Real(x)) => {
                 let moved = if *x == 0.0 { 0.3 } else { 0.8 * *x };
-                // Only without bandwidth does the trim settle elsewhere.
+                // The trim settles elsewhere only without bandwidth.
                 let moved = if meta.description.contains("0: no trim") { 0.0 } else { moved };
                 *x = if meta.range.contains(moved) { moved } else { *x * 1.1 };
             }
@@ -484,7 +484,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     Some(bits)
 }
 
-/// What a description says of a parameter's effect is true.
+/// The descriptions state the effect of each parameter correctly.
 #[test]
 fn parameters_have_an_effect_or_say_that_they_have_none() {
     let plain = [0, 1, 2, 3].map(|case| with_moved(None, case).unwrap());
@@ -509,16 +509,16 @@ fn parameters_have_an_effect_or_say_that_they_have_none() {
 #[test]
 fn a_request_beyond_the_limits_is_clipped_and_told() {
     let (plant, controller) = traction();
-    for (tau_ref, told) in [(100.0, false), (200.0, true)] {
+    for (tau_ref, clipped) in [(100.0, false), (200.0, true)] {
         let mut block = PmsmDriveMean::new(&plant, &controller);
         let set = |_, i: &mut DriveInputs| (i.u_dc, i.tau_ref, i.speed_shaft) = (400.0, tau_ref, 630.0);
         run(&mut block, 1.05, 0.01, set, |_, _| ());
         let out = &block.out.drive.controller;
-        assert_eq!((out.current_limited, out.voltage_limited), (told, false), "{out:?}");
+        assert_eq!((out.current_limited, out.voltage_limited), (clipped, false), "{out:?}");
         assert!(out.weakens && out.tau_max < 110.0 && out.tau_max > 100.0, "{out:?}");
         let mut messages = Vec::new();
         let mut sink = |(_, key, message): fmu_core::log::Said<'_>| messages.push((key, message()));
         block.model.warn(&mut Warnings::to(&mut sink));
-        assert_eq!(messages.iter().any(|(key, text)| *key == "tau_ref" && text.contains("tau_ref = 200 N.m")), told);
+        assert_eq!(messages.iter().any(|(key, text)| *key == "tau_ref" && text.contains("tau_ref = 200 N.m")), clipped);
     }
 }

@@ -1,4 +1,5 @@
-//! Model Exchange natively: derivatives and events, integrated in steps of 1 us between events, against co-simulation.
+//! Model Exchange of the native models: derivatives and events, integrated in steps of 1 us between events, against
+//! Co-Simulation.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
@@ -15,10 +16,10 @@ use std::f64::consts::PI;
 
 const T_S: f64 = 1e-4;
 const RPM: f64 = PI / 30.0;
-/// Longest integration step in s.
+/// Maximum integration step in s.
 const FINE: f64 = 1e-6;
 
-/// A model in co-simulation, and the same one integrated from its derivatives and events.
+/// A model in Co-Simulation, and the same model integrated from its derivatives and events.
 struct Both<M: Model, const N: usize> {
     stepped: Block<M>,
     integrated: Block<M>,
@@ -83,7 +84,7 @@ fn the_drive_starts_from_the_opposite_angle_and_takes_a_load_step() {
 
 #[test]
 fn the_drive_does_not_depend_on_the_importers_step() {
-    // The events at k T_s come wherever the communication points are.
+    // The events at k T_s do not depend on the communication points.
     let run = |h: f64, steps: u32| {
         let mut drive = Block::<PmsmDrive>::default();
         drive.model.inputs.speed_ref = 30.0;
@@ -116,7 +117,7 @@ fn an_enabled_plant_is_integrated_to_the_same_currents() {
     };
     // Most of the voltages lie outside of the hexagon of this link.
     let limited = |plant: &mut PmsmPlant| plant.inputs.u_dc = 95.0;
-    // Dead time has kinks, which cost the substeps of co-simulation their order.
+    // Dead time has kinks, which reduce the order of the substeps of Co-Simulation.
     let cases = [
         ("dead time", dead_time, 5e-4, 1e-4),
         ("linear", |_| (), 1e-7, 1e-6),
@@ -169,9 +170,9 @@ fn gates_off_the_current_decays_and_the_diodes_block() {
     }
     println!("{largest:?}, blocked after {gone:?} us");
     assert!(gone[0].abs_diff(gone[1]) <= 1 && gone[1] > 10, "{gone:?} us");
-    // Co-simulation blocks at the end of a step: up to 1 us of the torque of 0.1 A later.
+    // Co-Simulation blocks at the end of a step: up to 1 us later, with the torque of 0.1 A.
     assert!(largest.0 < 1e-4 && largest.1 < 5e-5, "{largest:?}");
-    // Blocked, the machine coasts; only friction slows it down.
+    // With blocking diodes the machine coasts; only friction brakes it.
     plant.step(0.2, FINE);
     let (di, dw) = apart(&plant.stepped.out, &plant.integrated.out);
     assert!(di == 0.0 && dw < 5e-5 && plant.integrated.out.speed < 97.0, "{di} A, {dw} rad/s");
@@ -230,7 +231,7 @@ fn indicators_stand_on_the_side_of_the_decision() {
     let before = z(&plant.model);
     assert!(!plant.model.event(Elapsed::ZERO).unwrap().states_changed);
     assert!(before[1].abs() < 2e-9 && z(&plant.model)[1] != 0.0, "{before:?} {:?}", z(&plant.model));
-    // A remaining current is thrown away once: a second event changes nothing.
+    // A remaining current is discarded once: a second event changes nothing.
     *PmsmPlant::STATES[2].at(&mut plant.model) = 10.0;
     *PmsmPlant::STATES[1].at(&mut plant.model) += 1e-4;
     assert!(plant.model.event(Elapsed::ZERO).unwrap().states_changed);
@@ -251,7 +252,7 @@ fn an_imposed_shaft_replaces_the_mechanical_states() {
     for k in 0..200 {
         let angle = speed * T_S * f64::from(k);
         plant.set(|plant| (plant.inputs.speed_shaft, plant.inputs.angle_shaft) = (speed, angle));
-        // Between two events, the importer moves the angle along.
+        // Between two events, the importer advances the angle.
         let step = Step { start: plant.now, h: T_S };
         plant.stepped.step(&step).unwrap();
         let model = &mut plant.integrated.model;
@@ -267,14 +268,14 @@ fn an_imposed_shaft_replaces_the_mechanical_states() {
         let (di, dw) = apart(a, b);
         assert!(di < 1e-5 && dw == 0.0, "{k}: {di} A, {dw} rad/s");
         assert!((a.angle - b.angle).abs() < 1e-9 && (a.tau_e - b.tau_e).abs() < 1e-5, "{a:?} {b:?}");
-        // The state goes with the angle of the shaft too.
+        // The state also follows the angle of the shaft.
         let state = *PmsmPlant::STATES[3].at(&mut plant.integrated.model);
         assert!((state - b.angle).abs() < 1e-9, "{state} {}", b.angle);
     }
     assert!(plant.stepped.out.tau_e.abs() > 0.5, "{:?}", plant.stepped.out);
 }
 
-/// One step of `h` (s) of Heun's method with an input that moves.
+/// One step of `h` (s) of Heun's method with a changing input.
 fn heun(plant: &mut PmsmPlant, now: Elapsed, h: f64, mut input: impl FnMut(&mut PmsmPlant, Elapsed)) {
     let (mut k_1, mut k_2) = ([0.0; 4], [0.0; 4]);
     input(plant, now);
@@ -309,7 +310,7 @@ fn controller() -> Block<SensorlessController> {
     controller
 }
 
-/// Debug text: tells -0 from 0 and every bit of a number.
+/// Debug text, in which -0 differs from 0, and numbers that differ in a bit.
 fn shown(controller: &SensorlessController, now: Elapsed) -> String {
     let mut out = <SensorlessController as Model>::Outputs::default();
     controller.output(now, &mut out);
@@ -318,7 +319,7 @@ fn shown(controller: &SensorlessController, now: Elapsed) -> String {
 
 #[test]
 fn a_controller_with_events_is_the_one_stepped_at_t_s() {
-    // Its inputs are set at every instant, in co-simulation as in the event.
+    // Its inputs are set at every instant, in Co-Simulation and in the event.
     let (mut stepped, mut eventful) = (controller(), controller().model);
     let mut now = Elapsed::ZERO;
     for k in 0..2000 {
@@ -350,7 +351,7 @@ fn a_controller_stepped_at_any_step_is_the_one_with_events() {
             at_instant(held, &mut eventful.inputs);
             let step = Step { start: now, h };
             stepped.step(&step).unwrap();
-            // Every instant of the step, its end not.
+            // Every instant of the step except its end.
             while grid(&eventful).passed(eventful.samples(), step.end()) {
                 let due = Elapsed::periods(eventful.samples(), T_S);
                 eventful.begin(due);
@@ -414,7 +415,7 @@ fn a_lost_rotor_is_warned_of() {
     };
     let mut block = controller();
     let mut now = Elapsed::ZERO;
-    // A voltage that no machine current answers. At speed, no wrong resistance explains it.
+    // A voltage without any current. At speed, no wrong resistance explains it.
     for (speed_ref, resistance) in [(10.0, true), (100.0, false)] {
         (block, now) = (controller(), Elapsed::ZERO);
         assert_eq!(warnings(&block.model), []);
@@ -431,7 +432,7 @@ fn a_lost_rotor_is_warned_of() {
         assert!(found[0].1.contains("rad/s") && found[0].1.contains("L_q = 0.006 H"), "{found:?}");
         assert_eq!(found[0].1.contains("R_s = 1.8 Ohm"), resistance, "{found:?}");
     }
-    // A current beyond all measure: the estimate turns too fast, the controller restarts.
+    // An enormous current: the estimate turns too fast, and the controller restarts.
     block.model.inputs.i = Phases { a: 1e12, b: -1e12, c: 3e11 };
     let mut keys = Vec::new();
     for _ in 0..100 {
@@ -456,7 +457,7 @@ fn the_states_are_rows_of_the_tables() {
     let of_drive = |i| PmsmDrive::TABLE.locate(i).map(|(name, meta, _)| (name, meta.nominal)).unwrap();
     assert_eq!(nominals(plant.rows().unwrap(), &of_plant), expected[..4]);
     assert_eq!(nominals(drive.rows().unwrap(), &of_drive), expected);
-    // A state and its variable are the same number.
+    // A state and its variable have the same value.
     let mut block = Block::<PmsmDrive>::default();
     block.model.pair.plant.model.parameters.initial.speed = 20.0;
     block.initialize();

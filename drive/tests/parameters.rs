@@ -1,4 +1,4 @@
-//! Each parameter has exactly one variable, in the one table of its part: so every refusal can name what it refuses.
+//! Each parameter has exactly one variable, in the table of its part, so every refusal can name the parameter.
 #![allow(missing_docs)]
 
 use drive::PmsmDrive;
@@ -26,7 +26,7 @@ fn leaves(value: &impl Serialize) -> BTreeMap<String, String> {
     found
 }
 
-/// Moves each variable of `table` in turn and looks for the field that moved.
+/// Changes each variable of `table` in turn and finds the changed field.
 fn each_field_has_a_variable<P: Clone + Default + Serialize + 'static>(table: &Table<P>) {
     let start = P::default();
     let before = leaves(&start);
@@ -51,11 +51,11 @@ fn each_field_has_a_variable<P: Clone + Default + Serialize + 'static>(table: &T
         let other = moved.insert(field.clone(), name.clone());
         assert_eq!(other, None, "{field} has two variables, {name} is one");
         if matches!(meta.kind, Kind::Real(_)) {
-            let told = table.tell(&start, |p| match table.entry(p, index) {
+            let named = table.tell(&start, |p| match table.entry(p, index) {
                 Some((_, Slot::Real(x))) => x,
                 other => panic!("{name}: {other:?}"),
             });
-            assert!(told.starts_with(&format!("{name} = ")), "{told}, not {name}");
+            assert!(named.starts_with(&format!("{name} = ")), "{named}, not {name}");
         }
     }
     let without: Vec<&String> = before.keys().filter(|path| !moved.contains_key(*path)).collect();

@@ -1,5 +1,5 @@
-//! Protection of the drive, in Co-Simulation and in Model Exchange: over-current and over-voltage trips, and a sensor that is
-//! lost during the run.
+//! Protection of the drive, in Co-Simulation and in Model Exchange: over-current and over-voltage trips, and the loss of a
+//! sensor during the run.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../control/tests/machines/mod.rs"]
@@ -8,7 +8,7 @@ mod machines;
 use drive::PmsmDrive;
 use drive::control::trip::Cause;
 use drive::estimator::Kind;
-use drive::plant::signals::Gates;
+use drive::plant::inverter::Gates;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, Warns, integrate};
 use machines::{Machine, RPM, b, c};
@@ -92,7 +92,7 @@ fn an_over_voltage_opens_the_gates_until_enable_falls() {
         run.drive.model.inputs.u_dc = 449.9;
         run.run(0.02);
         assert_eq!((run.tripped(), run.gates()), (Cause::None, Gates::Switch));
-        // The first sample beyond trips, and its command acts one sample later.
+        // The first sample above the limit trips, and its command takes effect one sample later.
         run.drive.model.inputs.u_dc = 450.1;
         run.step();
         run.step();
@@ -112,7 +112,7 @@ fn an_over_voltage_opens_the_gates_until_enable_falls() {
     }
 }
 
-/// Above the speed of the diodes, 11 138 rpm, gates off would feed 44 kW into the link at 13 500 rpm.
+/// Above the diode speed, 11 138 rpm, gates off would feed 44 kW into the link at 13 500 rpm.
 #[test]
 fn a_trip_short_circuits_where_the_diodes_would_conduct() {
     for (asc, expected) in [(false, Gates::Off), (true, Gates::Short)] {
@@ -130,7 +130,7 @@ fn a_trip_short_circuits_where_the_diodes_would_conduct() {
         assert_eq!((run.tripped(), run.gates()), (Cause::OverVoltage, expected));
         let p_in = run.drive.out.plant.powers.p_in;
         assert!(if asc { p_in == 0.0 } else { p_in < -35e3 }, "{p_in} W");
-        // Slower, the short circuit ends with some hysteresis: 10 024 rpm.
+        // At lower speeds the short circuit ends, with some hysteresis: 10 024 rpm.
         for (rpm, gates) in [(10_500.0, expected), (9900.0, Gates::Off), (10_500.0, Gates::Off), (11_500.0, expected)] {
             run.drive.model.inputs.speed_shaft = rpm * RPM;
             run.run(5.0 * T_S);
@@ -146,7 +146,7 @@ fn an_over_current_trips_at_the_first_sample_beyond() {
         let mut run = Run::new(&b(), exchange, |drive| {
             let par = &mut drive.pair.controller.model.parameters;
             (par.trip.used, par.trip.i, par.trip.u_dc) = (true, 8.0, 400.0);
-            // A current loop that overshoots, for its resistance is thought to be much less.
+            // A current loop that overshoots, because its estimate of the resistance is much too low.
             (par.motor.L_d, par.motor.L_q) = (0.03, 0.03);
         });
         run.drive.model.inputs.speed_ref = 1500.0 * RPM;
@@ -160,7 +160,7 @@ fn an_over_current_trips_at_the_first_sample_beyond() {
             run.step();
         }
         assert_eq!((run.tripped(), run.gates()), (Cause::OverCurrent, Gates::Off), "{most} A");
-        // The gates opened one sample after the first measurement beyond.
+        // The gates opened one sample after the first measurement above the limit.
         assert!(most > 8.0 && most < 12.0, "{most} A");
         assert!(run.warning().contains("trip.i = 8 A"), "{}", run.warning());
     }
@@ -181,7 +181,7 @@ fn a_trip_that_operation_would_reach_is_refused() {
     assert!(message.contains("trip.u_dc = 300 V") && message.contains("325 V"), "{message}");
     let message = refused(|drive| drive.pair.controller.model.parameters.trip.i = f64::NAN);
     assert!(message.contains("trip.i"), "{message}");
-    // Off, nothing is checked.
+    // Without trips, nothing is checked.
     let mut drive = PmsmDrive::default();
     drive.pair.controller.model.parameters.trip.i = -1.0;
     drive.derive();
@@ -216,7 +216,7 @@ fn a_lost_sensor_hands_over_to_the_fallback() {
             let out = &run.drive.out.controller;
             assert!(out.sensor_lost && out.enabled && out.lock_lost < 0.01, "{fallback:?}: {out:?}");
             assert!(torque < 0.01 && speed < 0.05, "{fallback:?}, {exchange}: {torque} N.m, {speed} rad/s");
-            // The sensor's values do not matter any more, and it does not come back by itself.
+            // The sensor's values have no effect any more, and it does not return by itself.
             run.drive.model.inputs.sensor_valid = true;
             run.run(0.1);
             assert!(run.drive.out.controller.sensor_lost);
@@ -249,7 +249,7 @@ fn a_fallback_that_cannot_work_is_refused() {
     drive.derive();
     let message = drive.validate().unwrap_err().message().to_owned();
     assert!(message.contains("sensor.fallback") && message.contains("PulsatingInjection"), "{message}");
-    // It is checked only where it is in use.
+    // It is checked only if it is in use.
     drive.pair.controller.model.parameters.estimator = Kind::Rasmussen;
     drive.derive();
     drive.validate().unwrap();

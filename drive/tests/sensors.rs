@@ -1,5 +1,5 @@
-//! Errors of the current sensors against their closed forms, for a machine without saliency at a speed well within the bandwidth of the
-//! current loop: an offset d of phase a gives a torque ripple n_p psi_M d at the electrical speed w, a gain error g of one
+//! Errors of the current sensors against closed forms, for a machine without saliency at a speed well within the bandwidth of
+//! the current loop: an offset d of phase a gives a torque ripple n_p psi_M d at the electrical speed w, a gain error g of one
 //! phase a ripple g tau / 3 at 2 w and the mean -g tau / 3.
 #![allow(missing_docs, non_snake_case)]
 
@@ -14,7 +14,7 @@ use std::f64::consts::TAU;
 
 const T_S: f64 = 1e-4;
 
-/// Mean and amplitudes at w and 2 w of the torque (N.m) for the reference `tau` (N.m) with the sensor errors that `set` makes.
+/// Mean and amplitudes at w and 2 w of the torque (N.m) for the reference `tau` (N.m), with the sensor errors of `set`.
 fn torque(tau: f64, exchange: bool, set: impl FnOnce(&mut Sensor)) -> [f64; 3] {
     let machine = b();
     let mut drive = Block::<PmsmDrive>::default();
@@ -75,7 +75,7 @@ fn a_gain_error_makes_a_torque_at_twice_the_electrical_speed() {
         for set in [|s: &mut Sensor| s.gain.a = 1.03, |s: &mut Sensor| s.gain.b = 1.03] {
             let [mean, at_w, at_2w] = torque(tau, exchange, set);
             println!("{mean} N.m, {at_w} N.m, {at_2w} N.m, not {expected} N.m");
-            // To the second order, the loop divides by 1 + g / 3 ...: 2 %.
+            // The second order, from the division by 1 + g / 3 in the loop, is 2 %.
             assert!((at_2w / expected - 1.0).abs() < 0.025, "{at_2w} N.m, not {expected} N.m");
             assert!(((mean - tau) / -expected - 1.0).abs() < 0.025, "{} N.m, not {expected} N.m", mean - tau);
             assert!(at_w < 0.01 * expected, "{at_w} N.m");

@@ -25,7 +25,7 @@ fn shorted(machine: &Machine, rpm: f64, enable: bool) -> Block<PmsmPlant> {
     (par.motor, par.mechanics.imposed) = (machine.motor.clone(), true);
     let inputs = &mut plant.model.inputs;
     (inputs.asc, inputs.enable, inputs.speed_shaft, inputs.u_dc) = (true, enable, rpm * RPM, machine.u_dc);
-    // A command that must not matter.
+    // A command that must have no effect.
     inputs.u.a = 20.0;
     plant.initialize();
     let mut now = Elapsed::ZERO;
@@ -61,7 +61,7 @@ fn currents_and_torque_are_those_of_the_closed_form() {
                 assert!((found - closed_form(&machine, rpm)).magnitude() < 1e-5 * i, "{rpm} rpm: {found:?}");
                 assert!((tau_e / tau - 1.0).abs() < 2e-4, "{rpm} rpm: {tau_e} N.m, not {tau} N.m");
                 assert!((found.magnitude() / i - 1.0).abs() < 1e-4, "{rpm} rpm: {found:?}, not {i} A");
-                // Nothing passes the link, and all braking power is lost in the copper.
+                // No power flows through the link, and all braking power is lost in the copper.
                 assert!(powers.p_in == 0.0 && powers.i_dc == 0.0, "{powers:?}");
                 let braking = -tau_e * rpm * RPM;
                 assert!((powers.losses.cu / braking - 1.0).abs() < 1e-4, "{rpm} rpm: {powers:?}");
@@ -127,7 +127,7 @@ fn the_first_swing_is_that_of_the_flux_linkage_before() {
     }
 }
 
-/// A traction machine with all losses runs down from 3000 rpm.
+/// A traction machine with all losses coasts down from 3000 rpm.
 fn runs_down(exchange: bool) -> Block<PmsmPlant> {
     let machine = c(240.0);
     let mut plant = Block::<PmsmPlant>::default();

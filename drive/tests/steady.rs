@@ -1,4 +1,4 @@
-//! The algebra of the steady state: figures of an independent calculation, and points of a drive that has settled.
+//! The algebra of the steady state against an independent calculation and against a settled drive.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../plant/tests/lossy/mod.rs"]
@@ -117,7 +117,7 @@ fn the_envelope() {
         assert!((speed - rpm).abs() < 1.0, "{speed} rpm, not {rpm}");
     }
     let beyond = at(&bare(&machines::b()), 5400.0, 325.0).ends().map(|point| point.tau_ref);
-    assert!(beyond[1] == 0.0, "no torque beyond the greatest speed: {beyond:?}");
+    assert!(beyond[1] == 0.0, "no torque above the maximum speed: {beyond:?}");
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn the_steady_temperatures() {
     }
 }
 
-/// Means over a second half of a run of PmsmDrive at constant speed (rad/s) and torque reference (N.m): p_in, the five losses,
+/// Means over the second half of a run of PmsmDrive at constant speed (rad/s) and torque reference (N.m): p_in, the five losses,
 /// torque at the shaft, and u_share and the limits at the end.
 fn settled(steady: &Steady, speed: f64, u_dc: f64, tau_ref: f64) -> ([f64; 7], f64, [f64; 2]) {
     let mut block = Block::<PmsmDrive>::default();
@@ -198,7 +198,7 @@ fn settled(steady: &Steady, speed: f64, u_dc: f64, tau_ref: f64) -> ([f64; 7], f
     (sum, out.u_share, [out.tau_min, out.tau_max])
 }
 
-/// The power within 0.05 % and each loss within 0.2 % of a drive with a sensor that has settled.
+/// The power within 0.05 % and each loss within 0.2 % of a settled drive with a sensor.
 #[test]
 fn points_of_a_settled_drive() {
     let b = |torque_reference| (lossy::b(), machines::b(), 2000.0, torque_reference);
@@ -242,7 +242,7 @@ fn compare(steady: &Steady, rpm: f64, u_dc: f64, tau_ref: f64, point: &Point) {
     }
 }
 
-/// At 36 V, the drop of diodes of 0.7 V is a part of the legs' voltage: without it, the conduction loss is 2 % too high.
+/// At 36 V, the drop of diodes of 0.7 V matters in the legs' voltage: without it, the conduction loss is 2 % too high.
 #[test]
 fn the_drop_of_the_devices_is_in_the_legs() {
     let motor = Motor { n_p: 15, R_s: 0.2, L_d: 0.35e-3, L_q: 0.35e-3, psi_M: 0.0155 };
@@ -260,7 +260,7 @@ fn the_drop_of_the_devices_is_in_the_legs() {
     }
 }
 
-/// Saturation, AC copper, a warm machine and wrong estimates; the trim of field weakening at work.
+/// Saturation, AC copper loss, a warm machine and wrong estimates, with the trim of field weakening active.
 #[test]
 fn points_of_a_drive_that_is_not_as_its_controller_thinks() {
     let (drive, machine) = (lossy::a(), machines::a());
@@ -283,7 +283,7 @@ fn points_of_a_drive_that_is_not_as_its_controller_thinks() {
     }
 }
 
-/// Rasmussen's i_d at low speed costs copper loss; the algebra has it.
+/// Rasmussen's i_d at low speed causes copper loss, which the algebra includes.
 #[test]
 fn the_low_speed_law_acts() {
     let mut steady = bare(&machines::b());
@@ -307,7 +307,7 @@ fn without_field_weakening_the_voltage_limits_the_torque() {
     let beyond = at(&steady, 1500.0, machine.u_dc).by_reference(30.0);
     assert!(beyond.tau_e < 29.0 && beyond.tau_e > 5.0 && (beyond.u_share - 1.0).abs() < 1e-9, "{beyond:?}");
     assert_eq!(beyond.region, Region::Limit);
-    // A drive that has settled there has that torque too, but for the corners of the hexagon.
+    // A settled drive has that torque too, except at the corners of the hexagon.
     let none = at(&steady, 2500.0, machine.u_dc).by_reference(30.0);
     assert!(none.tau_e.abs() < 1e-12, "the EMF is above the voltage: {none:?}");
     for weakening in [false, true] {
@@ -333,7 +333,7 @@ fn gates_off_iron_and_friction_brake() {
     }
 }
 
-/// The power that comes in goes out, at the shaft or as a loss, also by the voltage: 1.5 u i.
+/// The input power, also computed as 1.5 u i, is the shaft power plus the losses.
 #[test]
 fn the_powers_are_balanced() {
     for (drive, machine, _) in all() {
@@ -353,7 +353,7 @@ fn the_powers_are_balanced() {
     }
 }
 
-/// Machines whose voltage R i is up to 0.6 of the link's: the greatest torques, with field weakening and without, by brute force.
+/// Maximum torques of machines with R i up to 0.6 of the link's voltage, with and without field weakening, against brute force.
 #[test]
 fn the_limits_of_random_machines() {
     for machine in random_machines::all() {

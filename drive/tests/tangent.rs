@@ -1,4 +1,4 @@
-//! Tangents of plant and drive by dual numbers against central differences, at drawn points.
+//! Tangents of plant and drive by dual numbers against central differences, at random points.
 #![allow(missing_docs)]
 
 use drive::motor::Motor;
@@ -27,14 +27,14 @@ impl Draw {
     }
 }
 
-/// A known: its place in a model, and its size for a change.
+/// A known: its access in a model, and the size of a change.
 struct Known<M: Model> {
     name: &'static str,
     at: fn(&mut Block<M>) -> &mut f64,
     size: f64,
 }
 
-/// The continuous inputs and the states of the plant, with how they change.
+/// The continuous inputs and the states of the plant, with the sizes of their changes.
 fn knowns() -> Vec<Known<PmsmPlant>> {
     macro_rules! state {
         ($k:literal, $size:expr) => {
@@ -88,7 +88,7 @@ fn evaluate<M: Differentiable>(block: &Block<M>) -> Vec<f64> {
 
 /// The tangent along `seed`.
 fn tangent(base: &Block<PmsmPlant>, knowns: &[Known<PmsmPlant>], seed: &[f64]) -> Vec<f64> {
-    // Everything else in `along` is noise that must not matter.
+    // Everything else in `along` is noise, which must have no effect.
     let mut along = base.clone();
     for (known, change) in knowns.iter().zip(seed) {
         *(known.at)(&mut along) = *change;
@@ -112,7 +112,7 @@ fn difference(base: &Block<PmsmPlant>, knowns: &[Known<PmsmPlant>], seed: &[f64]
     central(0.5 * h).iter().zip(central(h)).map(|(fine, coarse)| (4.0 * fine - coarse) / 3.0).collect()
 }
 
-/// What a drawn point is about.
+/// Counts of the kinds of points.
 #[derive(Clone, Copy, Debug, Default)]
 struct Kinds {
     standstill: u32,
@@ -165,7 +165,7 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
     inputs.u_dc = if point % 25 == 7 { 0.0 } else { 100.0 + 300.0 * draw.unit() };
     (inputs.tau_load, inputs.speed_shaft, inputs.angle_shaft) =
         (draw.around(3.0), draw.around(300.0), draw.around(9.0));
-    // Diodes that block at the start would keep the states away.
+    // Diodes that block at the start would fix the states.
     let enable = std::mem::replace(&mut inputs.enable, true);
     block.initialize();
     block.model.inputs.enable = enable;
@@ -207,7 +207,7 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
 fn the_tangent_of_the_plant_is_its_derivative() {
     let (knowns, mut numbers, mut kinds) = (knowns(), Draw(0x9e37_79b9_7f4a_7c15), Kinds::default());
     let mut worst = 0.0_f64;
-    // The row of the efficiency: a value that no other unknown has.
+    // The row of the efficiency, found by its unique value.
     let mut marked = Block::<PmsmPlant>::default();
     marked.out.efficiency = 0.123;
     let efficiency = unknowns(&[0.0; 4], &mut marked).iter().position(|x| x.to_bits() == 0.123_f64.to_bits()).unwrap();
@@ -234,7 +234,7 @@ fn the_tangent_of_the_plant_is_its_derivative() {
         for row in (0..value.len()).filter(|row| kink != Some(*row)) {
             let size = exact.iter().map(|column| column[row].abs()).fold(0.0, f64::max);
             for (exact, near) in exact.iter().zip(&near) {
-                // Rounding of the difference: of values of this size, or of 1 % of 1 where this one is 0, over the step.
+                // Rounding of the difference: values of this size, or 1 % of 1 where the value is 0, divided by the step.
                 let rounding = 1e-10 * value[row].abs() + 1e-12;
                 let error = ((exact[row] - near[row]).abs() - rounding).max(0.0) / size.max(1e-9);
                 assert!(
@@ -271,7 +271,7 @@ fn tangents_are_linear() {
                 "point {point}, unknown {row}"
             );
         }
-        // Whatever else `along` holds does not matter.
+        // Other values in `along` have no effect.
         let none = tangent(&base, &knowns, &vec![0.0; knowns.len()]);
         assert!(none.iter().all(|x| *x == 0.0), "{none:?}");
     }

@@ -1,14 +1,13 @@
 //! Temperatures in plant and drive: R_s(T) and psi_M(T), the network with the losses of three operating points, the
 //! drive against the pair, imposed temperatures, and what is refused.
 //!
-//! Figures: an independent calculation for three machines (the reference, section 3): a, the 2.2 kW machine of Kim
-//! & Sul; b, the reference motor; c, a traction machine (gym-electric-motor's default, which cites DOI
+//! The figures are an independent calculation for three machines: a, the 2.2 kW machine of Kim & Sul; b, the reference motor; c, a traction machine (gym-electric-motor's default, which cites DOI
 //! 10.1109/TPEL.2020.3006779). The thermal parameters are assumed.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::control::current::CurrentLoop;
 use drive::control::envelope::{Envelope, Limit, WarmStart};
-use drive::control::tables::Limits;
+use drive::control::limits::Limits;
 use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
 use drive::motor::Motor;
@@ -61,7 +60,7 @@ fn the_envelope_at_temperature() {
 
 /// An operating point of the figures: machine, link, speed, torque at the shaft, network; coolant in degC and the losses
 /// of copper at 20 degC and of the iron in W; temperatures in degC, steady and after 600 s.
-struct Point {
+struct Figures {
     motor: Motor,
     u_dc: f64,
     rpm: f64,
@@ -77,9 +76,9 @@ fn network([C_winding, C_stator, C_rotor, G_ws, G_sc, G_sr]: [f64; 6]) -> Networ
     Network { C_winding, C_stator, C_rotor, C_inverter: 500.0, G_ws, G_sc, G_sr, G_inverter: 20.0 }
 }
 
-fn points() -> [Point; 3] {
+fn points() -> [Figures; 3] {
     [
-        Point {
+        Figures {
             motor: Motor::IPMSM_2_2_KW,
             u_dc: 540.0,
             rpm: 1500.0,
@@ -90,7 +89,7 @@ fn points() -> [Point; 3] {
             steady: [87.380, 68.345, 72.454],
             late: [48.461, 34.181, 23.493],
         },
-        Point {
+        Figures {
             motor: Motor::default(),
             u_dc: 325.0,
             rpm: 3000.0,
@@ -101,7 +100,7 @@ fn points() -> [Point; 3] {
             steady: [133.570, 100.950, 103.583],
             late: [88.172, 62.338, 47.841],
         },
-        Point {
+        Figures {
             motor: traction(),
             u_dc: 400.0,
             rpm: 3000.0,
@@ -115,8 +114,8 @@ fn points() -> [Point; 3] {
     ]
 }
 
-impl Point {
-    /// The drive on a shaft that turns at constant speed, in torque mode with a sensor and the right estimates.
+impl Figures {
+    /// The drive on a shaft at constant speed, in torque mode with a sensor and exact estimates.
     fn drive(&self) -> Block<PmsmDrive> {
         let mut drive = Block::<PmsmDrive>::default();
         let Pair { plant, controller, .. } = &mut drive.model.pair;
@@ -133,7 +132,7 @@ impl Point {
         drive
     }
 
-    /// Runs on for a time in s, in steps of 1 ms.
+    /// Runs for a time in s, in steps of 1 ms.
     fn run(&self, drive: &mut Block<PmsmDrive>, seconds: f64) {
         let mut now = drive.model.pair.now;
         let until = now.plus(seconds);
@@ -146,8 +145,8 @@ impl Point {
         }
     }
 
-    /// The drive with the losses of the figures, settled at 20 degC: the torque reference and the conductance of the iron
-    /// that give them.
+    /// The drive with the losses of the figures, settled at 20 degC, by adjusting the torque reference and the conductance of
+    /// the iron.
     fn settled(&self) -> Block<PmsmDrive> {
         let [p_20, p_iron] = self.losses;
         let (mut tau, mut G_e) = (self.torque, 1e-4);
@@ -167,8 +166,7 @@ impl Point {
         }
     }
 
-    /// The temperatures (degC) of the network after a time in s, which passes `faster` than it is: with smaller
-    /// capacities.
+    /// The temperatures (degC) of the network after a time in s, shortened by the factor `faster` with smaller capacities.
     fn heated(&self, settled: &Block<PmsmDrive>, seconds: f64, faster: f64) -> [f64; 3] {
         let mut drive = settled.clone();
         let plant = &mut drive.model.pair.plant.model;
@@ -204,7 +202,7 @@ fn the_plant_reaches_the_temperatures_of_the_figures() {
     }
 }
 
-/// Everything that gets warm, quickly.
+/// Sets all losses and a network with short time constants.
 fn quick(plant: &mut PmsmPlant) {
     let par = &mut plant.parameters;
     (par.iron.G_e, par.inverter.devices.r_transistor, par.inverter.devices.r_diode) = (1.3e-4, 0.08, 0.08);
@@ -237,7 +235,7 @@ fn the_drive_with_the_network_is_the_pair_bit_for_bit() {
             drive.step(&step).unwrap();
             now = step.end();
             if k == 3000 / samples {
-                // Saved and restored in the middle: the temperatures are part of the state.
+                // Saved and restored: the temperatures are part of the state.
                 drive = drive.clone();
                 assert!((drive.out.plant.temperatures.winding - 313.15).abs() > 1.0, "{:?}", drive.out.plant);
             }
@@ -270,7 +268,7 @@ fn the_heat_leaves_the_drive() {
         }
         to_coolant
     };
-    // What was lost is in the coolant or still in the capacities.
+    // The lost energy is in the coolant or in the capacities.
     let to_coolant = run(&mut drive);
     let T = &drive.out.plant.temperatures;
     let stored =
@@ -281,7 +279,7 @@ fn the_heat_leaves_the_drive() {
         (to_coolant + stored - lost).abs() < 1e-4 * lost && to_coolant > 0.1 * lost,
         "{to_coolant} {stored} {lost}"
     );
-    // Without the network all losses are given to the coolant at once; imposed, to the four parts.
+    // Without the network, all losses flow to the coolant at once; imposed, to the four parts.
     for (mode, share) in [(ThermalMode::Constant, 1.0), (ThermalMode::Imposed, 0.0)] {
         drive.model.pair.plant.model.parameters.thermal.mode = mode;
         run(&mut drive);
@@ -314,7 +312,7 @@ fn imposed_temperatures_act_in_the_machine() {
     for (celsius, resistance, magnet) in
         [(-20.0, 0.84280, 1.0440), (80.0, 1.23580, 0.9340), (120.0, 1.39300, 0.8900), (150.0, 1.51090, 0.8570)]
     {
-        // At standstill, the voltage over the current; at speed without current, the EMF. They act from the next step on.
+        // Voltage divided by current at standstill; EMF at speed without current. Both change from the next step on.
         let (mut still, mut now) = (imposed(20.0, 20.0), Elapsed::ZERO);
         still.model.parameters.mechanics.imposed = true;
         still.model.inputs.u = Phases::from_stator(AlphaBeta::new(4.0, 0.0));
@@ -336,7 +334,7 @@ fn imposed_temperatures_act_in_the_machine() {
         run(&mut coasting, &mut now, 1e-3);
         let psi = *PmsmPlant::STATES[0].at(&mut coasting.model);
         assert!((psi / 0.15 - magnet).abs() < 1e-9 && coasting.out.i_d == 0.0, "{psi} Wb, {} A", coasting.out.i_d);
-        // Blocking diodes stay closed in Model Exchange too.
+        // Blocking diodes also keep blocking in Model Exchange.
         let mut exchanged = imposed(20.0, 20.0);
         exchanged.model.inputs.enable = false;
         exchanged.initialize();
@@ -421,7 +419,7 @@ fn what_cannot_be_is_refused() {
     };
     refused(&hot, &["T_magnet_imposed = 1300 K", "magnet.alpha = -0.0011 1/K", "flux linkage", "-0.016", "Wb"]);
 
-    // In a step too; the refusal changes nothing.
+    // In a step too, where the refusal changes nothing.
     let (mut block, mut now) = (imposed(20.0, 20.0), Elapsed::ZERO);
     block.initialize();
     run(&mut block, &mut now, 1e-3);

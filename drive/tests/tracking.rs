@@ -31,8 +31,8 @@ fn machines() -> [Machine; 4] {
     ]
 }
 
-/// A drive at `rpm` that takes a load of `tau` (N.m), with the bandwidths of tracker and speed loop in rad/s.
-struct Point<'a> {
+/// A drive at `rpm` with a load of `tau` (N.m) and the bandwidths of tracker and speed loop in rad/s.
+struct Loaded<'a> {
     machine: &'a Machine,
     rpm: f64,
     tau: f64,
@@ -42,8 +42,8 @@ struct Point<'a> {
     w_s: f64,
 }
 
-/// Takes the least bandwidth from the gains of the `controller`, in its stored form: no parameter switches it off.
-fn without_least_bandwidth(controller: &mut SensorlessController) {
+/// Removes the minimum bandwidth from the gains of the `controller`, in its stored form: no parameter disables it.
+fn without_minimum_bandwidth(controller: &mut SensorlessController) {
     let mut stored = serde_json::to_value(&*controller).unwrap();
     let tracker = stored["gains"]["weakening"]["tracker"].as_object_mut().unwrap();
     assert!(tracker.values().any(|value| value.as_f64() > Some(0.0)), "{tracker:?}");
@@ -51,7 +51,7 @@ fn without_least_bandwidth(controller: &mut SensorlessController) {
     *controller = serde_json::from_value(stored).unwrap();
 }
 
-impl Point<'_> {
+impl Loaded<'_> {
     /// The frequency A / rho in rad/s at this point.
     fn by_angle(&self) -> f64 {
         let Machine { motor, i, u_dc, J, .. } = self.machine;
@@ -63,7 +63,7 @@ impl Point<'_> {
         f64::from(motor.n_p) * envelope.slope(i) / (J * self.rho)
     }
 
-    /// Whether a disturbance dies, with or without the tracker's least bandwidth.
+    /// Whether a disturbance decays, with or without the tracker's minimum bandwidth.
     fn held(&self, least: bool) -> bool {
         let &Machine { ref motor, i, u_dc, J, T_s, .. } = self.machine;
         let speed = self.rpm * PI / 30.0;
@@ -82,9 +82,9 @@ impl Point<'_> {
         pair.set_inputs(speed, 0.0, u_dc);
         pair.initialize();
         if !least {
-            without_least_bandwidth(&mut pair.controller.model);
+            without_minimum_bandwidth(&mut pair.controller.model);
         }
-        // The disturbance, then 89 times its duration.
+        // The disturbance, then a pause of 89 times its duration.
         let kick = 1.0 / self.w_s;
         let (mut t, mut low, mut high) = (0.0, f64::INFINITY, 0.0_f64);
         while t < 1.0 + 90.0 * kick {
@@ -103,8 +103,8 @@ impl Point<'_> {
     }
 }
 
-/// The bound separates what is held from what oscillates, over machines, speeds, loads and estimators; the least bandwidth
-/// of the tracker holds both.
+/// The bound separates stable from oscillating drives, over machines, speeds, loads and estimators; the minimum bandwidth of
+/// the tracker keeps both stable.
 #[test]
 fn the_bound_of_the_speed_loop_separates_held_from_oscillating() {
     let points: [&[(f64, f64)]; 4] = [
@@ -117,7 +117,7 @@ fn the_bound_of_the_speed_loop_separates_held_from_oscillating() {
         for &(rpm, tau) in points {
             for kind in [Kind::ExtendedEmf, Kind::FluxObserver, Kind::SlidingMode] {
                 let (tracker, rho) = (TrackerKind::Pll, TAU * 20.0);
-                let mut point = Point { machine, rpm, tau, kind, tracker, rho, w_s: 0.0 };
+                let mut point = Loaded { machine, rpm, tau, kind, tracker, rho, w_s: 0.0 };
                 // With t_is = 4, the part of the speed loop is w_s.
                 let bound = rho - point.by_angle();
                 for (share, expected) in [(0.75, true), (1.15, false)] {
@@ -134,14 +134,14 @@ fn the_bound_of_the_speed_loop_separates_held_from_oscillating() {
     }
 }
 
-/// So does that of the mechanical observer, regardless of the speed loop.
+/// So does the bound of the mechanical observer, regardless of the speed loop.
 #[test]
 fn the_bound_of_the_mechanical_observer_separates_held_from_oscillating() {
     let [.., machine] = machines();
     for (rpm, tau) in [(9000.0, 50.0), (11_400.0, 50.0)] {
         for kind in [Kind::ExtendedEmf, Kind::FluxObserver] {
             let (tracker, machine) = (TrackerKind::MechanicalObserver, &machine);
-            let mut point = Point { machine, rpm, tau, kind, tracker, rho: 1.0, w_s: 10.0 };
+            let mut point = Loaded { machine, rpm, tau, kind, tracker, rho: 1.0, w_s: 10.0 };
             let bound = (0.375 * point.by_angle()).sqrt();
             for (share, expected) in [(1.3, true), (0.85, false)] {
                 point.rho = share * bound;

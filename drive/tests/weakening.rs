@@ -1,6 +1,6 @@
 //! Field weakening in the closed loop with a sensor; [`envelope`](drive::control::envelope) has its algebra.
 //!
-//! Figures: those of the algebra's tests, for the same machines. k_u = 0.95 unless another is named.
+//! The figures are those of the algebra's tests, for the same machines, with k_u = 0.95 unless noted.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../control/tests/machines/mod.rs"]
@@ -72,7 +72,7 @@ impl Drive {
 
 #[test]
 fn between_the_ends_the_voltage_can_be_higher() {
-    // b at 3900 rpm: full generating torque fits the voltage, no load does not (without load up to 3783 rpm).
+    // b at 3900 rpm: full generating torque fits the voltage; without load, the limit is 3783 rpm.
     let (machine, tau, rpm) = (b(), -0.5, 3900.0);
     assert!((machine.limit(rpm, -1.0)[1].tau - 5.0625).abs() < 1e-9);
     let (i, state) = currents(&machine, rpm, tau);
@@ -133,12 +133,12 @@ fn a_sag_of_the_link() {
     let slow = sag(5.0);
     assert!((slow[0] - 14.0).abs() < 1.0 && (slow[1] - 15.4).abs() < 1.5, "{slow:?}");
     assert!((slow[2] - 16.7).abs() < 0.15, "{slow:?}");
-    // A quicker trim takes more torque away at first and is at the new envelope sooner.
+    // A faster trim reduces the torque more at first and reaches the new envelope sooner.
     let quick = sag(20.0);
     assert!((quick[1] - 12.6).abs() < 0.25 && (quick[2] - 17.5).abs() < 0.1, "{quick:?}");
 }
 
-/// Makes an estimate wrong.
+/// Sets a wrong estimate.
 type Wrong = fn(&mut Motor);
 
 /// Share of the true envelope, and of the voltage, at full torque at `n` times the base speed with wrong estimates of a.
@@ -155,7 +155,7 @@ fn with_wrong(set: Wrong, n: f64) -> (f64, f64) {
 
 #[test]
 fn injection_ends_before_field_weakening_begins() {
-    // Hybrid with the highest w_high that is accepted: 126.6 rad/s beside 150 V of injection.
+    // Hybrid with the highest accepted w_high: 126.6 rad/s with 150 V of injection.
     let machine = a();
     for s in [1.0, -1.0] {
         let mut drive = Drive::imposed(&machine, |p| {
@@ -190,7 +190,7 @@ fn wrong_estimates() {
         ("psi_M 1.08", |m| m.psi_M *= 1.08, [0.976, 0.966], false),
         ("L_q 0.8", |m| m.L_q *= 0.8, [1.029, 1.036], true),
         ("L_q 1.2", |m| m.L_q *= 1.2, [0.867, 0.844], false),
-        // At 2.5, the calculation has 0.978, which is where |u| is at 0.950, not 0.980: see below.
+        // At 2.5, the calculation gives 0.978, at which |u| is 0.950, not 0.980: see below.
         ("L_d 1.2", |m| m.L_d *= 1.2, [1.029, 1.0184], true),
     ];
     for (name, set, figures, trimmed) in figures {
@@ -206,8 +206,8 @@ fn wrong_estimates() {
 #[test]
 fn a_wrong_l_d_settles_at_the_mtpv_of_the_estimates() {
     // With L_d^ = 1.2 L_d, psi_M / L_d^ = 12.6 A < 15 A: at 2.5 times base speed the estimates have an MTPV inside the
-    // circle. The trim settles where its currents take 0.98 of the voltage of the true machine: unique, since that voltage
-    // rises with U. (The controller requests 0.03 % more than the mean over a sample, in which the rotor turns 4.5 degrees.)
+    // circle. The trim settles where its currents need 0.98 of the voltage with the true machine. This point is unique, because
+    // that voltage rises with U. (The controller requests 0.03 % more than the mean over a sample, a turn of 4.5 degrees.)
     let (rpm, truth) = (2.5 * 999.14, a());
     let wrong = Envelope::new(&Motor { L_d: 1.2 * truth.motor.L_d, ..truth.motor.clone() }, truth.i);
     let at = |U: f64| {
@@ -254,8 +254,8 @@ fn a_speed_step_to_two_and_a_half_times_base_speed() {
 
 #[test]
 fn a_clipped_request_is_told() {
-    // a at 2000 rpm gives 24.9058 N.m; 24 N.m are within.
-    for (tau, seconds, clipped, told) in
+    // a at 2000 rpm gives 24.9058 N.m; 24 N.m are possible.
+    for (tau, seconds, clipped, warns) in
         [(24.0, 1.1, false, false), (100.0, 0.9, true, false), (100.0, 1.1, true, true), (-100.0, 1.1, true, true)]
     {
         let mut drive = Drive::imposed(&a(), |_| ());
@@ -266,8 +266,8 @@ fn a_clipped_request_is_told() {
         assert!((out.tau_max - 24.9058).abs() < 1e-3 && (out.tau_min + 32.8101).abs() < 1e-3, "{out:?}");
         assert!(out.weakens && (out.u_share - 0.95).abs() < 2e-3, "{out:?}");
         assert_eq!(out.current_limited, clipped, "{tau} N.m");
-        assert_eq!(messages.iter().any(|(key, _)| *key == "tau_ref"), told, "{tau} N.m: {messages:?}");
-        if told {
+        assert_eq!(messages.iter().any(|(key, _)| *key == "tau_ref"), warns, "{tau} N.m: {messages:?}");
+        if warns {
             assert!(messages[0].1.contains(&format!("tau_ref = {tau} N.m has been clipped")), "{messages:?}");
         }
     }
@@ -275,7 +275,7 @@ fn a_clipped_request_is_told() {
 
 #[test]
 fn below_the_base_speed_nothing_changes() {
-    // A ramp and a load step, at 0.6 of the base speed: every bit is as without weakening.
+    // A ramp and a load step at 0.6 of the base speed have the same bits as without weakening.
     for kind in [Kind::Sensored, Kind::Rasmussen] {
         let run = |used: bool| {
             let machine = if kind == Kind::Rasmussen { b() } else { a() };

@@ -1,4 +1,4 @@
-//! Field weakening without a sensor: the drive comes to its speed and stays there, with every estimator.
+//! Field weakening without a sensor: the drive reaches its speed and stays there, with every estimator.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;
@@ -9,8 +9,8 @@ use std::f64::consts::{PI, TAU};
 
 const RPM: f64 = PI / 30.0;
 
-/// Least and greatest speed in rpm, greatest `lock_lost`, in the last three seconds of a ramp to `target` (rpm) within two
-/// seconds and a load of `tau` (N.m).
+/// Minimum and maximum speed in rpm and maximum `lock_lost` in the last three seconds, after a ramp to `target` (rpm) within
+/// two seconds and a load of `tau` (N.m).
 fn settled(mut pair: Pair, target: f64, tau: f64, u_dc: f64) -> (f64, f64, f64) {
     let (mut low, mut high, mut lost) = (f64::INFINITY, 0.0_f64, 0.0_f64);
     pair.set_inputs(0.0, 0.0, u_dc);
@@ -29,7 +29,7 @@ fn settled(mut pair: Pair, target: f64, tau: f64, u_dc: f64) -> (f64, f64, f64) 
     (low, high, lost)
 }
 
-/// The start values with field weakening: without the tracker's least bandwidth, 4235 to 4730 rpm.
+/// The start values with field weakening; without the tracker's minimum bandwidth, 4235 to 4730 rpm.
 #[test]
 fn the_start_values_hold_4500_rpm() {
     let mut wrong = Vec::new();
@@ -54,7 +54,7 @@ fn the_start_values_hold_4500_rpm() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// Hybrid has its own bandwidth above the injection's speeds.
+/// Hybrid has a separate bandwidth above the speeds of injection.
 #[test]
 fn hybrid_holds_a_light_rotor() {
     let mut pair = Pair::default();

@@ -5,7 +5,7 @@
     python examples/drive-train/axis.py target/fmu/fmi3/PmsmDriveMean.fmu
     python examples/drive-train/axis.py target/fmu/fmi3/PmsmDrive.fmu target/fmu/fmi3/PmsmDriveMean.fmu --plot axis.svg
 
-A ball screw moves a table: rapid travel, a cut against a force, rapid travel back. The numerical control gives the speed
+A ball screw moves a table: rapid travel, a cut against a force, rapid travel back. The numerical control sets the speed
 reference every millisecond from position error and speed of the profile; --stop 1 ends earlier.
 """
 

@@ -1,4 +1,4 @@
-"""What the examples share: a drive FMU of FMI 2.0 or 3.0 in a loop of one's own, its tuned parameters, and a plot."""
+"""Shared code of the examples: a drive FMU of FMI 2.0 or 3.0 in a loop written by hand, its tuned parameters, and a plot."""
 
 import sys
 import xml.etree.ElementTree as ET
@@ -59,7 +59,7 @@ class Fmu:
 
 
 def power(run, name="energy_in"):
-    """Mean power in W over each step, from a counter of the drive: p_in of PmsmDrive is the mean over its last T_s alone."""
+    """Mean power in W over each step, from a counter of the drive: p_in of PmsmDrive is the mean over only its last T_s."""
     return np.diff(run[name], prepend=0.0) / np.diff(run["time"], append=2 * run["time"][-1] - run["time"][-2])
 
 
@@ -80,7 +80,7 @@ def arguments(usage):
 
 
 def compare(runs, energies):
-    """Prints the energies in kJ that `energies` makes of each run, and how the first one differs from that of the first run."""
+    """Prints the energies in kJ of each run, from `energies`, and the deviation of the first energy from that of the first run."""
     table = {name: energies(run) for name, run in runs.items()}
     print(f"{'energy in kJ':<16}" + "".join(f"{title:>12}" for title in next(iter(table.values()))))
     for name, row in table.items():
@@ -91,7 +91,7 @@ def compare(runs, energies):
 
 
 def plot(file, runs, panels):
-    """Draws a panel per label with the curves of all runs; `panels` makes {label: values over time} of a run."""
+    """Draws a panel per label with the curves of all runs; `panels` returns {label: values over time} of a run."""
     import matplotlib.pyplot as plt
 
     plt.rcParams.update({"svg.fonttype": "none", "svg.hashsalt": "drive-train", "path.simplify_threshold": 0.5})

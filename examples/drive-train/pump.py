@@ -20,7 +20,7 @@ WATER = 1000 * 9.81  # N/m3
 DEMAND = [0.0, 0.6, 0.6, 0.8, 1.0, 0.9, 0.5, 0.4, 0.0]  # share of the flow, every 20 s
 OUTPUTS = ["speed", "tau_e", *ENERGIES]
 VALUES = tuned("ipmsm-2.2kw")
-# Impeller and water on the shaft (assumed), and losses (assumed), which the machine's file has not.
+# Impeller and water on the shaft, and losses that the machine's file lacks: assumed.
 J = float(VALUES["plant.mechanics.J"]) + 0.02
 VALUES |= {"plant.mechanics.J": J, "controller.mechanics.J": J, "controller.speed_loop.ramp": 40.0}
 VALUES |= {"plant.iron.G_e": 2.7e-4, "plant.iron.G_h": 0.127, "plant.inverter.E_sw": 2.5e-3, "plant.inverter.i_sw": 15.0}

@@ -7,7 +7,7 @@
     python examples/drive-train/vehicle.py target/fmu/fmi3/PmsmDrive.fmu target/fmu/fmi3/PmsmDriveMean.fmu \
         target/map/map.npz --plot vehicle.svg                  # compares them; --stop 60 ends earlier
 
-The driver asks for torque; the drive answers with the torque at its shaft, which moves the vehicle. The vehicle imposes
+The driver requests torque; the drive delivers torque at its shaft, which moves the vehicle. The vehicle imposes
 its speed on the shaft in return. Vehicle and cycle are those of examples/vehicle.
 """
 
@@ -32,7 +32,7 @@ MASS = CAR["mass"] + float(VALUES["plant.mechanics.J"]) * RATIO**2
 
 
 def cell(axis, at):
-    """The cell of a grid, and the place in it from 0 to 1."""
+    """The cell of a grid, and the position in it from 0 to 1."""
     k = min(np.searchsorted(axis, at, "right"), len(axis) - 1) - 1
     return k, (at - axis[k]) / (axis[k + 1] - axis[k])
 
@@ -40,7 +40,7 @@ def cell(axis, at):
 class Map:
     """A drive by the map of `fmu map`: torque at the shaft without delay, losses by bilinear interpolation.
 
-    The map's torque axis is the share x of the limit at that speed, so no cell reaches across the envelope. The losses in W
+    The map's torque axis is the share x of the limit at that speed, so no cell crosses the envelope. The losses in W
     are interpolated, never the efficiency, which is 0/0 without load.
     """
 

@@ -63,7 +63,7 @@ impl Baseline {
     }
 
     /// Known findings that no longer occur.
-    pub fn mended(&self, report: &Report) -> Vec<String> {
+    pub fn fixed(&self, report: &Report) -> Vec<String> {
         let found: Vec<_> = report.violated().map(|f| f.id).collect();
         let ran = |id: &str| report.finding(id).is_some();
         let Some(known) = self.0.get(&key(report)) else { return Vec::new() };

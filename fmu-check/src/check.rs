@@ -1,5 +1,6 @@
 //! The vocabulary of the checker: levels, checks, groups, verdicts and options.
 
+use super::confidence::Confidence;
 use super::fmu_file::FmuFile;
 use super::level::Level;
 use super::session::{NotDetermined, Session};
@@ -100,19 +101,21 @@ pub enum Verdict {
 
 /// A verdict with what only a probe knows about it.
 #[derive(Clone, Debug)]
-pub(super) struct Judgement {
+pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
     /// The level of the finding, if it is lower than that of the check.
     pub(super) lower: Option<Level>,
-    /// A call crashed the process or did not return: an importer would have gone down with it.
+    /// How sure the finding is.
+    pub(super) confidence: Confidence,
+    /// A call crashed the process or did not return: an importer would have crashed or hung.
     pub(super) fatal: bool,
     /// The calls that led to the finding, with what they returned.
     pub(super) calls: Vec<String>,
 }
 
-impl From<Verdict> for Judgement {
+impl From<Verdict> for Conclusion {
     fn from(verdict: Verdict) -> Self {
-        Self { verdict, lower: None, fatal: false, calls: Vec::new() }
+        Self { verdict, lower: None, confidence: Confidence::Certain, fatal: false, calls: Vec::new() }
     }
 }
 
@@ -141,9 +144,11 @@ pub struct Finding {
     pub clause: &'static str,
     /// Level of the check for the standard of this FMU, or of the finding, if that is lower.
     pub level: Level,
+    /// How sure it is.
+    pub confidence: Confidence,
     /// A call of the FMU crashed the process or did not return.
     pub fatal: bool,
-    /// `--allow` or the baseline knows it: it does not count.
+    /// Accepted by `--allow` or listed in the baseline: it does not count.
     pub known: bool,
     /// The calls of a probe that led to the finding, with what they returned; `--replay` repeats them.
     #[serde(skip_serializing_if = "Vec::is_empty")]

@@ -1,6 +1,7 @@
 //! The command `fmu check`: checks whether an FMU conforms to its standard.
 
 use crate::baseline::Baseline;
+use crate::confidence::Confidence;
 use crate::error::Error;
 use crate::report::Report;
 use crate::{self as check, Options, formats, replay, report};
@@ -17,9 +18,11 @@ use std::time::Duration;
 /// process, with limits, so a crash or a hang is a finding. The code of the FMU runs on this computer with your rights: check
 /// only FMUs that you would run. --sandbox takes the network away from it.
 ///
+/// Each finding is certain, likely or a hint: --confidence certain counts the first kind alone.
+///
 /// Exit status: 0 if no must is violated, 1 if one is, 2 if a file is not an FMU. With --strict, a violated should or hard
 /// and a check that is not determined count like a must. With --baseline, every violated check that the file does not have
-/// counts, whatever its level.
+/// counts, at every level.
 ///
 ///   fmu check target/fmu/fmi3/PmsmPlant.fmu
 ///   fmu check other.fmu --format html > report.html
@@ -40,6 +43,9 @@ pub struct CheckArguments {
     /// Run only these checks: ids or group names
     #[arg(long, value_name = "ID,GROUP", value_delimiter = ',')]
     pub only: Vec<String>,
+    /// Findings below this confidence do not count
+    #[arg(long, value_enum, value_name = "CONFIDENCE", default_value_t)]
+    pub confidence: Confidence,
     /// Findings of these checks do not count
     #[arg(long, value_name = "ID", value_delimiter = ',')]
     pub allow: Vec<String>,
@@ -74,7 +80,9 @@ pub struct CheckArguments {
     #[arg(long, value_name = "ID", exclusive = true)]
     pub explain: Option<String>,
     /// Repeat one check of the binary and print its calls with what they return; ID#N for its case N alone
-    #[arg(long, value_name = "ID[#N]", conflicts_with_all = ["format", "only", "allow", "baseline", "write_baseline", "verbose", "strict", "timeout"])]
+    #[arg(long, value_name = "ID[#N]", conflicts_with_all = [
+        "format", "only", "confidence", "allow", "baseline", "write_baseline", "verbose", "strict", "timeout",
+    ])]
     pub replay: Option<String>,
 }
 
@@ -151,6 +159,7 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     for file in &args.files {
         let left = options.timeout.map(|all| all.saturating_sub(began.elapsed()));
         let mut report = check::run(file, &Options { timeout: left, ..options.clone() })?;
+        report.confidence = args.confidence;
         report.allow(&args.allow);
         if let Some(baseline) = &baseline {
             baseline.apply(&mut report);
@@ -184,8 +193,8 @@ fn news(baseline: Option<&Baseline>, reports: &[Report]) -> String {
     let mut out = String::new();
     for report in baseline.map_or(&[][..], |_| reports) {
         let new: Vec<_> = report.unknown().map(|f| f.id).collect();
-        let gone = baseline.map(|b| b.mended(report)).unwrap_or_default();
-        for (what, ids) in [("new", new.join(", ")), ("mended, no longer needed in the baseline", gone.join(", "))] {
+        let gone = baseline.map(|b| b.fixed(report)).unwrap_or_default();
+        for (what, ids) in [("new", new.join(", ")), ("fixed, no longer needed in the baseline", gone.join(", "))] {
             if !ids.is_empty() {
                 let _ = writeln!(out, "{}: {what}: {ids}", report.file);
             }

@@ -25,6 +25,9 @@ pub(super) fn show(v: &ModelVariable, version: FmiVersion, bits: &[u64]) -> Stri
             ((x << shift).cast_signed() >> shift).to_string()
         }
     };
+    if bits.is_empty() {
+        return "no value".into();
+    }
     bits.iter().map(|x| one(*x)).collect::<Vec<_>>().join(" ")
 }
 

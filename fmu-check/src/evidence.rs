@@ -1,8 +1,10 @@
 //! What a probe has left: its findings, its calls, its console, and the verdict from them.
 
-use crate::check::{Judgement, Verdict};
+use crate::check::{Conclusion, Verdict};
+use crate::confidence::Confidence;
 use crate::level::Level;
-use crate::session::{FOUND, Line};
+use crate::lines::Line;
+use crate::session::FOUND;
 use fmu_import::guard::End;
 use std::fs::{self, File};
 use std::io::Read;
@@ -64,54 +66,43 @@ pub(super) fn side_effects(folder: &Path, working_directory: &Path) -> Vec<Strin
 }
 
 /// The verdict from the lines of the probe and from its crashes (how, and in which call).
-pub(super) fn judge(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Judgement {
+pub(super) fn conclude(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)>, slow: Option<String>) -> Conclusion {
     let (mut violated, mut notes, mut not_determined, mut not_applicable) = (Vec::new(), Vec::new(), slow, None);
-    let (mut lesser, mut lower, mut fatal) = (Vec::new(), None, false);
+    let mut fatal = false;
     for line in lines {
         match line {
-            Line::Violated(text) => violated.push(text),
-            Line::Lesser(level, text) => {
-                // The more binding level is the smaller one.
-                lower = Some(lower.map_or(level, |other: Level| other.min(level)));
-                lesser.push(text);
-            }
+            Line::Violated(lower, confidence, text) => violated.push((lower, confidence, text)),
             Line::Note(text) => notes.push(text),
             Line::NotDetermined(why) => not_determined = not_determined.or(Some(why)),
             Line::NotApplicable(why) => not_applicable = not_applicable.or(Some(why)),
-            Line::Case(_) | Line::Integrator(_) | Line::Done => {}
+            Line::Case(_) | Line::Integrator(_) | Line::Varies(_) | Line::Done => {}
         }
     }
     for (how, call) in crashes {
-        if let Some((level, call)) = [(Level::Should, "S "), (Level::Hard, "H ")]
-            .iter()
-            .find_map(|(level, mark)| Some((*level, call.strip_prefix(mark)?)))
-        {
-            lower = Some(lower.map_or(level, |other| other.min(level)));
-            lesser.push(format!("{call} {how}"));
-            fatal = true;
-            continue;
-        }
-        if let Some(call) = call.strip_prefix("C ") {
-            violated.push(format!("{call} {how}"));
-            fatal = true;
-            continue;
-        }
-        // Preparing the probe failed: another check reports that.
-        let call = call.strip_prefix("P ").unwrap_or("the start");
-        if id == "B00" || (["L00", "E00"].contains(&id) && !call.starts_with("loading")) {
-            violated.push(format!("{call} {how}"));
-            fatal = true;
-        } else {
-            not_determined = not_determined.or(Some(format!("{call} {how}, before the probe began")));
+        let marks = [(Some(Level::Should), "S "), (Some(Level::Hard), "H "), (None, "C ")];
+        let marked = marks.iter().find_map(|(level, mark)| Some((*level, call.strip_prefix(mark)?)));
+        // Preparing the probe failed: another check reports that, except in a minimal run.
+        let prepared = call.strip_prefix("P ").unwrap_or("the start");
+        let minimal = id == "B00" || (["L00", "E00"].contains(&id) && !prepared.starts_with("loading"));
+        match marked.or(minimal.then_some((None, prepared))) {
+            Some((level, call)) => {
+                violated.push((level, Confidence::Certain, format!("{call} {how}")));
+                fatal = true;
+            }
+            None => not_determined = not_determined.or(Some(format!("{prepared} {how}, before the probe began"))),
         }
     }
-    let lower = lower.filter(|_| violated.is_empty());
-    violated.extend(lesser);
+    // The more binding level is the smaller one, and that of the check comes first.
+    violated.sort_by_key(|(lower, ..)| lower.is_some());
+    let lower = violated.iter().map(|(lower, ..)| *lower).min().flatten();
+    let decisive = violated.iter().filter(|(of, ..)| *of == lower);
+    let confidence = decisive.map(|(_, confidence, _)| *confidence).min().unwrap_or(Confidence::Certain);
+    let violated: Vec<_> = violated.into_iter().map(|(.., text)| text).collect();
     let verdict = match (violated.is_empty(), not_determined, not_applicable) {
         (false, ..) => Verdict::Violated(violated),
         (_, Some(why), _) => Verdict::NotDetermined(why),
         (_, _, Some(why)) => Verdict::NotApplicable(why),
         _ => Verdict::Pass(notes),
     };
-    Judgement { verdict, lower, fatal, calls: Vec::new() }
+    Conclusion { verdict, lower, confidence, fatal, calls: Vec::new() }
 }

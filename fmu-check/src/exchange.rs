@@ -12,6 +12,8 @@ use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown}
 
 /// Why a run of the integrator cannot go on.
 pub(super) const UNSTABLE: &str = "Euler's method is not stable for this FMU";
+/// What vectors are filled with before a call.
+pub(super) const UNTOUCHED: f64 = f64::from_bits(0xc5c5_c5c5_c5c5_c5c5);
 /// Largest number of updates of one event; an FMU that needs more never ends the event.
 const UPDATES: usize = 100;
 
@@ -33,6 +35,20 @@ impl Session {
             }
             FmiVersion::V3 => self.elements_of(&self.description.event_indicators),
         }
+    }
+
+    /// The values that can be compared, of a vector with the values of these variables.
+    pub(super) fn steady(&self, variables: &[&ModelVariable], values: Vec<f64>) -> Vec<f64> {
+        if self.varying.is_empty() {
+            return values;
+        }
+        let of = variables.iter().flat_map(|v| std::iter::repeat_n(self.is_steady(v), self.elements(v)));
+        values.into_iter().zip(of).filter_map(|(x, steady)| steady.then_some(x)).collect()
+    }
+
+    /// The variables that are the derivatives of the continuous states.
+    pub(super) fn derivative_variables(&self) -> Vec<&ModelVariable> {
+        self.description.derivatives.iter().filter_map(|u| self.description.referenced(u.reference)).collect()
     }
 
     /// A capability of Model Exchange.
@@ -111,7 +127,7 @@ impl Instance<'_> {
 
     /// A vector of Model Exchange, and whether nothing was written past it.
     pub(super) fn vector(&self, name: Vector, n: usize) -> Result<(Status, Vec<f64>, bool), NotDetermined> {
-        let untouched = f64::from_bits(0xc5c5_c5c5_c5c5_c5c5);
+        let untouched = UNTOUCHED;
         let mut values = vec![untouched; n + 8];
         let status = self.call(name.as_str(), |raw| raw.vector(name, self.handle, Some(&mut values), n))?;
         let intact = values[n..].iter().all(|v| v.to_bits() == untouched.to_bits());
@@ -125,6 +141,13 @@ impl Instance<'_> {
         }
         let (status, values, _) = self.vector(name, n)?;
         self.must(name.as_str(), status)?;
+        // What the vector was filled with is no value of the FMU.
+        if values.iter().any(|v| v.to_bits() == UNTOUCHED.to_bits()) {
+            return Err(NotDetermined(format!(
+                "{} did not write all of the {n} values",
+                self.session.raw.name(name.as_str())
+            )));
+        }
         Ok(values)
     }
 
@@ -274,7 +297,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         })
     }
 
-    /// Goes on in Continuous-Time Mode.
+    /// Continues in Continuous-Time Mode.
     pub(super) fn resume(instance: &'a Instance<'b>, next: Option<f64>) -> Result<Self, NotDetermined> {
         Ok(Self::new(instance, next, instance.indicators()?))
     }
@@ -354,7 +377,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         let outputs: Vec<_> = session.watched().into_iter().filter(|v| v.base == BaseType::Float64).collect();
         let mut rows = Vec::new();
         self.run(steps, &mut |instance| {
-            let mut row = instance.states()?;
+            let mut row = session.steady(&session.description.states(), instance.states()?);
             row.extend(instance.snapshot(&outputs)?.into_iter().flatten().map(f64::from_bits));
             rows.push(row);
             Ok(())
@@ -363,8 +386,8 @@ impl<'a, 'b> Importer<'a, 'b> {
     }
 }
 
-/// The least scale of a deviation: what is small beside it is noise about 0.
-const LEAST_SCALE: f64 = 1e-6;
+/// Minimum scale of a deviation: anything far below it is noise around 0.
+const MIN_SCALE: f64 = 1e-6;
 
 /// Whether two vectors differ by more than rounding.
 pub(super) fn differ(a: &[f64], b: &[f64]) -> bool {
@@ -383,7 +406,7 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
             if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
                 0.0
             } else {
-                (x - y).abs() / scale.max(LEAST_SCALE)
+                (x - y).abs() / scale.max(MIN_SCALE)
             }
         });
         let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
@@ -392,7 +415,13 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
 }
 
 impl Session {
-    /// A complete run of each interface that this binary has, which nobody judges.
+    /// Whether this binary has Model Exchange.
+    pub(super) fn exchanges_here(&self) -> bool {
+        let own = self.binary.file_stem().unwrap_or_default();
+        self.description.model_exchange.as_ref().is_some_and(|i| own == i.model_identifier.as_str())
+    }
+
+    /// A complete run of each interface of this binary, without findings.
     pub(super) fn complete_run(&self) -> Result<(), NotDetermined> {
         let d = &self.description;
         if d.co_simulation.is_some() {
@@ -405,8 +434,7 @@ impl Session {
             let _ = instance.simple(Simple::Terminate)?;
             instance.free()?;
         }
-        let own = self.binary.file_stem().unwrap_or_default();
-        if d.model_exchange.as_ref().is_some_and(|i| own == i.model_identifier.as_str()) {
+        if self.exchanges_here() {
             let instance = self.exchange(State::Event)?;
             let run = Importer::start(&instance).and_then(|mut importer| {
                 importer.run(20, &mut |instance| instance.snapshot(&self.watched()).map(|_| ()))?;

@@ -96,7 +96,11 @@ impl FmuFile {
             return Err(in_description(cause.clone()));
         }
         let (tree, description) = (tree.map_err(|e| e.to_string()), description.map_err(|e| e.to_string()));
-        let dir = Folder::new().map_err(|e| unusable(e.to_string()))?;
+        let folder = std::env::temp_dir();
+        let full = |e: io::Error| {
+            unusable(format!("cannot be unpacked to the temporary folder {}: {e}; set TMPDIR", folder.display()))
+        };
+        let dir = Folder::new().map_err(full)?;
         let mut fmu = Self {
             path: path.into(),
             source,
@@ -111,7 +115,7 @@ impl FmuFile {
             own_errors: Vec::new(),
             dir,
         };
-        fmu.unpack().map_err(|e| unusable(e.to_string()))?;
+        fmu.unpack().map_err(full)?;
         Ok(fmu)
     }
 
@@ -178,15 +182,16 @@ impl FmuFile {
         let list = &self.root()?.child("ModelVariables")?.children;
         let places = self.places.get_or_init(|| {
             let key = |e: &Element| (e.line, e.get("name").unwrap_or_default().to_owned());
-            list.iter().enumerate().rev().map(|(place, e)| (key(e), place)).collect()
+            list.iter().enumerate().rev().map(|(index, e)| (key(e), index)).collect()
         });
         list.get(*places.get(&(v.line, v.name.clone()))?)
     }
 
-    /// The interface for co-simulation, or for Model Exchange where there is no other.
+    /// The interface for co-simulation, or another one if there is none.
     pub(super) fn interface(&self) -> Option<&Interface> {
         let description = self.description.as_ref().ok()?;
-        description.co_simulation.as_ref().or(description.model_exchange.as_ref())
+        let interface = description.co_simulation.as_ref().or(description.model_exchange.as_ref());
+        interface.or(description.scheduled_execution.as_ref())
     }
 
     /// The binary of an interface for this machine, as it is named in the archive: that of the first folder with a library for

@@ -37,7 +37,7 @@ pub(super) fn junit(reports: &[Report]) -> String {
             let _ = write!(out, "    <testcase classname=\"{}.{}\" name=\"{} {requirement}\"", name, f.group, f.id);
             let _ = match &f.verdict {
                 Verdict::Pass(_) => writeln!(out, "/>"),
-                Verdict::Violated(_) if !f.known => writeln!(
+                Verdict::Violated(_) if report.counts_for(f) => writeln!(
                     out,
                     "><failure type=\"{}\" message=\"{requirement}\">{why}\nsee {}</failure></testcase>",
                     level(f.level),
@@ -85,6 +85,7 @@ pub(super) fn sarif(reports: &[Report]) -> Value {
             "ruleId": f.id,
             "level": words,
             "message": { "text": format!("{}\n{text}", f.requirement) },
+            "properties": { "confidence": f.confidence },
             "locations": [{ "physicalLocation": at }],
         });
         if f.known {

@@ -8,7 +8,7 @@ use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Sim
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
-/// An instance. Dropping it does not free it: a probe of its own checks freeing.
+/// An instance. Dropping it does not free it: a separate probe checks freeing.
 pub(super) struct Instance<'b> {
     pub(super) session: &'b Session,
     pub(super) handle: Handle,
@@ -231,7 +231,7 @@ impl Instance<'_> {
         Ok(())
     }
 
-    /// A variable's values.
+    /// A variable's values; none if the getter returned OK and wrote nothing.
     pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), NotDetermined> {
         let n = self.session.elements(v);
         let version = self.session.description.version;
@@ -249,7 +249,8 @@ impl Instance<'_> {
         if !buffer.intact() {
             return Err(NotDetermined(format!("getting {} wrote past its {n} values", v.name)));
         }
-        Ok((status, buffer.bits()))
+        // The pattern that the buffer was filled with is no value of the FMU.
+        Ok((status, if not_written { Vec::new() } else { buffer.bits() }))
     }
 
     /// A variable's values after it was set; `None` where they cannot be read. FMI 2.0 lets an importer read few variables in
@@ -290,7 +291,7 @@ impl Instance<'_> {
         Ok(all.iter().map(|bits| bits.first().map_or(f64::NAN, |b| f64::from_bits(*b))).collect())
     }
 
-    /// Steps `n` times with held inputs and returns all watched variables after each step.
+    /// Steps `n` times with constant inputs and returns all watched variables after each step.
     pub(super) fn run(&self, n: usize, h: f64) -> Result<Vec<Vec<Vec<u64>>>, NotDetermined> {
         let watched = self.session.watched();
         self.session.record_calls(

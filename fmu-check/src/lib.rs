@@ -10,15 +10,19 @@ pub mod baseline;
 mod check;
 mod checks;
 pub mod command;
+mod confidence;
 mod encoding;
 mod error;
 mod evidence;
 mod exchange;
+mod excuse;
 mod fmu_file;
 mod formats;
 mod instance;
 mod level;
+mod lines;
 pub mod probe;
+mod queue;
 mod replay;
 pub mod report;
 mod runner;
@@ -33,6 +37,7 @@ mod zip_headers;
 
 pub use check::{Check, Finding, Group, Levels, Options, Verdict};
 pub use checks::GROUPS;
+pub use confidence::Confidence;
 pub use error::Error;
 pub use fmu_file::{FmuFile, Unusable};
 pub use level::Level;
@@ -56,19 +61,20 @@ pub fn run(path: &Path, options: &Options) -> Result<report::Report, Unusable> {
         .filter(|(group, check)| wanted(group, check))
         .filter_map(|(group, check)| check.levels.of(version).map(|level| (group, check, level)))
         .collect();
-    let verdicts = runner::run_all(&fmu, &chosen.iter().map(|(_, check, _)| *check).collect::<Vec<_>>(), options);
-    let findings = chosen.iter().zip(verdicts).map(|((group, check, level), found)| Finding {
+    let found = queue::run_all(&fmu, &chosen.iter().map(|(_, check, _)| *check).collect::<Vec<_>>(), options);
+    let findings = chosen.iter().zip(found.conclusions).map(|((group, check, level), found)| Finding {
         id: check.id,
         group: group.name,
         requirement: check.requirement,
         clause: check.clause,
         level: found.lower.map_or(*level, |lower| lower.max(*level)),
+        confidence: found.confidence.max(Confidence::highest(check.id)),
         fatal: found.fatal,
         known: false,
         verdict: found.verdict,
         calls: found.calls,
     });
-    let report = report::Report::new(&fmu, findings.collect());
+    let report = report::Report::new(&fmu, findings.collect(), found.varying);
     if Arc::strong_count(&fmu) > 1 {
         fmu.discard();
     }
@@ -80,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ids_are_unique_and_every_check_is_told() {
+    fn ids_are_unique_and_every_check_is_documented() {
         let checks: Vec<&Check> = GROUPS.iter().flat_map(|g| g.checks).collect();
         for (i, check) in checks.iter().enumerate() {
             assert!(checks[..i].iter().all(|c| c.id != check.id), "{} twice", check.id);

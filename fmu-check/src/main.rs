@@ -1,4 +1,4 @@
-//! The command `fmu-check`: the checker as a program of its own; it does what `fmu check` does.
+//! The command `fmu-check`: the checker as a separate program, with the options of `fmu check`.
 
 #![forbid(unsafe_code)]
 

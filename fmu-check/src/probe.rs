@@ -2,16 +2,21 @@
 
 use crate::check::Run;
 use crate::checks::GROUPS;
+use crate::confidence::Confidence;
 use crate::error::Error;
 use crate::level::Level;
-pub use crate::session::ProbeArguments;
-use crate::session::{Line, NotDetermined, NotOpened, Session};
+use crate::lines::Line;
+pub use crate::lines::ProbeArguments;
+use crate::session::{NotDetermined, NotOpened, Session};
 use fmu_import::guard;
 use std::fs;
 use std::path::Path;
 
 /// Checks that are violated if the probe cannot start; all others are then not determined.
 const VIOLATED_WHEN_BLOCKED: [&str; 3] = ["B00", "L00", "E00"];
+
+/// Exit status of a probe that could not write its findings.
+pub(super) const NOT_WRITTEN: i32 = 74;
 
 /// Runs one probe, in this process.
 ///
@@ -31,7 +36,7 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
         Ok(session) => {
             if let Err(NotDetermined(why)) = probe(&session) {
                 session.write(&if VIOLATED_WHEN_BLOCKED.contains(&check.map_or("", |c| c.id)) {
-                    Line::Violated(why)
+                    Line::Violated(None, Confidence::Certain, why)
                 } else {
                     Line::NotDetermined(why)
                 });
@@ -39,7 +44,11 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
             session.write(&Line::Done);
             // The parent reads the findings; a crash while the process ends is a finding too.
             session.record_call("(the process ends)");
+            let lost = session.lost.get();
             std::mem::forget(session);
+            if lost {
+                std::process::exit(NOT_WRITTEN);
+            }
         }
         Err(why) => {
             let line = match why {
@@ -55,9 +64,9 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
                     .iter()
                     .any(|sign| why.contains(sign))
                     {
-                        Line::Lesser(Level::Should, why)
+                        Line::Violated(Some(Level::Should), Confidence::Certain, why)
                     } else {
-                        Line::Violated(why)
+                        Line::Violated(None, Confidence::Certain, why)
                     }
                 }
                 NotOpened::Load(why) | NotOpened::Here(why) => Line::NotDetermined(why),

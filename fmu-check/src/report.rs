@@ -3,6 +3,7 @@
 use crate::check::{Finding, Verdict};
 use crate::checks::GROUPS;
 use crate::checks::life::shared::calls;
+use crate::confidence::Confidence;
 use crate::fmu_file::FmuFile;
 use crate::level::Level;
 use serde::Serialize;
@@ -21,6 +22,12 @@ pub struct Report {
     pub generation_tool: Option<String>,
     /// One for each check.
     pub findings: Vec<Finding>,
+    /// Names of the variables that were not compared, because two plain runs differ in them (T10).
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub varying: Vec<String>,
+    /// Findings of a lower confidence do not count.
+    #[serde(skip)]
+    pub confidence: Confidence,
 }
 
 /// The number of checks with each verdict.
@@ -39,7 +46,7 @@ pub struct Counts {
 }
 
 impl Report {
-    pub(super) fn new(fmu: &FmuFile, findings: Vec<Finding>) -> Self {
+    pub(super) fn new(fmu: &FmuFile, findings: Vec<Finding>, varying: Vec<String>) -> Self {
         let description = fmu.description.as_ref().ok();
         Self {
             file: fmu.path.display().to_string(),
@@ -47,7 +54,18 @@ impl Report {
             model: description.map(|d| d.model_name.clone()),
             generation_tool: description.and_then(|d| d.generation_tool.clone()),
             findings,
+            varying,
+            confidence: Confidence::default(),
         }
+    }
+
+    /// The variables that were not compared, for the end of the report.
+    fn not_compared(&self) -> Option<String> {
+        const NAMED: usize = 10;
+        let (named, more) = self.varying.split_at(self.varying.len().min(NAMED));
+        let more = if more.is_empty() { String::new() } else { format!(" and {} others", more.len()) };
+        let text = || format!("Not compared, because two plain runs differ (T10): {}{more}.", named.join(", "));
+        (!named.is_empty()).then(text)
     }
 
     /// The finding of a check.
@@ -60,9 +78,14 @@ impl Report {
         self.findings.iter().filter(|f| matches!(f.verdict, Verdict::Violated(_)))
     }
 
-    /// The violated checks that neither `--allow` nor the baseline knows.
+    /// Whether a finding counts: neither `--allow` nor the baseline knows it, and it is sure enough.
+    pub(super) fn counts_for(&self, finding: &Finding) -> bool {
+        !finding.known && finding.confidence <= self.confidence
+    }
+
+    /// The violated checks that count.
     pub fn unknown(&self) -> impl Iterator<Item = &Finding> {
-        self.violated().filter(|f| !f.known)
+        self.violated().filter(|f| self.counts_for(f))
     }
 
     /// Whether no requirement of the standard is violated, except for what is known.
@@ -79,7 +102,11 @@ impl Report {
 
     /// Whether every requirement that applies holds.
     pub fn is_clean(&self) -> bool {
-        let is_clean = |f: &Finding| f.known || matches!(f.verdict, Verdict::Pass(_) | Verdict::NotApplicable(_));
+        let is_clean = |f: &Finding| match f.verdict {
+            Verdict::Pass(_) | Verdict::NotApplicable(_) => true,
+            Verdict::Violated(_) => !self.counts_for(f),
+            Verdict::NotDetermined(_) => f.known,
+        };
         self.findings.iter().all(is_clean)
     }
 
@@ -155,6 +182,9 @@ impl Report {
             let _ = writeln!(out, "\nNot determined, {} checks: {reason}\n  {}", ids.len(), ids.join(", "));
         }
         let _ = writeln!(out, "\n{}", self.summary());
+        if let Some(text) = self.not_compared() {
+            let _ = writeln!(out, "{text}");
+        }
         if !self.fatal().is_empty() {
             let _ = writeln!(out, "An importer would have crashed or hung in: {}.", self.fatal().join(", "));
         }
@@ -189,6 +219,9 @@ impl Report {
 
     fn section(&self) -> String {
         let mut out = format!("<h1>{}</h1>\n<p>{}</p>\n", escape(&self.heading()), escape(&self.summary()));
+        if let Some(text) = self.not_compared() {
+            let _ = writeln!(out, "<p>{}</p>", escape(&text));
+        }
         // Violations first.
         if self.violated().next().is_some() {
             out.push_str("<ul>\n");
@@ -211,13 +244,14 @@ impl Report {
                 let evidence: Vec<_> = evidence.iter().map(|e| format!("<code>{}</code>", escape(e))).collect();
                 let _ = writeln!(
                     out,
-                    "<tr class=\"{class}\" id=\"{0}\"><td>{0}</td><td>{1}</td><td>{2}</td><td>{3} <small>({4})</small><br>{5}</td></tr>",
+                    "<tr class=\"{class}\" id=\"{0}\"><td>{0}</td><td>{1}{6}</td><td>{2}</td><td>{3} <small>({4})</small><br>{5}</td></tr>",
                     f.id,
                     level(f.level),
                     word,
                     escape(f.requirement),
                     escape(f.clause),
-                    evidence.join("<br>")
+                    evidence.join("<br>"),
+                    sure(f)
                 );
             }
             out.push_str("</table>\n");
@@ -306,13 +340,23 @@ fn verdict_text(finding: &Finding) -> (&'static str, Vec<&str>) {
     }
 }
 
+/// How sure a violation is, after its level, unless it is certain.
+fn sure(finding: &Finding) -> &'static str {
+    match (&finding.verdict, finding.confidence) {
+        (Verdict::Violated(_), Confidence::Likely) => ", likely",
+        (Verdict::Violated(_), Confidence::Hint) => ", a hint",
+        _ => "",
+    }
+}
+
 /// Pieces of evidence in the text.
 const MAX_EVIDENCE: usize = 8;
 
 fn line(out: &mut String, finding: &Finding, calls: bool) {
     let (word, evidence) = verdict_text(finding);
     let known = if finding.known { ", known" } else { "" };
-    let _ = writeln!(out, "  {:<6} {word} ({}{known}): {}", finding.id, level(finding.level), finding.requirement);
+    let (level, sure) = (level(finding.level), sure(finding));
+    let _ = writeln!(out, "  {:<6} {word} ({level}{sure}{known}): {}", finding.id, finding.requirement);
     if matches!(finding.verdict, Verdict::Violated(_)) {
         let clause = finding.clause;
         let _ =
@@ -346,15 +390,29 @@ pub(super) fn explain(id: &str) -> Option<String> {
     let calls = if calls.is_empty() { String::new() } else { format!("{head}{}\n", calls.join("\n  ")) };
     let levels: Vec<_> = [of("2.0", c.levels.0), of("3.0", c.levels.1)].into_iter().flatten().collect();
     Some(format!(
-        "{} ({}): {}\n\nRequirement, in our words\n  {}\n\nClause\n  {}\n\nHow it is tried\n  {}\n\nUsual fix\n  {}\n{calls}",
+        "{} ({}): {}; confidence: {}\n\nRequirement, in our words\n  {}\n\nClause\n  {}\n\nHow it is tried\n  {}\n\nUsual fix\n  {}\n{calls}",
         c.id,
         group.name,
         levels.join(", "),
+        Confidence::highest(c.id).as_str(),
         c.requirement,
         c.clause,
         c.tried,
         c.fix
     ))
+}
+
+/// The index of the list: a Markdown table of the groups, each with its checks and a link to its table.
+pub fn index() -> String {
+    let mut out = String::from("| group | `--only` | checks |\n|---|---|---|\n");
+    for group in GROUPS {
+        let heading = format!("{} {}", group.title, group.name).to_lowercase();
+        let kept = heading.chars().filter(|c| c.is_alphanumeric() || matches!(c, ' ' | '-'));
+        let anchor = kept.collect::<String>().replace(' ', "-");
+        let ids: Vec<_> = group.checks.iter().map(|c| c.id).collect();
+        let _ = writeln!(out, "| [{}](#{anchor}) | `{}` | {} |", group.title, group.name, ids.join(", "));
+    }
+    out
 }
 
 /// The list of all checks: one Markdown table per group.

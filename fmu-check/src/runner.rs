@@ -1,187 +1,46 @@
-//! Runs the probes: each check of the binary in a process of its own, with a time limit, on all cores.
+//! Runs the probes: each check of the binary in a separate process, with a time limit, on all cores.
 //!
 //! The parent starts the same program with the hidden command `probe`. The child appends its findings to a file, line by line,
 //! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
 //! call ended it. A probe with several cases is restarted after the case that ended it.
 
-use crate::check::{Check, Judgement, Options, Run, Verdict};
+use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
-use crate::evidence::{calls, is_of_second, judge, panic, read, side_effects};
+use crate::evidence::{calls, conclude, is_of_second, panic, read, side_effects};
 use crate::fmu_file::FmuFile;
-use crate::session::Line;
+use crate::lines::Line;
+use crate::probe::NOT_WRITTEN;
 use crate::watch::{Pace, Watch};
 use fmu_import::guard::{self, Allowance, End, Guarded};
-use fmu_import::{limits, threads};
+use fmu_import::limits;
 use model_description::Interface;
-use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 
 /// Default time limit of a probe.
 const TIMEOUT: Duration = Duration::from_secs(10);
-/// Checks that run even if a minimal run fails, because they show why.
-const WITHOUT_MINIMAL_RUN: [&str; 4] = ["B00", "L00", "E00", "X02b"];
+/// The check that compares two plain runs.
+pub(super) const PLAIN_RUNS: &str = "T10";
 /// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
-const OUT_OF_TIME: &str = "the time limit of the run was used up (see --timeout)";
+pub(super) const OUT_OF_TIME: &str = "the run reached its time limit (see --timeout)";
 /// After this time a clock that counts seconds shows another one.
 const ANOTHER_SECOND: Duration = Duration::from_millis(1050);
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
 
-/// The verdicts of checks, in their order.
-pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) -> Vec<Judgement> {
-    let verdicts: Vec<Mutex<Option<Judgement>>> = checks.iter().map(|_| Mutex::new(None)).collect();
-    let mut queue = VecDeque::new();
-    let mut of_file = Vec::new();
-    for (check, verdict) in checks.iter().zip(&verdicts) {
-        match check.run {
-            Run::File(check_file) => of_file.push((check_file, verdict)),
-            _ => queue.push_back((*check, verdict)),
-        }
-    }
-    let runner = Runner::new(fmu, options);
-    check_file(fmu, &of_file, options.deadline());
-    let by_exchange = |check: &Check| match (check.run, &runner) {
-        (Run::Any(_) | Run::Silent(_), Ok(runner)) => runner.simulation.is_none(),
-        _ => is_exchange(check),
-    };
-    let [simulates, exchanges] = [false, true].map(|exchange| {
-        let mut checks = queue.iter().filter(|(check, _)| exchange == by_exchange(check));
-        checks.next().and_then(|_| why_no_run_succeeds(&runner, if exchange { "E00" } else { "L00" }))
-    });
-    let queue = Mutex::new(queue);
-    let work = || {
-        while let Some((check, verdict)) = take(&queue) {
-            let why = match check.run {
-                Run::Scheduled(_) => &None,
-                _ if by_exchange(check) => &exchanges,
-                _ => &simulates,
-            };
-            let found = match (&runner, why) {
-                (Err(cause), _) => Verdict::NotDetermined(cause.clone()).into(),
-                (Ok(_), Some(cause)) if !WITHOUT_MINIMAL_RUN.contains(&check.id) => cause.clone().into(),
-                (Ok(runner), _) if matches!(check.run, Run::Twice(_)) => {
-                    let Some(found) = runner.once_more(check) else {
-                        put_back(&queue, (check, verdict));
-                        continue;
-                    };
-                    found
-                }
-                (Ok(runner), _) => runner.run(check),
-            };
-            store(verdict, found);
-        }
-    };
-    // The second process of a comparison begins when the clock shows another second: the other probes run meanwhile.
-    if let Ok(mut queue) = queue.lock() {
-        queue.make_contiguous().sort_by_key(|(check, _)| !matches!(check.run, Run::Twice(_)));
-    }
-    threads::share(threads::available(), |_| work());
-    let lost = || Verdict::NotDetermined("the probe did not report a result".into()).into();
-    let mut found: Vec<_> = verdicts.into_iter().map(|v| v.into_inner().ok().flatten().unwrap_or_else(lost)).collect();
-    if let Ok(runner) = &runner {
-        checks.iter().zip(&mut found).for_each(|(check, found)| runner.charge(check, found));
-    }
-    found
-}
-
-/// A check of the file, and the place for its verdict.
-type OfFile<'a> = (fn(&FmuFile) -> Verdict, &'a Mutex<Option<Judgement>>);
-
-/// Runs the checks of the file until the deadline, and for [`limits::STATIC_SECONDS`] at most, whatever an author of hostile files
-/// has thought of.
-fn check_file(fmu: &Arc<FmuFile>, checks: &[OfFile<'_>], deadline: Option<Instant>) {
-    if checks.is_empty() {
-        return;
-    }
-    let (send, receive) = mpsc::channel();
-    let functions: Vec<_> = checks.iter().map(|(function, _)| *function).collect();
-    // A thread cannot be ended from outside: one that takes too long ends with the process.
-    let start = || {
-        let (fmu, functions, send) = (fmu.clone(), functions.clone(), send.clone());
-        let work = move || functions.into_iter().try_for_each(|function| send.send(function(&fmu)));
-        std::thread::Builder::new().spawn(work)
-    };
-    let thread = match guard::patiently(start) {
-        Ok(thread) => thread,
-        Err(e) => {
-            let why = format!("no thread can be started: {e}");
-            return checks.iter().for_each(|(_, place)| store(place, Verdict::NotDetermined(why.clone()).into()));
-        }
-    };
-    drop(send);
-    let end = Instant::now() + Duration::from_secs(limits::STATIC_SECONDS);
-    let (end, over) = match deadline {
-        Some(deadline) if deadline < end => (deadline, OUT_OF_TIME.to_owned()),
-        _ => (end, format!("the checks of the file take more than {} s", limits::STATIC_SECONDS)),
-    };
-    let mut in_time = true;
-    for (_, place) in checks {
-        let verdict = receive.recv_timeout(end.saturating_duration_since(Instant::now()));
-        let why = |e| match e {
-            RecvTimeoutError::Timeout => over.clone(),
-            RecvTimeoutError::Disconnected => "the checker failed in this check or one before it".into(),
-        };
-        in_time &= verdict.is_ok();
-        store(place, verdict.unwrap_or_else(|e| Verdict::NotDetermined(why(e))).into());
-    }
-    if in_time {
-        // Its hold on the file ends before the caller's: the last one removes the unpacked archive.
-        let _ = thread.join();
-    }
-}
-
-fn is_exchange(check: &Check) -> bool {
-    matches!(check.run, Run::Exchange(_))
-}
-
-/// The verdict of all other probes of an interface if its minimal run does not succeed: L00 of co-simulation, E00 of Model
-/// Exchange.
-fn why_no_run_succeeds(runner: &Result<Runner, String>, id: &str) -> Option<Verdict> {
-    let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == id)?;
-    let runner = runner.as_ref().ok()?;
-    let began = Instant::now();
-    let verdict = runner.run(check).verdict;
-    let least = Duration::from_secs(1).min(runner.timeout);
-    let _ = runner.wild.set((20 * began.elapsed()).clamp(least, runner.timeout));
-    match verdict {
-        Verdict::Violated(found) => Some(Verdict::NotDetermined(format!(
-            "a minimal run fails ({id}): {}",
-            found.first().map_or("", String::as_str)
-        ))),
-        verdict @ (Verdict::NotDetermined(_) | Verdict::NotApplicable(_)) => Some(verdict),
-        Verdict::Pass(_) => None,
-    }
-}
-
-fn put_back<T>(queue: &Mutex<VecDeque<T>>, item: T) {
-    queue.lock().unwrap_or_else(PoisonError::into_inner).push_back(item);
-}
-
-fn take<T>(queue: &Mutex<VecDeque<T>>) -> Option<T> {
-    queue.lock().ok()?.pop_front()
-}
-
-fn store(place: &Mutex<Option<Judgement>>, verdict: Judgement) {
-    if let Ok(mut place) = place.lock() {
-        *place = Some(verdict);
-    }
-}
-
-/// Settings that all probes of a file share, and what they left behind.
+/// Settings that all probes of a file share, and the processes they left behind.
 pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
     /// The binaries for co-simulation, Model Exchange and Scheduled Execution; mostly the same one.
-    simulation: Option<PathBuf>,
+    pub(super) simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
     scheduled: Option<PathBuf>,
     /// Time limit of one call.
@@ -193,26 +52,45 @@ pub(super) struct Runner {
     wild: OnceLock<Duration>,
     /// The step of the integrator that E00 needs, in s.
     integrator: OnceLock<f64>,
+    /// Names of the variables in which the two runs of T10 differ.
+    pub(super) varying: OnceLock<Vec<String>>,
     /// What the first process of a check found that compares two, and when it began.
     first: Mutex<Option<(Instant, Vec<String>)>>,
     /// End of the whole run.
     deadline: Option<Instant>,
 }
 
-/// Checks whose calls have wild arguments: a hang shows sooner there.
+/// Whether a check makes instances for Model Exchange alone.
+pub(super) fn is_exchange(check: &Check) -> bool {
+    matches!(check.run, Run::Exchange(_))
+}
+
+/// Checks whose calls have extreme arguments: they have a shorter time limit.
 const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
-/// Checks of what a second instance does; in all others, one that hangs is only in the way.
+/// Checks whose subject is a second instance; in all others, a second instance that hangs is not a finding.
 const SEVERAL: [&str; 8] = ["L04a", "L04b", "L04c", "B05d", "G07a", "F03a", "F04a", "E14"];
 
-/// How a probe's process ended.
+/// Where a probe runs, and what it may use.
+#[derive(Clone)]
+pub(super) struct Conditions {
+    /// Folder that the FMU was unpacked to.
+    pub(super) dir: PathBuf,
+    pub(super) binary: PathBuf,
+    pub(super) allowance: Allowance,
+}
+
+/// The checks on which others depend: a failure that is due to this computer or to a limit is not a finding.
+const FIRST: [&str; 3] = ["B00", "L00", "E00"];
+
+/// How the process of a probe ended.
 enum Outcome {
     /// By itself.
     End(End),
     /// In a call that hangs, in this way.
     Hang(&'static str),
-    /// It was too slow, and no call hangs.
+    /// Too slow, although no call hangs.
     Slow,
-    /// The time of the whole run was over.
+    /// The time limit of the whole run was reached.
     OutOfTime,
 }
 
@@ -239,9 +117,16 @@ impl Runner {
             left: Mutex::default(),
             wild: OnceLock::new(),
             integrator: OnceLock::new(),
+            varying: OnceLock::new(),
             first: Mutex::default(),
             deadline: options.deadline(),
         })
+    }
+
+    /// Sets the time limit of calls with extreme arguments, from the time of a minimal run.
+    pub(super) fn measured(&self, run: Duration) {
+        let minimum = Duration::from_secs(1).min(self.timeout);
+        let _ = self.wild.set((20 * run).clamp(minimum, self.timeout));
     }
 
     /// The time limit of a call of a check.
@@ -250,7 +135,7 @@ impl Runner {
         wild.copied().unwrap_or(self.timeout)
     }
 
-    fn run(&self, check: &Check) -> Judgement {
+    pub(super) fn run(&self, check: &Check) -> Conclusion {
         if self.deadline.is_some_and(|end| Instant::now() > end) {
             return Verdict::NotDetermined(OUT_OF_TIME.into()).into();
         }
@@ -267,13 +152,14 @@ impl Runner {
         let Some(binary) = binary.as_ref().or_else(other) else {
             return Verdict::NotApplicable(format!("the FMU has no interface for {interface}")).into();
         };
-        self.attempt(check, binary)
-            .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")).into())
+        let conditions = Conditions { dir: self.dir.clone(), binary: binary.clone(), allowance: self.allowance };
+        let found = self.attempt(check, &conditions);
+        if FIRST.contains(&check.id) { self.excused(check, &conditions, found) } else { found }
     }
 
     /// The first process of a check that compares two: nothing yet, if it passes. The second, after another second of the clock:
     /// the verdict.
-    fn once_more(&self, check: &Check) -> Option<Judgement> {
+    pub(super) fn once_more(&self, check: &Check) -> Option<Conclusion> {
         let first = self.first.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some((began, first)) = first else {
             let (began, found) = (Instant::now(), self.run(check));
@@ -293,7 +179,13 @@ impl Runner {
         })
     }
 
-    fn attempt(&self, check: &Check, binary: &Path) -> io::Result<Judgement> {
+    /// Runs a probe under these conditions.
+    pub(super) fn attempt(&self, check: &Check, conditions: &Conditions) -> Conclusion {
+        self.try_attempt(check, conditions)
+            .unwrap_or_else(|e| Verdict::NotDetermined(format!("the probe could not be started: {e}")).into())
+    }
+
+    fn try_attempt(&self, check: &Check, conditions: &Conditions) -> io::Result<Conclusion> {
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
@@ -301,7 +193,7 @@ impl Runner {
         let mut from = 0;
         let began = Instant::now();
         loop {
-            let end = self.child(check, binary, folder.path(), from)?;
+            let end = self.child(check, conditions, folder.path(), from)?;
             let lines = read(&out);
             if lines.iter().any(|l| matches!(l, Line::Done)) {
                 break;
@@ -328,7 +220,12 @@ impl Runner {
         if let Some(step) = lines.iter().find_map(|l| if let Line::Integrator(step) = l { Some(*step) } else { None }) {
             let _ = self.integrator.set(step);
         }
-        let mut found = judge(check.id, lines, crashes, slow);
+        let varies = |l: &Line| if let Line::Varies(name) = l { Some(name.clone()) } else { None };
+        let varying: Vec<_> = lines.iter().filter_map(varies).collect();
+        if !varying.is_empty() {
+            let _ = self.varying.set(varying);
+        }
+        let mut found = conclude(check.id, lines, crashes, slow);
         if matches!(found.verdict, Verdict::Violated(_)) {
             found.calls = calls(&fs::read_to_string(out.with_extension("log")).unwrap_or_default());
         }
@@ -342,38 +239,45 @@ impl Runner {
     }
 
     /// The probe's process.
-    fn command(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> Command {
-        let mut command = guard::command(&self.program, self.allowance);
+    fn command(&self, check: &Check, conditions: &Conditions, folder: &Path, from: usize) -> io::Result<Command> {
+        let mut command = guard::command(&self.program, conditions.allowance);
         command
             .args(["probe", "--id", check.id, "--from", &from.to_string()])
             .args(["--seconds", &self.timeout.as_secs_f64().to_string()])
             .arg("--dir")
-            .arg(&self.dir)
+            .arg(&conditions.dir)
             .arg("--binary")
-            .arg(binary)
+            .arg(&conditions.binary)
             .arg("--out")
             .arg(folder.join("out"))
             .current_dir(folder.join("home"));
         if let Some(step) = self.integrator.get() {
             command.args(["--integrator", &step.to_string()]);
         }
-        command
+        if let Some(names) = self.varying.get() {
+            let file = folder.join("varying");
+            fs::write(&file, serde_json::to_vec(names)?)?;
+            command.arg("--varying").arg(file);
+        }
+        Ok(command)
     }
 
     /// Runs a probe, or one case of it, in a process that prints its calls; returns what was found.
-    pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> io::Result<Judgement> {
+    pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> io::Result<Conclusion> {
         let (exchange, simulation) = (self.exchange.as_deref(), self.simulation.as_deref());
         let Some(binary) = (if is_exchange(check) { exchange } else { simulation.or(exchange) }) else {
             return Ok(Verdict::NotApplicable("the FMU has no such interface".into()).into());
         };
-        // It finds the step of the integrator.
-        let first =
-            GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == "E00" && is_exchange(check) && c.id != check.id);
-        let _ = first.map(|first| self.run(first));
+        // They find the step of the integrator, and what cannot be compared.
+        for first in [Some("E00").filter(|_| is_exchange(check)), Some(PLAIN_RUNS)].into_iter().flatten() {
+            let first = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == first && c.id != check.id);
+            let _ = first.map(|first| self.run(first));
+        }
         let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
         fs::create_dir(folder.path().join("home"))?;
         let out = folder.path().join("out");
-        let mut command = self.command(check, binary, folder.path(), case.unwrap_or(0));
+        let conditions = Conditions { dir: self.dir.clone(), binary: binary.into(), allowance: self.allowance };
+        let mut command = self.command(check, &conditions, folder.path(), case.unwrap_or(0))?;
         command.arg("--trace");
         if case.is_some() {
             command.arg("--one");
@@ -387,14 +291,14 @@ impl Runner {
                 Err(why) => slow = Some(why),
             }
         }
-        let mut found = judge(check.id, lines, crashes, slow);
+        let mut found = conclude(check.id, lines, crashes, slow);
         self.charge(check, &mut found);
         Ok(found)
     }
 
-    fn child(&self, check: &Check, binary: &Path, folder: &Path, from: usize) -> io::Result<Outcome> {
+    fn child(&self, check: &Check, conditions: &Conditions, folder: &Path, from: usize) -> io::Result<Outcome> {
         let console = File::options().create(true).append(true).open(folder.join("console"))?;
-        let mut command = self.command(check, binary, folder, from);
+        let mut command = self.command(check, conditions, folder, from)?;
         command.stdout(console.try_clone()?).stderr(console);
         self.guarded(check, command, &folder.join("out"))
     }
@@ -439,17 +343,27 @@ impl Runner {
         match end {
             Outcome::OutOfTime => Err(OUT_OF_TIME.into()),
             Outcome::Slow => Err(format!(
-                "the probe is too slow here for a limit of {limit} s for each call; it was in {} (see --patience)",
+                "the probe is too slow on this machine for a limit of {limit} s per call; it was in {} (see --patience)",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => Err(format!(
-                "{} {how} within {limit} s, and that of the first instance did: see L04a",
+                "{} {how} within {limit} s, unlike that of the first instance: see L04a",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
+            // A full disk is no fault of the FMU, nor is a probe that could not begin.
+            Outcome::End(End::Ended(status))
+                if status.code() == Some(NOT_WRITTEN) || (call.is_empty() && status.code() == Some(2)) =>
+            {
+                let folder = std::env::temp_dir();
+                Err(format!(
+                    "the probe could not write to the temporary folder {}: the disk may be full (see TMPDIR)",
+                    folder.display()
+                ))
+            }
             // The limit is the checker's own.
             Outcome::End(end) if end.describe().contains("SIGXFSZ") => Err(format!(
-                "not tried to its end: a file of the probe reached the limit of {} bytes, in {}",
+                "incomplete: a file of the probe reached the limit of {} bytes, in {}",
                 limits::PROBE_FILE,
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
@@ -460,8 +374,8 @@ impl Runner {
         }
     }
 
-    /// Adds what outlived the probes, whichever it was, to the check that is about it.
-    fn charge(&self, check: &Check, found: &mut Judgement) {
+    /// Adds the processes that outlived any probe to the check that reports them.
+    pub(super) fn charge(&self, check: &Check, found: &mut Conclusion) {
         let left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
         if check.id != LEFT_BEHIND || left.is_empty() {
             return;

@@ -3,13 +3,14 @@
 //! Every finding is written at once and every call is written before it is made, so that nothing is lost if the FMU crashes the
 //! process. `Err(NotDetermined)` ends a probe that cannot decide.
 
+use crate::confidence::Confidence;
 use crate::level::Level;
-use clap::Args;
+use crate::lines::{Line, ProbeArguments};
 use fmu_import::raw::{Arguments, Interface, Raw};
 use fmu_import::{file_uri, printable_lines};
 use model_description::{BaseType, FmiVersion, ModelDescription};
-use serde::{Deserialize, Serialize};
 use std::cell::{Cell, RefCell};
+use std::collections::HashSet;
 use std::ffi::CString;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
@@ -28,60 +29,6 @@ pub(super) enum NotOpened {
     Load(String),
 }
 
-/// One line of a probe's output.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Line {
-    /// A case begins, by number.
-    Case(usize),
-    /// A violation.
-    Violated(String),
-    /// A violation of this level, lower than that of the check.
-    Lesser(Level, String),
-    /// Evidence for a pass.
-    Note(String),
-    /// The requirement does not apply to this FMU.
-    NotApplicable(String),
-    /// The check could not decide.
-    NotDetermined(String),
-    /// Euler's method needs steps of this size, in s.
-    Integrator(f64),
-    /// The probe is complete.
-    Done,
-}
-
-/// Runs one probe. Only the checker calls it.
-#[derive(Debug, Args)]
-pub struct ProbeArguments {
-    /// Id of the check.
-    #[arg(long)]
-    pub id: String,
-    /// Folder that the FMU was unpacked to.
-    #[arg(long)]
-    pub dir: PathBuf,
-    /// The binary.
-    #[arg(long)]
-    pub binary: PathBuf,
-    /// File that the findings go to.
-    #[arg(long)]
-    pub out: PathBuf,
-    /// Number of the first case.
-    #[arg(long, default_value_t = 0)]
-    pub from: usize,
-    /// Only this case.
-    #[arg(long)]
-    pub one: bool,
-    /// Print every call with what it returned.
-    #[arg(long)]
-    pub trace: bool,
-    /// Step of the integrator in s, where that of a twentieth of the communication step is too long.
-    #[arg(long)]
-    pub integrator: Option<f64>,
-    /// Time that it may take, in seconds.
-    #[arg(long, default_value_t = 10.0)]
-    pub seconds: f64,
-}
-
 /// A probe's FMU.
 pub(super) struct Session {
     pub(super) raw: Raw,
@@ -96,10 +43,14 @@ pub(super) struct Session {
     /// The level of a crash, if it is lower than that of the check.
     lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
+    /// A finding could not be written.
+    pub(super) lost: Cell<bool>,
     /// A getter has returned OK and written nothing.
     pub(super) unwritten: Cell<bool>,
     /// The step of the integrator in s, if it is not the usual one.
     pub(super) integrator: Cell<Option<f64>>,
+    /// Names of the variables in which two plain runs differ.
+    pub(super) varying: HashSet<String>,
     log: RefCell<File>,
     trace: bool,
     from: usize,
@@ -121,9 +72,9 @@ pub(super) struct Session {
 
 /// Below the environments of the instances.
 const ENVIRONMENT: usize = 0x5000;
-/// Stands in the log of calls where something was found.
+/// Marks a finding in the log of calls.
 pub(super) const FOUND: &str = "# found";
-/// How an end begins that the FMU asked for, as it may at any time.
+/// Start of the reason if the FMU ended the simulation, as it may at any time.
 pub(super) const ENDED: &str = "the FMU ended the simulation";
 /// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
@@ -147,7 +98,10 @@ impl Session {
         let timeout = Duration::from_secs_f64(args.seconds);
         let session = Self::new(raw, description, paths, [lines, journal, log], timeout);
         let integrator = Cell::new(args.integrator);
-        Ok(Self { integrator, trace: args.trace, from: args.from, one: args.one, ..session })
+        let names = args.varying.as_deref().map(std::fs::read).transpose().map_err(|e| lost(&e))?;
+        let varying = names.map(|json| serde_json::from_slice(&json)).transpose().map_err(|e| lost(&e))?;
+        let varying = varying.unwrap_or_default();
+        Ok(Self { integrator, varying, trace: args.trace, from: args.from, one: args.one, ..session })
     }
 
     /// A session at its start that runs every case and prints nothing; the paths are those of the binary, of the unpacked folder, of
@@ -169,8 +123,10 @@ impl Session {
             preparing: Cell::new(false),
             lower: Cell::new(None),
             silent: Cell::new(false),
+            lost: Cell::new(false),
             unwritten: Cell::new(false),
             integrator: Cell::new(None),
+            varying: HashSet::new(),
             log: RefCell::new(log),
             trace: false,
             from: 0,
@@ -208,8 +164,8 @@ impl Session {
         let files = [discarded()?, journal, discarded()?];
         let session = Self::new(raw, self.description.clone(), paths, files, self.timeout);
         let instances_made = Cell::new(1000 * (number + 1));
-        let (silent, integrator) = (Cell::new(true), self.integrator.clone());
-        Ok(Self { silent, integrator, instances_made, began: self.began, ..session })
+        let (silent, integrator, varying) = (Cell::new(true), self.integrator.clone(), self.varying.clone());
+        Ok(Self { silent, integrator, varying, instances_made, began: self.began, ..session })
     }
 
     /// Where the FMU's resources are, if it has any.
@@ -220,23 +176,30 @@ impl Session {
     /// Writes a line.
     pub(super) fn write(&self, line: &Line) {
         if let Ok(text) = serde_json::to_string(line) {
-            let _ = writeln!(self.lines.borrow_mut(), "{text}");
+            let written = writeln!(self.lines.borrow_mut(), "{text}");
+            self.lost.set(self.lost.get() || written.is_err());
         }
     }
 
     /// Reports a violation.
     pub(super) fn violated(&self, text: impl Into<String>) {
-        self.violations.set(self.violations.get() + 1);
-        if self.violations.get() <= MAX_VIOLATIONS {
-            self.write(&Line::Violated(text.into()));
+        self.report(None, Confidence::Certain, text);
+    }
+
+    /// Reports a violation of this level, or of that of the check.
+    pub(super) fn report(&self, lower: Option<Level>, confidence: Confidence, text: impl Into<String>) {
+        if lower.is_none() {
+            self.violations.set(self.violations.get() + 1);
+        }
+        if lower.is_some() || self.violations.get() <= MAX_VIOLATIONS {
+            self.write(&Line::Violated(lower, confidence, text.into()));
         }
         self.note_call(&format!("\n{FOUND}\n"));
     }
 
     /// Reports a violation of a lower level than that of the check.
     pub(super) fn lesser(&self, level: Level, text: impl Into<String>) {
-        self.write(&Line::Lesser(level, text.into()));
-        self.note_call(&format!("\n{FOUND}\n"));
+        self.report(Some(level), Confidence::Certain, text);
     }
 
     /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is not a violation.
@@ -352,7 +315,7 @@ impl Session {
         self.of_case.get()
     }
 
-    /// Tells the parent, from time to time, that calls without entries of their own return.
+    /// Shows the parent, from time to time, that calls without separate journal entries return.
     fn show_progress(&self) {
         if self.shown.get().elapsed() < Duration::from_millis(100) {
             return;
@@ -362,7 +325,7 @@ impl Session {
         let _ = journal.seek(SeekFrom::End(0)).and_then(|_| writeln!(journal, "and others"));
     }
 
-    /// Makes calls whose crash is of a lower level than the check, because the standard leaves open what they do.
+    /// Makes calls that the standard leaves undefined; a crash in them is reported at this lower level.
     pub(super) fn lenient<T>(&self, level: Level, work: impl FnOnce() -> T) -> T {
         let before = self.lower.replace(Some(level));
         let result = work();
@@ -423,8 +386,8 @@ impl Session {
         ENVIRONMENT + 0x10 * self.instances_made.get()
     }
 
-    /// The relative deviation below which two runs are the same to the standards, which nowhere say bit for bit: the
-    /// tolerance of the default experiment, at least 1e-6.
+    /// The relative deviation up to which two runs count as equal, because the standards nowhere require equal bits: the tolerance of
+    /// the default experiment, at least 1e-6.
     pub(super) fn tolerance(&self) -> f64 {
         self.description.default_experiment.tolerance.filter(|t| t.is_finite()).unwrap_or(0.0).max(1e-6)
     }

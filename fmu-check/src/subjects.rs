@@ -13,11 +13,16 @@ impl Session {
             .filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
     }
 
-    /// The numeric outputs, or all numeric variables where there are none.
+    /// Whether two plain runs agree in this variable, so that it can be compared.
+    pub(super) fn is_steady(&self, v: &ModelVariable) -> bool {
+        !self.varying.contains(&v.name)
+    }
+
+    /// The numeric outputs that can be compared, or all such variables if there are no outputs.
     pub(super) fn watched(&self) -> Vec<&ModelVariable> {
-        let outputs: Vec<_> =
-            self.numeric().filter(|v| v.causality == Causality::Output && v.clocks.is_empty()).collect();
-        if outputs.is_empty() { self.numeric().filter(|v| v.clocks.is_empty()).collect() } else { outputs }
+        let all: Vec<_> = self.numeric().filter(|v| v.clocks.is_empty() && self.is_steady(v)).collect();
+        let outputs: Vec<_> = all.iter().filter(|v| v.causality == Causality::Output).copied().collect();
+        if outputs.is_empty() { all } else { outputs }
     }
 
     /// Inputs that are floating-point numbers.

@@ -51,9 +51,9 @@ impl Instance<'_> {
     /// The interval of a clock in s, and its qualifier.
     pub(super) fn interval(&self, v: &ModelVariable) -> Result<(Status, (f64, i32)), NotDetermined> {
         let call = format!("GetIntervalDecimal({})", v.name);
-        let (status, told) = self.call_for(&call, |raw| raw.interval(self.handle, v.value_reference))?;
-        self.session.record_value(&format!("{} s, qualifier {}", told.0, told.1));
-        Ok((status, told))
+        let (status, answer) = self.call_for(&call, |raw| raw.interval(self.handle, v.value_reference))?;
+        self.session.record_value(&format!("{} s, qualifier {}", answer.0, answer.1));
+        Ok((status, answer))
     }
 
     /// The time in s from the start to the first tick of a clock with a period.
@@ -65,10 +65,10 @@ impl Instance<'_> {
     }
 
     /// [`interval`](Self::interval), which must succeed.
-    fn told(&self, v: &ModelVariable) -> Result<(f64, i32), NotDetermined> {
-        let (status, told) = self.interval(v)?;
+    fn known_interval(&self, v: &ModelVariable) -> Result<(f64, i32), NotDetermined> {
+        let (status, answer) = self.interval(v)?;
         self.must(&format!("GetIntervalDecimal({})", v.name), status)?;
-        Ok(told)
+        Ok(answer)
     }
 }
 
@@ -80,10 +80,10 @@ impl<'b> Ticking<'b> {
             let mut clock = Self { v, timing, due: None, interval: timing.interval.unwrap_or(0.0) };
             match timing.ticks {
                 Triggered => {}
-                Changing | Countdown => clock.hear(instance.told(v)?, start),
+                Changing | Countdown => clock.hear(instance.known_interval(v)?, start),
                 _ if timing.interval.is_some() => clock.due = Some(start + timing.shift),
                 Constant | Fixed | Tunable => {
-                    clock.interval = instance.told(v)?.0;
+                    clock.interval = instance.known_interval(v)?.0;
                     let (status, shift) = instance.shift(v)?;
                     instance.must(&format!("GetShiftDecimal({})", v.name), status)?;
                     clock.due = Some(start + shift);
@@ -94,7 +94,7 @@ impl<'b> Ticking<'b> {
         clocks(instance.session, true).into_iter().map(plan).collect()
     }
 
-    /// Takes the interval of a clock without a period, which the FMU told at `now`.
+    /// Takes the interval of a clock without a period, which the FMU returned at `now`.
     pub(super) fn hear(&mut self, (interval, qualifier): (f64, i32), now: f64) {
         if qualifier == CHANGED {
             self.due = Some(now + interval);
@@ -120,8 +120,8 @@ pub(super) struct Served<'b> {
     pub(super) clocks: Vec<Ticking<'b>>,
     /// Asks twice for each interval.
     pub(super) twice: bool,
-    /// The intervals that the FMU told after updates: the place of the clock, and what each call gave.
-    pub(super) told: Vec<(usize, Vec<(f64, i32)>)>,
+    /// The intervals returned after updates: the index of the clock, and the result of each call.
+    pub(super) intervals: Vec<(usize, Vec<(f64, i32)>)>,
     events: usize,
     over: bool,
 }
@@ -132,7 +132,7 @@ pub(super) enum Moment {
     Updated,
 }
 
-/// Looks at an instance in Event Mode; the places of the clocks that tick.
+/// Called in Event Mode, with the indices of the clocks that tick.
 pub(super) type Look<'a, 'b> = &'a mut dyn FnMut(&Served<'b>, Moment, &[usize]) -> Result<(), NotDetermined>;
 
 impl<'b> Served<'b> {
@@ -142,7 +142,7 @@ impl<'b> Served<'b> {
         instance.enter()?;
         let clocks = Ticking::all(&instance)?;
         instance.perform(Simple::ExitInitializationMode)?;
-        Ok(Self { instance, clocks, twice: false, told: Vec::new(), events: 0, over: false })
+        Ok(Self { instance, clocks, twice: false, intervals: Vec::new(), events: 0, over: false })
     }
 
     /// The clocks that tick now. Triggered ones do so at every third event.
@@ -181,13 +181,13 @@ impl<'b> Served<'b> {
                     self.clocks[i].ticked(now);
                 }
                 if ticks == Countdown || ticks == Changing && ticked {
-                    let told = self.instance.told(self.clocks[i].v)?;
-                    let mut all = vec![told];
+                    let answer = self.instance.known_interval(self.clocks[i].v)?;
+                    let mut all = vec![answer];
                     if self.twice {
-                        all.push(self.instance.told(self.clocks[i].v)?);
+                        all.push(self.instance.known_interval(self.clocks[i].v)?);
                     }
-                    self.told.push((i, all));
-                    self.clocks[i].hear(told, now);
+                    self.intervals.push((i, all));
+                    self.clocks[i].hear(answer, now);
                 }
             }
             let again = |c: &Ticking<'_>| !is_periodic(c.timing.ticks) && c.is_due(now);

@@ -1,5 +1,6 @@
 //! Trajectories: the watched variables after each step, and how far two of them are apart.
 
+use crate::confidence::Confidence;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
@@ -17,23 +18,42 @@ pub(super) fn trajectory(instance: &Instance<'_>, n: u32) -> Result<Vec<Vec<Vec<
         .collect()
 }
 
-/// Where two trajectories differ, and by how much.
+/// The variable in which two trajectories differ most, and where.
 pub(super) struct Difference {
-    /// First step that differs, from 0.
-    pub(super) step: usize,
-    /// The variable that differs first.
+    /// Index of the variable.
     pub(super) variable: usize,
-    /// The largest deviation of a floating-point variable, relative to its scale; infinite for another one.
+    /// First step in which it differs, from 0.
+    pub(super) first: usize,
+    /// The step in which it differs most, from 0.
+    pub(super) step: usize,
+    /// The deviation there, relative to the scale of the variable; infinite if it is not a floating-point number.
     pub(super) largest: f64,
-    /// Both values where the first variable differs most.
+    /// Both values there.
     pub(super) values: String,
+    /// There is only one step.
+    single: bool,
 }
 
-/// So many times the tolerance may a run differ that starts anew, where an integrator chooses its own steps.
+impl Difference {
+    /// Where it differs, and both values: ` after 3 steps: 1.0 and 2.0, 1.0e0 apart`.
+    pub(super) fn text(&self) -> String {
+        let (first, step, values) = (self.first + 1, self.step + 1, &self.values);
+        match (self.single, first == step) {
+            (true, _) => format!(": {values}"),
+            (_, true) => format!(" after {step} steps: {values}"),
+            _ => format!(" from step {first} on, most after {step} steps: {values}"),
+        }
+    }
+}
+
+/// Multiple of the tolerance by which a run may differ if an integrator with variable steps restarts.
 const INTEGRATOR: f64 = 5.0;
 
-/// The least scale of a deviation, for a variable without a nominal: what is small beside it is noise about 0.
-const LEAST_SCALE: f64 = 1e-9;
+/// A relative deviation from which on no integrator with variable steps is the cause.
+const LARGE: f64 = 1e-3;
+
+/// Minimum scale of a deviation, for a variable without a nominal: anything far below it is noise around 0.
+const MIN_SCALE: f64 = 1e-9;
 
 /// A value of a floating-point type.
 fn number(base: BaseType, bits: u64) -> f64 {
@@ -43,57 +63,65 @@ fn number(base: BaseType, bits: u64) -> f64 {
     }
 }
 
-/// Where two trajectories of these variables differ.
+/// The variable in which two trajectories of these variables differ most.
 pub(super) fn difference(variables: &[&ModelVariable], a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) -> Option<Difference> {
     if a.len() != b.len() {
-        let values = format!("{} and {} steps", a.len(), b.len());
-        return Some(Difference { step: a.len().min(b.len()), variable: 0, largest: f64::INFINITY, values });
+        let (step, values) = (a.len().min(b.len()), format!("{} and {} steps", a.len(), b.len()));
+        return Some(Difference { variable: 0, first: step, step, largest: f64::INFINITY, values, single: false });
     }
-    let mut rows = a.iter().zip(b).enumerate();
-    let (step, variable) = rows.find_map(|(step, (x, y))| Some((step, x.iter().zip(y).position(|(x, y)| x != y)?)))?;
-    let of = |(i, v): (usize, &&ModelVariable)| {
-        let pairs = || a.iter().zip(b).filter_map(move |(x, y)| Some((x.get(i)?, y.get(i)?)));
-        if !v.base.is_float() || pairs().any(|(x, y)| x.len() != y.len()) {
-            return if pairs().all(|(x, y)| x == y) { 0.0 } else { f64::INFINITY };
-        }
-        let values = |x: &[u64]| x.iter().map(|bits| number(v.base, *bits)).collect::<Vec<_>>();
-        // The largest value, which is at least half of the range over the run, or the nominal.
-        let (mut scale, mut gap) = (v.nominal.map_or(LEAST_SCALE, f64::abs).max(f64::MIN_POSITIVE), 0.0_f64);
-        for (x, y) in pairs().flat_map(|(x, y)| values(x).into_iter().zip(values(y))) {
-            if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
-                scale = scale.max(x.abs());
-            } else if (x - y).is_finite() {
-                (scale, gap) = (scale.max(x.abs()).max(y.abs()), gap.max((x - y).abs()));
-            } else {
-                gap = f64::INFINITY;
-            }
-        }
-        gap / scale
-    };
-    let largest = variables.iter().enumerate().map(of).fold(0.0, f64::max);
-    Some(Difference {
-        step,
-        variable,
-        largest,
-        values: both(variables.get(variable), &a[step][variable], &b[step][variable]),
-    })
+    let each = variables.iter().enumerate().filter_map(|(i, v)| of_variable((i, v), a, b));
+    each.reduce(|most, other| if other.largest > most.largest { other } else { most })
 }
 
-/// Two values of a variable, and how far they are apart.
-fn both(v: Option<&&ModelVariable>, a: &[u64], b: &[u64]) -> String {
-    let at = a.iter().zip(b).position(|(a, b)| a != b);
-    match (v, at.map(|at| (a[at], b[at]))) {
-        (Some(v), Some((a, b))) if v.base.is_float() => {
-            let [a, b] = [a, b].map(|bits| number(v.base, bits));
-            format!("{a:?} and {b:?}, {:.1e} apart", (a - b).abs())
+/// Where two trajectories of one variable differ.
+fn of_variable((i, v): (usize, &ModelVariable), a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) -> Option<Difference> {
+    let pairs = || a.iter().zip(b).map(|(x, y)| (x[i].as_slice(), y[i].as_slice())).enumerate();
+    let first = pairs().find_map(|(step, (x, y))| (x != y).then_some(step))?;
+    let numbers = v.base.is_float() && pairs().all(|(_, (x, y))| x.len() == y.len());
+    let (mut step, mut largest) = (first, f64::INFINITY);
+    if numbers {
+        // The largest value, which is at least half of the range over the run, or the nominal.
+        let (mut scale, mut gap) = (v.nominal.map_or(MIN_SCALE, f64::abs).max(f64::MIN_POSITIVE), 0.0_f64);
+        for (k, (x, y)) in pairs().flat_map(|(k, (x, y))| x.iter().zip(y).map(move |pair| (k, pair))) {
+            let [x, y] = [x, y].map(|bits| number(v.base, *bits));
+            let difference = if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
+                scale = scale.max(x.abs());
+                0.0
+            } else if (x - y).is_finite() {
+                scale = scale.max(x.abs()).max(y.abs());
+                (x - y).abs()
+            } else {
+                f64::INFINITY
+            };
+            if difference > gap {
+                (gap, step) = (difference, k);
+            }
         }
-        (_, Some((a, b))) => format!("{} and {}", a.cast_signed(), b.cast_signed()),
-        (_, None) => format!("{} and {} values", a.len(), b.len()),
+        largest = gap / scale;
     }
+    let values = both(v, &a[step][i], &b[step][i]);
+    Some(Difference { variable: i, first, step, largest, values, single: a.len() == 1 })
+}
+
+/// Two values of a variable, and how far they are apart: of an array, the pair that is farthest apart.
+fn both(v: &ModelVariable, a: &[u64], b: &[u64]) -> String {
+    if a.len() != b.len() {
+        let one = |x: &[u64]| if x.is_empty() { "no value".into() } else { format!("{} values", x.len()) };
+        return format!("{} and {}", one(a), one(b));
+    }
+    let pairs = a.iter().zip(b).filter(|(a, b)| a != b);
+    if !v.base.is_float() {
+        let (a, b) = pairs.into_iter().next().unwrap_or((&0, &0));
+        return format!("{} and {}", a.cast_signed(), b.cast_signed());
+    }
+    let distance = |(a, b): &(f64, f64)| (a - b).abs();
+    let pairs = pairs.map(|(a, b)| (number(v.base, *a), number(v.base, *b)));
+    let farthest = pairs.max_by(|x, y| distance(x).total_cmp(&distance(y)));
+    farthest.map_or_else(String::new, |(a, b)| format!("{a:?} and {b:?}, {:.1e} apart", (a - b).abs()))
 }
 
 impl Session {
-    /// Reports a difference between two runs that ought to be the same: below the tolerance it is a matter of robustness.
+    /// Reports a difference between two runs that ought to be the same; below the tolerance, at a lower level.
     pub(super) fn compare(&self, what: &str, a: &[Vec<Vec<u64>>], b: &[Vec<Vec<u64>>]) {
         let watched = self.watched();
         self.compare_variables(&watched, what, a, b);
@@ -107,10 +135,14 @@ impl Session {
         a: &[Vec<Vec<u64>>],
         b: &[Vec<Vec<u64>>],
     ) {
+        if let [v] = variables
+            && !self.is_steady(v)
+        {
+            return;
+        }
         let Some(found) = difference(variables, a, b) else { return };
         let name = variables.get(found.variable).map_or("an output", |v| v.name.as_str());
-        let after = if a.len() > 1 { format!(" after {} steps", found.step + 1) } else { String::new() };
-        let text = format!("{what}: {name} differs{after}: {}", found.values);
+        let text = format!("{what}: {name} differs{}", found.text());
         self.deviates(found.largest, &text);
     }
 
@@ -128,6 +160,9 @@ impl Session {
         found: Vec<u64>,
         text: &str,
     ) {
+        if !self.is_steady(v) {
+            return;
+        }
         if let Some(found) = difference(&[v], &[vec![expected.to_vec()]], &[vec![found]]) {
             self.deviates_at(lower, found.largest, text);
         }
@@ -141,23 +176,18 @@ impl Session {
     /// Reports a deviation at this level, or at that of the check.
     pub(super) fn deviates_at(&self, lower: Option<Level>, largest: f64, text: &str) {
         let tolerance = self.tolerance();
-        let (level, text) = if largest <= tolerance {
-            (Some(Level::Hard), format!("{text}; relative deviation {largest:.1e}, within {tolerance:e}"))
+        let (level, range) = if largest <= tolerance {
+            (Some(Level::Hard), format!("within {tolerance:e}"))
         } else if largest <= INTEGRATOR * tolerance {
-            // What an integrator with its own steps may differ by, if it starts anew.
-            (
-                Some(Level::Should),
-                format!("{text}; relative deviation {largest:.1e}, within {INTEGRATOR} times {tolerance:e}"),
-            )
-        } else if largest.is_finite() {
-            (lower, format!("{text}; relative deviation {largest:.1e}, above {tolerance:e}"))
+            // The deviation of an integrator with variable steps that restarts.
+            (Some(Level::Should), format!("within {INTEGRATOR} times {tolerance:e}"))
         } else {
-            (lower, text.into())
+            (lower, format!("above {tolerance:e}"))
         };
-        match level {
-            Some(level) => self.lesser(level, text),
-            None => self.violated(text),
-        }
+        let confidence = if largest < LARGE { Confidence::Likely } else { Confidence::Certain };
+        let size =
+            if largest.is_finite() { format!("; relative deviation {largest:.1e}, {range}") } else { String::new() };
+        self.report(level, confidence, format!("{text}{size}"));
     }
 }
 
@@ -177,6 +207,10 @@ mod tests {
         assert!(difference(&variables, &first, &first).is_none());
         let found = difference(&variables, &first, &[row(1.0, 3), row(-4.0, 3), row(2.5, 3)]).unwrap();
         assert_eq!((found.step, found.variable, found.largest.to_bits()), (2, 0, 0.125_f64.to_bits()));
+        // The values are those of the point with the largest deviation.
+        let found = difference(&variables, &first, &[row(1.1, 3), row(-4.0, 3), row(2.5, 3)]).unwrap();
+        assert_eq!((found.first, found.step), (0, 2));
+        assert_eq!(found.text(), " from step 1 on, most after 3 steps: 2.0 and 2.5, 5.0e-1 apart");
         let found = difference(&variables, &first, &[row(1.0, 3), row(-4.0, 4), row(2.0, 3)]).unwrap();
         assert!((found.step, found.variable) == (1, 1) && found.largest.is_infinite());
         let found = difference(&variables, &first, &first[..2]).unwrap();

@@ -1,4 +1,4 @@
-//! Tells a call that hangs from a probe that is slow: by its progress and by the processor time it uses, not by the clock alone,
+//! Distinguishes a call that hangs from a slow probe: by its progress and by the processor time it uses, not by the clock alone,
 //! so that a busy machine makes no finding.
 
 use std::fs;
@@ -17,7 +17,7 @@ pub(super) enum Pace {
     Hangs,
     /// One call has stopped the process (`SIGSTOP`) for the time limit: nothing here stops a probe, and it is in a session of its
     /// own, which no terminal stops.
-    #[cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "only Linux tells"))]
+    #[cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "read on Linux only"))]
     Stopped,
     /// It makes progress, or gets no processor: neither shows a fault.
     Slow,

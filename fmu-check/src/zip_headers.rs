@@ -117,7 +117,7 @@ impl Archive {
     }
 }
 
-/// Place of the end record, searched from the end as its comment may be 64 KiB long.
+/// Offset of the end record, searched from the end because its comment may be 64 KiB long.
 fn end_record(bytes: &[u8]) -> Option<usize> {
     let first = bytes.len().saturating_sub(22 + 0xffff);
     let last = bytes.len().checked_sub(22)?;

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::ops::{Deref, DerefMut};
 
-/// Bytes with room for more. The exporter makes room for as many as the row allows, and a clone has the same room: then
-/// setting them allocates nothing.
+/// Bytes with spare capacity. The exporter reserves the maximum size of the row, and a clone keeps that capacity, so setting
+/// them allocates nothing.
 ///
 /// ```
 /// # use fmu_core::Bytes;
@@ -29,17 +29,17 @@ impl Bytes {
         self.0.extend_from_slice(bytes);
     }
 
-    /// Removes the content; the room stays.
+    /// Removes the content and keeps the capacity.
     pub fn clear(&mut self) {
         self.0.clear();
     }
 
-    /// Makes room for `most` bytes in all.
+    /// Reserves capacity for `most` bytes in total.
     pub fn reserve(&mut self, most: usize) {
         self.0.reserve_exact(most.saturating_sub(self.0.len()));
     }
 
-    /// The bytes that pairs of hexadecimal digits name; `None` for another text.
+    /// Parses pairs of hexadecimal digits; `None` for any other text.
     pub fn from_hex(text: &str) -> Option<Self> {
         let (pairs, rest) = text.as_bytes().as_chunks::<2>();
         let digit = |byte: u8| char::from(byte).to_digit(16).and_then(|x| u8::try_from(x).ok());

@@ -1,7 +1,7 @@
-//! What a model can do beyond co-simulation: a table of its functions, made while compiling.
+//! What a model can do beyond co-simulation: a table of its functions, built at compile time.
 //!
-//! A capability is a separate trait, named in the line that exports the model. What a model does not name costs it
-//! nothing: its entry is `None`, known to the compiler.
+//! A capability is a separate trait, named in the line that exports the model. A capability that is not named costs nothing:
+//! its entry is `None` at compile time.
 
 use crate::clock::Clocked;
 use crate::continuous::{CompletedSteps, ContinuousTime, Differentiable, State};
@@ -19,8 +19,8 @@ use std::marker::PhantomData;
 
 /// A model with warnings for the importer's log.
 pub trait Warns: Model {
-    /// Passes what the user should know now to `log`; called after every step and event while the importer wants to
-    /// hear warnings. Each message appears at most once in a second of simulated time.
+    /// Passes warnings for the user to `log`; called after every step and event while the importer has warnings switched on.
+    /// Each message appears at most once in a second of simulated time.
     fn warn(&self, log: &mut Warnings<'_>);
 }
 
@@ -126,7 +126,7 @@ pub struct Capabilities<M: Model> {
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
 
-#[allow(non_snake_case, reason = "each method bears the name of its trait, as the line that exports a model has it")]
+#[allow(non_snake_case, reason = "each method has the name of its trait, as in the line that exports a model")]
 impl<M: Model> Capabilities<M> {
     /// Co-simulation only.
     pub const NONE: Self = Self {
@@ -228,7 +228,7 @@ impl<M: Model> Capabilities<M> {
         Self { clocked: Some(clocked), ..self }
     }
 
-    /// Adds Scheduled Execution to a [`Clocked`] model: an importer activates each of its clocks when its scheduler likes. Every
+    /// Adds Scheduled Execution to a [`Clocked`] model: the importer's scheduler decides when each clock is activated. Every
     /// clock that the importer ticks needs a priority.
     pub const fn ScheduledExecution(self) -> Self
     where
@@ -237,7 +237,7 @@ impl<M: Model> Capabilities<M> {
         Self { scheduled: true, ..self }
     }
 
-    /// Leaves out Co-Simulation: for equations that need the importer's solver. Nobody calls [`Model::advance`].
+    /// Leaves out Co-Simulation: for equations that need the importer's solver. [`Model::advance`] is never called.
     pub const fn ModelExchangeOnly(self) -> Self {
         Self { exchange_only: true, ..self }
     }
@@ -296,7 +296,7 @@ impl<M: Model> Capabilities<M> {
         }
     }
 
-    /// The indices of the states' rows in the table: one for each scalar state.
+    /// Table indices of the states' rows: one for each scalar state.
     ///
     /// # Errors
     /// Names a state without a continuous real row that is an output or local.
@@ -313,8 +313,8 @@ impl<M: Model> Capabilities<M> {
         Ok(rows?.into_iter().flatten().collect())
     }
 
-    /// Value reference of an index of the table: one more for those below its length, after which derivatives and event indicators
-    /// follow; the elements of wide arrays come after them.
+    /// Value reference of a table index. Below the length of the table it is the index plus one; derivatives and event
+    /// indicators follow, then the elements of wide arrays.
     pub fn reference(&self, index: usize) -> u32 {
         let beside = if index < WIDE { 0 } else { M::TABLE.len() + self.scalars() + self.indicators().len() };
         u32::try_from(index % WIDE + beside + 1).unwrap_or(u32::MAX)
@@ -331,8 +331,8 @@ impl<M: Model> Capabilities<M> {
         if index >= beside && index < beside + M::TABLE.wide() { index - beside + WIDE } else { index }
     }
 
-    /// What variable `index` is, and where the importer's start value of it goes: to the state itself for the row of a state.
-    /// `rows` are those of [`rows`](Self::rows).
+    /// The variable `index` and the location of its start value; for the row of a state, that is the state itself. `rows` are
+    /// those of [`rows`](Self::rows).
     pub fn place<'a>(
         &self,
         block: &'a mut Block<M>,
@@ -344,7 +344,7 @@ impl<M: Model> Capabilities<M> {
         Some((meta, Slot::Real(self.scalar(&mut block.model, number)?)))
     }
 
-    /// Hash of the model's table and of all that the capabilities add to its interface.
+    /// Hash of the model's table and of the parts of the interface that its capabilities add.
     pub const fn hash(&self) -> Hash {
         let mut hash = M::HASH;
         if !self.model_exchange() {
@@ -387,7 +387,7 @@ pub trait Exported: Sized + 'static {
     /// The model.
     type Model: Model;
 
-    /// What it can do.
+    /// Its capabilities.
     const CAN: Capabilities<Self::Model>;
 
     /// The instantiation token: a hash of name, version, table and capabilities.

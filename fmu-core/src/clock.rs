@@ -1,4 +1,4 @@
-//! Clocks (FMI 3.0.2, 2.2.8): when a part of a model acts is said to the importer, which makes the ticks.
+//! Clocks (FMI 3.0.2, 2.2.8): they announce when a part of a model acts; the importer generates the ticks.
 
 use crate::events::Sampled;
 use crate::row::{Access, Row};
@@ -21,7 +21,7 @@ pub enum Ticks {
     Changing,
     /// After a time that the model gives at any event.
     Countdown,
-    /// Whenever the importer likes; an output clock, whenever the model does.
+    /// At any time the importer chooses; an output clock, at any time the model chooses.
     Triggered,
 }
 
@@ -37,18 +37,18 @@ impl Ticks {
     }
 }
 
-/// What a row says of a clock.
+/// Properties of a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
     /// Who knows when it ticks.
     pub ticks: Ticks,
-    /// Interval in s of a constant clock; of others their start value has it.
+    /// Interval (s) of a constant clock; for other clocks the start value is the interval.
     pub interval: Option<f64>,
     /// The interval of a constant clock as a fraction: counter and resolution.
     pub fraction: Option<(u64, u64)>,
     /// Time in s from the start to the first tick of a periodic clock.
     pub shift: f64,
-    /// Its place among the partitions of Scheduled Execution; 0 is the most urgent.
+    /// Its priority among the partitions of Scheduled Execution; 0 is the most urgent.
     pub priority: Option<u32>,
 }
 
@@ -82,7 +82,7 @@ impl Timing {
 ///     V::clock("tuned", "The importer may change it", Clock::tunable(|m| &mut m.t_s)),
 ///     V::clock("pulse", "The model gives the next interval at each tick", Clock::changing()),
 ///     V::clock("ignition", "The model asks for a tick", Clock::countdown()).priority(2),
-///     V::clock("interrupt", "When the importer likes", Clock::triggered()),
+///     V::clock("interrupt", "At any time", Clock::triggered()),
 ///     V::clock_output("trip", "A limit was passed"),
 ///     V::input("u", &VOLT, "Read when the clock ticks", |m| &mut m.u).on("sample"),
 ///     V::output("y", &VOLT, "Changes when one of them ticks", |m| &mut m.y).on("sample interrupt"),
@@ -122,12 +122,12 @@ impl<W: 'static> Clock<W> {
         clock
     }
 
-    /// Ticks with the interval (s) at this place, which the importer may set in Initialization Mode.
+    /// Ticks with the interval (s) in this field, which the importer may set in Initialization Mode.
     pub const fn fixed(interval: fn(&mut W) -> &mut f64) -> Self {
         Self::new(Ticks::Fixed, Some(interval))
     }
 
-    /// Ticks with the interval (s) at this place, which the importer may set in Initialization Mode and at events.
+    /// Ticks with the interval (s) in this field, which the importer may set in Initialization Mode and at events.
     pub const fn tunable(interval: fn(&mut W) -> &mut f64) -> Self {
         Self::new(Ticks::Tunable, Some(interval))
     }
@@ -142,7 +142,7 @@ impl<W: 'static> Clock<W> {
         Self::new(Ticks::Countdown, None)
     }
 
-    /// Ticks when the importer likes.
+    /// Ticks when the importer chooses.
     pub const fn triggered() -> Self {
         Self::new(Ticks::Triggered, None)
     }
@@ -180,7 +180,7 @@ impl<W: 'static> Row<W> {
         self
     }
 
-    /// The place of a clock among the partitions of Scheduled Execution; 0 is the most urgent. Other interfaces ignore it.
+    /// The priority of a clock among the partitions of Scheduled Execution; 0 is the most urgent. Other interfaces ignore it.
     ///
     /// # Panics
     /// At compile time, if the variable is not a clock that the importer ticks.
@@ -207,8 +207,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// The variable, or every input, output and local variable of a part, changes when one of these clocks ticks, and is read
-    /// and set while it is active. Names of several clocks stand with spaces between them. A continuous variable becomes
-    /// discrete.
+    /// and set while it is active. Names of several clocks are separated by spaces. A continuous variable becomes discrete.
     ///
     /// # Panics
     /// At compile time, if the variable is a fixed parameter.
@@ -230,8 +229,8 @@ impl<W: 'static> Row<W> {
 /// 3.0.2, 2.2.8 and 5). Clocks are rows of the table; they are numbered in its order, from 0. Such an FMU is one of FMI 3.0
 /// only, and its importer handles events.
 ///
-/// A [`Sampled`] model with one clock needs no implementation: what it computed by the last sample shows when the clock becomes
-/// active, and then it takes the next sample.
+/// A [`Sampled`] model with one clock needs no implementation: when the clock becomes active, the outputs computed by the last
+/// sample become visible, and the model takes the next sample.
 ///
 /// ```
 /// # use fmu_core::*;
@@ -268,11 +267,11 @@ impl<W: 'static> Row<W> {
     note = "write `impl Clocked for {Self}`, or remove `Clocked` from the line that exports the model"
 )]
 pub trait Clocked: Model {
-    /// Outputs of an active clock depend on inputs of the same instant: a getter computes them by a tick on a copy. Without it they
-    /// are what [`activate`](Self::activate) shows.
+    /// Outputs of an active clock depend on inputs of the same instant: a getter computes them by a tick on a copy. Otherwise
+    /// they are the outputs that [`activate`](Self::activate) computes.
     const FEEDTHROUGH: bool = false;
 
-    /// The clock becomes active: shows what holds from now on, regardless of the inputs.
+    /// The clock becomes active: computes the outputs that hold from now on, regardless of the inputs.
     fn activate(&mut self, _clock: usize, _now: Elapsed) {}
 
     /// The clock ticks: acts on the inputs of this instant. Called once at each.

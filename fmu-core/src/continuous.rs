@@ -6,7 +6,7 @@ use std::slice;
 /// Where the model `M` keeps a state.
 enum Place<M: 'static> {
     One(fn(&mut M) -> &mut f64),
-    /// Greatest number of elements, and where they are.
+    /// Maximum number of elements, and their location.
     Many(usize, fn(&mut M) -> &mut [f64]),
 }
 
@@ -50,7 +50,7 @@ impl<M: 'static> State<M> {
         self
     }
 
-    /// Greatest number of elements of an array; `None` of a state that is not one.
+    /// Maximum number of elements of an array; `None` for a scalar state.
     pub const fn dimension(&self) -> Option<usize> {
         match self.place {
             Place::One(_) => None,
@@ -58,7 +58,7 @@ impl<M: 'static> State<M> {
         }
     }
 
-    /// Greatest number of scalar states that it stands for.
+    /// Maximum number of its scalar states.
     pub const fn most(&self) -> usize {
         match self.place {
             Place::One(_) => 1,
@@ -97,9 +97,8 @@ pub trait ContinuousTime: Model {
     /// The states, in the order of all calls.
     const STATES: &'static [State<Self>];
 
-    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an array
-    /// has as many as the model holds.
-    /// It allocates nothing and depends on nothing that a step leaves behind.
+    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an
+    /// array has as many as the model holds. It does not allocate, and its result does not depend on earlier steps.
     ///
     /// # Errors
     /// The derivatives do not exist here: the solver tries a shorter step.
@@ -113,36 +112,36 @@ pub trait ContinuousTime: Model {
         self.output(now, outputs);
     }
 
-    /// Writes the rate of every output that accumulates, such as an energy counter, in the place of that output, and leaves the
-    /// other places alone. The rates are a part of the output derivatives of Co-Simulation.
+    /// Writes the rate of every output that accumulates, such as an energy counter, to the field of that output, and leaves the
+    /// other fields alone. The rates are part of the output derivatives of Co-Simulation.
     fn integrands(&self, _now: Elapsed, _outputs: &mut Self::Outputs) {}
 }
 
-/// A continuous model that is called at every accepted point of the solution in Model Exchange, for example to count what
-/// passes between two points.
+/// A continuous model that is called at every accepted point of the solution in Model Exchange, for example to integrate a
+/// quantity between two points.
 ///
-/// A solver also tries states that it gives up again; a model without this trait cannot tell them apart. In Co-Simulation,
-/// [`Model::advance`] knows the solution, and nothing here is called.
+/// A solver also tries states that it later rejects, and a model without this trait cannot distinguish them from accepted ones.
+/// In Co-Simulation, [`Model::advance`] knows the solution, and nothing here is called.
 pub trait CompletedSteps: ContinuousTime {
     /// The solution passes through the present states, inputs and time: a step of the importer's solver is complete, or Event
-    /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time stands still or goes on from call to call,
-    /// unless [`account`](Self::account) takes back what was counted.
-    /// An importer that ignores the request for completed steps calls at events only.
+    /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time does not decrease from call to call, unless
+    /// [`account`](Self::account) takes counts back. An importer that ignores the request for completed steps calls at events
+    /// only.
     ///
     /// # Errors
     /// Gives the reason why the model cannot go on.
     fn complete(&mut self, now: Elapsed) -> Result<(), Fault>;
 
-    /// Keeps a copy of all that [`complete`](Self::complete) changes, after it, or takes back what was counted after a time: some
-    /// importers complete steps that their solver gives up. [`Kept`](crate::Kept) does both.
+    /// Copies the counts after [`complete`](Self::complete), or restores those of an earlier time: some importers complete
+    /// steps that their solver then rejects. [`Kept`](crate::Kept) does both.
     fn account(&mut self, account: Account);
 }
 
 /// A continuous model that knows its own tangent, for example with [`Dual`](crate::Dual) numbers. For a model that
 /// does not, the exporter takes a central difference.
 pub trait Differentiable: ContinuousTime {
-    /// The change of the derivatives (to `dx`) and of the continuous outputs (to `outputs`) per unit of a change of
-    /// states and continuous inputs by `along`, which holds the change of each in its own place.
+    /// The directional derivative of the derivatives (to `dx`) and of the continuous outputs (to `outputs`) along `along`,
+    /// which has a component for each state and continuous input.
     ///
     /// # Errors
     /// The derivatives do not exist here.

@@ -23,7 +23,7 @@ use std::collections::BTreeSet;
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
 
-/// Everything that an importer can know about a model.
+/// Everything that an importer can learn about a model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Description {
     /// Model identifier, and the name that users see unless there is a title.
@@ -44,7 +44,7 @@ pub struct Description {
     pub token: String,
     /// Recommended experiment.
     pub experiment: Experiment,
-    /// Log categories of the model's own: names and descriptions.
+    /// The model's log categories: names and descriptions.
     #[serde(default)]
     pub categories: Vec<(String, String)>,
     /// Body of the documentation page, an HTML fragment.
@@ -59,7 +59,7 @@ pub struct Description {
     pub model_exchange: Option<ModelExchange>,
 }
 
-/// The interface for Model Exchange, and what goes with it.
+/// The interface for Model Exchange.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[expect(clippy::struct_excessive_bools, reason = "properties that do not depend on each other")]
 pub struct ModelExchange {
@@ -111,7 +111,7 @@ pub struct Variable {
     /// Other names (FMI 3.0).
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub aliases: Vec<AliasDescription>,
-    /// Extents of an array at the start, whose elements are row by row; empty for a scalar.
+    /// Extents of an array at the start, whose elements are stored row by row; empty for a scalar.
     pub shape: Vec<usize>,
     /// Value references of the structural parameters that are its extents; empty for an array of one size.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -129,7 +129,7 @@ pub struct Variable {
     pub derivative: Option<u32>,
     /// A state that an event may change.
     pub reinit: bool,
-    /// Value references of the clocks that it is on.
+    /// Value references of its clocks.
     pub clocks: Vec<u32>,
     /// It can be read or set inside a communication step (FMI 3.0).
     pub intermediate: bool,
@@ -188,7 +188,7 @@ pub enum VariableKind {
     Binary {
         /// MIME type of the content.
         mime_type: String,
-        /// Greatest number of bytes.
+        /// Maximum number of bytes.
         most: usize,
     },
 }
@@ -227,7 +227,7 @@ impl Description {
         Self::instantiated::<E>(fresh()?)
     }
 
-    /// Describes an instance like [`exported`](Self::exported), with the start values and the resources that `block` has.
+    /// Describes an instance like [`exported`](Self::exported), with the start values and resources of `block`.
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
@@ -344,7 +344,7 @@ impl Description {
         self.title.as_deref().unwrap_or(&self.name)
     }
 
-    /// Why there can be no archive of FMI 2.0, if there cannot.
+    /// The reason why an archive of FMI 2.0 is impossible, if it is.
     pub fn needs_fmi3(&self) -> Option<String> {
         let binary = |v: &&Variable| matches!(v.kind, VariableKind::Binary { .. });
         let of_bytes = self.variables.iter().find(binary);
@@ -359,7 +359,8 @@ impl Description {
     }
 }
 
-/// The clocks of every variable. What is on a clock has no value before its first tick, and between events depends on the ticks.
+/// The clocks of every variable. A clocked variable has no value before its first tick, and between events it depends on the
+/// ticks.
 fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Result<(), Fault> {
     if const { !M::TABLE.kinds().meets(Kinds::CLOCK) } {
         return Ok(());
@@ -404,7 +405,7 @@ fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Res
     Ok(())
 }
 
-/// A variable of a table that the model shares with another one, as this model has it.
+/// A variable of a table that several models share, as seen by this model.
 fn in_place_of_another<M: Model>(v: &mut Variable) {
     let real = matches!(v.kind, VariableKind::Real { .. });
     if M::CONTINUOUS && real && v.causality == Causality::Output && v.variability == Variability::Discrete {
@@ -416,7 +417,7 @@ fn in_place_of_another<M: Model>(v: &mut Variable) {
 }
 
 impl Variable {
-    /// What is allowed.
+    /// Allowed values.
     pub fn range(&self) -> Range {
         let (min, max) = (self.min.unwrap_or(f64::NEG_INFINITY), self.max.unwrap_or(f64::INFINITY));
         Range { min, max, above: self.above, below: self.below }
@@ -492,8 +493,8 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
     }
 }
 
-/// The words of the need of `input`, with the full name of the parameter: the one that has the name of the table, or ends with
-/// it after the prefix of a part.
+/// The sentence that says when `input` is read, with the full name of the parameter: its name in the table, after the prefix of
+/// a part.
 fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, Fault> {
     let Need::With { parameter, value } = need else { return Ok(need.to_string()) };
     let named = |v: &&Variable| {
@@ -570,7 +571,7 @@ fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
         _ => "",
     };
     if text.contains(|c: char| c.is_control() && !"\t\n\r".contains(c) || "\u{fffe}\u{ffff}".contains(c)) {
-        return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not have")));
+        return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not allow")));
     }
     if slot.is_allowed(meta) {
         return Ok(());
@@ -600,7 +601,7 @@ fn wide_array<M: Model>(
     Ok(array)
 }
 
-/// No two variables or aliases have one name.
+/// Checks that no two variables or aliases share a name.
 fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fault> {
     let mut names = BTreeSet::new();
     let all = variables.iter().flat_map(|v| v.aliases.iter().map(|a| &a.name).chain([&v.name]));

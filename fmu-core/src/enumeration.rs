@@ -1,4 +1,4 @@
-//! Enumerations: one declaration gives the Rust enum, its type definition and what its row needs.
+//! Enumerations: one declaration gives the Rust enum, its type definition and the data of its row.
 //!
 //! The importer sees an integer; the model holds the enum, so a value that does not exist cannot be stored.
 
@@ -17,7 +17,7 @@ pub trait Enumerated: Copy + Debug + 'static {
     fn value(self) -> i32;
 }
 
-/// The place where a model holds an enum of some type.
+/// A field of a model with an enum of some type.
 pub trait Choice: Debug {
     /// The value of the current item.
     fn get(&self) -> i32;

@@ -22,7 +22,7 @@ pub enum Next {
 }
 
 impl Next {
-    /// Seconds from `now` to this event: 0 if it is due, or if rounding alone separates the two. An importer's time counts as
+    /// Seconds from `now` to this event: 0 if it is due, or if only rounding separates the two. An importer's time counts as
     /// that of the event if both agree to 1e-9 of the time.
     pub fn left(self, now: Elapsed) -> Option<f64> {
         let left = match self {
@@ -48,12 +48,12 @@ impl Next {
     }
 }
 
-/// What an event did in addition to changing discrete variables.
+/// Effects of an event beyond changed discrete variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
     /// Another call of [`Events::event`] follows before time goes on.
     pub again: bool,
-    /// A continuous state has another value than before.
+    /// A continuous state has changed.
     pub states_changed: bool,
     /// The simulation is to end.
     pub terminate: bool,
@@ -68,8 +68,8 @@ pub struct Indicator {
     pub description: &'static str,
 }
 
-/// A model with events. The importer enters Event Mode at the time that [`next`](Self::next) gave, where an indicator
-/// changes its sign, or for other reasons; there it exchanges inputs and outputs.
+/// A model with events. The importer enters Event Mode at the time given by [`next`](Self::next), where an indicator changes
+/// its sign, or for other reasons; there it exchanges inputs and outputs.
 ///
 /// A ball that bounces until it rests, a whole model:
 ///
@@ -175,7 +175,7 @@ pub trait Events: Model {
     /// The event indicators, in the order of all calls.
     const INDICATORS: &'static [Indicator] = &[];
 
-    /// Writes the indicators to `z`. After an event none is 0, and the sign says on which side the model is.
+    /// Writes the indicators to `z`. After an event none is 0, and the sign shows on which side the model is.
     fn indicators(&self, _now: Elapsed, _z: &mut [f64]) {}
 
     /// Event Mode begins, before the importer exchanges values: discrete outputs take the values that they have from
@@ -192,7 +192,7 @@ pub trait Events: Model {
     fn next(&self, now: Elapsed) -> Next;
 }
 
-/// Where a step towards an event came to an end.
+/// Where a step towards an event ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
     /// The instant, not after the end of the step: the model's state is of this instant.
@@ -211,17 +211,18 @@ pub struct Stop {
 )]
 pub trait EventMode: ContinuousTime + Events {
     /// Advances the state up to the first event after the beginning of the step, or to its end. A step begins as one of
-    /// [`Model::advance`] does: what is due at its beginning is done there. [`integrate::to_event`](crate::integrate::to_event) and
-    /// [`integrate::euler_to_event`](crate::integrate::euler_to_event) are implementations in one line.
+    /// [`Model::advance`] does: an event due at its beginning is handled there.
+    /// [`integrate::to_event`](crate::integrate::to_event) and [`integrate::euler_to_event`](crate::integrate::euler_to_event)
+    /// are implementations in one line.
     ///
     /// # Errors
     /// As [`Model::advance`].
     fn to_event(&mut self, step: &Step) -> Result<Stop, Fault>;
 }
 
-/// A model that acts at the instants k T only, like a digital controller: it reads its inputs at an instant, and shows
-/// what it computed from them at the next one. An importer that handles events gives it the inputs of every instant,
-/// regardless of its communication step.
+/// A model that acts at the instants k T only, like a digital controller: it reads its inputs at one instant, and the results
+/// become visible at the next one. An importer that handles events gives it the inputs of every instant, regardless of its
+/// communication step.
 pub trait Sampled: Model {
     /// The sample period T in s.
     fn period(&self) -> f64;
@@ -245,7 +246,7 @@ pub fn grid<M: Sampled>(model: &M) -> SampleGrid {
     SampleGrid { period: model.period() }
 }
 
-/// Refuses more samples than anyone can wait for.
+/// Refuses an unreasonable number of samples.
 ///
 /// # Errors
 /// More than 1e7 samples are due at `now`.
@@ -253,7 +254,7 @@ pub fn bounded<M: Sampled>(model: &M, now: Elapsed) -> Result<(), Fault> {
     bounded_by(model, grid(model).past(model.samples(), now), now)
 }
 
-/// Refuses a point `past` (s) after the next sample if more samples are due than anyone can wait for.
+/// Refuses a point `past` (s) after the next sample if too many samples are due.
 #[inline]
 pub(crate) fn bounded_by<M: Sampled>(model: &M, past: f64, now: Elapsed) -> Result<(), Fault> {
     if past <= MAX_SAMPLES * model.period() { Ok(()) } else { Err(endless(model.period(), now)) }

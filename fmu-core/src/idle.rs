@@ -1,7 +1,8 @@
-//! Values that a user has set and that change nothing with the others: found at the first step, and said once, by name.
+//! Values that a user has set and that have no effect with the other values: found at the first step, and reported once, by
+//! name.
 //!
-//! A model states in lists of [`Acts`] when its parameters and inputs act, and [`Model::idle`] looks there. A value that is not the
-//! start value counts as set. [`Watch`] looks at the parameters once and at an input until it is set.
+//! A model lists in [`Acts`] when its parameters and inputs act, and [`Model::idle`] evaluates the lists. A value that differs
+//! from the start value counts as set. [`Watch`] looks at the parameters once and at an input until it is set.
 
 use crate::row::Slot;
 use crate::table::Table;
@@ -14,7 +15,7 @@ pub struct Acts<P: 'static> {
     pub names: &'static [&'static str],
     /// Whether they act.
     pub when: fn(&P) -> bool,
-    /// What is said of them if they do not.
+    /// The message if they do not.
     pub why: &'static str,
 }
 
@@ -24,8 +25,8 @@ pub fn why<P>(all: &[Acts<P>], par: &P, name: &str) -> Option<&'static str> {
     if (found.when)(par) { None } else { Some(found.why) }
 }
 
-/// The parameters and inputs of `table` that `all` does not name exactly once, and the names there that the table does not have: a
-/// test has none.
+/// The parameters and inputs of `table` that `all` does not name exactly once, and the names in `all` that the table lacks. A
+/// test expects both to be empty.
 pub fn unstated<P, W>(all: &[Acts<P>], table: &Table<W>) -> Vec<String> {
     let listed = |name: &str| all.iter().flat_map(|acts| acts.names).filter(|listed| **listed == name).count();
     let located = table.indices().filter_map(|index| table.locate(index)).filter(|(.., element)| *element == 0);
@@ -35,7 +36,7 @@ pub fn unstated<P, W>(all: &[Acts<P>], table: &Table<W>) -> Vec<String> {
     names.iter().filter(|name| listed(name) != 1).cloned().chain(unknown.map(|name| (*name).to_owned())).collect()
 }
 
-/// What is left to look at.
+/// Parameters and inputs still to be checked.
 #[derive(Debug, Default)]
 pub struct Watch {
     begun: bool,
@@ -44,7 +45,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// Passes what was found since the last call to `tell`, a message for each reason.
+    /// Passes the findings since the last call to `tell`, one message for each reason.
     pub fn look<M: Model>(&mut self, block: &mut Block<M>, mut tell: impl FnMut(&str)) {
         let mut found = Vec::new();
         if !std::mem::replace(&mut self.begun, true) {
@@ -68,7 +69,7 @@ impl Watch {
     }
 }
 
-/// Whether the variable has another value than at the start; if it does not act, `found` gets its name and value.
+/// Whether the variable differs from its start value; if it does not act, its name and value are added to `found`.
 fn find<M: Model>(
     block: &mut Block<M>,
     (index, at_start): (usize, f64),
@@ -79,10 +80,10 @@ fn find<M: Model>(
         return false;
     }
     let name = M::TABLE.locate(index).map(|(name, ..)| name).unwrap_or_default();
-    if let (Some(why), Some(told)) = (block.model.idle(&name), M::TABLE.tell_index(block, index)) {
+    if let (Some(why), Some(shown)) = (block.model.idle(&name), M::TABLE.tell_index(block, index)) {
         match found.iter_mut().find(|(other, _)| *other == why) {
-            Some((_, values)) => values.push(told),
-            None => found.push((why, vec![told])),
+            Some((_, values)) => values.push(shown),
+            None => found.push((why, vec![shown])),
         }
     }
     true

@@ -1,21 +1,21 @@
-//! The integer types of FMI 3.0, and a row of constructors for each. In FMI 2.0 all are Integer, of 32 bits: a value outside of
-//! it is an error of the call that would carry it.
+//! The integer types of FMI 3.0, and a row of constructors for each. In FMI 2.0 all are Integer, of 32 bits: a value that does
+//! not fit is an error of the call.
 
 use crate::row::{Access, Constant, Row};
 use crate::variable::{Causality, Kind, Range, Variability};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
-/// The place where a model holds an integer of some type.
-pub trait Whole: Debug {
+/// A field of a model with an integer of some type.
+pub trait IntegerField: Debug {
     /// The value.
     fn get(&self) -> i128;
 
-    /// Stores the value; returns false and changes nothing if the type does not have it.
+    /// Stores the value; returns false and changes nothing if it does not fit the type.
     fn set(&mut self, value: i128) -> bool;
 }
 
-/// The types, one a line: its name in FMI 3.0, the type in Rust, and the constructors.
+/// The types, one per line: name in FMI 3.0, type in Rust, and constructors.
 macro_rules! integers {
     ($($name:ident $type:ident $input:ident $output:ident $local:ident $parameter:ident $constant:ident;)*) => {
         /// An integer type of FMI 3.0.
@@ -42,13 +42,13 @@ macro_rules! integers {
         }
 
         impl<W> Getter<W> {
-            pub(crate) fn find<'a>(&self, whole: &'a mut W) -> &'a mut dyn Whole {
+            pub(crate) fn find<'a>(&self, whole: &'a mut W) -> &'a mut dyn IntegerField {
                 match self { $(Self::$name(get) => get(whole)),* }
             }
         }
 
         $(
-            impl Whole for $type {
+            impl IntegerField for $type {
                 fn get(&self) -> i128 {
                     i128::from(*self)
                 }
@@ -136,7 +136,7 @@ mod tests {
     #[test]
     fn a_place_takes_what_its_type_has() {
         let mut x = 7_u8;
-        let place: &mut dyn Whole = &mut x;
+        let place: &mut dyn IntegerField = &mut x;
         assert!(!place.set(256) && !place.set(-1) && place.get() == 7 && place.set(255));
         assert_eq!(x, 255);
     }

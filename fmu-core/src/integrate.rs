@@ -40,7 +40,7 @@ const WIDTH: f64 = 1e-9;
 /// ```
 ///
 /// # Errors
-/// Those of [`ContinuousTime::derivatives`], a state that is not finite, or more substeps than anyone can wait for.
+/// Those of [`ContinuousTime::derivatives`], a state that is not finite, or an unreasonable number of substeps.
 pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, longest: f64) -> Result<(), Fault> {
     const { check_number::<M>(N) };
     let count = substeps(step.h, longest)?;
@@ -130,7 +130,7 @@ fn run<M: ContinuousTime + Events, const N: usize>(
     Ok(Stop { at: end, event: stops && model.next(end).is_due(end), settles: false })
 }
 
-/// The event indicators fit.
+/// Checks that the event indicators fit.
 const fn check_indicators<M: Events>() {
     assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for");
 }
@@ -212,7 +212,7 @@ fn substep<M: ContinuousTime + Events, const N: usize>(
     Ok(Some(high))
 }
 
-/// The states, those that the model has now in front.
+/// The states; those that the model has now come first.
 fn states<M: ContinuousTime, const N: usize>(model: &mut M) -> [f64; N] {
     let mut all = [0.0; N];
     if const { !has_arrays::<M>() } {
@@ -311,7 +311,7 @@ fn name_of<M: ContinuousTime>(scalar: usize) -> &'static str {
 /// Number of equal substeps into which a step of `h` (s) is divided.
 ///
 /// # Errors
-/// More substeps than anyone can wait for.
+/// An unreasonable number of substeps.
 pub fn substeps(h: f64, longest: f64) -> Result<f64, Fault> {
     let count = (h / longest - 1e-9).ceil().max(1.0);
     if count <= MAX_SUBSTEPS {

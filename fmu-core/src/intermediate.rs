@@ -3,10 +3,10 @@
 use crate::Model;
 
 /// A continuous model that shows its outputs, and takes inputs, inside a communication step (intermediate update, FMI 3.0.2,
-/// 4.2.2): an importer that asks for it is called after each part of a step, where it reads and sets the rows that are marked
+/// 4.2.2): an importer that requests it is called after each part of a step, where it reads and sets the rows that are marked
 /// with [`intermediate`](crate::Row::intermediate), and may end the step.
 ///
-/// An importer that does not ask gets whole steps.
+/// Other importers get whole steps.
 ///
 /// ```
 /// # use fmu_core::unit::{METER, METER_PER_S, NEWTON};
@@ -48,8 +48,8 @@ use crate::Model;
     note = "write `impl Intermediate for {Self}`, or remove `Intermediate` from the line that exports the model"
 )]
 pub trait Intermediate: Model {
-    /// The longest part of a communication step (s). A step is divided into the least number of equal parts, and
-    /// [`advance`](Model::advance) runs for each of them. With the length of the substeps of `advance`, as the integrators of
-    /// [`integrate`](mod@crate::integrate) have it, the parts together give the bits of the whole step.
+    /// The longest part of a communication step (s). A step is divided into the minimum number of equal parts, and
+    /// [`advance`](Model::advance) runs for each of them. If this is the length of the substeps of `advance`, as in the
+    /// integrators of [`integrate`](mod@crate::integrate), the parts together give the bits of the whole step.
     fn longest(&self) -> f64;
 }

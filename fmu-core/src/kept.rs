@@ -1,4 +1,4 @@
-//! What a model has counted at points of the solution, for an importer that goes back in time.
+//! Counts of a model at points of the solution, restored when an importer goes back in time.
 
 use crate::Elapsed;
 use serde::{Deserialize, Serialize};
@@ -9,13 +9,13 @@ const NEWEST: u8 = 8;
 /// What happens to the counts of a model with [`CompletedSteps`](crate::CompletedSteps).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Account {
-    /// They are those at an event: the importer goes back no further.
+    /// Counts at an event: the importer goes back no further.
     Event(Elapsed),
-    /// They are those at a completed step.
+    /// Counts at a completed step.
     Step(Elapsed),
-    /// A step is completed at this time, again: what was counted up to it is taken back, and counted anew.
+    /// A step is completed at this time again: counts from this time on are discarded and counted anew.
     Again(Elapsed),
-    /// The importer goes back to this time: what was counted after it is taken back.
+    /// The importer goes back to this time: counts after it are discarded.
     Back(Elapsed),
 }
 
@@ -46,8 +46,8 @@ pub struct Kept<C> {
 }
 
 impl<C: Clone> Kept<C> {
-    /// Keeps a copy of the `counts`, or takes back what was counted after a time: they become those of the newest point until
-    /// then. If more points were completed since, and none of those that are kept is early enough, they become those of the event.
+    /// Keeps a copy of the `counts`, or restores those of the newest point that is not later than a given time. If no kept
+    /// point is early enough, they become those of the event.
     pub fn follow(&mut self, account: Account, counts: &mut C) {
         match account {
             Account::Event(_) => {
@@ -55,7 +55,7 @@ impl<C: Clone> Kept<C> {
                 self.count = 0;
             }
             Account::Step(now) => {
-                // Stored bytes may hold any numbers.
+                // Stored bytes may contain any numbers.
                 if self.count >= NEWEST {
                     (self.first, self.count) = ((self.first % NEWEST + 1) % NEWEST, NEWEST - 1);
                 }

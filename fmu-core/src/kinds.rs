@@ -1,4 +1,4 @@
-//! Which kinds of variables a table has, known while compiling: what reads and sets the others is left out of the binary.
+//! The kinds of variables in a table, known at compile time: code for other kinds is left out of the binary.
 
 use crate::integer::IntegerType;
 use crate::variable::Kind;
@@ -53,7 +53,7 @@ impl Kinds {
         Self(self.0 | other.0)
     }
 
-    /// Whether both have a kind in common.
+    /// Whether the two have a kind in common.
     pub const fn meets(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }

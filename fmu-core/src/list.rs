@@ -12,11 +12,11 @@ pub trait Element: 'static {
     /// Base type of the variable.
     const KIND: Kind;
 
-    /// The element as a table finds it.
+    /// The element as a table slot.
     fn slot(&mut self) -> Slot<'_>;
 }
 
-/// The types, one a line: in Rust, its kind, and its slot.
+/// The types, one per line: type in Rust, kind, and slot.
 macro_rules! elements {
     ($($type:ty: $kind:expr, $slot:ident;)*) => { $(
         impl Element for $type {

@@ -23,13 +23,13 @@ pub const CATEGORIES: &[(&str, &str)] = &[
 /// In FMI 2.0 only: all categories at once.
 pub const ALL: &str = "logAll";
 
-/// Most categories of a model's own.
+/// Maximum number of a model's categories.
 pub const OWN: usize = 32 - CATEGORIES.len();
 
-/// What a model has to say: the category, a key that identifies the message, and a closure that formats it.
+/// A message of a model: its category, a key that identifies it, and a closure that formats it.
 pub type Said<'a> = (&'static str, &'static str, &'a dyn Fn() -> String);
 
-/// Where a model puts its warnings, and messages in the categories that it declares.
+/// Receives a model's warnings, and messages in the categories that it declares.
 pub struct Warnings<'a>(&'a mut dyn FnMut(Said<'_>));
 
 impl<'a> Warnings<'a> {

@@ -21,8 +21,8 @@ pub struct Info {
     pub copyright: &'static str,
     /// Recommended experiment.
     pub experiment: Experiment,
-    /// Log categories of the model's own, besides those of the standards: names and descriptions. [`Warns`](crate::Warns) logs
-    /// into them.
+    /// Log categories of the model, besides those of the standards: names and descriptions. [`Warns`](crate::Warns) logs into
+    /// them.
     pub categories: &'static [(&'static str, &'static str)],
     /// Body of the documentation page: an HTML fragment (equations, how to connect); the variables are added to it.
     pub documentation: &'static str,
@@ -55,7 +55,7 @@ pub struct Experiment {
     /// Recommended relative tolerance of the importer's solver.
     #[serde(default)]
     pub tolerance: Option<f64>,
-    /// The step of the model's own solver in Co-Simulation, if it is fixed: `fixedInternalStepSize` of FMI 3.0.
+    /// The step of the model's solver in Co-Simulation, if it is fixed: `fixedInternalStepSize` of FMI 3.0.
     #[serde(default)]
     pub fixed_step: Option<f64>,
 }
@@ -85,18 +85,18 @@ pub enum Interface {
 /// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
 /// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer
 ///    asks for a value after it has set one, so that initialization can be iterated.
-/// 4. [`validate`](Model::validate) judges the parameters together; then the simulation starts.
+/// 4. [`validate`](Model::validate) checks the parameters together; then the simulation starts.
 /// 5. [`advance`](Model::advance) and [`output`](Model::output) run in turn. An `advance` does not allocate, lock, read a
 ///    clock or print, and never writes a parameter.
 /// 6. Saving is a clone, storing is serde; both at any time between calls.
 pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static {
-    /// The outputs, a plain struct of their own.
+    /// The outputs, a separate plain struct.
     type Outputs: Default + Clone + Serialize + DeserializeOwned + Send + 'static;
 
     /// General information about the model.
     const INFO: Info;
 
-    /// The variables: the one place where a name, a unit or a range is written.
+    /// The variables: names, units and ranges are written only here.
     const TABLE: &'static Table<Block<Self>>;
 
     /// Variables that are connected together; they are not part of the token.
@@ -112,8 +112,8 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
 
     /// Reads data from the files of the FMU's folder `resources/`, once, at instantiation. `resources` is that folder; `None`
-    /// if the importer names none. Store what is read in a [`Resource`](crate::Resource): it is not part of a saved
-    /// state, and it is there again after a reset and when a state is restored.
+    /// if the importer names none. Store what is read in a [`Resource`](crate::Resource): it is not part of a saved state, and
+    /// remains after a reset and when a state is restored.
     ///
     /// ```
     /// # use fmu_core::{Fault, Resource};
@@ -146,12 +146,12 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
         Ok(())
     }
 
-    /// The real outputs that the table calls discrete follow at every instant: for a model without samples that has the table of one
-    /// that samples, so that it can take its place.
+    /// The real outputs that the table declares discrete are computed at every instant: for a model without samples that shares
+    /// the table of a sampled model, so that it can replace it.
     const CONTINUOUS: bool = false;
 
-    /// Whether the parameter of this name has an effect. A model that has the parameters of another one, so that it can take its
-    /// place, need not read them all; the descriptions of those without effect say so.
+    /// Whether the parameter of this name has an effect. A model that shares the parameters of another model, so that it can
+    /// replace it, need not read them all; the descriptions of those without effect say so.
     fn has_effect(_parameter: &str) -> bool {
         true
     }
@@ -196,7 +196,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     fn advance(&mut self, step: &Step) -> Result<(), Fault>;
 }
 
-/// A model together with its outputs, as the rows of its table see it.
+/// A model together with its outputs: the type that the rows of its table access.
 #[derive(Clone, Default, Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct Block<M: Model> {
@@ -207,7 +207,7 @@ pub struct Block<M: Model> {
 }
 
 impl<M: Model> Block<M> {
-    /// Calculated parameters, state and outputs at the start, from what is set so far.
+    /// Calculated parameters, state and outputs at the start, from the values set so far.
     pub fn initialize(&mut self) {
         self.model.derive();
         self.model.initialize();

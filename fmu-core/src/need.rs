@@ -1,17 +1,17 @@
-//! Whether an importer must feed an input, in the words of its description: neither standard has an attribute for it.
+//! Whether an importer must feed an input, expressed in its description: neither standard has an attribute for it.
 //!
-//! A row says it by [`Row::optional`](crate::Row::optional) or [`Row::read_with`](crate::Row::read_with). The words are written
-//! and read here alone, so that an importer knows what the table knows.
+//! A row states it by [`Row::optional`](crate::Row::optional) or [`Row::read_with`](crate::Row::read_with). The sentence is
+//! written and parsed only here, so that an importer knows as much as the table.
 
 use std::fmt;
 
 /// Whether an input must be fed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Need<'a> {
-    /// Its start value only serves the beginning of a run.
+    /// Its start value only serves to begin a run.
     #[default]
     Always,
-    /// Its start value is what is usually wanted.
+    /// Its start value usually suits.
     Never,
     /// The model reads it only while a parameter has a value.
     With {
@@ -27,7 +27,7 @@ const ONLY_WITH: &str = ": read only with ";
 const EQUALS: &str = " = ";
 
 impl fmt::Display for Need<'_> {
-    /// What follows the description.
+    /// The suffix of the description.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Always => Ok(()),

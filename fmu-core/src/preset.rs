@@ -1,7 +1,7 @@
 //! The preset of an FMU: start values in a file of its resources, in place of those of the model's `Default`.
 //!
-//! `fmu preset` writes the file, the exporter applies it when an instance is made. A line names the format; each of the
-//! others has a scalar, or an element of an array, a tab (here `→`), and its start value:
+//! `fmu preset` writes the file, the exporter applies it when it creates an instance. The first line names the format; each
+//! other line has a scalar, or an element of an array, a tab (here `→`), and its start value:
 //!
 //! ```text
 //! fmu preset 1
@@ -11,8 +11,8 @@
 //! weights[1,2]→0.5
 //! ```
 //!
-//! An enumeration has its integer, a Boolean `true` or `false`; `\n`, `\r`, `\t` and `\\` mean what they mean in Rust. The hash
-//! of the file follows the model's token after `+`: so the token shows whether there is a preset, and which one.
+//! An enumeration has its integer, a Boolean `true` or `false`; `\n`, `\r`, `\t` and `\\` are escapes as in Rust. The hash of
+//! the file follows the model's token after `+`, so the token identifies the preset.
 
 use crate::{Fault, Hash};
 
@@ -29,7 +29,7 @@ const FORMAT: &str = "1";
 
 /// A line of the file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Entry {
+pub struct PresetValue {
     /// Number of the line, from 1.
     pub line: usize,
     /// Name of the variable, an element of an array as `name[1,2]`.
@@ -61,10 +61,10 @@ pub fn write<'a>(values: impl IntoIterator<Item = (&'a str, &'a str)>) -> String
 /// The names and values of a file.
 ///
 /// # Errors
-/// Names the line and what is wrong: the size, the encoding, the format, the form of a line.
-pub fn read(bytes: &[u8]) -> Result<Vec<Entry>, Fault> {
+/// Names the line and the fault: size, encoding, format, or syntax of a line.
+pub fn read(bytes: &[u8]) -> Result<Vec<PresetValue>, Fault> {
     if bytes.len() as u64 > MOST {
-        return Err(Fault::new(format!("is larger than {MOST} bytes, the most that a preset may have")));
+        return Err(Fault::new(format!("is larger than {MOST} bytes, the maximum size of a preset")));
     }
     let text = std::str::from_utf8(bytes).map_err(|_| Fault::new("is not a preset: it is not UTF-8"))?;
     let mut lines = text.split('\n');
@@ -83,7 +83,7 @@ pub fn read(bytes: &[u8]) -> Result<Vec<Entry>, Fault> {
         let wrong = |why: &str| Fault::new(format!("line {line}: {why}"));
         let (name, value) = text.split_once('\t').ok_or_else(|| wrong("expected a name, a tab and a value"))?;
         let value = unescaped(value).ok_or_else(|| wrong("after \\ comes n, r, t or \\"))?;
-        Ok(Entry { line, name: name.into(), value })
+        Ok(PresetValue { line, name: name.into(), value })
     };
     (2..).zip(lines).map(entry).collect()
 }
@@ -105,12 +105,12 @@ fn unescaped(text: &str) -> Option<String> {
     Some(out)
 }
 
-/// What stands after the model's token for the preset of these bytes.
+/// The suffix of the model's token for the preset of these bytes.
 pub fn suffix(bytes: &[u8]) -> String {
     format!("+{}", Hash::START.bytes(bytes).guid().as_str())
 }
 
-/// Whether a token is that of the model, and what stands after it, which is empty without a preset; `None` for any other token.
+/// The suffix of a token of the model, empty without a preset; `None` for any other token.
 pub fn suffix_of<'a>(token: &'a str, model: &str) -> Option<&'a str> {
     token.strip_prefix(model).filter(|rest| rest.is_empty() || rest.starts_with('+'))
 }

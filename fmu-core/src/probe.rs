@@ -1,5 +1,5 @@
-//! Finds dependencies by running the model itself: each known is changed alone, at several operating points; every
-//! unknown that changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
+//! Finds dependencies by running the model itself: each known is varied alone, at several operating points; every unknown that
+//! changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
 use crate::capability::Capabilities;
 use crate::model::{Block, Model};
@@ -7,17 +7,18 @@ use crate::row::Slot;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault};
 
-/// Operating points tried, the start values among them. What three switches and a threshold hide shows in 1 of 40 or so.
+/// Number of operating points, the start values included. A dependency behind three switches and a threshold shows in about 1
+/// of 40.
 const POINTS: u32 = 192;
 
-/// The index that stands for `time`.
+/// The index used for `time`.
 pub(crate) const NOW: usize = usize::MAX;
 
 /// For each variable, the indices that it depends on; wide arrays, each as a whole under its first index, and then derivatives
 /// follow the table. `None` for a variable that is not an unknown.
 type Dependencies = Vec<Option<Vec<usize>>>;
 
-/// Checks that the start value of an exact variable stays what the importer has set.
+/// Checks that an exact variable keeps the start value set by the importer.
 pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Result<(), Fault> {
     let mut draw = Draw(3);
     for (index, meta) in metas::<M>().into_iter().enumerate().filter(|(_, meta)| meta.exact) {
@@ -38,7 +39,7 @@ pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     Ok(())
 }
 
-/// What initial values depend on: outputs, calculated parameters, states and derivatives on inputs and parameters.
+/// Dependencies of initial values: outputs, calculated parameters, states and derivatives on inputs and parameters.
 pub(crate) fn initial_dependencies<M: Model>(
     can: &Capabilities<M>,
     fresh: &Block<M>,
@@ -72,8 +73,8 @@ pub(crate) fn initial_dependencies<M: Model>(
     found.list(unknown, &wide::<M>())
 }
 
-/// What values depend on between two events: outputs and derivatives on states, inputs, tunable parameters and time,
-/// for any values of the parameters.
+/// Dependencies between two events: outputs and derivatives on states, inputs, tunable parameters and time, for any values of
+/// the parameters.
 pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
     let metas = metas::<M>();
     let known = |meta: &Meta| meta.causality == Causality::Input || meta.variability == Variability::Tunable;
@@ -84,7 +85,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     for point in 0..points {
         let mut base = operating_point(can, states, fresh, point, &settable, &mut draw);
         base.initialize();
-        // In every second point, the states move before the event: then what switches fits them.
+        // At every second point, the states are moved before the event, so that the switches match them.
         let moved = |first: bool| (0..states.len()).filter(move |_| first == (point % 2 == 1));
         moved(true).for_each(|i| shift(can, &mut base, states, i, &mut draw));
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
@@ -121,7 +122,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     found.list(|i| metas.get(i).is_none_or(|meta| meta.causality == Causality::Output), &wide::<M>())
 }
 
-/// Whether a variable is a text or bytes: which of them mean something is not known, so none is tried.
+/// Whether a variable is a text or bytes; these are not varied, because meaningful values are unknown.
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "a filter")]
 fn is_opaque<M: Model>(&known: &usize) -> bool {
     M::TABLE
@@ -147,8 +148,8 @@ fn operating_point<M: Model>(
     block
 }
 
-/// Greatest relative change of a real number that is rounding: a torque, which is computed in stator axes, changes by some
-/// 1e-16 with the angle of the rotor.
+/// Maximum relative change of a real number that counts as rounding: a torque, computed in stator axes, changes by about 1e-16
+/// with the rotor angle.
 const ROUNDING: f64 = 1e-11;
 
 /// Whether two values differ by more than rounding. Integers, Booleans and hashes of texts, seen as the bits of a real number,
@@ -159,7 +160,7 @@ fn differ(before: u64, after: u64) -> bool {
     before != after && !rounded
 }
 
-/// Which unknown depends on which known.
+/// The dependencies of the unknowns on the knowns.
 struct Found(Vec<Vec<usize>>);
 
 impl Found {
@@ -197,7 +198,7 @@ fn metas<M: Model>() -> Vec<&'static Meta> {
     (0..M::TABLE.len()).chain(wide::<M>().arrays.into_iter().map(|(first, _)| first)).filter_map(one).collect()
 }
 
-/// The wide arrays of a table, whose places follow those of its other variables.
+/// The wide arrays of a table, whose positions follow those of its other variables.
 pub(crate) struct Wide {
     /// Number of the other variables.
     len: usize,
@@ -206,7 +207,7 @@ pub(crate) struct Wide {
 }
 
 impl Wide {
-    /// The table's index of a place; [`NOW`] stays.
+    /// The table index of a position; [`NOW`] stays.
     fn index(&self, place: usize) -> usize {
         place.checked_sub(self.len).and_then(|i| self.arrays.get(i)).map_or(place, |(first, _)| *first)
     }
@@ -247,7 +248,7 @@ fn values<M: Model>(can: &Capabilities<M>, mut block: Block<M>, now: Elapsed) ->
     let mut value = |i| M::TABLE.entry(&mut block, i).map_or(0, |(_, slot)| slot.bits());
     let mut all: Vec<u64> = (0..M::TABLE.len()).map(&mut value).collect();
     for (first, n) in wide::<M>().arrays {
-        // Elements that differ by rounding alone make another hash: dependencies of a wide array may be too many.
+        // Elements that differ only by rounding change the hash, so a wide array may get too many dependencies.
         let of_all = (first..first + n)
             .map(&mut value)
             .fold(0, |hash: u64, bits| (hash.rotate_left(5) ^ bits).wrapping_mul(0x0100_0000_01b3));
@@ -267,7 +268,7 @@ fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize]
     }
 }
 
-/// Sets the variable of a place to another value that is allowed, each element of a wide array.
+/// Sets the variable at a position to another allowed value; in a wide array, each element.
 fn change<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], known: usize, draw: &mut Draw) {
     if let Some((first, n)) = known.checked_sub(M::TABLE.len()).and_then(|i| wide::<M>().arrays.get(i).copied()) {
         (first..first + n).for_each(|index| change_one(can, block, states, index, draw));
@@ -280,7 +281,7 @@ fn change_one<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[u
     let Some((meta, slot)) = can.place(block, states, index) else { return };
     match slot {
         Slot::Real(x) => {
-            // The magnitude of a value that is 0 at the start is not known: from 1 to 1000 times the nominal value.
+            // The magnitude of a value that is 0 at the start is unknown, so 1 to 1000 times the nominal value is tried.
             let magnitude = [1.0, 10.0, 100.0, 1000.0][draw.below(4)];
             let scale = if *x == 0.0 { magnitude * meta.nominal.unwrap_or(1.0) } else { *x };
             for _ in 0..20 {

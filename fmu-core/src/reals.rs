@@ -1,6 +1,6 @@
 //! Reading and writing several real scalars at once: what an importer does at every communication point.
 //!
-//! A part is looked up once for all of its variables that follow one another, and no value is wrapped on its way.
+//! A part is looked up once for all its consecutive variables, and no value is wrapped.
 
 use crate::row::{Access, Row};
 use crate::table::Table;
@@ -9,18 +9,18 @@ use std::mem::{MaybeUninit, replace};
 
 /// Values for real inputs.
 #[derive(Debug)]
-pub struct Inputs<'a> {
+pub struct RealInputs<'a> {
     /// The values, one for each reference.
     pub values: &'a [f64],
-    /// Room for the values that the inputs had before.
+    /// Buffer for the previous values of the inputs.
     pub before: &'a mut [f64],
-    /// Only continuous inputs are open.
+    /// Only continuous inputs may be set.
     pub continuous: bool,
 }
 
 impl<W: 'static> Table<W> {
-    /// Reads real scalars up to the first reference of anything else; returns how many they are. `first` is the reference
-    /// of the table's first variable.
+    /// Reads real scalars up to the first reference of another kind; returns their number. `first` is the reference of the
+    /// table's first variable.
     #[inline]
     pub fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize {
         let n = list.len().min(out.len());
@@ -45,11 +45,11 @@ impl<W: 'static> Table<W> {
         i
     }
 
-    /// Writes real scalar inputs up to the first reference of anything else, the first input that is not open, or the first
-    /// value that is out of range; returns how many it has written. There is room for the values before.
+    /// Writes real scalar inputs up to the first reference of another kind, the first input that may not be set, or the first
+    /// value out of range; returns their number. The buffer for previous values is large enough.
     #[inline]
-    pub fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize {
-        let Inputs { values, before, continuous } = inputs;
+    pub fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize {
+        let RealInputs { values, before, continuous } = inputs;
         let n = list.len().min(values.len()).min(before.len());
         let (list, values, before, mut i) = (&list[..n], &values[..n], &mut before[..n], 0);
         while i < n {
@@ -64,7 +64,7 @@ impl<W: 'static> Table<W> {
                     i += 1;
                 }
                 Access::Part { node, .. } => {
-                    let rest = Inputs { values: &values[i..], before: &mut before[i..], continuous };
+                    let rest = RealInputs { values: &values[i..], before: &mut before[i..], continuous };
                     let done = node.write(whole, &list[i..], list[i].wrapping_sub(inner), rest);
                     if done == 0 {
                         break;
@@ -85,7 +85,7 @@ impl<W: 'static> Table<W> {
     }
 }
 
-/// The values that a real input can be set to, as a closed interval; none for another variable.
+/// The allowed values of a real input as a closed interval; none for another variable.
 pub(crate) struct Interval {
     low: f64,
     high: f64,
@@ -147,10 +147,10 @@ mod tests {
         TABLE.read(&mut whole, list, 1, &mut [MaybeUninit::uninit(); 8])
     }
 
-    /// How many are written, and what all are afterwards.
+    /// The number written, and all values afterwards.
     fn write(list: &[u32], values: &[f64], continuous: bool) -> (usize, [f64; 5]) {
         let (mut whole, mut before) = (Whole { u: 1.0, ..Whole::default() }, [f64::NAN; 8]);
-        let inputs = Inputs { values, before: &mut before, continuous };
+        let inputs = RealInputs { values, before: &mut before, continuous };
         let n = TABLE.write(&mut whole, list, 1, inputs);
         for (&reference, x) in list[..n].iter().zip(&before) {
             assert_eq!(x.to_bits(), f64::from(u8::from(reference == 1)).to_bits(), "value of {reference} before");

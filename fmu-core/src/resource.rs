@@ -7,10 +7,10 @@ use std::mem::{ManuallyDrop, take};
 use std::ops::Deref;
 use std::sync::Arc;
 
-/// What a model read in [`load`](crate::Model::load). A clone shares the data; a saved state does not hold it, and the
-/// exporter puts it back when a state is read from bytes. Before `load`, it is the default of its type.
+/// Data that a model reads in [`load`](crate::Model::load). A clone shares it; a saved state does not contain it, and the
+/// exporter restores it when a state is read from bytes. Before `load`, it is the default of its type.
 ///
-/// It is a field of the model like any other, but not one inside a list whose length changes.
+/// A resource may be any field of the model, except inside a list whose length changes.
 ///
 /// ```
 /// # use fmu_core::Resource;
@@ -52,7 +52,7 @@ impl<T: Send + Sync + 'static> Serialize for Resource<T> {
     }
 }
 
-/// What the [`Shelf`] in use has in this place; without one, the default.
+/// The next resource of the [`Shelf`] in use; without one, the default.
 impl<'de, T: Default + Send + Sync + 'static> Deserialize<'de> for Resource<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         <()>::deserialize(deserializer)?;
@@ -69,7 +69,7 @@ impl<'de, T: Default + Send + Sync + 'static> Deserialize<'de> for Resource<T> {
 pub struct Shelf(Vec<Arc<dyn Any + Send + Sync>>);
 
 impl Shelf {
-    /// Collects the resources of what is serialized in the meantime.
+    /// Collects the resources of everything that is serialized during the call.
     pub fn of(serialize: impl FnOnce()) -> Self {
         let _cleared = InUse::start(Vec::new(), true);
         serialize();
@@ -81,7 +81,7 @@ impl Shelf {
         self.0.is_empty()
     }
 
-    /// Puts the resources into what is deserialized in the meantime.
+    /// Restores the resources in everything that is deserialized during the call.
     pub fn attach<T>(&self, deserialize: impl FnOnce() -> T) -> T {
         if self.is_empty() {
             return deserialize();
@@ -93,7 +93,7 @@ impl Shelf {
 
 /// serde passes no context along, so the shelf in use is a variable of the thread.
 struct Used {
-    /// Empty unless a shelf is in use. A variable with a destructor would keep the binary from being unloaded.
+    /// Empty unless a shelf is in use. A thread variable with a destructor would prevent the binary from being unloaded.
     data: ManuallyDrop<Vec<Arc<dyn Any + Send + Sync>>>,
     next: usize,
     collects: bool,
@@ -104,7 +104,7 @@ thread_local! {
         const { RefCell::new(Used { data: ManuallyDrop::new(Vec::new()), next: 0, collects: false }) };
 }
 
-/// Empties the thread's shelf at its end, in a panic too.
+/// Empties the thread's shelf at its end, even after a panic.
 struct InUse;
 
 impl InUse {

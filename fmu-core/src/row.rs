@@ -1,4 +1,5 @@
-//! One row of a variable table: what the variable is and the closure that finds its value, or a part with its own table.
+//! One row of a variable table: the properties of the variable and the closure that returns its value, or a part with its own
+//! table.
 //!
 //! Only causality/variability pairs that FMI 2.0.5, 2.2.7 and FMI 3.0.2, 2.4.7.4 allow have a constructor. Start
 //! values are not written here: they come from the model's `Default`.
@@ -14,7 +15,7 @@ use crate::integer::Getter;
 use crate::kinds::Kinds;
 use crate::list::List;
 use crate::need::Need;
-use crate::reals::{Inputs, Interval};
+use crate::reals::{Interval, RealInputs};
 use crate::sizes::Sizes;
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
@@ -25,13 +26,13 @@ use std::mem::MaybeUninit;
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
     fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize;
-    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize;
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize;
     fn locate(&self, index: usize, name: &mut String) -> Option<(&'static Meta, usize)>;
     fn element(&self, index: usize) -> Option<usize>;
     fn clocks_of(&self, index: usize) -> &'static str;
 }
 
-/// The interface of a part with structural parameters, beside [`Node`]: other parts have no code for it.
+/// The interface of a part with structural parameters, beside [`Node`]: other parts do not need its code.
 pub(crate) trait SizedNode<W>: Sync {
     fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)>;
     fn extents(&self, whole: &mut W, index: usize) -> Vec<usize>;
@@ -69,7 +70,7 @@ pub(crate) enum Access<W: 'static> {
 
 /// A row of the table of `W`: a variable, or the table of a part of `W`.
 ///
-/// A constructor says who sets the variable and when it changes; what follows says what is allowed.
+/// A constructor determines who sets the variable and when it changes; the methods after it restrict its values.
 ///
 /// Real numbers, continuous or sampled:
 ///
@@ -133,8 +134,8 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(model.fan.name(), "On");
 /// ```
 ///
-/// Arrays, matrices, single precision and texts. An array is one variable of FMI 3.0, and `a[1]`, `a[2]` or `m[1,2]` in
-/// FMI 2.0; an array of another type than real numbers is a list:
+/// Arrays, matrices, single precision and texts. An array is one variable of FMI 3.0, and `a[1]`, `a[2]` or `m[1,2]` in FMI
+/// 2.0; an array of other types is a list:
 ///
 /// ```
 /// # use fmu_core::unit::{ONE, VOLT};
@@ -155,7 +156,7 @@ pub(crate) enum Access<W: 'static> {
 ///     V::float32_parameter("x_parameter", &VOLT, "Parameter", |m| &mut m.x),
 ///     V::text_input("title", "Set by the importer at any communication point", |m| &mut m.label),
 ///     V::text_parameter("label", "Fixed after initialization", |m| &mut m.label),
-///     V::text_output("status", "Chosen or kept, never made in a step", |m| if m.on { &m.label } else { "off" }),
+///     V::text_output("status", "Stored or constant, never built in a step", |m| if m.on { &m.label } else { "off" }),
 ///     V::text_constant("revision", "Never changes", "r1"),
 /// ];
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
@@ -184,7 +185,7 @@ pub(crate) enum Access<W: 'static> {
 /// # struct Model { t: f64, count: i32 }
 /// # type V = Row<Model>;
 /// const TABLE: &Table<Model> = table![
-///     V::output("T", &KELVIN, "Starts where the importer wants it", |m| &mut m.t).exact(),
+///     V::output("T", &KELVIN, "Its start value can be set", |m| &mut m.t).exact(),
 ///     V::integer_local("count", "So does this", |m| &mut m.count).exact(),
 ///     V::constant("v_min", &METER_PER_S, "For inspection", 0.1),
 ///     V::integer_constant("poles", "An output; uint8_constant and so on for the other integers", 8).as_output(),
@@ -259,7 +260,7 @@ impl<W: 'static> Row<W> {
         self
     }
 
-    /// What the row says about its variable.
+    /// The properties of the row's variable.
     pub(crate) const fn meta(&self) -> &Meta {
         &self.meta
     }

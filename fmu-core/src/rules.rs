@@ -1,4 +1,4 @@
-//! What the compiler checks of a model. A panic while compiling is an error whose text names the row, the state or the model.
+//! Compile-time checks of a model. A panic during compilation is an error whose text names the row, the state or the model.
 
 use crate::capability::Exported;
 use crate::clock::word;
@@ -70,7 +70,7 @@ const fn is_positive(x: Option<f64>) -> bool {
     }
 }
 
-/// The capability and its rows come together.
+/// Checks that the capability comes with its rows.
 #[track_caller]
 const fn check_intermediate<E: Exported>(model: &str) {
     let (capability, rows) = (E::CAN.intermediate.is_some(), E::Model::TABLE.intermediate);
@@ -79,7 +79,7 @@ const fn check_intermediate<E: Exported>(model: &str) {
     demand(!capability || E::CAN.continuous.is_some(), model, "the capability Intermediate needs ContinuousTime");
 }
 
-/// The capability and its rows come together.
+/// Checks that the capability comes with its rows.
 #[track_caller]
 const fn check_resizable<E: Exported>(model: &str) {
     let (capability, rows) = (E::CAN.resizable.is_some(), E::Model::TABLE.has_sizes());
@@ -87,7 +87,7 @@ const fn check_resizable<E: Exported>(model: &str) {
     demand(capability || !rows, model, "a row V::structural needs the capability Resizable");
 }
 
-/// Clocks come with the capability, and what is on a clock names one.
+/// Checks that clocks come with the capability, and that a clocked variable names an existing clock.
 #[track_caller]
 const fn check_clocks<E: Exported>(model: &str) {
     let (rows, can) = (E::Model::TABLE.rows, E::CAN);
@@ -115,7 +115,7 @@ const fn check_clocks<E: Exported>(model: &str) {
     demand(alone || can.clocked.is_none(), model, "Clocked excludes Sampled, which ticks by itself, and Intermediate");
 }
 
-/// Number of clocks for which there is room.
+/// Maximum number of clocks.
 const MAX_CLOCKS: usize = 64;
 
 const fn is_clock<W>(rows: &[Row<W>], name: &str) -> bool {
@@ -170,7 +170,7 @@ pub(crate) const fn can_be_state(meta: &Meta, dimension: Option<usize>) -> bool 
         && matches!(meta.causality, Causality::Output | Causality::Local)
 }
 
-/// Checks the number of states that a model gives to an integrator.
+/// Checks the number of states that a model passes to an integrator.
 ///
 /// # Panics
 /// At compile time, if it is another.
@@ -188,7 +188,7 @@ pub(crate) const fn check_number<M: ContinuousTime>(given: usize) {
     }
 }
 
-/// A compile-time check of a row. The error is shown at the caller's place, which is the row, with the variable's name.
+/// A compile-time check of a row. The error is reported at the caller, which is the row, with the variable's name.
 #[track_caller]
 pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
     if !fits {

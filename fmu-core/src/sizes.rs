@@ -1,8 +1,8 @@
 //! Arrays whose sizes the importer chooses: structural parameters (FMI 3.0.2, 2.3.6, 2.3.7 and 2.4.7.4).
 //!
 //! A [structural parameter](crate::Row::structural) is a size that rows of the table [name](crate::Row::sized). The number of
-//! elements that an array has is the length of what the model holds, so nothing changes before [`Resizable::resize`] runs, when
-//! the importer leaves Configuration Mode.
+//! elements of an array is the length of the model's array, so nothing changes before [`Resizable::resize`] runs, when the
+//! importer leaves Configuration Mode.
 
 use crate::capability::Capabilities;
 use crate::continuous::State;
@@ -51,23 +51,23 @@ use crate::variable::{Causality, Meta};
 /// # Ok::<(), Fault>(())
 /// ```
 #[diagnostic::on_unimplemented(
-    message = "`{Self}` has no sizes that an importer chooses: it lacks the capability `Resizable`",
+    message = "`{Self}` has no structural parameters: it lacks the capability `Resizable`",
     note = "write `impl Resizable for {Self}`, or remove `Resizable` from the line that exports the model"
 )]
 pub trait Resizable: Model {
-    /// Gives every array whose sizes have changed its new length, and fills it: nothing of its old values is kept, start values
-    /// neither. Arrays of the outputs follow in [`Model::output`]. A size is never above its bound, and may be 0 if that is
-    /// inside. Once the simulation runs, only tunable structural parameters change.
+    /// Gives every array whose sizes have changed its new length, and fills it: old values and start values are not kept.
+    /// Arrays of the outputs follow in [`Model::output`]. A size never exceeds its bound, and may be 0 if the range includes 0.
+    /// Once the simulation runs, only tunable structural parameters change.
     ///
     /// # Errors
-    /// The sizes are impossible together: nothing has changed.
+    /// The combination of sizes is impossible; nothing has changed.
     fn resize(&mut self) -> Result<(), Fault>;
 }
 
-/// What the structural parameters of a table can do.
+/// Summary of the structural parameters of a table.
 #[derive(Clone, Copy)]
 pub(crate) struct Sizes {
-    /// There is one.
+    /// The table has one.
     pub(crate) any: bool,
     /// One can be set while the simulation runs.
     pub(crate) tunable: bool,
@@ -86,7 +86,7 @@ impl Sizes {
     }
 }
 
-/// The number of elements of a row is the product of the greatest sizes that it names.
+/// Checks that the number of elements of a row is the product of the maximum sizes that it names.
 #[track_caller]
 pub(crate) const fn check_sized<W>(rows: &[Row<W>], row: usize) {
     let meta = &rows[row].meta;
@@ -108,7 +108,7 @@ pub(crate) const fn check_sized<W>(rows: &[Row<W>], row: usize) {
         i += 1;
     }
     let fits = matches!(meta.dimension, Some(n) if n == product);
-    demand(fits, meta.name, "the product of the greatest sizes is not the number of elements");
+    demand(fits, meta.name, "the product of the maximum sizes is not the number of elements");
 }
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a bound of a size")]
@@ -127,7 +127,7 @@ impl<W: 'static> Table<W> {
         self.sizes.tunable
     }
 
-    /// What variable `index` is, and how many elements it has now: 1 for a scalar; `None` past the end. Does not allocate.
+    /// The variable `index` and its present number of elements: 1 for a scalar; `None` past the end. Does not allocate.
     pub fn extent(&self, whole: &mut W, index: usize) -> Option<(&'static Meta, usize)> {
         let (row, inner) = self.row_of(index)?;
         Some(match &row.access {
@@ -141,7 +141,8 @@ impl<W: 'static> Table<W> {
         })
     }
 
-    /// Extents now of the array that has variable `index`; empty for a scalar, and for an array with one extent that is the same always.
+    /// Present extents of the array that contains variable `index`; empty for a scalar, and for an array with one constant
+    /// extent.
     pub fn extents(&self, whole: &mut W, index: usize) -> Vec<usize> {
         match self.row_of(index) {
             Some((Row { access: Access::Part { sized: Some(node), .. }, .. }, inner)) => node.extents(whole, inner),
@@ -154,10 +155,10 @@ impl<W: 'static> Table<W> {
         }
     }
 
-    /// Checks that every array has the length that its sizes say.
+    /// Checks that every array has the length given by its sizes.
     ///
     /// # Errors
-    /// Names the first array that has another one.
+    /// Names the first array with another length.
     pub fn check_sizes(&self, whole: &mut W) -> Result<(), Fault> {
         if !self.sizes.any {
             return Ok(());
@@ -190,7 +191,7 @@ impl<W: 'static> Table<W> {
 }
 
 impl<W> Row<W> {
-    /// Number of elements that the model holds of an array.
+    /// Number of elements of an array in the model.
     fn len(&self, whole: &mut W) -> usize {
         match &self.access {
             Access::Reals(get) => get(whole).len(),
@@ -200,9 +201,9 @@ impl<W> Row<W> {
     }
 }
 
-/// Arrays of states: each scalar state has a number, counted with the greatest sizes, which its derivative has too.
+/// Arrays of states: each scalar state has a number, counted with the maximum sizes, and its derivative has the same.
 impl<M: Model> Capabilities<M> {
-    /// Greatest number of scalar states.
+    /// Maximum number of scalar states.
     pub const fn scalars(&self) -> usize {
         let (mut sum, mut i) = (0, 0);
         while i < self.states().len() {
@@ -224,7 +225,7 @@ impl<M: Model> Capabilities<M> {
         false
     }
 
-    /// Passes every scalar state that the model has now to `take`, with its number.
+    /// Passes every present scalar state to `take`, with its number.
     #[inline]
     pub fn each_state(&self, model: &mut M, mut take: impl FnMut(usize, &mut f64)) {
         let mut first = 0;
@@ -236,7 +237,7 @@ impl<M: Model> Capabilities<M> {
         }
     }
 
-    /// Number of scalar states that the model has now.
+    /// Present number of scalar states.
     #[inline]
     pub fn count_states(&self, model: &mut M) -> usize {
         self.states().iter().map(|state| state.all(model).len().min(state.most())).sum()
@@ -252,14 +253,14 @@ impl<M: Model> Capabilities<M> {
         })
     }
 
-    /// A scalar state by its number, if the model has it now.
+    /// A scalar state by its number, if it is present.
     pub fn scalar<'a>(&self, model: &'a mut M, number: usize) -> Option<&'a mut f64> {
         let (state, first) = self.state_of(number)?;
         state.all(model).get_mut(number - first)
     }
 
-    /// Moves derivatives from the front of `dx`, as the model writes them, to the numbers of their states. Those of states that the
-    /// model does not have are NaN.
+    /// Moves derivatives from the front of `dx`, as the model writes them, to the numbers of their states. Those of absent
+    /// states are NaN.
     pub fn spread(&self, model: &mut M, dx: &mut [f64]) {
         if !self.has_arrays() {
             return;

@@ -1,13 +1,13 @@
 //! The variable table of a type, composed of variables and of other types' tables.
 //!
 //! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table. A wide
-//! array, of more than [`DENSE`] elements, has separate indices, from [`WIDE`] on, and is found by a scan.
-//! Everything that does not need a value is checked while compiling: names, ranges, the number of variables.
+//! array, of more than [`DENSE`] elements, has separate indices, from [`WIDE`] on, and is found by a scan. Everything that does
+//! not need a value is checked at compile time: names, ranges, the number of variables.
 
 use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::kinds::Kinds;
-use crate::reals::Inputs;
+use crate::reals::RealInputs;
 use crate::row::{Access, Constant, Node, Row, SizedNode, Slot};
 use crate::rules::{demand, same_text};
 use crate::sizes::{Sizes, check_sized};
@@ -20,7 +20,7 @@ use std::ptr;
 /// Maximum number of variables in a table, including those of its parts, without wide arrays.
 pub const CAPACITY: usize = 512;
 
-/// Greatest number of elements of an array that is not wide.
+/// Maximum number of elements of an array that is not wide.
 pub const DENSE: usize = 128;
 
 /// Index of the first element of the first wide array.
@@ -33,7 +33,7 @@ const WIDE_ROWS: usize = 16;
 pub struct Part<W: 'static, P: 'static> {
     /// Table of the part.
     pub table: &'static Table<P>,
-    /// Where the part is.
+    /// Location of the part.
     pub lens: fn(&mut W) -> &mut P,
 }
 
@@ -46,7 +46,7 @@ impl<W, P> Node<W> for Part<W, P> {
         self.table.read((self.lens)(whole), list, first, out)
     }
 
-    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: Inputs<'_>) -> usize {
+    fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize {
         self.table.write((self.lens)(whole), list, first, inputs)
     }
 
@@ -104,7 +104,7 @@ fn item(meta: &Meta, value: i32) -> String {
     format!("{value} ({name})")
 }
 
-/// Where an index leads: a row, and the index inside it.
+/// The target of an index: a row, and the index inside it.
 #[derive(Clone, Copy)]
 pub(crate) struct RowPlace {
     pub(crate) row: u16,
@@ -119,7 +119,7 @@ struct WidePlace {
     len: usize,
 }
 
-/// Finds a value of an access that few tables have.
+/// Finds a value of a rare kind.
 type Rare<W> = for<'a> fn(&'static Row<W>, &'a mut W, usize) -> Option<Slot<'a>>;
 
 /// Finds an element of a wide array.
@@ -138,9 +138,9 @@ pub struct Table<W: 'static> {
     kinds: Kinds,
     /// A variable can be read or set inside a communication step.
     pub(crate) intermediate: bool,
-    /// What the structural parameters can do.
+    /// Summary of the structural parameters.
     pub(crate) sizes: Sizes,
-    /// Functions of tables that need them: others have no code for them.
+    /// Functions that only some tables need: other tables do not contain their code.
     rare: Option<Rare<W>>,
     beyond: Option<Beyond<W>>,
 }
@@ -205,7 +205,7 @@ impl<W: 'static> Table<W> {
         Self { rows, places, len, wide_places, wide, hash, kinds, intermediate, sizes, rare, beyond }
     }
 
-    /// Whether a row is a clock that the model ticks, or one whose ticks it asks for.
+    /// Whether a row is a clock that the model ticks, or one whose ticks the model requests.
     pub const fn announces(&self) -> bool {
         let mut row = 0;
         while row < self.rows.len() {
@@ -245,12 +245,12 @@ impl<W: 'static> Table<W> {
         self.kinds
     }
 
-    /// Hash of all that the rows say.
+    /// Hash of the content of the rows.
     pub const fn hash(&self) -> Hash {
         self.hash
     }
 
-    /// What variable `index` is, and its value in `whole`; `None` past the end.
+    /// The variable `index` and its value in `whole`; `None` past the end.
     #[inline]
     pub fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)> {
         if index >= self.len {
@@ -286,14 +286,14 @@ impl<W: 'static> Table<W> {
         Some((&row.meta, slot))
     }
 
-    /// The row of an element of a wide array, and its place there.
+    /// The row of an element of a wide array, and its position in the row.
     fn wide_place(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
         let at = index.checked_sub(WIDE).filter(|at| *at < self.wide)?;
         let place = self.wide_places.iter().find(|place| (place.first..place.first + place.len).contains(&at))?;
         Some((&self.rows[usize::from(place.row)], at - place.first))
     }
 
-    /// The row of a variable, and the index in it, which of a part's wide arrays counts from [`WIDE`].
+    /// The row of a variable, and the index in it; for wide arrays of a part it counts from [`WIDE`].
     pub(crate) fn row_of(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
         if let Some(place) = self.places[..self.len].get(index) {
             return Some((&self.rows[usize::from(place.row)], usize::from(place.inner)));
@@ -308,8 +308,8 @@ impl<W: 'static> Table<W> {
         if let Access::Part { node, .. } = &row.access { node.element(inner) } else { Some(inner) }
     }
 
-    /// Names of the clocks that variable `index` is on, with spaces between them; empty for none. A part that is on a clock has its
-    /// variables on it, but for parameters.
+    /// Names of the clocks of variable `index`, separated by spaces; empty for none. If a part is on a clock, all its variables
+    /// except parameters are.
     pub fn clocks_of(&self, index: usize) -> &'static str {
         let Some(place) = self.places[..self.len].get(index) else { return "" };
         let row = &self.rows[usize::from(place.row)];
@@ -438,7 +438,7 @@ const fn check(meta: &Meta) {
     demand(!matches!(meta.dimension, Some(0)), meta.name, "an array needs an element");
 }
 
-/// The name of row `last` differs from all before it.
+/// Checks that the name of row `last` differs from all before it.
 const fn check_unique<W>(rows: &[Row<W>], last: usize) {
     let mut row = 0;
     while row < last {

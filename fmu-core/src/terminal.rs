@@ -13,7 +13,7 @@ pub struct Terminal {
     pub name: &'static str,
     /// One sentence.
     pub description: &'static str,
-    /// How the members of two connected terminals find each other.
+    /// How the members of two connected terminals are matched.
     pub rule: MatchingRule,
     /// The variables that it groups.
     pub members: &'static [Member],
@@ -21,7 +21,7 @@ pub struct Terminal {
     pub picture: Option<Picture>,
 }
 
-/// How the members of two connected terminals find each other.
+/// How the members of two connected terminals are matched.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum MatchingRule {
@@ -29,7 +29,7 @@ pub enum MatchingRule {
     Plug,
     /// By name; only the members that both terminals have.
     Bus,
-    /// The tables of two maps over the same points: FMI-LS-STRUCT 1.0.0-rc.1, a map on a rectilinear grid (FMI 3.0).
+    /// A map on a rectilinear grid, with tables over the same points: FMI-LS-STRUCT 1.0.0-rc.1 (FMI 3.0).
     Map,
 }
 
@@ -54,13 +54,13 @@ pub enum MemberKind {
     Inflow,
     /// Flow out of the model through the terminal.
     Outflow,
-    /// The points on an axis of a map.
+    /// Grid points of an axis of a map.
     Domain,
-    /// Where on this axis the map is read.
+    /// The coordinate on this axis at which the map is read.
     DomainInput,
     /// The values of a map, row by row: an extent for each axis.
     Codomain,
-    /// The value that is read from the map.
+    /// The value read from the map.
     CodomainOutput,
 }
 
@@ -100,7 +100,7 @@ impl Terminal {
         Self::new(name, description, MatchingRule::Plug, members)
     }
 
-    /// A terminal that may be connected in part.
+    /// A terminal that may be connected partially.
     ///
     /// # Panics
     /// Same as [`plug`](Self::plug).
@@ -108,8 +108,8 @@ impl Terminal {
         Self::new(name, description, MatchingRule::Bus, members)
     }
 
-    /// A map: arrays with the points on its axes, an array for each of its tables, and where it is read now.
-    /// Each [`Member::domain_input`] follows its domain, each [`Member::codomain_output`] its codomain.
+    /// A map: arrays with the grid points of its axes, an array for each of its tables, and the coordinates at which it is
+    /// read. Each [`Member::domain_input`] follows its domain, each [`Member::codomain_output`] its codomain.
     ///
     /// # Panics
     /// At compile time, on two members with the same name, without a domain or a codomain, or on another order.
@@ -182,7 +182,7 @@ impl Member {
         Self { name, variable: name, kind: MemberKind::Domain }
     }
 
-    /// Where on the axis before it a [map](Terminal::map) is read.
+    /// The coordinate on the preceding axis at which a [map](Terminal::map) is read.
     pub const fn domain_input(name: &'static str) -> Self {
         Self { name, variable: name, kind: MemberKind::DomainInput }
     }
@@ -192,7 +192,7 @@ impl Member {
         Self { name, variable: name, kind: MemberKind::Codomain }
     }
 
-    /// What is read from the values before it.
+    /// The value read from the preceding table.
     pub const fn codomain_output(name: &'static str) -> Self {
         Self { name, variable: name, kind: MemberKind::CodomainOutput }
     }

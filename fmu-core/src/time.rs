@@ -1,12 +1,12 @@
 //! Time since the start: a sum of steps without rounding drift, and a sample grid counted in integers.
 //!
-//! An importer's communication points are rounded, often accumulated, and after 1e7 steps off by more than any sensible
-//! tolerance. The instance therefore adds up the step sizes itself, in two doubles (Knuth's two-sum, exact to about
+//! An importer's communication points are rounded, often accumulated, and after 1e7 steps they are off by more than any
+//! sensible tolerance. The instance therefore adds up the step sizes itself, in two doubles (Knuth's two-sum, exact to about
 //! 1e-32 relative), and a sampled model compares that sum with `k T_s`, k an integer.
 
 use serde::{Deserialize, Serialize};
 
-/// Instants closer than this fraction of the sample period are the same instant. An importer may make the step from the
+/// Instants closer than this fraction of the sample period are the same instant. An importer may compute the step as the
 /// difference of two times, which at 1e6 s are rounded to 1.2e-10 s: more than a millionth of a period of 50 us.
 pub const SAME_INSTANT: f64 = 1e-5;
 
@@ -129,12 +129,12 @@ impl SampleGrid {
     }
 
     /// Seconds from instant `k` to `now`: exact enough to be on the right side of +-[`width`](Self::width), otherwise rounded
-    /// like `now`. One subtraction, unless its result is too close to call.
+    /// like `now`. One subtraction, unless its result is too close to decide.
     #[inline]
     pub(crate) fn past(self, k: u64, now: Elapsed) -> f64 {
         let product = count(k) * self.period;
         let past = now.high - product;
-        // Twice what the low part of `now` and the rounding of the product can add.
+        // Twice the maximum contribution of the low part of `now` and of the rounding of the product.
         let doubt = 2.0 * (now.low.abs() + f64::EPSILON * product);
         if (past.abs() - self.width()).abs() > doubt { past } else { self.past_exactly(k, now) }
     }

@@ -67,7 +67,7 @@ impl Hash {
             .number(range.max)
             .number(nominal)
             .count(dimension);
-        // Nothing for what older tables do not have: their tokens stay.
+        // Features that older tables do not have add nothing, so their tokens stay.
         let (mut hash, mut i) = (hash, 0);
         while i < meta.shape.len() {
             hash = hash.count(meta.shape[i]);
@@ -205,8 +205,8 @@ mod tests {
         Row::array_parameter("weights", &VOLT, "", 6, |m: &mut Probe| &mut m.weights).shape(&[2, 3]),
     ];
 
-    /// The compiler judges this for every target: one with a `usize` of 32 bits hashes lengths, dimensions and extents as one
-    /// with 64 bits does. The values come from an FNV-1a written in Python over the fields in the order of `meta`.
+    /// The compiler evaluates this for every target: with a `usize` of 32 bits, lengths, dimensions and extents have the same
+    /// hash as with 64 bits. The values come from an FNV-1a written in Python over the fields in the order of `meta`.
     const _: () = {
         assert!(Hash::START.text("foobar").0 == 0x3517_208d_a565_faad_4add_dad2_61f9_235e, "the length of a text");
         assert!(TABLE.hash().0 == 0x2cc7_0a10_6bbc_fb72_0707_9a93_1d41_6613, "dimensions and extents");

@@ -1,8 +1,8 @@
 //! Quantities, units and display units: the constants that every variable table names.
 //!
-//! A [`Quantity`] is what a variable measures: it has a name (the type definition in the XML), a [`Unit`] with its SI
-//! base exponents, and at most one display unit that importers show by default. Each exists once, here or, for an
-//! author's own quantity, beside the author's model.
+//! A [`Quantity`] is what a variable measures: it has a name (the type definition in the XML), a [`Unit`] with its SI base
+//! exponents, and at most one display unit that importers show by default. Each exists once: here or, for a quantity of the
+//! author, beside the author's model.
 
 use serde::{Deserialize, Serialize};
 
@@ -49,7 +49,7 @@ impl Exponents {
     }
 }
 
-/// A unit an importer shows instead: `shown = factor * value + offset`.
+/// A unit that an importer shows instead: `shown = factor * value + offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DisplayUnit {
     /// Name, for example `rpm`.
@@ -85,7 +85,7 @@ pub struct Quantity {
     pub name: &'static str,
     /// Unit of the value.
     pub unit: Unit,
-    /// Unit an importer shows by default, if it differs.
+    /// Unit that an importer shows by default, if it differs.
     pub display: Option<DisplayUnit>,
     /// The value is a difference: the factor of a display unit applies, its offset does not (FMI 2.0.5, 2.2.3;
     /// FMI 3.0.2, 2.4.4 `relativeQuantity`).

@@ -90,12 +90,12 @@ pub enum Kind {
     Binary {
         /// MIME type of the content.
         mime_type: &'static str,
-        /// Greatest number of bytes.
+        /// Maximum number of bytes.
         most: usize,
     },
 }
 
-/// The values that are allowed. A strict bound is not itself allowed.
+/// The allowed values. A strict bound is not itself allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Lower bound, -infinity for none.
@@ -165,7 +165,7 @@ pub struct Meta {
     pub variability: Variability,
     /// Base type.
     pub kind: Kind,
-    /// What is allowed.
+    /// Allowed values.
     pub range: Range,
     /// Typical magnitude, for solvers' scaling.
     pub nominal: Option<f64>,
@@ -177,16 +177,16 @@ pub struct Meta {
     pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
-    /// Names of the clocks that it is on, with spaces between them; empty for none.
+    /// Names of its clocks, separated by spaces; empty for none.
     pub clocks: &'static str,
-    /// It can be read or set inside a communication step; of a part, that one of its variables can.
+    /// It can be read or set inside a communication step; for a part, one of its variables can.
     pub intermediate: bool,
     /// Number of elements of an array, `None` for a scalar.
     pub dimension: Option<usize>,
     /// Extents of a matrix, which is stored row by row; empty for a scalar, and for an array with one extent.
     pub shape: &'static [usize],
-    /// Names of the structural parameters that are the extents of an array, relative to the same part; empty for an array of one
-    /// size. Its number of elements is then the greatest.
+    /// Names of the structural parameters that are the extents of an array, relative to the same part; empty for an array of
+    /// one size. Its number of elements is then the maximum.
     pub sized: &'static [&'static str],
     /// Other names.
     pub aliases: &'static [Alias],
@@ -206,7 +206,7 @@ impl Meta {
     }
 }
 
-/// Where an element of an array is, as names have it: `[2]`, or `[1,2]` in a matrix that is stored row by row.
+/// The index of an array element as written in names: `[2]`, or `[1,2]` in a matrix stored row by row.
 pub fn position(shape: &[usize], element: usize) -> String {
     let mut rest = element;
     let mut indices: Vec<String> = Vec::new();
@@ -219,7 +219,7 @@ pub fn position(shape: &[usize], element: usize) -> String {
     format!("[{}]", indices.join(","))
 }
 
-/// The element that [`position`] writes so; `None` where the array has none.
+/// The element that [`position`] writes in this way; `None` if the array has none.
 pub fn element(shape: &[usize], position: &str) -> Option<usize> {
     let mut indices = position.strip_prefix('[')?.strip_suffix(']')?.split(',');
     let mut element = 0_usize;

@@ -1,4 +1,4 @@
-//! The table of capabilities: what follows from it, and what it refuses.
+//! The table of capabilities: derived properties, and refusals.
 #![allow(missing_docs)]
 
 use fmu_core::unit::{ONE, PER_SECOND};
@@ -52,7 +52,7 @@ impl Sampled for Both {
 
 const NONE: Capabilities<Both> = Capabilities::NONE;
 
-/// Its step integrates between the samples, so it is not one of samples alone.
+/// Its step integrates between the samples, so it is not a model with samples only.
 #[test]
 fn event_mode_is_for_models_without_states() {
     assert!(NONE.Sampled().event_mode());

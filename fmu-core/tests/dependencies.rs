@@ -70,7 +70,7 @@ impl Model for Known {
         *out = Outputs {
             through: self.u,
             gated: if self.on { self.u * self.x } else { 0.0 },
-            // Never -0, which has other bits than 0.
+            // Never -0, whose bits differ from those of 0.
             tuned: self.twice * self.y + 0.0,
             clock: now.seconds(),
             held: self.held,
@@ -135,7 +135,7 @@ fn between_events() {
         ("held", Some("")),
         ("constant", Some("")),
         ("sum", Some("k x")),
-        // Only after its event, which the probe must meet.
+        // Only after its event, which the probe must reach.
         ("der(y)", Some("tunable x")),
         ("der(x)", Some("u k x")),
         ("y", None),
@@ -169,7 +169,7 @@ fn at_the_start() {
         let variable = description.variable(name).unwrap();
         assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), wanted, "{name}");
     }
-    // For co-simulation alone there is nothing between events, and no state is an initial unknown.
+    // With only co-simulation there is nothing between events, and no state is an initial unknown.
     let plain = Description::of::<Known>().unwrap();
     assert!(plain.variables.iter().all(|v| v.dependencies.as_ref().is_none_or(Vec::is_empty)));
     assert!(plain.variable("y").unwrap().initial_dependencies.is_none() && plain.variable("der(x)").is_none());

@@ -1,4 +1,4 @@
-//! The integrators: order, events where they are due, and an end to events without end.
+//! The integrators: order, events at their time, and a limit for endless events.
 #![allow(missing_docs)]
 
 use fmu_core::unit::{ONE, Quantity, Unit};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 const RATE: Quantity = Quantity::new("TestRate", Unit::si("1/s", unit::Exponents::mechanical(0, 0, -1, 0)));
 
-/// A model with two states, without variables: what is tested is its motion.
+/// A model with two states, without variables: only its motion is tested.
 macro_rules! model {
     ($model:ty) => {
         impl Model for $model {
@@ -121,7 +121,7 @@ impl Events for Ball {
             return Ok(Outcome::default());
         }
         self.bounces.push(now.seconds());
-        // Above the ground by the least there is.
+        // Above the ground by the smallest number.
         (self.height, self.speed) = (f64::MIN_POSITIVE, -BOUNCE * self.speed);
         if self.speed < self.rest {
             (self.speed, self.resting) = (0.0, true);

@@ -1,4 +1,4 @@
-//! Inputs that need not be fed: what their descriptions say, and what a table may not say.
+//! Inputs that need not be fed: their descriptions, and invalid rows.
 #![allow(missing_docs)]
 
 use fmu_core::unit::{KELVIN, VOLT};

@@ -1,4 +1,4 @@
-//! Starts, sizes and other names that contradict each other: what the description of a model refuses, before the model is built.
+//! Contradictory starts, sizes and names, which the description of a model refuses before it is built.
 #![allow(missing_docs)]
 
 use fmu_core::unit::{METER, ONE};

@@ -1,4 +1,4 @@
-//! A small model with every kind of variable, a part and an array: what a table makes of it.
+//! The table of a small model with every kind of variable, a part and an array.
 #![allow(missing_docs, clippy::float_cmp)]
 
 use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};
@@ -111,7 +111,7 @@ fn description_says_what_depends_on_what() {
     let expected =
         [("u", 1), ("i", 2), ("load.R", 3), ("load.map", 4), ("load.mode", 7), ("on", 8), ("n", 9), ("gain", 10)];
     assert_eq!(names, expected);
-    // i depends on u, R, the middle of the map, on and n; the gain on R alone.
+    // i depends on u, R, the middle of the map, on and n; the gain only on R.
     assert_eq!(d.variable("i").unwrap().initial_dependencies, Some(vec![1, 3, 5, 8, 9]));
     assert_eq!(d.variable("gain").unwrap().initial_dependencies, Some(vec![3]));
     assert_eq!(d.variable("load.map").unwrap().start.as_ref().unwrap().len(), 3);

@@ -1,5 +1,5 @@
-//! What the interface costs: a set of six, a step and a get of six on a model that does nothing, through the C
-//! functions. `cargo bench -p fmu-export`. The goal is 60 ns together.
+//! Cost of the interface: a set of six, a step and a get of six on an empty model, through the C functions. `cargo bench -p
+//! fmu-export`. The goal is 60 ns together.
 #![allow(missing_docs)]
 
 mod timing;
@@ -66,7 +66,7 @@ fn main() {
     let get: unsafe extern "C" fn(InstancePointer, References, usize, *mut f64) -> c_int = black_box(fmi::fmi2GetReal);
     let (inputs, outputs, mut values) = ([1, 2, 3, 4, 5, 6], [7, 8, 9, 10, 11, 12], [1.0; 6]);
     let (mut t, h) = (0.0, 1e-4);
-    // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.
+    // SAFETY: used as the standard requires: one thread, arrays of the given lengths, freed once.
     unsafe {
         let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 1, token.as_ptr(), null(), null(), no, no);
         assert_eq!(fmi::fmi2SetupExperiment(it, no, 0.0, 0.0, Fmi2Boolean(1), 1e9), 0);

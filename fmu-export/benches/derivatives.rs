@@ -1,5 +1,5 @@
-//! What a solver's call costs: states, inputs, derivatives through the C functions, on four states with next to no
-//! equations. `cargo bench -p fmu-export`. The goal is 40 ns, which leaves 80 of 120 ns for the equations of a machine.
+//! Cost of a solver's call: states, inputs, derivatives through the C functions, for four states with almost no equations.
+//! `cargo bench -p fmu-export`. The goal is 40 ns, which leaves 80 of 120 ns for the equations of a machine.
 #![allow(missing_docs)]
 
 mod timing;
@@ -80,7 +80,7 @@ fn main() {
     let time_of: unsafe extern "C" fn(InstancePointer, f64) -> c_int = black_box(fmi::fmi2SetTime);
     let (write, read): (Write, Read) = (black_box(fmi::fmi2SetContinuousStates), black_box(fmi::fmi2GetDerivatives));
     let (inputs, u, mut x, mut dx) = ([1, 2, 3, 4, 5, 6], [1.0; 6], [0.5; 4], [0.0; 4]);
-    // SAFETY: used as the standard demands: one thread, arrays of the lengths given, freed once.
+    // SAFETY: used as the standard requires: one thread, arrays of the given lengths, freed once.
     unsafe {
         let it = fmi::fmi2Instantiate(c"bench".as_ptr(), 0, token.as_ptr(), null(), null(), no, no);
         assert_eq!(fmi::fmi2SetupExperiment(it, no, 0.0, 0.0, no, 0.0), 0);

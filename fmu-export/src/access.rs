@@ -5,7 +5,7 @@ use crate::habit::Habit;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Standard, State};
 use crate::message;
-use crate::value::Value;
+use crate::value::CValue;
 use fmu_core::description::TIME;
 use fmu_core::{Causality, Exported, Fault, Kind, Meta, Model, Slot, Table, Variability};
 use std::fmt::Display;
@@ -41,7 +41,7 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
             | State::Reconfiguration => false,
             _ => true,
         },
-        // Before the initialization, it has the effect of a Configuration Mode of its own.
+        // Before the initialization, it acts like a separate Configuration Mode.
         Causality::StructuralParameter => match state {
             State::Instantiated | State::Configuration => true,
             State::Reconfiguration => meta.variability == Variability::Tunable,
@@ -51,8 +51,8 @@ pub(crate) fn open(meta: &Meta, state: State) -> bool {
     }
 }
 
-/// Whether a variable cannot change in this state, where tunable parameters can, or would be in Event Mode: setting the value that it
-/// has is [`Habit::Fixed`].
+/// Whether a variable cannot change in this state, although tunable parameters can, or could in Event Mode: setting its present
+/// value is [`Habit::Fixed`].
 pub(crate) fn keeps(meta: &Meta, state: State) -> bool {
     matches!(state, State::Event | State::Continuous | State::Step)
         && (meta.causality == Causality::Parameter || meta.exact)
@@ -64,30 +64,30 @@ const fn table<E: Exported>() -> &'static Table<fmu_core::Block<E::Model>> {
     E::Model::TABLE
 }
 
-/// Whether the model has a variable that this type carries.
-pub(crate) const fn has<E: Exported, T: Value>() -> bool {
+/// Whether the model has a variable of this type.
+pub(crate) const fn has<E: Exported, T: CValue>() -> bool {
     E::Model::TABLE.kinds().meets(T::KINDS)
 }
 
 impl<E: Exported> Instance<E> {
-    /// The variables' values, one after the other. In initialization they fit what was set; later they are those of the
-    /// last step, inputs and tunable parameters as set.
+    /// The variables' values in sequence. In initialization they match the values set so far; later they are those of the last
+    /// step, with inputs and tunable parameters as set.
     ///
     /// # Errors
-    /// Unknown reference, another type, or another number of values than `out` has room for.
+    /// Unknown reference, another type, or a number of values that does not match `out`.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub fn get<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    pub fn get<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         if const { !has::<E, T>() } {
             return self.get_none(references, out.len(), T::CARRIES);
         }
-        // Outputs that are old are computed for a list that is right, and with arrays that is not known yet.
+        // Outdated outputs are computed only for a valid list, and with arrays that is not known yet.
         let old = self.stale || self.current.dirty;
         if references.len() != out.len() || self.arrays && old {
             return self.get_counted(references, out);
         }
         self.refresh();
-        // Scalars alone: one value for each reference.
+        // Only scalars: one value for each reference.
         let done = T::read_reals(&mut self.current.block, references, out);
         if done == out.len() {
             Ok(())
@@ -99,7 +99,7 @@ impl<E: Exported> Instance<E> {
     }
 
     #[inline(never)]
-    fn get_counted<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    fn get_counted<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         self.check_count(references, out.len())?;
         self.refresh();
         self.get_each(references, out)
@@ -122,7 +122,7 @@ impl<E: Exported> Instance<E> {
 
     /// Gets variables of any type; their number was checked.
     #[inline(never)]
-    fn get_each<T: Value>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
+    fn get_each<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
         let (mut references, mut out) = (references, out);
         while let Some((&reference, others)) = references.split_first() {
             let count = if self.arrays { self.elements(reference)? } else { 1 };
@@ -143,7 +143,7 @@ impl<E: Exported> Instance<E> {
 
     /// The value of `time`, of a derivative or of an indicator, or an error: no variable of this type has the reference.
     #[cold]
-    fn read_other<T: Value>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
+    fn read_other<T: CValue>(&mut self, reference: u32, index: usize) -> Result<T, Refusal> {
         let x = self.read_number(reference, index, (T::CARRIES, T::NARROW))?;
         T::from_real(x).ok_or_else(|| message::real(is_time(reference, self.standard), T::CARRIES).into())
     }
@@ -199,7 +199,7 @@ impl<E: Exported> Instance<E> {
     /// Unknown reference, another type, not settable in this state, value out of range, another number of values.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub fn set<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub fn set<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let state = self.current.life.state();
         let configures =
             const { E::CAN.resizable.is_some() } && matches!(state, State::Configuration | State::Reconfiguration);
@@ -236,10 +236,10 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Judges all values, then writes them. In Continuous-Time Mode, a solver tries values: one that is out of range is
-    /// discarded, the states can be set too, and a discrete input to the value that it has.
+    /// Checks all values, then writes them. In Continuous-Time Mode, a solver tries values: one out of range is discarded,
+    /// states can be set too, and discrete inputs only to their present values.
     #[inline(never)]
-    pub(crate) fn set_each<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub(crate) fn set_each<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         self.check_count(references, values.len())?;
         let state = self.current.life.state();
         for write in [false, true] {
@@ -256,7 +256,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// Whether the value can be written in this state.
-    fn try_value<T: Value>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
+    fn try_value<T: CValue>(&mut self, state: State, reference: u32, index: usize, value: T) -> Result<(), Refusal> {
         let found = table::<E>().entry(&mut self.current.block, index);
         let mut possible = None;
         if let Some((meta, slot)) = found {
@@ -284,15 +284,15 @@ impl<E: Exported> Instance<E> {
             && self.states.contains(&index)
     }
 
-    /// Whether the variable [keeps](keeps) its value now: one that was judged is the same.
+    /// Whether the variable [keeps](keeps) its value now: a checked value is the same.
     pub(crate) fn stays(&mut self, index: usize) -> bool {
         let (state, sets) = (self.current.life.state(), self.sets_state(index));
         let found = table::<E>().entry(&mut self.current.block, index);
         !sets && found.is_some_and(|(meta, _)| keeps(meta, state))
     }
 
-    /// Writes a value that was judged before.
-    fn write<T: Value>(&mut self, index: usize, value: T) {
+    /// Writes a value that has been checked.
+    fn write<T: CValue>(&mut self, index: usize, value: T) {
         if self.stays(index) {
             self.forgive(Habit::Fixed);
         } else if let (Some(i), Some(x)) = (self.states.iter().position(|&row| row == index), value.real()) {
@@ -303,7 +303,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// Why a value cannot be set, that the variable may take if it is `possible`; `None` for a variable of another type.
+    /// The reason why a value cannot be set; `possible` if it is in range. `None` for a variable of another type.
     #[cold]
     #[inline(never)]
     fn refuse(
@@ -333,12 +333,12 @@ impl<E: Exported> Instance<E> {
         } else {
             message::fixed::<E::Model>(index, meta, state)
         };
-        // FMI 2.0.5, 2.1.3. CVode looks ahead of an event, where FMPy already sets the discrete inputs of after it.
+        // FMI 2.0.5, 2.1.3. CVode integrates past an event, where FMPy already sets the later discrete inputs.
         let tried = state == State::Continuous && (settable || meta.causality == Causality::Input);
         if tried { Refusal::Discard(fault) } else { Refusal::Error(fault) }
     }
 
-    /// Why a reference past the table cannot be set, or read as another type.
+    /// The reason why a reference past the table cannot be set, or read as another type.
     #[cold]
     pub(crate) fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
         match self.after_table(index::<E>(reference)) {
@@ -362,7 +362,7 @@ impl<E: Exported> Instance<E> {
         if given == needed { Ok(()) } else { Err(message::count(given, needed)) }
     }
 
-    /// How many values a reference of FMI 3.0 stands for: one, or all elements of an array.
+    /// Number of values of a reference in FMI 3.0: one, or all elements of an array.
     pub(crate) fn elements(&mut self, reference: u32) -> Result<usize, Fault> {
         let index = index::<E>(reference);
         match table::<E>().element(index) {

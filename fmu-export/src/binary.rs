@@ -1,5 +1,5 @@
-//! Getting and setting bytes (FMI 3.0). The model lends its own bytes to the importer; setting copies into room that was made
-//! with the instance.
+//! Getting and setting bytes (FMI 3.0). A getter passes the model's bytes to the importer without a copy; a setter copies into
+//! memory reserved with the instance.
 
 use crate::access::index;
 use crate::habit::Habit;
@@ -7,10 +7,10 @@ use crate::instance::{Instance, Refusal};
 use crate::message;
 use fmu_core::{Block, Exported, Fault, Kind, Kinds, Model, Slot};
 
-/// What the functions for bytes carry.
+/// The type that the functions for bytes carry.
 const CARRIES: &str = "bytes";
 
-/// Makes room for the greatest size of every binary variable, so that no step and no set allocates.
+/// Reserves the maximum size of every binary variable, so that no step and no setter allocates.
 pub(crate) fn make_room<M: Model>(block: &mut Block<M>) {
     if const { !M::TABLE.kinds().meets(Kinds::BINARY) } {
         return;
@@ -25,10 +25,10 @@ pub(crate) fn make_room<M: Model>(block: &mut Block<M>) {
 }
 
 impl<E: Exported> Instance<E> {
-    /// Passes the bytes of `given` variables to `take`, which the model keeps until the next call that changes them.
+    /// Passes the bytes of `given` variables to `take`; they remain valid until the next call that changes them.
     ///
     /// # Errors
-    /// Unknown reference, another type, another number of values, more bytes than the variable may have.
+    /// Unknown reference, another type, another number of values, more bytes than the maximum of the variable.
     pub fn get_bytes(&mut self, references: &[u32], given: usize, mut take: impl FnMut(&[u8])) -> Result<(), Refusal> {
         self.check_count(references, given)?;
         self.refresh();

@@ -23,8 +23,8 @@ const FORMAT: u16 = 3;
 const HEADER: usize = 8 + 2 + 2 + 16 + 4;
 const CHECKSUM: usize = 4;
 
-/// Number of bytes of a state. Integers have a variable length in the payload, but the padding makes the size the same
-/// for every state of a model, unless it holds lists that grow.
+/// Number of bytes of a state. Integers have a variable length in the payload, but the padding makes the size the same for
+/// every state of a model, unless it contains lists that grow.
 ///
 /// # Errors
 /// The model cannot be serialized.
@@ -84,7 +84,7 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
         return Err(refuse("content".into()));
     }
     state.check().and_then(|()| state.check_time()).map_err(|fault| refuse(fault.to_string()))?;
-    // Tunable parameters that no step has seen are judged by the next one.
+    // Tunable parameters set since the last step are checked by the next one.
     let unjudged = matches!(
         state.life.state(),
         State::Instantiated | State::Configuration | State::Initialization | State::Reconfiguration | State::Error
@@ -126,7 +126,7 @@ fn padded<M: Model>(payload: usize) -> Result<usize, Fault> {
 
 /// The resources of a model.
 pub(crate) fn shelf<M: Model>(model: &M) -> Shelf {
-    // A model that cannot be serialized fails where it should be.
+    // A model that cannot be serialized fails later, when a state is written.
     Shelf::of(|| drop(postcard::experimental::serialized_size(model)))
 }
 

@@ -1,5 +1,5 @@
-//! Clocks in Event Mode and in Scheduled Execution (FMI 3.0.2, 2.2.8, 2.3.5 and 5): which are active, when the next ticks are, and
-//! which variables can be used.
+//! Clocks in Event Mode and in Scheduled Execution (FMI 3.0.2, 2.2.8, 2.3.5 and 5): active clocks, the times of the next ticks,
+//! and the variables that can be used.
 
 mod intervals;
 
@@ -19,24 +19,24 @@ use std::mem::MaybeUninit;
 pub enum Qualifier {
     /// The model does not know the interval yet.
     NotYetKnown = 0,
-    /// It is the one that was told before.
+    /// Unchanged since it was last reported.
     Unchanged = 1,
     /// It is new.
     Changed = 2,
 }
 
-/// What changes of a clock.
+/// The changing state of a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Tick {
     /// It is active.
     active: bool,
     /// It has ticked in this Event Mode; in Scheduled Execution, it was the last one to tick.
     done: bool,
-    /// What the next getter tells of the interval.
+    /// The qualifier of the interval for the next getter.
     qualifier: Qualifier,
-    /// The interval in s that was told last.
+    /// The interval in s that was reported last.
     interval: f64,
-    /// Time of the tick that follows the interval, in s from the start.
+    /// Time of the tick at the end of the interval, in s from the start.
     due: f64,
     /// Time of the last tick, in s from the start.
     last: Option<f64>,
@@ -50,7 +50,7 @@ impl Tick {
         Self { active: false, done: false, qualifier, interval: 0.0, due: 0.0, last: None, shift: timing.shift }
     }
 
-    /// Whether the values are possible: bytes of a state may be anything.
+    /// Whether the values are possible: a stored state may contain any bytes.
     pub(crate) fn is_sane(&self) -> bool {
         let Self { interval, due, last, shift, .. } = self;
         interval.is_finite() && due.is_finite() && last.is_none_or(f64::is_finite) && *shift >= 0.0 && shift.is_finite()
@@ -73,7 +73,7 @@ pub(crate) fn ticks<M: Model>() -> Option<Box<[Tick]>> {
     (!all.is_empty()).then_some(all)
 }
 
-/// What the clocks of a model are.
+/// The constant properties of a model's clocks.
 pub struct Clocks {
     /// In the order of the table: index, timing, and whether the importer ticks it.
     list: Vec<(usize, Timing, bool)>,
@@ -102,7 +102,7 @@ impl Clocks {
     }
 }
 
-/// A clock that a reference stands for.
+/// A clock that a reference denotes.
 #[derive(Clone, Copy)]
 struct Found {
     number: usize,
@@ -134,7 +134,7 @@ impl<E: Exported> Instance<E> {
         Fault::new(format!("{} {why}", message::name::<E::Model>(clock.index)))
     }
 
-    /// Refuses variables on clocks that are not active: they are open before the start, in Event Mode while a clock of theirs is
+    /// Refuses variables on inactive clocks: they can be used before the start, in Event Mode while one of their clocks is
     /// active, and in Scheduled Execution.
     ///
     /// # Errors
@@ -170,7 +170,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// In Event Mode, finds what the ticks to come do to output clocks and, with feedthrough, to the outputs: on a copy.
+    /// In Event Mode, computes the effect of pending ticks on output clocks and, with feedthrough, on the outputs: on a copy.
     fn evaluate_clocks(&mut self, outputs: bool) -> Result<(), Fault> {
         let (Some(functions), State::Event) = (&E::CAN.clocked, self.current.life.state()) else { return Ok(()) };
         let announced = self.clocks.as_ref().is_some_and(|clocks| clocks.list.iter().any(|(.., ticked)| !ticked));
@@ -208,7 +208,7 @@ impl<E: Exported> Instance<E> {
         theirs && self.current.ticks.as_ref().is_some_and(|ticks| ticks[number].active)
     }
 
-    /// Which clocks are active. In Scheduled Execution, one that has ticked is told once.
+    /// The active clocks. In Scheduled Execution, a clock that has ticked is reported once.
     ///
     /// # Errors
     /// A reference that is not a clock; a model that fails.
@@ -230,8 +230,8 @@ impl<E: Exported> Instance<E> {
     /// Makes clocks active: all of them or, on an error, none.
     ///
     /// # Errors
-    /// A clock that the model ticks; one with a period that has ticked in this Event Mode; one that is active and is to be inactive
-    /// (`canBeDeactivated` is false).
+    /// A clock that the model ticks; a periodic clock that has ticked in this Event Mode; an active clock that is to be
+    /// deactivated (`canBeDeactivated` is false).
     pub fn set_clocks(&mut self, references: &[u32], values: &[Fmi3Boolean]) -> Result<(), Fault> {
         for (&reference, value) in references.iter().zip(values) {
             let clock = self.clock(reference)?;
@@ -263,7 +263,7 @@ impl<E: Exported> Instance<E> {
         self.current.ticks.iter().flatten().any(|tick| tick.active)
     }
 
-    /// Ticks what is active, at the update of the discrete states; then no clock is active.
+    /// Ticks the active clocks when the discrete states are updated; then no clock is active.
     ///
     /// # Errors
     /// The model reports an error.
@@ -293,7 +293,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Warns of a tick that is not where the period puts it.
+    /// Warns of a tick that is not at a multiple of the period.
     fn watch_grid(&mut self, number: usize) {
         let Some((index, timing, _)) = self.clocks.as_ref().map(|clocks| clocks.list[number]) else { return };
         let (Some(period), Some(&mut Tick { last, shift, .. })) =
@@ -319,7 +319,7 @@ impl<E: Exported> Instance<E> {
     /// Asks the model for the next ticks of its aperiodic clocks: at the `start` and after each update.
     ///
     /// # Errors
-    /// An interval that is negative or not finite, or none of a changing clock that ticks.
+    /// An interval that is negative or not finite, or a missing interval of a changing clock that ticks.
     pub(crate) fn plan_ticks(&mut self, start: bool) -> Result<(), Fault> {
         let Some(functions) = &E::CAN.clocked else { return Ok(()) };
         let now = self.current.elapsed;
@@ -343,11 +343,11 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Activates the partition of a clock at `t` (s): Scheduled Execution. Returns whether the importer is to be told of clocks.
+    /// Activates the partition of a clock at `t` (s): Scheduled Execution. Returns whether the importer must be notified of
+    /// clocks.
     ///
     /// # Errors
-    /// An output clock, a time not after the last tick of the clock, tunable parameters that do not fit together, or what the model
-    /// reports.
+    /// An output clock, a time not after the last tick of the clock, inconsistent tunable parameters, or an error of the model.
     pub fn activate_partition(&mut self, reference: u32, t: f64) -> Result<bool, Refusal> {
         let clock = self.clock(reference)?;
         if !clock.ticked_by_importer {

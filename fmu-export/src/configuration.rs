@@ -1,11 +1,11 @@
 //! Configuration Mode and Reconfiguration Mode (FMI 3.0.2, 2.3.6 and 2.3.7): structural parameters, and the sizes of arrays.
 //!
-//! Until the mode is left, every array has the size that it had. Then the model resizes a copy, which takes the place of the
-//! model if it is right: no old value is kept.
+//! Until the mode is left, every array keeps its size. Then the model resizes a copy, which replaces the model if its sizes are
+//! right; no old value is kept.
 
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::State;
-use crate::value::Value;
+use crate::value::CValue;
 use fmu_core::{Block, Causality, Exported, Fault, Model};
 use std::mem;
 
@@ -26,12 +26,12 @@ impl<E: Exported> Instance<E> {
     /// Leaves the mode: the arrays get their new sizes.
     ///
     /// # Errors
-    /// The model refuses the sizes, or an array does not have the length that they say: nothing has changed.
+    /// The model refuses the sizes, or an array does not have the expected length; nothing has changed.
     pub fn exit_configuration(&mut self) -> Result<(), Fault> {
         self.resize(self.current.block.clone())
     }
 
-    /// Gives the arrays of this model the sizes that it has, and takes it.
+    /// Resizes the arrays of this model to its sizes, and adopts it.
     fn resize(&mut self, mut block: Block<E::Model>) -> Result<(), Fault> {
         let Some(resize) = E::CAN.resizable else { return Ok(()) };
         let exchanges = self.exchanges();
@@ -45,7 +45,7 @@ impl<E: Exported> Instance<E> {
         }
         E::Model::TABLE.check_sizes(&mut block)?;
         current.block = block;
-        // What hangs on values that are gone.
+        // Discards data that depends on discarded values.
         current.slopes.clear();
         current.dirty = true;
         let event = exchanges && current.life.state() == State::Reconfiguration;
@@ -55,13 +55,13 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Sets variables before the initialization: structural parameters take effect at once, as in a Configuration Mode of their
-    /// own.
+    /// Sets variables before the initialization: structural parameters take effect at once, as in a separate Configuration
+    /// Mode.
     ///
     /// # Errors
     /// As [`set`](Self::set) and [`exit_configuration`](Self::exit_configuration): nothing has changed.
     #[cold]
-    pub(crate) fn set_and_configure<T: Value>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+    pub(crate) fn set_and_configure<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let structural = |reference: &u32| {
             let found = E::Model::TABLE.locate(E::CAN.index(*reference));
             found.is_some_and(|(_, meta, _)| meta.causality == Causality::StructuralParameter)
@@ -75,7 +75,7 @@ impl<E: Exported> Instance<E> {
         Ok(self.resize(changed)?)
     }
 
-    /// Number of scalar states that the model has now.
+    /// Present number of scalar states.
     #[inline]
     pub(crate) fn state_count(&mut self) -> usize {
         if const { E::CAN.has_arrays() } {
@@ -85,7 +85,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// The number, counted with the greatest sizes, of a state that the model has now.
+    /// The number, counted with the maximum sizes, of a present state.
     #[cold]
     pub(crate) fn number_of_state(&mut self, place: usize) -> usize {
         let mut numbers = Vec::new();

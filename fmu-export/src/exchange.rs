@@ -8,7 +8,7 @@ use crate::lifecycle::{Standard, State};
 use crate::message;
 use fmu_core::{Account, Elapsed, Exported, Fault, Interface, Model, Next, Outcome, SampleGrid};
 
-/// Maximum number of updates of one event that an instance does by itself.
+/// Maximum number of updates of one event that an instance performs by itself.
 pub(crate) const MAX_ITERATIONS: usize = 100;
 
 /// The result of an update of the discrete states.
@@ -47,8 +47,8 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// In Model Exchange, tells the model that the solution passes through the present point, where an `event` begins or ends, or
-    /// a step is complete.
+    /// In Model Exchange, informs the model that the solution passes through the present point, where an `event` begins or
+    /// ends, or a step is complete.
     fn complete(&mut self, event: bool) -> Result<(), Fault> {
         let current = &mut self.current;
         // Some solvers complete every iteration at a point; the last one counts.
@@ -107,7 +107,7 @@ impl<E: Exported> Instance<E> {
         Ok(update)
     }
 
-    /// Leaves Event Mode; an event that the importer did not update, or tunable parameters that it set since, are done now.
+    /// Leaves Event Mode; an event that the importer did not update, and tunable parameters set since, are processed now.
     ///
     /// # Errors
     /// As [`update_discrete`](Self::update_discrete); an event that does not settle.
@@ -117,7 +117,7 @@ impl<E: Exported> Instance<E> {
         }
         for _ in 0..MAX_ITERATIONS {
             if !self.current.pending && !self.current.dirty {
-                // The importer may have gone on since the event began, and can go back to it.
+                // The importer may have advanced the time since the event began, and can go back to it.
                 return self.complete(self.current.end <= self.current.settled);
             }
             self.update_discrete()?;
@@ -157,7 +157,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Takes back what was counted after the present time.
+    /// Discards counts after the present time.
     #[cold]
     fn go_back(&mut self) {
         self.forgive(Habit::Back);

@@ -1,13 +1,13 @@
-//! Habits of importers that the standards forbid and that can do no harm: the call is taken, and a warning names the habit once
-//! for each instance. All else is as strict as the standards.
+//! Habits of importers that the standards forbid but that do no harm: the call is accepted, and a warning names the habit once
+//! for each instance. In all other respects the FMU is as strict as the standards.
 //!
-//! The importers that have them are in `docs/import.md`, the orders of their calls in `tests/orders/`.
+//! `docs/import.md` lists these importers, `tests/orders/` the orders of their calls.
 
 /// A habit, the number of a bit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum Habit {
-    /// Variables that cannot change now are set, to the values that they have.
+    /// Variables that cannot change now are set to their present values.
     Fixed,
     /// `SetContinuousStates` in Event Mode, and in Initialization Mode of FMI 2.0.
     States,
@@ -20,7 +20,7 @@ pub(crate) enum Habit {
 }
 
 impl Habit {
-    /// What the importer does, and what comes of it.
+    /// The importer's habit, and its effect.
     pub(crate) const fn tell(self) -> &'static str {
         match self {
             Self::Fixed => {
@@ -30,11 +30,11 @@ impl Habit {
                 "the importer sets the continuous states outside Continuous-Time Mode; they are taken as those of its integrator"
             }
             Self::Back => {
-                "the importer sets a time before the last completed step; what was counted after that time is taken back"
+                "the importer sets a time before the last completed step; counts after that time are discarded"
             }
             Self::Time => "the importer sets the time in Event Mode; the event is handled at that time",
             Self::Event => {
-                "the importer enters Event Mode in Event Mode; the event is that of the time that it has set"
+                "the importer enters Event Mode in Event Mode; the event is handled at the time that it has set"
             }
         }
     }

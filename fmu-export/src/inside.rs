@@ -1,34 +1,34 @@
 //! Intermediate update: a communication step in parts, between which the importer reads and sets variables, and may end the
 //! step (FMI 3.0.2, 4.2.2). The gate calls the importer while nothing here is borrowed.
 //!
-//! Only parts that are accepted are shown, so each is the end of a finished step of the solver.
+//! Only accepted parts are shown, so each is the end of a finished step of the solver.
 
 use crate::access::index;
-use crate::instance::{Instance, Refusal, Stepped};
+use crate::instance::{Instance, Refusal, StepResult};
 use crate::message;
-use crate::value::Value;
+use crate::value::CValue;
 use fmu_core::description::TIME;
 use fmu_core::{Causality, Elapsed, Exported, Fault, Model, integrate};
 use std::mem::{MaybeUninit, swap};
 
-/// What the importer does inside communication steps.
-pub struct Inside<M: Model> {
-    /// The variables that it asked for at instantiation.
+/// The importer's use of intermediate updates.
+pub struct IntermediateUpdates<M: Model> {
+    /// The variables that it requested at instantiation.
     required: Vec<u32>,
     /// The outputs at the last communication point: variables that are not intermediate keep them.
     outputs: M::Outputs,
 }
 
-/// A communication step that is under way: its parts from here on.
+/// A communication step in progress: its remaining parts.
 pub(crate) struct Parts {
     start: Elapsed,
     t: f64,
     h: f64,
     count: f64,
     done: f64,
-    /// Where the last part ends.
+    /// End of the last part.
     end: f64,
-    stepped: Stepped,
+    stepped: StepResult,
 }
 
 /// The importer is to be called.
@@ -40,19 +40,19 @@ pub struct Pause {
     pub can_return: bool,
 }
 
-/// What it answers: the time (s) at which the step is to end, if it wants that.
+/// Its answer: the time (s) at which the step is to end, if it requests that.
 pub type Reply = Option<f64>;
 
-/// What follows a part of a step.
+/// The action after a part of a step.
 pub(crate) enum Then {
     /// The importer is called, and the step goes on.
     Call(Pause),
     /// The step is done.
-    Done(Stepped),
+    Done(StepResult),
 }
 
 impl<E: Exported> Instance<E> {
-    /// The importer will be called inside steps, where it uses these variables.
+    /// The importer will be called inside steps and uses these variables there.
     ///
     /// # Errors
     /// A variable does not exist.
@@ -62,14 +62,17 @@ impl<E: Exported> Instance<E> {
         if let Some(&reference) = required.iter().find(|&&reference| reference as usize > last) {
             return Err(message::unknown::<E>(reference, self.standard));
         }
-        self.inside = Some(Box::new(Inside { required: required.to_vec(), outputs: self.current.block.out.clone() }));
+        self.inside = Some(Box::new(IntermediateUpdates {
+            required: required.to_vec(),
+            outputs: self.current.block.out.clone(),
+        }));
         Ok(())
     }
 
     /// Begins a communication step from `t` to `t + h` at its first call, then advances by one part.
     ///
     /// # Errors
-    /// As [`do_step`](Self::do_step), or the importer wants to end the step at a time outside of it.
+    /// As [`do_step`](Self::do_step), or the importer requests an end outside of the step.
     pub(crate) fn step_part(
         &mut self,
         (t, h): (f64, f64),
@@ -94,7 +97,7 @@ impl<E: Exported> Instance<E> {
             if until > now {
                 *parts = self.divide(now, until - now)?;
             }
-            (parts.end, parts.stepped) = (until, Stepped { early, ..Stepped::default() });
+            (parts.end, parts.stepped) = (until, StepResult { early, ..StepResult::default() });
             if until <= now {
                 return Ok(Then::Done(parts.stepped));
             }
@@ -109,7 +112,7 @@ impl<E: Exported> Instance<E> {
             return Err(Fault::value("the longest part of a step", longest, "greater than 0: an error of the model"));
         }
         let count = integrate::substeps(h, longest)?;
-        Ok(Parts { start: self.current.elapsed, t, h, count, done: 0.0, end: t + h, stepped: Stepped::default() })
+        Ok(Parts { start: self.current.elapsed, t, h, count, done: 0.0, end: t + h, stepped: StepResult::default() })
     }
 
     fn advance_part(&mut self, parts: &mut Parts) -> Result<Then, Fault> {
@@ -130,7 +133,7 @@ impl<E: Exported> Instance<E> {
         }
         // An event ends the step where the importer takes steps that end early.
         if parts.stepped.early || (parts.stepped.event && self.early_return && !last) {
-            return Ok(Then::Done(Stepped { early: true, ..parts.stepped }));
+            return Ok(Then::Done(StepResult { early: true, ..parts.stepped }));
         }
         self.current.elapsed = next;
         self.current.end = if last { parts.end } else { (parts.t + parts.done * h).min(parts.end) };
@@ -138,7 +141,8 @@ impl<E: Exported> Instance<E> {
         Ok(Then::Call(Pause { time: self.current.end, can_return: self.early_return }))
     }
 
-    /// Refuses variables that the importer did not ask for at instantiation, and to set those that are not intermediate.
+    /// Refuses variables that the importer did not request at instantiation, and refuses to set those that are not
+    /// intermediate.
     ///
     /// # Errors
     /// Names the first one.
@@ -168,7 +172,7 @@ impl<E: Exported> Instance<E> {
     ///
     /// # Errors
     /// As [`get`](Self::get) and [`check_inside`](Self::check_inside).
-    pub(crate) fn get_inside<T: Value>(
+    pub(crate) fn get_inside<T: CValue>(
         &mut self,
         references: &[u32],
         out: &mut [MaybeUninit<T>],
@@ -196,7 +200,7 @@ impl<E: Exported> Instance<E> {
     }
 }
 
-/// Whether a variable is marked so.
+/// Whether a variable is marked as intermediate.
 fn is_intermediate<E: Exported>(reference: u32, causality: Causality) -> bool {
     let found = E::Model::TABLE.locate(index::<E>(reference));
     found.is_some_and(|(_, meta, _)| meta.intermediate && meta.causality == causality)

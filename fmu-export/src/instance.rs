@@ -1,9 +1,9 @@
-//! An instance of a model as an importer sees it, without C: names, times, saved states, messages.
+//! An instance of a model as seen by an importer, without C: names, times, saved states, messages.
 
 use crate::clocks::Clocks;
 use crate::exchange::MAX_ITERATIONS;
 use crate::habit::Habit;
-use crate::inside::Inside;
+use crate::inside::IntermediateUpdates;
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
 use crate::sensitivity::Scratch;
@@ -34,7 +34,7 @@ impl From<Fault> for Refusal {
 
 /// The results of a communication step in addition to its status (FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Stepped {
+pub struct StepResult {
     /// The importer is to enter Event Mode.
     pub event: bool,
     /// The step ended before the next communication point.
@@ -43,7 +43,7 @@ pub struct Stepped {
     pub terminate: bool,
 }
 
-/// One instance. Its functions assume that the lifecycle admits them: the gate checks that.
+/// One instance. Its functions assume that the lifecycle allows them; the gate checks that.
 #[expect(clippy::struct_excessive_bools, reason = "independent facts")]
 pub struct Instance<E: Exported> {
     /// The standard that it was instantiated with.
@@ -64,7 +64,7 @@ pub struct Instance<E: Exported> {
     pub(crate) ranges: Box<[Range]>,
     /// Room for the derivatives and the indicators.
     pub(crate) values: Box<[f64]>,
-    /// The outputs are old: they belong to another instant (Model Exchange only).
+    /// The outputs are outdated: they belong to another instant (Model Exchange only).
     pub(crate) stale: bool,
     /// Memory for derivatives of the equations.
     pub(crate) scratch: Option<Box<Scratch<E::Model>>>,
@@ -74,27 +74,27 @@ pub struct Instance<E: Exported> {
     pub(crate) shelf: Shelf,
     /// The model as it was instantiated, for a reset, if that is not its `Default`.
     pub(crate) made: Option<Box<Block<E::Model>>>,
-    /// What the clocks are, of a model that has some.
+    /// The properties of the clocks, for a model with clocks.
     pub(crate) clocks: Option<Box<Clocks>>,
     /// What the importer does inside communication steps.
-    pub(crate) inside: Option<Box<Inside<E::Model>>>,
+    pub(crate) inside: Option<Box<IntermediateUpdates<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
-    /// The habits of the importer that were heard, a bit for each.
+    /// The importer's habits already reported, one bit each.
     forgiven: u8,
     /// The first step, or continuous time, has begun.
     pub(crate) begun: bool,
-    /// What was set and has no effect.
+    /// Values that were set and have no effect.
     watch: Watch,
     starts: Starts,
 }
 
-/// What is known of the values that a run starts with.
+/// Knowledge about the start values of a run.
 #[derive(Default)]
 struct Starts {
-    /// Whether those after a reset pass [`Snapshot::check`]: found out at the first reset.
+    /// Whether the values after a reset pass [`Snapshot::check`]: determined at the first reset.
     pass: Option<bool>,
-    /// They are those of such a reset, and of set calls, which judge each value.
+    /// They come from such a reset and from setters, which check each value.
     judged: bool,
 }
 
@@ -152,14 +152,14 @@ impl<E: Exported> Instance<E> {
         self.current.experiment.map(|_| ()).ok_or_else(|| Fault::new("fmi2SetupExperiment must be called before it"))
     }
 
-    /// Ends initialization: parameters are judged together, state and outputs computed. Where the importer handles
-    /// events, the first one begins.
+    /// Ends initialization: checks the parameters together, and computes state and outputs. Where the importer handles events,
+    /// the first one begins.
     ///
     /// # Errors
     /// As [`Snapshot::check`] and [`Model::validate`].
     pub fn exit_initialization(&mut self) -> Result<(), Fault> {
-        // Of many runs, the first is checked whole: a check takes longer than all else between reset and first step. Sizes and clocks
-        // have to fit together.
+        // Of many runs, only the first is checked completely: the check takes longer than everything else between reset and
+        // first step. Sizes and clocks must be consistent.
         if !self.starts.judged || const { E::CAN.resizable.is_some() || E::CAN.clocked.is_some() } {
             self.current.check()?;
         }
@@ -195,19 +195,19 @@ impl<E: Exported> Instance<E> {
         self.log.event(|| format!("{}: reset", self.name));
     }
 
-    /// One communication step from `t` to `t + h`. Tunable parameters that were set take effect here, all together.
+    /// One communication step from `t` to `t + h`. Tunable parameters take effect here, all together.
     ///
     /// # Errors
-    /// Times that do not continue the simulation, tunable parameters that do not fit together: then nothing has changed.
-    /// Or what the model reports.
+    /// Times that do not continue the simulation, or inconsistent tunable parameters (nothing has changed); or an error of the
+    /// model.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub fn do_step(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
+    pub fn do_step(&mut self, t: f64, h: f64) -> Result<StepResult, Fault> {
         let next = self.begin_step(t, h)?;
         self.advance(t, h, next)
     }
 
-    /// Judges a communication step and the tunable parameters that were set; the time after the step.
+    /// Checks a communication step and the tunable parameters; returns the time after the step.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub(crate) fn begin_step(&mut self, t: f64, h: f64) -> Result<Elapsed, Fault> {
@@ -224,10 +224,10 @@ impl<E: Exported> Instance<E> {
         Ok(next)
     }
 
-    /// A communication step that was judged, or a part of it.
+    /// A communication step that has been checked, or a part of it.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
-    pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<Stepped, Fault> {
+    pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<StepResult, Fault> {
         let current = &mut self.current;
         let handles_events = current.life.handles_events();
         if E::CAN.event_mode() && E::CAN.clocked.is_none() && (handles_events || self.early_return) {
@@ -249,13 +249,13 @@ impl<E: Exported> Instance<E> {
         self.current.elapsed = next;
         self.current.end = t + h;
         self.warn();
-        Ok(Stepped::default())
+        Ok(StepResult::default())
     }
 
-    /// What a step comes to that was not done to its end: the model ends the simulation (FMI 2.0.5, 4.2.2 and 4.2.3; FMI 3.0.2,
-    /// 4.2.1), or the step fails. Where no early return is allowed, FMI 3.0 has no time before the end of the step.
+    /// The result of an incomplete step: the model ends the simulation (FMI 2.0.5, 4.2.2 and 4.2.3; FMI 3.0.2, 4.2.1), or the
+    /// step fails. Without early return, FMI 3.0 cannot report a time before the end of the step.
     #[cold]
-    fn end_or_fail(&mut self, fault: Fault, t: f64, h: f64) -> Result<Stepped, Fault> {
+    fn end_or_fail(&mut self, fault: Fault, t: f64, h: f64) -> Result<StepResult, Fault> {
         let Some(at) = fault.ends() else { return Err(fault) };
         let current = &mut self.current;
         let end = current.elapsed.plus(h);
@@ -267,19 +267,19 @@ impl<E: Exported> Instance<E> {
         current.block.model.output(current.elapsed, &mut current.block.out);
         self.log.event(|| format!("{}: {fault}", self.name));
         self.warn();
-        Ok(Stepped { early, terminate: true, ..Stepped::default() })
+        Ok(StepResult { early, terminate: true, ..StepResult::default() })
     }
 
-    /// A step of a sampled model for an importer that handles its events, or takes steps that end early. Every sample
-    /// reads what the importer set at its instant, or else what it set last.
-    fn step_to_event(&mut self, t: f64, h: f64) -> Result<Stepped, Fault> {
-        let Some(samples) = &E::CAN.samples else { return Ok(Stepped::default()) };
+    /// A step of a sampled model for an importer that handles its events, or takes steps that end early. Every sample reads the
+    /// inputs set at its instant, or else those set last.
+    fn step_to_event(&mut self, t: f64, h: f64) -> Result<StepResult, Fault> {
+        let Some(samples) = &E::CAN.samples else { return Ok(StepResult::default()) };
         let event_mode = self.current.life.handles_events();
         let (start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
         let model = &mut self.current.block.model;
         (samples.bounded)(model, if self.early_return { start } else { end })?;
         let grid = SampleGrid { period: (samples.period)(model) };
-        let mut stepped = Stepped::default();
+        let mut stepped = StepResult::default();
         loop {
             let k = (samples.samples)(model);
             if !grid.reached(k, end) {
@@ -310,7 +310,7 @@ impl<E: Exported> Instance<E> {
         Ok(stepped)
     }
 
-    /// Warns, if anyone listens and this key was not heard in the last second.
+    /// Warns, if warnings are enabled and this key was not reported in the last second.
     pub(crate) fn warn_of(&mut self, key: &'static str, message: impl FnOnce() -> String) {
         let now = self.current.elapsed.seconds();
         self.warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
@@ -321,7 +321,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// Takes a call that the standard forbids, and says so if that was not heard before.
+    /// Accepts a call that the standard forbids, with a warning the first time.
     #[cold]
     pub(crate) fn forgive(&mut self, habit: Habit) {
         let bit = 1 << habit as u8;
@@ -332,13 +332,13 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// A step of a model with states for an importer that handles its events, or takes steps that end early. What the importer
-    /// does not handle happens as in [`Model::advance`].
-    fn step_to_stop(&mut self, to_event: ToEvent<E::Model>, t: f64, h: f64) -> Result<Stepped, Fault> {
-        let Some(events) = &E::CAN.events else { return Ok(Stepped::default()) };
+    /// A step of a model with states for an importer that handles its events, or takes steps that end early. Events that the
+    /// importer does not handle are handled as in [`Model::advance`].
+    fn step_to_stop(&mut self, to_event: ToEvent<E::Model>, t: f64, h: f64) -> Result<StepResult, Fault> {
+        let Some(events) = &E::CAN.events else { return Ok(StepResult::default()) };
         let event_mode = self.current.life.handles_events();
         let (mut start, end) = (self.current.elapsed, self.current.elapsed.plus(h));
-        let mut stepped = Stepped::default();
+        let mut stepped = StepResult::default();
         let stop = loop {
             let rest = if start == self.current.elapsed { h } else { end.since(start) };
             let stop = match to_event(&mut self.current.block.model, &Step { start, h: rest }) {
@@ -374,7 +374,7 @@ impl<E: Exported> Instance<E> {
         Ok(stepped)
     }
 
-    /// Lets the model warn, if anyone listens.
+    /// Lets the model warn, if warnings are enabled.
     #[inline]
     pub(crate) fn warn(&mut self) {
         let Some(warn) = E::CAN.warn else { return };
@@ -397,8 +397,8 @@ impl<E: Exported> Instance<E> {
         warn(&current.block.model, &mut Warnings::to(&mut sink));
     }
 
-    /// Makes the outputs fit what was set: before the first step or event by a new initialization; later a get returns the
-    /// values of the last step, and in Model Exchange those of the present states, inputs and time.
+    /// Brings the outputs up to date with the values set: before the first step or event by a new initialization; later a
+    /// getter returns the values of the last step, and in Model Exchange those of the present states, inputs and time.
     #[inline]
     pub(crate) fn refresh(&mut self) {
         if self.current.dirty && matches!(self.current.life.state(), State::Instantiated | State::Initialization) {
@@ -407,7 +407,7 @@ impl<E: Exported> Instance<E> {
         self.observe();
     }
 
-    /// Computes outputs that are of another instant.
+    /// Computes the outputs if they are outdated.
     #[inline]
     fn observe(&mut self) {
         if self.stale {
@@ -458,7 +458,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Makes a state from bytes and returns its handle.
+    /// Creates a state from bytes and returns its handle.
     ///
     /// # Errors
     /// As [`blob::read`].

@@ -1,8 +1,8 @@
-//! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and where it
+//! The one lifecycle table: which call is allowed in which state, for both standards and all interfaces, and to which state it
 //! leads.
 //!
-//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The state that is not here (step in progress) does not exist in an
-//! FMU without asynchronous steps: the calls that would lead to it are [`Call::Unsupported`].
+//! FMI 2.0.5, 3.2.3 and 4.2.4; FMI 3.0.2, 2.3, 3.2 and 4.2. The missing state (step in progress) does not exist in an FMU
+//! without asynchronous steps: the calls that would lead to it are [`Call::Unsupported`].
 
 use fmu_core::Interface;
 use serde::{Deserialize, Serialize};
@@ -68,7 +68,7 @@ impl State {
         Self::ClockUpdate,
     ];
 
-    /// Those in which no call is under way; Clock Activation Mode takes the place of Step Mode in Scheduled Execution.
+    /// The states between calls; Clock Activation Mode replaces Step Mode in Scheduled Execution.
     const REST: [Self; 10] = {
         let [rest @ .., _, _, _] = Self::ALL;
         rest
@@ -114,7 +114,7 @@ impl States {
         Self(bits)
     }
 
-    /// The states of Scheduled Execution, where Clock Activation Mode is what Step Mode is elsewhere.
+    /// The states of Scheduled Execution, where Clock Activation Mode corresponds to Step Mode.
     const fn scheduled(self) -> Self {
         use State::{
             Activation, Configuration, Error, Initialization, Instantiated, Reconfiguration, Step, Terminated,
@@ -148,7 +148,7 @@ impl fmt::Display for States {
     }
 }
 
-/// A call of the importer, by what it does; several functions of the standards share one.
+/// A call of the importer, by its purpose; several functions of the standards share one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Call {
     /// `Instantiate`: there is no instance yet, so no state.
@@ -238,7 +238,7 @@ pub enum Next {
     Start,
     /// Configuration Mode from Instantiated, Reconfiguration Mode from another state.
     Configure,
-    /// Back to where one of these was entered.
+    /// Back to the state in which one of these was entered.
     Configured,
 }
 
@@ -333,7 +333,7 @@ impl Call {
                 Stay,
             ),
             Self::DoStep => stepping(both(&[Step]), Stay),
-            // A state that an error left behind is of no use.
+            // The state after an error is useless.
             Self::SaveState => {
                 let saved = &[Instantiated, Initialization, Step, Event, Continuous, Ended, Terminated];
                 let also = &[
@@ -445,8 +445,8 @@ impl Allowed {
     }
 }
 
-/// The state of one instance and the interface that it was made for. It changes in [`Life::after`] and
-/// [`Life::end`] and nowhere else; a restored FMU state brings its own.
+/// The state of one instance and its interface. It changes in [`Life::after`] and [`Life::end`] and nowhere else; a restored
+/// FMU state brings its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Life {
     state: State,

@@ -18,12 +18,12 @@ pub enum Status {
     Error = 3,
 }
 
-/// The bit of [`WARNING`], and those of the model's own categories.
+/// The bit of [`WARNING`], and those of the model's categories.
 const WARNINGS: u32 = 1 << 1;
 const OWNS: u32 = !0 << CATEGORIES.len();
 const _: () = assert!(matches!(CATEGORIES[1].0.as_bytes(), b"logStatusWarning") && OWN + CATEGORIES.len() == 32);
 
-/// The model's own categories: names and descriptions.
+/// The model's categories: names and descriptions.
 pub type Categories = &'static [(&'static str, &'static str)];
 
 /// The importer's logger.
@@ -38,7 +38,7 @@ pub trait Sink {
 /// The logger and the enabled categories.
 pub struct Log {
     sink: Box<dyn Sink>,
-    /// A bit for each category of [`CATEGORIES`], then of the model's own.
+    /// A bit for each category of [`CATEGORIES`], then of the model's categories.
     enabled: u32,
 }
 
@@ -48,7 +48,7 @@ impl Log {
         Self { sink, enabled: if on { !0 } else { 0 } }
     }
 
-    /// Logs why a call failed, even with logging off: the status alone does not help.
+    /// Logs why a call failed, even with logging off: the status alone is not enough.
     #[cold]
     pub fn error(&self, message: &str) {
         self.sink.write(Status::Error, ERROR, message);
@@ -62,19 +62,19 @@ impl Log {
         }
     }
 
-    /// Whether anyone hears what the model says: warnings, and messages of its own categories.
+    /// Whether messages of the model are logged: warnings, and messages in its categories.
     #[inline]
     pub fn hears_model(&self, own: Categories) -> bool {
         let heard = if own.is_empty() { WARNINGS } else { WARNINGS | OWNS };
         self.enabled & heard != 0 && self.sink.hears()
     }
 
-    /// Whether anyone hears this category. One that does not exist counts as that of warnings.
+    /// Whether messages of this category are logged. An unknown category counts as that of warnings.
     pub(crate) fn hears(&self, category: &str, own: Categories) -> bool {
         self.enabled & position(category, own).map_or(WARNINGS, |i| 1 << i) != 0
     }
 
-    /// Logs what the model says in a call that succeeded: a warning, or a message of one of its own categories.
+    /// Logs a message of the model in a call that succeeded: a warning, or a message in one of its categories.
     #[cold]
     pub(crate) fn said(&self, category: &str, own: Categories, message: &str) {
         match position(category, own) {

@@ -16,7 +16,7 @@ pub(crate) fn name<M: Model>(index: usize) -> String {
     }
 }
 
-/// [`name`] with the sizes that arrays have now, by which a description counts the elements of a matrix.
+/// [`name`] with the present sizes of arrays, by which a description counts the elements of a matrix.
 pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String {
     if const { !M::TABLE.has_sizes() } {
         return name::<M>(index);
@@ -29,7 +29,7 @@ pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String
     }
 }
 
-/// What a variable may be set to.
+/// The allowed values of a variable.
 pub(crate) fn allowed(meta: &Meta) -> String {
     let enumeration = match meta.kind {
         Kind::Enumeration(enumeration) => enumeration,
@@ -62,7 +62,7 @@ fn kind(kind: &Kind) -> String {
 #[cold]
 pub(crate) fn narrow<M: Model>(index: usize, value: i128, of: IntegerType) -> Fault {
     let (name, of) = (name::<M>(index), of.name());
-    Fault::new(format!("{name} = {value} does not fit: an Integer of FMI 2.0 has 32 bits; FMI 3.0 has it as {of}"))
+    Fault::new(format!("{name} = {value} does not fit a 32-bit FMI 2.0 Integer; in FMI 3.0 it is {of}"))
 }
 
 /// No variable has this value reference.
@@ -75,7 +75,7 @@ pub(crate) fn unknown<E: Exported>(reference: u32, standard: Standard) -> Fault 
     Fault::new(format!("value reference {reference} does not exist; {first} to {last} do"))
 }
 
-/// The reference belongs to an element that has no reference of its own in FMI 3.0.
+/// The reference belongs to an element without a separate reference in FMI 3.0.
 #[cold]
 pub(crate) fn element<M: Model>(reference: u32, index: usize, element: usize) -> Fault {
     let first = reference as usize - element;
@@ -93,13 +93,13 @@ pub(crate) fn inner_derivative(reference: u32, state: &str, first: u32) -> Fault
     ))
 }
 
-/// The variable is not of the type that the function carries.
+/// The variable's type does not match the function.
 #[cold]
 pub(crate) fn type_of<M: Model>(index: usize, meta: &Meta, carries: &str) -> Fault {
     Fault::new(format!("{} is {}, and this function carries {carries}", name::<M>(index), kind(&meta.kind)))
 }
 
-/// The variable cannot be set, or not now.
+/// The variable cannot be set, or not in this state.
 #[cold]
 pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State) -> Fault {
     let name = name::<M>(index);
@@ -131,7 +131,7 @@ pub(crate) fn fixed<M: Model>(index: usize, meta: &Meta, state: lifecycle::State
     })
 }
 
-/// The variable cannot be set now to another value than its own.
+/// The variable cannot be changed now.
 #[cold]
 pub(crate) fn kept<M: Model>(
     block: &mut Block<M>,
@@ -150,14 +150,14 @@ pub(crate) fn range<M: Model>(block: &mut Block<M>, index: usize, meta: &Meta, v
     Fault::value(&sized_name(block, index), value, allowed(meta))
 }
 
-/// The number of values is not what the references need.
+/// The number of values does not match the references.
 #[cold]
 pub(crate) fn count(given: usize, needed: usize) -> Fault {
     Fault::value("nValues", given, format_args!("{needed} for these value references"))
 }
 
-/// How an instance starts: what differs from the start values, which are those of the model's `Default` unless it was `made`
-/// with others.
+/// The start of an instance: the values that differ from the start values, which are those of the model's `Default` unless it
+/// was `made` with others.
 pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
     let mut fresh = made.cloned().unwrap_or_default();
     fresh.initialize();
@@ -177,7 +177,7 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: O
     format!("{instance}: initialized at {} s with {changes}", current.end)
 }
 
-/// A real number that no setter changes, asked for with another type.
+/// A real number that no setter changes, requested with another type.
 #[cold]
 pub(crate) fn real(time: bool, carries: &str) -> Fault {
     Fault::new(if time {
@@ -213,7 +213,7 @@ pub(crate) fn interface(theirs: Interface, ours: Interface) -> Fault {
     Fault::new(format!("the FMU state is of an instance {}, and this is one {}", made_for(theirs), made_for(ours)))
 }
 
-/// What an instance was made for.
+/// The interface of an instance.
 pub(crate) fn made_for(interface: Interface) -> &'static str {
     match interface {
         Interface::CoSimulation => "for Co-Simulation without Event Mode",

@@ -1,9 +1,9 @@
-//! The start values that an instance is made with: those of the model's `Default`, or of the [preset](fmu_core::preset) that
-//! the importer's token asks for.
+//! The start values of a new instance: those of the model's `Default`, or of the [preset](fmu_core::preset) that the importer's
+//! token requires.
 
 use crate::lifecycle::State;
 use crate::message;
-use fmu_core::preset::{self, Entry, FILE, MOST};
+use fmu_core::preset::{self, FILE, MOST, PresetValue};
 use fmu_core::{Block, Bytes, Capabilities, Fault, Kind, Meta, Model, Slot};
 use std::fmt::Display;
 use std::fs::File;
@@ -11,7 +11,7 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-/// A module for WebAssembly has no files, whatever its importer names.
+/// A WebAssembly module has no files, even if its importer passes a path.
 const READS_FILES: bool = !cfg!(target_family = "wasm");
 
 /// A model before it loads its resources.
@@ -25,20 +25,20 @@ impl<M: Model> Made<M> {
     /// The model for an importer whose token has this suffix.
     ///
     /// # Errors
-    /// The token asks for a preset, which is not in the folder, is another one, or has a name or a value that is not allowed.
+    /// The token requires a preset that is missing from the folder, differs, or contains a name or a value that is not allowed.
     pub(crate) fn asked(can: &Capabilities<M>, resources: Option<&Path>, suffix: &str) -> Result<Self, Fault> {
         if suffix.is_empty() {
             return Ok(Self { block: Block::default(), suffix: String::new() });
         }
         if !READS_FILES {
             return Err(Fault::new(format!(
-                "the token asks for the preset in resources/{FILE}, and a WebAssembly module reads no files: take the FMU \
-                 without its preset, and set the start values"
+                "the token requires the preset in resources/{FILE}, but a WebAssembly module reads no files: use the \
+                 FMU without its preset, and set the start values"
             )));
         }
         let Some(folder) = resources else {
             return Err(Fault::new(format!(
-                "the token asks for the preset in resources/{FILE}, the start values of this FMU, and the importer names no \
+                "the token requires the preset in resources/{FILE}, the start values of this FMU, and the importer names no \
                  folder of resources (NULL, empty, or the URI of no file): it must pass that of the unpacked archive"
             )));
         };
@@ -47,7 +47,7 @@ impl<M: Model> Made<M> {
             of(
                 &path,
                 format!(
-                    "{e}; this file of the archive has the FMU's preset, its start values, for which the token asks"
+                    "{e}; this file of the archive has the FMU's preset, its start values, which the token requires"
                 ),
             )
         })?;
@@ -56,7 +56,7 @@ impl<M: Model> Made<M> {
             return Err(of(
                 &path,
                 format!(
-                    "its hash is {}, and the token asks for the preset {}: the file was changed, or is of another archive; \
+                    "its hash is {}, and the token requires the preset {}: the file was changed, or is of another archive; \
                      unpack the archive anew, or write it with `fmu preset`",
                     &found[1..],
                     &suffix[1..]
@@ -89,7 +89,7 @@ fn of(path: &Path, why: impl Display) -> Fault {
     Fault::new(format!("{}: {why}", path.display()))
 }
 
-/// The bytes of the file; of a file that is too large, one byte more than is allowed.
+/// The bytes of the file; for a file that is too large, one byte more than allowed.
 fn content(path: &Path) -> io::Result<Vec<u8>> {
     // Opening a pipe would wait for its writer.
     if !path.metadata()?.is_file() {
@@ -101,11 +101,11 @@ fn content(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 /// Sets the start values as an importer would after instantiation.
-fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry]) -> Result<(), Fault> {
+fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[PresetValue]) -> Result<(), Fault> {
     let rows = can.rows()?;
     let indices: Vec<usize> = M::TABLE.indices().collect();
     let (mut set, mut next) = (vec![false; indices.len()], 0);
-    for Entry { line, name, value } in entries {
+    for PresetValue { line, name, value } in entries {
         let wrong = |fault: Fault| Fault::new(format!("line {line}: {fault}"));
         // `fmu preset` writes the variables in the order of the table.
         let mut places = (next..indices.len()).chain(0..next);
@@ -113,7 +113,7 @@ fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Entry
         let place = found.ok_or_else(|| wrong(Fault::new(format!("{} has no variable {name}", M::INFO.name))))?;
         let index = indices[place];
         if std::mem::replace(&mut set[place], true) {
-            return Err(wrong(Fault::new(format!("{name} has a value already"))));
+            return Err(wrong(Fault::new(format!("{name} already has a value"))));
         }
         let Some((meta, slot)) = can.place(block, &rows, index) else { continue };
         if !meta.takes_start() {

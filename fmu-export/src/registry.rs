@@ -1,4 +1,4 @@
-//! The saved FMU states, and the handles that stand for them in C.
+//! The saved FMU states, and the handles that represent them in C.
 //!
 //! A handle is a unique number, not an address: it is looked up and never dereferenced. A foreign, freed or garbage `FMUState`
 //! therefore gives an error with a message and never a crash. This is the only global of a binary; a step does not touch it.
@@ -57,7 +57,7 @@ pub fn free<M: Model>(handle: usize) -> Result<(), Fault> {
     }
     registry.states.remove(&handle);
     if registry.states.is_empty() {
-        // An empty map still holds a node, which would be lost when the importer unloads the binary.
+        // An empty map still owns a node, which would leak when the importer unloads the binary.
         registry.states = BTreeMap::new();
     }
     Ok(())

@@ -1,10 +1,10 @@
-//! The folder of the FMU's resources, as an importer names it.
+//! The folder of the FMU's resources, as passed by an importer.
 
 use std::ffi::CStr;
 use std::path::PathBuf;
 
 /// The folder, from the URI of FMI 2.0 (2.0.5, 2.1.5: `file:///`, with percent codes) or the path of FMI 3.0 (3.0.2, 2.3.1).
-/// Practice knows more forms, and neither standard gives them another meaning: `file:/` and `file://localhost/`, a path in
+/// Importers also use other forms, to which neither standard gives another meaning: `file:/` and `file://localhost/`, a path in
 /// FMI 2.0, a URI in FMI 3.0. `None` for NULL, for an empty text, and for another scheme.
 pub(crate) fn folder(location: Option<&CStr>) -> Option<PathBuf> {
     let location = location?.to_bytes();

@@ -1,9 +1,9 @@
 //! Derivatives of a model's equations: directional and adjoint derivatives, derivatives of outputs with respect to time, and
 //! steps with inputs that change at a given rate.
 //!
-//! A model with a [tangent](fmu_core::Differentiable) gives exact values. For another one, and in Initialization Mode, a
-//! central difference along the whole direction is taken on a copy; its step makes the errors of rounding and of the
-//! third derivative about equal, 1e-10 of a value of nominal size. FMI 2.0.5, 2.1.9; FMI 3.0.2, 2.2.12.
+//! A model with a [tangent](fmu_core::Differentiable) gives exact values. For other models, and in Initialization Mode, a
+//! central difference along the whole direction is taken on a copy; its step balances the errors of rounding and of the third
+//! derivative at about 1e-10 of a value of nominal size. FMI 2.0.5, 2.1.9; FMI 3.0.2, 2.2.12.
 
 use crate::access::index;
 use crate::instance::{Instance, Refusal};
@@ -12,7 +12,7 @@ use crate::message;
 use crate::snapshot::{Snapshot, ramps};
 use fmu_core::{Block, Causality, Constant, Elapsed, Exported, Fault, Kind, Meta, Model, Slot, Step, Variability};
 
-/// Parts into which a step with changing inputs is divided: each uses the inputs at its middle.
+/// Number of parts of a step with changing inputs: each uses the inputs at its middle.
 const PARTS: u32 = 32;
 
 /// Memory for the derivatives.
@@ -34,8 +34,8 @@ impl<E: Exported> Instance<E> {
     /// Directional derivative: the change of `unknowns` per unit of a change of `knowns` by `seed`.
     ///
     /// # Errors
-    /// A variable that is not a known or unknown in this state, one named twice, a seed of another length (Error); derivatives
-    /// that do not exist here (Discard). Nothing changes.
+    /// A variable that is not a known or unknown in this state, a duplicate variable, a seed of the wrong length (Error);
+    /// derivatives that do not exist here (Discard). Nothing changes.
     pub fn directional(
         &mut self,
         unknowns: &[u32],
@@ -114,7 +114,7 @@ impl<E: Exported> Instance<E> {
                 (continuous.integrands)(&current.block.model, current.elapsed, &mut scratch.block.out);
             }
             for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-                // Fresh outputs lack the elements of arrays whose sizes are chosen.
+                // New outputs lack the elements of arrays with structural sizes.
                 if let Some((_, Slot::Real(x))) = E::Model::TABLE.entry(&mut scratch.block, index::<E>(unknown)) {
                     *out += sign * *x;
                 }
@@ -148,7 +148,8 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// One step of `h` (s) with inputs that change at the rates that were set. Afterwards the inputs are as they were set.
+    /// One step of `h` (s) with inputs that change at the rates that were set. Afterwards the inputs have the values set by the
+    /// importer.
     pub(crate) fn step_on_slopes(&mut self, h: f64) -> Result<(), Fault> {
         let table = E::Model::TABLE;
         let is_mean = |&index: &usize| table.locate(index).is_some_and(|(_, meta, _)| meta.mean);
@@ -193,7 +194,7 @@ impl<E: Exported> Instance<E> {
         done
     }
 
-    /// Works with the references of all elements, where those of FMI 3.0 stand for arrays.
+    /// Expands references of arrays in FMI 3.0 to those of all elements.
     fn with_elements(
         &mut self,
         unknowns: &[u32],
@@ -362,7 +363,7 @@ impl<E: Exported> Instance<E> {
         index::<E>(unknown).wrapping_sub(E::Model::TABLE.len()) < E::CAN.scalars()
     }
 
-    /// What the table says of a variable.
+    /// The table entry of a variable.
     fn meta(&mut self, reference: u32) -> Option<&'static Meta> {
         E::Model::TABLE.entry(&mut self.current.block, index::<E>(reference)).map(|(meta, _)| meta)
     }
@@ -384,7 +385,7 @@ impl<E: Exported> Instance<E> {
         })
     }
 
-    /// Knowns and unknowns are what they may be in this state, each once.
+    /// Checks that knowns and unknowns are allowed in this state, each once.
     fn check_sides(&mut self, unknowns: &[u32], knowns: &[u32]) -> Result<(), Fault> {
         let state = self.current.life.state();
         let initial = state == State::Initialization;
@@ -449,7 +450,7 @@ fn zeros(memory: &mut Vec<f64>, n: usize) -> Vec<f64> {
     zeros
 }
 
-/// Checks that the seed has as many numbers as it needs, all finite, and that there is room for the results.
+/// Checks that the seed has the right length and is finite, and that the array for the results is large enough.
 fn check_sizes(seed: &[f64], needed: usize, (room, results): (usize, usize)) -> Result<(), Fault> {
     if seed.len() != needed {
         return Err(Fault::value("nSeed", seed.len(), format_args!("{needed} for these value references")));
@@ -495,7 +496,7 @@ fn pick<E: Exported>(block: &mut Block<E::Model>, dx: &[f64], index: usize) -> f
     derivative.unwrap_or_else(|| real(block, index))
 }
 
-/// Makes a direction: no continuous input and no state changes, and so far no output.
+/// Creates a direction in which no continuous input, no state and, so far, no output changes.
 fn clear<E: Exported>(direction: &mut Block<E::Model>) {
     for index in E::Model::TABLE.indices() {
         if let Some((meta, Slot::Real(x))) = E::Model::TABLE.entry(direction, index)

@@ -51,14 +51,14 @@ pub struct Snapshot<M: Model> {
     pub experiment: Option<Experiment>,
     /// Time since the start, summed here.
     pub elapsed: Elapsed,
-    /// Time as the importer computes it: the end of the last step, `t + h`, or what it set in Model Exchange; before
-    /// the first step the start time.
+    /// Time as the importer computes it: the end of the last step, `t + h`, or the time set in Model Exchange; before the first
+    /// step the start time.
     pub end: f64,
     /// In Model Exchange, time of the last event: no earlier time can be set.
     pub settled: f64,
-    /// In Model Exchange, time of the last event or completed step: counts after an earlier time would be taken back.
+    /// In Model Exchange, time of the last event or completed step: setting an earlier time discards counts.
     pub completed: f64,
-    /// In Initialization Mode, the importer has set the continuous states: they count unless a start value is set after them.
+    /// In Initialization Mode, the importer has set the continuous states: they apply unless a start value is set after them.
     pub stated: bool,
     /// Event Mode was entered, and the event has not been done.
     pub pending: bool,
@@ -66,7 +66,7 @@ pub struct Snapshot<M: Model> {
     pub slopes: Vec<(u32, f64)>,
     /// A set call awaits processing by the model: before the start for any variable, afterwards for a tunable parameter.
     pub dirty: bool,
-    /// The clocks of a model that has some, in the order of the table.
+    /// The clocks of the model, if it has any, in the order of the table.
     pub ticks: Option<Box<[Tick]>>,
     /// The model and its outputs.
     pub block: Block<M>,
@@ -109,7 +109,7 @@ impl<M: Model> Clone for Snapshot<M> {
         Self { block: self.block.clone(), slopes: self.slopes.clone(), ticks: self.ticks.clone(), ..*self }
     }
 
-    /// Reuses what `self` holds: for a plain model, and one with a `clone_from` of its own, nothing is allocated.
+    /// Reuses the memory of `self`: for a plain model, and for one that implements `clone_from`, nothing is allocated.
     fn clone_from(&mut self, source: &Self) {
         let Self { life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks, block } =
             source;
@@ -145,7 +145,7 @@ impl<M: Model> Snapshot<M> {
                 return Err(Fault::value(&message::sized_name(&mut self.block, index), value, allowed));
             }
         }
-        // Where sizes are set, arrays have those of before, also if the simulation ends there.
+        // Where sizes are set, arrays keep their old lengths, even if the simulation ends there.
         if const { M::TABLE.has_sizes() }
             && !matches!(self.life.state(), State::Configuration | State::Reconfiguration | State::Terminated)
         {
@@ -165,13 +165,13 @@ impl<M: Model> Snapshot<M> {
         if self.slopes.iter().all(ramps) { Ok(()) } else { Err(Fault::new("derivatives of inputs")) }
     }
 
-    /// State and outputs at the start, from what is set so far.
+    /// State and outputs at the start, from the values set so far.
     pub(crate) fn initialize(&mut self) {
         self.block.initialize();
         (self.dirty, self.stated) = (false, false);
     }
 
-    /// The model with its calculated parameters, if its parameters fit together; this one stays as it is.
+    /// A copy of the model with its calculated parameters, if the parameters are consistent.
     ///
     /// # Errors
     /// As [`Model::validate`].
@@ -183,7 +183,7 @@ impl<M: Model> Snapshot<M> {
         Ok(model)
     }
 
-    /// Whether an instance that was made for this interface can be in this state.
+    /// Whether an instance for this interface can be in this state.
     pub(crate) fn fits_its_interface(&self) -> bool {
         match (self.life.state(), self.life.interface()) {
             (State::Step | State::Ended, interface) => {
@@ -192,7 +192,7 @@ impl<M: Model> Snapshot<M> {
             (State::Event, interface) => matches!(interface, Interface::EventMode | Interface::ModelExchange),
             (State::Activation, interface) => interface == Interface::ScheduledExecution,
             (State::Continuous, interface) => interface == Interface::ModelExchange,
-            // A step that is under way cannot be saved.
+            // A step in progress cannot be saved.
             (State::Intermediate | State::ClockUpdate, _) => false,
             _ => true,
         }
@@ -207,7 +207,7 @@ impl<M: Model> Snapshot<M> {
         let start = self.experiment.map_or(M::INFO.experiment.start, |e| e.start);
         let (elapsed, since) = (self.elapsed.seconds(), self.end - start);
         let rounding = 8.0 * f64::EPSILON * start.abs().max(self.end.abs());
-        // A sum that is not in its normal form hides numbers that cancel.
+        // A sum that is not in normal form may contain numbers that cancel.
         let fits = self.elapsed == self.elapsed.plus(0.0)
             && match (self.life.state(), self.experiment) {
                 (State::Instantiated | State::Configuration, _) | (State::Initialization, Some(_)) => {

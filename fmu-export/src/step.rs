@@ -11,7 +11,7 @@ impl<M: Model> Snapshot<M> {
     #[inline]
     pub(crate) fn check_step(&self, t: f64, h: f64, next: Elapsed) -> Result<(), Fault> {
         let end = t + h;
-        // Nothing of this holds for NaN; a subnormal h is below the resolution of any time but 0.
+        // None of these comparisons is true for NaN; a subnormal h is below the resolution of any time except 0.
         let advances = h >= f64::MIN_POSITIVE && end > t && end < f64::INFINITY;
         if !(advances && self.continues(t, h)) {
             return Err(self.misplaced(t, h));

@@ -8,10 +8,10 @@ use crate::message;
 use fmu_core::{Causality, Exported, Fault, Kind, Kinds, Model, Slot};
 use std::ffi::{CStr, CString};
 
-/// What the functions for texts carry.
+/// The type that the functions for texts carry.
 const CARRIES: &str = "a text";
 
-/// Greatest size of a text that is set, in bytes.
+/// Maximum size of a text that is set, in bytes.
 const MOST: usize = 1 << 20;
 
 impl<E: Exported> Instance<E> {
@@ -95,7 +95,7 @@ impl<E: Exported> Instance<E> {
         Ok(indices)
     }
 
-    /// The table's index of a variable whose type fits, or why there is none.
+    /// The table index of a variable of the right type, or the reason why there is none.
     pub(crate) fn index_of(&mut self, reference: u32, carries: &str, fits: fn(&Kind) -> bool) -> Result<usize, Fault> {
         let index = index::<E>(reference);
         match E::Model::TABLE.entry(&mut self.current.block, index) {
@@ -140,7 +140,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// Some texts or bytes have new values.
+    /// Records that some texts or bytes have new values.
     pub(crate) fn was_set(&mut self) {
         let state = self.current.life.state();
         self.current.dirty |= matches!(state, State::Instantiated | State::Initialization);

@@ -1,4 +1,5 @@
-//! A warning when a run begins with inputs at 0 that do not start there: some importers feed 0 or false to an input that is not connected.
+//! A warning when a run begins with inputs at 0 whose start values differ: some importers feed 0 or false to an unconnected
+//! input.
 
 use crate::instance::Instance;
 use crate::message;
@@ -6,7 +7,8 @@ use fmu_core::log::WARNING;
 use fmu_core::{Block, Causality, Exported, Kind, Model, Need, Slot};
 
 impl<E: Exported> Instance<E> {
-    /// The first step, or continuous time, begins: names the inputs at 0 or false that have another start value and are read.
+    /// Called when the first step, or continuous time, begins: names the inputs at 0 or false that the model reads and whose
+    /// start values differ.
     #[cold]
     #[inline(never)]
     pub(crate) fn warn_of_unfed(&mut self) {

@@ -1,7 +1,7 @@
-//! Values as they cross the C interface: which base type of the table each C type carries.
+//! Values as they cross the C interface: the base type of the table that each C type carries.
 
 use crate::lifecycle::Standard;
-use fmu_core::{Block, Constant, Inputs, IntegerType, Kind, Kinds, Meta, Model, Slot};
+use fmu_core::{Block, Constant, IntegerType, Kind, Kinds, Meta, Model, RealInputs, Slot};
 use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::mem::MaybeUninit;
@@ -9,11 +9,11 @@ use std::mem::MaybeUninit;
 /// The reference of a table's first variable, after that of `time`.
 const FIRST: u32 = 1;
 
-/// Number of inputs that are set quickly: the room for the values that they had before.
+/// Maximum number of inputs that are set quickly: the size of the buffer for their previous values.
 const SHORT: usize = 8;
 
 /// A C type of one of the standards, in the layout of C.
-pub trait Value: Copy + Display + PartialEq {
+pub trait CValue: Copy + Display + PartialEq {
     /// Name of the type in messages.
     const CARRIES: &'static str;
 
@@ -26,19 +26,19 @@ pub trait Value: Copy + Display + PartialEq {
     /// The value in `slot`, `None` if the variable has another base type, or a value that this type lacks.
     fn read(meta: &Meta, slot: &Slot<'_>, standard: Standard) -> Option<Self>;
 
-    /// Writes a value that was [judged](Value::judge) before.
+    /// Writes a value that has been [checked](CValue::judge).
     fn write(self, slot: Slot<'_>);
 
     /// Whether the variable may take this value, `None` if it has another base type.
     fn judge(self, meta: &Meta, standard: Standard) -> Option<bool>;
 
-    /// Reads scalars that hold this very type, quickly, up to the first reference of anything else; returns how many.
+    /// Quickly reads scalars of exactly this type, up to the first reference of another kind; returns their number.
     #[inline]
     fn read_reals<M: Model>(_block: &mut Block<M>, _references: &[u32], _out: &mut [MaybeUninit<Self>]) -> usize {
         0
     }
 
-    /// Sets inputs that hold this very type, quickly: all of them or, if one cannot be set in this way, none.
+    /// Quickly sets inputs of exactly this type: all of them or, if one cannot be set in this way, none.
     #[inline]
     fn write_inputs<M: Model>(_block: &mut Block<M>, _references: &[u32], _values: &[Self], _continuous: bool) -> bool {
         false
@@ -66,7 +66,7 @@ impl Display for Fmi2Integer {
     }
 }
 
-impl Value for f64 {
+impl CValue for f64 {
     const CARRIES: &'static str = "a real number";
     // Time and derivatives have no row.
     const KINDS: Kinds = Kinds::ALL;
@@ -115,7 +115,7 @@ impl Value for f64 {
         if list.len() > SHORT {
             return false;
         }
-        let done = M::TABLE.write(block, list, FIRST, Inputs { values, before: &mut before, continuous });
+        let done = M::TABLE.write(block, list, FIRST, RealInputs { values, before: &mut before, continuous });
         if done == list.len() {
             return true;
         }
@@ -132,7 +132,7 @@ impl Value for f64 {
     }
 }
 
-/// Undoes a partial set, the last value first: a reference may come twice.
+/// Undoes a partial set, the last value first: a reference may occur twice.
 #[cold]
 fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
     for (&reference, &value) in list.iter().zip(before).rev() {
@@ -142,7 +142,7 @@ fn take_back<M: Model>(block: &mut Block<M>, list: &[u32], before: &[f64]) {
     }
 }
 
-impl Value for f32 {
+impl CValue for f32 {
     const CARRIES: &'static str = "a Float32";
     const KINDS: Kinds = Kinds::FLOAT32;
 
@@ -165,10 +165,10 @@ impl Value for f32 {
     }
 }
 
-/// The integers of FMI 3.0, each of which carries the variables of its own type.
+/// The integers of FMI 3.0; each carries the variables of its type.
 macro_rules! integers {
     ($($type:ident $name:ident $carries:literal;)*) => { $(
-        impl Value for $type {
+        impl CValue for $type {
             const CARRIES: &'static str = $carries;
             const KINDS: Kinds = {
                 let own = Kinds::integer(IntegerType::$name);
@@ -231,7 +231,7 @@ integers! {
     u64 UInt64 "a UInt64";
 }
 
-impl Value for Fmi2Integer {
+impl CValue for Fmi2Integer {
     const CARRIES: &'static str = "an integer or an enumeration";
     const KINDS: Kinds = Kinds::INTEGERS.and(Kinds::ENUMERATION);
     const NARROW: bool = true;
@@ -258,7 +258,7 @@ impl Value for Fmi2Integer {
     }
 }
 
-/// The truth values of the standards: the C type, and the number that it is. Everything but 0 is true.
+/// The truth values of the standards: the C type, and its number. Everything except 0 is true.
 macro_rules! truth_values {
     ($($(#[$doc:meta])* $name:ident $number:ident;)*) => { $(
         $(#[$doc])*
@@ -278,7 +278,7 @@ macro_rules! truth_values {
             }
         }
 
-        impl Value for $name {
+        impl CValue for $name {
             const CARRIES: &'static str = "a truth value";
             const KINDS: Kinds = Kinds::BOOLEAN;
 

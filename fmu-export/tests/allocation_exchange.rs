@@ -13,7 +13,7 @@ use std::ptr::null_mut;
 
 fmu_export::export!(Ball: ContinuousTime + Events + Differentiable + Warns);
 
-/// Allocations of `work`, which also ran before.
+/// Allocations of `work`, which has run before.
 fn allocations(mut work: impl FnMut()) -> u64 {
     work();
     let before = calls();
@@ -35,7 +35,7 @@ fn derivatives(fmu: &Fmu, knowns: [u32; 2]) {
 fn a_solver_does_not_allocate() {
     let _neighbor = neighbor();
     for kind in ME {
-        // Warnings are on, and there is no logger: nothing is built for nobody.
+        // Warnings are on, but there is no logger: no text is built.
         let fmu = Fmu::with(kind, false, true);
         assert_eq!((fmu.enter(0.0, None), fmu.exit(), fmu.leave()), (OK, OK, OK));
         let mut state = null_mut();
@@ -73,7 +73,7 @@ fn a_solver_does_not_allocate() {
     }
 }
 
-/// A warning is built once a second, when someone hears it.
+/// A warning is built once a second, if it is logged.
 #[test]
 fn a_warning_is_built_when_it_is_heard() {
     let steps = |logger: bool, on: bool| {

@@ -1,5 +1,5 @@
-//! Start values that the importer sets, constants, the end of the simulation, Event Mode with states, and log categories of a
-//! model's own: a ball of Euler's method, in both standards.
+//! Start values that the importer sets, constants, the end of the simulation, Event Mode with states, and a model's log
+//! categories: a ball of Euler's method, in both standards.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -58,7 +58,7 @@ impl Model for Ball {
         V::boolean_local("rests", "At rest", |m| &mut m.model.rests).exact(),
         V::parameter("e", &ONE, "Restitution", |m| &mut m.model.e).tunable(),
         V::integer_parameter("limit", "Bounces at the end", |m| &mut m.model.limit),
-        V::constant("v_min", &METER_PER_S, "Least velocity", 0.1).as_output(),
+        V::constant("v_min", &METER_PER_S, "Minimum velocity", 0.1).as_output(),
         V::float32_constant("single", &METER, "Single", 0.1),
         V::integer_constant("int32", "32 bits", -7),
         V::uint64_constant("uint64", "64 bits", 9),
@@ -66,10 +66,10 @@ impl Model for Ball {
         V::enumeration_constant::<Ground>("ground", "Stone", Ground::Stone as i32),
         V::array_constant("levels", &METER, "Heights", &[1.0, 0.49]),
         V::text_constant("made", "By whom", "here"),
-        V::int8_constant("int8", "Least of 8 bits", i8::MIN),
-        V::uint8_constant("uint8", "Greatest of 8 bits", u8::MAX),
-        V::int16_constant("int16", "Least of 16 bits", i16::MIN),
-        V::uint16_constant("uint16", "Greatest of 16 bits", u16::MAX),
+        V::int8_constant("int8", "Minimum of 8 bits", i8::MIN),
+        V::uint8_constant("uint8", "Maximum of 8 bits", u8::MAX),
+        V::int16_constant("int16", "Minimum of 16 bits", i16::MIN),
+        V::uint16_constant("uint16", "Maximum of 16 bits", u16::MAX),
         V::uint32_constant("uint32", "More than an Int32 has", 4_000_000_000),
         V::int64_constant("int64", "Of 64 bits", -3_000_000_000),
     ];
@@ -319,7 +319,7 @@ fn the_model_ends_the_simulation() {
     assert_eq!((fmu.get(H), fmu.get_integer(BOUNCES)), (f64::MIN_POSITIVE, 1));
     assert_eq!(fmu.step(5.453, 0.1).0, ERROR, "no step follows");
     assert_eq!((fmu.reset(), fmu.enter(0.0, None), fmu.exit(), fmu.step(0.0, 0.1).0), (OK, OK, OK, OK));
-    // In Event Mode, the update tells it, as in Model Exchange.
+    // In Event Mode, the update reports it, as in Model Exchange.
     let fmu = Fmu::entered(Kind::Cs3 { event: true, early: true }, 0.0);
     assert_eq!(set_integer(&fmu, LIMIT, 1), OK);
     assert_eq!(fmu.exit(), OK);

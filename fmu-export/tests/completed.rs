@@ -1,4 +1,4 @@
-//! A model that follows the solution: which calls of an importer tell it a point, in both standards.
+//! A model that follows the solution: the calls of an importer that report a point, in both standards.
 #![allow(missing_docs)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
@@ -46,7 +46,7 @@ impl Model for Meter {
         Var::input("u", &ONE_PER_S, "Slope", |m| &mut m.model.u),
         Var::output("x", &SECOND, "Height", |m| &mut m.model.x),
         Var::output("area", &SECOND, "Area below x", |m| &mut m.out.area),
-        Var::integer_output("points", "Points told", |m| &mut m.out.points),
+        Var::integer_output("points", "Points reported", |m| &mut m.out.points),
     ];
 
     fn initialize(&mut self) {
@@ -103,8 +103,8 @@ impl Events for Meter {
 
 fmu_export::export!(Meter: ContinuousTime + Events + CompletedSteps);
 
-/// The area, and how many points were told.
-fn told(fmu: &Fmu) -> (f64, i32) {
+/// The area, and the number of reported points.
+fn counted(fmu: &Fmu) -> (f64, i32) {
     (fmu.get(AREA), fmu.get_integer(POINTS))
 }
 
@@ -117,33 +117,33 @@ fn completed_steps_and_events_are_told_and_trials_are_not() {
     for kind in ME {
         // The event that ends the initialization, and its end.
         let fmu = Fmu::running(kind, 2.0);
-        assert_eq!(told(&fmu), (0.0, 2));
-        // A step that is tried at several times and given up, a shorter one that is complete.
+        assert_eq!(counted(&fmu), (0.0, 2));
+        // A step that is tried at several times and rejected, a shorter one that is complete.
         for (t, x) in [(2.5, 7.0), (3.0, 9.0), (2.1, 1.0)] {
             point(&fmu, t, x);
             let _: [f64; 1] = fmu.derivatives();
-            assert_eq!(told(&fmu), (0.0, 2));
+            assert_eq!(counted(&fmu), (0.0, 2));
         }
         point(&fmu, 2.5, 4.0);
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)));
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)), "no time has passed: counted again");
+        assert_eq!((fmu.completed(), counted(&fmu)), (OK, (1.0, 3)));
+        assert_eq!((fmu.completed(), counted(&fmu)), (OK, (1.0, 3)), "no time has passed: counted again");
         point(&fmu, 2.5, 6.0);
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.5, 3)), "another iteration at the same time");
+        assert_eq!((fmu.completed(), counted(&fmu)), (OK, (1.5, 3)), "another iteration at the same time");
         point(&fmu, 2.5, 4.0);
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (1.0, 3)));
+        assert_eq!((fmu.completed(), counted(&fmu)), (OK, (1.0, 3)));
         // An event inside of the next step: beyond it, then back to it.
         point(&fmu, 3.5, 6.0);
         point(&fmu, 3.0, 5.0);
-        assert_eq!((fmu.event(), told(&fmu)), (OK, (3.25, 4)));
+        assert_eq!((fmu.event(), counted(&fmu)), (OK, (3.25, 4)));
         fmu.settle();
-        assert_eq!((fmu.leave(), fmu.get(X), told(&fmu)), (OK, 2.5, (3.25, 5)));
+        assert_eq!((fmu.leave(), fmu.get(X), counted(&fmu)), (OK, 2.5, (3.25, 5)));
         // From the height after the event on.
         point(&fmu, 4.0, 3.5);
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (6.25, 6)));
+        assert_eq!((fmu.completed(), counted(&fmu)), (OK, (6.25, 6)));
     }
 }
 
-/// A step that was completed and is given up leaves nothing behind.
+/// A completed step that is then rejected has no effect.
 #[test]
 fn what_completed_steps_counted_is_taken_back() {
     for kind in ME {
@@ -154,17 +154,17 @@ fn what_completed_steps_counted_is_taken_back() {
             point(&fmu, t, x);
             assert_eq!(fmu.completed(), OK);
         }
-        assert_eq!(told(&fmu), (2.0 + 6.0 + 9.5, 5));
+        assert_eq!(counted(&fmu), (2.0 + 6.0 + 9.5, 5));
         assert!(fmu.messages().is_empty());
         // Back between two points, and on from the one before.
         point(&fmu, 1.5, 6.0);
-        assert_eq!(told(&fmu), (2.0, 3));
+        assert_eq!(counted(&fmu), (2.0, 3));
         let warned = fmu.messages();
         assert!(warned.len() == usize::from(has_logger(kind.version())), "{warned:?}");
         assert!(warned.iter().all(|m| m.status == 1 && m.text.contains("a time before the last completed step")));
-        assert_eq!((fmu.completed(), told(&fmu)), (OK, (4.5, 4)));
+        assert_eq!((fmu.completed(), counted(&fmu)), (OK, (4.5, 4)));
         point(&fmu, 1.0, 5.0);
-        assert_eq!((fmu.completed(), told(&fmu), fmu.messages().len()), (OK, (2.5, 3), 0), "counted again");
+        assert_eq!((fmu.completed(), counted(&fmu), fmu.messages().len()), (OK, (2.5, 3), 0), "counted again");
         // As far as the last event, and no further.
         point(&fmu, 2.0, 5.0);
         assert_eq!((fmu.event(), fmu.set_time(1.9)), (OK, ERROR));
@@ -172,7 +172,7 @@ fn what_completed_steps_counted_is_taken_back() {
     }
 }
 
-/// From one call to the next, with any number of steps to give up, what counts is the solution alone.
+/// From one call to the next, with any number of rejected steps, only the solution counts.
 #[test]
 fn any_number_of_steps_is_given_up() {
     for kind in ME {
@@ -206,13 +206,13 @@ fn a_saved_state_goes_on_from_its_point() {
         let (mut saved, bytes) = (null_mut(), fmu.bytes());
         assert_eq!(fmu.save(&mut saved), OK);
         point(&fmu, 3.0, 8.0);
-        assert_eq!((fmu.completed(), told(&fmu).0), (OK, 14.0));
-        assert_eq!((fmu.restore(saved), told(&fmu).0), (OK, 2.0));
+        assert_eq!((fmu.completed(), counted(&fmu).0), (OK, 14.0));
+        assert_eq!((fmu.restore(saved), counted(&fmu).0), (OK, 2.0));
         let (other, mut stored) = (Fmu::new(kind), null_mut());
         assert_eq!((other.deserialize(&bytes, &mut stored), other.restore(stored)), (OK, OK));
         for fmu in [&fmu, &other] {
             point(fmu, 3.0, 8.0);
-            assert_eq!((fmu.completed(), told(fmu).0), (OK, 14.0));
+            assert_eq!((fmu.completed(), counted(fmu).0), (OK, 14.0));
         }
         assert_eq!((fmu.free_state(&mut saved), other.free_state(&mut stored)), (OK, OK));
     }
@@ -236,7 +236,7 @@ fn a_point_that_the_model_refuses_is_an_error() {
 fn a_step_of_co_simulation_is_the_models_own() {
     for kind in CS {
         let fmu = Fmu::running(kind, 0.0);
-        assert_eq!((fmu.set(&[U], &[1.0]), fmu.step(0.0, 1.0).0, told(&fmu)), (OK, OK, (0.0, 0)));
+        assert_eq!((fmu.set(&[U], &[1.0]), fmu.step(0.0, 1.0).0, counted(&fmu)), (OK, OK, (0.0, 0)));
     }
 }
 

@@ -1,5 +1,5 @@
-//! Event Mode and early return of FMI 3.0 Co-Simulation, and Model Exchange, of a sampled model: every sample reads what
-//! was set at its instant, for any communication step.
+//! Event Mode and early return of FMI 3.0 Co-Simulation, and Model Exchange, of a sampled model: every sample reads the values
+//! set at its instant, for any communication step.
 //!
 //! States: i instantiated, n initialization, s step, v event, t terminated, e error.
 #![allow(missing_docs, clippy::float_cmp)]
@@ -75,7 +75,7 @@ fn every_function_in_every_state() {
     }
 }
 
-/// What the importer has at instant k.
+/// The importer's values at instant k.
 fn inputs(k: u64) -> [f64; 2] {
     let k = f64::from(u32::try_from(k).unwrap());
     [(0.7 * k).sin(), (1.3 * k).cos()]
@@ -91,7 +91,7 @@ fn instant(fmu: &Fmu, start: f64) -> Option<u64> {
     ((fmu.get(TIME) - start - k * T).abs() < 1e-5 * T).then_some(k as u64)
 }
 
-/// Outputs at the instants k T by steps of T without any event handling: what every importer is to see.
+/// Outputs at the instants k T by steps of T without any event handling: the expected outputs of every importer.
 fn reference(start: f64) -> Vec<u64> {
     let fmu = Fmu::running(Kind::Cs3 { event: false, early: false }, start);
     let mut outputs = vec![fmu.get(Y).to_bits()];
@@ -170,7 +170,7 @@ fn every_sample_reads_what_was_set_at_its_instant() {
     }
 }
 
-/// An importer that is offered Event Mode and does not enter it loses no sample: each reads the held inputs.
+/// An importer that does not enter an offered Event Mode loses no sample: each reads the held inputs.
 #[test]
 fn without_entering_event_mode_nothing_is_lost() {
     for early in [false, true] {
@@ -265,7 +265,7 @@ fn without_both_flags_nothing_changes() {
     }
 }
 
-/// Model Exchange: due instants in Event Mode, early and late by rounding, with events of others in between.
+/// Model Exchange: due instants in Event Mode, early and late by rounding, with foreign events in between.
 #[test]
 fn model_exchange_samples_at_its_time_events() {
     for kind in ME {
@@ -300,7 +300,7 @@ fn model_exchange_samples_at_its_time_events() {
     }
 }
 
-/// A late event does all that is due, with the inputs as they are set; leaving Event Mode without an update does it too.
+/// A late event handles everything that is due, with the inputs as set; so does leaving Event Mode without an update.
 #[test]
 fn late_and_forgotten_events() {
     for kind in ME {
@@ -332,7 +332,7 @@ fn a_tunable_parameter_acts_at_the_update() {
     }
 }
 
-/// An FMU state inside Event Mode keeps the event that is pending, through bytes too.
+/// An FMU state inside Event Mode keeps the pending event, also as bytes.
 #[test]
 fn a_state_inside_event_mode() {
     for kind in [Kind::Cs3 { event: true, early: true }, Kind::Me2, Kind::Me3] {

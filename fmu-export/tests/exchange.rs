@@ -18,7 +18,7 @@ fmu_export::export!(Ball: ContinuousTime + Events + Warns);
 
 use fmi::*;
 
-/// What a message tells, and the call.
+/// The content of a message, and the call.
 type Trial = (&'static str, fn(&Fmu) -> c_int);
 
 /// Mass and map of a fresh ball.
@@ -37,7 +37,7 @@ const BALL2: &[Line] = &[
     ("fmi2SetReal", "invcs", '.', |f| f.set(&[U], &[2.0])),
     ("fmi2SetReal", "invs", '.', |f| f.set(&[C, K], &[0.2, 2.0])),
     ("fmi2SetReal", "in", '.', |f| f.set(&[M, MAP, MAP + 1], &[2.0, 3.0, 4.0])),
-    // The values that they have, also among others.
+    // Their present values, also among others.
     ("fmi2SetReal", "invcs", '.', |f| f.set(&[M, MAP, MAP + 1, U], &[START[0], START[1], START[2], 0.3])),
     ("fmi2SetReal", "in", '.', |f| f.set(&[M, MAP, MAP + 1, U], &[START[0], START[1], 0.25, 0.3])),
     ("fmi2SetReal", "invcs", '.', |f| f.set(&[C], &[0.1])),
@@ -124,7 +124,7 @@ const BALL3: &[Line] = &[
     ("fmi3GetClock", "", '.', |f| unsafe { fmi3GetClock(f.it, null(), 0, null_mut()) }),
 ];
 
-/// What Co-Simulation without Event Mode does not have, and what Model Exchange does not have.
+/// Functions that Co-Simulation without Event Mode lacks, and those that Model Exchange lacks.
 fn of(table: &[Line], kind: Kind) -> Vec<Line> {
     let exchange_only = |allowed: &str| !allowed.contains('s') && allowed.chars().any(|c| "vc".contains(c));
     let step_only = |allowed: &str| allowed.contains('s') && !allowed.chars().any(|c| "vc".contains(c));
@@ -189,7 +189,7 @@ fn a_state_of_another_interface_is_refused() {
                 error.contains("for Model Exchange") && error.contains("for Co-Simulation without Event Mode"),
                 "{error}"
             );
-            // Nothing else changed: the instance is as after any error, and its own states lead out.
+            // Nothing else changed: the instance is as after any error, and its saved states lead out.
             assert_eq!((before.get(H), before.state()), (1.0, 'e'));
         }
         assert_eq!((to.free_state(&mut state), to.free_state(&mut stored)), (OK, OK));
@@ -200,7 +200,7 @@ fn a_state_of_another_interface_is_refused() {
 #[test]
 fn a_trial_step_is_discarded() {
     let trials: [Trial; 10] = [
-        // CVode looks ahead of an event, where FMPy already sets the inputs of after it.
+        // CVode integrates past an event, where FMPy already sets the later inputs.
         ("k changes at events only", |f| f.set(&[U, K], &[1.0, 2.0])),
         ("h = NaN", |f| f.set_states(&[f64::NAN, 0.0])),
         ("v = inf", |f| f.set_states(&[0.0, f64::INFINITY])),
@@ -410,7 +410,7 @@ fn a_tunable_parameter_acts_after_the_event() {
             assert_eq!((fmu.leave(), fmu.get(C_M)), (OK, 2.0));
             let rho = (1.0 - 5.0 / 44_330.0_f64).powf(4.255);
             assert!((fmu.derivatives::<2>()[1] - (8.0 * rho - 9.81)).abs() < 1e-12);
-            // Values that do not fit together are refused at once.
+            // Inconsistent values are refused at once.
             assert_eq!((fmu.event(), fmu.set(&[C], &[30.0])), (OK, OK));
             assert_eq!(if update { fmu.try_update().0 } else { fmu.leave() }, ERROR);
             assert!(fmu.error().ends_with("c / m is greater than 10"));
@@ -471,7 +471,7 @@ fn a_run_continues_from_a_state_bit_for_bit() {
     }
 }
 
-/// Warnings of the model: with a message of their own while the call returns OK, once a second and key.
+/// Warnings of the model: a separate message while the call returns OK, once a second and key.
 #[test]
 fn warnings_come_once_a_second() {
     for kind in [Kind::Me2, Kind::Me3, Kind::Cs2, Kind::Cs3 { event: false, early: false }] {
@@ -503,7 +503,7 @@ fn warnings_come_once_a_second() {
     }
 }
 
-/// A value without effect is said once, by name, whatever is said later; after a reset again.
+/// A value without effect is reported once, by name, despite later messages; after a reset again.
 #[test]
 fn a_value_without_effect_is_said_once() {
     for kind in [Kind::Me2, Kind::Me3, Kind::Cs2, Kind::Cs3 { event: false, early: false }] {

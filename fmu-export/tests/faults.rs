@@ -52,7 +52,7 @@ fn a_fault_of_the_model_is_its_message() {
     assert_eq!((fmu.state(), fmu.get(TIME)), ('e', 0.0));
 }
 
-/// Where the logger below finds the instance that logs.
+/// The instance that logs, for the logger below.
 struct Caller {
     it: InstancePointer,
     statuses: Vec<c_int>,

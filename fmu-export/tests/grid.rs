@@ -1,8 +1,8 @@
 //! No control sample is lost or doubled, regardless of the communication step and however the importer adds up its time.
 //!
-//! A model that counts its samples, through the C functions; what must come out is counted in integers. 1e7 steps of every
-//! step size: from every start with optimization, from one of them without, and a tenth from the others.
-//! `FMU_STEPS=n` for another number.
+//! A model that counts its samples, through the C functions; the expected results are counted in integers. 1e7 steps of every
+//! step size: from every start with optimization, from one of them without, and a tenth from the others. `FMU_STEPS=n` for
+//! another number.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -138,14 +138,14 @@ impl Drop for Fmu {
     }
 }
 
-/// How an importer makes the times of its steps.
+/// How an importer computes the times of its steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Clock {
     /// t = t + h, h always the same.
     Accumulates,
     /// t = start + n h, h always the same.
     Multiplies,
-    /// t = start + n h, and the step is what is missing to the next t.
+    /// t = start + n h, and the step is the difference to the next t.
     Differs,
 }
 

@@ -17,7 +17,7 @@ use common::*;
 use fmu_export::abi::types::*;
 use std::ptr::{null, null_mut};
 
-/// Name, states that allow it, state afterwards, the call with arguments that are right otherwise.
+/// Name, states that allow it, state afterwards, the call with otherwise valid arguments.
 type Line = (&'static str, &'static str, char, fn(InstancePointer) -> c_int);
 
 fn check(version: u8, table: &[Line], unsupported: &[Unsupported]) {
@@ -115,7 +115,7 @@ const FMI3: &[Line] = &[
     ("fmi3SetFloat64", "ins", '.', |it| unsafe { fmi3SetFloat64(it, &U, 1, &2.0, 1) }),
     ("fmi3SetInt32", "in", '.', |it| unsafe { fmi3SetInt32(it, &N, 1, &2, 1) }),
     ("fmi3SetInt64", "in", '.', |it| unsafe { fmi3SetInt64(it, &MODE, 1, &2, 1) }),
-    // A fixed parameter may be set to what it is.
+    // A fixed parameter may be set to its present value.
     ("fmi3SetInt64", "ins", '.', |it| unsafe { fmi3SetInt64(it, &MODE, 1, &1, 1) }),
     ("fmi3SetBoolean", "ins", '.', |it| unsafe { fmi3SetBoolean(it, &ON, 1, &NO, 1) }),
     ("fmi3SetFloat32", "ins", '.', |it| unsafe { fmi3SetFloat32(it, null(), 0, null(), 0) }),

@@ -1,4 +1,4 @@
-//! Logging: what is said when, escaped how, to whom; and how instances are made.
+//! Logging: messages, their escapes and receivers; and the creation of instances.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -96,7 +96,7 @@ fn switch(fmu: &Fmu, on: bool, categories: &[&CStr]) -> c_int {
     }
 }
 
-/// Whether a reset is heard.
+/// Whether a reset is logged.
 fn hears_events(fmu: &Fmu) -> bool {
     drain(&fmu.journal);
     assert_eq!(fmu.reset(), OK);

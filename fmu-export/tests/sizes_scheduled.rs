@@ -173,7 +173,7 @@ fn each_mode_takes_its_own_parameters() {
         let it = It::begun();
         assert_eq!((it.enter(), call(&it)), (OK, ERROR), "{number}");
     }
-    // Outside of the mode, and where values of the old sizes are given.
+    // Outside of the mode, and with values of the old sizes.
     assert_eq!(It::begun().set_size(N, 1), ERROR);
     assert_eq!(It::begun().exit(), ERROR);
     for n in [2, 4] {

@@ -1,4 +1,4 @@
-//! What the end of initialization checks, in the first run of an instance and after each reset.
+//! Checks at the end of initialization, in the first run of an instance and after each reset.
 #![allow(missing_docs, non_snake_case)]
 
 use fmu_core::unit::OHM;
@@ -48,7 +48,7 @@ impl Sink for Deaf {
     }
 }
 
-/// A start value that no importer could set is refused in every run that leaves it, regardless of the runs before have set.
+/// A start value that no importer could set is refused in every run that leaves it, regardless of values set in earlier runs.
 #[test]
 fn a_start_value_out_of_range_is_refused_after_each_reset() {
     let (log, fresh) = (Log::new(Box::new(Deaf), false), Snapshot::new(Interface::CoSimulation));

@@ -1,4 +1,4 @@
-//! FMU states: exact continuation, other instances, handles that are wrong, bytes that are wrong.
+//! FMU states: exact continuation, other instances, wrong handles, wrong bytes.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -35,7 +35,7 @@ fn a_restored_state_continues_bit_for_bit() {
             assert_eq!(fmu.save(&mut state), OK);
             let bytes = fmu.bytes();
             let first = run(&fmu, k, 100);
-            // Back, several times; also with what was saved as bytes; also in another instance, of either standard.
+            // Back, several times; also from bytes; also in another instance, of either standard.
             for _ in 0..2 {
                 assert_eq!(fmu.restore(state), OK);
                 assert_eq!(run(&fmu, k, 100), first);

@@ -1,4 +1,4 @@
-//! What a step tells of states and stop times: noSetFMUStatePriorToCurrentPoint, stopTimeDefined, tunable parameters.
+//! Promises of a step about states and stop times: noSetFMUStatePriorToCurrentPoint, stopTimeDefined, tunable parameters.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -51,7 +51,7 @@ fn the_promise_changes_no_result_and_leaves_the_current_point_open() {
         assert_eq!(bound.save(&mut here), OK);
         let ahead = run(&free, 10, 20, false);
         assert_eq!((bound.restore(here), run(&bound, 10, 20, true)), (OK, ahead.clone()));
-        // An importer that breaks its promise gets what it would have got without it.
+        // An importer that breaks its promise gets the same results as without it.
         assert_eq!((bound.restore(here), run(&bound, 10, 20, false)), (OK, ahead));
         assert_eq!(bound.free_state(&mut here), OK);
     }
@@ -104,7 +104,7 @@ fn a_tunable_parameter_takes_effect_in_the_next_step() {
     for version in [2, 3] {
         let (tuned, plain) = (resistive(version), resistive(version));
         assert_eq!(tuned.set(&[GAIN], &[4.0]), OK);
-        // Between steps a look shows the last step, and the parameter as it was set.
+        // Between steps a getter returns the values of the last step, and the parameter as set.
         assert_eq!((tuned.get(GAIN), tuned.get(DOUBLE_GAIN), tuned.get(X)), (4.0, 2.0, plain.get(X)));
         assert_eq!((tuned.step(H, H), plain.step(H, H)), (OK, OK));
         assert_eq!((tuned.get(DOUBLE_GAIN), plain.get(DOUBLE_GAIN)), (8.0, 2.0));
@@ -126,7 +126,7 @@ fn tunable_parameters_that_do_not_fit_are_refused_by_the_step_which_changes_noth
         assert_eq!((fmu.get(X), fmu.get(GAIN), fmu.get(DOUBLE_GAIN)), (x, 6.0, 2.0));
         assert!(version == 2 || fmu.get(TIME) == count);
         assert_eq!(fmu.state(), 'e');
-        // What was saved before the step still waits for its judgment, as bytes too; there is time to mend it.
+        // A state saved before the step is still unchecked, as bytes too, and can be corrected.
         let mut stored = null_mut();
         assert_eq!(fmu.deserialize(&bytes, &mut stored), OK);
         for state in [pending, stored] {

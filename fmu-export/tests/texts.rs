@@ -1,4 +1,4 @@
-//! Texts and resources through the C functions: what the importer may pass, what it gets back, and what is refused.
+//! Texts and resources through the C functions: arguments that the importer may pass, results, and refusals.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -15,7 +15,7 @@ use std::ffi::{CStr, CString};
 use std::path::Path;
 use std::ptr::{null, null_mut};
 
-/// Says its label, or a text that C cannot have. The name of its folder tells `load` what to do.
+/// Returns its label, or a text that C cannot represent. The name of its folder selects the action of `load`.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Speaker {
     label: String,
@@ -148,7 +148,7 @@ fn what_no_text_can_be_is_refused_and_changes_nothing() {
     }
 }
 
-/// A pointer that leads nowhere: it is not followed for a variable that is no text.
+/// An invalid pointer: it is not dereferenced for a variable that is not a text.
 fn without_a_text() -> Text {
     std::ptr::without_provenance(8)
 }
@@ -232,7 +232,7 @@ fn a_load_that_fails_gives_no_instance() {
     }
 }
 
-/// `fmu build` asks the library for its description with the folder at hand.
+/// `fmu build` requests the library's description with the folder available.
 #[test]
 fn a_load_that_changes_the_state_is_not_described() {
     extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {

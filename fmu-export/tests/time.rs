@@ -1,4 +1,4 @@
-//! Which steps continue a simulation.
+//! Steps that continue a simulation.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -104,7 +104,7 @@ fn the_last_step_may_be_cut_by_a_rounded_time() {
 
 #[test]
 fn a_time_may_be_off_by_its_rounding() {
-    // A hundredth of h is less than what a time of 1e6 s resolves.
+    // A hundredth of h is below the resolution of a time of 1e6 s.
     let (start, h) = (1e6, 1e-8);
     let fmu = Fmu::new(3);
     assert_eq!((fmu.enter(start, None), fmu.exit()), (OK, OK));

@@ -1,4 +1,4 @@
-//! Getting and setting: what may be set when, ranges, types, arrays, atomicity, and the words of the errors.
+//! Getting and setting: times at which values may be set, ranges, types, arrays, atomicity, and the texts of errors.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -41,7 +41,7 @@ fn messages_name_variable_value_and_range() {
     assert!(late.contains("motor.R is a fixed parameter") && late.contains("Step Mode"), "{late}");
 }
 
-/// Archives of FMI 2.0 have no variable for time: value reference 0 is any other that no variable has.
+/// Archives of FMI 2.0 have no variable for time: value reference 0 is as unknown as any other.
 #[test]
 fn time_is_a_variable_of_fmi3_alone() {
     let unknown = "value reference 0 does not exist; 1 to 15 do";
@@ -149,7 +149,7 @@ fn a_vector_is_set_whole_or_not_at_all() {
 fn a_long_vector_is_set_whole_or_not_at_all() {
     for version in [2, 3] {
         for length in 1..20_u32 {
-            // The second variable comes late: after what a short vector remembers.
+            // The second variable comes late, beyond the buffer of a short vector.
             let vr: Vec<u32> = (0..length).map(|i| if i < 9 { U } else { K }).collect();
             let good: Vec<f64> = (0..length).map(|i| 2.0 - 0.1 * f64::from(i)).collect();
             for bad in 0..length as usize {
@@ -212,7 +212,7 @@ fn initialization_can_be_iterated_in_any_order() {
         assert_eq!(fmu.get(X), 0.5);
         assert_eq!(fmu.set(&[R, U], &[4.0, 8.0]), OK);
         assert_eq!((fmu.get(X), fmu.get(DOUBLE_GAIN)), (2.0, 2.0));
-        // An input alone, after a get, is seen too.
+        // A single input, set after a get, has its effect too.
         assert_eq!((fmu.set(&[U], &[4.0]), fmu.get(X)), (OK, 1.0));
         assert_eq!((fmu.set(&[U], &[8.0]), fmu.get(X)), (OK, 2.0));
         assert_eq!(fmu.set(&[GAIN], &[3.0]), OK);

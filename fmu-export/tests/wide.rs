@@ -1,4 +1,4 @@
-//! Arrays of more elements than a table has places for, and other names of variables.
+//! Arrays of more elements than a table has indices, and other names of variables.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,

@@ -1,4 +1,4 @@
-//! Opens the archive of an FMU: reads its description and extracts what is needed to run it.
+//! Opens the archive of an FMU: reads its description and extracts the files needed to run it.
 
 use crate::error::Error;
 use crate::folder::Folder;
@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zip::ZipArchive;
 
-/// Where an archive is read from: a file, or memory.
+/// Source of an archive: a file, or memory.
 trait Source: Read + Seek + Send {}
 impl<T: Read + Seek + Send> Source for T {}
 type Zip = ZipArchive<Box<dyn Source>>;
@@ -28,18 +28,18 @@ pub(super) struct Archive {
     pub(super) description: Arc<ModelDescription>,
 }
 
-/// What was extracted from an archive.
+/// Files extracted from an archive.
 pub(super) struct Extracted {
     pub(super) folder: Folder,
-    /// Path of the binary for Co-Simulation, if there is that interface.
+    /// Path of the binary for Co-Simulation, if the FMU has that interface.
     pub(super) co_simulation: Option<PathBuf>,
-    /// Path of the binary for Model Exchange, if there is that interface.
+    /// Path of the binary for Model Exchange, if the FMU has that interface.
     pub(super) model_exchange: Option<Result<PathBuf, Error>>,
     /// Number of files.
     pub(super) files: usize,
 }
 
-/// The interfaces that an FMU has, in words.
+/// The names of an FMU's interfaces.
 pub(super) fn interfaces(description: &ModelDescription) -> String {
     let ModelDescription { co_simulation: cs, model_exchange: me, scheduled_execution: se, version, .. } = description;
     let standard = if *version == FmiVersion::V2 { "FMI 2.0" } else { "FMI 3.0" };
@@ -101,7 +101,7 @@ impl Archive {
             return Err(wrong(&format!("has neither Co-Simulation nor Model Exchange; it has {has}")));
         }
         let folder = Folder::new().map_err(|e| wrong(&e))?;
-        // The resources folder is named to the FMU, so it exists even when the archive has none.
+        // The FMU is given the path of the resources folder, so it is created even if the archive has none.
         fs::create_dir(folder.path().join("resources")).map_err(|e| wrong(&e))?;
         let found = co_simulation.iter().chain(model_exchange.iter().flatten());
         let mut prefixes: Vec<String> = found.map(|(folder, _)| format!("binaries/{folder}/")).collect();
@@ -130,7 +130,7 @@ impl Archive {
             let file = self.zip.by_index(index).map_err(|e| wrong(&e))?;
             file.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
             let platforms = machine::platforms(&head);
-            // The loader says what is wrong with a file that is not a library.
+            // The loader reports the fault of a file that is not a library.
             if platforms.is_empty() || platforms.contains(&host) {
                 return Ok((folder, name));
             }
@@ -141,7 +141,7 @@ impl Archive {
         Err(Error::file(&self.path, others.unwrap_or_else(|| self.missing_binary(folders[0], &name))))
     }
 
-    /// The names of its files, and what a library below `binaries/` begins with, which says what platform it is for.
+    /// The names of its files, and the head of each library below `binaries/`, from which its platform is read.
     pub(super) fn outline(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
         let mut files = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate().filter(|(_, name)| !name.ends_with('/')) {
@@ -175,7 +175,7 @@ impl Archive {
         Ok(files)
     }
 
-    /// Extracts what begins with one of the prefixes; returns the number of files.
+    /// Extracts the entries that begin with one of the prefixes; returns the number of files.
     fn extract_into(&mut self, dir: &Path, prefixes: &[String]) -> io::Result<usize> {
         let mut files = 0;
         for (index, name) in self.names.iter().enumerate() {
@@ -251,7 +251,7 @@ pub fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<Stri
     Ok(names)
 }
 
-/// Whether a name stays below the folder it is joined to, on every system.
+/// Whether a name stays below the folder to which it is joined, on every system.
 fn inside(name: &str) -> bool {
     !name.contains(['\\', ':', '\0']) && !name.starts_with('/') && name.split('/').all(|part| part != "..")
 }

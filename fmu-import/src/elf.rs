@@ -1,4 +1,4 @@
-//! Requirements of a Linux binary on the system that loads it, read from its ELF file.
+//! System requirements of a Linux binary, read from its ELF file.
 
 use object::read::elf::{Dyn, ElfFile64, FileHeader, SectionHeader};
 use std::fmt;
@@ -39,7 +39,7 @@ impl Needs {
         Ok(Self { glibc: newest_glibc(&file)?, others })
     }
 
-    /// Whether a system with the C library of [`FLOOR`] and nothing else loads it.
+    /// Whether a system with only the C library of [`FLOOR`] loads it.
     pub fn are_modest(&self) -> bool {
         self.others.is_empty() && self.glibc <= Some(FLOOR)
     }
@@ -118,8 +118,8 @@ pub fn newest_glibc(file: &ElfFile64<'_>) -> Result<Option<Glibc>, object::Error
     Ok(newest)
 }
 
-/// The version that a symbol's version names: GLIBC_2.2.5 is 2.2 here, GLIBC_PRIVATE is none, relative relocations came
-/// with 2.36.
+/// The C library version of a symbol's version: GLIBC_2.2.5 is 2.2 here, GLIBC_PRIVATE is none, relative relocations came with
+/// 2.36.
 fn version_of(name: &str) -> Option<Glibc> {
     let number = name.strip_prefix("GLIBC_")?;
     let mut parts = number.split('.').map(str::parse);

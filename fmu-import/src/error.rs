@@ -14,7 +14,7 @@ pub enum Error {
         /// What is wrong with it.
         cause: String,
     },
-    /// A name, a type or a value that the FMU does not have or does not take.
+    /// A name, a type or a value that the FMU does not have or accept.
     #[error("{instance}: {cause}")]
     Usage {
         /// Name of the instance.
@@ -37,17 +37,17 @@ pub enum Error {
 }
 
 impl Error {
-    /// A file that cannot be used; the cause becomes one line.
+    /// An unusable file; the cause becomes one line.
     pub fn file(path: &Path, cause: impl std::fmt::Display) -> Self {
         Self::File { path: path.into(), cause: one_line(&cause.to_string()) }
     }
 
-    /// What cannot be done with an instance; the cause becomes one line.
+    /// An impossible use of an instance; the cause becomes one line.
     pub fn usage(instance: &str, cause: impl std::fmt::Display) -> Self {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
     }
 
-    /// Adds to the error what was tried when it happened.
+    /// Adds the attempted action to the error.
     pub fn during(self, what: &str) -> Self {
         match self {
             Self::Call { instance, function, status, message } => {

@@ -25,17 +25,17 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
     Ok((Arc::unwrap_or_clone(archive.description), files))
 }
 
-/// What an `.fmu` file is, as far as few of its bytes say.
+/// Summary of an `.fmu` file, from a small part of its bytes.
 pub struct Outline {
     /// Its description.
     pub description: ModelDescription,
-    /// Terminals and icons, if there are any that can be read.
+    /// Terminals and icons, if they exist and can be read.
     pub terminals: Option<TerminalsAndIcons>,
-    /// The names of its files, and what those below `binaries/` begin with.
+    /// The names of its files, and the heads of those below `binaries/`.
     pub files: BTreeMap<String, Vec<u8>>,
 }
 
-/// Reads an `.fmu` file as far as needed to describe it: its memory does not grow with what the archive unpacks to.
+/// Reads an `.fmu` file as far as needed to describe it: its memory does not grow with the unpacked size of the archive.
 ///
 /// # Errors
 /// The file is missing, no archive, or has no readable description.
@@ -45,7 +45,7 @@ pub fn outline(path: &Path) -> Result<Outline, Error> {
     Ok(Outline { description: Arc::unwrap_or_clone(archive.description), terminals, files })
 }
 
-/// An archive in a folder of its own, for [`describe`](crate::describe).
+/// An archive unpacked to its folder, for [`describe`](crate::describe).
 pub struct Unpacked {
     folder: Folder,
     /// The library for this platform.
@@ -70,14 +70,14 @@ impl Unpacked {
     }
 }
 
-/// An FMU with its description and its loaded binary. Every opening loads a copy of the binary of its own; clones share it.
+/// An FMU with its description and its loaded binary. Every opening loads a separate copy of the binary; clones share it.
 #[derive(Clone)]
 pub struct Fmu {
     path: PathBuf,
     description: Arc<ModelDescription>,
     terminals: Arc<Result<Option<TerminalsAndIcons>, Error>>,
-    /// Each interface of the description with its binary. A binary that serves Model Exchange alone may fail to load if there
-    /// is Co-Simulation.
+    /// Each interface of the description with its binary. If there is Co-Simulation, a binary for Model Exchange only may fail
+    /// to load.
     co_simulation: Option<Functions>,
     model_exchange: Option<Result<Functions, Error>>,
     archive: Arc<Mutex<Archive>>,
@@ -103,8 +103,8 @@ impl Fmu {
         Self::load(&Arc::new(Mutex::new(Archive::from_bytes(path.as_ref(), bytes)?)))
     }
 
-    /// Opens the FMU again with another copy of its binary, from the archive that this one was opened from, whatever its path
-    /// leads to by now. After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
+    /// Opens the FMU again with another copy of its binary, from the same archive, even if its path now leads to another file.
+    /// After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
     ///
     /// # Errors
     /// The archive cannot be read or unpacked.
@@ -119,7 +119,7 @@ impl Fmu {
         let (terminals, description) = (Arc::new(archive.terminals()), archive.description.clone());
         let (path, resources) = (archive.path.clone(), folder.path().join("resources"));
         journal::note(journal::name(&path.to_string_lossy()), Call::Load);
-        // A binary that is loaded needs its file no more, except on Windows: then a kill leaves nothing behind.
+        // A loaded binary no longer needs its file, except on Windows, so a kill leaves nothing behind.
         let kept = (cfg!(windows) || files > 1).then(|| folder.clone());
         let load = |binary: &Path, kind| {
             Functions::load(binary, description.version, kind, kept.clone()).map_err(|e| Error::file(&path, e.cause()))
@@ -153,7 +153,7 @@ impl Fmu {
     /// The contents of terminalsAndIcons.xml, if there is one.
     ///
     /// # Errors
-    /// The file cannot be read; the FMU runs all the same.
+    /// The file cannot be read; the FMU still runs.
     pub fn terminals(&self) -> Result<Option<&TerminalsAndIcons>, Error> {
         (*self.terminals).as_ref().map(Option::as_ref).map_err(Clone::clone)
     }
@@ -179,7 +179,7 @@ impl Fmu {
         self.instantiate_with(kind, name, logging, false)
     }
 
-    /// Creates an instance of this kind; `visible` lets an FMU with a window of its own show it.
+    /// Creates an instance of this kind; `visible` lets an FMU that has a window show it.
     ///
     /// # Errors
     /// As [`instantiate_as`](Self::instantiate_as).
@@ -190,7 +190,7 @@ impl Fmu {
         let log = Log::new();
         let resources = match self.description.version {
             FmiVersion::V2 => file_uri(&self.resources),
-            // FMI 3.0 wants a path of this system with a separator at its end (FMI 3.0.2, 2.3.1).
+            // FMI 3.0 requires a native path with a separator at its end (FMI 3.0.2, 2.3.1).
             FmiVersion::V3 => format!("{}{}", self.resources.display(), std::path::MAIN_SEPARATOR),
         };
         let resources = text(name, &resources)?;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process;
 
 const PREFIX: &str = "fmu-";
-/// Locked as long as a process uses the folder. The system unlocks it when the process ends, however it ends, so no process has
-/// to guess from the number in the name whether that process lives, perhaps in another container or on another machine.
+/// Locked as long as a process uses the folder. The system unlocks it whenever the process ends, so no process has to guess
+/// from the number in the name whether its owner is alive, perhaps in another container or on another machine.
 const LOCK: &str = ".lock";
 
 /// A folder `fmu-PID-XXXXXX` for temporary files. Dropping it removes it.
@@ -18,10 +18,10 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Makes a folder, and removes those that killed processes have left.
+    /// Creates a folder, and removes those left by killed processes.
     ///
     /// # Errors
-    /// The system makes none.
+    /// The system cannot create it.
     pub fn new() -> io::Result<Self> {
         remove_abandoned();
         let owner = process::id();
@@ -51,7 +51,7 @@ impl Folder {
 
 impl Drop for Folder {
     fn drop(&mut self) {
-        // A forked process has a copy of this and not the right to remove what its parent still uses.
+        // A forked process has a copy of this but must not remove a folder that its parent still uses.
         if self.owner == process::id() {
             self.lock = None;
             remove(&self.path);
@@ -59,7 +59,7 @@ impl Drop for Folder {
     }
 }
 
-/// Removes a folder as far as possible, its lock last: whatever a kill leaves has a lock or is empty.
+/// Removes a folder as far as possible, its lock last: after a kill, it has a lock or is empty.
 fn remove(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten().filter(|entry| entry.file_name() != LOCK) {
         let path = entry.path();
@@ -89,7 +89,7 @@ fn remove_abandoned() {
     }
 }
 
-/// Whether it is the name of such a folder: others may begin alike, as those of the checker's probes do.
+/// Whether it is the name of such a folder; others, such as those of the checker's probes, may begin alike.
 fn is_ours(name: &str) -> bool {
     let owner = name.strip_prefix(PREFIX).and_then(|rest| rest.split_once('-'));
     owner.is_some_and(|(owner, _)| owner.parse::<u32>().is_ok())
@@ -99,17 +99,17 @@ fn is_ours(name: &str) -> bool {
 mod tests {
     use super::*;
 
-    // Another process that opens an FMU meanwhile removes what is abandoned, too.
+    // Another process that opens an FMU in the meantime also removes abandoned folders.
     #[test]
     fn only_unused_folders_are_removed() {
         let used = Folder::new().unwrap();
         let mut abandoned = Folder::new().unwrap();
         let path = abandoned.path().to_owned();
-        // What a kill does: the lock is gone, the folder is not.
+        // The effect of a kill: the lock is gone, the folder remains.
         abandoned.lock = None;
         abandoned.owner = 0;
         drop(abandoned);
-        // A process that is killed before it has made the lock, and folders that are none of these.
+        // A process that is killed before it has created the lock, and unrelated folders.
         let temporary = |prefix| tempfile::Builder::new().prefix(prefix).tempdir().unwrap();
         let (empty, full, of_probe) = (temporary("fmu-0-"), temporary("fmu-0-"), temporary("fmu-probe-"));
         fs::write(full.path().join("x"), "").unwrap();

@@ -1,10 +1,10 @@
-//! Guards the process that runs FMUs of unknown origin, so that nothing they do reaches the process that asked for it.
+//! Guards the process that runs FMUs of unknown origin, so that they cannot affect the calling process.
 //!
 //! The caller starts a guard, which is the same program again ([`command`], [`serve`]), and the guard starts the process that
-//! loads the FMUs. On Unix the guard leads a session of its own, its child a process group of its own: a signal that an FMU
-//! sends to its group ends nobody else. On Linux the guard adopts whatever the child leaves behind, counts it, and ends it.
-//! Guard and caller share a socket: when the caller ends, however it ends, the guard ends everything and removes the folder for
-//! temporary files. Other systems end the child alone.
+//! loads the FMUs. On Unix the guard leads a new session and its child a new process group, so a signal that an FMU sends to
+//! its group ends no other process. On Linux the guard adopts processes that the child leaves behind, counts them, and ends
+//! them. Guard and caller share a socket: when the caller ends for any reason, the guard ends all processes and removes the
+//! folder for temporary files. Other systems end the child only.
 
 use crate::folder::Folder;
 use crate::limits;
@@ -16,22 +16,22 @@ use std::time::{Duration, Instant};
 
 /// First argument of a guard.
 const GUARD: &str = "@guard";
-/// How often a caller looks at its clock.
+/// Interval at which a caller checks the time.
 const LOOK: Duration = Duration::from_millis(5);
-/// Time that a busy system may take until it has room for one more process or thread.
+/// Time to wait until a busy system can start another process or thread.
 const PRESSURE: Duration = Duration::from_secs(10);
 /// Time for a guard to end its child.
 #[cfg(unix)]
 const GRACE: Duration = Duration::from_secs(5);
 
-/// What a guarded process may use.
+/// Limits of a guarded process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Allowance {
-    /// Address space in bytes; 0 for no limit. It holds on Unix.
+    /// Address space in bytes; 0 for no limit. Unix only.
     pub memory: u64,
-    /// Largest file in bytes that it may write; 0 for no limit. It holds on Unix.
+    /// Largest file in bytes that it may write; 0 for no limit. Unix only.
     pub file: u64,
-    /// Without network: on Linux, where the kernel lets this user have a namespace of its own.
+    /// Without network: on Linux, if the kernel allows this user a namespace.
     pub sandbox: bool,
 }
 
@@ -49,25 +49,25 @@ pub struct Guarded {
     folder: Folder,
 }
 
-/// How a guarded process ended.
+/// The end of a guarded process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
     /// By itself, or by a signal.
     Ended(ExitStatus),
-    /// Its time was over.
+    /// Its time was up.
     Stopped,
-    /// The guard itself was ended, by whatever ran in its child.
+    /// The guard itself was ended by code in its child.
     Lost,
     /// The guard could not start it, for this reason.
     Refused(String),
 }
 
-/// What the guard found.
+/// Findings of the guard.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Report {
-    /// How the process ended.
+    /// The end of the process.
     pub end: End,
-    /// Processes that it had left behind, with number and name; they are ended.
+    /// Processes that it left behind, with number and name; the guard has ended them.
     pub left: Vec<String>,
 }
 
@@ -82,7 +82,8 @@ pub fn command(program: &Path, allowance: Allowance) -> Command {
 }
 
 impl Guarded {
-    /// Starts what [`command`] made. Standard input is the guard's; temporary files go to a folder that is removed at the end.
+    /// Starts a command from [`command`]. Standard input is the guard's; temporary files go to a folder that is removed at the
+    /// end.
     ///
     /// # Errors
     /// The process cannot be started.
@@ -109,8 +110,8 @@ impl Guarded {
         self.folder.path()
     }
 
-    /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process as soon as
-    /// the guard has started it.
+    /// Waits until the process has ended, or `over` reports that its time is up. `over` gets the number of the process as soon
+    /// as the guard has started it.
     ///
     /// # Errors
     /// The system does not report the end of the process.
@@ -118,15 +119,15 @@ impl Guarded {
     pub fn wait(&mut self, mut over: impl FnMut(Option<u32>) -> bool) -> io::Result<Report> {
         use std::io::Read;
         let mut stopped = None;
-        let mut told = Vec::new();
+        let mut received = Vec::new();
         self.channel.set_read_timeout(Some(LOOK))?;
         let mut bytes = [0; 4096];
         loop {
             match self.channel.read(&mut bytes) {
                 Ok(0) => break,
-                Ok(n) => told.extend_from_slice(&bytes[..n]),
+                Ok(n) => received.extend_from_slice(&bytes[..n]),
                 Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => match stopped {
-                    None if over(unix::read_id(&told)) => {
+                    None if over(unix::read_id(&received)) => {
                         stopped = Some(Instant::now());
                         self.channel.shutdown(std::net::Shutdown::Write)?;
                     }
@@ -139,7 +140,7 @@ impl Guarded {
             }
         }
         let id = self.child.id();
-        let report = unix::read_report(&String::from_utf8_lossy(&told));
+        let report = unix::read_report(&String::from_utf8_lossy(&received));
         if report.is_none() {
             unix::end_session(id);
             let _ = self.child.kill();
@@ -149,7 +150,7 @@ impl Guarded {
         Ok(Report { end: if stopped.is_some() { End::Stopped } else { end }, left })
     }
 
-    /// Waits until the process has ended, or `over` says that its time is over. `over` gets the number of the process.
+    /// Waits until the process has ended, or `over` reports that its time is up. `over` gets the number of the process.
     ///
     /// # Errors
     /// The system does not report the end of the process.
@@ -170,7 +171,7 @@ impl Guarded {
 }
 
 impl End {
-    /// What happened, in words that follow the name of a call: `ended the process by SIGSEGV (invalid memory access)`.
+    /// Description of the end, to follow the name of a call: `ended the process by SIGSEGV (invalid memory access)`.
     pub fn describe(&self) -> String {
         match self {
             Self::Ended(status) => how(*status),
@@ -193,9 +194,9 @@ pub fn how(status: ExitStatus) -> String {
         .map_or_else(|| "ended the process".into(), |code| format!("ended the process with exit status {code}"))
 }
 
-/// Name of a signal, and what it mostly means: `SIGSEGV` and ` (invalid memory access)`.
+/// Name of a signal, and its usual meaning: `SIGSEGV` and ` (invalid memory access)`.
 pub fn signal_name(signal: i32) -> (String, &'static str) {
-    // The one number of these that systems disagree on.
+    // The only number of these that differs between systems.
     let bus = if cfg!(target_os = "macos") { 10 } else { 7 };
     let (name, meaning) = match signal {
         4 => ("SIGILL", " (illegal instruction)"),
@@ -214,10 +215,10 @@ pub fn signal_name(signal: i32) -> (String, &'static str) {
     (name.into(), meaning)
 }
 
-/// Starts a process or a thread. A busy system may have no room for one, and have it a moment later.
+/// Starts a process or a thread. A busy system may be unable to start one at first, and able a moment later.
 ///
 /// # Errors
-/// It cannot be started, or there is no room for ten seconds.
+/// It cannot be started within ten seconds.
 pub fn patiently<T>(mut start: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     let begun = Instant::now();
     loop {
@@ -229,7 +230,8 @@ pub fn patiently<T>(mut start: impl FnMut() -> io::Result<T>) -> io::Result<T> {
     }
 }
 
-/// What the process of this command sends to its process group reaches no other; it calls [`end_with_parent`] itself. On Linux.
+/// Signals that the process of this command sends to its process group reach no other process; it calls [`end_with_parent`]
+/// itself. Linux only.
 pub fn own_group(command: &mut Command) {
     #[cfg(target_os = "linux")]
     std::os::unix::process::CommandExt::process_group(command, 0);
@@ -243,7 +245,7 @@ pub fn end_with_parent() {
     let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
 }
 
-/// The processes that this one has started and not waited for, with number and name; none but on Linux.
+/// The processes that this one has started and not waited for, with number and name; empty except on Linux.
 pub fn children() -> Vec<String> {
     #[cfg(unix)]
     return unix::children();
@@ -251,12 +253,13 @@ pub fn children() -> Vec<String> {
     return Vec::new();
 }
 
-/// What the three standard streams of this process lead to: device and number of the file; nothing on systems that do not tell.
+/// Targets of the three standard streams of this process: device and number of the file; empty on systems without this
+/// information.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Streams([Option<(u64, u64)>; 3]);
 
 impl Streams {
-    /// What they lead to now.
+    /// Their targets now.
     pub fn now() -> Self {
         #[cfg(unix)]
         {
@@ -268,7 +271,7 @@ impl Streams {
         Self([None; 3])
     }
 
-    /// The streams that lead elsewhere now, or nowhere.
+    /// The streams whose targets have changed or are closed.
     pub fn lost(&self) -> Vec<&'static str> {
         let names = ["standard input", "standard output", "standard error"];
         let pairs = self.0.iter().zip(Self::now().0);
@@ -305,14 +308,14 @@ mod unix {
     use std::sync::{Mutex, PoisonError};
     use std::time::{Duration, Instant};
 
-    /// How the line with the number of the child begins: the first that the guard writes, before its report.
+    /// Prefix of the line with the number of the child, which the guard writes first, before its report.
     const STARTED: &str = "started ";
-    /// Time that helpers of a process that ended by itself may take to end as well.
+    /// Time that helpers of a process may take to end after it.
     const FAREWELL: Duration = Duration::from_millis(100);
 
     /// Arguments: memory, file, sandbox or open, then those of the child, which runs the same program.
     pub(super) fn serve(arguments: &[OsString]) -> ExitCode {
-        // The caller's end of the socket is all that this process talks to.
+        // This process communicates only over the caller's socket.
         let Ok(channel) = io::stdin().as_fd().try_clone_to_owned().map(UnixStream::from) else {
             return ExitCode::from(2);
         };
@@ -323,7 +326,7 @@ mod unix {
         if getppid() != caller
             && let Some(folder) = std::env::var_os("TMPDIR")
         {
-            // Nobody else is there to remove it.
+            // No other process will remove it.
             let _ = fs::remove_dir_all(folder);
         }
         ExitCode::SUCCESS
@@ -334,7 +337,7 @@ mod unix {
         let number =
             |index: usize| text(index).parse().map_err(|_| format!("argument {index} of {GUARD} is not a number"));
         let allowance = Allowance { memory: number(0)?, file: number(1)?, sandbox: text(2) == "sandbox" };
-        // Fails only for a process that leads its group already, which then has a group of its own.
+        // Fails only for a process that already leads its group.
         let _ = setsid();
         limit(allowance);
         if allowance.sandbox {
@@ -357,7 +360,7 @@ mod unix {
             }
         };
         let watch = || {
-            // The caller says nothing: its end closes when it ends, or when it no longer wants the result.
+            // The caller sends nothing: its end closes when it ends, or when it no longer needs the result.
             let _ = (&*channel).read(&mut [0]);
             end();
         };
@@ -435,11 +438,11 @@ mod unix {
 
     pub(super) fn children() -> Vec<String> {
         let me = rustix::process::getpid().as_raw_pid();
-        let told = |p: Process| {
+        let named = |p: Process| {
             let state = if p.alive { "" } else { ", which has ended and is not waited for" };
             format!("{} ({}){state}", p.id.as_raw_pid(), p.name)
         };
-        processes().filter(|p| p.parent == me).map(told).collect()
+        processes().filter(|p| p.parent == me).map(named).collect()
     }
 
     /// Ends all processes of a session.
@@ -458,11 +461,11 @@ mod unix {
         session: i32,
     }
 
-    /// All processes that can be seen; none but on Linux.
+    /// All visible processes; empty except on Linux.
     fn processes() -> impl Iterator<Item = Process> {
         fs::read_dir("/proc").into_iter().flatten().flatten().filter_map(|entry| {
             let id = entry.file_name().to_str()?.parse().ok().and_then(Pid::from_raw)?;
-            // `11206 (a name) S 11205 11206 11206 ...`, where the name may have anything in it.
+            // `11206 (a name) S 11205 11206 11206 ...`, where the name may contain any characters.
             let bytes = fs::read(entry.path().join("stat")).ok()?;
             let stat = String::from_utf8_lossy(&bytes);
             let (name, rest) = (stat.find('(')?, stat.rfind(')')?);
@@ -479,8 +482,8 @@ mod unix {
         })
     }
 
-    pub(super) fn read_id(told: &[u8]) -> Option<u32> {
-        let line = std::str::from_utf8(told).ok()?.strip_prefix(STARTED)?.split_once('\n')?.0;
+    pub(super) fn read_id(received: &[u8]) -> Option<u32> {
+        let line = std::str::from_utf8(received).ok()?.strip_prefix(STARTED)?.split_once('\n')?.0;
         line.parse().ok()
     }
 

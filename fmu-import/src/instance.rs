@@ -31,9 +31,9 @@ pub struct Instance {
     kind: Kind,
     states: Vec<Option<Pointer>>,
     dead: bool,
-    /// The clocks of an FMU that has some, unless events are not used.
+    /// The clocks of the FMU, if it has any and events are used.
     clocks: Option<Box<Clocks>>,
-    /// Structural parameters that do not have their start values, by value reference.
+    /// Structural parameters that differ from their start values, by value reference.
     sizes: BTreeMap<u32, usize>,
     // After the instance, which may log while it is freed.
     log: Arc<Log>,
@@ -59,7 +59,7 @@ impl Instance {
         &self.name
     }
 
-    /// What the instance was made for.
+    /// The interface of the instance.
     pub fn kind(&self) -> Kind {
         self.kind
     }
@@ -69,7 +69,7 @@ impl Instance {
         &self.description
     }
 
-    /// The messages since the last time.
+    /// The messages since the previous call.
     pub fn take_messages(&self) -> Vec<Message> {
         self.log.take()
     }
@@ -92,7 +92,7 @@ impl Instance {
         self.get_at(base, reference, count)
     }
 
-    /// Writes a variable; a structural parameter in a Configuration Mode of its own, as [`configure`](Self::configure).
+    /// Writes a variable; a structural parameter in a separate Configuration Mode, as [`configure`](Self::configure).
     ///
     /// # Errors
     /// The variable does not exist, the values do not fit, or the FMU refuses.
@@ -221,7 +221,7 @@ impl Instance {
         self.tick()
     }
 
-    /// Steps from `t` to `t + h`; breaks when the FMU asks to end the simulation.
+    /// Steps from `t` to `t + h`; breaks when the FMU requests the end of the simulation.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -231,7 +231,7 @@ impl Instance {
         Ok(if stepped.terminate { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
     }
 
-    /// Time (s) that the last step reached; it differs from its end when the FMU asked to end the simulation.
+    /// Time (s) that the last step reached; it differs from its end if the FMU requested the end of the simulation.
     ///
     /// # Errors
     /// The FMU refuses, or does not report it.
@@ -338,7 +338,7 @@ impl Instance {
         self.dead = true;
     }
 
-    /// The one way to the FMU.
+    /// All calls to the FMU pass here.
     #[inline]
     fn call<T>(&mut self, what: Call, call: impl FnOnce(&mut Live) -> Outcome<T>) -> Result<T, Error> {
         if self.dead {
@@ -366,7 +366,7 @@ impl Drop for Instance {
     fn drop(&mut self) {
         journal::note(self.id, Call::Free);
         for state in std::mem::take(&mut self.states).into_iter().flatten() {
-            // Nobody is left to hear of a refusal.
+            // A refusal can no longer be reported.
             let _ = self.call(Call::Free, |s| s.free_state(state));
         }
     }

@@ -4,12 +4,12 @@
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
 //! - [`quantity`]: numbers with units, as a user writes them; [`threads`]: work for several threads.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
-//! - [`guard`]: processes of their own for FMUs of unknown origin; [`limits`]: what they and a file may ask for.
+//! - [`guard`]: separate processes for FMUs of unknown origin; [`limits`]: limits of these processes and of files.
 //!
 //! Several FMUs together are the subject of the crate `fmu-system`.
 //!
-//! `abi` is the only module with `unsafe` code: every pointer that goes to an FMU points to memory of the size that the standard
-//! asks for. What no importer can check is the FMU itself: its code runs in this process with all of its rights.
+//! `abi` is the only module with `unsafe` code: every pointer passed to an FMU points to memory of the size that the standard
+//! requires. No importer can check the FMU itself: its code runs in this process with all of its rights.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {

@@ -1,7 +1,7 @@
-//! Every limit on what a file may ask for and on what a process that runs an FMU may use: one message each.
+//! Every limit on files and on processes that run FMUs, each with a message.
 //!
-//! They hold for all commands, and keep the static checks of a file below 512 MB and 20 s. Those on a description stand beside its
-//! reader.
+//! They apply to all commands, and keep the static checks of a file below 512 MB and 20 s. The limits of descriptions are
+//! beside their reader.
 
 use model_description::limits;
 pub use model_description::limits::{DEPENDENCIES, LEVELS, Limit, NODES, VALUES, VARIABLES, XML};
@@ -24,11 +24,11 @@ pub const STEPS: Limit = Limit::new("Communication points of a simulation", "tak
 pub const STATIC_SECONDS: u64 = 12;
 /// Address space of a process that runs FMUs, in bytes.
 pub const PROCESS_MEMORY: u64 = 4 << 30;
-/// Open files of a process that runs FMUs.
+/// Maximum number of open files of a process that runs FMUs.
 pub const PROCESS_FILES: u64 = 1024;
-/// Threads that a process that runs FMUs may add to those of the system.
+/// Maximum number of threads that a process that runs FMUs may add to those of the system.
 pub const PROCESS_THREADS: u64 = 1024;
-/// A file that a probe of the checker writes, in bytes.
+/// Maximum size of a file that a probe of the checker writes, in bytes.
 pub const PROBE_FILE: u64 = 1 << 30;
 
 /// The limits as a Markdown table.

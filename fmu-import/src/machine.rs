@@ -1,4 +1,4 @@
-//! For which platforms a shared library is, from its headers, and universal libraries of macOS, which hold several.
+//! The platforms of a shared library, from its headers, and universal libraries of macOS, which contain several images.
 //!
 //! Formats: ELF-64, `e_machine`; Mach-O, `mach/machine.h` and `mach-o/fat.h` (all numbers of a universal header are
 //! big-endian); PE/COFF, `Machine`.
@@ -16,13 +16,13 @@ const UNIVERSAL: u32 = 0xcafe_babe;
 /// Size in bytes of a universal file's header, and of an entry of its table.
 const HEADER: usize = 8;
 const ENTRY: usize = 20;
-/// Most images of a universal file; a Java class has the same magic and a greater number in this place.
+/// Maximum number of images in a universal file; a Java class has the same magic and a greater number in this field.
 const MOST: u32 = 18;
-/// `cputype` with the alignment of an image as a power of 2: the size of a page on that processor, as lipo takes it.
+/// `cputype` with the alignment of an image as a power of 2: the page size of that processor, as in lipo.
 const PROCESSORS: [(u32, Platform, u32); 2] =
     [(0x0100_0007, Platform::X64Darwin, 12), (0x0100_000c, Platform::ArmDarwin, 14)];
 
-/// The platforms that a library is for; empty if this is not a library of a known platform. Its first [`HEAD`] bytes are enough.
+/// The platforms of a library; empty if it is not a library of a known platform. Its first [`HEAD`] bytes are enough.
 pub fn platforms(library: &[u8]) -> Vec<Platform> {
     if let Some(images) = table(library) {
         return images.iter().filter_map(|(cpu, _)| darwin(*cpu)).collect();
@@ -58,7 +58,7 @@ pub fn images(library: &[u8]) -> Result<Vec<&[u8]>, String> {
     images.into_iter().map(|(_, range)| library.get(range.clone()).ok_or_else(|| outside(&range))).collect()
 }
 
-/// A universal library with these images, which dyld and dlopen of macOS choose from.
+/// A universal library with these images, among which dyld and dlopen of macOS choose.
 ///
 /// # Errors
 /// An image is not for macOS, two are for one processor, or all together exceed 4 GiB.
@@ -94,7 +94,7 @@ pub fn universal(images: &[&[u8]]) -> Result<Vec<u8>, String> {
     Ok(header)
 }
 
-/// `cputype` and place of each image of a universal library.
+/// `cputype` and range of each image of a universal library.
 fn table(library: &[u8]) -> Option<Vec<(u32, Range<usize>)>> {
     let number = |at: usize| Some(u32::from_be_bytes(library.get(at..at.checked_add(4)?)?.try_into().ok()?));
     let count = number(4).filter(|count| number(0) == Some(UNIVERSAL) && (1..=MOST).contains(count))?;
@@ -124,7 +124,7 @@ mod tests {
     use object::read::macho::{FatArch, MachOFatFile32};
     use object::{Architecture, FileKind};
 
-    /// A Mach-O header with nothing behind it but a name.
+    /// A Mach-O header followed by only a name.
     fn image(cpu: u32, subtype: u32, name: &str) -> Vec<u8> {
         let words = [MACH_O, cpu, subtype, 6, 0, 0, 0, 0];
         words.iter().flat_map(|word| word.to_le_bytes()).chain(name.bytes()).collect()
@@ -168,7 +168,7 @@ mod tests {
         (pe[0], pe[1], pe[0x3c]) = (b'M', b'Z', 64);
         pe[64..70].copy_from_slice(b"PE\0\0\x64\xaa");
         assert_eq!(platforms(&pe), [Platform::ArmWindows]);
-        // What is none: text, a 32-bit library, a Java class, what is cut short.
+        // Not libraries: text, a 32-bit library, a Java class, a truncated file.
         for bytes in [&b"text"[..], &elf(1, 3), b"\xca\xfe\xba\xbe\0\0\0\x41", b"MZ", b"", &[0xcf, 0xfa, 0xed, 0xfe]] {
             assert!(platforms(bytes).is_empty(), "{bytes:?}");
         }

@@ -5,7 +5,7 @@ use std::env::consts;
 use std::fmt;
 use std::str::FromStr;
 
-/// An operating system and a processor that FMUs have binaries for.
+/// An operating system and a processor for which FMUs have binaries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Platform {
     /// Linux on x86_64.
@@ -66,8 +66,8 @@ impl Platform {
         }
     }
 
-    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5, 2.3 names three of 64 bits, which say
-    /// nothing of the processor, and lets others take the tuples of FMI 3.0. Many importers know those three only, on ARM too.
+    /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5, 2.3 names three of 64 bits, which do not
+    /// depend on the processor, and lets others use the tuples of FMI 3.0. Many importers know only those three, even on ARM.
     pub fn folders(self, version: FmiVersion) -> Vec<&'static str> {
         match (version, self) {
             (FmiVersion::V2, Self::X64Linux) => vec!["linux64", self.tuple()],

@@ -1,8 +1,8 @@
-//! What a user writes for a variable: numbers with or without a unit, names with or without a mistake.
+//! User input for a variable: numbers with or without a unit, names with or without a typing error.
 
-use model_description::{ModelDescription, ModelVariable};
+use model_description::{Measured, ModelDescription, ModelVariable, Passage};
 
-/// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a number alone.
+/// Splits `1000 rpm` or `1000rpm` into the number and the unit, which is empty for a plain number.
 pub fn split(text: &str) -> Option<(f64, &str)> {
     let text = text.trim();
     if let Ok(number) = text.parse() {
@@ -12,8 +12,8 @@ pub fn split(text: &str) -> Option<(f64, &str)> {
     (1..=digits).rev().find_map(|end| Some((text.get(..end)?.parse().ok()?, text.get(end..)?.trim())))
 }
 
-/// The number in the unit of the variable, from one in `unit`: that of the variable or one of its display units; none is that
-/// of the variable.
+/// Converts a number from `unit` to the unit of the variable; `unit` is that of the variable (also if empty), one of its display
+/// units, or another unit of the FMU for the same quantity.
 ///
 /// # Errors
 /// Names the units that the variable has.
@@ -30,6 +30,13 @@ pub fn convert(
     if let Some(shown) = description.display_unit(variable, Some(unit)) {
         return Ok(shown.unshow(number));
     }
+    let defined = description.unit(unit).and_then(|defined| defined.base);
+    let given = Measured { unit: Some(unit), base: defined, relative: variable.relative };
+    match given.into_unit(description.measured(variable)) {
+        Ok(Passage::Equal) if defined.is_some() => return Ok(number),
+        Ok(Passage::Converted(conversion)) => return Ok(conversion.apply(number)),
+        _ => {}
+    }
     let definition = own.and_then(|own| description.unit(own));
     let of = format!("{} = {number}{unit}", variable.name);
     if unit.starts_with(',') {
@@ -42,7 +49,7 @@ pub fn convert(
     }
 }
 
-/// `; did you mean a or b?` with the names that resemble what was written, or nothing.
+/// `; did you mean a or b?` with the names that resemble the input, or nothing.
 pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
     let whole = written.to_lowercase();
     let (parent, last) = split_last(&whole);
@@ -67,7 +74,7 @@ pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> Strin
     if names.is_empty() { String::new() } else { format!("; did you mean {}?", names.join(" or ")) }
 }
 
-/// What is before the last dot, if there is one, and what follows it.
+/// The parts before the last dot, if there is one, and after it.
 fn split_last(name: &str) -> (Option<&str>, &str) {
     name.rsplit_once('.').map_or((None, name), |(parent, last)| (Some(parent), last))
 }

@@ -1,4 +1,4 @@
-//! What calls take and how they end, in the words of the facade.
+//! Arguments and results of calls, in the terms of the facade.
 
 use crate::abi::log::Status;
 use crate::error::Error;
@@ -7,7 +7,7 @@ use model_description::BaseType;
 
 /// A call that did not succeed.
 pub(super) enum Refusal {
-    /// The FMU returned something else than OK or a warning.
+    /// The FMU returned neither OK nor a warning.
     Status(&'static str, Status),
     /// The FMU returned no instance.
     Null(&'static str),
@@ -18,7 +18,7 @@ pub(super) enum Refusal {
 /// Result of a call.
 pub(super) type Outcome<T = ()> = Result<T, Refusal>;
 
-/// Judges a status: a warning is a success.
+/// Converts a status: a warning is a success.
 #[inline]
 pub(super) fn judge(function: &'static str, status: Status) -> Outcome {
     if status.is_ok() { Ok(()) } else { Err(Refusal::Status(function, status)) }
@@ -32,7 +32,7 @@ pub(super) struct Experiment {
     pub(super) tolerance: Option<f64>,
 }
 
-/// What an instance is made for.
+/// The interface of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Steps, which the FMU computes.
@@ -53,7 +53,7 @@ impl Default for Kind {
     }
 }
 
-/// Which partial derivatives: value references and the seed.
+/// Selection of partial derivatives: value references and the seed.
 #[derive(Clone, Copy)]
 pub(super) struct Directions<'a> {
     pub(super) unknowns: &'a [u32],
@@ -64,7 +64,7 @@ pub(super) struct Directions<'a> {
 /// What `DoStep` returned.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stepped {
-    /// The FMU asks to end the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
     /// The FMU is to enter event mode before the next step (FMI 3.0 only).
     pub event: bool,
@@ -74,32 +74,32 @@ pub struct Stepped {
     pub last: f64,
 }
 
-/// What an update of the discrete states returned.
+/// Result of an update of the discrete states.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "the results of the standards")]
 pub struct Update {
     /// The FMU needs another update.
     pub again: bool,
-    /// The FMU asks to end the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
     /// Nominal values of states have changed.
     pub nominals_changed: bool,
     /// States have jumped.
     pub states_changed: bool,
-    /// Time (s) of the next time event, if one is known. Every update tells it anew.
+    /// Time (s) of the next time event, if one is known. Every update determines it anew.
     pub next_event_time: Option<f64>,
 }
 
-/// What the end of an integrator step returned.
+/// Result of a completed integrator step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CompletedStep {
     /// There is a step event.
     pub enter_event_mode: bool,
-    /// The FMU asks to end the simulation.
+    /// The FMU requests the end of the simulation.
     pub terminate: bool,
 }
 
-/// Refuses arrays that do not have one element each.
+/// Refuses arrays of different lengths.
 pub(super) fn same_length(what: &str, lengths: &[usize]) -> Outcome {
     if lengths.windows(2).all(|pair| pair[0] == pair[1]) {
         return Ok(());
@@ -108,7 +108,7 @@ pub(super) fn same_length(what: &str, lengths: &[usize]) -> Outcome {
     Err(Refusal::Impossible(format!("{what} must have as many elements, and have {found}")))
 }
 
-/// A value that does not fit the type that crosses the interface.
+/// A value that does not fit the type of the interface.
 pub(super) fn misfit(base: BaseType, values: &Values) -> Refusal {
     Refusal::Impossible(format!("{values} is not a value of the type {base}"))
 }

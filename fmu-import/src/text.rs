@@ -1,10 +1,10 @@
-//! Text of others, for a terminal, and paths as URIs, for others.
+//! Foreign text for a terminal, and paths as URIs.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 use std::path::Path;
 
-/// The text with its control characters escaped, `\u{1b}` for ESC: what an FMU says must not command a terminal.
+/// The text with its control characters escaped, `\u{1b}` for ESC: text of an FMU must not control a terminal.
 pub fn printable(text: &str) -> Cow<'_, str> {
     if !text.contains(commands) {
         return Cow::Borrowed(text);
@@ -28,7 +28,7 @@ pub fn printable_lines(text: &str) -> Cow<'_, str> {
     Cow::Borrowed(text)
 }
 
-/// Control characters, and those that turn the direction of what follows (Unicode, 9.0, UAX 9).
+/// Control characters, and those that change the text direction (Unicode, 9.0, UAX 9).
 fn commands(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

@@ -1,4 +1,4 @@
-//! The calls of one thread as lines, `fmi3DoStep -> OK`, for a user who asks what happens.
+//! The calls of one thread as lines, `fmi3DoStep -> OK`, for a user who wants to follow a run.
 
 use std::cell::{Cell, RefCell};
 
@@ -7,7 +7,7 @@ thread_local! {
     static LINES: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Does the work; returns its result and a line for each call to an FMU of this thread meanwhile.
+/// Does the work; returns its result and a line for each FMU call that this thread makes meanwhile.
 pub fn traced<T>(work: impl FnOnce() -> T) -> (T, Vec<String>) {
     /// Ends the trace, also when the work panics.
     struct Off;
@@ -24,7 +24,7 @@ pub fn traced<T>(work: impl FnOnce() -> T) -> (T, Vec<String>) {
     (result, LINES.take())
 }
 
-/// Notes a call and how it ended.
+/// Records a call and its result.
 #[inline]
 pub(crate) fn note(function: &str, ended: impl FnOnce() -> String) {
     if ON.get() {

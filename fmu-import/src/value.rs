@@ -1,11 +1,11 @@
-//! Values that cross the interface, whatever the standard calls their type.
+//! Values that cross the interface, independent of the names of types in the standards.
 
 use crate::quantity;
 use fmu_core::{Bytes, IntegerType};
 use model_description::{BaseType, ModelDescription, ModelVariable};
 use std::fmt;
 
-/// The elements of a variable: one of a scalar, all in row-major order of an array.
+/// The elements of a variable: one for a scalar, all in row-major order for an array.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Values {
     /// Values of `Real`, `Float32`, `Float64`.
@@ -21,10 +21,10 @@ pub enum Values {
 }
 
 impl Values {
-    /// Reads what a user writes: numbers, `true` or `false`, names of an enumeration; commas or spaces between elements.
+    /// Parses user input: numbers, `true` or `false`, names of an enumeration; commas or spaces between elements.
     ///
     /// # Errors
-    /// Says what was expected.
+    /// States what was expected.
     pub fn parse(text: &str, variable: &ModelVariable, items: &[(String, i64)]) -> Result<Self, String> {
         Self::parse_with(text, variable, items, |e| Ok(e.parse::<f64>().ok()))
     }
@@ -110,7 +110,7 @@ impl Values {
     /// The start value of a variable, all elements of an array.
     ///
     /// # Errors
-    /// It has none, or not one of its type.
+    /// It has none, or one of another type.
     pub fn start(variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         match variable.base {
             BaseType::String if !variable.start_texts.is_empty() => Ok(Self::Strings(variable.start_texts.clone())),
@@ -140,7 +140,7 @@ impl Values {
             BaseType::Boolean | BaseType::Clock => Ok(Self::Booleans(numbers.iter().map(|x| *x != 0.0).collect())),
             BaseType::String | BaseType::Binary => Err(format!("a {base} takes no number")),
             _ => {
-                // Beyond the range of the variable's type the setter refuses; a NaN becomes 0.
+                // The setter refuses values outside the range of the variable's type; a NaN becomes 0.
                 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
                 let rounded = numbers.iter().map(|x| x.round() as i128).collect();
                 Ok(Self::Integers(rounded))
@@ -164,7 +164,7 @@ impl Values {
         }
     }
 
-    /// Replaces an element by the one of `value`; returns whether both exist and have one type.
+    /// Replaces an element by the one of `value`; returns whether both exist and have the same type.
     #[must_use]
     pub fn replace(&mut self, element: usize, value: &Self) -> bool {
         fn put<T: Clone>(all: &mut [T], element: usize, value: &[T]) -> bool {
@@ -182,7 +182,7 @@ impl Values {
         }
     }
 
-    /// The elements as a cell of CSV has them: spaces between them, bytes in hexadecimal digits.
+    /// The elements as in a CSV cell: separated by spaces, bytes in hexadecimal digits.
     pub fn cell(&self) -> String {
         self.words().join(" ")
     }
@@ -218,7 +218,7 @@ impl Values {
     }
 }
 
-/// Texts with commas between them; one with a comma of its own is in quotation marks.
+/// Texts separated by commas; a text that contains a comma is in quotation marks.
 fn texts(text: &str) -> Vec<String> {
     let (mut texts, mut quoted) = (vec![String::new()], false);
     for c in text.chars() {
@@ -232,7 +232,7 @@ fn texts(text: &str) -> Vec<String> {
     texts.iter().map(|text| text.trim().to_owned()).collect()
 }
 
-/// The least and the greatest value of an integer type.
+/// The minimum and the maximum of an integer type.
 fn bounds(base: BaseType) -> (i128, i128) {
     match base {
         BaseType::Int8 => IntegerType::Int8,

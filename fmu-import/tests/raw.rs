@@ -1,4 +1,4 @@
-//! No argument of a raw call is undefined behavior: what could be is refused before the FMU sees it.
+//! No argument of a raw call causes undefined behavior: dangerous ones are refused before they reach the FMU.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use fmu_import::Status;
@@ -7,7 +7,7 @@ use model_description::{BaseType, FmiVersion};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::process::Command;
 
-/// An FMU in C that ends its process when it gets a pointer that it did not give out.
+/// An FMU in C that ends its process when it receives a foreign pointer.
 const SOURCE: &str = r#"
 #include <stdint.h>
 #include <stdlib.h>

@@ -1,8 +1,8 @@
 //! A map in colors over a plane: filled contours, lines and marks, drawn as SVG on light or dark paper.
 //!
-//! The areas above the levels are painted one over the other, from the lowest level up; what has no value stays paper. The
-//! element carries what a script needs to find a place of the plane: `data-area` (left, top, right and bottom of the axes in
-//! pixels) and `data-window` (what they show).
+//! The areas above the levels are painted one over the other, from the lowest level up; points without a value stay blank. The
+//! element carries the data that a script needs to locate a point of the plane: `data-area` (left, top, right and bottom of the
+//! axes in pixels) and `data-window` (their ranges).
 
 use crate::contour::{Field, Place};
 use crate::error::Error;
@@ -13,7 +13,7 @@ use std::fmt::Write as _;
 /// Width and height in pixels, and the space for the legend.
 const SIZE: (f64, f64) = (900.0, 620.0);
 const BESIDE: f64 = 124.0;
-/// Least length in pixels of a contour that has a label, and least distance of the label from the border.
+/// Minimum length in pixels of a labeled contour, and minimum distance of the label from the border.
 const LONG: f64 = 70.0;
 const BORDER: f64 = 14.0;
 
@@ -33,7 +33,7 @@ pub struct Chart {
     pub window: (f64, f64),
     /// Range of the vertical axis.
     pub range: (f64, f64),
-    /// The fields; those beside each other share their levels.
+    /// The fields; adjacent fields share their levels.
     pub fields: Vec<Field>,
     /// Heading of the legend.
     pub legend: String,
@@ -41,7 +41,7 @@ pub struct Chart {
     pub bands: Vec<Band>,
     /// Lines over the areas.
     pub lines: Vec<Line>,
-    /// Places on the horizontal axis with a label each, in ascending order.
+    /// Positions on the horizontal axis with a label each, in ascending order.
     pub marks: Vec<(f64, String)>,
     /// Points with a label each.
     pub dots: Vec<(Place, String)>,
@@ -106,7 +106,7 @@ pub fn draw(chart: &Chart) -> Result<String, Error> {
         };
         let path = path(&points);
         if !line.thick {
-            // Light below the dashes, for dark areas.
+            // A light line below the dashes, for dark areas.
             let _ = writeln!(
                 svg,
                 "<path d=\"{path}\" fill=\"none\" stroke=\"#ffffff\" stroke-opacity=\"0.4\" stroke-width=\"1.6\"/>"
@@ -214,7 +214,7 @@ fn length(line: &[Place]) -> f64 {
     line.windows(2).map(|pair| (pair[1].0 - pair[0].0).hypot(pair[1].1 - pair[0].1)).sum()
 }
 
-/// An open path without the points that cannot be seen. A closed line is cut where it is farthest from its start.
+/// An open path without its invisible points. A closed line is cut where it is farthest from its start.
 fn path(points: &[Place]) -> String {
     let [first, .., last] = points else { return String::new() };
     let kept = if first == last {

@@ -1,9 +1,9 @@
-//! Where a field is at or above a level: areas with their outlines, and the contour lines along them.
+//! Areas where a field is at or above a level: their outlines, and the contour lines along them.
 //!
 //! The field has values at the points of a grid of rows and columns, which may lie anywhere in the plane. Each quadrilateral of
-//! four neighbors is cut into four triangles about its middle, which has the mean of their values; in a triangle the field is
-//! linear. What the triangles have in common cancels: the edges of an area that remain are its outline, and those between two
-//! points inside of grid edges are the contour. A quadrilateral with a value that is not finite belongs to no area.
+//! four neighbors is cut into four triangles around its center, which has the mean of their values; in a triangle the field is
+//! linear. Shared edges of triangles cancel: the remaining edges of an area are its outline, and those between two points
+//! inside grid edges are the contour. A quadrilateral with a value that is not finite belongs to no area.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -15,7 +15,7 @@ pub type Place = (f64, f64);
 pub struct Field {
     /// Number of points in a row.
     pub columns: usize,
-    /// Places of the grid's points, row by row.
+    /// Coordinates of the grid's points, row by row.
     pub places: Vec<Place>,
     /// Values there; one that is not finite is missing.
     pub values: Vec<f64>,
@@ -24,17 +24,17 @@ pub struct Field {
 /// The part of the plane with values at or above a level.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Above {
-    /// Closed outlines; with the even-odd or the nonzero rule, what is between them.
+    /// Closed outlines; they bound the area under the even-odd or the nonzero rule.
     pub rings: Vec<Vec<Place>>,
     /// The stretches of the outlines along which the field has the level: the contour.
     pub lines: Vec<Vec<Place>>,
 }
 
-/// A vertex of an outline: a point of the grid or a middle (twice the same number), or the crossing of the edge between two.
+/// A vertex of an outline: a point of the grid or a center (the same number twice), or the crossing of the edge between two.
 type Vertex = (usize, usize);
 
 impl Field {
-    /// The area where the field is at or above `level`; with minus infinity, everything that has a value.
+    /// The area where the field is at or above `level`; with minus infinity, all points with a value.
     pub fn above(&self, level: f64) -> Above {
         let mut edges: HashSet<(Vertex, Vertex)> = HashSet::new();
         for triangle in self.triangles() {
@@ -74,7 +74,7 @@ impl Field {
             let last = row * n + column;
             let corners = [last - n - 1, last - n, last, last - 1];
             let whole = corners.iter().all(|&k| self.values[k].is_finite());
-            // Middles have the numbers after those of the points.
+            // Centers are numbered after the points.
             let middle = self.places.len() + last;
             (0..if whole { 4 } else { 0 }).map(move |k| [middle, corners[k], corners[(k + 1) % 4]])
         })
@@ -183,7 +183,7 @@ mod tests {
         assert_eq!(hill(5, |x, _| x).above(2.0), Above::default());
     }
 
-    /// A hole has its own outline; a missing value takes the quadrilaterals about it.
+    /// A hole has its own outline; a missing value removes the quadrilaterals around it.
     #[test]
     fn holes_and_missing_values() {
         let ring = hill(41, |x, y| -(x.hypot(y) - 0.5).abs()).above(-0.2);

@@ -1,12 +1,12 @@
 //! Errors of drawing.
 
-/// Why there is no drawing.
+/// The reason why there is no drawing.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A figure without a point.
     #[error("nothing was recorded, so there is nothing to plot")]
     Empty,
-    /// The numbers of a page cannot be deflated.
+    /// The numbers of a page cannot be compressed.
     #[error(transparent)]
     Deflate(#[from] std::io::Error),
 }

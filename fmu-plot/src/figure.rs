@@ -1,4 +1,4 @@
-//! What a figure shows: panels with curves. [`crate::svg`] and [`crate::page`] draw it.
+//! The content of a figure: panels with curves. [`crate::svg`] and [`crate::page`] draw it.
 
 use crate::ink::Ink;
 use std::rc::Rc;
@@ -19,7 +19,7 @@ pub struct Figure {
 /// Curves over one pair of axes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Panel {
-    /// What the panel shows; may be empty.
+    /// Title of the panel; may be empty.
     pub title: String,
     /// Label of the vertical axis: a unit, or a quantity with its unit.
     pub unit: String,
@@ -29,7 +29,7 @@ pub struct Panel {
     pub curves: Vec<Curve>,
     /// Single points.
     pub dots: Vec<(f64, f64)>,
-    /// Places on the horizontal axis with a label each.
+    /// Positions on the horizontal axis with a label each.
     pub marks: Vec<(f64, String)>,
 }
 

@@ -1,4 +1,4 @@
-//! Colors of curves that have none of their own.
+//! Default colors of curves.
 
 /// A color as `#rrggbb`.
 pub type Ink = &'static str;
@@ -9,7 +9,7 @@ pub const CURVES: [Ink; 7] = ["#0a80c4", "#d55e00", "#009e73", "#cc79a7", "#e69f
 /// The color of references, and of marks.
 pub const REFERENCE: Ink = CURVES[6];
 
-/// Light and dark paper, as the style of a page has them.
+/// Light and dark background, as in the style of a page.
 pub const PAPERS: [Ink; 2] = ["#ffffff", "#15191c"];
 
 /// Contrast of two colors by WCAG 2.2, from 1 to 21: at least 3 for a curve on each of the [`PAPERS`].

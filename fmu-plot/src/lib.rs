@@ -1,10 +1,10 @@
-//! Figures, and pages that need no network. Knows neither motors nor FMUs.
+//! Figures, and pages that need no network. The crate knows neither motors nor FMUs.
 //!
-//! - [`figure`]: what a figure shows; whoever makes one chooses the colors of its curves.
+//! - [`figure`]: the content of a figure; its author chooses the colors of the curves.
 //! - [`svg`]: draws a figure as SVG.
 //! - [`chart`]: a map in colors over a plane, as SVG: filled contours ([`contour`]), lines and marks.
 //! - [`page`]: a page, and a figure in it with zoom, legend switches and readings at the cursor.
-//! - [`ink`]: colors for curves that have none of their own.
+//! - [`ink`]: default colors for curves.
 
 #![forbid(unsafe_code)]
 

@@ -10,7 +10,7 @@ const SIZE: [(f64, f64); 2] = [(1060.0, 240.0), (520.0, 270.0)];
 /// Space for the legend: beside the panels of one column, above those of several.
 const BESIDE: f64 = 240.0;
 const ABOVE: f64 = 22.0;
-/// Distance of two names below each other.
+/// Vertical distance of two names.
 const LINE: f64 = 17.0;
 /// Maximum number of points drawn per curve: the highest and lowest point of as many intervals as the picture resolves.
 const STRETCHES: usize = 1000;
@@ -31,7 +31,7 @@ pub fn draw(figure: &Figure) -> Result<String, Error> {
     }
     let (width, height) = SIZE[usize::from(figure.columns > 1)];
     let beside = figure.columns == 1;
-    // As high as the names beside it need.
+    // As high as the names beside it require.
     let height_of = |panel: &Panel| if beside { height.max(LINE * count(panel.curves.len()) + 20.0) } else { height };
     let all_width = width * count(figure.columns.min(figure.panels.len()));
     let all_height: f64 = figure.panels.iter().step_by(figure.columns).map(height_of).sum();
@@ -72,7 +72,7 @@ pub fn draw(figure: &Figure) -> Result<String, Error> {
     Ok(svg + "</svg>\n")
 }
 
-/// Text at a place; `anchor` may close its attribute and open others.
+/// Text at a position; `anchor` may close its attribute and open others.
 pub(crate) fn text(svg: &mut String, (x, y): (f64, f64), anchor: &str, words: &str) {
     let words = words.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{words}</text>");
@@ -82,7 +82,7 @@ pub(crate) fn count(n: usize) -> f64 {
     u32::try_from(n).map_or(f64::MAX, f64::from)
 }
 
-/// Where the curves of a panel are, in pixels, and what they show there.
+/// The area of a panel's curves, in pixels, and the range shown there.
 pub(crate) struct Area {
     pub(crate) left: f64,
     pub(crate) top: f64,
@@ -191,7 +191,7 @@ fn number(x: f64, decimals: usize) -> String {
     text.replace('-', "−")
 }
 
-/// Drops points that cannot be seen and keeps every peak.
+/// Drops invisible points and keeps every peak.
 fn thin(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let length = points.len().div_ceil(STRETCHES);
     let mut kept = Vec::new();

@@ -1,33 +1,34 @@
 //! Runs at a point and beside it, for derivatives of measures with respect to variables.
 //!
-//! Two runs that the master integrates (Model Exchange) differ by more than their values: the solver chooses other steps, and that
-//! difference, of the size of its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
-//! ([`with_copy`](fmu_system::cosimulation::Plan::with_copy)), which is integrated in common steps. What is differentiated is then the
-//! computed solution, and its derivative is as exact as the solution itself, at any tolerance. Events and samples are each run's own.
+//! Two runs that the master integrates (Model Exchange) differ not only by their values: the solver chooses other steps, and
+//! that difference, about its tolerance, is divided by the distance of the two. Here the two runs beside a point are one system
+//! ([`with_copy`](fmu_system::cosimulation::SystemPlan::with_copy)), which is integrated in common steps. Thus the computed solution
+//! is differentiated, and its derivative is as exact as the solution itself, at any tolerance. Each run has its own events and
+//! samples.
 //!
 //! Source: H. G. Bock, Numerical treatment of inverse problems in chemical reaction kinetics, in: Modelling of Chemical Reaction
 //! Systems, Springer 1981, 102-125: internal numerical differentiation.
 
-use crate::plan::{Outcome, Outcomes, Plan, Variable};
+use crate::plan::{Plan, RunResult, RunResults, RunVariable};
 use crate::{Error, measure::Measure, pool};
-use fmu_system::cosimulation::{Target, Worker};
+use fmu_system::cosimulation::{PlanTarget, Worker};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 impl Plan {
-    /// Runs at a point, then with each variable above it by its step, then with each below it: as many rows as twice the variables,
-    /// and one. `progress` is called with the number of rows done.
+    /// Runs at a point, then with each variable above it by its step, then with each below it: two rows for each variable, plus
+    /// one. `progress` is called with the number of rows done.
     ///
     /// # Errors
-    /// An FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run is in its row.
+    /// An FMU refuses an instance, or `progress` stops it. An error of a run is in its row.
     pub fn run_around(
         &self,
-        variables: &[Variable],
+        variables: &[RunVariable],
         point: &[f64],
         steps: &[f64],
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         let n = point.len().min(steps.len());
         let row = |row: usize, values: &mut Vec<f64>| {
             values.clear();
@@ -42,9 +43,9 @@ impl Plan {
             return self.run_rows(variables, count(2 * n + 1), &|k, values| row(index(k), values), threads, progress);
         }
         let pairs = Arc::new(self.system().with_copy());
-        let copied = |v: &Variable| v.targets().iter().map(|target| self.system().in_copy(target)).collect();
-        let copies: Vec<Vec<Target>> = variables.iter().map(copied).collect();
-        let all = Mutex::new((Outcomes::empty(self.measures().len(), 2 * n + 1), 0));
+        let copied = |v: &RunVariable| v.targets().iter().map(|target| self.system().in_copy(target)).collect();
+        let copies: Vec<Vec<PlanTarget>> = variables.iter().map(copied).collect();
+        let all = Mutex::new((RunResults::empty(self.measures().len(), 2 * n + 1), 0));
         pool::run(
             count(n + 1),
             threads,
@@ -56,7 +57,7 @@ impl Plan {
                     vec![(0, runner.run(above, &mut |_, _| {}))]
                 } else {
                     row(k + n, below);
-                    let set = variables.iter().map(Variable::targets).zip(&*above);
+                    let set = variables.iter().map(RunVariable::targets).zip(&*above);
                     let set = set.chain(copies.iter().map(Vec::as_slice).zip(&*below));
                     let set = set.flat_map(|(targets, x)| targets.iter().map(|target| (target, *x)));
                     let [above, below] = self.pair(worker, set);
@@ -76,7 +77,7 @@ impl Plan {
     }
 
     /// Runs the system and its copy with these values.
-    fn pair<'a>(&self, worker: &mut Worker, set: impl IntoIterator<Item = (&'a Target, f64)>) -> [Outcome; 2] {
+    fn pair<'a>(&self, worker: &mut Worker, set: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> [RunResult; 2] {
         let renewed = if self.reuses() { Ok(()) } else { worker.renew() };
         let (mut end, columns) = (f64::NAN, self.system().columns().len());
         let begin = || self.readers().iter().map(|_| Measure::begin()).collect::<Vec<_>>();
@@ -92,6 +93,6 @@ impl Plan {
             })
         });
         let ended = ended.map_err(|error| error.to_string());
-        readings.map(|readings| Outcome { result: ended.clone().and_then(|_| self.measured(&readings)), end })
+        readings.map(|readings| RunResult { result: ended.clone().and_then(|_| self.measured(&readings)), end })
     }
 }

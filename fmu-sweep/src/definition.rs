@@ -8,7 +8,7 @@ use std::fmt;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// A sweep: the system, its runs, what is varied and what is measured. A program fills in the fields that a file would have.
+/// A sweep: the system, its runs, varied variables and measures. A program fills in the fields of a file.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {
@@ -20,36 +20,40 @@ pub struct Definition {
     pub connect: Vec<[String; 2]>,
     /// Pairs of terminals.
     pub terminal: Vec<[String; 2]>,
+    /// Pass numbers between different units on as they are; otherwise they are converted by the BaseUnits of both FMUs.
+    pub no_unit_conversion: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
-    /// How all FMUs run; otherwise each steps itself if it can.
+    /// How to run all FMUs; by default each steps itself if it can.
     pub interface: Option<Interface>,
-    /// Names of the FMUs that step themselves all the same, in a system for Model Exchange.
+    /// Names of FMUs that still step themselves in a system for Model Exchange.
     pub stepping: Vec<String>,
-    /// How states are integrated (Model Exchange); otherwise with the adaptive solver.
+    /// Integration method (Model Exchange); by default the adaptive solver.
     pub solver: Option<SolverName>,
-    /// Relative tolerance of the adaptive solver; otherwise 1e-6.
+    /// Relative tolerance of the adaptive solver; by default 1e-6. If no FMU is integrated, as `tolerance`.
     pub rtol: Option<f64>,
-    /// Start time in s; otherwise from the FMUs.
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation; by default that of the default experiment of each.
+    pub tolerance: Option<f64>,
+    /// Start time in s; by default from the FMUs.
     pub start: Option<f64>,
-    /// Stop time in s; otherwise from the FMUs.
+    /// Stop time in s; by default from the FMUs.
     pub stop: Option<f64>,
-    /// Communication step in s; otherwise from the FMUs.
+    /// Communication step in s; by default from the FMUs.
     pub step: Option<f64>,
-    /// Reuse instances from run to run by resetting them; otherwise found out by comparing two rows.
+    /// Reuse instances from run to run by resetting them; by default determined by comparing two rows.
     pub reuse: Option<bool>,
     /// Parameters and unconnected inputs, the same in all runs.
-    pub set: Ordered<Scalar>,
+    pub set: Ordered<SetValue>,
     /// Inputs over time, written as for `fmu simulate --input`.
     pub input: Ordered<String>,
-    /// How rows are made.
+    /// How to generate rows.
     pub design: Option<Design>,
     /// The varied variables; their order is that of the columns.
     pub vary: Ordered<Vary>,
     /// The measures of each run.
     pub measure: Ordered<MeasureDefinition>,
-    /// Which runs are recorded.
-    pub trace: Option<Trace>,
+    /// The runs to record.
+    pub trace: Option<Traces>,
 }
 
 /// Who integrates the states of an FMU.
@@ -71,7 +75,7 @@ pub enum SolverName {
     Rk4,
 }
 
-/// How rows are made.
+/// How to generate rows.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Design {
@@ -79,11 +83,11 @@ pub struct Design {
     pub kind: Kind,
     /// Number of rows, of a random, LHS or Sobol design.
     pub runs: Option<u64>,
-    /// Another seed gives other rows, of a random, LHS or Sobol design.
+    /// Seed of a random, LHS or Sobol design; another seed gives other rows.
     pub seed: Option<u64>,
     /// CSV file of a list; its header names the variables.
     pub file: Option<String>,
-    /// Rows of a part; otherwise about 5 s of work.
+    /// Rows of a part; by default about 5 s of work.
     pub part: Option<u64>,
 }
 
@@ -95,7 +99,7 @@ pub enum Kind {
     Grid,
     /// Independent random numbers.
     Random,
-    /// Latin hypercube sampling: of each variable one number in each of as many strata as there are rows.
+    /// Latin hypercube sampling: with n rows, each variable has one value in each of n strata.
     Lhs,
     /// Sobol's sequence, shifted by the seed.
     Sobol,
@@ -116,16 +120,16 @@ pub struct Vary {
     /// Truncates the normal distribution.
     pub within: Option<[f64; 2]>,
     /// One of these.
-    pub values: Option<Vec<Scalar>>,
+    pub values: Option<Vec<SetValue>>,
     /// One of `count` evenly spaced numbers: the first.
     pub from: Option<f64>,
     /// The last of them.
     pub to: Option<f64>,
-    /// How many there are.
+    /// Their number.
     pub count: Option<u32>,
     /// Equal to another column ...
     pub same: Option<String>,
-    /// ... times this; otherwise 1.
+    /// ... times this; by default 1.
     pub times: Option<f64>,
 }
 
@@ -136,10 +140,10 @@ pub struct MeasureDefinition {
     /// A sum of variables, each optionally after a number and `*`.
     pub of: String,
     /// The function to compute from it.
-    pub is: Function,
-    /// Wraps the sum into half of this on both sides of 0: a number, or one before `pi`.
-    pub wrap: Option<Scalar>,
-    /// Time in s from which on it counts; otherwise the start.
+    pub is: MeasureFunction,
+    /// Period to which the sum is wrapped (±period/2): a number or a multiple of pi such as `2pi`.
+    pub wrap: Option<SetValue>,
+    /// Time in s from which on values count; by default the start.
     pub after: Option<f64>,
     /// Time in s, of `at`.
     pub time: Option<f64>,
@@ -149,14 +153,14 @@ pub struct MeasureDefinition {
     pub to: Option<f64>,
     /// The value at which it settles.
     pub target: Option<f64>,
-    /// How far from the target it may be when it has settled.
+    /// Maximum distance from the target of a settled value.
     pub band: Option<f64>,
 }
 
 /// The function that a measure computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Function {
+pub enum MeasureFunction {
     /// The last value.
     Final,
     /// The least value.
@@ -173,7 +177,7 @@ pub enum Function {
     Integral,
     /// The value at a time: that of the first communication point at or after it.
     At,
-    /// Time in s from the first passage of `from` to the next passage of `to`, interpolated; infinite without them.
+    /// Time in s from the first crossing of `from` to the next crossing of `to`, interpolated; infinite without them.
     Rise,
     /// Time in s until it stays within `band` of `target`; infinite if it never does.
     Settling,
@@ -182,16 +186,16 @@ pub enum Function {
 /// Recordings of runs, as files in the folder `traces`.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields)]
-pub struct Trace {
+pub struct Traces {
     /// Variables to record.
     pub of: Vec<String>,
-    /// Every how many communication points; otherwise each.
+    /// Record every n-th communication point; by default each.
     pub every: Option<u32>,
     /// Which runs.
     pub runs: Runs,
 }
 
-/// Which runs are recorded.
+/// The runs to record.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(untagged)]
 pub enum Runs {
@@ -214,7 +218,7 @@ pub enum Which {
 /// A number, a Boolean or a text.
 #[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 #[serde(untagged, expecting = "expected a number, true, false or a text; put a name with dots in quotes")]
-pub enum Scalar {
+pub enum SetValue {
     /// `true` or `false`.
     Boolean(bool),
     /// An integer.
@@ -225,7 +229,7 @@ pub enum Scalar {
     Text(String),
 }
 
-impl fmt::Display for Scalar {
+impl fmt::Display for SetValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Boolean(x) => x.fmt(f),
@@ -236,7 +240,7 @@ impl fmt::Display for Scalar {
     }
 }
 
-/// A table whose order counts.
+/// An ordered table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ordered<T>(pub Vec<(String, T)>);
 
@@ -280,7 +284,7 @@ impl Definition {
     /// Reads a file.
     ///
     /// # Errors
-    /// The file cannot be read, or is not a definition of a sweep: names the line and what is wrong there.
+    /// The file cannot be read, or is not a definition of a sweep: names the line and the fault.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = std::fs::read_to_string(path).map_err(|e| Error::file(path, e))?;
         Self::parse(&text).map_err(|cause| Error::file(path, cause))
@@ -289,7 +293,7 @@ impl Definition {
     /// Reads the text of a file.
     ///
     /// # Errors
-    /// The line and what is wrong there.
+    /// The line and the fault.
     pub fn parse(text: &str) -> Result<Self, String> {
         toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
@@ -313,7 +317,7 @@ mod tests {
         assert_eq!(d.vary.0.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["z.b", "z.a"]);
         let values: Vec<_> = d.vary.0[1].1.values.as_ref().unwrap().iter().map(ToString::to_string).collect();
         assert_eq!(values, ["1", "2.5", "true", "Off"]);
-        assert_eq!((d.measure.0[0].1.is, d.measure.0[0].1.after), (Function::MaxAbs, Some(1.0)));
+        assert_eq!((d.measure.0[0].1.is, d.measure.0[0].1.after), (MeasureFunction::MaxAbs, Some(1.0)));
     }
 
     #[test]

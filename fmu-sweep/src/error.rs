@@ -1,20 +1,20 @@
-//! Errors before a run, and errors of files. An error within a run is part of its row: [`Outcome`](crate::Outcome).
+//! Errors before a run, and errors of files. An error within a run is part of its row: [`RunResult`](crate::RunResult).
 
 use std::path::{Path, PathBuf};
 
 /// One line that names the thing, its value and what was expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// An FMU, or what it does not have.
+    /// An FMU, or something that it lacks.
     #[error(transparent)]
     Fmu(#[from] fmu_import::Error),
-    /// A definition or a table that makes no sense.
+    /// An invalid definition or table.
     #[error("{0}")]
     Invalid(String),
-    /// The caller broke off.
+    /// The caller stopped.
     #[error("interrupted")]
     Interrupted,
-    /// A file that cannot be read or written, or does not fit.
+    /// A file that cannot be read or written, or does not match.
     #[error("{}: {cause}", path.display())]
     File {
         /// Path of the file.

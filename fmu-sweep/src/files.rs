@@ -8,12 +8,12 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process;
 
-/// Writes a file under another name, on the disk, and then gives it its own.
+/// Writes a file under a temporary name, syncs it to disk, and then renames it.
 pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     write_with(path, |file| file.write_all(bytes))
 }
 
-/// Writes a file with contents that a function writes.
+/// Writes a file whose contents a function produces.
 pub(crate) fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), Error> {
     let partial = partial(path);
     let whole = || {
@@ -39,13 +39,13 @@ pub(crate) fn create(path: &Path, bytes: &[u8]) -> Result<bool, Error> {
         let mut file = File::create(&partial)?;
         file.write_all(bytes)?;
         file.sync_all()?;
-        // A link fails where a rename would replace.
+        // A link fails where a rename would replace the file.
         let linked = fs::hard_link(&partial, path);
         fs::remove_file(&partial)?;
         match linked {
             Ok(()) => sync_folder(path).map(|()| true),
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => Ok(false),
-            // A file system without links: then two processes at the same moment are one too many.
+            // A file system without links: two processes at the same moment are then not safe.
             Err(_) if path.exists() => Ok(false),
             Err(_) => {
                 let mut file = File::create_new(path)?;
@@ -73,7 +73,7 @@ pub(crate) fn own() -> String {
     format!("{}-{:016x}", process::id(), RandomState::new().hash_one(0))
 }
 
-/// Removes what killed processes have left of files that are complete by now.
+/// Removes temporary files of killed processes whose files have been completed since.
 pub(crate) fn clean_up(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for entry in entries.flatten() {
@@ -84,7 +84,7 @@ pub(crate) fn clean_up(folder: &Path) {
     }
 }
 
-/// Makes a new name last, where a folder can be opened.
+/// Syncs a new name to disk, where a folder can be opened.
 fn sync_folder(path: &Path) -> io::Result<()> {
     let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     if cfg!(unix) { File::open(parent)?.sync_all() } else { Ok(()) }

@@ -1,10 +1,10 @@
-//! Rows in processes of their own: an FMU that crashes ends one process and one row.
+//! Rows in separate processes: an FMU that crashes ends one process and one row.
 //!
-//! The parent sends what the sweep is, then ranges of rows, on standard input. The worker answers on standard output, where an
-//! FMU may print as well: each answer begins a new line with a mark, and other lines are passed over.
+//! The parent sends the sweep, then ranges of rows, on standard input. The worker answers on standard output, where an FMU may
+//! print as well: each answer begins a new line with a mark, and other lines are skipped.
 
 use crate::sweep::Writer;
-use crate::{Definition, Error, Outcome, Sweep};
+use crate::{Definition, Error, RunResult, Sweep};
 use fmu_import::guard;
 use serde::{Deserialize, Serialize};
 use std::ffi::OsString;
@@ -46,7 +46,7 @@ struct Running {
     output: BufReader<ChildStdout>,
 }
 
-/// How a process ended instead of answering.
+/// The end of a process that did not answer.
 struct Died(String);
 
 impl<'a> Process<'a> {
@@ -75,7 +75,7 @@ impl<'a> Process<'a> {
     pub(crate) fn run(&mut self, mut rows: Range<u64>, lines: &mut String) -> Result<(), Error> {
         let mut idle = 0;
         while !rows.is_empty() {
-            // Only the row that it has announced is its own fault.
+            // Only the row that it has announced can have caused the crash.
             let mut announced = None;
             let died = match self.started()?.ask(&format!("{} {}", rows.start, rows.end)) {
                 Ok(running) => loop {
@@ -99,7 +99,7 @@ impl<'a> Process<'a> {
             let Some(Died(how)) = died else { continue };
             self.running = None;
             if announced == Some(rows.start) {
-                let (mut values, outcome) = (Vec::new(), Outcome { result: Err(how), end: f64::NAN });
+                let (mut values, outcome) = (Vec::new(), RunResult { result: Err(how), end: f64::NAN });
                 self.sweep.rows().row(rows.start, &mut values);
                 lines.push_str(&self.sweep.line(rows.start, &values, &outcome));
                 rows.start += 1;
@@ -107,7 +107,10 @@ impl<'a> Process<'a> {
             } else {
                 idle += 1;
                 if idle > 3 {
-                    return Err(Error::Invalid(format!("the process for row {} is {how} before it runs", rows.start)));
+                    return Err(Error::Invalid(format!(
+                        "the worker process was {how} before row {} started",
+                        rows.start
+                    )));
                 }
             }
         }
@@ -129,7 +132,7 @@ impl<'a> Process<'a> {
                 Ok(ready) if ready == "ready" => {}
                 Ok(cause) => return Err(Error::Invalid(cause.trim_start_matches("error ").into())),
                 Err(Died(how)) => {
-                    return Err(Error::Invalid(format!("a worker process is {how} when it loads the FMUs")));
+                    return Err(Error::Invalid(format!("a worker process was {how} while it loaded the FMUs")));
                 }
             }
             self.running = Some(running);
@@ -168,7 +171,7 @@ impl Running {
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // A worker that waits for rows ends with its input; one that still computes a row is no longer needed.
+        // A worker that waits for rows ends when its input closes; one that still computes a row is no longer needed.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

@@ -1,11 +1,11 @@
 //! Many runs of FMUs, of any tool: designs, measures, threads, parts that a killed sweep resumes from.
 //!
-//! - [`Definition`]: what a sweep is, from a TOML file or from a program.
-//! - [`Plan`]: the system with its measures; runs rows on threads. [`Rows`]: the rows of a design.
-//! - [`Sweep`]: both, from a file. [`run`]: a sweep into a folder; [`isolate`]: in processes of their own.
+//! - [`Definition`]: the definition of a sweep, from a TOML file or from a program.
+//! - [`Plan`]: the system with its measures; runs rows on threads. [`DesignRows`]: the rows of a design.
+//! - [`Sweep`]: both, from a file. [`run`]: a sweep into a folder; [`isolate`]: in separate processes.
 //!
-//! A row is a function of the definition, the seed and its number, and its results have the same bits whichever thread, process
-//! or machine computes it.
+//! A row is a function of the definition, the seed and its number, and its results have the same bits on every thread, process
+//! and machine.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_sweep::Error> {
@@ -37,10 +37,10 @@ mod signal;
 mod sweep;
 
 pub use definition::Definition;
-pub use design::Rows;
+pub use design::DesignRows;
 pub use error::Error;
 pub use fmu_import::threads::available as threads_here;
 pub use output::Failures;
-pub use plan::{Column, Outcome, Outcomes, Plan, Runner, Variable, last_columns};
-pub use run::{Options, Report, Watch, missing, run};
+pub use plan::{Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner, last_columns};
+pub use run::{Options, Progress, Report, missing, run};
 pub use sweep::Sweep;

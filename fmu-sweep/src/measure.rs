@@ -1,8 +1,8 @@
 //! Measures: one number from a run, computed while it runs.
 //!
-//! Sums are taken in the order of time, so a measure has the same bits on every thread and machine.
+//! Sums are accumulated in the order of time, so a measure has the same bits on every thread and machine.
 
-use crate::definition::{Function, MeasureDefinition};
+use crate::definition::{MeasureDefinition, MeasureFunction};
 use crate::signal::Signal;
 use fmu_system::cosimulation::Settings;
 
@@ -40,9 +40,9 @@ pub(crate) struct Reading {
     count: f64,
     /// Extremum, sum, or last value.
     x: f64,
-    /// Time and value before.
+    /// Previous time and value.
     before: (f64, f64),
-    /// Time of an event: a passage of `from`, or the return into the band.
+    /// Time of an event: a crossing of `from`, or the return into the band.
     since: Option<f64>,
     /// Time of the end of a rise.
     until: Option<f64>,
@@ -56,16 +56,18 @@ impl Measure {
     pub(crate) fn new(definition: &MeasureDefinition, signal: Signal, settings: &Settings) -> Result<Self, String> {
         let MeasureDefinition { of, is, after, time, from, to, target, band, .. } = definition;
         let kind = match is {
-            Function::Final => Kind::Final,
-            Function::Min => Kind::Min,
-            Function::Max => Kind::Max,
-            Function::MaxAbs => Kind::MaxAbs,
-            Function::Mean => Kind::Mean,
-            Function::Rms => Kind::Rms,
-            Function::Integral => Kind::Integral,
-            Function::At => Kind::At(time.ok_or("at needs time")?),
-            Function::Rise => Kind::Rise { from: from.ok_or("rise needs from")?, to: to.ok_or("rise needs to")? },
-            Function::Settling => Kind::Settling {
+            MeasureFunction::Final => Kind::Final,
+            MeasureFunction::Min => Kind::Min,
+            MeasureFunction::Max => Kind::Max,
+            MeasureFunction::MaxAbs => Kind::MaxAbs,
+            MeasureFunction::Mean => Kind::Mean,
+            MeasureFunction::Rms => Kind::Rms,
+            MeasureFunction::Integral => Kind::Integral,
+            MeasureFunction::At => Kind::At(time.ok_or("at needs time")?),
+            MeasureFunction::Rise => {
+                Kind::Rise { from: from.ok_or("rise needs from")?, to: to.ok_or("rise needs to")? }
+            }
+            MeasureFunction::Settling => Kind::Settling {
                 target: target.ok_or("settling needs target")?,
                 band: band.ok_or("settling needs band")?,
             },
@@ -123,7 +125,7 @@ impl Measure {
         Reading { count: 0.0, x: f64::NAN, before: (0.0, 0.0), since: None, until: None, begun: 0.0, bad: None }
     }
 
-    /// Takes the values of a communication point.
+    /// Processes the values of a communication point.
     pub(crate) fn take(&self, s: &mut Reading, t: f64, values: &[f64]) {
         if t < self.after - SAME || s.bad.is_some() {
             return;

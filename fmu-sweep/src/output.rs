@@ -1,7 +1,7 @@
-//! The folder of a sweep: what it is (`sweep.json`), its parts, and the whole of them (`results.csv`).
+//! The folder of a sweep: its identity (`sweep.json`), its parts, and all results (`results.csv`).
 //!
-//! A part has its name when it is complete and on the disk. So a sweep that was killed at any time goes on where parts are
-//! missing, several processes may work on one folder, and a part that two of them write has the same bytes.
+//! A part gets its name when it is complete and on the disk. So a sweep killed at any time resumes with the missing parts,
+//! several processes may work on one folder, and a part that two of them write has the same bytes.
 
 use crate::sweep::hash;
 use crate::{Error, Sweep, files};
@@ -12,9 +12,9 @@ use std::io::{self, BufRead, BufReader, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Version of what `sweep.json` says.
+/// Version of the format of `sweep.json`.
 const VERSION: u64 = 2;
-/// A part takes about this long, in s: what a kill costs at most.
+/// Approximate duration of a part in s: the maximum loss of a kill.
 const PART_SECONDS: f64 = 5.0;
 const MOST_ROWS: u64 = 100_000;
 
@@ -31,7 +31,7 @@ pub(crate) struct Output {
 pub(crate) struct Cut {
     /// Rows of a part.
     pub(crate) rows_per_part: u64,
-    /// Whether instances are reset from run to run, or new ones made.
+    /// Whether instances are reset from run to run, or created anew.
     pub(crate) reuse: bool,
 }
 
@@ -44,10 +44,10 @@ impl Cut {
     }
 }
 
-/// How many rows of the results failed, and the first of them.
+/// Number of failed rows of the results, and the first of them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Failures {
-    /// How many rows failed.
+    /// Number of failed rows.
     pub count: u64,
     /// The first three: row and error.
     pub first: Vec<(u64, String)>,
@@ -82,7 +82,7 @@ fn identity(sweep: &Sweep) -> Result<Value, Error> {
 }
 
 impl Output {
-    /// Opens the folder, or begins it with the parts that a function determines.
+    /// Opens the folder, or creates it with the parts that a function determines.
     pub(crate) fn open(sweep: &Sweep, folder: &Path, cut: impl FnOnce() -> Result<Cut, Error>) -> Result<Self, Error> {
         let path = folder.join("sweep.json");
         let mine = identity(sweep)?;
@@ -92,7 +92,7 @@ impl Output {
             whole["rows_per_part"] = cut.rows_per_part.into();
             whole["reuse"] = cut.reuse.into();
             let text = serde_json::to_string_pretty(&whole).map_err(|e| Error::file(&path, e))?;
-            // If another process was faster, its cut counts.
+            // If another process was faster, its division into parts applies.
             files::create(&path, (text + "\n").as_bytes())?;
         }
         let text = fs::read_to_string(&path).map_err(|e| Error::file(&path, e))?;
@@ -170,7 +170,7 @@ impl Output {
     }
 }
 
-/// Removes the results of a sweep, and nothing else; of a folder without `sweep.json` nothing at all.
+/// Removes the results of a sweep, and nothing else; in a folder without `sweep.json` it removes nothing.
 pub(crate) fn restart(folder: &Path) -> Result<(), Error> {
     if !folder.join("sweep.json").exists() {
         return Ok(());
@@ -194,7 +194,7 @@ pub(crate) fn restart(folder: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// The first thing in which two descriptions differ; what only the first has does not count.
+/// The first difference of two descriptions; entries that only the first has do not count.
 fn difference(place: &str, there: &Value, here: &Value) -> Option<String> {
     if there == here {
         return None;
@@ -202,7 +202,7 @@ fn difference(place: &str, there: &Value, here: &Value) -> Option<String> {
     let inner = |key: &str| if place.is_empty() { key.to_owned() } else { format!("{place}.{key}") };
     match (there, here) {
         (Value::Object(a), Value::Object(b)) => {
-            // The definition says more than its hash.
+            // The definition is more informative than its hash.
             let first = b.iter().filter(|(key, _)| *key != "sha256");
             let found = first
                 .chain(b.iter().filter(|(key, _)| *key == "sha256"))

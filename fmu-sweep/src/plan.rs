@@ -8,25 +8,25 @@ use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
 use fmu_import::{Fmu, Kind};
 use fmu_system::cosimulation::{
-    self, Integration, Method, Recording, Schedule, Settings, Solver, Target, Worker, item,
+    self, Integration, Method, PlanTarget, Recording, Schedule, Settings, Solver, System, Units, Worker, item,
 };
 use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What all runs share. A clone refers to the same data; any thread may use it.
+/// Data shared by all runs. A clone refers to the same data; any thread may use it.
 #[derive(Clone)]
 pub struct Plan(Arc<Shared>);
 
 struct Shared {
     /// Records the variables of the measures, then those of the trace.
-    system: Arc<cosimulation::Plan>,
+    system: Arc<cosimulation::SystemPlan>,
     connectors: Connectors,
     measures: Vec<Measure>,
-    columns: Vec<Column>,
+    columns: Vec<ResultColumn>,
     trace: Vec<usize>,
-    /// `instance.variable` of all that the definition sets.
+    /// `instance.variable` of all variables that the definition sets.
     set: Vec<String>,
     outputs: Vec<String>,
     reuse: bool,
@@ -36,7 +36,8 @@ struct Shared {
 /// The first column of all results; neither a measure nor a varied variable may have its name.
 pub(crate) const RUN: &str = "run";
 
-/// Names of the last two columns of all results: `end` and `error`, or `run.end` and `run.error` where one of these names is taken.
+/// Names of the last two columns of all results: `end` and `error`, or `run.end` and `run.error` if one of these names is
+/// taken.
 pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
     ["end", "error"].map(|name| {
         let mut name = name.to_owned();
@@ -49,16 +50,16 @@ pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
 
 /// Name and unit of a column of results.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Column {
+pub struct ResultColumn {
     /// Name.
     pub name: String,
     /// Unit; empty for none.
     pub unit: String,
-    /// Numbers and names of an enumeration's values, of which results show the names; empty for other types.
+    /// Numbers and names of an enumeration's values (results show the names); empty for other types.
     pub items: Vec<(i64, String)>,
 }
 
-impl Column {
+impl ResultColumn {
     /// The name of the enumeration's value `x`.
     pub fn item(&self, x: f64) -> Option<&str> {
         item(&self.items, x)
@@ -67,69 +68,72 @@ impl Column {
 
 /// A variable that runs set, found by [`Plan::bind`]: one of an FMU, or an input of an SSP's system, which may feed several.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Variable {
+pub struct RunVariable {
     /// Name and unit.
-    pub column: Column,
-    targets: Vec<Target>,
+    pub column: ResultColumn,
+    targets: Vec<PlanTarget>,
 }
 
-impl Variable {
+impl RunVariable {
     /// The variables of FMUs that it sets.
-    pub(crate) fn targets(&self) -> &[Target] {
+    pub(crate) fn targets(&self) -> &[PlanTarget] {
         &self.targets
     }
 }
 
 /// The result of a run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcome {
-    /// The measures, or one line with what went wrong.
+pub struct RunResult {
+    /// The measures, or the error in one line.
     pub result: Result<Vec<f64>, String>,
-    /// Time in s that was reached; NaN if the run never began.
+    /// Time reached, in s; NaN if the run never began.
     pub end: f64,
 }
 
 /// The results of many runs: columns with one value per run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outcomes {
+pub struct RunResults {
     /// A column for each measure; NaN where the run failed.
     pub measures: Vec<Vec<f64>>,
-    /// Time in s that was reached; NaN if the run never began.
+    /// Time reached, in s; NaN if the run never began.
     pub end: Vec<f64>,
     /// The error.
     pub errors: Vec<Option<String>>,
 }
 
 impl Plan {
-    /// Opens the FMUs of a definition, connects them and sets what is the same in all runs. Relative paths begin in `folder`.
+    /// Opens the FMUs of a definition, connects them and sets the values common to all runs. Relative paths begin in `folder`.
     ///
     /// # Errors
-    /// A file is not an FMU that runs here, a name or a value is wrong, or a measure makes no sense.
+    /// A file is not an FMU that runs here, or a name, a value or a measure is invalid.
     pub fn new(definition: &Definition, folder: &Path) -> Result<Self, Error> {
         if definition.fmus.is_empty() {
             return invalid("fmus: expected at least one FMU, or an SSP file");
         }
-        if let Some(rtol) = definition.rtol.filter(|rtol| !(1e-14..=0.1).contains(rtol)) {
-            return invalid(format!("rtol = {rtol}: expected a number between 1e-14 and 0.1"));
+        for (name, given) in [("rtol", definition.rtol), ("tolerance", definition.tolerance)] {
+            if let Some(x) = given.filter(|x| !(1e-14..=0.1).contains(x)) {
+                return invalid(format!("{name} = {x}: expected a number between 1e-14 and 0.1"));
+            }
         }
         let mut unknown = None;
-        let method = |fmus: &[(String, Fmu)]| {
+        let units = if definition.no_unit_conversion { Units::PassOn } else { Units::Convert };
+        let system = |fmus: &[(String, Fmu)]| {
             let known = |name: &&String| fmus.iter().any(|(other, _)| other == *name);
             unknown = definition.stepping.iter().find(|name| !known(name)).cloned();
-            method(definition, fmus)
+            System::new(method(definition, fmus)).with_units(units)
         };
-        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, method)?;
+        let mut loaded = Loaded::open_files_with(&definition.fmus, folder, false, system)?;
         if let Some(name) = unknown {
-            return invalid(format!("stepping: {name} is the name of no FMU"));
+            return invalid(format!("stepping: {name} is not the name of an FMU"));
         }
         let integrates = loaded.system.instances().iter().any(|i| i.kind() == Kind::ModelExchange);
-        if !integrates && (definition.solver.is_some() || definition.rtol.is_some()) {
-            return invalid(
-                "solver and rtol are for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'",
-            );
+        if !integrates && definition.solver.is_some() {
+            return invalid("solver is for Model Exchange, and no FMU runs so: give interface = 'ModelExchange'");
         }
+        let own = definition.rtol.filter(|_| !integrates);
+        loaded.system = loaded.system.with_tolerance(definition.tolerance.or(own));
         if integrates && definition.sequential {
-            return invalid("sequential: FMUs step one after another in Co-Simulation alone");
+            return invalid("sequential: FMUs step one after another only in Co-Simulation");
         }
         for [from, to] in &definition.connect {
             loaded.system.connect(from, to)?;
@@ -152,6 +156,7 @@ impl Plan {
         }
         let Definition { start, stop, step, .. } = *definition;
         let settings = loaded.settings(start, stop, step, definition.sequential);
+        let settings = loaded.system.feasible(&settings)?;
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
         for (name, measure) in &definition.measure.0 {
@@ -171,7 +176,8 @@ impl Plan {
         } else {
             loaded.connectors.outputs.iter().map(|(name, _)| name.clone()).collect()
         };
-        let Loaded { system, connectors, notes, .. } = loaded;
+        let Loaded { mut system, connectors, mut notes, .. } = loaded;
+        notes.extend(system.take_notes());
         let system = Arc::new(system.into_plan(&settings)?);
         let of = |name: &str| system.columns().iter().find(|c| c.name == name);
         let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {
@@ -184,7 +190,7 @@ impl Plan {
                 _ => None,
             };
             let unit = measure.unit(if same { units[0] } else { "" });
-            Column { name: name.clone(), unit, items: items.unwrap_or_default() }
+            ResultColumn { name: name.clone(), unit, items: items.unwrap_or_default() }
         });
         let columns = columns.collect();
         let measures = measures.into_iter().map(|(measure, _)| measure).collect();
@@ -193,7 +199,7 @@ impl Plan {
     }
 
     /// The FMUs, ready for runs.
-    pub(crate) fn system(&self) -> &cosimulation::Plan {
+    pub(crate) fn system(&self) -> &cosimulation::SystemPlan {
         &self.0.system
     }
 
@@ -202,13 +208,13 @@ impl Plan {
         self.0.reuse
     }
 
-    /// What reads the measures from recorded values.
+    /// The reader of the measures from recorded values.
     pub(crate) fn readers(&self) -> &[Measure] {
         &self.0.measures
     }
 
     /// Names and units of the measures.
-    pub fn measures(&self) -> &[Column] {
+    pub fn measures(&self) -> &[ResultColumn] {
         &self.0.columns
     }
 
@@ -232,7 +238,7 @@ impl Plan {
         &self.0.outputs
     }
 
-    /// The name of an FMU of which a process can have one instance only, if there is one: then runs are on one thread.
+    /// The name of an FMU that allows only one instance per process, if there is one; then all runs are on one thread.
     pub fn only_one_instance(&self) -> Option<&str> {
         self.0.system.only_one_instance()
     }
@@ -241,13 +247,13 @@ impl Plan {
     ///
     /// # Errors
     /// A variable does not exist, is not a number, cannot be set, is fed or set for all runs, or occurs twice.
-    pub fn bind<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Vec<Variable>, Error> {
-        let mut all: Vec<Variable> = Vec::new();
+    pub fn bind<'a>(&self, names: impl IntoIterator<Item = &'a str>) -> Result<Vec<RunVariable>, Error> {
+        let mut all: Vec<RunVariable> = Vec::new();
         for name in names {
             let system = &self.0.system;
             let mut targets = Vec::new();
             for port in self.0.connectors.ports(name)? {
-                // Values in an SSP file are what a run may replace; those of the definition are for all runs.
+                // A run may replace values of an SSP file, but not those of the definition.
                 if self.0.set.contains(&port) {
                     return invalid(format!("{name} is set for all runs and varied: remove one of them"));
                 }
@@ -258,7 +264,7 @@ impl Plan {
             }
             let of = targets.first().map(|target| system.column(target));
             let (unit, items) = of.map(|c| (c.unit, c.items)).unwrap_or_default();
-            all.push(Variable { column: Column { name: name.into(), unit, items }, targets });
+            all.push(RunVariable { column: ResultColumn { name: name.into(), unit, items }, targets });
         }
         Ok(all)
     }
@@ -267,8 +273,8 @@ impl Plan {
     ///
     /// # Errors
     /// The text is not a value of the variable's type.
-    pub fn number(&self, variable: &Variable, text: &str) -> Result<f64, Error> {
-        let number = |target: &Target| self.0.system.number(target, text);
+    pub fn number(&self, variable: &RunVariable, text: &str) -> Result<f64, Error> {
+        let number = |target: &PlanTarget| self.0.system.number(target, text);
         Ok(variable.targets.first().map_or(Ok(f64::NAN), number)?)
     }
 
@@ -276,7 +282,7 @@ impl Plan {
     ///
     /// # Errors
     /// The variable does not exist, or an FMU refuses.
-    pub fn simulate(&self, values: &[(Variable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
+    pub fn simulate(&self, values: &[(RunVariable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
         let source = |name: &String| Ok((self.0.connectors.source(name)?, name.clone()));
         let variables = outputs.iter().map(source).collect::<Result<Vec<_>, Error>>()?;
@@ -284,11 +290,11 @@ impl Plan {
         Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
     }
 
-    /// Makes a runner of one row after another, for one thread.
+    /// Creates a runner of one row after another, for one thread.
     ///
     /// # Errors
-    /// An FMU refuses to make an instance.
-    pub fn runner(&self, variables: &[Variable]) -> Result<Runner, Error> {
+    /// An FMU refuses an instance.
+    pub fn runner(&self, variables: &[RunVariable]) -> Result<Runner, Error> {
         Ok(Runner {
             plan: self.clone(),
             worker: self.0.system.worker()?,
@@ -303,15 +309,15 @@ impl Plan {
     /// the threads, and may stop the run.
     ///
     /// # Errors
-    /// The columns are not of one length, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run
-    /// is in its row.
+    /// The columns are not of one length, an FMU refuses to make an instance, or `progress` stops it. An error of a run is in
+    /// its row.
     pub fn run_many(
         &self,
-        variables: &[Variable],
+        variables: &[RunVariable],
         columns: &[&[f64]],
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         if variables.len() != columns.len() {
             return invalid(format!("{} columns of values for {} variables", columns.len(), variables.len()));
         }
@@ -331,9 +337,9 @@ impl Plan {
         self.run_rows(variables, u64::try_from(length).unwrap_or(u64::MAX), &row, threads, progress)
     }
 
-    /// The measures that the readings of a run have come to.
+    /// The measures from the readings of a run.
     pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<f64>, String> {
-        let of = |((measure, reading), column): ((&Measure, &Reading), &Column)| {
+        let of = |((measure, reading), column): ((&Measure, &Reading), &ResultColumn)| {
             measure.end(reading).map_err(|cause| format!("{}: {cause}", column.name))
         };
         self.0.measures.iter().zip(readings).zip(&self.0.columns).map(of).collect()
@@ -345,15 +351,15 @@ impl Plan {
     /// As for [`run_many`](Self::run_many).
     pub fn run_rows(
         &self,
-        variables: &[Variable],
+        variables: &[RunVariable],
         count: u64,
         row: &(dyn Fn(u64, &mut Vec<f64>) + Sync),
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         let rows =
             usize::try_from(count).map_err(|_| Error::Invalid(format!("{count} rows are too many for the memory")))?;
-        let all = Mutex::new((Outcomes::empty(self.0.measures.len(), rows), 0));
+        let all = Mutex::new((RunResults::empty(self.0.measures.len(), rows), 0));
         let threads = if self.only_one_instance().is_some() { 1 } else { threads };
         pool::run(
             count.div_ceil(BLOCK),
@@ -361,7 +367,7 @@ impl Plan {
             |_| Ok((self.runner(variables)?, Vec::new())),
             |(runner, values), block| {
                 let range = pool::rows_of(block, count);
-                let outcomes: Vec<Outcome> = range
+                let outcomes: Vec<RunResult> = range
                     .clone()
                     .map(|index| {
                         row(index, values);
@@ -382,12 +388,12 @@ impl Plan {
     }
 }
 
-impl Outcomes {
+impl RunResults {
     pub(crate) fn empty(measures: usize, rows: usize) -> Self {
         Self { measures: vec![vec![f64::NAN; rows]; measures], end: vec![f64::NAN; rows], errors: vec![None; rows] }
     }
 
-    pub(crate) fn put(&mut self, row: usize, outcome: Outcome) {
+    pub(crate) fn put(&mut self, row: usize, outcome: RunResult) {
         self.end[row] = outcome.end;
         match outcome.result {
             Ok(values) => self.measures.iter_mut().zip(values).for_each(|(column, x)| column[row] = x),
@@ -396,7 +402,7 @@ impl Outcomes {
     }
 }
 
-/// How the FMUs run: as the definition says, otherwise those step themselves that can.
+/// How to run the FMUs: as in the definition; by default those that can step themselves do.
 fn method(definition: &Definition, fmus: &[(String, Fmu)]) -> Method {
     let steps = |fmu: &Fmu| fmu.description().co_simulation.is_some();
     let stepping = match definition.interface {
@@ -413,7 +419,7 @@ fn method(definition: &Definition, fmus: &[(String, Fmu)]) -> Method {
     Method::ModelExchange(Integration { solver, stepping, ..Integration::default() })
 }
 
-/// The place of a name in a list, added if it is new.
+/// The position of a name in a list, added if it is new.
 fn place(names: &mut Vec<String>, name: &str) -> usize {
     names.iter().position(|n| n == name).unwrap_or_else(|| {
         names.push(name.to_owned());
@@ -432,7 +438,7 @@ fn of(measure: &MeasureDefinition, settings: &Settings, recorded: &mut Vec<Strin
 pub struct Runner {
     plan: Plan,
     worker: Worker,
-    variables: Vec<Variable>,
+    variables: Vec<RunVariable>,
     states: Vec<Reading>,
     reuse: bool,
     /// No run yet.
@@ -446,7 +452,7 @@ impl Runner {
     }
 
     /// Runs with a value for each variable. `trace` sees the time and the traced variables of every communication point.
-    pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> Outcome {
+    pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> RunResult {
         let Self { plan, worker, variables, states, .. } = self;
         let Shared { measures, trace: traced, .. } = &*plan.0;
         let mut end = f64::NAN;
@@ -466,7 +472,7 @@ impl Runner {
             })
         });
         let result = ended.map_err(|error| error.to_string()).and_then(|_| plan.measured(states));
-        Outcome { result, end }
+        RunResult { result, end }
     }
 }
 

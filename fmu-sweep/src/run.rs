@@ -18,7 +18,7 @@ use std::time::{Instant, SystemTime};
 /// How to run.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Threads or processes; otherwise as many as the machine runs at once.
+    /// Threads or processes; by default as many as the machine runs at once.
     pub jobs: Option<usize>,
     /// Only the parts k with k = I mod N.
     pub part: Option<(u64, u64)>,
@@ -26,15 +26,15 @@ pub struct Options {
     pub limit: Option<u64>,
     /// Remove earlier results first.
     pub restart: bool,
-    /// Run rows in processes of their own.
+    /// Run rows in separate processes.
     pub isolate: Option<Isolation>,
 }
 
-/// Receives news of a run, on any thread.
-pub trait Watch: Sync {
+/// Receives progress of a run, on any thread.
+pub trait Progress: Sync {
     /// A note of one line.
     fn note(&self, text: &str);
-    /// The number of rows that are done, of those to run, and how many of them failed.
+    /// The numbers of rows done, to run, and failed.
     fn progress(&self, done: u64, failed: u64, all: u64);
 }
 
@@ -43,7 +43,7 @@ pub trait Watch: Sync {
 pub struct Report {
     /// Rows that this call has run.
     pub rows: u64,
-    /// Parts of the sweep that are missing.
+    /// Missing parts of the sweep.
     pub missing: u64,
     /// All results, once no part is missing.
     pub results: Option<PathBuf>,
@@ -51,11 +51,11 @@ pub struct Report {
     pub failures: Failures,
 }
 
-/// Runs what is missing in the folder.
+/// Runs the missing parts of the folder.
 ///
 /// # Errors
-/// The folder is of another sweep, a file cannot be written, or an FMU cannot be instantiated. Parts that are complete stay.
-pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -> Result<Report, Error> {
+/// The folder is of another sweep, a file cannot be written, or an FMU cannot be instantiated. Complete parts remain.
+pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress) -> Result<Report, Error> {
     // An FMU may change the working directory.
     let folder = &std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
     if options.restart {
@@ -69,7 +69,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     let output = Output::open(sweep, folder, || match isolate {
         None => sweep.probe().map(|(seconds, reuse)| Cut::new(fixed, seconds, reuse)),
         Some(command) => {
-            // A row that kills the process says nothing of the others: small parts.
+            // If the probed row killed the process, the duration of a row is unknown: small parts.
             let probed = Process::new(sweep, command, true, None)?.probe()?;
             let (seconds, reuse) = probed.unwrap_or((0.05, sweep.definition().reuse.unwrap_or(true)));
             Ok(Cut::new(fixed, seconds, reuse))
@@ -77,7 +77,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     })?;
     let reuse = output.cut().reuse;
     if !reuse && sweep.definition().reuse.is_none() {
-        watch.note("a run after a reset differs from a run of a new instance: every run has new instances");
+        watch.note("a run after a reset differs from a run of a new instance: every run gets new instances");
     }
     if let Some(traces) = &traces {
         fs::create_dir_all(traces).map_err(|e| Error::file(traces, e))?;
@@ -85,7 +85,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     let missing = output.missing();
     let there = output.parts() - len(&missing);
     if there > 0 {
-        watch.note(&format!("{there} of {} parts are there already", output.parts()));
+        watch.note(&format!("{there} of {} parts already exist", output.parts()));
     }
     let mut jobs = Vec::new();
     let (mut rows, mut blocks) = (0, 0);
@@ -106,7 +106,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Watch) -
     };
     let log = Log::new(folder)?;
     log.write(&format!("{rows} rows in {} parts on {threads} jobs", jobs.len()))?;
-    let state = Mutex::new(Progress::default());
+    let state = Mutex::new(Tally::default());
     let work = Work { sweep, output: &output, jobs: &jobs, state: &state, watch, log: &log, rows };
     pool::run(
         blocks,
@@ -161,7 +161,7 @@ enum Executor<'a> {
 }
 
 #[derive(Default)]
-struct Progress {
+struct Tally {
     /// The completed lines of unfinished parts, by part number.
     parts: HashMap<u64, HashMap<u64, String>>,
     begun: HashMap<u64, Instant>,
@@ -173,8 +173,8 @@ struct Work<'a> {
     sweep: &'a Sweep,
     output: &'a Output,
     jobs: &'a [Job],
-    state: &'a Mutex<Progress>,
-    watch: &'a dyn Watch,
+    state: &'a Mutex<Tally>,
+    watch: &'a dyn Progress,
     log: &'a Log,
     /// Rows of all jobs.
     rows: u64,
@@ -218,12 +218,12 @@ impl Work<'_> {
         Ok(())
     }
 
-    fn state(&self) -> std::sync::MutexGuard<'_, Progress> {
+    fn state(&self) -> std::sync::MutexGuard<'_, Tally> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// `log.txt`: what may differ between two sweeps with the same results.
+/// `log.txt`: data that may differ between two sweeps with the same results.
 struct Log(Mutex<File>, PathBuf);
 
 impl Log {
@@ -252,7 +252,7 @@ struct Marker {
 }
 
 impl Marker {
-    fn new(folder: &Path, watch: &dyn Watch) -> Result<Self, Error> {
+    fn new(folder: &Path, watch: &dyn Progress) -> Result<Self, Error> {
         let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, e))?;
         let names = entries.flatten().filter(|e| e.file_name().to_string_lossy().starts_with(".running-"));
         let mut killed = false;
@@ -263,11 +263,11 @@ impl Marker {
             }
         }
         if killed {
-            watch.note("an earlier process ended in the middle; if an FMU crashes, --isolate makes its row an error");
+            watch.note("an earlier process was interrupted; if an FMU crashes, --isolate makes its row an error");
         }
         let path = folder.join(format!(".running-{}", files::own()));
         let lock = File::create(&path).map_err(|e| Error::file(&path, e))?;
-        // Without locks in this file system the note is missing, nothing else.
+        // Without locks in this file system only the note is missing.
         let _ = lock.try_lock();
         Ok(Self { path, _lock: lock })
     }

@@ -1,6 +1,6 @@
 //! The signal of a measure: a sum of variables.
 
-use crate::definition::Scalar;
+use crate::definition::SetValue;
 use std::f64::consts::PI;
 
 /// A sum as it is written.
@@ -11,7 +11,7 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
-    /// Reads `[number *] variable` with ` + ` and ` - ` between them: the spaces, because names may have signs.
+    /// Reads `[number *] variable` terms joined by ` + ` or ` - `; the spaces are required because names may contain signs.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let mut terms = Vec::new();
         let mut sign = Some(1.0);
@@ -54,12 +54,12 @@ impl Sum {
 pub(crate) struct Signal {
     /// Factors and columns.
     terms: Vec<(f64, usize)>,
-    /// Period that it is wrapped by.
+    /// Period of the wrapping.
     wrap: Option<f64>,
 }
 
 impl Signal {
-    /// `column` finds the place of a variable among the recorded values.
+    /// `column` returns the position of a variable among the recorded values.
     pub(crate) fn new(sum: &Sum, wrap: Option<f64>, mut column: impl FnMut(&str) -> usize) -> Self {
         Self { terms: sum.terms.iter().map(|(factor, name)| (*factor, column(name))).collect(), wrap }
     }
@@ -77,7 +77,7 @@ impl Signal {
 }
 
 /// A period: `6.28`, `"2pi"`, `"pi"`.
-pub(crate) fn period(wrap: &Scalar) -> Result<f64, String> {
+pub(crate) fn period(wrap: &SetValue) -> Result<f64, String> {
     let text = wrap.to_string();
     let number = match text.trim().strip_suffix("pi").map(str::trim) {
         Some("") => Some(PI),
@@ -118,12 +118,12 @@ mod tests {
 
     #[test]
     fn periods_are_numbers_or_have_pi() {
-        let text = |text: &str| period(&Scalar::Text(text.into()));
+        let text = |text: &str| period(&SetValue::Text(text.into()));
         assert_eq!(
             (text("2pi"), text("pi"), text("0.5 pi"), text("360")),
             (Ok(2.0 * PI), Ok(PI), Ok(0.5 * PI), Ok(360.0))
         );
-        assert_eq!(period(&Scalar::Integer(360)), Ok(360.0));
+        assert_eq!(period(&SetValue::Integer(360)), Ok(360.0));
         assert!(text("0").is_err() && text("x").is_err() && text("-2pi").is_err() && text("").is_err());
     }
 }

@@ -1,9 +1,9 @@
 //! A sweep from its file: its rows and their results, as lines of CSV.
 
-use crate::definition::{Runs, Trace, Which};
+use crate::definition::{Runs, Traces, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
-use crate::{Column, Definition, Error, Outcome, Outcomes, Plan, Rows, Runner, Variable};
+use crate::{Definition, DesignRows, Error, Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner};
 use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -13,14 +13,14 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// A sweep, ready to run: the file that defines it has been read, its FMUs are open, its names are found.
+/// A sweep, ready to run: its file is read, its FMUs are open, its names are resolved.
 #[derive(Clone)]
 pub struct Sweep {
     definition: Definition,
     folder: PathBuf,
     plan: Plan,
-    rows: Rows,
-    variables: Vec<Variable>,
+    rows: DesignRows,
+    variables: Vec<RunVariable>,
 }
 
 impl Sweep {
@@ -53,7 +53,7 @@ impl Sweep {
             let variable = plan.bind([name]).map_err(|e| e.to_string())?;
             plan.number(&variable[0], text).map_err(|e| e.to_string())
         };
-        let rows = Rows::new(design, &definition.vary, &folder, &number)?;
+        let rows = DesignRows::new(design, &definition.vary, &folder, &number)?;
         if rows.names().any(|name| name == RUN) {
             return invalid(format!("vary: {RUN} is the column with the number of each run: write INSTANCE.{RUN}"));
         }
@@ -69,7 +69,7 @@ impl Sweep {
                 return invalid(format!("measure: {name:?} has a comma, a quote or a line break: rename it"));
             }
         }
-        if let Some(Trace { every: Some(0), .. }) = definition.trace {
+        if let Some(Traces { every: Some(0), .. }) = definition.trace {
             return invalid("trace: every = 0, expected at least 1");
         }
         if design.part == Some(0) {
@@ -78,7 +78,7 @@ impl Sweep {
         Ok(Self { definition, folder, plan, rows, variables })
     }
 
-    /// The folder that relative paths refer to.
+    /// The folder to which relative paths refer.
     pub(crate) fn folder(&self) -> &Path {
         &self.folder
     }
@@ -94,27 +94,26 @@ impl Sweep {
     }
 
     /// The rows of the design.
-    pub fn rows(&self) -> &Rows {
+    pub fn rows(&self) -> &DesignRows {
         &self.rows
     }
 
     /// The varied variables, in the order of the columns of a row.
-    pub fn variables(&self) -> &[Variable] {
+    pub fn variables(&self) -> &[RunVariable] {
         &self.variables
     }
 
     /// Runs rows `first..first + count`, which must be rows of the design.
     ///
     /// # Errors
-    /// There are fewer rows, an FMU refuses to make an instance, or `progress` breaks off. What goes wrong in a run is in its
-    /// row.
+    /// There are fewer rows, an FMU refuses an instance, or `progress` stops it. An error of a run is in its row.
     pub fn run(
         &self,
         first: u64,
         count: u64,
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
-    ) -> Result<Outcomes, Error> {
+    ) -> Result<RunResults, Error> {
         if first.checked_add(count).is_none_or(|end| end > self.rows.count()) {
             let all = self.rows.count();
             return invalid(format!("rows from {first}, {count} of them, of a design with {all} rows"));
@@ -124,8 +123,9 @@ impl Sweep {
     }
 
     /// All columns of the results: `run`, the varied variables, the measures, `end`, `error` (or [`last_columns`]).
-    pub fn columns(&self) -> Vec<Column> {
-        let plain = |name: &str, unit: &str| Column { name: name.into(), unit: unit.into(), ..Column::default() };
+    pub fn columns(&self) -> Vec<ResultColumn> {
+        let plain =
+            |name: &str, unit: &str| ResultColumn { name: name.into(), unit: unit.into(), ..ResultColumn::default() };
         let varied = self.variables.iter().map(|variable| &variable.column);
         let mut all = vec![plain(RUN, "")];
         all.extend(varied.chain(self.plan.measures()).cloned());
@@ -140,7 +140,7 @@ impl Sweep {
         names.join(",") + "\n"
     }
 
-    /// Everything that an FMU or another file of the sweep is read from, with the SHA-256 of its bytes.
+    /// All files of the sweep, FMUs included, with the SHA-256 of their bytes.
     pub(crate) fn files(&self) -> Result<Vec<(String, String)>, Error> {
         let list = self.definition.design.iter().filter_map(|design| design.file.as_deref());
         let fmus = self.definition.fmus.iter().map(|text| fmu_system::ssp::load::name_and_path(text));
@@ -168,9 +168,9 @@ impl Sweep {
     }
 
     /// The line of a row, with its line break.
-    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &Outcome) -> String {
+    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &RunResult) -> String {
         let mut line = row.to_string();
-        let mut put = |(column, x): (&Column, &f64)| {
+        let mut put = |(column, x): (&ResultColumn, &f64)| {
             line.push(',');
             push_value(&mut line, &column.items, *x);
         };
@@ -198,8 +198,8 @@ impl Sweep {
         line.trim_end().splitn(columns + 1, ',').nth(columns).filter(|error| !error.is_empty())
     }
 
-    /// How long a run takes in s, and whether instances are reused: whether the last row has the same line after a reset as with
-    /// new instances.
+    /// Duration of a run in s, and whether instances can be reused, that is, whether the last row gives the same line after a
+    /// reset as with new instances.
     pub(crate) fn probe(&self) -> Result<(f64, bool), Error> {
         let (first, last) = (0, self.rows.count() - 1);
         let mut writer = self.writer(true, None)?;
@@ -273,7 +273,7 @@ fn push_value(text: &mut String, items: &[(i64, String)], x: f64) {
 /// A number that reads back to the same double, in few characters.
 fn push_number(text: &mut String, x: f64) {
     let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite();
-    // A String takes everything.
+    // Writing to a String cannot fail.
     let _ = if plain { write!(text, "{x}") } else { write!(text, "{x:e}") };
 }
 

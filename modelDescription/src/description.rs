@@ -1,5 +1,6 @@
-//! The content of a modelDescription.xml, as far as importers need it.
+//! The content of modelDescription.xml that importers need.
 
+use crate::conversion::Measured;
 use crate::units::{DisplayUnit, TypeDefinition, Unit};
 use crate::variable::{Dimension, ModelVariable};
 use crate::version::FmiVersion;
@@ -10,7 +11,7 @@ use fmu_core::variable::element;
 pub struct ModelDescription {
     /// The standard.
     pub version: FmiVersion,
-    /// `fmiVersion` as the file has it.
+    /// `fmiVersion` as in the file.
     pub fmi_version: String,
     /// Name of the model.
     pub model_name: String,
@@ -38,7 +39,7 @@ pub struct ModelDescription {
     pub model_exchange: Option<Interface>,
     /// The scheduled execution interface, if there is one (FMI 3.0 only).
     pub scheduled_execution: Option<Interface>,
-    /// `numberOfEventIndicators` as the file has it (FMI 2.0 only).
+    /// `numberOfEventIndicators` as in the file (FMI 2.0 only).
     pub number_of_event_indicators: Option<u32>,
     /// Recommended times, step size and tolerance.
     pub default_experiment: Experiment,
@@ -67,12 +68,14 @@ impl ModelDescription {
         named.or_else(|| self.variables.iter().find(|v| v.aliases.iter().any(|a| a.name == name)))
     }
 
-    /// Extents of a variable, none of a scalar; a structural parameter counts with its start value. `None` if a size is not known.
+    /// Extents of a variable, empty for a scalar; a structural parameter counts with its start value. `None` if a size is not
+    /// known.
     pub fn shape(&self, variable: &ModelVariable) -> Option<Vec<usize>> {
         self.shape_with(variable, |_| None)
     }
 
-    /// [`shape`](Self::shape), where `size` has the structural parameters, by value reference, that do not have their start values.
+    /// [`shape`](Self::shape), where `size` gives the structural parameters that differ from their start values, by value
+    /// reference.
     pub fn shape_with(&self, variable: &ModelVariable, size: impl Fn(u32) -> Option<usize>) -> Option<Vec<usize>> {
         let extent = |dimension: &Dimension| match dimension {
             Dimension::Fixed(n) => usize::try_from(*n).ok(),
@@ -84,7 +87,7 @@ impl ModelDescription {
         variable.dimensions.iter().map(extent).collect()
     }
 
-    /// The array of FMI 3.0 and the index of its element that this name means: `x[2]`, `m[1,2]`.
+    /// The array of FMI 3.0 and the element index denoted by this name: `x[2]`, `m[1,2]`.
     pub fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
         self.element_with(name, |_| None)
     }
@@ -115,7 +118,7 @@ impl ModelDescription {
     }
 
     /// The continuous states in the order of `x` in every call, which is the order of the derivatives in the model structure
-    /// (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). An entry that refers to no derivative of a variable is left out.
+    /// (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). Entries that do not refer to the derivative of a variable are left out.
     pub fn states(&self) -> Vec<&ModelVariable> {
         self.derivatives.iter().filter_map(|unknown| self.state_of(self.referenced(unknown.reference)?)).collect()
     }
@@ -125,10 +128,16 @@ impl ModelDescription {
         self.units.iter().find(|u| u.name == name)
     }
 
-    /// A unit to show the variable's values in: that of a name, or without one the variable's own.
+    /// A display unit for the variable's values: the named one, or by default the variable's.
     pub fn display_unit(&self, v: &ModelVariable, name: Option<&str>) -> Option<DisplayUnit> {
         let shown = self.unit(v.unit.as_deref()?)?.display_unit(name.or(v.display_unit.as_deref())?)?;
         Some(if v.relative { shown.of_differences() } else { shown.clone() })
+    }
+
+    /// What is known of the unit of a variable's values.
+    pub fn measured<'a>(&self, v: &'a ModelVariable) -> Measured<'a> {
+        let base = v.unit.as_deref().and_then(|name| self.unit(name)?.base);
+        Measured { unit: v.unit.as_deref(), base, relative: v.relative }
     }
 
     /// The type definition with this name.
@@ -204,8 +213,8 @@ impl Interface {
         self.flag(self.of("providesDirectionalDerivative", "providesDirectionalDerivatives"))
     }
 
-    /// The FMU wants to know of every completed integrator step (Model Exchange): FMI 2.0 says when it does not, FMI 3.0
-    /// when it does.
+    /// The FMU must be notified of every completed integrator step (Model Exchange): FMI 2.0 states when it need not be, FMI
+    /// 3.0 when it must.
     pub fn needs_completed_integrator_step(&self, version: FmiVersion) -> bool {
         match version {
             FmiVersion::V2 => !self.flag("completedIntegratorStepNotNeeded"),

@@ -1,6 +1,6 @@
 //! Reasons why a modelDescription.xml cannot be read.
 
-/// Why the XML cannot be read: the line, what was found and what was expected.
+/// The reason why the XML cannot be read: the line, the content found and expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -12,7 +12,7 @@ pub enum Error {
         /// Message of the parser.
         reason: String,
     },
-    /// The document is larger than any reader here takes: one of [`limits`](crate::limits).
+    /// The document exceeds one of the [`limits`](crate::limits) of readers.
     #[error("{0}")]
     Limit(String),
     /// An XML document of another kind.
@@ -22,7 +22,7 @@ pub enum Error {
         line: usize,
         /// Name of the root element.
         found: String,
-        /// Name that it should have.
+        /// Expected name.
         expected: &'static str,
     },
     /// FMI 1.0, or a version that does not exist.

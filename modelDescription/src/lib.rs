@@ -9,6 +9,7 @@
 
 #![forbid(unsafe_code)]
 
+mod conversion;
 mod date;
 mod description;
 mod error;
@@ -22,6 +23,7 @@ mod version;
 mod write;
 mod xml;
 
+pub use conversion::{Conversion, Measured, Passage};
 pub use date::date_from_epoch;
 pub use description::{CoSimulation, Experiment, Interface, LogCategory, ModelDescription, Unknown};
 pub use error::Error;

@@ -1,22 +1,22 @@
-//! Limits on what a description may ask for, one message each; what `fmu-import` adds keeps the checks of a file below 512 MB
+//! Limits on descriptions, each with a message; together with those of `fmu-import` they keep the checks of a file below 512 MB
 //! and 20 s.
 
 use std::fmt::Display;
 
-/// A limit on a number that a file has.
+/// A limit on a number in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit {
     /// What is limited.
     pub subject: &'static str,
     before: &'static str,
-    /// The greatest number that is allowed.
+    /// The maximum.
     pub most: u64,
     /// The unit of the number.
     pub unit: &'static str,
 }
 
 impl Limit {
-    /// The message of a number says `before`, the number and its unit.
+    /// The message consists of `before`, the number and its unit.
     pub const fn new(subject: &'static str, before: &'static str, most: u64, unit: &'static str) -> Self {
         Self { subject, before, most, unit }
     }
@@ -29,7 +29,7 @@ impl Limit {
         if found > self.most { Err(self.exceeded(found)) } else { Ok(()) }
     }
 
-    /// The message for a number beyond the limit; `found` may also say that counting ended there.
+    /// The message for a number beyond the limit; `found` may also state that counting ended there.
     pub fn exceeded(&self, found: impl Display) -> String {
         let Self { before, unit, most, .. } = self;
         format!("{before} {found} {unit}; the limit is {most}")

@@ -1,9 +1,9 @@
-//! Numbers as xs:double writes them.
+//! Numbers in the form of xs:double.
 
 /// The shortest text that reads back as the same double, in the form of xs:double.
 ///
-/// Small and large magnitudes get an exponent (`1e-7`, not 0.0000001), and what is not finite is spelled `INF`, `-INF` and
-/// `NaN` as XML Schema spells it.
+/// Small and large magnitudes get an exponent (`1e-7`, not 0.0000001), and non-finite values are spelled `INF`, `-INF` and
+/// `NaN` as in XML Schema.
 ///
 /// ```
 /// assert_eq!(model_description::format_number(325.0), "325");

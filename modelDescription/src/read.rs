@@ -1,8 +1,8 @@
 //! modelDescription.xml of any FMU of either standard.
 //!
-//! The reader requires what an importer cannot work without: well-formed XML, a known version, required attributes and
-//! values of the right form. It does not judge the content: it accepts duplicate names and undefined units for a
-//! checker to find. It ignores unknown elements and attributes.
+//! The reader requires the minimum for an importer: well-formed XML, a known version, required attributes and values of the
+//! right form. It does not check the content: duplicate names and undefined units are left to a checker. It ignores unknown
+//! elements and attributes.
 
 mod attributes;
 mod document;
@@ -24,7 +24,7 @@ use document::of_kind;
 /// Reads modelDescription.xml; the bytes must be UTF-8, as both standards require.
 ///
 /// # Errors
-/// Gives the line, what was found and what was expected.
+/// States the line, the content found and expected.
 pub fn read(xml: impl AsRef<[u8]>) -> Result<ModelDescription, Error> {
     read_element(&parse(decode(xml.as_ref())?)?)
 }

@@ -1,4 +1,4 @@
-//! Terminals and icons as a file has them (FMI 3.0.2, 2.4.9; FMI 2.0.5, 2.3 takes the file of FMI 3.0).
+//! Terminals and icons as in a file (FMI 3.0.2, 2.4.9; FMI 2.0.5, 2.3 refers to the file of FMI 3.0).
 
 /// A terminalsAndIcons.xml.
 #[derive(Clone, Debug, PartialEq)]
@@ -73,7 +73,7 @@ pub struct Terminal {
     pub streams: Vec<StreamMember>,
     /// Terminals inside this one.
     pub terminals: Vec<Terminal>,
-    /// How it is drawn.
+    /// Its appearance.
     pub picture: Option<TerminalPicture>,
     /// Line of the element.
     pub line: usize,
@@ -103,7 +103,7 @@ pub struct StreamMember {
     pub line: usize,
 }
 
-/// How a terminal is drawn.
+/// Appearance of a terminal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TerminalPicture {
     /// Where.

@@ -1,4 +1,4 @@
-//! Units and type definitions as a file has them (FMI 2.0.5, 2.2.2 and 2.2.3; FMI 3.0.2, 2.4.3 and 2.4.4).
+//! Units and type definitions as in a file (FMI 2.0.5, 2.2.2 and 2.2.3; FMI 3.0.2, 2.4.3 and 2.4.4).
 
 use crate::variable::BaseType;
 
@@ -9,7 +9,7 @@ pub struct Unit {
     pub name: String,
     /// Its relation to the SI base units, if the file gives it.
     pub base: Option<BaseUnit>,
-    /// Units to show values in.
+    /// Display units for values.
     pub display_units: Vec<DisplayUnit>,
     /// Line of the element.
     pub line: usize,
@@ -38,7 +38,7 @@ impl BaseUnit {
     pub const NAMES: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 }
 
-/// A unit to show values in: `shown = factor * value + offset`, or `factor / value` when inverse.
+/// A display unit: `shown = factor * value + offset`, or `factor / value` when inverse.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DisplayUnit {
     /// Name, for example `rpm`.
@@ -52,7 +52,7 @@ pub struct DisplayUnit {
 }
 
 impl DisplayUnit {
-    /// The conversion of differences of values: its factor alone.
+    /// The conversion of differences of values: only its factor.
     pub fn of_differences(&self) -> Self {
         Self { offset: 0.0, ..self.clone() }
     }
@@ -81,9 +81,9 @@ pub struct TypeDefinition {
     pub quantity: Option<String>,
     /// Name of the unit.
     pub unit: Option<String>,
-    /// Unit to show values in.
+    /// Display unit.
     pub display_unit: Option<String>,
-    /// Values are differences, for which the offset of a display unit does not count (`relativeQuantity`).
+    /// Values are differences, to which the offset of a display unit does not apply (`relativeQuantity`).
     pub relative: Option<bool>,
     /// Lower bound.
     pub min: Option<f64>,

@@ -1,6 +1,6 @@
-//! Variables as a file has them (FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7).
+//! Variables as in a file (FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7).
 
-/// Declares an enumeration of words of the XML: the words, both ways, in one place.
+/// Declares an enumeration of words of the XML, with conversions in both directions.
 macro_rules! words {
     ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $word:literal),* $(,)? }) => {
         $(#[$doc])*
@@ -67,7 +67,7 @@ words! {
 }
 
 words! {
-    /// Where the initial value comes from.
+    /// Source of the initial value.
     Initial {
         /// The start value.
         Exact = "exact",
@@ -145,7 +145,7 @@ words! {
     }
 }
 
-/// When a clock ticks, as the file says it (FMI 3.0 only).
+/// When a clock ticks, as in the file (FMI 3.0 only).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockTiming {
     /// Who knows when it ticks.
@@ -174,7 +174,7 @@ pub struct Alias {
     pub name: String,
     /// One sentence.
     pub description: Option<String>,
-    /// Unit to show values in.
+    /// Display unit.
     pub display_unit: Option<String>,
 }
 
@@ -191,13 +191,13 @@ pub struct ModelVariable {
     pub causality: Causality,
     /// When it changes.
     pub variability: Variability,
-    /// Where the initial value comes from, as the file says it; see [`initial_or_default`](Self::initial_or_default).
+    /// Source of the initial value, as in the file; see [`initial_or_default`](Self::initial_or_default).
     pub initial: Option<Initial>,
     /// Base type.
     pub base: BaseType,
     /// Name of the type definition.
     pub declared_type: Option<String>,
-    /// Start value as the file has it: a list for an array of numbers, the first `<Start>` of an FMI 3.0 String or Binary.
+    /// Start value as in the file: a list for an array of numbers, the first `<Start>` of an FMI 3.0 String or Binary.
     pub start: Option<String>,
     /// All `<Start>` values of an FMI 3.0 String or Binary.
     pub start_texts: Vec<String>,
@@ -205,9 +205,9 @@ pub struct ModelVariable {
     pub quantity: Option<String>,
     /// Name of the unit.
     pub unit: Option<String>,
-    /// Unit to show values in.
+    /// Display unit.
     pub display_unit: Option<String>,
-    /// The value is a difference, for which the offset of a display unit does not count (`relativeQuantity`).
+    /// The value is a difference, to which the offset of a display unit does not apply (`relativeQuantity`).
     pub relative: bool,
     /// Lower bound; beyond 2^53 the nearest double.
     pub min: Option<f64>,
@@ -215,21 +215,21 @@ pub struct ModelVariable {
     pub max: Option<f64>,
     /// Typical magnitude.
     pub nominal: Option<f64>,
-    /// Greatest number of bytes of a Binary.
+    /// Maximum number of bytes of a Binary.
     pub max_size: Option<u64>,
     /// Extents of an array, empty for a scalar.
     pub dimensions: Vec<Dimension>,
     /// Other names.
     pub aliases: Vec<Alias>,
-    /// The state whose derivative this is, as the file says it: an index in FMI 2.0, a value reference in FMI 3.0.
+    /// The state whose derivative this is, as in the file: an index in FMI 2.0, a value reference in FMI 3.0.
     pub derivative: Option<u32>,
     /// A state may jump at events (Model Exchange only).
     pub reinit: bool,
     /// It can be read or set inside a communication step (FMI 3.0 only).
     pub intermediate: bool,
-    /// Value references of the clocks that this belongs to (FMI 3.0 only).
+    /// Value references of its clocks (FMI 3.0 only).
     pub clocks: Vec<u32>,
-    /// When a clock ticks; `None` where the file does not say it as the standard does.
+    /// When a clock ticks; `None` if the file does not follow the standard.
     pub timing: Option<ClockTiming>,
     /// Line of the element.
     pub line: usize,

@@ -14,7 +14,7 @@ pub enum FmiVersion {
 
 impl fmt::Display for FmiVersion {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // `fmiVersion` names no patch release: FMI 2.0.5, 2.2.1; FMI 3.0.2, 2.4.1.
+        // `fmiVersion` does not include a patch release: FMI 2.0.5, 2.2.1; FMI 3.0.2, 2.4.1.
         f.pad(match self {
             Self::V2 => "2.0",
             Self::V3 => "3.0",

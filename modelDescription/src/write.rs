@@ -50,7 +50,7 @@ pub fn write(description: &Description, version: FmiVersion, generation: &Genera
     print(&root)
 }
 
-/// Whether the standard has room for the variables: FMI 2.0 needs at least one, and its Integer has 32 bits.
+/// Checks that the standard supports the variables: FMI 2.0 needs at least one, and its Integer has 32 bits.
 ///
 /// # Errors
 /// Names the variable, its value and the remedy.
@@ -71,8 +71,7 @@ pub fn fits(description: &Description, version: FmiVersion) -> Result<(), String
         {
             let (name, of) = (&v.name, of.name());
             return Err(format!(
-                "{name} starts with {x}, and an Integer of FMI 2.0 has 32 bits: choose another start value, or build \
-                 for FMI 3.0 only, which has {of}"
+                "{name} starts with {x}, which does not fit a 32-bit FMI 2.0 Integer: choose another start value, or build for FMI 3.0 only, where it is {of}"
             ));
         }
     }
@@ -145,7 +144,7 @@ fn derivatives(element: Element, exchange: &ModelExchange, version: FmiVersion) 
     }
 }
 
-/// FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2 and 4.4. What is not written is `false` in both.
+/// FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2 and 4.4. Omitted attributes are `false` in both.
 fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     let exchange = description.model_exchange.as_ref();
     let continuous = exchange.is_some_and(|exchange| !exchange.states.is_empty());

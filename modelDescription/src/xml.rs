@@ -1,4 +1,4 @@
-//! A small element tree: names, attributes, children. Neither standard keeps anything in text content, so there is none.
+//! A small element tree: names, attributes, children. Neither standard uses text content, so it is not stored.
 
 mod element;
 mod parse;

@@ -1,4 +1,4 @@
-//! What the reader makes of other people's files, and of files that are broken.
+//! The reader on foreign files, and on broken ones.
 
 mod common;
 

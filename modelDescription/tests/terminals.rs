@@ -47,7 +47,7 @@ fn a_model_without_has_no_file() {
     assert!(!no_icon.contains("<Icon ") && no_icon.contains("<Terminals>"));
 }
 
-/// What our writer does not use: terminals inside terminals, streams, rules of others.
+/// Features that our writer does not use: terminals inside terminals, streams, foreign rules.
 #[test]
 fn files_of_others() {
     let read = read_terminals(

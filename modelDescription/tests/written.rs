@@ -1,4 +1,4 @@
-//! What the writer says, read back and held against the description and the rules of the standards.
+//! The output of the writer, read back and compared with the description and the rules of the standards.
 
 mod common;
 
@@ -52,7 +52,7 @@ fn header() {
     }
 }
 
-/// What users see has its own name; the binary keeps its name.
+/// The name for users may differ; the binary keeps its name.
 #[test]
 fn a_title_is_the_name_of_the_model() {
     for version in VERSIONS {
@@ -120,7 +120,7 @@ fn variables_come_back() {
         if version == FmiVersion::V2 {
             assert!(md.variables.iter().all(|v| v.causality != Causality::Independent && v.value_reference > 0), "V03");
         } else {
-            // OMSimulator counts value references of FMI 3.0 from 1: time, which is 0, stands behind all others.
+            // OMSimulator counts value references of FMI 3.0 from 1: time, which is 0, comes last.
             let time = md.variables.last().unwrap();
             assert_eq!((time.name.as_str(), time.value_reference, time.unit.as_deref()), ("time", 0, Some("s")), "V03");
             assert_eq!((time.causality, time.variability), (Causality::Independent, Variability::Continuous), "V03");
@@ -138,7 +138,7 @@ fn variables_come_back() {
         }
         let u_dc = md.variable("u_dc").unwrap();
         assert_eq!((u_dc.min, u_dc.max, u_dc.nominal), (Some(0.0), Some(1e21), Some(300.0)));
-        // An integer's bound that xs:int cannot say is no bound.
+        // A bound of an integer that xs:int cannot express is omitted.
         let n_p = md.variable("motor.n_p").unwrap();
         assert_eq!((n_p.min, n_p.max), (Some(1.0), None));
         let mut names: Vec<_> = md.variables.iter().map(|v| &v.name).collect();
@@ -255,7 +255,7 @@ fn wide_integers_and_matrices() {
     let b = d.variables.iter_mut().find(|v| v.name == "filter.b").unwrap();
     (b.shape, b.start) = (vec![1, 3], Some([0.0, 1.0, 2.0].map(Value::Real).to_vec()));
     let refusal = fits(&d, FmiVersion::V2).unwrap_err();
-    assert!(refusal.starts_with("motor.n_p starts with 18446744073709551615, and an Integer of FMI 2.0"), "{refusal}");
+    assert!(refusal.starts_with("motor.n_p starts with 18446744073709551615, which does not fit"), "{refusal}");
     assert_eq!(fits(&d, FmiVersion::V3), Ok(()));
     let three = write(&d, FmiVersion::V3, &generation());
     assert!(three.contains(r#"max="10000000000000000000" start="18446744073709551615""#), "{three}");
@@ -274,7 +274,7 @@ fn a_model_without_outputs_has_no_empty_list() {
         let time = usize::from(version == FmiVersion::V3);
         assert_eq!(read(&text).map(|md| md.variables.len()).ok(), Some(time));
     }
-    // The schema of FMI 2.0 wants a variable.
+    // The schema of FMI 2.0 requires a variable.
     let refusal = fits(&bare, FmiVersion::V2).unwrap_err();
     assert!(refusal.contains(" has no variable, and FMI 2.0 needs at least one"), "{refusal}");
     assert_eq!(fits(&bare, FmiVersion::V3), Ok(()));

@@ -1,7 +1,7 @@
-"""The build backend of `fmurun`: maturin, after the drives and the machines are in the package.
+"""The build backend of `fmurun`: maturin, after the drives and the machines have been added to the package.
 
-In a clone of the repository, Cargo builds the drives for this computer; `FMURUN_ARCHIVES` names a folder with fmi2/ and fmi3/ that
-`fmu build` wrote, to take them from there. A source distribution has them in it.
+In a clone of the repository, Cargo builds the drives for this computer, or they are taken from `FMURUN_ARCHIVES`, a folder with fmi2/
+and fmi3/ of `fmu build`. A source distribution contains them.
 """
 
 import os
@@ -16,7 +16,7 @@ _DRIVES = _PACKAGE / "fmurun" / "drives"
 
 
 def _copy(source, target):
-    """A file is whole or as it was: another build may run beside this one."""
+    """Replaces a file atomically, because another build may run at the same time."""
     target.parent.mkdir(parents=True, exist_ok=True)
     partial = target.with_name(f"{target.name}.{os.getpid()}")
     shutil.copyfile(source, partial)
@@ -42,7 +42,7 @@ def _drives():
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     _drives()
-    # Calls of an FMU pass three of our crates: as one, they are 2 % faster.
+    # Calls of an FMU pass through three of our crates: in one unit, they are 2 % faster.
     os.environ.setdefault("CARGO_PROFILE_RELEASE_LTO", "thin")
     return maturin.build_wheel(wheel_directory, config_settings, metadata_directory)
 

@@ -4,7 +4,8 @@
 
 DIR of the archives has fmi2/ and fmi3/ of `fmu build`; every wheel has these archives, so build them with a binary for each platform
 (`fmu build --release-dir` does both). This needs maturin and ziglang (pip install maturin==1.16.0 ziglang==0.17.1), Rust's standard library
-for each target, and mingw for Windows. What is missing is printed, and that wheel is left out. Prints the paths of the files, and nothing else.
+for each target, and mingw for Windows. If something is missing, a message says so and that wheel is omitted. Prints only the
+paths of the files.
 """
 
 import argparse

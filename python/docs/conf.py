@@ -12,7 +12,7 @@ myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-# The pages need none of the engines.
+# The pages do not need the engines.
 autodoc_mock_imports = ["dask", "distributed", "fsspec", "gymnasium", "pyarrow"]
 napoleon_use_rtype = False
 exclude_patterns = ["build"]

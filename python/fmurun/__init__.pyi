@@ -76,6 +76,7 @@ class Plan:
         fmi_type: _Interface | Mapping[str, _Interface] | None = None,
         solver: Literal["Dopri", "RK4"] | None = None,
         relative_tolerance: float | None = None,
+        unit_conversion: bool = True,
     ) -> None: ...
     @staticmethod
     def from_toml(path: _Path, *, output: Sequence[str] | None = None, embed: bool = False) -> Plan: ...

@@ -1,11 +1,11 @@
-"""Model descriptions as objects with the attributes that FMPy gives them."""
+"""Model descriptions as objects with FMPy's attributes."""
 
 from dataclasses import dataclass, field
 
 
 @dataclass(eq=False)
 class DefaultExperiment:
-    """Times (s) as texts of the file; None where the file gives none."""
+    """Times (s) as in the file; None if missing."""
 
     startTime: str | None = None
     stopTime: str | None = None
@@ -63,7 +63,7 @@ class Item:
 
 @dataclass(eq=False)
 class DisplayUnit:
-    """A unit to show values in: shown = factor * value + offset."""
+    """A display unit: shown = factor * value + offset."""
 
     name: str
     factor: float = 1.0

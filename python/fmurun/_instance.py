@@ -21,7 +21,7 @@ def _described(fmu):
 
 
 def _open(filename):
-    """An open FMU from an archive or from a folder with the files of one."""
+    """An open FMU from an archive or from a folder with its files."""
     filename = os.fspath(filename)
     if not os.path.isdir(filename):
         return _core.open(filename)
@@ -94,7 +94,7 @@ class _Instance(_core.Instance):
         pass
 
     def instantiate(self, visible=False, callbacks=None, loggingOn=False, **more):
-        """Switch logging on; the instance exists already, with the arguments of `instantiate_fmu`."""
+        """Switch logging on; the instance already exists, with the arguments of `instantiate_fmu`."""
         late = [name for name, value in {"visible": visible, "callbacks": callbacks, **more}.items() if value]
         if late:
             raise ValueError(f"{', '.join(late)}: give this to instantiate_fmu, which creates the instance")
@@ -110,7 +110,7 @@ class _Instance(_core.Instance):
         return self._take_messages()
 
     def _talk(self):
-        """Give messages and calls since the last time to the loggers."""
+        """Pass new messages and calls to the loggers."""
         logger, call_logger = self._loggers
         if call_logger is not None:
             for line in self._take_calls():
@@ -131,7 +131,7 @@ _STATUS = {"OK": 0, "Warning": 1, "Discard": 2, "Error": 3, "Fatal": 4, "Pending
 
 @lru_cache
 def _talking(cls):
-    """The class with methods that call the loggers when they end."""
+    """Wraps the methods of a class so that they call the loggers at their end."""
 
     def __getattribute__(self, name):
         value = cls.__getattribute__(self, name)
@@ -297,7 +297,7 @@ def instantiate_fmu(unzipdir, model_description, fmi_type=None, visible=False, d
 
 
 def _interface(description, fmi_type):
-    """ "CoSimulation" or "ModelExchange": what is asked for, or what the FMU has."""
+    """ "CoSimulation" or "ModelExchange": the requested interface, or that of the FMU."""
     has = {"CoSimulation": description.coSimulation, "ModelExchange": description.modelExchange}
     if fmi_type is None:
         fmi_type = next((name for name, interface in has.items() if interface), "CoSimulation")
@@ -309,7 +309,7 @@ def _interface(description, fmi_type):
 
 
 def _kind(description, fmi_type, event_mode, early_return):
-    """(Model Exchange, event mode, early return) as far as the FMU has them."""
+    """(Model Exchange, event mode, early return) if the FMU has them."""
     exchange, stepping = fmi_type == "ModelExchange", description.coSimulation
     three = description.fmiVersion != "2.0" and not exchange
     return exchange, three and event_mode and stepping.hasEventMode, three and early_return and stepping.mightReturnEarlyFromDoStep

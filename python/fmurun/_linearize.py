@@ -77,7 +77,7 @@ def linearize(fmu, point=None, *, time=0.0, inputs=None, outputs=None, method=No
         chosen[what] = list(all_.values()) if names is None else [all_[name] for name in names]
     given = dict(point or {})
     at = {v.name: _value(v, description, given.pop(v.name))[0] for v in states if v.name in given}
-    # Inputs are set at the point, too: the event of the initialization may change what they lead to.
+    # Inputs are set again at the point, because the event of the initialization may change their effect.
     before, during = _start_values(variables, description, given, True)
     wrong = [name for name, x in (*at.items(), *((v.name, x) for v, x in before)) if not np.isfinite(np.asarray(x, float)).all()]
     if wrong:

@@ -6,6 +6,7 @@ import os
 import shutil
 import tempfile
 import threading
+import warnings
 from collections import OrderedDict
 from contextlib import contextmanager
 
@@ -16,7 +17,7 @@ from ._error import FmuError
 from ._simulate import SimulationResult
 
 _LOCK = threading.Lock()
-# Plans of this process by their arguments: a task of Dask unpickles its plan and finds it here.
+# Plans of this process by their arguments: a Dask task unpickles its plan and finds it here.
 _MADE = OrderedDict()
 _KEPT = 16
 
@@ -38,12 +39,15 @@ class Plan:
         output: names that `simulate` records; by default all outputs
         measures: name -> {"of": "p.speed", "is": "min", "after": 0.2}, or a text ("speed" is its final value), or
             (text, function): functions are final, min, max, max_abs, mean, rms, integral, at, rise, settling; see docs/sweeps.md
+        unit_conversion: convert numbers between connected variables in different units; False passes them on as they are
         sequential: step the FMUs one after another, each with the new outputs of those before it
         embed: pickle the files, too
         fmi_type: "CoSimulation", "ModelExchange", or a dictionary with the one of each FMU; by default FMUs step themselves if they
             can. FMUs for Model Exchange are integrated as one system: events of any of them are met at their time, and algebraic
             loops are solved. Those for Co-Simulation among them step from one communication point to the next
-        solver, relative_tolerance: for Model Exchange: "Dopri" (the default, with a relative tolerance of 1e-6) or "RK4"
+        solver: for Model Exchange: "Dopri" (the default) or "RK4"
+        relative_tolerance: of "Dopri", by default 1e-6, or of the solvers inside FMUs for Co-Simulation, by default those of their
+            default experiments
 
     >>> plan = Plan(PLANT, start_values={"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}, stop_time=0.01, step_size=1e-4,
     ...             output=["i_a"], measures={"last": "i_a", "peak": ("i_a", "max_abs")})
@@ -58,7 +62,7 @@ class Plan:
 
     def __init__(self, fmus, *, connections="by_name", terminals=(), start_values=None, input=None, start_time=None,
                  stop_time=None, step_size=None, output=None, measures=None, sequential=False, embed=False,
-                 fmi_type=None, solver=None, relative_tolerance=None):  # fmt: skip
+                 fmi_type=None, solver=None, relative_tolerance=None, unit_conversion=True):  # fmt: skip
         files, self._prefix = _files(fmus)
         name = self._name if self._prefix else lambda name: name
         if isinstance(connections, str) and connections != "by_name":
@@ -69,6 +73,7 @@ class Plan:
             "auto_connect": by_name and len(files) > 1,
             "connect": [] if connections == "by_name" else [list(pair) for pair in connections],
             "terminal": [list(pair) for pair in terminals],
+            "no_unit_conversion": not unit_conversion,
             "sequential": bool(sequential),
             **_integration(fmi_type, solver, relative_tolerance, [key for key, _ in files], _is_ssp(files)),
             "start": _number("start_time", start_time),
@@ -99,6 +104,8 @@ class Plan:
         self._hashes = [hashlib.sha256(content).hexdigest() for content in contents]
         self._contents = contents if embed else None
         self._core = self._opened()
+        for note in self._core.notes():
+            warnings.warn(note, stacklevel=3)
 
     def _opened(self):
         key = json.dumps([self._definition, self._hashes, None if self._embed else self._folder], sort_keys=False)
@@ -113,7 +120,7 @@ class Plan:
     def _open(self):
         if not self._embed:
             return _core.Plan(json.dumps(self._definition), self._folder)
-        # The archives are files only until they are open.
+        # Archives are needed as files only until they are open.
         folder = tempfile.mkdtemp(prefix="fmurun-")
         try:
             paths, copies = _core.paths(json.dumps(self._definition)), []
@@ -134,7 +141,7 @@ class Plan:
             for path, expected in zip(_core.paths(json.dumps(self._definition)), self._hashes):
                 path = os.path.join(self._folder, path)
                 if hashlib.sha256(_read(path)).hexdigest() != expected:
-                    raise FmuError(None, None, None, f"{path}: is another file than the one that the plan was made of")
+                    raise FmuError(None, None, None, f"{path}: differs from the file with which the plan was created")
         self._core = self._opened()
 
     def _name(self, name):
@@ -269,7 +276,7 @@ class Plan:
 
 @contextmanager
 def _bar(progress, total):
-    """A function that gets the number of rows done, or None."""
+    """A function of the number of rows done, or None."""
     if progress is None or progress is False:
         yield None
     elif callable(progress):
@@ -292,11 +299,11 @@ def _named(items, column):
 
 
 def _integration(fmi_type, solver, tolerance, names, ssp):
-    """How the FMUs run, as a definition has it."""
+    """How to run the FMUs, in the form of a definition."""
     one = fmi_type if isinstance(fmi_type, dict) else dict.fromkeys(names, fmi_type)
     for name, kind in one.items():
         if name not in names and not ssp:
-            raise ValueError(f"fmi_type: {name} is the name of no FMU; expected one of {', '.join(names)}")
+            raise ValueError(f"fmi_type: {name} is not the name of an FMU; expected one of {', '.join(names)}")
         if kind not in (None, "CoSimulation", "ModelExchange"):
             raise ValueError(f"fmi_type of {name} must be CoSimulation or ModelExchange, not {kind!r}")
     if solver not in (None, "Dopri", "RK4"):
@@ -356,7 +363,7 @@ def _number(what, value):
 
 
 def _scalar(name, value):
-    """A start value as a definition has it."""
+    """A start value in the form of a definition."""
     value = value.item() if isinstance(value, (np.generic, np.ndarray)) and np.ndim(value) == 0 else value
     if isinstance(value, float) and not np.isfinite(value):
         raise ValueError(f"the start value of {name} must be finite, not {value}")
@@ -366,7 +373,7 @@ def _scalar(name, value):
 
 
 def _schedule(name, value):
-    """An input as `fmu simulate --input` has it."""
+    """An input in the form of `fmu simulate --input`."""
     if isinstance(value, str):
         return value
     try:
@@ -378,7 +385,7 @@ def _schedule(name, value):
 
 
 def _measure(key, value, name):
-    """A measure as a definition has it."""
+    """A measure in the form of a definition."""
     if isinstance(value, str):
         value = {"of": value, "is": "final"}
     elif isinstance(value, (tuple, list)) and len(value) == 2:
@@ -398,7 +405,7 @@ def _is_float(word):
 
 
 def _columns(table):
-    """Columns by name, of anything tabular."""
+    """Columns by name, from any table."""
     if isinstance(table, dict):
         return table
     if isinstance(table, np.ndarray) and table.dtype.names:
@@ -418,7 +425,7 @@ def _values(name, column, core, full):
         raise ValueError(f"the column {name} has {array.ndim} dimensions; expected one")
     if array.dtype.kind in "OUS" and all(isinstance(x, str) for x in array.tolist()):
         return np.array([core.number(full, x) for x in array.tolist()])
-    # NumPy also makes numbers from other kinds, for example NaN from None.
+    # NumPy also converts other kinds to numbers, for example None to NaN.
     bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
     if bad:
         raise TypeError(f"the column {name} must have numbers, not {bad[0]!r}")

@@ -1,4 +1,4 @@
-"""Plots of results: matplotlib, and the page with zoom that a notebook shows."""
+"""Plots of results: with matplotlib, and as a page with zoom for notebooks."""
 
 import html
 
@@ -6,12 +6,12 @@ import numpy as np
 
 from . import _core
 
-# What a notebook shows of a result with more columns than this: the first ones.
+# Maximum number of columns that a notebook shows: the first ones.
 _MOST = 24
 
 
 def units(result):
-    """Name -> (unit, factor, offset) of what is shown of each column: the display unit where the FMU gives one."""
+    """Name -> (unit, factor, offset) for each column: the display unit if the FMU defines one."""
     known = getattr(result, "units", None)
     if known is not None:
         return known
@@ -33,7 +33,7 @@ def units(result):
 
 
 def curves(result, columns=None):
-    """(name, unit, values as they are shown) of each column that is a number."""
+    """(name, unit, values in that unit) of each numeric column."""
     if getattr(result, "dtype", None) is None or result.dtype.names is None or "time" not in result.dtype.names:
         raise TypeError(f"a result is a structured array with the column time, not {type(result).__name__}")
     if columns is not None:
@@ -82,12 +82,12 @@ def plot(result, columns=None, *, figure=None):
 
 
 def page(result, title="fmurun", columns=None):
-    """The page with the figure of a result, as HTML: zoom, legend switches, values at the cursor; it needs no network."""
+    """The page with the figure of a result, as HTML: zoom, legend switches, values at the cursor; works offline."""
     return _core.run_page(title, np.ascontiguousarray(result["time"], dtype=float), curves(result, columns))
 
 
 def frame(result):
-    """What a notebook shows of a result."""
+    """The notebook representation of a result."""
     names = [name for name in result.dtype.names if name != "time"][:_MOST]
     if not len(result) or not names:
         return None

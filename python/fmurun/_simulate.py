@@ -15,7 +15,7 @@ _COLUMNS = {
     "Boolean": np.bool_,
 }  # fmt: skip
 _FLOATS = ("Real", "Float32", "Float64")
-# The least and the greatest value of each integer type.
+# The minimum and the maximum of each integer type.
 _INTEGERS = {f"Int{n}": (-(2 ** (n - 1)), 2 ** (n - 1) - 1) for n in (8, 16, 32, 64)}
 _INTEGERS |= {f"UInt{n}": (0, 2**n - 1) for n in (8, 16, 32, 64)} | {"Integer": _INTEGERS["Int32"]}
 
@@ -394,7 +394,7 @@ def _samples(description, variables, signals):
     if not t.size:
         raise ValueError("input has no row")
     if not np.isfinite(t).all() or (np.diff(t) < 0).any():
-        raise ValueError("the times of input must be finite and must not fall")
+        raise ValueError("the times of input must be finite and must not decrease")
     unknown = [name for name in names if name not in variables]
     if unknown:
         raise ValueError(f"{description.modelName} has no variable {', '.join(unknown)}; see input")

@@ -1,10 +1,10 @@
-"""A sweep on a Dask cluster: parts as Parquet files, every row once, whichever worker dies.
+"""A sweep on a Dask cluster: parts as Parquet files, every row once, even if workers die.
 
     client = Client(LocalCluster(n_workers=2, threads_per_worker=1))      # or any other cluster
     sweep(Plan.from_toml("sweep.toml"), None, "results", client)
     table = pyarrow.parquet.read_table("results")
 
-Workers need this package and pyarrow; `out` must be one place for all of them: a shared folder, or any place of fsspec
+Workers need this package and pyarrow; `out` must be the same location for all of them: a shared folder, or any fsspec location
 (s3://..., gs://...).
 """
 
@@ -24,7 +24,7 @@ from ._plan import _columns
 
 __all__ = ["sweep"]
 
-# Work of a part (s): little is lost with a worker, and the 10 ms of a task are negligible.
+# Work of a part (s): little is lost with a worker, and the overhead of 10 ms per task is negligible.
 _WORK = 7.0
 
 
@@ -34,7 +34,7 @@ def sweep(plan, rows, out, client, chunk=None):
     Args:
         plan: a Plan; workers open its files at the same paths, or take them from the pickle with `embed=True`
         rows: a table as for `Plan.run_many`; a number of rows, or None for all, of the plan's design
-        out: folder of the parts; parts that are there already are not run again
+        out: folder of the parts; existing parts are not run again
         client: a `distributed.Client`
         chunk: rows of a part; by default about 7 s of work, timed on the first row
 
@@ -82,14 +82,14 @@ def sweep(plan, rows, out, client, chunk=None):
     for future in as_completed(futures, raise_errors=False):
         first = first_of[future.key]
         try:
-            # Not `status`: a worker that has died since took the number with it, and `result` waits for another worker.
+            # Not `status`: a worker that has died has lost the number, and `result` waits for another worker.
             report["failed"] += future.result()
             continue
         except KilledWorker:
             pass
         except Exception as error:
             client.cancel(futures)
-            cause = f"{folder}/{_part(first)}: {type(error).__name__}: {error}; the other parts stay, and the sweep resumes"
+            cause = f"{folder}/{_part(first)}: {type(error).__name__}: {error}; the other parts remain, and the sweep resumes"
             raise error if isinstance(error, FmuError) else FmuError(None, None, None, cause) from error
         n = min(chunk, count - first)
         results = _isolated(plan, take(first, n), first)
@@ -144,7 +144,7 @@ def _agreed(fs, folder, cut):
 
 
 def _publish(fs, path, data):
-    """Write a file that gets its name when it is complete."""
+    """Write a file under a temporary name, and rename it when it is complete."""
     folder, name = path.rsplit("/", 1)
     partial = f"{folder}/.{name}-{uuid.uuid4().hex}"
     fs.pipe_file(partial, data)

@@ -3,8 +3,8 @@
     from fmurun.fmpy import extract, instantiate_fmu, read_model_description
 
 `read_model_description` returns objects with FMPy's attributes; `instantiate_fmu` returns an `FMU2Slave`, `FMU3Slave`,
-`FMU2Model` or `FMU3Model` with FMPy's methods. An `FmuError` (also `FMICallException` here) says which call failed and why.
-Scheduled Execution, intermediate update and functions of clocks are not there.
+`FMU2Model` or `FMU3Model` with FMPy's methods. An `FmuError` (also `FMICallException` here) names the failed call and the
+cause. Scheduled Execution, intermediate update and functions of clocks are not supported.
 """
 
 from ._description import (

@@ -1,9 +1,9 @@
 """Environments of Gymnasium on `Batch`: one, or many that step in one call.
 
-The task is three functions of arrays with a row for each instance, so that both kinds of environment take the same:
+The task is three functions of arrays with a row for each instance, so that both kinds of environment accept the same:
 
     reward(observations, actions) -> n numbers
-    terminated(observations) -> n Booleans; by default only an instance that fails ends
+    terminated(observations) -> n Booleans; by default an episode ends only if its instance fails
     randomize(generator, n) -> {start value: n numbers}, new for each episode
 """
 
@@ -39,7 +39,7 @@ class _Task:
 
 
 def _box(variables, names, bounds, what):
-    """A space from the bounds given, else from the minima and maxima of the variables."""
+    """A space from the given bounds, otherwise from the minima and maxima of the variables."""
     low, high = np.full(len(names), -np.inf), np.full(len(names), np.inf)
     for k, name in enumerate(names):
         variable = variables.get(name)
@@ -70,7 +70,7 @@ class Env(gymnasium.Env):
     def __init__(self, fmu, actions, observations, step_size, reward, terminated=None, **options):
         self._task, self._steps = _Task(fmu, 1, actions, observations, step_size, reward, terminated, **options), 0
         self.action_space, self.observation_space = self._task.action_space, self._task.observation_space
-        # A step takes about a microsecond: what it needs is at hand.
+        # A step takes about a microsecond, so its data are kept at hand.
         task = self._task
         self._advance, self._repeat, self._most = task.batch.step, task.repeat, task.max_steps
         self._reward, self._terminated = task.reward, task.terminated

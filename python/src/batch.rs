@@ -46,7 +46,7 @@ impl Lanes {
             one(lanes, actions.get(k * size * a..).unwrap_or_default(), out);
         };
         std::thread::scope(|scope| {
-            // This thread works too: a busy system may have no room for another.
+            // This thread works too, because a busy system may be unable to start another.
             for _ in 1..self.threads {
                 let _ = std::thread::Builder::new().spawn_scoped(scope, work);
             }
@@ -166,9 +166,9 @@ impl Batch {
 
     /// Write the actions, take `repeat` steps, read the observations.
     ///
-    /// `actions` has the shape (n, number of actions), or (number of actions,) for n = 1; `out` takes the observations
-    /// (n, number of observations) instead of a new array. An instance that fails has NaN from then on and its error in
-    /// `failed` until it is reset; FmuError when none is left.
+    /// `actions` has the shape (n, number of actions), or (number of actions,) for n = 1; `out` receives the observations (n,
+    /// number of observations) instead of a new array. A failed instance returns NaN, with its error in `failed`, until it is
+    /// reset; FmuError when no instance is left.
     #[pyo3(signature = (actions, repeat = 1, out = None))]
     fn step<'py>(
         &self,
@@ -212,7 +212,7 @@ impl Batch {
     /// The errors of the instances that failed, by their number.
     #[getter]
     fn failed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        // The lanes must not be locked here: making an exception runs Python, which may run another thread.
+        // The lanes must not be locked here: creating an exception runs Python, which may switch to another thread.
         let errors: Vec<_> = self.lanes().all.iter().map(|lane| lane.error.clone()).collect();
         let dict = PyDict::new(py);
         for (k, error) in errors.into_iter().enumerate().filter_map(|(k, e)| Some((k, e?))) {

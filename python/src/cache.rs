@@ -10,7 +10,7 @@ use std::collections::{HashMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Greatest number of unused FMUs that stay open.
+/// Maximum number of unused FMUs that stay open.
 const KEPT: usize = 16;
 
 static OPENED: Mutex<VecDeque<Arc<Opened>>> = Mutex::new(VecDeque::new());
@@ -29,7 +29,7 @@ impl Opened {
     }
 }
 
-/// The open FMU with these bytes; the lock is held while it opens, so that two threads open it once.
+/// The open FMU with these bytes; it is opened under the lock, so that two threads open it once.
 pub(crate) fn opened(path: &Path, bytes: Vec<u8>) -> Result<Arc<Opened>, Error> {
     let mut all = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(index) = all.iter().position(|o| *o.bytes == *bytes) {
@@ -48,7 +48,7 @@ pub(crate) fn opened(path: &Path, bytes: Vec<u8>) -> Result<Arc<Opened>, Error> 
     Ok(opened)
 }
 
-/// After a fatal error no instance of the library can be used (FMI 3.0.2, 2.2.4): the next one gets its own library.
+/// After a fatal error no instance of the library can be used (FMI 3.0.2, 2.2.4): the next one gets a separate library.
 pub(crate) fn forget(opened: &Arc<Opened>) {
     OPENED.lock().unwrap_or_else(PoisonError::into_inner).retain(|o| !Arc::ptr_eq(o, opened));
 }

@@ -1,4 +1,4 @@
-//! Where a simulation is: FMPy's regular points `start + (n + 1) interval`, the inputs and the rows.
+//! Progress of a simulation: FMPy's regular points `start + (n + 1) interval`, the inputs and the rows.
 
 use crate::input::{Input, is_close};
 use crate::record::Record;

@@ -1,4 +1,4 @@
-//! A model description as plain Python values; `fmurun/fmpy.py` makes objects like FMPy's from them.
+//! A model description as plain Python values; `fmurun/fmpy.py` creates objects like FMPy's from them.
 
 use model_description::{
     BaseType, Dimension, Experiment, FmiVersion, Interface, ModelDescription, ModelVariable, Unknown, format_number,
@@ -6,7 +6,7 @@ use model_description::{
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-/// Name of a type as the file has it.
+/// Name of a type as in the file.
 pub(crate) fn type_name(version: FmiVersion, base: BaseType) -> &'static str {
     match (version, base) {
         (FmiVersion::V2, BaseType::Float64) => "Real",

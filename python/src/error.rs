@@ -38,7 +38,7 @@ pub(crate) fn plain(message: &str) -> PyErr {
     make((None, None, None, message))
 }
 
-/// The way in for every call from Python: a panic becomes an `FmuError`, which `except Exception` sees, instead of PyO3's
+/// The entry of every call from Python: a panic becomes an `FmuError`, which `except Exception` catches, instead of PyO3's
 /// `PanicException`, which it does not.
 #[inline]
 pub(crate) fn gate<T>(call: impl FnOnce() -> PyResult<T>) -> PyResult<T> {

@@ -6,13 +6,13 @@ use crate::record::Record;
 use crate::stepping::update;
 use fmu_import::{Error, Instance};
 use fmu_system::cosimulation::{Equations, Feed, Inputs, Integration, Solver};
-use fmu_system::integration::{Driver, Stop, Trial};
+use fmu_system::integration::{Driver, StopReason, TrialError};
 use std::slice;
 
 /// FMPy's forward Euler: one step from point to point; events are not located.
 pub(crate) struct Euler {
     record_events: bool,
-    /// The regular point that the last step was made for.
+    /// The regular point of the last step.
     regular: f64,
     x: Vec<f64>,
     dx: Vec<f64>,
@@ -123,7 +123,7 @@ impl Euler {
     }
 }
 
-/// Our integrators: they land on time events, and locate state events.
+/// Our integrators: they hit time events exactly, and locate state events.
 pub(crate) struct Integrating {
     integration: Integration,
     /// Step of a fixed-step solver (s).
@@ -180,10 +180,10 @@ impl Integrating {
         if flow.is_break() { Err(ends(instance)) } else { Ok(()) }
     }
 
-    /// The sample of this point, and the way to the next regular point or event; false at the end.
+    /// The sample of this point, and the integration to the next regular point or event; false at the end.
     pub(crate) fn step(&mut self, course: &mut Course, instance: &mut Instance) -> Result<bool, Error> {
         let Some((equations, driver)) = &mut self.running else { return Ok(false) };
-        // Callbacks may have set what the FMU computes with.
+        // Callbacks may have set variables of the FMU.
         equations.forget();
         driver.forget();
         let (records, over, next) = (self.record_events, course.is_over(), cut(course.regular(), course.stop));
@@ -192,7 +192,7 @@ impl Integrating {
         let mut signals = Signals { input, record, since: &mut self.since, records };
         let mut fmus = equations.of(slice::from_mut(instance), &mut signals);
         let (t, x) = driver.point();
-        fmus.place(t, x).map_err(Trial::into_error)?;
+        fmus.place(t, x).map_err(TrialError::into_error)?;
         if sampled {
             signals.record.sample(instance, course.time)?;
         }
@@ -201,11 +201,11 @@ impl Integrating {
         }
         let stop = driver.stop_at(&mut equations.of(slice::from_mut(instance), &mut signals), next)?;
         self.regular = course.regular();
-        course.time = if stop == Stop::Target { next } else { driver.point().0 };
+        course.time = if stop == StopReason::Target { next } else { driver.point().0 };
         if is_close(course.time, self.regular) {
             course.reached += 1;
         }
-        course.ended = stop == Stop::End;
+        course.ended = stop == StopReason::End;
         Ok(!course.ended)
     }
 }

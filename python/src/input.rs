@@ -1,7 +1,7 @@
 //! Inputs over time as FMPy 0.3.32 applies them, to the last bit: `fmpy.simulation.Input`.
 //!
 //! Continuous variables are interpolated as `w0 v0 + (1 - w0) v1`, `w0 = (t1 - t) / (t1 - t0)`; discrete ones hold. Two samples
-//! of one time are an event: its right-hand values act from the step that begins there.
+//! at the same time are an event: its right-hand values act from the step that begins there.
 
 use fmu_import::{Error, Instance, Values};
 use model_description::BaseType;
@@ -11,7 +11,7 @@ pub(crate) struct Group {
     pub(crate) base: BaseType,
     pub(crate) continuous: bool,
     pub(crate) references: Vec<u32>,
-    /// The samples of each variable, or of each element of an array, which is alone in its group.
+    /// The samples of each variable, or of each element of an array, which has a separate group.
     pub(crate) tables: Vec<Vec<f64>>,
 }
 
@@ -33,7 +33,7 @@ pub(crate) fn is_close(a: f64, b: f64) -> bool {
     same || (a.is_finite() && b.is_finite() && (a - b).abs() <= 1e-9 * a.abs().max(b.abs()))
 }
 
-/// The samples that give the value at a time.
+/// The samples that determine the value at a time.
 enum At {
     Sample(usize),
     /// Between a sample and the next, with the weight of the first.
@@ -46,7 +46,7 @@ impl Input {
         self.events.iter().copied().find(|&t| t > time && !is_close(t, time)).unwrap_or(f64::INFINITY)
     }
 
-    /// Sets the inputs at `time`; `after_event` takes the right-hand values of an event.
+    /// Sets the inputs at `time`; `after_event` selects the right-hand values of an event.
     pub(crate) fn apply(&self, instance: &mut Instance, time: f64, after_event: bool) -> Result<(), Error> {
         self.apply_to(instance, time, after_event, |_| true)
     }
@@ -91,7 +91,7 @@ impl Input {
         Ok(())
     }
 
-    /// The derivative of a continuous input: 0 where the first or the last sample holds.
+    /// The derivative of a continuous input: 0 before the first and after the last sample.
     fn slope(&self, table: &[f64], time: f64, after_event: bool) -> f64 {
         let (t, i) = (&self.times, self.times.partition_point(|&x| x < time));
         if i == 0 || i == t.len() {

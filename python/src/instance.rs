@@ -20,7 +20,7 @@ pub(crate) struct Instance {
     fmi2: bool,
     /// `None` after it was freed.
     inner: Mutex<Option<fmu_import::Instance>>,
-    /// A line for each call to the FMU, if somebody wants them.
+    /// A line for each call to the FMU, if requested.
     calls: Option<Mutex<Vec<String>>>,
 }
 
@@ -47,7 +47,7 @@ impl Instance {
         Ok(Self { opened: opened.clone(), name: name.into(), id, fmi2, inner: Mutex::new(Some(inner)), calls })
     }
 
-    /// One call on the instance, with Python's lock held: for calls of less than a microsecond.
+    /// One call on the instance that keeps Python's lock: for calls of less than a microsecond.
     #[inline]
     fn call<T>(
         &self,
@@ -59,7 +59,7 @@ impl Instance {
     {
         gate(|| match self.inner.try_lock() {
             Ok(mut inner) => self.on(inner.as_mut(), call),
-            // Another thread calls, and may want Python's lock before it is ready.
+            // Another thread is calling, and may need Python's lock before it finishes.
             Err(_) => py.detach(|| self.with(call)),
         })
     }
@@ -115,7 +115,7 @@ impl Instance {
     }
 }
 
-/// Value references from a list, which is fast, or from anything that can be iterated.
+/// Value references from a list, which is fast, or from any iterable.
 fn references(vr: &Bound<'_, PyAny>) -> PyResult<Vec<u32>> {
     if let Ok(list) = vr.cast::<PyList>() {
         list.iter().map(|x| x.extract()).collect()
@@ -167,7 +167,7 @@ impl Instance {
         gate(|| Self::new(py, &fmu.get().0, name, kind, [logging, visible, traces]))
     }
 
-    /// Name that errors and messages give it.
+    /// Name in errors and messages.
     #[getter]
     #[pyo3(name = "instanceName")]
     fn name(&self) -> &str {
@@ -261,7 +261,7 @@ impl Instance {
         self.call(py, fmu_import::Instance::exit_initialization)
     }
 
-    /// Step from a time by a step size (s). FMI 3.0 returns (event encountered, end asked for, early return, time reached).
+    /// Step from a time by a step size (s). FMI 3.0 returns (event encountered, end requested, early return, time reached).
     #[pyo3(name = "doStep", signature = (currentCommunicationPoint, communicationStepSize, noSetFMUStatePriorToCurrentPoint = true))]
     #[allow(non_snake_case, unused_variables, reason = "FMPy's names; a state may be set at any time, promised or not")]
     fn do_step<'py>(

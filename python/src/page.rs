@@ -1,4 +1,4 @@
-//! A figure of a run with zoom and readings at the cursor, as a page: what a notebook shows of a result.
+//! A figure of a run with zoom and readings at the cursor, as a page: the notebook representation of a result.
 
 use crate::error::{gate, plain};
 use fmu_plot::figure::{Curve, Figure, Panel};

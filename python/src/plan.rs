@@ -1,8 +1,8 @@
-//! Many runs of one system: `fmurun.Plan` in `fmurun/_plan.py` has one of these.
+//! Many runs of one system: the implementation behind `fmurun.Plan` in `fmurun/_plan.py`.
 
 use crate::error::{gate, plain, raise};
 use fmu_import::guard::patiently;
-use fmu_sweep::{Definition, Outcomes, Sweep, Variable};
+use fmu_sweep::{Definition, RunResults, RunVariable, Sweep};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -37,7 +37,7 @@ pub(crate) fn read_definition(path: PathBuf) -> PyResult<String> {
     })
 }
 
-/// Paths of the files of a definition: those of the FMUs, then that of the design, as they are written.
+/// Paths of the files of a definition, as written there: those of the FMUs, then that of the design.
 #[pyfunction]
 pub(crate) fn paths(definition: &str) -> PyResult<Vec<String>> {
     gate(|| {
@@ -67,6 +67,11 @@ impl Plan {
         })
     }
 
+    /// What was noticed while the files were opened and connected.
+    fn notes(&self) -> Vec<String> {
+        self.plan.notes().to_vec()
+    }
+
     /// Run once: time, and (name, values) of each recorded variable.
     #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn simulate<'py>(
@@ -79,7 +84,7 @@ impl Plan {
         gate(|| {
             let run = || {
                 let set = self.plan.bind(names.iter().map(String::as_str))?;
-                let number = |(v, text): (Variable, &String)| Ok((v.clone(), self.plan.number(&v, text)?));
+                let number = |(v, text): (RunVariable, &String)| Ok((v.clone(), self.plan.number(&v, text)?));
                 let set: Vec<_> = set.into_iter().zip(&values).map(number).collect::<Result<_, fmu_sweep::Error>>()?;
                 self.plan.simulate(&set, outputs.as_deref())
             };
@@ -112,7 +117,7 @@ impl Plan {
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
             let run = |go_on: &GoOn<'_>| self.plan.run_many(&variables, &columns, threads, go_on);
-            let Outcomes { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
+            let RunResults { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
             let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
             Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
@@ -132,7 +137,7 @@ impl Plan {
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let run = |go_on: &GoOn<'_>| self.plan.run_around(&variables, &point, &steps, threads, go_on);
-            let Outcomes { measures, errors, .. } = py.detach(|| attended(run, None))?;
+            let RunResults { measures, errors, .. } = py.detach(|| attended(run, None))?;
             let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
             Ok((measures, errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
@@ -175,7 +180,7 @@ impl Plan {
         self.plan.outputs().to_vec()
     }
 
-    /// Numbers and names of an enumeration's values, of a variable that runs set; empty for other types.
+    /// Numbers and names of an enumeration's values, for a variable set in runs; empty for other types.
     fn items(&self, name: &str) -> PyResult<Vec<(i64, String)>> {
         gate(|| Ok(self.plan.bind([name]).map_err(failed)?.swap_remove(0).column.items))
     }
@@ -193,7 +198,7 @@ impl Plan {
         fmu_sweep::last_columns(|name| columns.iter().any(|column| column == name))
     }
 
-    /// The number that a text stands for as the value of a variable.
+    /// The number of a text as the value of a variable.
     fn number(&self, name: &str, text: &str) -> PyResult<f64> {
         gate(|| {
             let variable = self.plan.bind([name]).map_err(failed)?;
@@ -210,14 +215,14 @@ impl Plan {
     }
 }
 
-/// Gets the number of rows done, and says whether to go on.
+/// Called with the number of rows done; returns whether to continue.
 type GoOn<'a> = dyn Fn(u64) -> ControlFlow<()> + Sync + 'a;
 
 /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
 fn attended(
-    run: impl Fn(&GoOn<'_>) -> Result<Outcomes, fmu_sweep::Error> + Sync,
+    run: impl Fn(&GoOn<'_>) -> Result<RunResults, fmu_sweep::Error> + Sync,
     progress: Option<&Py<PyAny>>,
-) -> PyResult<Outcomes> {
+) -> PyResult<RunResults> {
     let stop = AtomicBool::new(false);
     let done_rows = AtomicU64::new(0);
     let tell = |py: Python<'_>| match progress {

@@ -1,4 +1,4 @@
-//! Rows of a result as NumPy's structured arrays store them: one packed record of bytes per sample.
+//! Rows of a result in the layout of NumPy's structured arrays: one packed record of bytes per sample.
 
 use fmu_import::{Error, Instance, Values};
 use model_description::BaseType;
@@ -59,7 +59,7 @@ impl Record {
 
 /// Appends values in the width of their type; enumerations have 32 bits in FMI 2.0, 64 in FMI 3.0.
 fn append(bytes: &mut Vec<u8>, base: BaseType, fmi2: bool, values: Values) {
-    /// Integers in the width of a type; the importer got them in this width.
+    /// Integers in the width of a type, as received by the importer.
     fn integers<const N: usize>(bytes: &mut Vec<u8>, values: &[i128], cut: impl Fn(i128) -> [u8; N]) {
         bytes.extend(values.iter().flat_map(|&x| cut(x)));
     }

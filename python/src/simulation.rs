@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// Steps between two checks of the clock and of Python's signals.
 const CHUNK: u32 = 1024;
 
-/// How the instance gets from point to point.
+/// Method from one point to the next.
 enum Way {
     Steps(Stepping),
     Euler(Euler),
@@ -42,7 +42,7 @@ impl Run {
         }
     }
 
-    /// What follows the initialization.
+    /// Actions after the initialization.
     fn begin(&mut self, instance: &mut fmu_import::Instance) -> Result<(), Error> {
         match &mut self.way {
             Way::Steps(way) => way.begin(&mut self.course, instance),
@@ -146,12 +146,12 @@ impl Simulation {
         self.with(py, |run, i| run.course.record.sample(i, time))
     }
 
-    /// Take one step; false when there was none, or when it was the last because the FMU asked to end.
+    /// Take one step; false if there was none, or if it was the last because the FMU requested the end.
     fn step(&self, py: Python<'_>) -> PyResult<bool> {
         self.with(py, Run::step)
     }
 
-    /// Run to the end, or until the timeout (s) is over.
+    /// Run to the end, or until the timeout (s).
     #[pyo3(signature = (timeout = None))]
     fn finish(&self, py: Python<'_>, timeout: Option<f64>) -> PyResult<()> {
         let end = timeout.map(|s| (Instant::now(), Duration::from_secs_f64(s.clamp(0.0, 1e9))));
@@ -183,7 +183,7 @@ impl Simulation {
         self.run().course.record.rows
     }
 
-    /// The rows as bytes; those of the simulation are then empty with `take`.
+    /// The rows as bytes; `take` empties those of the simulation.
     fn bytes<'py>(&self, py: Python<'py>, take: bool) -> Bound<'py, PyArray1<u8>> {
         let bytes = &mut self.run().course.record.bytes;
         if take { std::mem::take(bytes) } else { bytes.clone() }.into_pyarray(py)

@@ -4,11 +4,11 @@ use crate::course::{Course, cut};
 use crate::input::is_close;
 use fmu_import::{Error, Instance, Update};
 
-/// Most updates of discrete states of one event.
+/// Maximum number of updates of discrete states of one event.
 const UPDATES: usize = 1000;
 
 /// The FMU steps itself.
-#[expect(clippy::struct_excessive_bools, reason = "capabilities, and what was done")]
+#[expect(clippy::struct_excessive_bools, reason = "capabilities, and actions taken")]
 pub(crate) struct Stepping {
     /// Steps may have any size: they end at input events and at the stop time.
     pub(crate) variable_step: bool,
@@ -72,7 +72,7 @@ impl Stepping {
     }
 }
 
-/// Updates the discrete states in event mode until they need no other update, or the FMU asks to end the simulation.
+/// Updates the discrete states in event mode until they need no other update, or the FMU requests the end of the simulation.
 pub(crate) fn update(instance: &mut Instance, time: f64) -> Result<Update, Error> {
     for _ in 0..UPDATES {
         let update = instance.update_discrete_states()?;

@@ -1,4 +1,4 @@
-"""A plan with a row that kills its process, as an FMU of someone else may: in a module that workers import."""
+"""A plan with a row that kills its process, as a faulty FMU may, in a module that workers can import."""
 
 import os
 import signal

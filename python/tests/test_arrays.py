@@ -37,7 +37,7 @@ def test_model_exchange_has_the_solution(archive):
 
 
 def test_co_simulation_is_a_loop_by_hand(archive):
-    """Before each step the inputs of its begin, as one array."""
+    """Before each step, the inputs at its start, as one array."""
     result = simulate_fmu(archive, fmi_type="CoSimulation", input=SIGNALS, start_values=START, stop_time=1.0, output_interval=0.1, output=["y"])
     assert np.max(np.abs(result["y"][-1] - exact(np.array([1.0]))[0])) <= 0.1
     description = fmurun.fmpy.read_model_description(archive)

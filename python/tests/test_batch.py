@@ -142,7 +142,7 @@ def test_in_another_thread(plant):
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="another user has such a limit; root chooses one")
 def test_a_system_without_room_for_threads(plant):
-    """The thread that calls does what the others cannot."""
+    """The calling thread does the work of threads that cannot be started."""
     script = """
 import os, resource, sys
 import numpy as np

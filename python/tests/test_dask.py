@@ -77,7 +77,7 @@ def test_a_killed_worker_loses_no_row(archives, client, tmp_path):
 
 
 def test_a_worker_that_dies_with_its_number(archives, client, tmp_path, monkeypatch):
-    """The number of a finished part is gone before it is read: it comes from the part, and is no error."""
+    """The number of a finished part is gone before it is read: the number is read from the part, without an error."""
 
     def after_a_death(futures, **more):
         for future in list(as_completed(futures, **more)):
@@ -135,13 +135,13 @@ def test_a_full_disk_is_told_and_what_is_there_stays(archives, client, tmp_path)
     rows = table(40)
     sweep(drive(archives), rows, tmp_path, client, chunk=20)
     (tmp_path / "part-000000000020.parquet").unlink()
-    with pytest.raises(FmuError, match=r"part-000000000020\.parquet: OSError: .*No space.*; the other parts stay"):
+    with pytest.raises(FmuError, match=r"part-000000000020\.parquet: OSError: .*No space.*; the other parts remain"):
         sweep(drive(archives, Full), rows, tmp_path, client)
     assert sweep(drive(archives), rows, tmp_path, client)["skipped"] == 1
 
 
 def test_map_partitions(archives):
-    """The recipe for a Dask DataFrame stands on `meta`."""
+    """The recipe for a Dask DataFrame depends on `meta`."""
     plan = drive(archives)
     empty = plan.meta(["plant.motor.R_s", "tau_load"])
     results = plan.run_many(table(3))

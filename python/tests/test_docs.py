@@ -1,4 +1,4 @@
-"""The pages of python/docs: built without network, whole, and with every public name."""
+"""The pages of python/docs: built without network, complete, and with every public name."""
 
 import html
 import re

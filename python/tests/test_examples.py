@@ -1,4 +1,4 @@
-"""The examples run as they stand; that of Gymnasium is in test_gym.py. Ray and OpenTURNS are opt-in."""
+"""The examples run unchanged; that of Gymnasium is in test_gym.py. Ray and OpenTURNS are opt-in."""
 
 import os
 import re
@@ -58,7 +58,7 @@ def test_the_notebook_of_the_vehicle(tmp_path, monkeypatch):
 
 
 def test_the_fit_finds_the_values(standard):
-    """The recorded run has noise of 1e-3: the fit is within its own 95 % of what made the run."""
+    """The recorded run has noise of 1e-3: the true values are within the 95 % interval of the fit."""
     said = run("fit_scipy.py", standard / "PmsmPlant.fmu")
     found = re.findall(r"(motor\.\w+) = ([\d.]+) \+- ([\d.]+), true ([\d.]+)", said)
     assert [name for name, *_ in found] == ["motor.R_s", "motor.psi_M"], said

@@ -114,7 +114,7 @@ def test_event_mode_and_early_return_have_fmpys_bits(archives, events, early, h)
 
 
 def test_input_derivatives(archives, reference):
-    """A ramp that a step of 10 ms gets with its slope is as good as one in steps of 0.1 ms."""
+    """A ramp passed with its slope to a step of 10 ms is as accurate as one in steps of 0.1 ms."""
     ramp = np.array([(0.0, 0.0), (0.1, 2.0)], dtype=[("time", float), ("tau_load", float)])
     arguments = {"stop_time": 0.1, "input": ramp, "output": ["speed"], "start_values": VOLTAGES}
     archive = archives / "fmi2" / "PmsmPlant.fmu"

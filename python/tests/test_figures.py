@@ -1,6 +1,6 @@
-"""Figures against FMPy, as ratios within one run. `cargo test --test python figures -- --ignored --nocapture`, on an idle
-machine, measures the time of the clock, adds the long ones and asserts the goals. Elsewhere it is CPU time, and a figure may be
-half as good as its goal, because machines are noisy."""
+"""Figures compared with FMPy, as ratios within one run. `cargo test --test python figures -- --ignored --nocapture`, on
+an idle machine, measures the time of the clock, adds the long ones and asserts the goals. Elsewhere it is CPU time, and
+a figure may be half as good as its goal, because machines are noisy."""
 
 import importlib.util
 import os
@@ -123,7 +123,8 @@ def test_g4_overhead_of_a_run(archives):
 
 
 def test_g5_two_threads_take_no_more_cpu(archives):
-    """Compares the least times: threads that wait for each other always take longer; other load on the machine comes and goes."""
+    """Compares the minimum times: threads that wait for each other always take longer; other load on the machine
+    varies."""
     plan, rows, goal = drive(archives, 0.05), table(400), 1.10 if LONG else 1.5
     one, two = [], []
     while len(one) < 5 or len(one) < 60 and min(two) > goal * min(one):
@@ -205,7 +206,7 @@ def test_g1_g2_a_sweep_on_dask(archives):
     for name in times:
         wall, used = min(times[name]), statistics.median(spent[name])
         report("G1", f"{name}: {n / wall:.0f} runs/s of the clock, {used / n * 1e3:.2f} ms of CPU a run")
-    # Goals are for CPU time: what other programs take from the clock is not in it.
+    # Goals are for CPU time: the load of other programs does not count.
     over = lambda a, b, of: statistics.median(x / y for x, y in zip(of[a], of[b]))
     first, second, third = (over(*ab, spent) for ab in (("FMPy by path", "ours"), ("FMPy reused", "ours"), ("FMPy reused", "alone")))
     report("G1", f"FMPy by path / ours: {first:.1f} (goal 10; clock {over('FMPy by path', 'ours', times):.1f})")

@@ -28,7 +28,7 @@ def initialized(archive):
 
 
 def test_load_step_by_its_import(standard, tmp_path, monkeypatch, capsys):
-    """The script as it is, with FMPy and with fmurun: the same output. matplotlib is not there."""
+    """The unchanged script, with FMPy and with fmurun: the same output. matplotlib is not installed."""
     import types
 
     class Nothing:
@@ -103,7 +103,8 @@ def test_types_and_states(standard):
 
 
 def test_an_instance_in_another_thread(standard):
-    """Created here, used there, and here again: Dask's worker threads and vector environments do this."""
+    """Created in one thread, used in another, and again in the first: Dask's workers and vector environments do
+    this."""
     instance, reference = initialized(standard / "PmsmPlant.fmu")
     read = instance.getReal if standard.name == "fmi2" else instance.getFloat64
     found = []

@@ -98,7 +98,8 @@ def test_a_gradient_is_as_exact_as_the_run(reference, rtol):
 
 
 def test_a_gradient_beside_runs_with_steps_of_their_own(reference, standard):
-    """Where the solver chooses its steps by the values, two runs apart differ by its tolerance, divided by a step of 1e-4."""
+    """Where the solver adapts its steps to the values, two separate runs differ by its tolerance, divided by a step of
+    1e-4."""
 
     def plan(rtol):
         return Plan(reference / standard.name / "VanDerPol.fmu", fmi_type="ModelExchange", relative_tolerance=rtol, stop_time=20.0,

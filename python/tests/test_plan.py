@@ -146,7 +146,7 @@ def test_the_pickle_is_small_and_knows_its_files(standard, tmp_path):
     assert len(stored) <= 1024
     pickle.loads(stored)
     shutil.copy(standard / "PmsmDrive.fmu", copy)
-    with pytest.raises(FmuError, match="is another file than the one"):
+    with pytest.raises(FmuError, match="differs from the file"):
         pickle.loads(stored)
     copy.unlink()
     with pytest.raises(FmuError, match=r"plant\.fmu: No such file"):
@@ -167,7 +167,7 @@ def test_embedded_archives(standard, tmp_path):
 
 
 def test_the_pair_in_model_exchange_is_the_drive(standard):
-    """Coupled, with each sample at its instant, regardless of the communication step: the FMU that has both inside."""
+    """Coupled, with each sample at its instant, regardless of the communication step: the FMU that contains both."""
     more = {"fmi_type": "ModelExchange", "relative_tolerance": 1e-11, "step_size": 1e-3, "stop_time": 0.1}
     apart = pair(standard, output=["p.speed", "p.i_a", "c.theta_est"], **more).simulate()
     whole = Plan(standard / "PmsmDrive.fmu", input={"speed_ref": SPEED}, output=["speed", "i_a", "theta_est"], **more).simulate()
@@ -190,7 +190,7 @@ def test_interfaces_may_be_mixed(standard, resistances):
 
 WRONG = {
     "an interface": (lambda p: pair_of(p, fmi_type="ME"), ValueError, "must be CoSimulation or ModelExchange, not 'ME'"),
-    "an FMU of an interface": (lambda p: pair_of(p, fmi_type={"q": "ModelExchange"}), ValueError, "q is the name of no FMU"),
+    "an FMU of an interface": (lambda p: pair_of(p, fmi_type={"q": "ModelExchange"}), ValueError, "q is not the name of an FMU"),
     "a solver": (lambda p: pair_of(p, solver="Rk45"), ValueError, "solver = 'Rk45': there is no such solver"),
     "a solver of nobody": (lambda p: pair_of(p, solver="RK4"), FmuError, "are for Model Exchange, and no FMU runs so"),
     "a tolerance": (lambda p: pair_of(p, fmi_type="ModelExchange", relative_tolerance=1.0), FmuError, "between 1e-14 and 0.1"),
@@ -240,7 +240,7 @@ def test_bad_input_is_told_before_the_first_run(archives, case):
 
 
 def ticks(plan):
-    """Share of the sleeps of 1 ms of another thread that end while runs go on, of those that end otherwise."""
+    """Number of sleeps of 1 ms that another thread completes during the runs, relative to those without runs."""
     done, stop = [], threading.Event()
 
     def tick():

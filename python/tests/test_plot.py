@@ -1,4 +1,4 @@
-"""What a person sees: the figure of a notebook, pandas, a bar of progress."""
+"""The visible output: the figure of a notebook, pandas, a progress bar."""
 
 import re
 

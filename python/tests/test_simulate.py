@@ -117,7 +117,7 @@ WRONG = {
     "a unit": ({"start_values": {"motor.R_s": (3.0, "rpm")}}, "unit 'rpm' of the start value of motor.R_s is not one of"),
     "an interval of zero": ({"output_interval": 0.0}, "output_interval must be positive"),
     "a stop that is no number": ({"stop_time": float("nan")}, "must be finite"),
-    "times that fall": ({"input": STEP[::-1]}, "must not fall"),
+    "times that fall": ({"input": STEP[::-1]}, "must not decrease"),
 }
 
 

@@ -1,4 +1,4 @@
-"""The stubs: complete, and what mypy says of a file that uses them."""
+"""The stubs: their completeness, and mypy's report for a file that uses them."""
 
 import inspect
 import os

@@ -1,4 +1,4 @@
-//! `fmu atlas`: where a drive with wrong estimates holds low speeds under load.
+//! `fmu atlas`: at which low speeds a drive with wrong estimates carries its load.
 
 use super::{bar_of_cells, numbers};
 use crate::workspace::output_folder;
@@ -13,14 +13,15 @@ use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-/// Runs drives with wrong estimates of resistance and magnet flux at low speed under load, and maps where they are lost.
+/// Runs drives with wrong estimates of resistance and magnet flux at low speed under load, and maps where they lose the rotor.
 ///
 /// Without MOTOR.toml, an estimator runs on the drive of `fmu compare`: flux observers on the reference motor (1 pu is 3000 rpm
 /// and the 2 N.m of the paper's load steps), all others on the 2.2 kW machine. With it, they run on the drive that `fmu tune`
-/// gives for the machine. The cells are all combinations of the values on the axes; shares are of the true or the rated value.
+/// computes for the machine. The cells are all combinations of the values on the axes; shares are of the true or the rated
+/// value.
 ///
-/// Writes a map per estimator (atlas-NAME.svg, red where the drive is lost), atlas.csv, atlas.md and atlas.html, which needs no
-/// network. The files have the same bytes for any number of jobs.
+/// Writes a map per estimator (atlas-NAME.svg, red where the drive is lost), atlas.csv, atlas.md and atlas.html (works
+/// offline). The files have the same bytes for any number of jobs.
 ///
 ///   fmu atlas --estimator Rasmussen --out target/atlas
 ///   fmu atlas --set adaptation.resistance=true --set adaptation.k_a=0.02
@@ -107,7 +108,7 @@ fn grid(args: &Atlas) -> Result<Grid> {
         let find = |name: &String| {
             let known = || Course::ALL.iter().map(|s| s.name()).collect::<Vec<_>>().join(", ");
             let found = Course::ALL.iter().find(|s| s.name() == name);
-            found.copied().ok_or_else(|| anyhow!("--scenario {name}: is not a scenario; there are {}", known()))
+            found.copied().ok_or_else(|| anyhow!("--scenario {name}: unknown scenario; available: {}", known()))
         };
         grid.scenarios = names.iter().filter(|name| !name.is_empty()).map(find).collect::<Result<_>>()?;
     }
@@ -126,7 +127,7 @@ fn drives(args: &Atlas) -> Result<Vec<Drive>> {
         drives.push(drive);
     }
     if drives.is_empty() {
-        bail!("--estimator has no value: an atlas needs at least one estimator; leave the option out for Rasmussen");
+        bail!("--estimator has no value: an atlas needs at least one estimator; omit the option for Rasmussen");
     }
     Ok(drives)
 }
@@ -137,5 +138,5 @@ fn tuned(path: &Path, name: &str) -> Result<Drive> {
 }
 
 fn unknown<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> anyhow::Error {
-    anyhow!("--estimator {name}: is not an estimator; there are {}", known.collect::<Vec<_>>().join(", "))
+    anyhow!("--estimator {name}: unknown estimator; available: {}", known.collect::<Vec<_>>().join(", "))
 }

@@ -6,7 +6,7 @@ use crate::compile::{Library, compile, program};
 use crate::icons;
 use crate::licenses::Licenses;
 use crate::message;
-use crate::pack::{self, Entry, Moment};
+use crate::pack::{self, GenerationTime, PackedFile};
 use crate::target::{Target, Tools, ZIG, has_modules};
 use crate::workspace::{Package, Workspace, output_folder};
 use crate::{reference, release};
@@ -24,26 +24,26 @@ use std::process::{Command, Stdio};
 
 /// Compiles FMUs and packs them for both standards.
 ///
-/// Without names, builds every FMU of the Cargo package or workspace around the current folder: the packages in its folder fmus/
-/// or, if there is no such folder, every cdylib that depends on fmu-export. Select an FMU by the
-/// name of its package (pmsm-plant) or of the FMU (PmsmPlant). `fmu new` makes a package for an FMU of your own.
+/// Without names, builds every FMU of the Cargo package or workspace around the current folder: the packages in its folder
+/// fmus/ or, if there is no such folder, every cdylib that depends on fmu-export. Select an FMU by the name of its package
+/// (pmsm-plant) or of the FMU (PmsmPlant). `fmu new` creates a package for your FMU.
 ///
 /// An FMU is any cdylib with the line `fmu_export::export!(MyModel);`:
 ///   packages elsewhere in the workspace     fmu build --package own-fmu --package my-fmu
-///   a library that is already built, or several libraries of one model for several platforms
+///   an existing library, or several libraries of one model for several platforms
 ///                                  fmu build --library target/release/libmy_fmu.so
 ///                                  fmu build --library libmy_fmu.so --library x86_64-windows=my_fmu.dll
 ///
 /// The folder resources/ beside the package's Cargo.toml, or that of --resources, becomes the folder resources/ of the FMU; the
-/// model reads it in `load`. Hidden files stay out.
+/// model reads it in `load`. Hidden files are omitted.
 ///
-/// For other platforms, name the Rust targets; the FMUs then contain a binary for each of them and no others:
+/// For other platforms, name the Rust targets; the FMUs then contain exactly one binary for each:
 ///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu,x86_64-pc-windows-gnu
 /// This needs Rust's standard library for each target (rustup target add TRIPLE), mingw for Windows, and cargo-zigbuild with
 /// ziglang for Linux and macOS. The command always builds for this computer too, because that library describes the model.
 ///
-/// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise this computer's linker decides, and the command
-/// prints what they need. CARGO_TARGET_TRIPLE_LINKER (spelled as Cargo does) selects another linker.
+/// With cargo-zigbuild in PATH, Linux binaries need glibc 2.17 (2012). Otherwise they depend on this computer's linker, and the
+/// command prints their requirements. CARGO_TARGET_TRIPLE_LINKER (spelled as Cargo does) selects another linker.
 ///
 /// --release-dir DIR writes all files of a release: the archives, with a binary for each of Linux, Windows and macOS that can be
 /// built here; pages/NAME.html (fmu page); presets/MACHINE.PmsmDrive.fmu for each file of motors/; wheels/, the Python package fmurun
@@ -52,8 +52,8 @@ use std::process::{Command, Stdio};
 /// no other library if cargo-zigbuild builds them.
 ///   fmu build --release-dir release
 ///
-/// Archives of FMI 2.0 hold one universal library for both processors of macOS. Many importers look for Linux libraries of FMI 2.0
-/// in linux64 only, whatever the processor. `--linux64 aarch64` puts the library for ARM there; that for x86_64 moves to
+/// Archives of FMI 2.0 contain one universal library for both processors of macOS. Many importers look for Linux libraries of
+/// FMI 2.0 only in linux64, on every processor. `--linux64 aarch64` puts the library for ARM there; that for x86_64 moves to
 /// x86_64-linux, so such importers no longer run the archive on x86_64:
 ///   fmu build --target x86_64-unknown-linux-gnu,aarch64-unknown-linux-gnu --linux64 aarch64 --out for-arm
 ///
@@ -73,7 +73,7 @@ pub struct Build {
     /// Package of this workspace with a cdylib (repeatable)
     #[arg(long, value_name = "NAME", conflicts_with_all = ["library", "resources"])]
     pub package: Vec<String>,
-    /// Library that is already built; PLATFORM= names another platform than this computer's
+    /// Existing library; PLATFORM= names a platform other than this computer's
     #[arg(long, value_name = "[PLATFORM=]FILE")]
     pub library: Vec<String>,
     /// Folder with the resources of the --library
@@ -90,7 +90,7 @@ pub struct Build {
     pub release_dir: Option<PathBuf>,
 }
 
-/// The processor that the folder `linux64` of FMI 2.0 is for.
+/// The processor of the folder `linux64` of FMI 2.0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Linux64 {
     /// x86_64.
@@ -131,8 +131,8 @@ struct Model {
     own: Vec<(Platform, Vec<u8>)>,
     binaries: Vec<(Platform, Vec<u8>)>,
     licenses: Licenses,
-    /// The model's own files.
-    resources: BTreeMap<String, Entry>,
+    /// The model's resource files.
+    resources: BTreeMap<String, PackedFile>,
     /// The file that feeds the default experiment.
     stimuli: PathBuf,
 }
@@ -145,7 +145,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     if let Some(folder) = &args.release_dir {
         return release(args, folder);
     }
-    let moment = Moment::of_environment()?;
+    let moment = GenerationTime::of_environment()?;
     let versions = match args.fmi.as_deref() {
         None => vec![FmiVersion::V2, FmiVersion::V3],
         Some(version) => vec![version.parse()?],
@@ -172,7 +172,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     for model in &models {
         let name = &model.description.name;
         let mut versions = versions.clone();
-        // Whoever names no FMU gets those that the standard has room for.
+        // Without names, only FMUs that the standard supports are built.
         let all = args.fmus.is_empty() && args.package.is_empty() && args.library.is_empty();
         if let Some(why) = model.description.needs_fmi3()
             && (versions.len() > 1 || all)
@@ -200,8 +200,8 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-/// The reference files for the model's archives. A model that does not run by itself has none; a note says why.
-fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTreeMap<String, Entry>> {
+/// The reference files for the model's archives. A model that cannot run alone has none; a note gives the reason.
+fn reference(model: &Model, version: FmiVersion, moment: GenerationTime) -> Result<BTreeMap<String, PackedFile>> {
     let Model { description, stimuli, .. } = model;
     let dir = tempfile::tempdir()?;
     let archive = dir.path().join("reference.fmu");
@@ -219,7 +219,7 @@ fn reference(model: &Model, version: FmiVersion, moment: Moment) -> Result<BTree
 
 /// Writes all files of a release to a folder; returns them.
 fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
-    let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, Moment::of_environment()?);
+    let (workspace, tools, moment) = (Workspace::find()?, Tools::find()?, GenerationTime::of_environment()?);
     let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
     let (fmus, fmi, linux64) = (args.fmus.clone(), args.fmi.clone(), args.linux64);
     let mut packages: Vec<String> = choose(&workspace.fmus(), &fmus)?.iter().map(|p| p.name.clone()).collect();
@@ -234,7 +234,7 @@ fn release(args: &Build, folder: &Path) -> Result<Vec<PathBuf>> {
             && !needs.are_modest()
         {
             message::note(&format!(
-                "{name} needs {needs} where it runs; built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most"
+                "{name} requires {needs}; built with cargo-zigbuild ({ZIG}) it requires at most {FLOOR}"
             ));
         }
         let path = folder.join(built.file_name().unwrap_or_default());
@@ -284,7 +284,7 @@ fn presets(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-/// The wheels of the Python package of the workspace, with these archives; its script names what it cannot build.
+/// The wheels of the Python package of the workspace, with these archives; its script reports those that it cannot build.
 fn wheels(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
     let script = workspace.root.join("python/build/wheels.py");
     if !script.is_file() {
@@ -307,7 +307,7 @@ fn wheels(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(String::from_utf8_lossy(&output.stdout).lines().map(PathBuf::from).collect())
 }
 
-/// The targets of a release that can be built here; notes say what is missing for the others.
+/// The targets of a release that can be built here; notes list what is missing for the others.
 fn available(tools: &Tools) -> Vec<String> {
     let can = |triple: &&str| match tools.target(triple) {
         Ok(_) => true,
@@ -363,7 +363,7 @@ fn compiled(workspace: &Workspace, args: &Build) -> Result<Vec<Model>> {
     describing.iter().map(model).collect()
 }
 
-/// The targets of these names, each for another platform.
+/// The targets of these names, each for a different platform.
 fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
     let mut targets: Vec<Target> = Vec::new();
     for triple in triples {
@@ -377,7 +377,7 @@ fn targets(tools: &Tools, triples: &[String]) -> Result<Vec<Target>> {
     Ok(targets)
 }
 
-/// Checks that there is a library for `--linux64 aarch64`; a note says what the option costs.
+/// Checks that there is a library for `--linux64 aarch64`; a note states the drawback of the option.
 fn has_arm(models: &[Model]) -> Result<()> {
     let has = |model: &Model, platform| model.binaries.iter().any(|(p, _)| *p == platform);
     if let Some(model) = models.iter().find(|model| !has(model, Platform::ArmLinux)) {
@@ -386,14 +386,14 @@ fn has_arm(models: &[Model]) -> Result<()> {
     }
     if models.iter().any(|model| has(model, Platform::X64Linux)) {
         message::note(
-            "linux64 of FMI 2.0 holds the libraries for aarch64: an importer on x86_64 that does not look into x86_64-linux \
+            "linux64 of FMI 2.0 contains the libraries for aarch64: an importer on x86_64 that does not look into x86_64-linux \
              too cannot load these archives",
         );
     }
     Ok(())
 }
 
-/// What the Linux binaries need beyond glibc 2.17 on the importing system: one line for all binaries with the same needs.
+/// Requirements of the Linux binaries beyond glibc 2.17: one line for all binaries with the same requirements.
 fn notes(models: &[Model]) -> Vec<String> {
     let mut by_needs: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for Model { description, binaries, .. } in models {
@@ -401,12 +401,12 @@ fn notes(models: &[Model]) -> Vec<String> {
             if let Ok(needs) = Needs::of(bytes)
                 && !needs.are_modest()
             {
-                by_needs.entry(format!("for {platform} needs {needs}")).or_default().push(&description.name);
+                by_needs.entry(format!("for {platform} requires {needs}")).or_default().push(&description.name);
             }
         }
     }
-    let remedy = format!("built with cargo-zigbuild ({ZIG}) it needs {FLOOR} at most");
-    let note = |(needs, names): (String, Vec<&str>)| format!("{} {needs} where it runs; {remedy}", names.join(", "));
+    let remedy = format!("built with cargo-zigbuild ({ZIG}) it requires at most {FLOOR}");
+    let note = |(needs, names): (String, Vec<&str>)| format!("{} {needs}; {remedy}", names.join(", "));
     by_needs.into_iter().map(note).collect()
 }
 
@@ -416,7 +416,7 @@ pub(super) fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'
     if all.is_empty() {
         bail!(
             "no package here is an FMU: expected crate-type = [\"cdylib\"] and the dependency fmu-export in a Cargo.toml; \
-             fmu new my-model makes such a package"
+             fmu new my-model creates such a package"
         );
     }
     if names.is_empty() {
@@ -425,12 +425,12 @@ pub(super) fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'
     let one = |name: &String| {
         let known = || all.iter().map(|p| p.name.as_str()).collect::<Vec<_>>().join(", ");
         let found = all.iter().copied().find(|p| letters(&p.name) == letters(name));
-        found.ok_or_else(|| anyhow!("there is no FMU {name}; there are {}", known()))
+        found.ok_or_else(|| anyhow!("there is no FMU {name}; available: {}", known()))
     };
     names.iter().map(one).collect()
 }
 
-/// Libraries of one model that are already built.
+/// Existing libraries of one model.
 fn given(libraries: &[String], resources: Option<&Path>) -> Result<Model> {
     let parse = |text: &String| match text.split_once('=') {
         Some((platform, file)) => Ok((platform.parse().map_err(|e: String| anyhow!(e))?, PathBuf::from(file))),

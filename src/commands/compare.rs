@@ -65,11 +65,11 @@ fn selection(args: &Compare) -> Result<Selection> {
     let mut selection = Selection::all(Effort::Full);
     let estimator = |name: &String| {
         let known = || names(Entry::all().iter().map(|e| e.name));
-        Entry::find(name).ok_or_else(|| anyhow!("--only {name}: is not an estimator; there are {}", known()))
+        Entry::find(name).ok_or_else(|| anyhow!("--only {name}: unknown estimator; available: {}", known()))
     };
     let scenario = |id: &String| {
         let known = || names(SCENARIOS.iter().map(|s| s.id));
-        scenario::find(id).ok_or_else(|| anyhow!("--scenario {id}: is not a scenario; there are {}", known()))
+        scenario::find(id).ok_or_else(|| anyhow!("--scenario {id}: unknown scenario; available: {}", known()))
     };
     if !args.only.is_empty() {
         selection.entries = args.only.iter().map(estimator).collect::<Result<_>>()?;

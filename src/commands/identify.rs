@@ -12,14 +12,14 @@ use std::path::PathBuf;
 
 /// Identifies a machine from a record of its running drive: resistance, inductances, magnet flux, inertia, friction.
 ///
-/// RECORD.csv has one row per sample of the controller: time t, voltage, current, electrical angle theta, and where they are known
-/// u_dc and the load torque. A header may name a unit: `i_a [mA]`, `speed [rpm]`. docs/identify.md lists the forms of columns.
+/// RECORD.csv has one row per sample of the controller: time t, voltage, current, electrical angle theta, and if known, u_dc
+/// and the load torque. A header may name a unit: `i_a [mA]`, `speed [rpm]`. docs/identify.md lists the forms of columns.
 ///
 /// With --run, the record is a run of the self-commissioning in PmsmDrive or SensorlessController, as `fmu simulate --csv` writes it: the
 /// values are the outputs identified_* of its last row.
 ///
-/// Each value has an interval (95 %), or a reason why this record does not tell it. Exit status: 0 if all values are written, 1 if
-/// one is refused, 2 for a wrong record, of which nothing is written.
+/// Each value has an interval (95 %), or the reason why this record does not determine it. Exit status: 0 if all values are
+/// written, 1 if one is refused, 2 for an invalid record, for which nothing is written.
 ///
 ///   fmu identify bench.csv --n-p 3 --current 15 --out target/motor.toml
 ///   fmu identify bench.csv --n-p 3 --current 15 --html bench.html
@@ -34,7 +34,7 @@ pub struct Identify {
     /// Recording of a self-commissioning instead: its last row has the values
     #[arg(long, value_name = "RUN.csv", conflicts_with_all = ["delay", "every", "rate", "map", "unit", "zero", "load"])]
     pub run: Option<PathBuf>,
-    /// Values of the machine file that a commissioning does not tell: psi_M=0.545,J=0.015
+    /// Values of the machine file that a commissioning does not determine: psi_M=0.545,J=0.015
     #[arg(long, value_name = "NAME=VALUE,...", value_delimiter = ',', requires = "run")]
     pub given: Vec<String>,
     /// Machine file to write, for `fmu tune`; its name without .toml names the machine
@@ -43,25 +43,25 @@ pub struct Identify {
     /// Pole pairs
     #[arg(long = "n-p", value_name = "N")]
     pub n_p: Option<i32>,
-    /// Maximum current in A, peak value [default: the greatest of the record]
+    /// Maximum current in A, peak value [default: the maximum of the record]
     #[arg(long, value_name = "A")]
     pub current: Option<f64>,
-    /// Rated mechanical speed in rad/s [default: the greatest of the record]
+    /// Rated mechanical speed in rad/s [default: the maximum of the record]
     #[arg(long, value_name = "RAD/S")]
     pub speed: Option<f64>,
-    /// Rated torque in N.m [default: the greatest of the record]
+    /// Rated torque in N.m [default: the maximum of the record]
     #[arg(long, value_name = "N.M")]
     pub torque: Option<f64>,
     /// DC-link voltage in V [default: the mean of the column u_dc]
     #[arg(long, value_name = "V")]
     pub u_dc: Option<f64>,
-    /// Samples from a row to the action of its voltage [default: the best of 0, 0.5, 1, 1.5, 2]
+    /// Delay in samples from a row to the action of its voltage [default: the best of 0, 0.5, 1, 1.5, 2]
     #[arg(long, value_name = "SAMPLES")]
     pub delay: Option<f64>,
     /// The record keeps one of N samples of the controller [default: 1]
     #[arg(long, value_name = "N")]
     pub every: Option<u32>,
-    /// Rows per second, where the record has no column t
+    /// Rows per second, if the record has no column t
     #[arg(long, value_name = "HZ")]
     pub rate: Option<f64>,
     /// Columns under other headers: u_a=Vph1,i_a=I1
@@ -70,10 +70,10 @@ pub struct Identify {
     /// Units of columns: speed=rpm
     #[arg(long, value_name = "COLUMN=UNIT,...", value_delimiter = ',')]
     pub unit: Vec<String>,
-    /// Times in s between which there is no current, for the sensors' offset [default: the start without voltage]
+    /// Interval in s without current, for the sensors' offset [default: the start without voltage]
     #[arg(long, value_name = "FROM:TO")]
     pub zero: Option<String>,
-    /// `none`: the shaft is free; else the column of the load torque, tau_load or tau_shaft
+    /// `none` if the shaft is free; otherwise the column of the load torque, tau_load or tau_shaft
     #[arg(long, value_name = "none|COLUMN")]
     pub load: Option<String>,
     /// Page to write: the values, and each fit beside the record
@@ -84,7 +84,7 @@ pub struct Identify {
     pub json: bool,
 }
 
-/// Runs the command; whether every value is written.
+/// Runs the command; returns whether every value is written.
 ///
 /// # Errors
 /// The record or an option is wrong, or the file cannot be written.
@@ -121,7 +121,7 @@ pub fn run(args: &Identify) -> Result<bool> {
     Ok(result.whole)
 }
 
-/// What the command writes.
+/// The output of the command.
 struct Written {
     machine: String,
     page: Option<String>,
@@ -195,7 +195,7 @@ fn options(args: &Identify) -> Result<Options> {
     })
 }
 
-/// The values, one a line.
+/// The values, one per line.
 fn rows<'a>(values: impl Iterator<Item = &'a Quantity>) -> String {
     let row = |value: &Quantity| {
         let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value);
@@ -209,12 +209,12 @@ fn rows<'a>(values: impl Iterator<Item = &'a Quantity>) -> String {
     values.map(row).collect()
 }
 
-/// What the fit says besides its values.
+/// Results of the fit other than the values.
 fn facts(found: &Identified) -> String {
     let Fit { theta_0, tau, rest, noise, .. } = found.fit;
     format!(
-        "\nsensor of the angle: offset {theta_0:.4} rad, delay {:.1} us\nthe voltage of a row acts {} samples later\nrest of the fit: {rest:.3} V; \
-         noise explains {noise:.3} V\n",
+        "\nsensor of the angle: offset {theta_0:.4} rad, delay {:.1} us\nthe voltage of a row acts {} samples \
+         later\nresidual of the fit: {rest:.3} V; noise explains {noise:.3} V\n",
         tau * 1e6,
         found.timing.delay
     )

@@ -1,4 +1,4 @@
-//! `fmu info`: what an FMU is, in half a page.
+//! `fmu info`: summary of an FMU, in half a page.
 
 use anyhow::Result;
 use clap::Args;
@@ -10,7 +10,7 @@ use std::path::PathBuf;
 
 /// Describes an FMU: standard, interfaces, platforms, size, terminals, and its variables by group.
 ///
-/// The command reads the archive and runs nothing in it.
+/// The command only reads the archive; it does not run the FMU.
 ///
 /// The inputs, outputs and parameters of the drive, with units and start values:
 ///   fmu info target/fmu/fmi3/PmsmDrive.fmu
@@ -79,7 +79,7 @@ fn head(Outline { description: md, terminals, files }: &Outline, size: u64) -> V
     let interfaces = [interface("Co-Simulation", &md.co_simulation), interface("Model Exchange", &md.model_exchange)];
     let interfaces: Vec<String> = interfaces.into_iter().flatten().collect();
     line("standard", format!("FMI {}; {}", md.version, interfaces.join(" and ")));
-    // The names of FMI 2.0 do not say which processor.
+    // The names of FMI 2.0 do not identify the processor.
     let folder = |(name, bytes): (&String, &Vec<u8>)| {
         let (folder, _) = name.strip_prefix("binaries/")?.split_once('/')?;
         let platforms: Vec<&str> = machine::platforms(bytes).into_iter().map(Platform::tuple).collect();

@@ -13,13 +13,14 @@ use std::path::PathBuf;
 
 /// Computes the efficiency map and the envelope of a machine with the values of `fmu tune`.
 ///
-/// The map covers speed and torque at the shaft in both quadrants, for each DC-link voltage and temperature. It counts the losses
-/// of copper, iron, inverter and friction that the motor file describes (its tables iron, inverter and mechanics). Points of it are
-/// compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, a note says where and by how much.
+/// The map covers speed and torque at the shaft in both quadrants, for each DC-link voltage and temperature. It counts the
+/// losses of copper, iron, inverter and friction that the motor file describes (its tables iron, inverter and mechanics). Some
+/// points are compared with PmsmDrive; if one differs by more than 0.1 % of its power or 1 % of a loss, a note states the point
+/// and the deviation.
 ///
-/// Writes map.csv (a line per point), envelope.csv, map.npz (for numpy.load), map.svg and map.html, which needs no network, and
-/// prints the best point, the losses at the rated point and the energy of a driving cycle. The example's cycle is left out where
-/// the drive cannot follow it.
+/// Writes map.csv (a line per point), envelope.csv, map.npz (for numpy.load), map.svg and map.html (works offline), and prints
+/// the best point, the losses at the rated point and the energy of a driving cycle. The example's cycle is omitted if the drive
+/// cannot follow it.
 ///
 ///   fmu map motors/traction-63kw.toml --out target/map
 ///   fmu map motors/traction-63kw.toml --u-dc 300,350,400 --T 20,80,120 --grid 21x21
@@ -42,7 +43,7 @@ pub struct Map {
     /// Number of speeds and of torques, which is odd
     #[arg(long, value_name = "NxM", default_value = "47x41", allow_hyphen_values = true)]
     pub grid: String,
-    /// Points that are compared with PmsmDrive, for each voltage and temperature; 0: none
+    /// Number of points compared with PmsmDrive, for each voltage and temperature; 0: none
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub verify: usize,
     /// Driving cycle: lines of time in s and speed in km/h, with straight lines between them [default: that of examples/vehicle]
@@ -75,7 +76,7 @@ pub fn run(args: &Map) -> Result<()> {
         let Some(text) = given else { return Ok(Vec::new()) };
         let values = numbers(option, text)?;
         if values.is_empty() {
-            bail!("{option} has no value: give at least one, or leave the option out");
+            bail!("{option} has no value: give at least one, or omit the option");
         }
         Ok(values)
     };
@@ -89,7 +90,7 @@ pub fn run(args: &Map) -> Result<()> {
     let cycle = cycle(args)?;
     let map = map::make(&MotorFile::read(&args.motor)?, &request)?;
     let report = report::of(&map, &cycle, args.cycle.is_some() || args.vehicle.is_some());
-    // All of them are ready before the first is written.
+    // All files are ready before the first is written.
     let files = map::files(&map, &report)?;
     let out = args.out.clone().map_or_else(|| output_folder("map"), Ok)?;
     for (name, bytes) in &files {

@@ -1,7 +1,7 @@
 //! `fmu merge`: one archive from several archives of one FMU, each with binaries for other platforms.
 
 use super::build::Linux64;
-use crate::pack::{self, Entry, Moment};
+use crate::pack::{self, GenerationTime, PackedFile};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use fmu_import::platform::Platform;
@@ -47,7 +47,7 @@ struct Part {
 /// # Errors
 /// A file is not an FMU, or two FMUs differ in more than binaries and date.
 pub fn run(args: &Merge) -> Result<()> {
-    let moment = Moment::of_environment()?;
+    let moment = GenerationTime::of_environment()?;
     let open = |path: &PathBuf| {
         let (description, files) = contents(path)?;
         Ok(Part { name: path.display().to_string(), description, files })
@@ -55,7 +55,7 @@ pub fn run(args: &Merge) -> Result<()> {
     let parts = args.files.iter().map(open).collect::<Result<Vec<_>>>()?;
     let entry = |(name, bytes): (String, Vec<u8>)| {
         let executable = name.starts_with(BINARIES);
-        (name, Entry { bytes, executable })
+        (name, PackedFile { bytes, executable })
     };
     if let Some(linux64) = args.linux64 {
         has_linux64(&parts, linux64.platform())?;
@@ -161,7 +161,7 @@ fn dateless(bytes: &[u8], date: &str) -> Vec<u8> {
     }
 }
 
-/// A library that is named after the FMU, of one platform.
+/// A library named after the FMU, for one platform.
 struct Library<'a> {
     /// Its path in the archive.
     path: &'a str,
@@ -171,8 +171,8 @@ struct Library<'a> {
     bytes: &'a [u8],
 }
 
-/// The libraries of a part; a universal library counts once for each processor. The folder decides where a library does not say its
-/// platform.
+/// The libraries of a part; a universal library counts once for each processor. The folder counts if a library does not state
+/// its platform.
 fn libraries(part: &Part) -> Result<Vec<Library<'_>>> {
     let md = &part.description;
     let interfaces = [&md.co_simulation, &md.model_exchange, &md.scheduled_execution].into_iter().flatten();

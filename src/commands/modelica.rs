@@ -8,14 +8,15 @@ use std::path::PathBuf;
 
 /// Writes a Modelica package around a drive's FMU: a flange, ports for DC link and heat, a dialog.
 ///
-/// Modelica tools import an FMU as a block of signals: without units, and with an equation missing for each input that is not
-/// connected. The package has that block inside a drive with a Flange_a, in two forms. In ImposedShaft the rotor's inertia is in
-/// Modelica, which suits every drive train; in CompliantShaft the rotor turns in the FMU, behind a spring. Inputs have their start
-/// values until a switch in the dialog replaces one by a connector, pins or a heat port. Parameters have units, limits, tabs and
+/// Modelica tools import an FMU as a block of signals, without units and with a missing equation for each unconnected input.
+/// The package wraps that block in a drive with a Flange_a, in two forms. In ImposedShaft the rotor's inertia is in Modelica,
+/// which suits every drive train; in CompliantShaft the rotor turns in the FMU, behind a spring. Inputs keep their start values
+/// until a switch in the dialog replaces one by a connector, pins or a heat port. Parameters have units, limits, tabs and
 /// groups; --motor adds machines with the values of `fmu tune`, to choose in the dialog.
 ///
-/// DIR receives the package, a copy of the FMU, and import.mos: `omc import.mos`, in DIR, imports the FMU into OpenModelica, runs an
-/// example and prints figures, and its head says which must come out. docs/modelica.md has the rest, Modelica-FMI included.
+/// DIR receives the package, a copy of the FMU, and import.mos: `omc import.mos`, in DIR, imports the FMU into OpenModelica,
+/// runs an example and prints figures, and its head lists the expected ones. docs/modelica.md has the details, also for
+/// Modelica-FMI.
 ///
 ///   fmu modelica target/fmu/fmi2/PmsmDrive.fmu --out drive
 /// With machines, and for the block of another import:
@@ -41,7 +42,7 @@ pub struct Modelica {
     pub out: PathBuf,
 }
 
-/// Runs the command; returns the package's folder, and what to do next.
+/// Runs the command; returns the package's folder and the next steps.
 ///
 /// # Errors
 /// The FMU has no shaft, a name is wrong, or the folder is not empty or cannot be written.

@@ -1,6 +1,6 @@
-//! `fmu new`: a project for an FMU of one's own.
+//! `fmu new`: a project for a new FMU.
 
-use crate::pack::Moment;
+use crate::pack::GenerationTime;
 use crate::vendor;
 use anyhow::{Context, Result, bail};
 use clap::Args;
@@ -8,9 +8,9 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-/// Makes a folder with an FMU of your own: a small model, its test, a manifest, a file for CI.
+/// Creates a folder with a new FMU: a small model, its test, a manifest, a file for CI.
 ///
-/// Replace the model in src/lib.rs with yours. The folder needs nothing but Rust: it contains the crates that the FMU links.
+/// Replace the model in src/lib.rs with yours. The folder needs only Rust: it contains the crates that the FMU links.
 ///
 ///   fmu new my-model
 ///   cd my-model
@@ -39,7 +39,7 @@ const TEMPLATE: [(&str, &str); 7] = [
 /// Version of a new package.
 const VERSION: &str = "0.1.0";
 
-/// Runs the command; returns what to do next.
+/// Runs the command; returns the next steps.
 ///
 /// # Errors
 /// The name is not that of a package, the folder exists, or nothing can be written here.
@@ -47,10 +47,10 @@ pub fn run(args: &New) -> Result<String> {
     let name = args.name.as_str();
     judge(name)?;
     if fs::symlink_metadata(name).is_ok() {
-        bail!("{name}: already exists: take another name, or remove it");
+        bail!("{name}: already exists: choose another name, or remove it");
     }
     let files = files(name)?;
-    // Under another name until it is complete.
+    // Uses a temporary name until it is complete.
     let here = std::env::current_dir().context("the current folder")?;
     let why = || format!("{name}: cannot be written in {}: change to a folder that you may write", here.display());
     let partial = tempfile::Builder::new().prefix(".fmu-new-").tempdir_in(&here).with_context(why)?;
@@ -75,7 +75,7 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
     };
     let install =
         if carried { "cargo install --locked --git ${{ vars.FMU_GIT }} fmu" } else { "cargo install --locked fmu" };
-    let year = &Moment::of_environment()?.date_and_time()[..4];
+    let year = &GenerationTime::of_environment()?.date_and_time()[..4];
     let places = [
         ("{package}", name),
         ("{model}", &fmu_name(name)),
@@ -92,19 +92,19 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
         files.extend(vendor::files()?);
         let lock = vendor::lock(name, VERSION)?;
         if lock.matches(&format!("name = \"{name}\"\n")).count() > 1 {
-            bail!("{name}: is a package that the FMU itself needs: take another name, for example {name}-model");
+            bail!("{name}: is a package that the FMU itself needs: choose another name, for example {name}-model");
         }
         files.insert("Cargo.lock".into(), lock);
     }
     Ok(files)
 }
 
-/// Until the command is published, the CI of a project must know where to get it.
+/// Until the command is published, the CI of a project must know its source.
 const CONDITION: &str = "        # The variable of the repository that names the Git repository of the command fmu
         if: vars.FMU_GIT != ''
 ";
 const VENDOR: &str = "`vendor/` contains the crates `fmu-core` and `fmu-export`. In CI, the native tests always run; the FMU is built and checked \
-                      too\nif the repository's variable `FMU_GIT` names the Git repository that the command `fmu` is installed from.\n";
+                      too\nif the repository's variable `FMU_GIT` names the Git repository of the command `fmu`.\n";
 
 /// Refuses names that cannot be a package with a library and an FMU.
 fn judge(name: &str) -> Result<()> {
@@ -120,13 +120,13 @@ fn judge(name: &str) -> Result<()> {
         bail!("{name}: does not start with a letter: {remedy}");
     }
     if name.len() > 64 {
-        bail!("{name}: has {} characters: 64 are allowed", name.len());
+        bail!("{name}: has {} characters: at most 64 are allowed", name.len());
     }
     if KEYWORDS.contains(&name) {
-        bail!("{name}: is a keyword of Rust: take another name, for example {name}-model");
+        bail!("{name}: is a keyword of Rust: choose another name, for example {name}-model");
     }
     if TAKEN.contains(&name) {
-        bail!("{name}: is a name of Rust or Cargo: take another name, for example {name}-model");
+        bail!("{name}: is a name of Rust or Cargo: choose another name, for example {name}-model");
     }
     Ok(())
 }

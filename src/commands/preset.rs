@@ -2,7 +2,7 @@
 
 mod motor;
 
-use crate::preset::{Course, PresetFmu};
+use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, setting::Tuned};
@@ -13,10 +13,10 @@ use std::path::{Path, PathBuf};
 
 /// Writes an FMU with other start values, from an FMU of this program.
 ///
-/// The new FMU starts with these values in every importer, also in those that read no parameter file: they are in its description
-/// and in its instances, and a reset returns to them. An importer may still set others. Binaries stay as they are: the values are
-/// a file of the archive's resources, without which the binary refuses to run. The result of the default experiment is computed
-/// again, and documentation/index.html lists the new start values.
+/// The new FMU starts with these values in every importer, even in those that do not read parameter files: they are in its
+/// description and in its instances, and a reset returns to them. An importer may still set others. Binaries are unchanged: the
+/// values are stored in a file under resources/; without it the binary refuses to run. The result of the default experiment is
+/// computed again, and documentation/index.html lists the new start values.
 ///
 /// A value is written as for `fmu simulate --set`: a number, with one of the variable's units if needed (1000rpm), true or false, a
 /// name or a number of an enumeration, a text; the elements of an array with commas, or one element as `NAME[2]` or `NAME[1,2]`. The
@@ -47,8 +47,8 @@ pub struct Preset {
     /// Name that importers show (modelName) [default: that of FILE.fmu]
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// CSV file that feeds the default experiment, which lasts until its last time, for the reference result [default: that of
-    /// FILE.fmu; with --motor one that fits the machine]
+    /// CSV file with the inputs of the default experiment and, by its last time, its stop time, for the reference result
+    /// [default: that of FILE.fmu; with --motor one that fits the machine]
     #[arg(long, value_name = "FILE.csv")]
     pub stimuli: Option<PathBuf>,
     /// File to write [default: NAME.fmu]
@@ -98,24 +98,23 @@ pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
     preset.write(None, Some(&course), out).map(drop)
 }
 
-/// The default experiment that a file feeds.
-fn course(path: &Path) -> Result<Course> {
+/// The default experiment with the inputs of a file.
+fn course(path: &Path) -> Result<NewExperiment> {
     let of = || format!("--stimuli {}", path.display());
     let stimuli = std::fs::read_to_string(path).with_context(of)?;
     let wrong = |cause: String| anyhow!("--stimuli {cause}");
     Schedule::read_csv(path).map_err(wrong)?;
     let last = stimuli.lines().rfind(|line| !line.trim().is_empty()).and_then(|line| line.split([',', ';']).next());
     let stop = last.and_then(|time| time.trim().parse().ok()).with_context(|| format!("{}: has no last time", of()))?;
-    Ok(Course { stimuli, stop, step: None })
+    Ok(NewExperiment { stimuli, stop, step: None })
 }
 
-/// Checks that a name for users is also a file name on every system, because the reference files have it.
+/// Checks that a name for users is also a file name on every system, because the reference files use it.
 fn judge(name: &str) -> Result<()> {
     let plain = |b: u8| (b' '..=b'~').contains(&b) && !br#"/\:*?"<>|"#.contains(&b);
     ensure!(
         name.bytes().all(plain) && (1..=100).contains(&name.len()) && name.trim() == name && !name.starts_with('.'),
-        "--name {name}: a name has 1 to 100 letters of ASCII, none of / \\ : * ? \" < > |, no blank at its ends and no dot \
-         before it, because files have it"
+        "--name {name}: a name has 1 to 100 letters of ASCII, none of / \\ : * ? \" < > |, no blank at its ends and no dot before it, because files use it"
     );
     Ok(())
 }

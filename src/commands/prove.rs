@@ -1,4 +1,4 @@
-//! `fmu prove`: the folders of examples that the FMI tools page asks for, and the importers that replayed them.
+//! `fmu prove`: the folders of examples required by the FMI tools page, and the importers that replayed them.
 
 use super::build::{self, Build};
 use crate::TOOL;
@@ -35,7 +35,7 @@ pub struct Prove {
     /// Folder to write
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// FMUs that `fmu build` made [default: the command builds them]
+    /// FMUs of `fmu build` [default: the command builds them]
     #[arg(value_name = "FILE.fmu")]
     pub files: Vec<PathBuf>,
     /// Python with FMPy
@@ -43,14 +43,14 @@ pub struct Prove {
     pub python: PathBuf,
 }
 
-/// Greatest deviation that counts as rounding.
+/// Maximum deviation that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// The result of FMPy.
 #[derive(Deserialize)]
 struct Replay {
     version: String,
-    /// `None` with the reason if FMPy cannot feed the inputs, and if it is not finite, as JSON has no such number.
+    /// `None` with the reason if FMPy cannot feed the inputs, or if it is not finite, which JSON cannot express.
     deviation: Option<f64>,
     cannot: Option<String>,
     problems: Vec<String>,
@@ -92,7 +92,7 @@ fn example(archive: &Path, folder: &Path) -> Result<(Example, ModelDescription)>
     let wanted = format!("{FOLDER}{name}_ref.csv");
     if !files.contains_key(&wanted) {
         bail!(
-            "{}: has no {wanted}: build it with this command; fmu build says whether a model runs by itself",
+            "{}: has no {wanted}: build it with this command; fmu build reports models that cannot run alone",
             archive.display()
         );
     }
@@ -147,7 +147,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
             validations.push(format!("FMPy {version}, validate_fmu: {found}"));
         }
         None => message::note(&format!(
-            "{} has no FMPy: {} names this program alone; --python takes one that has it (pip install fmpy)",
+            "{} has no FMPy: {} lists only this program; --python selects a Python that has it (pip install fmpy)",
             python.display(),
             example.folder.join("Readme.txt").display()
         )),
@@ -215,15 +215,15 @@ fn own(example: &Example) -> Result<f64> {
     Ok(largest)
 }
 
-/// The values of a column as CSV has them.
+/// The values of a column in CSV form.
 fn cells(recording: &Recording, name: &str) -> Option<Vec<String>> {
     let numbers = |column: &fmu_system::cosimulation::Column| column.values.iter().map(f64::to_string).collect();
     let texts = || Some(recording.texts.iter().find(|column| column.name == name)?.values.clone());
     recording.column(name).map(numbers).or_else(texts)
 }
 
-/// Largest difference of the numbers of two columns, relative to the largest number of the second. A cell of an array has several;
-/// what is not a number is the same, or infinitely far apart.
+/// Largest difference of the numbers of two columns, relative to the largest number of the second. A cell of an array has
+/// several; values other than numbers are equal or infinitely far apart.
 fn deviation<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> f64 {
     let numbers = |text: &str| text.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>().ok();
     let (mut apart, mut size) = (0.0_f64, f64::MIN_POSITIVE);
@@ -241,7 +241,7 @@ fn deviation<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> f64 {
     apart / size
 }
 
-/// Replays the example in FMPy; `None` if the Python does not have it.
+/// Replays the example in FMPy; `None` if the Python lacks it.
 fn fmpy(example: &Example, python: &Path) -> Result<Option<Replay>> {
     let has_it = Command::new(python).args(["-c", "import fmpy"]).output();
     if !has_it.is_ok_and(|output| output.status.success()) {
@@ -258,7 +258,7 @@ fn fmpy(example: &Example, python: &Path) -> Result<Option<Replay>> {
         let last = said.lines().last().unwrap_or_default().to_owned();
         return Err(crate::Failed(format!("{}: FMPy cannot run it: {last}", file(".fmu").display())).into());
     }
-    // FMPy may print something before.
+    // FMPy may print other text before.
     let said = String::from_utf8_lossy(&output.stdout);
     Ok(Some(serde_json::from_str(said.lines().last().unwrap_or_default()).context("what FMPy found")?))
 }

@@ -11,7 +11,7 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
-use fmu_system::cosimulation::{Integration, Method, Point, Sequence, Settings, Solver, System};
+use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
 use fmu_system::ssp::values::{self, Given};
@@ -31,21 +31,22 @@ use std::time::{Duration, Instant};
 /// FMUs one step later. With --sequential, the FMUs step in the order given, and each receives the new outputs of those before
 /// it.
 ///
-/// With --me, the command integrates FMUs for Model Exchange itself: it lands on time events, locates state events, and sets
-/// discrete inputs only at events. --step is then the distance of the recorded points, and the step of --solver rk4. If one of the
-/// FMUs has no Co-Simulation, the command does so without --me. With --event-mode and --early-return, FMUs for Co-Simulation of FMI 3.0
-/// handle their events at their time, whatever --step is.
+/// With --me, the command integrates FMUs for Model Exchange itself: it hits time events exactly, locates state events, and
+/// sets discrete inputs only at events. --step is then the distance of the recorded points, and the step of --solver rk4. If
+/// one of the FMUs has no Co-Simulation, the command does so without --me. With --event-mode and --early-return, FMUs for
+/// Co-Simulation of FMI 3.0 handle their events at their time, independent of --step.
 ///
-/// Ctrl-C ends the run at the next communication point and writes what was computed; a second Ctrl-C ends the command at once.
+/// Ctrl-C ends the run at the next communication point and writes the results so far; a second Ctrl-C ends the command at once.
 ///
-/// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them, unless
-/// their descriptions call them optional, and a step that is longer than the DefaultExperiment of an FMU. The command ends with
-/// the last values: those of the curves if it draws a first plot, otherwise of all that is recorded. Then it names its files.
+/// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them,
+/// unless their descriptions call them optional, and a step that is longer than the DefaultExperiment of an FMU. Finally the
+/// command prints the last values (those of the curves if it draws the default plot, otherwise all recorded ones) and the names
+/// of its files.
 ///
-/// The FMUs run in a separate process, with limits on memory, open files and new processes. If an FMU crashes, blocks or ends that
-/// process, the command names the FMU and the call, removes the temporary files and has exit status 2. What they print goes to standard
-/// error. --in-process runs them in the process of the command: it starts some milliseconds sooner, and an FMU that crashes
-/// takes the command with it.
+/// The FMUs run in a separate process, with limits on memory, open files and new processes. If an FMU crashes, blocks or ends
+/// that process, the command names the FMU and the call, removes the temporary files and has exit status 2. Their output goes
+/// to standard error. --in-process runs them in the process of the command: it starts some milliseconds sooner, but an FMU that
+/// crashes ends the command too.
 ///
 /// Start the drive, turn it at 1000 rpm, and load it after 0.5 s:
 ///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --html run.html
@@ -79,16 +80,19 @@ pub struct Simulate {
     /// Connect every unconnected input to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
+    /// Pass numbers between different units on as they are; without it they are converted by the BaseUnits of both FMUs
+    #[arg(long)]
+    pub no_unit_conversion: bool,
     /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
     #[arg(long, value_name = "INSTANCE=FILE.ssv")]
     pub parameters: Vec<String>,
     /// Set a parameter or an unconnected input (repeatable); a number may have a unit that the FMU shows: 20degC
     #[arg(long, value_name = "VARIABLE=VALUE")]
     pub set: Vec<String>,
-    /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE
-    /// for straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the others name
-    /// what they feed. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`. What is not one real number is held from
-    /// point to point: texts, bytes as hexadecimal digits, arrays with spaces between their elements
+    /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE for
+    /// straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the other columns name
+    /// the inputs. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`. Values other than a real number are held
+    /// from point to point: texts, bytes as hexadecimal digits, arrays with spaces between their elements
     #[arg(long, value_name = "[VARIABLE=]POINTS|FILE.csv")]
     pub input: Vec<String>,
     /// Start time in s [default: from the FMUs, else 0]
@@ -106,29 +110,32 @@ pub struct Simulate {
     /// Write the recording as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]
     pub csv: Option<PathBuf>,
-    /// Plot the recording; the ending selects the format. Without --record: speed, torque, dq currents, angle error and power of
-    /// a drive, the first of each unit of other FMUs
+    /// Plot the recording; the extension selects the format. Without --record: speed, torque, dq currents, angle error and
+    /// power of a drive, the first of each unit of other FMUs
     #[arg(long, value_name = "FILE.svg|FILE.png")]
     pub plot: Option<PathBuf>,
-    /// Write the same plot as a page with zoom, legend switches and values at the cursor, which needs no network
+    /// Write the same plot as an offline page with zoom, legend switches and values at the cursor
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
-    /// Plot all outputs, with --plot or --html; with --record, all that is recorded is plotted anyway
+    /// Plot all outputs, with --plot or --html; with --record, all recorded variables are plotted anyway
     #[arg(long, conflicts_with = "record")]
     pub all: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it
     #[arg(long)]
     pub sequential: bool,
-    /// Integrate the FMUs (Model Exchange) instead of having them step themselves (Co-Simulation)
+    /// Integrate the FMUs (Model Exchange) instead of letting them step themselves (Co-Simulation)
     #[arg(long, conflicts_with = "sequential")]
     pub me: bool,
-    /// How --me integrates [default: dopri]
+    /// Integrator of --me [default: dopri]
     #[arg(long, value_enum)]
-    pub solver: Option<SolverName>,
+    pub solver: Option<SolverOption>,
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
-    /// Handle events of FMUs of FMI 3.0 that have event mode at their time (Co-Simulation)
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: that of the default experiment of each]
+    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true, conflicts_with = "me")]
+    pub tolerance: Option<f64>,
+    /// Handle events at their time, for FMUs of FMI 3.0 with event mode (Co-Simulation)
     #[arg(long, conflicts_with_all = ["me", "sequential"])]
     pub event_mode: bool,
     /// Let FMUs of FMI 3.0 return early from a step (Co-Simulation)
@@ -137,7 +144,7 @@ pub struct Simulate {
     /// Show all messages that the FMUs log
     #[arg(long)]
     pub logging: bool,
-    /// Longest time in s for loading, for initialization, and from one communication point to the next; 0 for no limit
+    /// Maximum time in s for loading, for initialization, and between two communication points; 0 for no limit
     #[arg(long, value_name = "S", default_value_t = 300.0)]
     pub timeout: f64,
     /// Address space of the process of the FMUs, in GiB; 0 for no limit
@@ -156,7 +163,7 @@ pub struct Simulate {
 
 /// Integrators of Model Exchange.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SolverName {
+pub enum SolverOption {
     /// Runge-Kutta of order 4, with fixed steps of the size --step
     Rk4,
     /// Dormand-Prince of order 5, with adaptive steps
@@ -177,7 +184,7 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
         _ => {}
     }
     let solver = match (args.solver, args.rtol) {
-        (Some(SolverName::Rk4), _) => Solver::Rk4,
+        (Some(SolverOption::Rk4), _) => Solver::Rk4,
         (_, Some(rtol)) => Solver::Dopri { rtol },
         (_, None) => Solver::default(),
     };
@@ -212,24 +219,31 @@ pub fn run(args: &Simulate) -> Result<()> {
 }
 
 fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
-    // An FMU may change it; the files of the command are named from here.
+    // An FMU may change the working directory; file names of the command are relative to this one.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
-    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, |fmus| method(args, fmus))?;
+    let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
+    if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
+        bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
+    }
+    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
+    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {
         bail!("--solver and --rtol are for Model Exchange: add --me");
     }
-    if args.solver == Some(SolverName::Rk4) && args.rtol.is_some() {
+    if args.solver == Some(SolverOption::Rk4) && args.rtol.is_some() {
         bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
     }
     std::env::set_current_dir(&home)?;
     loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
+    let settings = system.feasible(&settings)?;
+    system.take_notes().iter().for_each(|note| message::note(&printable(note)));
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
-    let mut hook = |point: &mut Point<'_>| {
+    let mut hook = |point: &mut CommunicationPoint<'_>| {
         if args.logging {
             show(&point.take_messages());
         }
@@ -241,7 +255,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         }
         Ok(ControlFlow::Continue(()))
     };
-    let outcome = system.run(&settings, &mut hook);
+    let (recording, outcome) = system.run_keeping(&settings, &mut hook);
     progress.end();
     if args.logging {
         show(&system.take_messages());
@@ -251,21 +265,24 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     if !lost.is_empty() {
         let names: Vec<&str> = system.instances().iter().map(Instance::name).collect();
         let text = format!("{}: the FMU closed or replaced {} of its process", names.join(" or "), lost.join(", "));
-        // Files that it holds may be closed too, and their numbers may be those of others by now.
+        // Files of the command may have been closed too, and their descriptors reused.
         std::mem::forget(system);
         bail!("{text}");
     }
-    let recording = outcome?;
+    let failed = match outcome {
+        Err(error) if recording.time.is_empty() => return Err(error.into()),
+        outcome => outcome.err().map(|error| ending(&error, recording.time.last(), settings.step)),
+    };
     journal::writes();
     std::env::set_current_dir(&home)?;
     let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
-    let bad = bad.map(|column| format!("{} is not finite at the end", column.name));
+    let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
     let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
     let written = output::write(recording, for_plot, alone, args, &mut out);
     for text in warnings(&system, &settings) {
         message::warning(&printable(&text));
     }
-    // The results come last.
+    // The results are written last.
     let written = written?;
     let text = printable_lines(&written);
     if args.csv.as_deref() == Some(Path::new("-")) {
@@ -284,7 +301,14 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     }
 }
 
-/// Warns of inputs that keep their start values and of a step that is too long: no FMU refuses either.
+/// Why a run ended early, with advice.
+fn ending(error: &fmu_import::Error, last: Option<&f64>, step: f64) -> String {
+    let advice =
+        if error.is_discard() { format!("; a shorter step may go on: --step {}", 0.5 * step) } else { String::new() };
+    format!("{error}; the results end at {} s{advice}", last.copied().unwrap_or_default())
+}
+
+/// Warns of inputs that keep their start values and of a step that is too long, because FMUs refuse neither.
 fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     let mut found = Vec::new();
     for (index, instance) in system.instances().iter().enumerate() {
@@ -317,7 +341,7 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
 fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
     let Loaded { system, .. } = loaded;
     let values = args.set.iter().map(|text| halves(text, "--set VARIABLE=VALUE")).collect::<Result<Vec<_>>>()?;
-    // What follows names elements of arrays, which these size.
+    // The following arguments name elements of arrays whose sizes are set here.
     let (sizes, values): (Vec<_>, Vec<_>) =
         values.into_iter().partition(|(port, _)| system.is_size(port).unwrap_or(false));
     system.configure(sizes)?;

@@ -1,8 +1,8 @@
 //! `fmu ssp`: the closed loop of plant and controller as one file.
 
 use super::build::{self, Build};
-use crate::pack::{self, Moment};
-use crate::ssp::{self, COMPONENTS, Options, Values};
+use crate::pack::{self, GenerationTime};
+use crate::ssp::{self, COMPONENTS, ComponentValues, Options};
 use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
@@ -39,11 +39,11 @@ pub struct Ssp {
     /// Values for controller or plant as SSV of SSP 1.0 (repeatable)
     #[arg(long, value_name = "COMPONENT=FILE.ssv")]
     pub parameters: Vec<String>,
-    /// Write values of enumerations by name, as SSP 1.0 describes them, instead of by number; some importers read no names
+    /// Write values of enumerations by name, as SSP 1.0 describes them, instead of by number; some importers do not read names
     /// (OMSimulator)
     #[arg(long)]
     pub names: bool,
-    /// Write values of enumerations by number: the default; older scripts pass it
+    /// Write values of enumerations by number: the default, kept for older scripts
     #[arg(long, hide = true, conflicts_with = "names")]
     pub integers: bool,
     /// Connect `enabled` of the controller to `enable` of the plant, for a drive that can be switched off; some importers do
@@ -63,7 +63,7 @@ pub struct Ssp {
 /// # Errors
 /// The FMUs do not build, values do not fit, or the file cannot be written.
 pub fn run(args: &Ssp) -> Result<()> {
-    let moment = Moment::of_environment()?;
+    let moment = GenerationTime::of_environment()?;
     let values = values(args)?;
     let dir = tempfile::tempdir()?;
     if values.is_empty() && args.names {
@@ -110,17 +110,17 @@ fn is_of(folder: &Path, version: FmiVersion) -> Result<()> {
         let file = folder.join(fmu).with_extension("fmu");
         let found = fmu_import::outline(&file)?.description.version;
         if found != version {
-            bail!("{}: is of FMI {found}, but --fmi asks for {version}", file.display());
+            bail!("{}: is of FMI {found}, but --fmi is {version}", file.display());
         }
     }
     Ok(())
 }
 
 /// The values, each with its file.
-fn values(args: &Ssp) -> Result<Vec<Values>> {
+fn values(args: &Ssp) -> Result<Vec<ComponentValues>> {
     if let Some(motor) = &args.motor {
         let tuned = tune::tune(motor)?;
-        let of = |component: &str, settings: &[tune::setting::Setting]| Values {
+        let of = |component: &str, settings: &[tune::setting::Setting]| ComponentValues {
             component: component.into(),
             file: motor.display().to_string(),
             text: ssv::text(&format!("{} {component}", tuned.name), settings),
@@ -128,19 +128,19 @@ fn values(args: &Ssp) -> Result<Vec<Values>> {
         let (plant, controller) = tune::needed(&tuned, false)?;
         return Ok(vec![of("controller", &controller), of("plant", &plant)]);
     }
-    let mut values: Vec<Values> = Vec::new();
+    let mut values: Vec<ComponentValues> = Vec::new();
     for text in &args.parameters {
         let (component, file) =
             text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --parameters COMPONENT=FILE.ssv"))?;
         if !COMPONENTS.iter().any(|(name, ..)| *name == component) {
             let names: Vec<&str> = COMPONENTS.iter().map(|(name, ..)| *name).collect();
-            bail!("--parameters {text}: there is no component {component}; there are {}", names.join(" and "));
+            bail!("--parameters {text}: there is no component {component}; available: {}", names.join(", "));
         }
         if values.iter().any(|v| v.component == component) {
-            bail!("--parameters {text}: {component} has a file already: put the values of both into one");
+            bail!("--parameters {text}: {component} already has a file: put the values of both into one");
         }
         let content = std::fs::read_to_string(file).with_context(|| file.to_owned())?;
-        values.push(Values { component: component.into(), file: file.into(), text: content });
+        values.push(ComponentValues { component: component.into(), file: file.into(), text: content });
     }
     Ok(values)
 }

@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use fmu_sweep::isolate::Isolation;
-use fmu_sweep::{Options, Report, Sweep as Definition, Watch, threads_here};
+use fmu_sweep::{Options, Progress, Report, Sweep as Definition, threads_here};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fs::File;
 use std::io::{self, IsTerminal};
@@ -15,8 +15,8 @@ use std::path::{Path, PathBuf};
 /// measures: docs/sweeps.md and examples/sweep.toml. Results are rows of CSV in parts, in DIR, and at the end DIR/results.csv.
 /// A row depends on the file, the seed and its number only, so results have the same bytes for any number of jobs.
 ///
-/// Started again, also after a kill, the command runs the parts that are missing. Several processes may work on one DIR, for example the tasks
-/// of an array job on a shared folder, each with its --part. A run that fails becomes a row with its error.
+/// Started again, even after a kill, the command runs the missing parts. Several processes may work on one DIR, for example the
+/// tasks of an array job on a shared folder, each with its --part. A run that fails becomes a row with its error.
 ///
 /// Exit status: 0 if all rows are good, 1 if some failed, 2 for wrong usage or an unusable file.
 ///
@@ -46,7 +46,7 @@ pub struct Sweep {
     /// Run rows in separate processes: an FMU that crashes ends only its row
     #[arg(long)]
     pub isolate: bool,
-    /// Check the file and list what is missing in DIR
+    /// Check the file and list the missing parts in DIR
     #[arg(long, conflicts_with_all = ["jobs", "part", "limit", "restart", "isolate", "csv"])]
     pub dry_run: bool,
     /// Write all results as CSV once they are complete; - for standard output
@@ -68,7 +68,9 @@ pub fn run(args: &Sweep) -> Result<bool> {
     let mut isolate = args.isolate;
     let jobs = args.jobs.map_or_else(threads_here, usize::from);
     if let Some(name) = sweep.plan().only_one_instance().filter(|_| !isolate && jobs > 1) {
-        watch.note(&format!("{name} can have one instance per process: rows run in processes, as with --isolate"));
+        watch.note(&format!(
+            "{name} allows only one instance per process: rows run in separate processes, as with --isolate"
+        ));
         isolate = true;
     }
     let isolate = isolate.then(std::env::current_exe).transpose().context("the path of this program")?;
@@ -119,7 +121,7 @@ fn plan(sweep: &Definition, args: &Sweep) -> Result<bool> {
     match fmu_sweep::missing(sweep, &args.out)? {
         None => println!("{}: not begun", args.out.display()),
         Some((missing, all, rows)) if missing.is_empty() => {
-            println!("{}: all {all} parts of {rows} rows are there", args.out.display());
+            println!("{}: all {all} parts of {rows} rows exist", args.out.display());
         }
         Some((missing, all, rows)) => {
             println!(
@@ -157,7 +159,7 @@ struct Shown {
     bar: std::sync::OnceLock<ProgressBar>,
 }
 
-impl Watch for Shown {
+impl Progress for Shown {
     fn note(&self, text: &str) {
         crate::message::note(text);
     }

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 /// NAME.SensorlessController.ssv (SSP 1.0) with the values that differ from the start values of the FMUs, for importers.
 ///
 /// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
-/// a load at rating.speed_max if that is given. A note names each load and each start that the drive does not hold, with remedies
+/// a load at rating.speed_max if that is given. A note lists each load and each start at which the drive fails, with remedies
 /// that the command has tried too; the exit status is still 0. Another note names the speed at which the drive without a load swings
 /// most, on the way from 0.1 to 1 pu and back. Rasmussen's observer adapts the resistance, unless the trial holds less with it: a note
 /// says so. --check prints the trial as a table, and that of a machine of -30 and of 130 degC.
@@ -53,13 +53,13 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
-    /// Print the values as JSON, a dictionary for each FMU, and nothing else; enumerations are integers, as FMPy takes them
+    /// Print the values as JSON, a dictionary for each FMU, and nothing else; enumerations are integers, as FMPy expects
     #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
     pub json: bool,
     /// Estimator to tune for, instead of that of the motor file: Rasmussen or ExtendedEmf
     #[arg(long, value_name = "NAME")]
     pub estimator: Option<String>,
-    /// Print the trial: starts from 24 angles at each speed, loads held, least speed, greatest angle error
+    /// Print the trial: starts from 24 angles at each speed, loads carried, minimum speed, maximum angle error
     #[arg(long)]
     pub check: bool,
 }
@@ -139,7 +139,7 @@ pub fn run(args: &Tune) -> Result<()> {
 
 /// Prints the trial.
 fn table(trials: &[Trial], lost: &str) {
-    println!("\nspeed   started    held load  least speed  angle error");
+    println!("\nspeed   started    held load   min. speed  angle error");
     for trial in trials {
         let Trial { task, angles, started, held, least, error, .. } = trial;
         let least = if *started > 0 { format!("{least:8.3} pu") } else { format!("{:>11}", "-") };
@@ -171,7 +171,7 @@ pub fn example_for(description: &Description) -> Result<Option<(String, String)>
 
 /// Which of the three models an FMU is, in the order of [`texts`]; `PmsmDriveMean` has the values of `PmsmDrive`.
 pub(super) fn place(description: &Description) -> Result<Option<usize>> {
-    // Only the model of this name: a description takes a quarter of a second, because it finds the dependencies by trial.
+    // Only the model of this name: a description takes a quarter of a second, because dependencies are found by probing.
     let (place, known) = match &*description.name {
         name if name == PmsmDrive::INFO.name => (0, Description::of::<PmsmDrive>()),
         name if name == PmsmDriveMean::INFO.name => (0, Description::of::<PmsmDriveMean>()),
@@ -209,7 +209,7 @@ fn texts(tuned: &Tuned, integers: bool) -> Result<Vec<(&'static str, String)>> {
 
 fn shown(value: &Value) -> String {
     match value {
-        // Six digits are enough to read; the file has them all.
+        // Six digits suffice for reading; the file has all digits.
         Value::Real(x) => format!("{}", format!("{x:.5e}").parse::<f64>().unwrap_or(*x)),
         Value::Reals(all) => format!("{} values", all.len()),
         Value::Integer(i) => i.to_string(),

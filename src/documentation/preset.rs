@@ -1,4 +1,4 @@
-//! The part of a preset's page that lists its own start values.
+//! The part of a preset's page that lists its start values.
 
 use super::{escape, start, unit};
 use fmu_core::Description;
@@ -15,8 +15,9 @@ pub fn preset(preset: &Description, own: &Description) -> String {
     let values = if pairs.len() == 1 { "1 start value".into() } else { format!("{} start values", pairs.len()) };
     let mut out = format!(
         "<p><b>A preset of {name}</b>, of which <a href=\"#preset\">{values}</a> differ. Figures and plots in this text are of \
-         {name} itself.</p>\n{}\n<h2>Preset</h2>\n<p>The start values of this FMU that differ from those of {name}. They are in \
-         its file resources/{FILE}, without which the binary refuses to run. An importer may set other values.</p>\n\
+         {name} itself.</p>\n{}\n<h2>Preset</h2>\n<p>The start values of this FMU that differ from those of {name}. \
+          They are in its file resources/{FILE}; without it the binary refuses to run. An importer may set other \
+           values.</p>\n\
          <table class=\"variables\">\n<tr><th>Name</th><th class=\"number\">Start</th><th>Unit</th>\
          <th class=\"number\">In {name}</th></tr>\n",
         own.documentation.trim()

@@ -7,7 +7,7 @@ use model_description::Area;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// What begins the groups of the estimators: the controller's own groups would be lost among them in one tab.
+/// Prefix of the groups of the estimators: in a common tab, they would bury the controller's other groups.
 pub(super) const ESTIMATORS: [&str; 14] = [
     "adaptation",
     "carrier",
@@ -74,6 +74,17 @@ fn switch(name: &str, about: &str, group: &str) -> String {
     declare("parameter Boolean", &format!("use_{name}"), &[], "false", about, &annotation)
 }
 
+/// The assertion that an enumeration has the value of the FMU.
+fn unchanged(v: &Variable) -> String {
+    let (start, fmi) = (v.start(), &v.fmi);
+    let item = start.rsplit('.').next().unwrap_or(&start);
+    format!(
+        "  assert({} == {start},\n    \"{fmi} of the FMU is {item}, and no enumeration is sent to it. For another value: \
+         fmu preset FILE.fmu --set {fmi}=VALUE --out NEW.fmu, then import NEW.fmu and write this package again\");\n",
+        v.name
+    )
+}
+
 /// The value of an input that is not connected: its start value, or that of the machine.
 fn constant(v: &Variable, group: &str, disabled_by: &str, machine: &BTreeSet<String>) -> String {
     let value = if machine.contains(&v.fmi) { format!("machine.{}", v.name) } else { v.start() };
@@ -126,14 +137,7 @@ pub(super) fn text(package: &str, about: &str, interface: &Interface, machine: &
         let annotation = format!("Dialog(tab=\"{tab}\", group=\"{group}\")");
         out += &declare(&head, &v.name, &v.modifiers(), &value, &v.about, &annotation);
         if let Kind::Enumeration { .. } = v.kind {
-            let start = v.start();
-            let _ = writeln!(
-                equations,
-                "  assert({name} == {start},\n    \"{fmi} of the FMU is {start}: its import sends no enumeration. For another \
-                 value: fmu preset FILE.fmu --set {fmi}=VALUE --out NEW.fmu, then import NEW.fmu and write this package again\");",
-                name = v.name,
-                fmi = v.fmi,
-            );
+            equations += &unchanged(v);
         }
     }
     for (v, y) in signals.iter().zip(column(signals.len())) {
@@ -206,7 +210,7 @@ fn outputs(interface: &Interface) -> String {
     // Below each other, without the middle, where the flange is.
     let row = |i: u32| f64::from(if i < 3 { 80 } else { 20 }) - 20.0 * f64::from(i);
     let rows: Vec<(&&str, f64)> = sent.iter().zip((0..).map(row)).collect();
-    // The type of an enumeration is the block's: read it there, as fmu.tripped.
+    // The type of an enumeration belongs to the block: read it there, as fmu.tripped.
     for v in interface.outputs.iter().filter(|v| !matches!(v.kind, Kind::Enumeration { .. })) {
         let units: Vec<String> = v.modifiers().into_iter().filter(|m| !m.starts_with('m')).collect();
         let value = match &v.kind {

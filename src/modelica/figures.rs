@@ -1,7 +1,9 @@
-//! What the example `TwoInertias` must give: the FMU in Co-Simulation, and the equations of the drive train by Runge-Kutta.
+//! Expected results of the example `TwoInertias`: the FMU in Co-Simulation, and the equations of the drive train by
+//! Runge-Kutta.
 //!
-//! J_r dw_r/dt = tau_shaft - tau_c, J_l dw_l/dt = tau_c + tau_load, tau_c = c (phi_r - phi_l) + d (w_r - w_l). In a step h the FMU has
-//! the speed of its begin, and the train the mean torque of the step, so the result is off by a delay of about h / 2.
+//! J_r dw_r/dt = tau_shaft - tau_c, J_l dw_l/dt = tau_c + tau_load, tau_c = c (phi_r - phi_l) + d (w_r - w_l). In a step h the
+//! FMU uses the speed at its beginning, and the train the mean torque of the step, so the result has a delay error of about h /
+//! 2.
 
 use super::interface::Interface;
 use anyhow::{Context, Result, ensure};
@@ -17,10 +19,10 @@ pub(super) const COUPLING: (f64, f64, f64) = (500.0, 0.2, 2e-3);
 /// End of the examples in s.
 pub(super) const STOP: f64 = 1.0;
 
-/// Steps in a second. Half of their length moves the figures by 0.006 rad/s and 0.001 N.m.
+/// Steps per second. Halving their length changes the figures by 0.006 rad/s and 0.001 N.m.
 const RATE: f64 = 50_000.0;
 
-/// Steps to the figures: in the start, at speed, and twice under load.
+/// Numbers of steps at the figures: during the start, at speed, and twice under load.
 const ROW: [u32; 4] = [7_500, 15_000, 35_000, 50_000];
 
 /// A figure: time in s, speed of the load in rad/s, torque of the coupling in N.m.

@@ -1,4 +1,4 @@
-//! What of an FMU becomes what in Modelica: ports from terminals, connectors from other inputs, parameters with their dialog.
+//! The mapping from an FMU to Modelica: ports from terminals, connectors from other inputs, parameters with their dialog.
 
 use super::text::identifier;
 use anyhow::{Context, Result, bail};
@@ -22,10 +22,10 @@ pub(super) enum Kind {
     Enumeration { of: String, items: Vec<(i64, String)> },
 }
 
-/// A variable, or an array of which FMI 2.0 has the elements only.
+/// A variable, or an array that FMI 2.0 represents by its elements.
 #[derive(Clone, Debug)]
 pub(super) struct Variable {
-    /// Name in the FMU, without the place of an element.
+    /// Name in the FMU, without the index of an element.
     pub(super) fmi: String,
     /// Name in Modelica.
     pub(super) name: String,
@@ -33,7 +33,7 @@ pub(super) struct Variable {
     pub(super) kind: Kind,
     pub(super) min: Option<f64>,
     pub(super) max: Option<f64>,
-    /// Start values as Modelica literals; one of a scalar.
+    /// Start values as Modelica literals; one for a scalar.
     pub(super) start: Vec<String>,
     /// Names of the elements in the imported block; empty for a scalar and for an array of FMI 3.0.
     pub(super) elements: Vec<String>,
@@ -98,7 +98,7 @@ pub(super) struct Heat {
     pub(super) area: Option<Area>,
 }
 
-/// The FMU as the wrapper sees it.
+/// The FMU as seen by the wrapper.
 #[derive(Clone, Debug)]
 pub(super) struct Interface {
     pub(super) parameters: Vec<Variable>,
@@ -107,10 +107,10 @@ pub(super) struct Interface {
     pub(super) enumerations: Vec<TypeDefinition>,
     /// The shaft that turns inside the FMU.
     pub(super) shaft: Option<Shaft>,
-    /// The shaft that the drive train imposes, the parameter that says so, and the rotor's inertia.
+    /// The shaft imposed by the drive train, the parameter that selects it, and the rotor's inertia.
     pub(super) imposed: Option<(Shaft, String, String)>,
     pub(super) heats: Vec<Heat>,
-    /// Voltage and current of the DC link, and where it is drawn.
+    /// Voltage and current of the DC link, and its position.
     pub(super) link: Option<(String, String, Option<Area>)>,
     /// Outputs that other terminals send as signals.
     pub(super) sent: Vec<String>,
@@ -120,7 +120,7 @@ impl Interface {
     /// Reads description and terminals.
     ///
     /// # Errors
-    /// There is no terminal of a shaft, or the wrapper cannot have a variable.
+    /// There is no terminal of a shaft, or the wrapper does not support a variable.
     pub(super) fn of(md: &ModelDescription, terminals: Option<&TerminalsAndIcons>) -> Result<Self> {
         let terminals = terminals.map(|t| t.terminals.as_slice()).unwrap_or_default();
         let all = |causality| variables(md, causality);
@@ -144,13 +144,13 @@ impl Interface {
                 if names.is_empty() { "no terminals".into() } else { format!("the terminals {}", names.join(", ")) };
             bail!(
                 "has no shaft for a flange: a terminal with the members speed, angle and the outflow tau; it has {has}. \
-                 PmsmDrive, PmsmDriveMean and PmsmPlant have one; an FMU of signals needs no more than the block of the import"
+                 PmsmDrive, PmsmDriveMean and PmsmPlant have one; for an FMU of signals, the imported block suffices"
             );
         }
         Ok(interface)
     }
 
-    /// What a terminal becomes, by the names of its members.
+    /// The port of a terminal, by the names of its members.
     fn take(&mut self, md: &ModelDescription, terminal: &Terminal) {
         let member = |name: &str, kind: &str| {
             let found = terminal.members.iter().find(|m| m.name.as_deref() == Some(name) && m.kind == kind)?;
@@ -196,7 +196,7 @@ impl Interface {
         self.sent.extend(signals.filter(|v| v.causality == Causality::Output).map(of));
     }
 
-    /// The inputs that no port has.
+    /// The inputs without a port.
     pub(super) fn signals(&self) -> impl Iterator<Item = &Variable> {
         let mut taken: Vec<&str> = self.heats.iter().map(|h| h.temperature.as_str()).collect();
         taken.extend(self.link.iter().map(|(u, ..)| u.as_str()));
@@ -279,7 +279,7 @@ fn starts(md: &ModelDescription, v: &ModelVariable, kind: &Kind) -> Result<Vec<S
     let shape = md.shape(v).context("its size is unknown")?;
     let count = shape.iter().product::<usize>();
     if shape.len() > 1 {
-        bail!("an array of {} dimensions; the wrapper has those of one", shape.len());
+        bail!("an array of {} dimensions; the wrapper supports one dimension", shape.len());
     }
     // FMI 3.0 allows one value for all elements.
     Ok(if values.len() == 1 && count > 1 { vec![values[0].clone(); count] } else { values })

@@ -12,7 +12,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-/// A machine: the name of its record, what it is, and its values.
+/// A machine: the name of its record, its description, and its values.
 pub(super) struct Machine {
     name: String,
     about: String,
@@ -44,7 +44,7 @@ fn of(file: &Path, tuned: &Tuned, interface: &Interface) -> Result<Machine> {
         tuned.plant.iter().map(|s| (s.name.to_owned(), s.value.clone())).collect()
     };
     for (name, _) in &values {
-        ensure!(variable(interface, name).is_some(), "a machine has {name}, and the FMU has no such parameter");
+        ensure!(variable(interface, name).is_some(), "a machine has {name}, but the FMU has no such parameter");
     }
     let stem = file.file_stem().and_then(|s| s.to_str()).context("its name is not valid UTF-8")?;
     let name = identifier(stem);
@@ -102,7 +102,7 @@ pub(super) fn text(package: &str, machines: &[Machine], interface: &Interface) -
     Ok(out + "end Machines;\n")
 }
 
-/// A value as Modelica writes it.
+/// A value in Modelica notation.
 fn literal(v: &Variable, value: &Value) -> Result<String> {
     let fits = match (value, &v.kind) {
         (Value::Reals(all), Kind::Real { .. }) => v.is_array && all.len() == v.start.len(),

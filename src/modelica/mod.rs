@@ -1,6 +1,7 @@
-//! A Modelica package around an FMU: a drive with a flange, ports and a dialog, for the block that an import makes of the FMU.
+//! A Modelica package around an FMU: a drive with a flange, ports and a dialog, for the block that an import creates from the
+//! FMU.
 //!
-//! - `interface`: which terminal is which port; `base`, `shafts`: the drives; `machines`: records of machines.
+//! - `interface`: the mapping of terminals to ports; `base`, `shafts`: the drives; `machines`: records of machines.
 //! - `examples`: drive trains, and the script for OpenModelica.
 
 mod base;
@@ -30,13 +31,13 @@ pub struct Wrapping {
     pub motors: Vec<PathBuf>,
 }
 
-/// Where FMI 2.0 and FMI 3.0 have the picture.
+/// Paths of the picture in FMI 2.0 and FMI 3.0.
 const ICON: &str = "terminalsAndIcons/icon.png";
 
 /// The files of the package by their names below the output folder, and the name of the package.
 ///
 /// # Errors
-/// The FMU has no shaft, or Model Exchange is missing; a name is none of Modelica; a machine does not fit.
+/// The FMU has no shaft, or Model Exchange is missing; a name is invalid in Modelica; a machine does not match.
 pub fn files(fmu: &Path, options: &Wrapping) -> Result<(String, BTreeMap<String, Vec<u8>>)> {
     let (md, contents) = fmu_import::contents(fmu)?;
     let terminals = fmu_import::outline(fmu)?.terminals;
@@ -51,7 +52,7 @@ pub fn files(fmu: &Path, options: &Wrapping) -> Result<(String, BTreeMap<String,
             block.clone()
         }
         None if md.version == FmiVersion::V3 || md.model_exchange.is_none() => bail!(
-            "{}: the import of OpenModelica reads FMI 2.0 for Model Exchange, and this is {} of FMI {}; take the archive of FMI \
+            "{}: OpenModelica imports FMI 2.0 for Model Exchange, and this is {} of FMI {}; use the archive of FMI \
              2.0, or give the class of another import with --block",
             of(),
             if md.model_exchange.is_none() { "Co-Simulation" } else { "an FMU" },
@@ -106,10 +107,10 @@ fn identifier(md: &ModelDescription) -> Result<String> {
     Ok(identifier)
 }
 
-/// The one place that names the block of the import.
+/// The only file that names the imported block.
 fn of_block(package: &str, block: &str) -> String {
     format!(
-        "within {package};\nmodel Block = {block}\n  \"The block that the import made of the FMU; if it has another name, write it here\";\n"
+        "within {package};\nmodel Block = {block}\n  \"The block that the import created from the FMU; if it has another name, write it here\";\n"
     )
 }
 

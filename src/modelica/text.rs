@@ -9,8 +9,9 @@ const RESERVED: &str = " algorithm and annotation block break class connect conn
      import impure in initial inner input loop model not operator or outer output package parameter partial protected public \
      pure record redeclare replaceable return stream then true type when while within ";
 
-/// The identifier that an import makes of a variable's name. OpenModelica replaces each character that is none of an
-/// identifier (`plant_flux_map_w_46_`); Modelica-FMI replaces a row of them by one `_`, which is the same for our names.
+/// The identifier that an import derives from a variable's name. OpenModelica replaces each character that is invalid in an
+/// identifier (`plant_flux_map_w_46_`); Modelica-FMI replaces a sequence of them by one `_`, which gives the same for our
+/// names.
 pub(super) fn identifier(name: &str) -> String {
     name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect()
 }
@@ -18,7 +19,7 @@ pub(super) fn identifier(name: &str) -> String {
 /// Checks that a name can be a class of Modelica.
 ///
 /// # Errors
-/// Says what a name is made of.
+/// States the rules of a name.
 pub(super) fn check(what: &str, name: &str) -> Result<()> {
     let plain = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     let starts = name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');

@@ -13,12 +13,12 @@ use fmu_plot::ink::CURVES;
 use fmu_plot::page::{AXIS, document, escape};
 use fmu_system::cosimulation::Schedule;
 use model_description::{FmiVersion, Generation};
-use own::{Judged, Own, Run, is_curve};
+use own::{Judged, Own, PresetRun, is_curve};
 use serde_json::{Map, Value, json};
 use std::io::Write as _;
 use std::path::Path;
 
-/// The file of a package that shapes its page.
+/// The file of a package that configures its page.
 pub const FILE: &str = "page.toml";
 
 const BODY: &str = include_str!("body.html");
@@ -26,21 +26,21 @@ const STYLE: &str = include_str!("run.css");
 const RUN: &str = include_str!("run.js");
 const WORKER: &str = include_str!("worker.js");
 
-/// The page loads nothing: scripts and styles are its own, the worker is a part of it.
+/// The page loads nothing: scripts, styles and the worker are part of it.
 const POLICY: &str = "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; script-src 'unsafe-inline' \
      'wasm-unsafe-eval' blob:; worker-src blob:; style-src 'unsafe-inline'; img-src data:\">\n";
 
-/// Greatest number of plots and of curves in a plot, where the author names none.
+/// Maximum number of plots and of curves in a plot, where the author names none.
 const PLOTS: usize = 4;
 
-/// Greatest number of changes that a file of inputs becomes.
+/// Maximum number of changes that a file of inputs becomes.
 const CHANGES: usize = 2000;
 
-/// What a page is made of.
+/// The parts of a page.
 pub struct Source<'a> {
     /// The model with the start values of the page.
     pub description: &'a Description,
-    /// The model as its module has it, if other start values make it a preset.
+    /// The model of the module, if the page is for a preset.
     pub plain: &'a Description,
     /// The module.
     pub module: &'a [u8],
@@ -48,7 +48,7 @@ pub struct Source<'a> {
     pub own: Option<(&'a Path, &'a str)>,
     /// The file that feeds the default experiment.
     pub stimuli: Option<&'a Path>,
-    /// The licenses of what the module contains.
+    /// The licenses of the module's contents.
     pub licenses: &'a str,
 }
 
@@ -58,7 +58,7 @@ pub struct Source<'a> {
 /// The model has no Co-Simulation.
 pub fn is_possible(of: &Description) -> Result<()> {
     let alone = of.model_exchange.as_ref().is_some_and(|exchange| exchange.only);
-    ensure!(!alone, "{}: a page runs Co-Simulation, and this FMU is for Model Exchange alone", of.model_name());
+    ensure!(!alone, "{}: a page runs Co-Simulation, but this FMU is for Model Exchange only", of.model_name());
     Ok(())
 }
 
@@ -72,7 +72,7 @@ pub fn page(source: &Source<'_>) -> Result<String> {
     let Judged { mut members, presets } = judged(plain, source.own)?;
     // The author's presets are for the author's start values.
     let is_plain = of.variables.iter().zip(&plain.variables).all(|(a, b)| a.start == b.start);
-    let mut presets: Vec<Value> = presets.iter().filter(|_| is_plain).map(Run::json).collect();
+    let mut presets: Vec<Value> = presets.iter().filter(|_| is_plain).map(PresetRun::json).collect();
     if presets.is_empty() {
         let run = default_experiment(of, source.stimuli)?;
         if !is_plain {
@@ -98,8 +98,8 @@ pub fn page(source: &Source<'_>) -> Result<String> {
     Ok(document(of.model_name(), POLICY, STYLE, &body))
 }
 
-/// The ranges of the inputs of a run, twice what it needs, for a machine that the author's ranges are not for.
-fn ranges_of(run: &Run) -> Value {
+/// The ranges of the inputs of a run, twice those needed, for a machine to which the author's ranges do not apply.
+fn ranges_of(run: &PresetRun) -> Value {
     let mut ranges = Map::new();
     for (_, name, value) in &run.events {
         let most = ranges.get(name).map_or(0.0, |range: &Value| range[1].as_f64().unwrap_or(0.0));
@@ -129,10 +129,10 @@ fn fits(module: &[u8], plain: &Description) -> Result<()> {
     Ok(())
 }
 
-/// The file of the author, compared with the model.
+/// The file of the author, checked against the model.
 ///
 /// # Errors
-/// Names the file, the place in it, and what is wrong.
+/// Names the file, the location in it, and the fault.
 pub fn judged(of: &Description, own: Option<(&Path, &str)>) -> Result<Judged> {
     let generation = Generation { tool: String::new(), date_and_time: String::new() };
     let reader = model_description::read(model_description::write(of, FmiVersion::V3, &generation))?;
@@ -142,7 +142,7 @@ pub fn judged(of: &Description, own: Option<(&Path, &str)>) -> Result<Judged> {
     judged.map_err(|cause| anyhow!("{file}: {cause}"))
 }
 
-/// What the page knows of the model.
+/// The page's description of the model.
 fn described(of: &Description, plain: &Description, mut members: Map<String, Value>, presets: &[Value]) -> Value {
     let ranges = members.remove("ranges").unwrap_or_default();
     if members.get("plots").is_none_or(|plots| plots == &json!([])) {
@@ -154,11 +154,11 @@ fn described(of: &Description, plain: &Description, mut members: Map<String, Val
             enumerations.insert(name.clone(), json!(items));
         }
     }
-    // Bytes and clocks stay out.
+    // Bytes and clocks are omitted.
     let has_text = |v: &Variable| !matches!(v.kind, VariableKind::Binary { .. } | VariableKind::Clock(_));
     let shown = |v: &&Variable| (v.causality.is_settable() || is_curve(v)) && has_text(v);
     let variables: Vec<Value> = of.variables.iter().filter(shown).map(|v| variable(v, &ranges)).collect();
-    // What a preset archive starts with, and the module does not.
+    // Start values of a preset archive that differ from the module's.
     let starts = of.variables.iter().filter(|v| plain.variable(&v.name).is_none_or(|p| p.start != v.start));
     let starts: Vec<Value> =
         starts.filter(|v| v.causality.is_settable() && has_text(v)).map(|v| json!([v.name, start(v)])).collect();
@@ -222,7 +222,7 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
             json[key] = value;
         }
     };
-    // What most variables have is left out.
+    // Default properties are omitted.
     if v.variability == Variability::Tunable {
         put("variability", json!(v.variability));
     }
@@ -248,7 +248,7 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
 fn start(v: &Variable) -> Value {
     let one = |value: &Start| match value {
         Start::Real(x) => json!(x),
-        // A page counts in doubles; a start beyond them is shown and set as a text of digits.
+        // A page computes in doubles; a start value that does not fit is shown and set as a text of digits.
         Start::Integer(x) => i64::try_from(*x).map_or_else(|_| json!(x.to_string()), |x| json!(x)),
         Start::Boolean(x) => json!(x),
         Start::Text(x) => json!(x),
@@ -281,9 +281,9 @@ fn plots(of: &Description) -> Value {
 }
 
 /// The default experiment, with its inputs held over the steps.
-fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<Run> {
+fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<PresetRun> {
     let experiment = &of.experiment;
-    let mut run = Run {
+    let mut run = PresetRun {
         title: "Default experiment".into(),
         text: String::new(),
         set: Vec::new(),

@@ -1,4 +1,4 @@
-//! What an author says about the page of a model: `page.toml`, beside the package's `Cargo.toml`.
+//! The author's configuration of a page: `page.toml`, beside the package's `Cargo.toml`.
 
 use fmu_core::Description;
 use fmu_core::description::{Variable, VariableKind};
@@ -12,10 +12,10 @@ use std::fmt;
 
 /// Largest size of the file in bytes.
 pub const LARGEST: u64 = 1 << 20;
-/// Greatest numbers of presets, and of arrows in a plane.
+/// Maximum numbers of presets, and of arrows in a plane.
 const PRESETS: usize = 50;
 const ARROWS: usize = 20;
-/// Greatest number of changes in a preset.
+/// Maximum number of changes in a preset.
 const EVENTS: usize = 10_000;
 
 /// The file.
@@ -70,7 +70,7 @@ struct Arrow {
     thin: bool,
 }
 
-/// A value, with one of the variable's units where it is a text.
+/// A value; a text may contain one of the variable's units.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged)]
 enum Written {
@@ -100,7 +100,7 @@ enum Term {
     Product(Vec<Term>),
 }
 
-/// A run to begin with.
+/// A preset run.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Preset {
@@ -117,18 +117,18 @@ struct Preset {
     compare: bool,
 }
 
-/// What the page needs of the file, judged.
+/// The content of the file for the page, after its checks.
 #[derive(Clone, Debug)]
 pub struct Judged {
     /// Members of the page's description of the model.
     pub members: serde_json::Map<String, Value>,
-    /// The runs to begin with.
-    pub presets: Vec<Run>,
+    /// The preset runs.
+    pub presets: Vec<PresetRun>,
 }
 
 /// A preset in SI units and steps.
 #[derive(Clone, Debug)]
-pub struct Run {
+pub struct PresetRun {
     /// Its name.
     pub title: String,
     /// What to see.
@@ -141,12 +141,12 @@ pub struct Run {
     pub stop: Option<f64>,
     /// Seconds of the run per second; `None` for the one that ends the default experiment in 10 s.
     pub rate: Option<f64>,
-    /// The run before stays in the plots.
+    /// The previous run stays in the plots.
     pub compare: bool,
 }
 
-impl Run {
-    /// The run as the page has it.
+impl PresetRun {
+    /// The run in the form that the page uses.
     pub fn json(&self) -> Value {
         let Self { title, text, set, events, stop, rate, compare } = self;
         json!({ "title": title, "text": text, "set": set, "events": events, "stop": stop, "rate": rate, "compare": compare })
@@ -157,10 +157,10 @@ impl Own {
     /// Reads the text of the file.
     ///
     /// # Errors
-    /// Says in which line what is wrong.
+    /// Names the line and the fault.
     pub fn read(text: &str) -> Result<Self, String> {
         if text.len() as u64 > LARGEST {
-            return Err(format!("has {} bytes, and {LARGEST} are the most", text.len()));
+            return Err(format!("has {} bytes; the maximum is {LARGEST}", text.len()));
         }
         toml::from_str(text).map_err(|error: toml::de::Error| {
             let line = error.span().map_or(1, |span| text[..span.start.min(text.len())].matches('\n').count() + 1);
@@ -168,10 +168,10 @@ impl Own {
         })
     }
 
-    /// Compares the file with the model: `reader` is the model as FMI 3.0 describes it.
+    /// Checks the file against the model: `reader` is the model as described by FMI 3.0.
     ///
     /// # Errors
-    /// Names the place in the file and what is wrong there.
+    /// Names the location in the file and the fault.
     pub fn judge(&self, of: &Description, reader: &ModelDescription) -> Result<Judged, String> {
         let model = Model { of, reader };
         let computed: Vec<&str> = self.difference.iter().map(|d| d.name.as_str()).collect();
@@ -216,7 +216,7 @@ impl Own {
         }
         let planes = self.plane.iter().map(|plane| model.plane(plane)).collect::<Result<Vec<_>, _>>()?;
         if self.preset.len() > PRESETS {
-            return Err(format!("has {} presets, and {PRESETS} are the most", self.preset.len()));
+            return Err(format!("has {} presets; the maximum is {PRESETS}", self.preset.len()));
         }
         let presets =
             self.preset.iter().map(|preset| model.run(preset).map_err(|e| format!("preset {:?}: {e}", preset.title)));
@@ -259,7 +259,7 @@ fn distinct<'a>(what: &str, names: impl Iterator<Item = &'a str>) -> Result<(), 
     Ok(())
 }
 
-/// The model that the file is about.
+/// The model of the file.
 struct Model<'a> {
     of: &'a Description,
     reader: &'a ModelDescription,
@@ -273,7 +273,7 @@ impl Model<'_> {
             .ok_or_else(|| format!("{} has no variable {name}{}", self.of.name, suggest(name, names())))
     }
 
-    /// The value of a variable as a user writes it, checked against its range.
+    /// The value of a variable from user input, checked against its range.
     fn value(&self, name: &str, written: &Written) -> Result<Value, String> {
         let text = &written.to_string();
         let v = self.variable(name)?;
@@ -348,7 +348,7 @@ impl Model<'_> {
             Term::Name(name) => {
                 let v = self.variable(name)?;
                 let has_number = is_curve(v) || (v.causality == Causality::Parameter && !v.is_array());
-                if has_number { Ok(json!(name)) } else { Err(format!("{name} has no number that the page knows")) }
+                if has_number { Ok(json!(name)) } else { Err(format!("{name} has no number that the page can read")) }
             }
             Term::Product(parts) => {
                 if parts.iter().any(|part| matches!(part, Term::Product(_))) {
@@ -359,7 +359,7 @@ impl Model<'_> {
         }
     }
 
-    fn run(&self, preset: &Preset) -> Result<Run, String> {
+    fn run(&self, preset: &Preset) -> Result<PresetRun, String> {
         let experiment = &self.of.experiment;
         let set = preset.set.iter().map(|(name, text)| {
             self.value(name, text).map(|value| (name.clone(), value)).map_err(|e| format!("set: {e}"))
@@ -373,7 +373,7 @@ impl Model<'_> {
             return Err("rate is not a finite number of at least 0".into());
         }
         if preset.events.len() > EVENTS {
-            return Err(format!("has {} events, and {EVENTS} are the most", preset.events.len()));
+            return Err(format!("has {} events; the maximum is {EVENTS}", preset.events.len()));
         }
         let event = |(t, name, text): &(f64, String, Written)| -> Result<(u64, String, Value), String> {
             let place = |e: String| format!("event at {t} s: {e}");
@@ -394,6 +394,6 @@ impl Model<'_> {
         };
         let events = preset.events.iter().map(event).collect::<Result<_, _>>()?;
         let Preset { title, text, rate, compare, .. } = preset.clone();
-        Ok(Run { title, text, set, events, stop: Some(stop), rate, compare })
+        Ok(PresetRun { title, text, set, events, stop: Some(stop), rate, compare })
     }
 }

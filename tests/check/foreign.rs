@@ -57,8 +57,8 @@ fn tool(module: &str) -> Command {
     command
 }
 
-/// What is said of it is true: PythonFMU lists no InitialUnknowns (its issue 193), and its binary needs a Python that
-/// is not in this process, which it declares.
+/// The findings are true: PythonFMU lists no InitialUnknowns (its issue 193), and its binary needs a Python that is not in this
+/// process, which it declares.
 #[test]
 fn pythonfmu() {
     let dir = tempfile::tempdir().unwrap();
@@ -69,7 +69,7 @@ fn pythonfmu() {
     assert_eq!(must, ["S02a"], "{}", listed(&report));
 }
 
-/// Nor does it describe the Python that it needs, which FMI 3.0 demands (3.0.2, 2.5.1.1).
+/// Nor does it describe the Python that it needs, as FMI 3.0 requires (3.0.2, 2.5.1.1).
 #[test]
 fn pythonfmu3() {
     let dir = tempfile::tempdir().unwrap();
@@ -80,9 +80,9 @@ fn pythonfmu3() {
     assert_eq!(must, ["Z04c"], "{}", listed(&report));
 }
 
-/// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a call has 20 s only. It steps beyond the stop
-/// time (FMI 2.0.5, 2.1.6) and has no Error for a wrong value reference (2.0.5, 2.1.2); all else that it does not do the
-/// standard leaves open.
+/// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a call has only 20 s. It steps beyond the stop
+/// time (FMI 2.0.5, 2.1.6) and has no Error for a wrong value reference (2.0.5, 2.1.2); the standard leaves its other omissions
+/// open.
 #[test]
 fn fmucontainer() {
     let dir = tempfile::tempdir().unwrap();

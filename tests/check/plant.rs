@@ -26,7 +26,7 @@ fn faults_of_fmi_3() {
             "canHandleVariableCommunicationStepSize=\"true\"",
             "canHandleVariableCommunicationStepSize=\"true\" canReturnEarlyAfterIntermediateUpdate=\"true\"",
         ),
-        // Others depend on the input whose reference is gone.
+        // Others depend on the input whose reference was removed.
         (&["V02a", "S03a"], "valueReference=\"2\"", "valueReference=\"1\""),
         (&["V03"], "causality=\"independent\"", "causality=\"local\" initial=\"calculated\""),
         (&["V09a"], "unit=\"N.m\" start", "unit=\"Nm\" start"),
@@ -44,7 +44,7 @@ fn faults_of_fmi_3() {
         ),
         (&["V14"], "start=\"325\"", "start=\"3,25\""),
         (&["V13"], "start=\"325\"", "start=\"325 326\""),
-        // The first output, in whose place an input is listed.
+        // The first output, replaced by an input.
         (&["S01"], &output, "<Output valueReference=\"1\""),
     ];
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! It survives any file.
+//! The checker survives any file.
 
 use crate::zip::{Entry, write};
 use crate::{check, common};
@@ -31,7 +31,7 @@ fn what_is_no_fmu_is_status_2() {
     assert_eq!(status(&path, &[]).0, Some(2));
 }
 
-/// Any byte may be another: a verdict or a message, never a crash.
+/// With any byte changed: a verdict or a message, never a crash.
 #[test]
 fn changed_bytes_are_judged() {
     let dir = tempfile::tempdir().unwrap();
@@ -67,7 +67,7 @@ fn bad_intent_is_harmless() {
     let xml = Entry::new("modelDescription.xml", include_bytes!("../../fmu-check/tests/faults/fmu.xml"));
     write(&path, &[xml.clone(), Entry::new("resources/../../../../tmp/evil-of-fmu-check", b"x")]);
     assert_eq!(status(&path, &[]).0, Some(1));
-    // The page begins with what is violated.
+    // The page begins with the violations.
     assert!(check(&path, &["archive"]).html().contains("<li><a href=\"#Z01b\">Z01b</a> (must)"));
     assert!(!Path::new("/tmp/evil-of-fmu-check").exists());
     let deep = format!("<?xml version=\"1.0\" encoding=\"UTF-8\"?><a fmiVersion=\"2.0\">{}", "<a>".repeat(200_000));

@@ -55,7 +55,7 @@ fn each_fault_is_found_by_its_check() {
             file.bytes = xml.replacen(from, to, 1).into_bytes();
             write(&path, &faulty);
             let report = check(&path, &["I01", "I01n", "I01k", "I01p"]);
-            // A file that cannot be read or names no color is the matter of the first check alone.
+            // An unreadable file or one without a color is reported by the first check only.
             assert_eq!(violated(&report), *expected, "{standard}: {from} -> {to}: {}", listed(&report));
         }
         let mut faulty = good.clone();

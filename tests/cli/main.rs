@@ -1,4 +1,4 @@
-//! The command line: what it prints, what it writes, how it ends.
+//! The command line: its output, its files, its exit status.
 #![allow(missing_docs)]
 
 #[path = "../common/mod.rs"]
@@ -30,7 +30,7 @@ fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
     }
 }
 
-/// The first word of a message and the help are colored on a terminal alone; files and pipes get what users ask for.
+/// The first word of a message and the help are colored only on a terminal; files and pipes are colored on request.
 #[test]
 fn color_is_for_terminals() {
     let said = |arguments: &[&str], variables: &[(&str, &str)]| {
@@ -78,7 +78,7 @@ fn info_tells_what_an_fmu_is() {
     assert!(text(&fmu(&["completions", "bash"]).stdout).contains("--auto-connect"));
 }
 
-/// Two builds agree byte for byte, and nothing in them shows where they were made.
+/// Two builds agree byte for byte, and contain no local paths.
 #[test]
 fn builds_are_reproducible() {
     let dir = tempfile::tempdir().unwrap();
@@ -106,7 +106,7 @@ fn help_has_an_example_for_the_pair() {
     assert!(text(&fmu(&["build", "--help"]).stdout).contains("fmu build --package own-fmu"));
 }
 
-/// An atlas writes its files with the same bytes for any number of jobs, and refuses what cannot be run.
+/// An atlas writes its files with the same bytes for any number of jobs, and refuses requests that cannot be run.
 #[test]
 fn an_atlas_is_written_or_refused() {
     let dir = tempfile::tempdir().unwrap();
@@ -134,7 +134,7 @@ fn an_atlas_is_written_or_refused() {
     };
     let [.., page, map] = run("1", "a");
     common::pages::stands_alone(&text(&page), |file| file == "atlas.csv");
-    // A map says what its dots mean, on the page, by itself and in the documentation.
+    // A map explains its dots, on the page, in the file and in the documentation.
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let kept = std::fs::read_to_string(root.join("docs/atlas-Rasmussen.svg")).unwrap();
     for part in ["white dot: lost, and lock_lost does not report it", "red dot: held, and lock_lost"] {
@@ -152,8 +152,8 @@ fn an_atlas_is_written_or_refused() {
         (&["--flux", "-1"], &["--flux -1: must be within 0.1..10; correct the value"]),
         (&["--speed", "fast"], &["--speed fast: is not a number; write for example --speed 0.9,1"]),
         (&["--every", "0"], &["--every 0: must be 1 or more"]),
-        (&["--scenario", "storm"], &["--scenario storm: is not a scenario; there are load, speed, heating"]),
-        (&["--estimator", "Luenberger"], &["--estimator Luenberger: is not an estimator; there are Rasmussen"]),
+        (&["--scenario", "storm"], &["--scenario storm: unknown scenario; available: load, speed, heating"]),
+        (&["--estimator", "Luenberger"], &["--estimator Luenberger: unknown estimator; available: Rasmussen"]),
         (&["--set", "R=1"], &["--set R: is not a parameter of SensorlessController"]),
         (
             &["--estimator", "ExtendedEmf", "--set", "adaptation.resistance=true"],

@@ -1,4 +1,4 @@
-//! `fmu map`: what it writes and prints, and what it refuses.
+//! `fmu map`: its files, its output, and its refusals.
 
 use super::{common, fails, fmu, text};
 use std::path::Path;
@@ -36,7 +36,7 @@ fn a_map_is_written_whole_or_not_at_all() {
     for (name, before) in names.iter().zip(before) {
         assert!(std::fs::read(out.join(name)).unwrap() == before, "{name}");
     }
-    // Another cycle: at rest, the vehicle takes nothing.
+    // Another cycle: at rest, the vehicle takes no energy.
     let cycle = dir.path().join("rest.csv");
     std::fs::write(&cycle, "t,v\n0,0\n10,0\n").unwrap();
     let with = [&arguments[..], &["--verify", "0", "--cycle", cycle.to_str().unwrap()]].concat();
@@ -45,7 +45,7 @@ fn a_map_is_written_whole_or_not_at_all() {
     assert!(energy(&resting) != energy(&printed) && resting.contains("0.00000"), "{resting}");
     std::fs::write(&cycle, "t,v\n0,0\n0,50\n").unwrap();
     fails(&with, 2, &["rest.csv", "the time 0 s does not increase"]);
-    // A request that fails leaves nothing.
+    // A failed request leaves no files.
     let none = dir.path().join("none");
     fails(&["map", &traction, "--T", "-300", "--out", none.to_str().unwrap()], 2, &["--T -300"]);
     assert!(!none.exists());

@@ -1,4 +1,4 @@
-//! `fmu simulate`: what it runs, writes, reports and refuses.
+//! `fmu simulate`: runs, files, reports and refusals.
 
 use super::{archive, common, fails, fmu, text};
 use std::fs::File;
@@ -60,7 +60,7 @@ fn a_bad_binary_gives_one_line_and_status_2() {
     };
     with(b"not a library");
     fails(&["simulate", path.to_str().unwrap()], 2, &["x.fmu: "]);
-    // A library of the system that is no FMU.
+    // A library of the system that is not an FMU.
     let system = ["/lib/x86_64-linux-gnu/libm.so.6", "/lib64/libm.so.6", "/usr/lib/libm.so.6"];
     if let Some(library) = system.iter().find_map(|path| std::fs::read(path).ok()) {
         with(&library);
@@ -72,7 +72,7 @@ fn a_bad_binary_gives_one_line_and_status_2() {
     }
 }
 
-/// An FMU of another tool with Model Exchange alone: x' = u - x from 1, in C.
+/// An FMU of another tool with only Model Exchange: x' = u - x from 1, in C.
 #[test]
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn model_exchange_is_integrated() {
@@ -137,7 +137,7 @@ fn bad_usage_names_what_is_wrong() {
         fails(&[&["simulate", p.as_str(), c.as_str()][..], &arguments[..]].concat(), 2, &[part]);
     }
     fails(&["simulate", p.as_str(), p.as_str()], 2, &["p: two instances have this name"]);
-    fails(&["build", "Magic"], 2, &["there is no FMU Magic; there are "]);
+    fails(&["build", "Magic"], 2, &["there is no FMU Magic; available: "]);
     fails(&["build", "--library", "Cargo.toml"], 2, &["Cargo.toml: "]);
 }
 
@@ -171,7 +171,7 @@ fn the_pair_runs_alike_in_both_standards() {
     assert_ne!(run("fmi3", &["--sequential"]), three, "one step less on the way from plant to controller");
 }
 
-/// The controller with a clock in place of the one with a grid: the plant moves as before in every interface.
+/// The controller with a clock instead of the one with a grid: the plant moves as before in every interface.
 #[test]
 fn clocks_tick() {
     let run = |controller: &str, more: &[&str]| {
@@ -201,7 +201,7 @@ fn clocks_tick() {
     }
 }
 
-/// What no FMU refuses and yet may make a result wrong is reported after the run, whose exit status stays 0.
+/// Settings that FMUs accept but that may invalidate a result are reported after the run; the exit status stays 0.
 #[test]
 fn inputs_left_alone_and_long_steps_are_told() {
     let warned = |more: &[&str]| {
@@ -222,7 +222,8 @@ fn inputs_left_alone_and_long_steps_are_told() {
         "warning: d: the step of 0.002 s is longer than the stepSize of its DefaultExperiment, 0.001 s; --step 0.001 shows \
          whether the results depend on it"
     );
-    // What the description calls optional is reported only while it is read, with a parameter that is set or a start value.
+    // Inputs that the description calls optional are reported only if they are read, depending on a set parameter or a start
+    // value.
     for optional in ["enable", "speed_shaft", "angle_shaft", "tau_ref", "T_coolant", "T_winding_imposed"] {
         assert!(!printed.contains(optional), "{optional}: {printed}");
     }
@@ -231,13 +232,13 @@ fn inputs_left_alone_and_long_steps_are_told() {
         assert!(printed.contains(read), "{read}: {printed}");
     }
     assert!(!printed.contains("tau_ref") && !printed.contains("T_coolant"), "{printed}");
-    // An input that is fed or set is not reported, even at its start value; a step up to stepSize is none either.
+    // An input that is fed or set is not reported, even at its start value; nor is a step up to stepSize.
     let printed = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
     assert!(printed.lines().count() == 1 && printed.contains("u_dc") && !printed.contains("speed_ref ="), "{printed}");
     assert!(!printed.contains("tau_load"), "{printed}");
 }
 
-/// The README's first run ends with what a person wants: the speed that was reached, and the page with a way to open it.
+/// The README's first run ends with useful output: the speed reached, and the page with a command to open it.
 #[test]
 fn the_first_run_of_the_readme() {
     let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
@@ -310,7 +311,7 @@ fn what_a_person_types() {
     }
 }
 
-/// Without --record a plot shows what matters of a drive, and the CSV has the outputs alone.
+/// Without --record a plot shows the main variables of a drive, and the CSV has only the outputs.
 #[test]
 fn a_first_plot_has_five_panels() {
     let dir = tempfile::tempdir().unwrap();
@@ -338,7 +339,7 @@ fn a_first_plot_has_five_panels() {
     assert!(!first.contains("PmsmDrive.i_a") && run(&["--all"]).contains("PmsmDrive.i_a"));
 }
 
-/// The page of a run: the panels of the plot with all their points, and nothing from outside; of an FMU of another maker too.
+/// The page of a run: the panels of the plot with all their points, and no external content; also for a foreign FMU.
 #[test]
 fn a_run_is_written_as_a_page() {
     let dir = tempfile::tempdir().unwrap();
@@ -379,7 +380,7 @@ fn a_run_is_written_as_a_page() {
     }
 }
 
-/// Ctrl-C keeps what was computed.
+/// Ctrl-C keeps the results so far.
 #[cfg(unix)]
 #[test]
 fn an_interrupted_run_keeps_its_results() {

@@ -1,7 +1,7 @@
-//! Circles of files inside a crate: files of which each leads to every other along what they name of one another.
+//! Circles of files inside a crate: sets of files in which each depends, directly or through others, on every other.
 //!
 //! A file names another one by a path: in a `use`, in an expression or in the body of a macro. A path that a module re-exports
-//! leads to the file that has the item. `mod` names nothing, and tests may name what they test.
+//! leads to the file that has the item. `mod` names nothing, and tests may name the tested items.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
@@ -43,7 +43,7 @@ fn sorted(mut names: Vec<String>) -> Vec<String> {
     names
 }
 
-/// The files that one leads to; itself only on a way back.
+/// The files reachable from one; itself only through a circle.
 fn reached(known: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
     let (mut found, mut open) = (BTreeSet::new(), vec![from]);
     while let Some(file) = open.pop() {
@@ -114,7 +114,7 @@ impl Modules {
             };
             let next = word(tokens.get(at + 1));
             match (first.as_str(), next) {
-                // `pub(in crate::abi)` says who may name an item.
+                // `pub(in crate::abi)` restricts who may name an item.
                 ("pub", _) => at += 1 + usize::from(group(tokens.get(at + 1), Delimiter::Parenthesis).is_some()),
                 ("use", _) => at = self.tree(&tokens, at + 1, &[], module),
                 ("mod", Some(name)) => {
@@ -150,7 +150,7 @@ impl Modules {
         }
     }
 
-    /// A path of at least two words: a word alone is a variable, or was imported.
+    /// A path of at least two words: a single word is a variable, or was imported.
     fn path(&mut self, tokens: &[TokenTree], mut at: usize, module: usize) -> usize {
         let is_within = at > 0 && [':', '.', '\''].iter().any(|&before| is(tokens.get(at - 1), before));
         let is_rest = is_within && !(is(tokens.get(at - 1), ':') && !(at > 1 && is(tokens.get(at - 2), ':')));
@@ -204,7 +204,7 @@ impl Modules {
         }
     }
 
-    /// The module that a path begins in, and the rest of the path.
+    /// The module in which a path begins, and the rest of the path.
     fn begin<'a>(&self, module: usize, path: &'a [String]) -> Option<(usize, &'a [String])> {
         let first = path[0].as_str();
         let this = &self.all[module];
@@ -221,7 +221,7 @@ impl Modules {
         }
     }
 
-    /// The file of what a path in a module names, if this crate has it.
+    /// The file of the item that a path in a module names, if it is in this crate.
     fn resolve(&self, module: usize, path: &[String], depth: usize) -> Option<usize> {
         if depth > 16 {
             return None;

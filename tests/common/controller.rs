@@ -30,7 +30,7 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// In Initialization Mode at `start` (s); with a `clockUpdate` of Scheduled Execution and the environment that it gets.
+    /// In Initialization Mode at `start` (s); with a `clockUpdate` of Scheduled Execution and its environment.
     pub fn new(kind: Kind, start: f64, clock_update: Option<Fmi3ClockUpdate>, environment: *mut c_void) -> Self {
         let token = CString::new(This::TOKEN.as_str()).unwrap();
         let (name, token, no, yes) = (c"c".as_ptr(), token.as_ptr(), Fmi3Boolean(0), Fmi3Boolean(1));

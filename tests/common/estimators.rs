@@ -1,4 +1,4 @@
-//! A start and a load step for every estimator, run natively and passed to FMPy: parameters, inputs and what must come out.
+//! A start and a load step for every estimator, run natively and passed to FMPy: parameters, inputs and expected outputs.
 
 use drive::control::start::StartMode;
 use drive::estimator::{Class, Kind};
@@ -24,7 +24,7 @@ struct Experiment {
     on: f64,
 }
 
-/// Every parameter that is not at its start value.
+/// Every parameter that differs from its start value.
 fn parameters<M: Model>(block: &Block<M>) -> Map<String, Value> {
     let (mut block, mut fresh) = (block.clone(), Block::<M>::default());
     let mut map = Map::new();
@@ -107,7 +107,7 @@ fn adapting_at_rest() -> Experiment {
     Experiment { name, pair, speed_ref, load: vec![(1.0, -2.0)], duration: 2.6, on: 0.0 }
 }
 
-/// What only `compensation.observe` and `compensation.calibrate` hold: 15 rpm under 2 N.m with a dead time, noise and
+/// A case that needs `compensation.observe` and `compensation.calibrate`: 15 rpm under 2 N.m with a dead time, noise and
 /// offsets, while the resistance is tracked.
 fn with_a_real_inverter() -> Experiment {
     let mut experiment = adapting_at_rest();
@@ -134,7 +134,7 @@ fn adapting() -> Experiment {
     Experiment { name: "FluxObserver: adapting at 0.02 pu".into(), pair, speed_ref, load, duration: 2.6, on: 0.0 }
 }
 
-/// The reversal from 0.5 to -0.5 pu in 0.5 s that only `emf.hold_reversal` holds, under friction of 0.3 pu.
+/// The reversal from 0.5 to -0.5 pu in 0.5 s that needs `emf.hold_reversal`, under friction of 0.3 pu.
 fn reversal(kind: Kind) -> Experiment {
     let mut pair = runner::turning(runner::drive(kind), 0.5);
     pair.plant.model.parameters.mechanics.tau_coulomb = 0.3 * RATED_TORQUE;

@@ -1,5 +1,5 @@
-//! Start-up and load step of the pair in every exchange order that importers have, run natively: what the packed FMUs
-//! must give in each importer.
+//! Start-up and load step of the pair in every exchange order that importers have, run natively: the expected results of the
+//! packed FMUs in each importer.
 
 pub use super::estimators::at;
 
@@ -46,10 +46,10 @@ pub fn experiments() -> [Experiment; 2] {
 enum Order {
     /// All outputs read, all inputs set, both stepped.
     Jacobi,
-    /// The plant is stepped first, and the controller gets the currents at the end of this very step: the command of the
-    /// sample acts in the next one already, `timing.delay` = 0.
+    /// The plant is stepped first, and the controller gets the currents at the end of the same step: the command of the sample
+    /// already acts in the next one, `timing.delay` = 0.
     PlantFirst,
-    /// The controller is stepped first, and the plant gets its command in this very step: `timing.delay` = 0.
+    /// The controller is stepped first, and the plant gets its command in the same step: `timing.delay` = 0.
     ControllerFirst,
 }
 

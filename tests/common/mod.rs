@@ -36,7 +36,7 @@ pub fn error(pair: &Pair) -> f64 {
     drive::math::wrap(pair.controller.out.theta_est - pair.plant.out.theta_e).to_degrees()
 }
 
-/// Runs a pair for `duration` (s) in steps of `h` (s); `each` sees it before every step with the time, and at the end.
+/// Runs a pair for `duration` (s) in steps of `h` (s); `each` is called with it and the time before every step, and at the end.
 pub fn run(pair: &mut Pair, h: f64, duration: f64, each: impl FnMut(f64, &mut Pair)) {
     let lasted = run_in_steps(pair, h, duration, each).expect("parameters that fit together");
     assert!(lasted, "a step failed");
@@ -83,8 +83,8 @@ impl ClosedLoop for Native {
     }
 }
 
-/// Folder with the packed FMUs of both standards, `fmi2/` and `fmi3/`: `FMU_TEST_ARCHIVES`, which `.ci/run` names, or built
-/// once a test program.
+/// Folder with the packed FMUs of both standards, `fmi2/` and `fmi3/`: `FMU_TEST_ARCHIVES`, set by `.ci/run`, or built once for
+/// each test program.
 pub fn archives() -> &'static Path {
     static FOLDER: std::sync::OnceLock<PathBuf> = std::sync::OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -96,7 +96,7 @@ pub fn archives() -> &'static Path {
     })
 }
 
-/// Copies an archive entry by entry, each with new bytes or not at all.
+/// Copies an archive entry by entry, each with new bytes or omitted.
 pub fn rewrite(from: &Path, to: &Path, each: impl Fn(&str, Vec<u8>) -> Option<Vec<u8>>) {
     let mut source = zip::ZipArchive::new(std::fs::File::open(from).unwrap()).unwrap();
     let mut target = zip::ZipWriter::new(std::fs::File::create(to).unwrap());

@@ -1,9 +1,9 @@
-//! What every page must keep.
+//! Rules for every page.
 
 use std::collections::BTreeSet;
 
-/// A page opens without a network: no address but that of the SVG name space; its links lead to its own places or to files that
-/// are `there`; what it opens it closes.
+/// A page works offline: no address except that of the SVG name space; its links lead to its anchors or to files that are
+/// `there`; every element is closed.
 pub fn stands_alone(page: &str, there: impl Fn(&str) -> bool) {
     let outside = page.replace("http://www.w3.org/2000/svg", "");
     for part in ["http:", "https:", "src=", "@import", "url(h", "<link", "<iframe", "fetch(", "import("] {

@@ -1,5 +1,5 @@
-//! Tests written in Python: run with pytest in a virtual environment of their own below Cargo's target folder, so that
-//! Rust and Python 3 are all that a machine needs.
+//! Tests written in Python: run with pytest in a separate virtual environment below Cargo's target folder, so that a machine
+//! needs only Rust and Python 3.
 
 use std::collections::hash_map::DefaultHasher;
 use std::hash::{Hash, Hasher};
@@ -41,14 +41,14 @@ pub fn pytest_with(requirements: &str, folder: &str, name: &str, files: &[&str],
     assert!(said.contains(" passed"), "pytest ran no test");
 }
 
-/// Where packages put shared libraries that others of them link (tbb, which Ecos needs), and what was there before.
+/// The folder of shared libraries that packages link (tbb, which Ecos needs), and the previous search path.
 fn libraries(python: &Path) -> std::ffi::OsString {
     let own = python.parent().and_then(Path::parent).map(|venv| venv.join("lib"));
     let inherited = env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
     env::join_paths(own.into_iter().chain(env::split_paths(&inherited))).unwrap_or(inherited)
 }
 
-/// Past the test harness, which keeps what is printed to itself when a test passes.
+/// Bypasses the test harness, which hides the output of a passing test.
 fn show(output: &Output) {
     let mut out = io::stdout().lock();
     let _ = out.write_all(&output.stdout).and_then(|()| out.write_all(&output.stderr)).and_then(|()| out.flush());
@@ -59,16 +59,16 @@ pub fn scratch() -> &'static Path {
     Path::new(env!("CARGO_TARGET_TMPDIR"))
 }
 
-/// The Python of a virtual environment that has what the file of requirements says.
+/// The Python of a virtual environment with the packages of the file of requirements.
 pub fn environment(requirements: &Path) -> PathBuf {
-    // Two tests of one program want the same environment: the second finds it complete.
+    // Two tests of one program may need the same environment: the second finds it complete.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     find_or_make(requirements).unwrap_or_else(|why| panic!("{why}"))
 }
 
-/// Finds the environment, or makes it. Its name holds a hash of the requirements and of the Python that made it, and it
-/// gets its name when it is complete: one that exists can be used.
+/// Finds the environment, or creates it. Its name contains a hash of the requirements and of its Python, and it gets its name
+/// when it is complete, so an existing one can be used.
 fn find_or_make(requirements: &Path) -> Result<PathBuf, String> {
     let (base, version) = base_python()?;
     let wanted = fs::read_to_string(requirements).map_err(|e| format!("{}: {e}", requirements.display()))?;
@@ -90,7 +90,7 @@ fn find_or_make(requirements: &Path) -> Result<PathBuf, String> {
         Command::new(partial.join(inside)).args(install).arg(requirements),
         &format!("the packages of {} from a Python package index", requirements.display()),
     )?;
-    // Another test program may have been faster: then its environment is as good.
+    // Another test program may have been faster: its environment is equivalent.
     if let Err(error) = fs::rename(&partial, &complete) {
         let _ = fs::remove_dir_all(&partial);
         if !complete.is_dir() {
@@ -100,7 +100,7 @@ fn find_or_make(requirements: &Path) -> Result<PathBuf, String> {
     Ok(complete.join(inside))
 }
 
-/// A Python 3 and what it says of itself: `PYTHON`, or the usual names.
+/// A Python 3 and its version: `PYTHON`, or the usual names.
 fn base_python() -> Result<(String, String), String> {
     let named = env::var("PYTHON").ok();
     let usual = ["python3", "python"].map(String::from);
@@ -120,7 +120,7 @@ fn base_python() -> Result<(String, String), String> {
     ))
 }
 
-/// Runs a command to its end; otherwise one line with what was to be had, and what the command said.
+/// Runs a command to its end; an error is one line with the goal and the output of the command.
 pub fn run(command: &mut Command, what: &str) -> Result<(), String> {
     let output =
         command.output().map_err(|e| format!("cannot get {what}: {}: {e}", command.get_program().to_string_lossy()))?;

@@ -1,5 +1,4 @@
-//! What a reader sees of the sources: doc comments and string literals, and the lines of pages; with the patterns of sentences that
-//! stumble.
+//! Text for readers: doc comments, string literals and the lines of pages, with the patterns of awkward sentences.
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +28,7 @@ pub fn texts(path: &Path) -> Vec<(usize, String)> {
         let tests = text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.len());
         rust(&text[..tests])
     } else {
-        // A paragraph may fill several lines.
+        // A paragraph may span several lines.
         let lines = text.lines().map(str::trim);
         blocks(lines.map(|line| (!line.is_empty()).then_some(line)))
     }

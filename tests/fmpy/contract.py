@@ -1,6 +1,6 @@
 """What scripts outside the project rely on: names, causalities, units, display units and start values.
 
-Written down here a second time on purpose: a change of the tables in Rust must not slip through. More variables may
+They are repeated here on purpose, so that a change of the tables in Rust cannot go unnoticed. More variables may
 join; none of these may be renamed, dropped or given another start value.
 """
 

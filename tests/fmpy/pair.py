@@ -1,4 +1,4 @@
-"""Plant and controller in a co-simulation written by hand with FMPy: the loop of every test, and one to copy.
+"""Plant and controller in a co-simulation written by hand with FMPy: the loop that every test uses, for copying.
 
 Jacobi exchange: at a communication point all outputs are read, then all inputs set, then both FMUs step. So the currents
 of one instant give the voltages that act from the next one on, which is what `timing.delay` = 1 (the start value) means.

@@ -1,4 +1,4 @@
-"""The paper's experiments, and how their figures are read off a trace.
+"""The paper's experiments, and how their figures are computed from a trace.
 
 Units here: rpm, degrees, N.m, A, s. Expected values hold for the reference motor with the start values of the FMUs.
 """
@@ -25,7 +25,7 @@ def schedule(*steps):
 
 @dataclass(frozen=True)
 class Scenario:
-    """What is set, what happens when; speeds in rad/s as the FMUs have them."""
+    """Settings and inputs over time; speeds in rad/s, as in the FMUs."""
 
     duration: float
     speed_ref: object = field(default_factory=schedule)

@@ -130,13 +130,13 @@ def defects(equations, n):
 
 @STANDARDS
 def test_mapped_equations(plant, standard):
-    """What direct transcription differentiates."""
+    """The function that direct transcription differentiates."""
     x, u = casadi.SX.sym("x", 4), casadi.SX.sym("u", len(INPUTS))
     by_hand = casadi.Function("by_hand", [x, u], [casadi.vertcat(*derivatives(x, u))])
     point = POINTS.T, np.random.default_rng(2).uniform(-30.0, 30.0, (3, len(POINTS)))
     exact = np.array(defects(by_hand, len(POINTS))(*point))
     close(defects(plant.create("equations", ["x", "u"], ["ode"], OPTIONS), len(POINTS))(*point), exact, 1e-12)
-    # When this fails, CasADi is right without the options: tell docs/import.md.
+    # When this fails, CasADi no longer needs the options: update docs/import.md.
     wrong = np.array(defects(plant.create("equations", ["x", "u"], ["ode"]), len(POINTS))(*point))
     assert np.abs(wrong - exact).max() > 0.1
 
@@ -161,7 +161,8 @@ def test_why_casadi_needs_options(plant, standard):
 
 @STANDARDS
 def test_the_example(archives, standard):
-    """With 7.5 A the torque is at most 1.5 n_p psi_M 7.5 A; the start takes little more than with this torque throughout."""
+    """With 7.5 A the torque is at most 1.5 n_p psi_M 7.5 A; the start takes little longer than with this torque
+    throughout."""
     done = subprocess.run(
         [sys.executable, EXAMPLE, archives / f"fmi{standard}"], capture_output=True, text=True, timeout=1800
     )

@@ -1,5 +1,6 @@
-"""The packed drive commissions itself at standstill, and turning: the bits of the native run in both standards, saved and restored in
-each state of the sequence; aborts; parameters that do not fit. `FMU_COMMISSIONING` names the values of the native run, as hexadecimal numbers."""
+"""The packed drive commissions itself, at standstill and rotating: the bits of the native run in both standards, saved
+and restored in each state of the sequence; aborts; parameters that do not fit. `FMU_COMMISSIONING` names the values of
+the native run, as hexadecimal numbers."""
 
 import json
 import os
@@ -18,7 +19,7 @@ VOLTAGE, NOT_FOLLOWING, ABORTED = 3, 6, 11
 
 
 class Drive(Unit):
-    """PmsmDrive, which begins a commissioning at once."""
+    """A PmsmDrive that starts a commissioning at once."""
 
     def __init__(self, archives, standard, mode="Standstill", **parameters):
         names = {"controller.commission.mode": MODES[mode]}

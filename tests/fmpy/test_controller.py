@@ -1,4 +1,4 @@
-"""The controller alone, one sample of it: what a closed loop would hide behind its integrators."""
+"""One sample of the controller alone: tests what a closed loop would hide behind its integrators."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""FMPy co-simulates plant and controller from the packed archives and sees what the paper shows."""
+"""FMPy co-simulates plant and controller from the packed archives and reproduces the paper's results."""
 
 from functools import cache
 
@@ -15,7 +15,7 @@ STEPS = pytest.mark.parametrize("h", [T_S, T_S / 2], ids=["T_s", "half T_s"])
 
 @pytest.fixture(scope="session")
 def run(archives):
-    """A trace, simulated once."""
+    """The trace, simulated once."""
     return cache(lambda standard, name, h: simulate(archives / f"fmi{standard}", SCENARIOS[name], h))
 
 
@@ -99,7 +99,7 @@ def test_three_samples_per_step_from_180_degrees(run, standard):
 @pytest.mark.parametrize("name", ["start", "step 500", "load 0", "load 1000"])
 @pytest.mark.parametrize("h", [T_S, T_S / 2, 3 * T_S], ids=["T_s", "half T_s", "3 T_s"])
 def test_both_standards_agree(run, name, h):
-    """Bit for bit: it is one binary, and one model."""
+    """Bit for bit: both use the same binary and the same model."""
     one, other = run(2, name, h), run(3, name, h)
     for column, values in one.items():
         assert values.tobytes() == other[column].tobytes(), column
@@ -107,7 +107,8 @@ def test_both_standards_agree(run, name, h):
 
 @pytest.mark.parametrize("name", ["start", "step 500", "load 0", "load 1000"])
 def test_half_a_sample_per_step_changes_nothing(run, name):
-    """At the sample instants, but for the error of an integration step of T_s: 1e-6 A, which the current controller makes 1e-5 V."""
+    """At the sample instants, apart from the error of an integration step of T_s: 1e-6 A, which the current controller
+    makes 1e-5 V."""
     whole, half = run(2, name, T_S), run(2, name, T_S / 2)
     for column, values in whole.items():
         turn = 2 * np.pi if column.startswith("theta") else np.inf

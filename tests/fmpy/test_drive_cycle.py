@@ -98,7 +98,7 @@ def test_cycle(archives, standard):
     assert p_in.clip(min=0.0).sum() == pytest.approx(DRAWN, rel=1e-3)
     assert p_in.clip(max=0.0).sum() == pytest.approx(RETURNED, rel=2e-3)
     # A voltage that is held for 0.1 ms while the rotor turns by x = 0.33 rad has the fundamental sin(x/2) / (x/2), 0.4 %
-    # less: weakening goes that much deeper, which moves iron loss to copper and inverter.
+    # less: field weakening goes that much deeper, which moves iron loss to copper and inverter.
     for name, energy in LOSSES.items():
         assert result[name].sum() * H / KWH == pytest.approx(energy, rel=0.01), name
     assert result["p_friction"].sum() * H / KWH == pytest.approx(LOSSES["p_friction"], rel=1e-4)
@@ -112,13 +112,13 @@ def test_cycle(archives, standard):
 
 @STANDARDS
 def test_full_torque(archives, standard):
-    """On a ramp to 12000 rpm in 12 s, the torque is the greatest that current and voltage allow."""
+    """On a ramp to 12000 rpm in 12 s, the torque is the maximum that current and voltage allow."""
     speed = np.linspace(500.0, 12000.0, 12001) * RPM
     names = ["tau_e", "tau_max"]
     archive = archives / f"fmi{standard}" / "PmsmDrive.fmu"
     result = run(archive, speed, np.full(len(speed), 500.0), names, correct=False)
     n_p, r, l_d, l_q, psi = (MACHINE[name] for name in ("n_p", "R_s", "L_d", "L_q", "psi_M"))
-    # Currents on the limit circle, from the least current at full torque on.
+    # Currents on the limit circle, from the minimum current at full torque onwards.
     angle = np.linspace(0.0, 0.5 * np.pi, 20001)
     i_d, i_q = -I_MAX * np.sin(angle), I_MAX * np.cos(angle)
     tau = 1.5 * n_p * (psi - (l_q - l_d) * i_d) * i_q

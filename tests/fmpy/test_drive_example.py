@@ -1,4 +1,4 @@
-"""`examples/drive.py` and `examples/drive.ipynb` run as they stand, and the notebook keeps what it shows today.
+"""`examples/drive.py` and `examples/drive.ipynb` run unchanged, and the notebook's stored outputs are up to date.
 
 `UPDATE_GOLDEN=1 cargo test --test fmpy example` writes the notebook's outputs.
 """

@@ -26,12 +26,13 @@ def exponential(a):
 
 
 class Train:
-    """The states of what is outside the FMU, and behind them what it holds over a step."""
+    """The states outside the FMU, followed by the values held over a step."""
 
     def __init__(self, train, imposed, h):
         self.c, self.d, load = train
         self.imposed = imposed
-        # Rotor angle and speed, load angle and speed, torques of drive and load. The FMU's rotor goes on at its speed.
+        # Rotor angle and speed, load angle and speed, torques of drive and load. The FMU's rotor continues at its
+        # speed.
         a = np.zeros((6, 6))
         a[0, 1] = a[2, 3] = 1.0
         a[3] = [self.c / load, self.d / load, -self.c / load, -self.d / load, 0.0, -1.0 / load]
@@ -71,7 +72,7 @@ def run(folder, train, imposed, h, stop=1.4):
         try:
             write([reference[name] for name in ["speed_ref", *put]], [speed_ref, *given])
             fmu.doStep(currentCommunicationPoint=k * h, communicationStepSize=h)
-        except Exception:  # the FMU refuses what a diverging coupling gives it
+        except Exception:  # the FMU refuses the values of a diverging coupling
             break
         outside.x = outside.step @ outside.x
         if abs(outside.x[3]) > 1e3:

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-# What follows the names of the drives, seconds of the short run, and energy from the link in kJ there.
+# The arguments after the drives' names, the duration of the short run in s, and its energy from the link in kJ.
 EXAMPLES = {"vehicle": (56, 66.26), "pump": (120, 102.4), "axis": (1.4, 0.325)}
 
 
 def run(script, *words):
-    """What the script prints."""
+    """The output of the script."""
     command = [sys.executable, ROOT / "examples/drive-train" / f"{script}.py", *map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "MPLBACKEND": "Agg"})
     assert done.returncode == 0, done.stderr
@@ -45,7 +45,8 @@ def test_another_file_name_is_another_drive(archives, script):
 
 @pytest.mark.parametrize("script", EXAMPLES)
 def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
-    """All of it with FMI 3.0, the vehicle with a map, too: the numbers of the page, and the labels of its plot."""
+    """The whole example with FMI 3.0, and the vehicle also with a map: the numbers of the page, and the labels of its
+    plot."""
     drives = [archives / "fmi3" / f"{name}.fmu" for name in ("PmsmDrive", "PmsmDriveMean")]
     if script == "vehicle":
         motor = ROOT / "motors/traction-100kw.toml"
@@ -55,7 +56,7 @@ def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
     assert close(text) == len(drives) - 1
     page = (ROOT / "docs/drive-train.md").read_text()
     shown = page[page.index("energy in kJ", page.index(f"{script}.py")) :].split("```")[0]
-    # Some of the last digits belong to rounding.
+    # Some of the last digits are rounding errors.
     assert re.findall(r"[A-Za-z]+", shown) == re.findall(r"[A-Za-z]+", text), text
     assert numbers(shown) == pytest.approx(numbers(text), rel=2e-3, abs=2e-3), text
     labels = [re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text())

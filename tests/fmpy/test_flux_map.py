@@ -1,4 +1,5 @@
-"""PmsmDrive with a flux map: a table of a machine that saturates, what `fmu tune` makes of it, and the currents of the drive.
+"""PmsmDrive with a flux map: the table of a saturating machine, the result of `fmu tune` for it, and the currents of
+the drive.
 
 `FMU_COMMAND` names the command. The table is reciprocal: i_d = x / L_d + c (x^3 + x q^2), i_q = q / L_q + c (q^3 + x^2 q), with
 x = psi_d - psi_M and q = psi_q.
@@ -119,7 +120,7 @@ def test_torque(archives, tuned):
     assert tau == pytest.approx(1.5 * N_P * ((PSI_M + x) * i_q - q * i_d), rel=3e-3)
     # The power of the terminals: no other losses than copper's.
     assert result["p_in"][-100:].mean() == pytest.approx(tau * SPEED + 1.5 * R * (i_d**2 + i_q**2), rel=1e-3)
-    # The voltage is that of the table's flux linkage, and not that of constant inductances.
+    # The voltage belongs to the table's flux linkage, not to constant inductances.
     phases = np.array([result[name] for name in ("u_a", "u_b", "u_c")])
     u = np.sqrt((2 / 3 * (phases - phases.mean(axis=0)) ** 2).sum(axis=0))[-100:].mean()
 
@@ -131,7 +132,8 @@ def test_torque(archives, tuned):
 
 
 def test_short_circuit(archives, tuned):
-    """The current of a short circuit, which no controller makes: 0 = R i + j w psi with the currents of the table."""
+    """The current of a short circuit, which does not depend on the controller: 0 = R i + j w psi with the currents of
+    the table."""
     w = N_P * SPEED
 
     def equations(x, q):

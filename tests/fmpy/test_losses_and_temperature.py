@@ -1,7 +1,8 @@
-"""Losses and temperatures of the packed drive: one operating point of a traction machine, and the network that it heats.
+"""Losses and temperatures of the packed drive: one operating point of a traction machine, and its thermal network.
 
-The machine is gym-electric-motor's default (DOI 10.1109/TPEL.2020.3006779) at 400 V; what loses power and what gets warm
-is assumed. The figures are an independent calculation with the closed forms of the inverter and of the network.
+The machine is gym-electric-motor's default (DOI 10.1109/TPEL.2020.3006779) at 400 V; the loss parameters and the
+thermal network are assumed. The figures are an independent calculation with the closed forms of the inverter and of the
+network.
 """
 
 import numpy as np
@@ -14,7 +15,7 @@ from scenarios import RPM
 STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
 CONSTANT, NETWORK, IMPOSED = 1, 2, 3
 SPEED = 3000.0 * RPM
-# Of 80 N.m at the shaft: the currents of the least copper loss, and with them the torque that iron and friction reduce.
+# For 80 N.m at the shaft: the currents with the lowest copper loss, and the torque before iron loss and friction.
 I_D, I_Q = -92.549, 126.193
 TORQUE = 4.5 * (66e-3 + (1.2e-3 - 0.37e-3) * -I_D) * I_Q
 LOSSES = {"p_cu": 661.23, "p_iron": 264.18, "p_cond": 322.67, "p_sw": 249.07, "p_friction": 120.19}
@@ -86,7 +87,7 @@ def test_loss_split(archives, standard):
 
 @STANDARDS
 def test_steady_temperatures(archives, standard):
-    """The coolant at 65 degC, capacities a thousandth: 10 s are 10 000 s, twelve of the greatest time constant."""
+    """The coolant at 65 degC, capacities a thousandth: 10 s are 10 000 s, twelve times the longest time constant."""
     network = {"C_winding": 2.5, "C_stator": 12.0, "C_rotor": 6.0, "C_inverter": 0.5}
     network |= {"G_ws": 60.0, "G_sc": 150.0, "G_sr": 8.0, "G_inverter": 20.0, "T_start": 338.15}
     start = {f"plant.thermal.{name}": value for name, value in network.items()}
@@ -136,7 +137,7 @@ def test_temperatures_are_part_of_the_state(archives, standard):
 
 @STANDARDS
 def test_model_exchange(archives, standard):
-    """Imposed temperatures act as in Co-Simulation; the network is refused with what to do."""
+    """Imposed temperatures act as in Co-Simulation; the network is refused, with advice."""
     start = {"plant.winding.alpha": 3.93e-3, "plant.magnet.alpha": -1.1e-3, "controller.estimator": 13, "speed_ref": 50.0}
     start |= {"T_winding_imposed": 393.15, "T_magnet_imposed": 353.15, "plant.thermal.mode": IMPOSED}
     output = ["T_winding", "T_magnet", "Q_coolant", "i_d", "i_q", "tau_e", "speed"]

@@ -1,8 +1,8 @@
 """Model Exchange in FMPy: its CVode and Euler integrate the plant and the whole drive, and run the controller's events.
 
 The reference is co-simulation at T_s. Both hold the voltages over a sample period, so they solve the same equations: what
-differs is the error of the integrators, 2e-7 A and 6e-7 rad/s with CVode at a relative tolerance of 1e-12. CVode starts
-anew at every event; a start from 180 deg amplifies its errors, at 1e-9 to 4e-5 A, at 1e-10 to 4e-6 A.
+differs is the error of the integrators, 2e-7 A and 6e-7 rad/s with CVode at a relative tolerance of 1e-12. CVode
+restarts at every event; a start from 180 deg amplifies its errors, at 1e-9 to 4e-5 A, at 1e-10 to 4e-6 A.
 """
 
 import numpy as np
@@ -183,7 +183,7 @@ def controller(folder, ramp=False, **arguments):
 
 
 def after_events(result):
-    """The last row of each time: what is visible once the event is over."""
+    """The last row of each time: the values that are visible once the event is over."""
     time = result["time"]
     return result[np.append(np.diff(time) > 1e-9, True)]
 
@@ -191,7 +191,8 @@ def after_events(result):
 @STANDARDS
 @pytest.mark.parametrize("solver", ["CVode", "Euler"])
 def test_controller(archives, standard, solver):
-    """It has no state, only events, which read the inputs of their instants: bit for bit co-simulation at T_s."""
+    """It has no state, only events, which read the inputs at their instants: equal to co-simulation at T_s, bit for
+    bit."""
     folder = archives / f"fmi{standard}"
     result = after_events(controller(folder, fmi_type="ModelExchange", solver=solver, output_interval=1e-4))
     reference = controller(folder, fmi_type="CoSimulation", step_size=1e-4, output_interval=1e-4)
@@ -204,7 +205,7 @@ def test_controller(archives, standard, solver):
 @pytest.mark.parametrize("early", [False, True], ids=["whole", "early"])
 @pytest.mark.parametrize("h", [1e-4, 0.7e-4, 1e-3, 7.3e-3])
 def test_controller_with_event_mode(archives, early, h):
-    """Co-simulation with Event Mode: every sample reads what the inputs are at its instant, bit for bit.
+    """Co-simulation with Event Mode: every sample reads the inputs at its instant, bit for bit.
 
     FMPy enters Event Mode at steps of inputs; on a ramp, the samples inside a step need early return.
     """

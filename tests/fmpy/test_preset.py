@@ -43,7 +43,7 @@ def folder(pump, tmp_path):
 
 
 class Raw:
-    """An instance through the C functions, with a resource path and a token of one's own."""
+    """An instance through the C functions, with a given resource path and token."""
 
     def __init__(self, folder, version, exchange=False):
         self.version, self.said = version, []
@@ -56,7 +56,7 @@ class Raw:
         self.reference = {v.name: v.valueReference for v in self.description.modelVariables}
 
     def instantiate(self, resources, token=None):
-        """Whether there is an instance; `said` has what the FMU logged."""
+        """Whether there is an instance; `said` holds the FMU's log messages."""
         token = (token or self.description.guid).encode()
         path = resources.encode() if resources is not None else None
         if self.version == 2:

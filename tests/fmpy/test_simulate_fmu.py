@@ -1,4 +1,4 @@
-"""FMPy's own `simulate_fmu` on each archive alone: what needs no partner is right."""
+"""FMPy's own `simulate_fmu` on each archive alone: results that need no second FMU."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ OPTIONS = [{}, {"early_return_allowed": True}, {"set_stop_time": False}, {"recor
 
 
 def plant(archives, standard, **arguments):
-    """Direct current through phase a, with the rotor aligned: nothing turns."""
+    """Direct current through phase a, with the rotor aligned: it does not turn."""
     return simulate_fmu(
         archives / f"fmi{standard}" / "PmsmPlant.fmu",
         stop_time=0.05,
@@ -44,7 +44,7 @@ def test_start_values_reach_the_plant(archives, standard):
 
 @STANDARDS
 def test_inputs_over_time(archives, standard):
-    """A load torque from t = 10 ms on, read from an input table: speed falls as tau / J says."""
+    """A load torque from t = 10 ms on, read from an input table: speed falls at tau / J."""
     table = np.array([(0.0, 0.0), (0.01, 0.0), (0.01, 1.0), (0.03, 1.0)], dtype=[("time", float), ("tau_load", float)])
     quiet = {"u_a": 0.0, "u_b": 0.0, "u_c": 0.0, "mechanics.tau_coulomb": 0.0, "mechanics.B": 0.0, "motor.psi_M": 1e-9}
     result = simulate_fmu(

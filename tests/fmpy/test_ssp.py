@@ -1,7 +1,7 @@
 """The closed loop as an SSP: its files against the schemas of SSP 1.0, and its run in `fmpy.ssp` against `fmu simulate`.
 
-FMPy exchanges values as Jacobi does, but takes what comes from outside one step late, and 0 before the start: the reference is
-run with inputs that are shifted by that step.
+FMPy exchanges values as Jacobi does, but passes external inputs one step late, and 0 before the start: the reference
+run has its inputs shifted by that step.
 """
 
 import csv
@@ -96,7 +96,7 @@ def test_a_start_and_a_load_step_as_with_fmu_simulate(name, tmp_path):
         },
     )
     n = round(STOP / T_S)
-    # A row of FMPy has the time at which its step began and what came out of it.
+    # A row of FMPy has the start time of its step and the outputs at its end.
     for column in header[1:]:
         np.testing.assert_array_equal(result[column][:n], expected[column][1:], err_msg=column)
     # The machine of the motor's file is still on its way, led by a current.
@@ -104,6 +104,7 @@ def test_a_start_and_a_load_step_as_with_fmu_simulate(name, tmp_path):
 
 
 def test_fmi_3_is_beyond_fmpy_ssp():
-    """It instantiates every FMU as one of FMI 2.0. When this fails, FMPy has learnt it: run the test above with fmi3 too."""
+    """It instantiates every FMU as one of FMI 2.0. When this fails, FMPy supports it: run the test above with fmi3
+    too."""
     with pytest.raises(Exception, match="Cannot find shared library .*binaries"):
         simulate_ssp(str(FOLDER / "fmi3.ssp"), stop_time=0.001, step_size=T_S)

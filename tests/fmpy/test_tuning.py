@@ -83,7 +83,8 @@ def test_the_plants_resistance_acts_in_the_next_step(drives):
 
 
 def test_what_does_not_fit_is_refused_by_the_next_step(drives):
-    """zero_speed.i_0 = 5 A does not fit into limit.i = 4 A: the step says so, and the state before it is not lost."""
+    """zero_speed.i_0 = 5 A does not fit into limit.i = 4 A: the step returns an error, and the previous state is
+    kept."""
     drive, other = drives
     save, restore = states(drive)
     state, k = save(), drive.k

@@ -1,4 +1,4 @@
-"""EveryType.fmu in FMPy: integers of every size, single precision, texts, arrays and matrices, a file of resources."""
+"""EveryType.fmu in FMPy: integers of every size, single precision, strings, arrays and matrices, a resource file."""
 
 import os
 import shutil
@@ -42,7 +42,7 @@ def test_types(archive, version):
 
 
 def test_the_difference_is_relative(archive):
-    """In the type definition and in the variable; validate_fmu holds both against the schema."""
+    """In the type definition and in the variable; validate_fmu checks both against the schema."""
     with zipfile.ZipFile(archive) as file:
         root = etree.fromstring(file.read("modelDescription.xml"))
     relative = [e for e in root.iter() if e.get("relativeQuantity") == "true"]
@@ -71,7 +71,7 @@ def test_simulation(archive, version):
 
 
 def test_texts_of_an_instance(archive, version, tmp_path):
-    """The pointer of a text stays as it is until the next call; a path with a blank is a URI with a code."""
+    """The pointer to a string stays valid until the next call; a blank in a path is escaped in the URI."""
     folder = tmp_path / "with a blank % \u00e4"
     shutil.unpack_archive(archive, folder, "zip")
     description = fmpy.read_model_description(archive)

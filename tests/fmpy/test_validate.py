@@ -1,4 +1,4 @@
-"""The archives as FMPy reads them, against the contract with scripts outside the project."""
+"""The archives as FMPy reads them, compared with the contract with scripts outside the project."""
 
 import platform
 import zipfile
@@ -42,7 +42,7 @@ def variables(description):
 
 
 def value(text, type):
-    """A start value from the XML; FMPy leaves it as it is written."""
+    """A start value from the XML, where FMPy keeps it as a string."""
     return {"Boolean": lambda t: t == "true", "Real": float}.get(type, int)(text)
 
 
@@ -123,7 +123,7 @@ def test_discrete_and_continuous_inputs(archive, variables):
 
 
 def test_estimators_are_a_subset_in_order(archive, description, variables):
-    """An estimator joins when it works, with the value of its place in the list."""
+    """An estimator is added when it works, with its index in the list as value."""
     if "estimator" not in variables:
         pytest.skip("no estimator")
     items = variables["estimator"].declaredType.items
@@ -168,7 +168,7 @@ def test_both_standards_tell_the_same(archives, archive):
 
 
 def test_contents(archive):
-    """Binary, documentation and licenses are inside, and nothing strange."""
+    """Binary, documentation and licenses are inside, and nothing else."""
     with zipfile.ZipFile(archive) as file:
         names = file.namelist()
         assert file.testzip() is None

@@ -1,6 +1,6 @@
 """Field weakening of the packed drive: torque far above base speed, on a shaft that is driven at constant speed.
 
-The reference motor at 7.5 A and 325 V: of the voltage u_dc / sqrt 3 the controller uses 0.95. The limits follow from
+The reference motor at 7.5 A and 325 V: the controller uses 0.95 of the voltage u_dc / sqrt 3. The limits follow from
 |i| <= 7.5 A and |R_s i + j w psi| <= 0.95 u_dc / sqrt 3; base speed is 3330 rpm.
 """
 
@@ -11,12 +11,12 @@ from fmpy import simulate_fmu
 from scenarios import RPM
 
 STANDARDS = pytest.mark.parametrize("standard", [2, 3], ids=["fmi2", "fmi3"])
-# Speed in rpm, greatest motoring and generating torque in N.m.
+# Speed in rpm, maximum motoring and generating torque in N.m.
 ENVELOPE = [(3000.0, 5.0625, -5.0625), (4000.0, 4.2045, -5.0493), (4500.0, 3.0945, -4.5584), (5000.0, 1.7105, -3.4982)]
 
 
 def drive(archives, standard, speed, tau_ref, use=True, stop=0.5, log=None):
-    """Torque asked for at constant speed; everything else at its start value, with the shaft sensor. `log` collects
+    """Torque requested at constant speed; everything else at its start value, with the shaft sensor. `log` collects
     the messages of the FMU."""
     w = speed * RPM
     inputs = np.array(

@@ -48,7 +48,7 @@ fn entries_that_are_wrong() {
         assert_eq!(ended.status, status, "{what}: {ended:?}");
         place.runs("simulate", &[]);
     }
-    // What this computer cannot store is no fault of the archive.
+    // A full disk is not a fault of the archive.
     for name in ["resources".to_owned(), format!("resources/{}", "x".repeat(60_000))] {
         let place = with(&[Entry::new(&name, b"x")]);
         let ended = place.runs("check", &["--only", STATIC]);
@@ -67,7 +67,8 @@ fn entries_that_are_wrong() {
     deep.runs("simulate", &[]);
 }
 
-/// An archive of 100 KB whose 2000 entries share the same data, 100 MB each; one that holds more than it says; 70 000 entries.
+/// An archive of 100 KB whose 2000 entries share the same data, 100 MB each; one that contains more than its headers state; 70
+/// 000 entries.
 #[test]
 fn bombs() {
     let zeros = vec![0_u8; 100_000_000];
@@ -144,7 +145,7 @@ fn a_description_that_swells() {
     let place = Place::new();
     let packed = packed.finish().unwrap();
     write(&place.fmu(), &[Entry { method: 8, crc: Some(crc.sum()), ..Entry::new("modelDescription.xml", &packed) }]);
-    // The writer of the test claims the packed size.
+    // The test's writer claims the packed size.
     place.is_refused("a lie", 2, "modelDescription.xml: ");
 }
 
@@ -161,7 +162,7 @@ fn files_that_are_cut_short() {
     });
 }
 
-/// A library that is cut short in an archive that is whole: the system loader may end the process.
+/// A truncated library in a complete archive: the system loader may end the process.
 #[test]
 fn libraries_that_are_cut_short() {
     let Some(library) = library() else { return };
@@ -171,12 +172,12 @@ fn libraries_that_are_cut_short() {
         let library = Entry::new("binaries/linux64/Hostile.so", &library[..at]);
         write(&place.fmu(), &[Entry::new("modelDescription.xml", XML.as_bytes()), library]);
         place.runs("check", &["--only", "binary", "--patience", "90"]);
-        // What is missing at the end of a library is not always needed.
+        // The missing end of a library is not always needed.
         assert!(place.runs("simulate", &["--timeout", "90"]).status != 1, "{at}");
     });
 }
 
-/// One bit of the archive, or of the library in it, is another.
+/// One flipped bit in the archive, or in its library.
 #[test]
 fn bytes_that_are_changed() {
     let Some(library) = library() else { return };

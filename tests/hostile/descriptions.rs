@@ -1,4 +1,4 @@
-//! Descriptions that attack the reader of XML, or whoever believes their numbers.
+//! Descriptions that attack the XML reader, or code that trusts their numbers.
 
 use crate::zip::{Entry, write};
 use crate::{Place, XML, described, entries, library};
@@ -97,7 +97,7 @@ fn experiments_that_make_no_sense() {
     }
 }
 
-/// Names that command a terminal are shown, not obeyed: `runs` looks for control characters.
+/// Names with control sequences are escaped: `runs` looks for control characters.
 #[test]
 fn names_are_escaped() {
     let place = with("name=\"y\"", "name=\"y&#27;[2J&#27;]0;title&#7;&#x202e;\" description=\"&#27;[31m\"");
@@ -110,7 +110,7 @@ fn names_are_escaped() {
         let ended = place.runs("simulate", &["--csv", "-"]);
         let header = "time,x.y\\u{1b}[2J\\u{1b}]0;title\\u{7}\\u{202e}\n0,1\n";
         assert!(ended.status == 0 && ended.out.starts_with(header), "{ended:?}");
-        // A name that the command line gives, on standard error.
+        // A name from the command line, on standard error.
         let named = format!("\u{1b}[2J={}", place.fmu().display());
         let output = std::process::Command::new(env!("CARGO_BIN_EXE_fmu"))
             .args(["simulate", &named, "--logging", "--csv", "-"])

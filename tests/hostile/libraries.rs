@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::Path;
 use std::process::Command;
 
-/// What an FMU does, the status of `fmu simulate`, and a part of what it says.
+/// The action of an FMU, the status of `fmu simulate`, and a part of its message.
 const ACTS: &[(&str, i32, &str)] = &[
     ("exit", 2, "ended the process with exit status 0"),
     ("_exit", 2, "ended the process with exit status 0"),
@@ -49,9 +49,9 @@ fn simulate_says_what_happened() {
     }
     let mut all = Vec::new();
     for (place, expected) in &PLACES {
-        // Every act where it is most likely, and the shortest everywhere.
+        // Every action at its most likely call, and the shortest ones at every call.
         let rare = |act: &str| ["exit", "crash", "fork", "hang", "close", "kill-guard"].contains(&act);
-        // What is closed in the end no longer matters.
+        // Descriptors closed at the end no longer matter.
         let matters = |act: &str| (*place, act) != ("free", "close");
         let acts = ACTS.iter().filter(|(act, ..)| (*place == "step" || rare(act)) && matters(act));
         all.extend(acts.map(|act| (*place, *expected, *act)));
@@ -62,7 +62,7 @@ fn simulate_says_what_happened() {
         let how = format!("{place} {act}");
         let ended = fmu.run("simulate", &["--timeout", seconds, "--memory", "1", "--csv", "out.csv"], &how);
         assert_eq!(ended.status, *status, "{how}: {ended:?}");
-        // What is closed while the archive is open ends the process where that is closed again.
+        // Descriptors closed while the archive is open end the process when the archive is closed.
         let named = how == "load close" && ended.errors.contains("x.fmu");
         assert!(named || ended.errors.contains(part), "{how}: {ended:?}");
         assert!(!ended.out.contains("hello"), "the output is the command's alone: {ended:?}");
@@ -74,7 +74,7 @@ fn simulate_says_what_happened() {
     });
 }
 
-/// An FMU writes to descriptors that are not its own: the recording on standard output is the command's alone.
+/// An FMU writes to foreign descriptors: the recording on standard output contains only data of the command.
 #[test]
 fn standard_output_is_the_recording() {
     if library().is_none() {
@@ -90,7 +90,7 @@ fn standard_output_is_the_recording() {
     });
 }
 
-/// The checker names the call, or the processes that were left, and its other probes still run.
+/// The checker names the call, or the remaining processes, and its other probes still run.
 #[test]
 fn check_survives() {
     if library().is_none() {
@@ -123,7 +123,7 @@ fn check_survives() {
     });
 }
 
-/// Nothing but the FMU stops the process of a probe: it has its own session.
+/// Only the FMU can stop the process of a probe, which has its own session.
 #[test]
 fn a_library_that_stops_itself_is_found() {
     if library().is_none() {
@@ -138,7 +138,7 @@ fn a_library_that_stops_itself_is_found() {
     });
 }
 
-/// A signal to the group of an FMU ends nobody else: here the shell that has started the command in its own group.
+/// A signal to the process group of an FMU ends no other process: here the shell that has started the command in its own group.
 #[test]
 fn the_group_of_the_caller_survives() {
     if library().is_none() {
@@ -159,7 +159,7 @@ fn the_group_of_the_caller_survives() {
     }
 }
 
-/// The FMU connects to this test, and with `--sandbox` it does not, or the command says that there is none.
+/// The FMU connects to this test; with `--sandbox` it cannot, or the command says that there is no sandbox.
 #[test]
 fn a_sandbox_has_no_network() {
     if library().is_none() {
@@ -175,8 +175,8 @@ fn a_sandbox_has_no_network() {
     assert_eq!(sandbox.errors.lines().count(), usize::from(refused), "{sandbox:?}");
 }
 
-/// A system that has no room for threads and processes for a moment makes no finding and ends no check; one that has none makes
-/// everything undetermined. As another user, because such limits do not hold for root.
+/// If a system cannot start threads and processes for a moment, no check reports a finding or ends; if it never can, every
+/// check is undetermined. Run as another user, because such limits do not apply to root.
 #[test]
 fn a_system_without_room_is_no_finding() {
     let root = fs::read_to_string("/proc/self/status").unwrap().contains("\nUid:\t0\t");
@@ -192,7 +192,7 @@ fn a_system_without_room_is_no_finding() {
     for path in [dir.clone(), dir.join("temporary"), dir.join("work")] {
         open(&path);
     }
-    // Nobody else has this number.
+    // This number is unused elsewhere.
     let user = 0x6000_0000 + std::process::id();
     let check = |script: &str| {
         let setpriv = ["setpriv", &format!("--reuid={user}"), &format!("--regid={user}"), "--clear-groups"];

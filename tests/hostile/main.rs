@@ -1,4 +1,5 @@
-//! Hostile files and libraries, generated here: no crash, no hang, nothing outside, nothing left, one line and the right status.
+//! Hostile files and libraries, generated here: no crash, no hang, no file outside, nothing left behind, one line and the right
+//! status.
 #![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc, clippy::new_without_default)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -17,7 +18,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use zip::{Entry, write};
 
-/// What ends a command that hangs: much longer than any takes on a busy machine.
+/// Time limit of a command: much longer than any takes on a busy machine.
 const HANG: Duration = Duration::from_secs(100);
 
 /// The checks that do not run the binary.
@@ -28,7 +29,7 @@ pub struct Place {
     dir: TempDir,
 }
 
-/// What a command did.
+/// The result of a command.
 #[derive(Debug)]
 pub struct Ended {
     pub status: i32,
@@ -49,7 +50,7 @@ impl Place {
         self.dir.path().join("x.fmu")
     }
 
-    /// Runs `fmu` with these arguments after the first and the file; checks that it leaves nothing but what it was asked for.
+    /// Runs `fmu` with these arguments after the first and the file; checks that it leaves only the requested files.
     pub fn run(&self, command: &str, more: &[&str], act: &str) -> Ended {
         let (work, temporary) = (self.dir.path().join("work"), self.dir.path().join("temporary"));
         let file = |name: &str| fs::File::create(self.dir.path().join(name)).unwrap();
@@ -201,7 +202,7 @@ fn the_fmu_that_does_no_harm_runs() {
     assert!(library().is_none() || (ended.status == 0 && ended.errors.is_empty()), "{ended:?}");
 }
 
-/// The page has the limits that the program has.
+/// The page has the program's limits.
 #[test]
 fn the_page_has_the_limits() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/check.md");

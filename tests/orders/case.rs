@@ -1,4 +1,4 @@
-//! What is simulated: FMUs, inputs over time, outputs to compare.
+//! The simulated cases: FMUs, inputs over time, outputs to compare.
 
 use fmu_import::Fmu;
 use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, Solver, System};
@@ -46,7 +46,7 @@ pub struct Case {
     pub fmu: &'static str,
     pub inputs: &'static [Input],
     pub outputs: &'static [&'static str],
-    /// Distance in s of the points that are compared: none is at a sample.
+    /// Distance in s of the compared points: none is at a sample.
     pub apart: f64,
     pub points: u32,
     /// Largest deviation, as a part of the largest value of the output.

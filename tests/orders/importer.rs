@@ -1,4 +1,4 @@
-//! An importer in Model Exchange that calls in a given order: the method of Dormand and Prince, roots by bisection.
+//! An importer in Model Exchange with a given call order: the method of Dormand and Prince, roots by bisection.
 
 use super::case::Case;
 use super::order::{Completes, Order, STRICT, Starts};
@@ -30,7 +30,7 @@ impl Loaded {
     }
 }
 
-/// An instance that is called; every call succeeds, or the test ends with what the FMU said.
+/// An instance; every call succeeds, or the test ends with the FMU's message.
 struct Instance<'a> {
     fmu: &'a Loaded,
     it: Handle,
@@ -111,7 +111,7 @@ impl<'a> Instance<'a> {
                 (Causality::Parameter, Some(start)) => start.split_whitespace().map(|x| bits(v.base, x)).collect(),
                 _ => None,
             };
-            // Texts are set one by one elsewhere, and no parameter of these FMUs is one.
+            // Texts are set one by one elsewhere, and these FMUs have no text parameters.
             let Some(bits) = bits else { continue };
             match calls.iter_mut().find(|call| call.0 == v.base) {
                 Some(call) => {
@@ -144,7 +144,7 @@ fn bits(base: BaseType, text: &str) -> Option<u64> {
     }
 }
 
-/// What a run gives: the case's outputs at its points, one row each, and the warnings.
+/// Result of a run: the case's outputs at its points, one row each, and the warnings.
 pub struct Run {
     pub rows: Vec<Vec<f64>>,
     pub warnings: Vec<String>,
@@ -170,12 +170,12 @@ struct Importer<'a> {
     /// Time of the initialization, at which FMI 3.0 has no SetTime yet.
     initial: bool,
     next: Option<f64>,
-    /// Time of the last event. Inputs jump in events alone: the step before a jump ends with the value before it, or the plant
+    /// Time of the last event. Inputs jump only in events: the step before a jump ends with the value before it, or the plant
     /// would count that step's energy along a straight line to the new value.
     since: f64,
 }
 
-/// Runs the case in this order; `draw` says for every call that the standard forbids whether it is made, and a constant `true`
+/// Runs the case in this order; `draw` decides for every call that the standard forbids whether it is made; a constant `true`
 /// makes them all.
 pub fn run(fmu: &Loaded, case: &Case, order: Order, draw: &mut dyn FnMut() -> bool) -> Run {
     take_events();
@@ -229,7 +229,7 @@ fn sizes(d: &ModelDescription) -> (usize, usize) {
 }
 
 impl Importer<'_> {
-    /// Whether a habit of this order shows now.
+    /// Whether a habit of this order applies now.
     fn does(&mut self, habit: bool) -> bool {
         habit && (self.draw)()
     }
@@ -481,13 +481,13 @@ impl Importer<'_> {
     }
 }
 
-/// A run in the order that the standards have.
+/// A run in the order of the standards.
 pub fn strict(fmu: &Loaded, case: &Case) -> Run {
     run(fmu, case, STRICT, &mut || true)
 }
 
-/// Co-Simulation as Simulink and Modelica-FMI call: parameters before the initialization, inputs that hold over a step, outputs
-/// after it.
+/// Co-Simulation with the calls of Simulink and Modelica-FMI: parameters before the initialization, inputs held over a step,
+/// outputs after it.
 pub fn stepped(fmu: &Loaded, case: &Case, (delayed, starts): (bool, bool)) -> Run {
     take_events();
     let it = Instance::new(fmu, Interface::CoSimulation);
@@ -526,7 +526,8 @@ pub fn stepped(fmu: &Loaded, case: &Case, (delayed, starts): (bool, bool)) -> Ru
     Run { rows, warnings }
 }
 
-/// Whether a parameter of a type that FMI 2.0 passes as an Integer is tunable: importers that pass enumerations unconverted stop there.
+/// Whether a parameter of a type that FMI 2.0 passes as an Integer is tunable: importers that pass enumerations unconverted
+/// fail there.
 pub fn tunable_enumerations(d: &ModelDescription) -> Vec<&str> {
     let fits = |v: &&model_description::ModelVariable| {
         v.causality == Causality::Parameter && v.variability == Variability::Tunable && v.base == BaseType::Enumeration

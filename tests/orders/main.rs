@@ -1,5 +1,5 @@
-//! Importers call in orders that the standards forbid: what the packed FMUs then give, against the order of the standards in our own
-//! importer, which FMPy confirms (`cargo test --test fmpy`). No importer runs here: the orders are replayed from `order.rs`.
+//! Call orders of importers that the standards forbid: the results of the packed FMUs, against the order of the standards in
+//! our importer, whose results FMPy confirms. No other importer runs here: the orders are replayed from `order.rs`.
 //!
 //! `cargo test --release --test orders random -- --ignored --nocapture` makes a million calls in random orders; `FMU_CALLS` and
 //! `FMU_SEED` select others.
@@ -39,18 +39,21 @@ fn replay(case: &Case, standards: Range<usize>, file: impl Fn(usize) -> PathBuf)
             let line = format!("{:52} {:20} {name} {deviation:9.1e} {output}\n", order.name, case.fmu);
             print!("{line}");
             assert!(deviation <= case.tolerance, "{line}");
-            let told: Vec<_> = made.warnings.iter().filter(|text| text.contains("the importer")).collect();
+            let warned: Vec<_> = made.warnings.iter().filter(|text| text.contains("the importer")).collect();
             let lawful =
                 order.completes != Completes::Evaluations && order.starts != Starts::After && !order.states_in_event;
-            assert!(!lawful || told.is_empty(), "{line}{told:?}");
+            assert!(!lawful || warned.is_empty(), "{line}{warned:?}");
             let states = fmu.description.variables.iter().any(|v| v.derivative.is_some());
-            assert!(order.late == 0.0 || !states || !told.is_empty(), "{line}");
-            assert!((1..told.len()).all(|i| !told[..i].iter().any(|one| habit(one) == habit(told[i]))), "{told:?}");
+            assert!(order.late == 0.0 || !states || !warned.is_empty(), "{line}");
+            assert!(
+                (1..warned.len()).all(|i| !warned[..i].iter().any(|one| habit(one) == habit(warned[i]))),
+                "{warned:?}"
+            );
         }
     }
 }
 
-/// What a warning is about, without the time.
+/// The subject of a warning, without the time.
 fn habit(text: &str) -> &str {
     text.split_once("the importer").map_or(text, |(_, habit)| habit)
 }
@@ -73,7 +76,36 @@ fn the_reference_fmus_in_every_order() {
     }
 }
 
-/// In the order of the standards, nothing is warned of, and inputs that a tool feeds 0 are named.
+/// FMPy with CVode gives the reference of the orders. Straight lines are steps here: FMPy 0.3.32 sets inputs where it looks for
+/// events and not where it reads derivatives.
+#[test]
+fn fmpy_gives_the_reference() {
+    let _one = ONE.lock();
+    let ours = OURS.iter().flat_map(|case| [0, 1].map(|standard| (case, standard, ours(case, standard))));
+    let packed = REFERENCE.iter().flat_map(|case| {
+        let standards = if case.fmu == "Feedthrough" { 1..2 } else { 0..2 };
+        standards.map(move |standard| (case, standard, packed::archive(case.fmu, standard)))
+    });
+    let runs: Vec<_> = ours
+        .chain(packed)
+        .map(|(case, standard, file)| {
+            let steps: Vec<_> = case.inputs.iter().map(|input| case::Input { linear: false, ..*input }).collect();
+            let case = Case { inputs: steps.leak(), ..*case };
+            let inputs = case.inputs.iter().map(
+                |input| serde_json::json!({ "name": input.name, "points": input.points, "boolean": input.boolean }),
+            );
+            serde_json::json!({ "name": format!("{}, FMI {}.0", case.fmu, standard + 2), "file": file,
+                "inputs": inputs.collect::<Vec<_>>(), "outputs": case.outputs,
+                "times": (1..=case.points).map(|k| case.point(k)).collect::<Vec<_>>(), "rows": case.reference(&file),
+                "tolerance": case.tolerance })
+        })
+        .collect();
+    let path = common::python::scratch().join("orders.json");
+    std::fs::write(&path, serde_json::to_vec(&runs).unwrap()).unwrap();
+    common::python::pytest("fmpy", "orders", &["test_orders.py"], &[("FMU_ORDERS", &path)]);
+}
+
+/// In the order of the standards, there is no warning, and inputs to which a tool feeds 0 are named.
 #[test]
 fn inputs_at_zero_are_named_once() {
     const ZERO: &[(f64, f64)] = &[(0.0, 0.0)];
@@ -101,8 +133,8 @@ fn inputs_at_zero_are_named_once() {
         for standard in 0..2 {
             let fmu = Loaded::new(&ours(&case, standard));
             for made in [strict(&fmu, &case), stepped(&fmu, &case, (false, false))] {
-                let told: Vec<_> = made.warnings.iter().filter(|text| text.contains("the run begins with")).collect();
-                assert!(told.len() == 1 && told[0].contains(expected), "{:?}", made.warnings);
+                let warned: Vec<_> = made.warnings.iter().filter(|text| text.contains("the run begins with")).collect();
+                assert!(warned.len() == 1 && warned[0].contains(expected), "{:?}", made.warnings);
             }
             let fed = Case { inputs: &[], ..case };
             assert!(strict(&fmu, &fed).warnings.iter().all(|text| !text.contains("the run begins with")));
@@ -126,8 +158,8 @@ fn the_orders_of_co_simulation() {
             assert!(plain.warnings.iter().all(|text| !text.contains("the importer")), "{:?}", plain.warnings);
             let set = stepped(&fmu, &case, (false, true));
             assert_eq!(set.rows, reference, "{}: parameters set to what they are", case.fmu);
-            let told = set.warnings.iter().filter(|text| text.contains("their values are unchanged")).count();
-            assert_eq!(told, 1, "{:?}", set.warnings);
+            let warned = set.warnings.iter().filter(|text| text.contains("their values are unchanged")).count();
+            assert_eq!(warned, 1, "{:?}", set.warnings);
             let later = stepped(&fmu, &case, (true, false)).rows;
             let apart = case.deviation(&later, &reference);
             println!("Modelica-FMI, inputs a step later: {:20} {:9.1e} {}", case.fmu, apart.0, apart.1);
@@ -209,7 +241,7 @@ fn some_random_orders() {
 }
 
 #[test]
-#[ignore = "minutes: see CONTRIBUTING.md"]
+#[ignore = "minutes: see docs/testing.md"]
 fn random_orders() {
     let _one = ONE.lock();
     random(std::env::var("FMU_CALLS").map_or(1_000_000, |text| text.parse().expect("a whole number")));

@@ -1,7 +1,6 @@
-//! The orders in which importers call, as data. Each row has its source; what an importer does that no source tells is as the
-//! standard says.
+//! The call orders of importers, as data. Each row has its source; calls that no source describes follow the standard.
 
-/// When an importer sets every parameter to the start value that the description has.
+/// When an importer sets every parameter to its start value in the description.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Starts {
     /// It sets none.
@@ -15,7 +14,7 @@ pub enum Starts {
 /// When an importer calls `CompletedIntegratorStep`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Completes {
-    /// Never, although the FMU asks for it.
+    /// Never, although the FMU requests it.
     Never,
     /// At the end of an accepted step.
     Steps,
@@ -28,7 +27,7 @@ pub enum Completes {
 #[expect(clippy::struct_excessive_bools, reason = "habits that do not depend on each other")]
 pub struct Order {
     pub name: &'static str,
-    /// Where the order comes from.
+    /// Source of the order.
     pub source: &'static str,
     /// For FMI 2.0 and for FMI 3.0.
     pub standards: [bool; 2],
@@ -38,11 +37,11 @@ pub struct Order {
     /// It updates the discrete states until that is no longer needed; without, once for each event.
     pub iterates: bool,
     pub completes: Completes,
-    /// It sets the continuous states in Event Mode, too.
+    /// It also sets the continuous states in Event Mode.
     pub states_in_event: bool,
-    /// It reads derivatives in Event Mode, too.
+    /// It also reads derivatives in Event Mode.
     pub derivatives_in_event: bool,
-    /// It sets discrete inputs at every evaluation outside of Continuous-Time Mode, not at events alone.
+    /// It sets discrete inputs at every evaluation outside of Continuous-Time Mode, not only at events.
     pub discrete_inputs: bool,
     /// It finds time events as roots, this many seconds late; 0: its steps end there.
     pub late: f64,
@@ -50,11 +49,11 @@ pub struct Order {
     pub blind: bool,
     /// Evaluations at each point.
     pub repeats: u8,
-    /// It restarts its solver from the states of before a rejected step with a call at that point.
+    /// It restarts its solver from the states before a rejected step with a call at that point.
     pub returns: bool,
 }
 
-/// The order that the standards have.
+/// The order of the standards.
 pub const STRICT: Order = Order {
     name: "strict",
     source: "FMI 2.0.5, 3.2.4; FMI 3.0.2, 3.3",

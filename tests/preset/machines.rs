@@ -7,7 +7,7 @@ use std::fs;
 
 const MOTORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/");
 
-/// The FMU with the values of `fmu tune` is the FMU that an importer gives the parameter file of `fmu tune`.
+/// The FMU with the values of `fmu tune` behaves like the FMU to which an importer applies the parameter file of `fmu tune`.
 #[test]
 fn a_tuned_fmu_needs_no_parameter_file() {
     let dir = tempfile::tempdir().unwrap();
@@ -48,7 +48,7 @@ fn a_tuned_fmu_needs_no_parameter_file() {
     }
 }
 
-/// What a machine has takes the place of what another one had; a note names what stays of that.
+/// The values of a machine replace those of another one; a note names the remaining values.
 #[test]
 fn another_machine_takes_the_place_of_the_first() {
     let dir = tempfile::tempdir().unwrap();

@@ -20,7 +20,7 @@ use std::process::Command;
 
 const REFERENCE: &str = "extra/org.fmi-standard.fmi-ls-ref/";
 
-/// Runs `fmu`; what it wrote to standard output and standard error.
+/// Runs `fmu`; returns its standard output and standard error.
 fn fmu(arguments: &[&str]) -> Result<String, String> {
     let output = Command::new(env!("CARGO_BIN_EXE_fmu")).args(arguments).output().unwrap();
     let said = String::from_utf8_lossy(&[&output.stdout[..], &output.stderr[..]].concat()).into_owned();
@@ -86,7 +86,7 @@ const SETS: [&str; 6] = [
     "controller.motor.n_p=4",
     "plant.motor.n_p=4",
 ];
-/// The same for an importer that sets them, and what the description says.
+/// The same for an importer that sets them, and the description.
 const VALUES: [(&str, &str, &str); 6] = [
     ("plant.motor.R_s", "3.25", "3.25"),
     ("plant.initial.speed", "30rpm", "3.141592653589793"),
@@ -167,7 +167,7 @@ fn a_preset_is_in_the_description_and_in_every_instance() {
     }
 }
 
-/// The values of a preset stay in a preset of it, but for those that it sets again; so does the name.
+/// The values of a preset stay in a preset of it, except those that it sets again; so does the name.
 #[test]
 fn a_preset_of_a_preset_merges() {
     let dir = tempfile::tempdir().unwrap();
@@ -211,7 +211,7 @@ fn a_preset_of_a_preset_merges() {
     }
 }
 
-/// `fmu check` and `fmu prove` find nothing that they do not find in the FMU itself.
+/// `fmu check` and `fmu prove` report the same as for the FMU itself.
 #[test]
 fn check_and_prove_treat_it_as_any_fmu() {
     let dir = tempfile::tempdir().unwrap();

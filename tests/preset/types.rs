@@ -77,7 +77,7 @@ fn every_type_has_a_start_value() {
             }
             assert_eq!(it.get("in.truth").unwrap(), Values::Booleans(vec![false]));
             assert_eq!(it.get("label").unwrap(), Values::Strings(vec![LABEL.into()]));
-            // What follows from them, and the data that `load` read.
+            // Calculated values, and the data that `load` has read.
             assert_eq!(it.get("status").unwrap(), Values::Strings(vec!["off".into()]));
             it.reset().unwrap();
         }
@@ -90,7 +90,7 @@ fn every_type_has_a_start_value() {
             assert_eq!((start("weights[1,3]"), start("weights[2,3]")), ("-3".into(), "6e-7".into()));
         }
         assert!(files.contains_key("resources/tables/squares.csv"));
-        // A value returns to the model's own.
+        // A value returns to that of the model.
         preset(&new, &new, &["label=as built & <tested>"]).unwrap();
         assert_eq!(contents(&new).unwrap().0.variable("label").unwrap().start.as_deref(), Some("as built & <tested>"));
     }
@@ -103,7 +103,7 @@ fn what_fmi_2_cannot_carry_is_refused_there() {
     let new = dir.path().join("new.fmu");
     let said = preset(of(V2), &new, &["in.uint64=18446744073709551615"]).unwrap_err();
     assert!(
-        said.contains("in.uint64 starts with 18446744073709551615, and an Integer of FMI 2.0 has 32 bits"),
+        said.contains("in.uint64 starts with 18446744073709551615, which does not fit a 32-bit FMI 2.0 Integer"),
         "{said}"
     );
     assert!(!new.exists());

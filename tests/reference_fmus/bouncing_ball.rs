@@ -54,7 +54,7 @@ fn event_mode_and_early_return_change_no_bit() {
             assert_eq!(found, wanted, "event mode {event_mode}, early return {early_return}, steps of {h} s");
         }
     }
-    // FMPy records what is before and after an event, too.
+    // FMPy also records the values before and after an event.
     let ([_, v], bounces) = expected(1);
     let columns = fmpy(
         &fmu,

@@ -1,10 +1,10 @@
-//! `clocks`: an importer that makes its ticks.
+//! `clocks`: an importer that generates its ticks.
 
 use super::{archive, open, script};
 use fmu_import::{Instance, Kind, Values};
 use model_description::FmiVersion::V3;
 
-/// `inClock1` ticks by itself, `inClock3` when it asks for it, `inClock2` when the test does; the output clock at totals of 5.
+/// `inClock1` ticks by itself, `inClock3` on request, `inClock2` when the test ticks it; the output clock at totals of 5.
 #[test]
 fn clocks_tick_by_their_kinds() {
     for kind in [Kind::CoSimulation { event_mode: true, early_return: false }, Kind::ModelExchange] {

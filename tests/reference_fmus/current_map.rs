@@ -1,4 +1,4 @@
-//! The example of a map as FMI-LS-STRUCT describes it: `examples/current-map`.
+//! The example of a map as defined by FMI-LS-STRUCT: `examples/current-map`.
 
 use super::{archive, checks, open, script};
 use fmu_import::Values;

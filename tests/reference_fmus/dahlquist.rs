@@ -13,7 +13,7 @@ fn has_the_bits_of_the_original() {
     for version in BOTH {
         let fmu = archive("dahlquist", version);
         assert_eq!(column(&run(Method::default(), &fmu, &[], 10.0, 0.1), "x"), wanted, "{version:?}");
-        // What is left of a communication step waits for the next one.
+        // The rest of a communication step is left to the next one.
         let rows = column(&run(Method::default(), &fmu, &[], 9.0, 0.25), "x");
         assert_eq!(
             rows.iter().step_by(2).copied().collect::<Vec<_>>(),
@@ -53,7 +53,7 @@ fn starts_where_the_importer_wants() {
     }
 }
 
-/// The step of its solver is an attribute of FMI 3.0 alone.
+/// The step of its solver is an attribute only in FMI 3.0.
 #[test]
 fn its_description_has_the_step_of_the_solver() {
     for (version, expected) in [(V2, None), (V3, Some(" fixedInternalStepSize=\"0.1\""))] {
@@ -65,7 +65,7 @@ fn its_description_has_the_step_of_the_solver() {
     }
 }
 
-/// Inside a step of 1 s, FMPy reads the rows of the original, and ends a step where it wants.
+/// Inside a step of 1 s, FMPy reads the rows of the original, and may end a step.
 #[test]
 fn fmpy_reads_it_inside_a_step() {
     let said = script(include_str!("dahlquist.py"), &[&archive("dahlquist", V3)]);

@@ -88,7 +88,7 @@ fn the_ends_of_every_integer_arrive_exactly() {
     assert_eq!(instance.get("Int64_output").unwrap(), Values::Integers(vec![i64::MAX.into()]));
 }
 
-/// Lines for what is continuous, jumps where a time comes twice, and texts and bytes that are held.
+/// Straight lines for continuous values, jumps where a time occurs twice, and texts and bytes that are held.
 #[test]
 fn inputs_of_every_kind_come_from_one_file() {
     let recording = run(

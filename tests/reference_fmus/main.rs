@@ -56,7 +56,7 @@ fn packed(package: &str) -> Vec<PathBuf> {
     .clone()
 }
 
-/// Where the archives are.
+/// Folder of the archives.
 fn archives() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| python::scratch().join("reference-fmus"))
@@ -120,7 +120,7 @@ fn fmpy(fmu: &Path, arguments: &str) -> Vec<Vec<f64>> {
     said.lines().map(|line| line.split(' ').map(hexadecimal).collect()).collect()
 }
 
-/// A number as Python's `float.hex` writes it.
+/// A number in the form of Python's `float.hex`.
 fn hexadecimal(text: &str) -> f64 {
     let (sign, text) = text.strip_prefix('-').map_or((1.0, text), |rest| (-1.0, rest));
     let (mantissa, exponent) = text.strip_prefix("0x").and_then(|text| text.split_once('p')).unwrap();
@@ -140,7 +140,7 @@ fn open(package: &str) -> Fmu {
     Fmu::open(archive(package, V3)).unwrap()
 }
 
-/// What the checker finds in the archives, but for the linker's matters.
+/// The checker's findings in the archives, except those about the linker.
 fn checks(package: &str) {
     for file in packed(package) {
         let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));

@@ -63,7 +63,7 @@ fn arrays_and_integers_are_replayed() {
     assert!(read("StateSpace/Readme.txt").contains("arrays, structural parameters"));
 }
 
-/// A reference with another element than the FMU gives is found, by each importer.
+/// A reference with a wrong element is found, by each importer.
 #[test]
 fn a_wrong_element_is_found() {
     let folder = tempfile::tempdir().unwrap();
@@ -74,7 +74,7 @@ fn a_wrong_element_is_found() {
     assert_eq!(said.matches(": 1.0e0").count(), 2, "{said}");
 }
 
-/// FMPy records bytes and no texts.
+/// FMPy records bytes but not texts.
 #[test]
 fn outputs_that_fmpy_does_not_record_are_left_out_there() {
     let folder = tempfile::tempdir().unwrap();
@@ -86,7 +86,7 @@ fn outputs_that_fmpy_does_not_record_are_left_out_there() {
     assert!(readme.contains("FMPy 0.3.32: 0.0e0\n"), "{readme}");
 }
 
-/// Texts and bytes in this program, which FMPy does not feed.
+/// Texts and bytes in this program; FMPy cannot feed them.
 #[test]
 fn texts_and_bytes_are_replayed() {
     let folder = tempfile::tempdir().unwrap();

@@ -3,7 +3,7 @@
 use super::*;
 use model_description::{Causality, Initial};
 
-/// Derivatives as the original writes them.
+/// Derivatives as in the original.
 fn f([y1, y2]: [f64; 2]) -> [f64; 2] {
     let y3 = 1.0 - y1 - y2;
     [-0.04 * y1 + 1e4 * y2 * y3, 0.04 * y1 - 1e4 * y2 * y3 - 3e7 * y2 * y2]

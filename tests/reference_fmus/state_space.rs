@@ -22,7 +22,7 @@ fn expected() -> Vec<[f64; 3]> {
     rows
 }
 
-/// The output as columns of texts or of numbers have it.
+/// The output as columns of texts or of numbers.
 fn rows(recording: &Recording) -> Vec<Vec<f64>> {
     if let Some(column) = recording.texts.first() {
         return column.values.iter().map(|row| row.split(' ').map(|x| x.parse().unwrap()).collect()).collect();
@@ -101,7 +101,7 @@ fn sizes_change_while_it_runs() {
     }
 }
 
-/// Values that differ from place to place.
+/// Values that differ from element to element.
 fn drawn(n: usize, seed: usize) -> Vec<f64> {
     (0..n).map(|i| f64::from(u8::try_from((7 * i + 3 * seed) % 11).unwrap()) - 5.0).collect()
 }
@@ -112,7 +112,7 @@ fn product(matrix: &[f64], vector: &[f64], start: &[f64]) -> Vec<f64> {
     start.iter().enumerate().map(|(i, y)| row(i).iter().zip(vector).fold(*y, |y, (a, x)| y + a * x)).collect()
 }
 
-/// Sets matrices and inputs, makes three steps of the solver, and compares with the matrices' own products.
+/// Sets matrices and inputs, makes three steps of the solver, and compares with the products of the matrices.
 fn compare(it: &mut Instance, time: f64, [m, n, r]: [usize; 3]) {
     let matrices = [("A", n * n), ("B", n * m), ("C", r * n), ("D", r * m), ("u", m)];
     let [a, b, c, d, u] = std::array::from_fn(|seed| {
@@ -194,7 +194,7 @@ fn elements_of_a_resized_array_are_found() {
     }
 }
 
-/// A state saved with other sizes brings them along.
+/// A state saved with other sizes restores them.
 #[test]
 fn a_saved_state_has_its_sizes() {
     let mut it = open("state-space").instantiate("it", false).unwrap();
@@ -282,7 +282,7 @@ fn a_preset_finds_an_element_of_a_matrix() {
     let fmu = fmu_import::Fmu::open(&out).unwrap();
     let a = fmu.description().variable("A").unwrap();
     assert_eq!(a.start.as_deref(), Some("1 0 0 5 1 0 0 0 1"));
-    // The binary has it too: y = x + u, and x_2 grows with 5 x_1.
+    // The binary does the same: y = x + u, and x_2 grows with 5 x_1.
     let of = |fmu| run(exchange(), fmu, &[], 1.0, 0.1);
     let (with, without) = (rows(&of(&out)), rows(&of(&archive("state-space", V3))));
     let last = |rows: &[Vec<f64>]| rows.last().unwrap().clone();
@@ -291,7 +291,7 @@ fn a_preset_finds_an_element_of_a_matrix() {
     assert!(with[1] > without[1] + 1.0, "{with:?} {without:?}");
 }
 
-/// Values of an SSP may name elements before the sizes: the structural parameters of all its files come first, and together.
+/// Values of an SSP may name elements before the sizes: the structural parameters of all its files are set first, together.
 #[test]
 fn an_ssp_sets_sizes_before_arrays() {
     let folder = tempfile::tempdir().unwrap();
@@ -332,7 +332,7 @@ fn an_ssp_sets_sizes_before_arrays() {
     for port in ["it.x[2]", "it.x[5]", "it.y[4]", "it.n", "it.m", "it.r"] {
         loaded.record(port).unwrap();
     }
-    // Sizes that change later leave no value behind that does not fit.
+    // Sizes that change later leave no inconsistent value behind.
     let settings = Settings { start: 0.0, stop: 1e-3, step: 1e-3, sequential: false };
     let wrong = loaded.system.configure([("it.n", "2")]).unwrap_err().to_string();
     assert!(wrong.contains("x0 has 2 elements, not 5"), "{wrong}");

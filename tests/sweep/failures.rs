@@ -52,7 +52,7 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
             "d: has no variable motor.R; did you mean plant.motor.R_s or controller.motor.R_s?",
         ),
         (vary("'x.R' = { uniform = [2, 3] }"), "d: has no variable x.R"),
-        (vary("'d.speed' = { uniform = [2, 3] }"), "d.speed: is continuous output and takes no value"),
+        (vary("'d.speed' = { uniform = [2, 3] }"), "d.speed: is continuous output and cannot be set"),
         (vary("'d.controller.estimator' = { values = ['Rasmusen'] }"), "Rasmusen is not one of Rasmussen"),
         (vary(&format!("{good}\n[set]\n'd.plant.motor.R_s' = 3")), "R_s is set for all runs and varied"),
         (vary("'d.tau_load' = { uniform = [0, 1] }\n[input]\n'd.tau_load' = '0:1'"), "d.tau_load: is fed by"),
@@ -102,7 +102,7 @@ fn a_row_that_crashes_is_one_row() {
     let again = folder.sweep(&file, "out").output().unwrap();
     assert!(died(&first) && died(&again), "{first:?} {again:?}");
     let said = String::from_utf8(again.stderr).unwrap();
-    assert!(said.contains("an earlier process ended in the middle; if an FMU crashes, --isolate"), "{said}");
+    assert!(said.contains("an earlier process was interrupted; if an FMU crashes, --isolate"), "{said}");
     let said = ends(folder.sweep(&file, "out").args(["--isolate", "--jobs", "2"]), 1);
     assert!(said.contains("row 2: killed by SIGABRT") && said.contains("2 of 10 rows failed"), "{said}");
     let rows = folder.rows("out");
@@ -155,7 +155,7 @@ fn a_full_disk_names_the_file_and_loses_no_part() {
     ends(&mut folder.sweep(&file, "whole"), 0);
     let sweep =
         |out: &Path| format!("'{}' sweep '{}' --out '{}'", env!("CARGO_BIN_EXE_fmu"), file.display(), out.display());
-    // A disk of 64 KiB, where a process may have a separate one.
+    // A disk of 64 KiB, if a process may mount one.
     let (disk, copy) = (folder.path("disk"), folder.path("copy"));
     fs::create_dir(&disk).unwrap();
     fs::create_dir(&copy).unwrap();
@@ -171,11 +171,11 @@ fn a_full_disk_names_the_file_and_loses_no_part() {
             let said = String::from_utf8(stderr).unwrap();
             assert!(String::from_utf8(stdout).unwrap().contains("status 2"), "{said}");
             assert!(said.contains("error: ") && said.contains("disk/") && said.contains("No space left"), "{said}");
-            assert!(said.contains("of 40 parts are there already"), "{said}");
+            assert!(said.contains("of 40 parts already exist"), "{said}");
             let half = fs::read_to_string(copy.join("ls")).unwrap();
             assert!(!half.contains(".part-") && half.contains("part-0"), "{half}");
             assert_eq!(folder.results("copy"), folder.results("whole"));
         }
-        other => println!("no disk of one's own here: {other:?}"),
+        other => println!("no separate disk here: {other:?}"),
     }
 }

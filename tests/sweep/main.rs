@@ -1,4 +1,4 @@
-//! `fmu sweep`: the same bytes in every case, and one clear line for what is wrong.
+//! `fmu sweep`: the same bytes in every case, and one clear line for every error.
 #![allow(missing_docs)]
 #![cfg(unix)]
 
@@ -43,7 +43,7 @@ impl Folder {
         command
     }
 
-    /// All files of the results that may not differ, with their bytes.
+    /// All files of the results that must not differ, with their bytes.
     fn results(&self, out: &str) -> Vec<(String, Vec<u8>)> {
         let results = |name: &str| name == "results.csv" || name.starts_with("part-");
         let mut all: Vec<_> = names(&self.path(out)).into_iter().filter(|name| results(name)).collect();

@@ -43,7 +43,7 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
     let there = parts("killed");
     assert!((3..40).contains(&there), "{there}");
 
-    // Again and again, for longer each time, so that even a machine with no time to spare gets ahead.
+    // Repeatedly, for longer each time, so that even a busy machine makes progress.
     let mut patience = Duration::from_millis(50);
     loop {
         let mut child = start();
@@ -69,16 +69,16 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
         names(&folder.path("killed"))
     );
     let said = ends(&mut folder.sweep(&file, "killed"), 0);
-    assert!(said.contains("note: 40 of 40 parts are there already"), "{said}");
+    assert!(said.contains("note: 40 of 40 parts already exist"), "{said}");
 
-    // The first kill alone, to see what is said.
+    // Only the first kill, to check the messages.
     for part in 5..40 {
         fs::remove_file(folder.path("killed").join(format!("part-{part:08}.csv"))).unwrap();
     }
     fs::write(folder.path("killed/.running-1"), "").unwrap();
     let said = ends(&mut folder.sweep(&file, "killed"), 0);
-    assert!(said.contains("note: 5 of 40 parts are there already"), "{said}");
-    assert!(said.contains("note: an earlier process ended in the middle; if an FMU crashes, --isolate"), "{said}");
+    assert!(said.contains("note: 5 of 40 parts already exist"), "{said}");
+    assert!(said.contains("note: an earlier process was interrupted; if an FMU crashes, --isolate"), "{said}");
     assert_eq!(folder.results("killed"), whole);
 }
 

@@ -95,7 +95,7 @@ fn chosen_runs_are_recorded() {
     assert!(lines[1].starts_with("0,") && lines[6].starts_with("0.01,"), "{trace}");
 }
 
-/// FMUs in C that forget to reset a state, end their binary by the status Fatal, print what they like, or can be there once.
+/// FMUs in C that do not reset a state, end their binary by the status Fatal, print text, or allow only one instance.
 #[test]
 #[cfg(all(target_os = "linux", target_arch = "x86_64"))]
 fn rude_fmus_run_as_well_as_polite_ones() {
@@ -140,13 +140,16 @@ fn rude_fmus_run_as_well_as_polite_ones() {
     assert_eq!(rows, polite, "after the status Fatal there is another copy of the binary");
     assert_eq!(sweep("PRINT", &["--isolate", "--jobs", "2"], 0), (String::new(), polite.clone()));
     let (said, rows) = sweep("ONCE", &["--jobs", "2"], 0);
-    assert_eq!(said, "note: s can have one instance per process: rows run in processes, as with --isolate\n");
+    assert_eq!(
+        said,
+        "note: s allows only one instance per process: rows run in separate processes, as with --isolate\n"
+    );
     assert_eq!(rows, polite);
     fs::remove_dir_all(folder.path("ONCE")).unwrap();
     assert_eq!(sweep("ONCE", &["--jobs", "1"], 0), (String::new(), polite));
 }
 
-/// What the documentation shows: the file of docs/sweeps.md and examples/sweep.toml, with fewer runs.
+/// The examples of the documentation: the file of docs/sweeps.md and examples/sweep.toml, with fewer runs.
 #[test]
 fn the_files_of_the_documentation_run() {
     let folder = Folder::new();
@@ -171,7 +174,7 @@ fn the_files_of_the_documentation_run() {
     assert!((1..20).contains(&lost), "{lost} of 256 starts lost");
 }
 
-/// A run of one period beside the model: reset, two values, initialization, end.
+/// The overhead of a run of one period: reset, two values, initialization, end.
 #[test]
 fn a_run_costs_microseconds() {
     let drive = common::archives().join("fmi3/PmsmDrive.fmu");
@@ -181,7 +184,7 @@ fn a_run_costs_microseconds() {
     );
     let plan = Plan::new(&Definition::parse(&text).unwrap(), Path::new("")).unwrap();
     let variables = plan.bind(["d.plant.motor.R_s", "d.tau_load"]).unwrap();
-    // Rounds shorter than a turn of the processor: the best of many has the machine for itself.
+    // Rounds shorter than a time slice: the best of many has the machine to itself.
     let columns: [&[f64]; 2] = [&[3.0; 50], &[0.5; 50]];
     let once = || {
         let begun = Instant::now();

@@ -1,8 +1,7 @@
 //! Connections between plant and controller: what the sensors measure, and the terminals that exist on both.
 //!
-//! `phases` and `sensor` exist twice, on the plant and mirrored on the controller: members with the same name connect.
-//! The inverter is inside the plant, so the phases carry references and measured values, and a connection makes them
-//! equal (signals).
+//! `phases` and `sensor` exist on the plant and, mirrored, on the controller; members with the same name connect. The
+//! inverter is inside the plant, so the phases carry references and measured values: signals, which a connection makes equal.
 
 use crate::frame::Phases;
 use fmu_core::{Icon, Member};
@@ -26,11 +25,11 @@ pub struct Commanded {
     pub u: Phases,
     /// Whether the gates switch.
     pub enable: bool,
-    /// Active short circuit, whatever `enable` says.
+    /// Active short circuit, regardless of `enable`.
     pub asc: bool,
 }
 
-/// The signals between controller and inverter; `enable` and `asc` have another variable on each side.
+/// The signals between controller and inverter; the variables of `enable` and `asc` differ between the two sides.
 pub const fn phases(enable: Member, asc: Member) -> [Member; 8] {
     [
         Member::signal("u_a"),

@@ -1,6 +1,6 @@
 //! Joins the fragments of HTML and SVG that make the page of a model, at compile time.
 //!
-//! A page stands alone, so the page of a whole contains the fragments of its parts, which stand in the crates of the parts.
+//! Each page is complete: that of a whole contains the fragments of its parts, which are stored in the crates of the parts.
 
 /// Joins texts at compile time.
 ///
@@ -16,7 +16,7 @@ macro_rules! joined {
         const BYTES: [u8; $crate::documentation::length(TEXTS)] = $crate::documentation::join(TEXTS);
         match ::std::str::from_utf8(&BYTES) {
             Ok(text) => text,
-            Err(_) => panic!("whole texts make a text"),
+            Err(_) => panic!("texts in UTF-8 stay UTF-8 when joined"),
         }
     }};
 }

@@ -155,7 +155,7 @@ impl<F: Rotating, S: Copy> Vector<F, S> {
         self.im
     }
 
-    /// Both components, to be changed.
+    /// Both components, mutable.
     pub fn parts_mut(&mut self) -> (&mut S, &mut S) {
         (&mut self.re, &mut self.im)
     }
@@ -237,21 +237,21 @@ impl<F: Rotating, S: Copy> Clone for Axis<F, S> {
 impl<F: Rotating, S: Copy> Copy for Axis<F, S> {}
 
 impl<F: Rotating> Axis<F> {
-    /// The frame further on by `turn`.
+    /// The frame rotated ahead by `turn`.
     #[inline]
     pub fn ahead(self, turn: Turn) -> Self {
         let Turn { cos, sin } = turn;
         Self::new(self.cos * cos - self.sin * sin, self.cos * sin + self.sin * cos)
     }
 
-    /// The frame further on by a small `angle` (rad): the error is angle^3 / 6.
+    /// The frame rotated ahead by a small `angle` (rad); the error is angle^3 / 6.
     #[inline]
     pub fn slightly_ahead(self, angle: f64) -> Self {
         let half = 0.5 * angle;
         Self::new(self.cos - angle * (self.sin + half * self.cos), self.sin + angle * (self.cos - half * self.sin))
     }
 
-    /// This frame, whose electrical angle is `theta` (rad), with the change that `theta` has.
+    /// This frame, whose electrical angle is `theta` (rad), with the change of `theta`.
     #[inline]
     pub fn with<S: Scalar>(self, theta: S) -> Axis<F, S> {
         Axis::new(theta.chain(self.cos, -self.sin), theta.chain(self.sin, self.cos))
@@ -292,7 +292,7 @@ impl<F: Rotating, S: Scalar> Axis<F, S> {
     }
 }
 
-/// A rotation by an angle that is usually small: [`Axis::ahead`].
+/// A rotation, usually by a small angle: see [`Axis::ahead`].
 #[derive(Clone, Copy, Debug)]
 pub struct Turn {
     cos: f64,

@@ -19,6 +19,7 @@
 pub mod connection;
 pub mod documentation;
 pub mod frame;
+pub mod hexagon;
 pub mod integrate;
 pub mod math;
 pub mod modulation;

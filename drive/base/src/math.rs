@@ -1,5 +1,5 @@
-//! Elementary functions, from the `libm` crate or, where a period needs them, by series of basic operations: identical
-//! bits on every platform; the C library does not guarantee this.
+//! Elementary functions, from the `libm` crate or, where speed matters, by series of basic operations: the same bits on
+//! every platform, which the C library does not guarantee.
 
 use fmu_core::Scalar;
 use std::f64::consts::SQRT_2;
@@ -10,15 +10,15 @@ pub fn abs<S: Scalar>(x: S) -> S {
     x.chain(x.value().abs(), if x.value() == 0.0 { 0.0 } else { 1.0_f64.copysign(x.value()) })
 }
 
-/// Sine and cosine of `x` (rad), to 2e-16; in half of the time of the library.
+/// Sine and cosine of `x` (rad), to 2e-16; twice as fast as the library.
 ///
 /// x - n pi/2, |.| <= pi/4, by subtracting n times the three parts of pi/2 one after the other (Cody & Waite 1980).
 #[inline]
 pub fn sin_cos(x: f64) -> (f64, f64) {
-    // n times the first or the second part is exact up to n = 2^20.
+    // n times the first or second part is exact up to n = 2^20.
     const HALF_PI: [f64; 3] = [1.570_796_326_734_125_6, 6.077_100_506_303_966e-11, 2.022_266_248_795_950_6e-21];
     const MOST: f64 = 1.6e6;
-    // A NaN is not within.
+    // NaN is outside.
     let within = x.abs() <= MOST;
     if !within {
         return far(x);
@@ -33,7 +33,7 @@ pub fn sin_cos(x: f64) -> (f64, f64) {
     (sign(sin, quadrant), sign(cos, quadrant.wrapping_add(1)))
 }
 
-/// Sine and cosine for |d| <= pi/4, by polynomials with the least greatest error (Remez 1934): below 5e-18.
+/// Sine and cosine for |d| <= pi/4, by minimax polynomials (Remez 1934) with an error below 5e-18.
 #[inline]
 fn sin_cos_octant(d: f64) -> (f64, f64) {
     const S: [f64; 6] = [
@@ -64,7 +64,7 @@ pub fn atan2(y: f64, x: f64) -> f64 {
     libm::atan2(y, x)
 }
 
-/// A number above this one has no fractional digits, so adding and subtracting it rounds to the nearest integer.
+/// Numbers above this one have no fractional digits, so adding and then subtracting it rounds to the nearest integer.
 const ROUNDS: f64 = 6_755_399_441_055_744.0;
 
 /// 2^(j/64) for j = 0 to 63: e^(j ln(2) / 64) to 60 digits, rounded to the nearest double.
@@ -87,7 +87,7 @@ const POWERS_OF_2: [f64; 64] = [
 
 /// e to the power of `x`, with an error below 1.3 units in the last place.
 ///
-/// e^x = 2^(n/64) e^r with |r| <= ln(2) / 128: a power from the table and a series, whose first term left out is below
+/// e^x = 2^(n/64) e^r with |r| <= ln(2) / 128: a power from the table and a series, whose first omitted term is below
 /// 4e-17. Tang 1989, ACM Trans. Math. Softw. 15 (2), without the tail of the table.
 #[inline]
 pub fn exp(x: f64) -> f64 {
@@ -97,7 +97,7 @@ pub fn exp(x: f64) -> f64 {
 #[inline]
 fn exp_near(x: f64) -> f64 {
     use std::f64::consts::LOG2_E;
-    // ln(2) / 64 in two parts; n times the first one is exact.
+    // ln(2) / 64 in two parts; n times the first is exact.
     const STEP: [f64; 2] = [6.931_471_803_691_238e-1 / 64.0, 1.908_214_929_270_587_7e-10 / 64.0];
     let shifted = x * (64.0 * LOG2_E) + ROUNDS;
     let n = shifted - ROUNDS;
@@ -131,9 +131,9 @@ pub fn tanh(x: f64) -> f64 {
     if x.abs() <= 0.5 { tanh_beside(0.0, x) } else { (1.0 - 2.0 / (exp(2.0 * x.abs()) + 1.0)).copysign(x) }
 }
 
-/// Sine and cosine of a small angle `d` (rad), by their series; of a larger one, [`sin_cos`].
+/// Sine and cosine of a small angle `d` (rad), by their series; larger angles go to [`sin_cos`].
 ///
-/// For |d| <= 0.3, the first term left out is below 3e-17.
+/// For |d| <= 0.3, the first omitted term is below 3e-17.
 #[inline]
 pub fn sin_cos_small(d: f64) -> (f64, f64) {
     if d.abs() > 0.3 {
@@ -148,9 +148,9 @@ pub fn sin_cos_small(d: f64) -> (f64, f64) {
     (d + d * z * s, (1.0 - 0.5 * z) + z_2 * c)
 }
 
-/// Sine and cosine of a tiny angle `d` (rad), by shorter series; of a larger one, [`sin_cos`].
+/// Sine and cosine of a tiny angle `d` (rad), by shorter series; larger angles go to [`sin_cos`].
 ///
-/// For |d| <= 0.004, the first term left out is below 6e-18.
+/// For |d| <= 0.004, the first omitted term is below 6e-18.
 #[inline]
 pub fn sin_cos_tiny(d: f64) -> (f64, f64) {
     if d.abs() > 0.004 {
@@ -192,7 +192,7 @@ pub fn at_most(x: f64, most: f64) -> f64 {
     if most < x { most } else { x }
 }
 
-/// The greater of two numbers, as quick as [`at_most`]. If either is NaN, the result is `x`.
+/// The larger of two numbers, as fast as [`at_most`]. If either is NaN, the result is `x`.
 #[inline]
 pub fn at_least(x: f64, least: f64) -> f64 {
     if least > x { least } else { x }
@@ -213,7 +213,7 @@ pub fn reciprocal(x: f64) -> f64 {
 /// Whether all values are finite.
 #[inline]
 pub fn all_finite<const N: usize>(values: [f64; N]) -> bool {
-    // Then their sum is one, too, unless it overflows.
+    // The sum of finite numbers is finite, unless it overflows.
     values.iter().sum::<f64>().abs() <= f64::MAX || values.iter().all(|x| x.is_finite())
 }
 
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn sine_and_cosine_are_as_exact_as_the_library() {
         let mut angles: Vec<f64> = (-40_000..40_000).map(|k| 0.037 * f64::from(k)).collect();
-        // About the quadrants' edges and centers, and where the library takes over.
+        // Around the edges and centers of the quadrants, and where the library takes over.
         for n in [-1_018_590, -77_777, -3, -2, -1, 0, 1, 2, 3, 4, 5, 1000, 65_537, 1_018_591, 3_000_001] {
             for d in [-1e-3, -1e-9, 0.0, 1e-12, 1e-6] {
                 angles.push(f64::from(n) * std::f64::consts::FRAC_PI_4 + d);

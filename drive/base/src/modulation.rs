@@ -1,9 +1,9 @@
 //! The average output of three inverter legs over a PWM period for a voltage command: the hexagon of the DC link and
-//! the dead-time voltage. The plant models its inverter with these functions; the controller accounts for the limits and
-//! the dead time with them, too.
+//! the dead-time voltage. The plant models its inverter with these functions; the controller uses them to account for the
+//! limits and the dead time.
 //!
 //! The hexagon is derived here from three legs between the rails. Dead time: a leg loses u_dead sign(i), or u_dead i /
-//! i_zero below i_zero. This is the field's usual mean-value model; neither paper contains it. u in V, i in A.
+//! i_zero below i_zero: the usual mean-value model, which neither paper contains. u in V, i in A.
 
 use crate::frame::{Phases, Stator, Vector};
 use fmu_core::Scalar;

@@ -30,7 +30,7 @@ pub struct Motor<S = f64> {
 }
 
 impl Default for Motor {
-    /// The reference motor: 800 W; its values are assumed because the paper's table is missing.
+    /// The reference motor, 800 W; its values are assumed, because the paper omits its table.
     fn default() -> Self {
         Self { n_p: 3, R_s: 2.0, L_d: 6e-3, L_q: 6e-3, psi_M: 0.15 }
     }

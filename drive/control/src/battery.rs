@@ -20,12 +20,10 @@
 //!
 //! Derived here. u in V, i in A, w in rad/s, tau in N.m.
 
-use crate::estimator::Class;
-use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use fmu_core::unit::AMPERE;
-use fmu_core::{Fault, Row, Table, table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Share of the new loss in the low-pass at each sample.
@@ -36,9 +34,9 @@ const SHARE: f64 = 0.25;
 pub struct DcLimits {
     /// They are in use.
     pub used: bool,
-    /// Greatest current in A, >= 0.
+    /// Maximum current in A, >= 0.
     pub max: f64,
-    /// Least current in A, <= 0.
+    /// Minimum current in A, <= 0.
     pub min: f64,
 }
 
@@ -49,28 +47,10 @@ impl Default for DcLimits {
 }
 
 impl DcLimits {
-    /// Greatest i_0 (A) of the low-speed law on a link of `u_dc` (V).
+    /// Maximum i_0 (A) of the low-speed law on a link of `u_dc` (V).
     #[inline]
     pub fn i_0(&self, motor: &Motor, u_dc: f64) -> f64 {
         (self.max * u_dc / (3.0 * motor.R_s)).sqrt()
-    }
-
-    /// Whether the limits lower `zero_speed.i_0` on a link of `u_dc` (V).
-    pub(crate) fn lowers(par: &ControllerParameters, u_dc: f64) -> bool {
-        par.dc.used && par.estimator.class() == Class::FluxObserver && par.zero_speed.i_0 > par.dc.i_0(&par.motor, u_dc)
-    }
-
-    /// The warning of this.
-    pub(crate) fn lowered(par: &ControllerParameters, u_dc: f64) -> String {
-        let (i_0, most) = (par.zero_speed.i_0, par.dc.i_0(&par.motor, u_dc));
-        let alone = 1.5 * par.motor.R_s * i_0 * i_0 / u_dc;
-        format!(
-            "{}: {} alone would take 1.5 R_s i_0^2 / u_dc = {alone:.3} A at standstill, more than half of it; i_0 is {most:.3} A, \
-             which holds a load of up to {:.3} N.m",
-            PARAMETERS.tell(par, |p| &mut p.dc.max),
-            PARAMETERS.tell(par, |p| &mut p.zero_speed.i_0),
-            par.motor.torque_constant() * most
-        )
     }
 }
 
@@ -82,7 +62,7 @@ pub struct Battery {
 }
 
 impl Battery {
-    /// Greatest magnitudes of negative and of positive torque at the mechanical `speed` (rad/s) and the link's `u_dc` (V), after a
+    /// Maximum magnitudes of negative and of positive torque at the mechanical `speed` (rad/s) and the link's `u_dc` (V), after a
     /// sample with the references `i` (A).
     pub fn limits(&mut self, par: &DcLimits, motor: &Motor, u_dc: f64, speed: f64, i: DqHat) -> (f64, f64) {
         let R = 1.5 * motor.R_s;
@@ -104,21 +84,6 @@ impl Battery {
     }
 }
 
-/// Checks the limits, where they are in use.
-///
-/// # Errors
-/// A limit of the wrong sign.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let DcLimits { used, max, min } = par.dc;
-    if used && max < 0.0 {
-        return Err(PARAMETERS.fault(par, |p| &mut p.dc.max, "at least 0 A: at no speed could the drive keep it"));
-    }
-    if used && min > 0.0 {
-        return Err(PARAMETERS.fault(par, |p| &mut p.dc.min, "at most 0 A: at no speed could the drive keep it"));
-    }
-    Ok(())
-}
-
 type P = Row<DcLimits>;
 
 /// Variables of the limits; their owner supplies the prefix `limit.`.
@@ -128,9 +93,9 @@ pub const DC_LIMITS: &Table<DcLimits> = table![
         "Limits of the current of the DC link, kept by limiting the torque; false: no such limits",
         |p| &mut p.used,
     ),
-    P::parameter("i_dc_max", &AMPERE, "Greatest current of the DC link with i_dc_use, 0 or more", |p| { &mut p.max })
+    P::parameter("i_dc_max", &AMPERE, "Maximum current of the DC link with i_dc_use, 0 or more", |p| { &mut p.max })
         .tunable(),
-    P::parameter("i_dc_min", &AMPERE, "Least current of the DC link with i_dc_use, 0 or less", |p| &mut p.min)
+    P::parameter("i_dc_min", &AMPERE, "Minimum current of the DC link with i_dc_use, 0 or less", |p| &mut p.min)
         .tunable(),
 ];
 

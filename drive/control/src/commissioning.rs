@@ -12,11 +12,10 @@
 
 pub use crate::commission::CommissionMode;
 use crate::commission::{Commission, CommissionFault, CommissionSetup, CommissionState, Results, Voltage};
-use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::Phases;
 use drive_base::motor::{A_PER_WB2, A_PER_WB3};
 use fmu_core::unit::{AMPERE, HENRY, KG_M2, NEWTON_METER, NM_S_PER_RAD, OHM, ONE, SECOND, SPEED, VOLT, WEBER};
-use fmu_core::{Fault, Field, Row, Table, table};
+use fmu_core::{Field, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Time in s with the gates off before the sequence: the currents of the control before it are gone.
@@ -27,7 +26,7 @@ const QUIET: f64 = 0.02;
 pub struct CommissionParameters {
     /// What it finds.
     pub mode: CommissionMode,
-    /// Greatest current in A, > 0.
+    /// Maximum current in A, > 0.
     pub i: f64,
     /// Rated mechanical speed in rad/s, > 0.
     pub speed: f64,
@@ -49,7 +48,7 @@ pub const COMMISSION: &Table<CommissionParameters> = table![
     P::parameter(
         "i",
         &AMPERE,
-        "Greatest current of the self-commissioning (peak), at most limit.i: the rated current to twice as much",
+        "Maximum current of the self-commissioning (peak), at most limit.i: the rated current to twice as much",
         |p| &mut p.i,
     )
     .above(0.0),
@@ -59,18 +58,6 @@ pub const COMMISSION: &Table<CommissionParameters> = table![
     .above(0.0),
     P::parameter("t_max", &SECOND, "Longest time of the self-commissioning", |p| &mut p.t_max).above(0.0),
 ];
-
-/// Checks that the parameters fit together.
-///
-/// # Errors
-/// Names the current and its limit.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    if par.commission.mode == CommissionMode::Off || par.commission.i <= par.limit.i {
-        return Ok(());
-    }
-    let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
-    Err(PARAMETERS.fault(par, |p| &mut p.commission.i, format!("at most {limit}")))
-}
 
 /// What the controller is to do at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,8 +84,9 @@ pub struct Commissioning {
 }
 
 impl Commissioning {
-    /// One sample of an enabled controller with `commission_start` = `asked`, currents `i` (A) and link voltage `u_dc` (V).
-    pub(crate) fn update(&mut self, par: &ControllerParameters, asked: bool, i: Phases, u_dc: f64) -> Turn {
+    /// One sample of an enabled controller with `commission_start` = `asked`, currents `i` (A) and link voltage `u_dc` (V); `setup` is
+    /// what a new sequence is given.
+    pub(crate) fn update(&mut self, setup: &CommissionSetup, asked: bool, i: Phases, u_dc: f64) -> Turn {
         let before = std::mem::replace(&mut self.asked, asked);
         let first = asked && !before;
         if !asked {
@@ -106,12 +94,12 @@ impl Commissioning {
             return if self.abort() { Turn::Rests } else { Turn::Works };
         }
         if first {
-            (self.sequence, self.quiet) = (Some(Commission::new(setup(par))), 0.0);
+            (self.sequence, self.quiet) = (Some(Commission::new(setup.clone())), 0.0);
         }
         match &mut self.sequence {
             Some(sequence) if sequence.is_running() => {
                 let voltage = if self.quiet < QUIET {
-                    self.quiet += par.T_s;
+                    self.quiet += setup.T_s;
                     Voltage::default()
                 } else {
                     sequence.update(i, u_dc)
@@ -150,33 +138,6 @@ impl Commissioning {
     /// The results that are visible now.
     pub fn shown(&self) -> &Results {
         &self.shown
-    }
-}
-
-/// What the sequence is given.
-fn setup(par: &ControllerParameters) -> CommissionSetup {
-    CommissionSetup {
-        mode: par.commission.mode,
-        n_p: par.motor.n_p,
-        T_s: par.T_s,
-        delay: par.delay,
-        i: par.commission.i,
-        speed: f64::from(par.motor.n_p) * par.commission.speed,
-        t_max: par.commission.t_max,
-    }
-}
-
-#[expect(clippy::derivable_impls, reason = "the macro writes the variants")]
-impl Default for CommissionState {
-    fn default() -> Self {
-        Self::Idle
-    }
-}
-
-#[expect(clippy::derivable_impls, reason = "the macro writes the variants")]
-impl Default for CommissionFault {
-    fn default() -> Self {
-        Self::None
     }
 }
 

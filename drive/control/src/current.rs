@@ -8,14 +8,11 @@
 //! the loop is first-order with bandwidth w_c (internal model control); active resistance and back-calculation are
 //! common practice in the field. u in V, i in A, w_c and w^ in rad/s (electrical).
 
-use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::{Axis, DqHat, Estimated};
-use drive_base::math::sin_cos;
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Fault, Row, Table, table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 
 /// Parameters of the current loop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -142,32 +139,6 @@ impl CurrentController {
     }
 }
 
-/// Greatest w_c T_s as a share of the gain at which a loop without resistance oscillates: 2 pi 0.06 with one sample of delay.
-const GREATEST_GAIN: f64 = 0.12 * PI;
-
-/// Checks that the sample period is short enough for the bandwidth.
-///
-/// A sampled integrator with d samples of delay oscillates at the gain w_c T_s = 2 sin(pi / (4 d + 2)): 2, 1 and 0.618 for d
-/// = 0, 1 and 2. With active resistance, which doubles the gain, it does at 2, 0.456 and 0.268.
-///
-/// # Errors
-/// The loop would oscillate, or nearly so.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let critical = 2.0 * sin_cos(PI / f64::from(4 * par.delay + 2)).0;
-    let most = GREATEST_GAIN * critical / par.T_s;
-    if par.current.bandwidth <= most * (1.0 + 1e-9) {
-        return Ok(());
-    }
-    let table = PARAMETERS;
-    let allowed = format!(
-        "at most {most:.4} rad/s (2 pi {:.3} / T_s) with {} and {}, or the current oscillates; lower it or T_s",
-        0.06 * critical,
-        table.tell(par, |p| &mut p.T_s),
-        table.tell(par, |p| &mut p.delay)
-    );
-    Err(table.fault(par, |p| &mut p.current.bandwidth, allowed))
-}
-
 type P = Row<CurrentLoop>;
 
 /// Variables of the current loop; their owner supplies the prefix `current.`.
@@ -283,7 +254,7 @@ mod tests {
         }
     }
 
-    /// An error adds K_p of its axis to the command, whatever else is in it, and this is what `output` shows too.
+    /// An error adds K_p of its axis to the command beside everything else in it, and `output` shows the same.
     #[test]
     fn an_error_acts_with_the_proportional_gain_of_its_axis() {
         let motor = Motor::IPMSM_2_2_KW;

@@ -12,8 +12,9 @@ use crate::tables::{Compensation, ControllerParameters};
 use crate::trip::Cause;
 use crate::weakening::share;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
+use drive_base::hexagon::within_hexagon;
 use drive_base::math::{at_most, wrap};
-use drive_base::modulation::{dead_time_loss, limit_span};
+use drive_base::modulation::dead_time_loss;
 use fmu_core::Elapsed;
 
 /// The estimated rotor frame at a sample and the quantities controlled in it.
@@ -29,6 +30,16 @@ struct Frame {
     i: DqHat,
     /// Injected voltage in V.
     injection: Injection,
+}
+
+/// The result of the modulation.
+struct Modulated {
+    /// Voltage references in V.
+    u: Phases,
+    /// Whether the hexagon limited them.
+    voltage_limited: bool,
+    /// Share of u_dc / sqrt(3) that was requested.
+    u_share: f64,
 }
 
 impl SensorlessController {
@@ -84,8 +95,15 @@ impl SensorlessController {
         let speed = frame.w * (1.0 / f64::from(self.parameters.motor.n_p));
         let References { i: i_ref, limited: current_limited, tau: (low, high), weakens } =
             self.reference(mode, speed, frame.injection, tuned);
-        let (u, voltage_limited, u_share) = self.modulate(mode, &frame, i_ref, tuned);
-        let R_s_est = self.state.estimator.resistance(&self.in_use.estimators, &self.parameters.motor);
+        if self.parameters.speed_loop.torque_mode {
+            self.state.stands.update(&self.parameters, mode == Mode::ClosedLoop, speed, i_ref, at_most(low, high));
+        }
+        let Modulated { u, voltage_limited, u_share } = self.modulate(mode, &frame, i_ref, tuned);
+        let R_s_est = self.state.estimator.resistance(&context(
+            &self.parameters,
+            &self.in_use.estimators,
+            &self.parameters.motor,
+        ));
         let lock_lost = self.lock(mode, &frame, &sample, R_s_est, at_most(low, high));
         self.keep(&sample, i_ref, frame.i);
 
@@ -195,10 +213,9 @@ impl SensorlessController {
         }
     }
 
-    /// Current control, injection, the hexagon and dead-time compensation: the voltage references in V, whether the
-    /// hexagon limited them, and the share of u_dc / sqrt(3) that was requested.
+    /// Current control, injection, the hexagon and dead-time compensation.
     #[inline(always)]
-    fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> (Phases, bool, f64) {
+    fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> Modulated {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
         if tuned && mode != Mode::AfterSearch {
@@ -243,7 +260,7 @@ impl SensorlessController {
         state.commands[2] = state.commands[1];
         state.commands[1] = state.commands[0];
         state.commands[0] = Command { u: command, injected };
-        (Phases::from_stator(output), limited || beyond, u_share)
+        Modulated { u: Phases::from_stator(output), voltage_limited: limited || beyond, u_share }
     }
 
     /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.
@@ -272,12 +289,6 @@ impl SensorlessController {
         state.tau_ref = par.motor.torque(i_ref.d(), i_ref.q());
         state.u_pi = state.current.output(&gains.current, i_ref - i);
     }
-}
-
-/// The voltage `u` (V) limited to the hexagon of `u_dc` (V), and whether it was outside.
-pub(super) fn within_hexagon(u: AlphaBeta, u_dc: f64) -> (AlphaBeta, bool) {
-    let span = Phases::from_stator(u).span();
-    (limit_span(u, span, u_dc), span > u_dc)
 }
 
 #[cfg(test)]
@@ -393,7 +404,7 @@ mod tests {
         let half = Turn::new(0.5 * controller.parameters.T_s * 400.0);
         let frame =
             Frame { axis: Axis::at(0.0), theta: 0.0, w: 400.0, half, i: DqHat::ZERO, injection: Injection::None };
-        let (u, ..) = controller.modulate(Mode::Voltage(DqHat::new(10.0, 0.0)), &frame, DqHat::ZERO, false);
+        let Modulated { u, .. } = controller.modulate(Mode::Voltage(DqHat::new(10.0, 0.0)), &frame, DqHat::ZERO, false);
         let u = u.to_stator();
         assert!((u.beta().atan2(u.alpha()) - 0.06).abs() < 1e-12, "{u:?}");
     }
@@ -413,10 +424,10 @@ mod tests {
     #[test]
     fn what_the_hexagon_cuts_off_drives_the_integrators_back() {
         let (mut controller, frame) = turning(200.0, |c| c.inputs.u_dc = 60.0);
-        let mut request =
-            |n: u32| (0..n).map(|_| controller.modulate(Mode::ClosedLoop, &frame, DqHat::new(-2.0, 4.0), false)).last();
-        let (_, limited, share) = request(20_000).unwrap();
-        let (.., later) = request(20_000).unwrap();
+        let i_ref = DqHat::new(-2.0, 4.0);
+        let mut request = |n: u32| (0..n).map(|_| controller.modulate(Mode::ClosedLoop, &frame, i_ref, false)).last();
+        let Modulated { voltage_limited: limited, u_share: share, .. } = request(20_000).unwrap();
+        let Modulated { u_share: later, .. } = request(20_000).unwrap();
         assert!(limited && share < 2.5 && (later - share).abs() < 1e-3, "{share} and later {later} of u_dc / sqrt 3");
     }
 
@@ -426,7 +437,7 @@ mod tests {
         let (mut controller, frame) = turning(0.0, |c| c.parameters.compensation.u_dead = 6.5);
         let i_ref = DqHat::new(0.0, 4.0);
         let at = |u: Phases| frame.axis.from_stator(u.to_stator());
-        let (with, ..) = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
+        let Modulated { u: with, .. } = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
         let command = frame.axis.from_stator(controller.state.commands[0].u);
         assert!((command - DqHat::new(0.0, 20.0)).magnitude() < 1e-9, "the estimators see the command: {command:?}");
         let more = (at(with) - command).q();
@@ -444,7 +455,7 @@ mod tests {
             });
             // Inside +-i_zero the legs are resistances: what they lose has the angle of the current.
             let i_ref = DqHat::new(-1.0, 4.0);
-            let (u, ..) = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
+            let Modulated { u, .. } = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
             let lost = Axis::<Estimated>::at(0.7 + turned).from_stator(u.to_stator() - controller.state.commands[0].u);
             assert!((lost - i_ref * 0.65).magnitude() < 1e-9, "{lost:?} V at {w} rad/s, delay {delay}");
         }
@@ -466,8 +477,8 @@ mod tests {
                 (c.parameters.compensation.u_dead, c.parameters.compensation.observe) = (6.5, observe);
                 c.inputs.u_dc = 325.0;
             });
-            let (output, ..) =
-                controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, DqHat::new(0.0, 4.0), false);
+            let (mode, i_ref) = (Mode::Voltage(DqHat::new(0.0, 20.0)), DqHat::new(0.0, 4.0));
+            let Modulated { u: output, .. } = controller.modulate(mode, &frame, i_ref, false);
             let beside = (output.to_stator() - controller.state.commands[0].u).magnitude();
             assert_eq!(beside < 1e-9, observe, "{beside} V");
         }

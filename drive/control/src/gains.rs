@@ -45,7 +45,7 @@ impl Gains {
         // With i_d of the low-speed law, the limits of the currents are those of each sample.
         let by_law = observes_flux && !current.mtpa;
         let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
-        let weakening = WeakeningGains::new(par, tau, current.mtpa);
+        let weakening = WeakeningGains::new(motor, limit, tau, current.mtpa, par.least_tracker());
         let speed = SpeedGains::new(speed_loop, *J, k);
         let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
         let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p / J, lag: speed_loop.lag() };
@@ -109,7 +109,7 @@ pub(crate) struct Law {
     pub(crate) share: f64,
     /// i_d in A that it requests.
     pub(crate) i_d: f64,
-    /// Greatest torque in N.m that remains, divided by the torque constant.
+    /// Maximum torque in N.m that remains, divided by the torque constant.
     pub(crate) limit: f64,
 }
 

@@ -9,6 +9,7 @@
 #![allow(non_snake_case)]
 
 pub mod battery;
+mod checks;
 pub mod clocked;
 pub mod commission;
 pub mod commissioning;
@@ -19,6 +20,7 @@ pub mod envelope;
 pub mod estimator;
 mod gains;
 pub mod idle;
+pub mod limits;
 pub mod lock;
 pub mod model;
 pub mod polarity;
@@ -27,6 +29,7 @@ pub mod sensor;
 pub mod settled;
 pub mod signals;
 pub mod speed;
+mod stands;
 pub mod start;
 mod state;
 pub mod tables;

@@ -78,7 +78,7 @@ const SMOOTH: f64 = TAU * 7.0;
 const SLIP: f64 = 4.0;
 /// Bandwidth in rad/s of the powers.
 const MEAN: f64 = TAU * 8.0;
-/// Greatest turn of the frame in a sample in rad.
+/// Maximum turn of the frame in a sample in rad.
 const FASTEST: f64 = 0.5 * PI;
 /// Half of a swing that counts, in units of lock.u / psi_M.
 const SWING: f64 = 1.4;
@@ -266,6 +266,11 @@ impl Lock {
     /// Clearly lost.
     pub fn lost() -> Self {
         Self { level: LOST, ..Self::default() }
+    }
+
+    /// Voltage in V that the estimate does not explain with any resistance.
+    pub fn voltage(&self) -> f64 {
+        self.powers[0].sqrt()
     }
 
     /// `lock_lost` after a sample with the estimated frame on `axis`, turning at `w` (rad/s) with the reference `w_ref`

@@ -1,23 +1,21 @@
 //! The model `SensorlessController`: one digital controller on its own sample grid. `cycle.rs` implements one sample.
 
-use crate::battery::{self, DcLimits};
+use crate::checks;
 use crate::commission::{CommissionFault, CommissionState};
-use crate::commissioning::{self, CommissionMode, Held, IDENTIFIED, Turn};
-use crate::current;
-use crate::cycle::within_hexagon;
-use crate::estimator::{Class, Estimator, Kind, Sample, Setup};
+use crate::commissioning::{CommissionMode, Held, IDENTIFIED, Turn};
+use crate::estimator::{Class, Estimator, Kind, Sample, Setup, options};
 use crate::gains::Gains;
 use crate::idle;
 use crate::lock::{LOST, Lock};
-use crate::polarity;
 use crate::signals::{ControllerInputs, ControllerOutputs};
+use crate::stands;
 use crate::start::StartMode;
 use crate::state::{InUse, State, context};
 use crate::tables::{ControllerParameters, OUTPUTS, PARAMETERS};
-use crate::trip::{self, Cause, Trip};
-use crate::weakening;
-use crate::zero_speed::{self, ZeroSpeed};
+use crate::trip::{Cause, Trip};
+use crate::zero_speed::ZeroSpeed;
 use drive_base::frame::Phases;
+use drive_base::hexagon::within_hexagon;
 use drive_base::motor::Motor;
 use fmu_core::idle::why;
 use fmu_core::log::Warnings;
@@ -126,7 +124,7 @@ impl SensorlessController {
         }
         let Self { inputs, parameters: par, state, .. } = self;
         let sensor = par.estimator == Kind::Sensored && inputs.sensor_valid && !state.sensor_lost;
-        state.trip.update(par, inputs, sensor);
+        state.trip.update(&par.trip, &par.motor, inputs.u_dc, sensor.then_some(inputs.speed_meas));
         self.stop();
         true
     }
@@ -137,7 +135,7 @@ impl SensorlessController {
     fn commissions(&mut self) -> bool {
         let (i, &ControllerInputs { commission_start, u_dc, .. }) = (self.currents(), &self.inputs);
         let Some(commissioning) = &mut self.commissioning else { return false };
-        match commissioning.update(&self.parameters, commission_start, i, u_dc) {
+        match commissioning.update(&self.parameters.commission_setup(), commission_start, i, u_dc) {
             Turn::Works => return false,
             Turn::Rests => self.state.computed = self.rest(),
             Turn::Commissions { voltage, first } => {
@@ -197,7 +195,7 @@ impl SensorlessController {
             shown: state.shown,
             ..State::default()
         };
-        let R_s_est = state.estimator.resistance(&par.estimators, &par.motor);
+        let R_s_est = state.estimator.resistance(&context(par, &par.estimators, &par.motor));
         state.computed = ControllerOutputs {
             theta_est: theta,
             lock_lost: LOST,
@@ -228,8 +226,7 @@ impl SensorlessController {
     fn validate_with(&self, par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
         let ControllerParameters { limit, zero_speed, estimator, start, .. } = par;
         let tell = |name: &str| PARAMETERS.tell_name(par, name).unwrap_or_else(|| name.to_owned());
-        estimator.validate(&Setup {
-            kind: *estimator,
+        let setup = Setup {
             par: &par.estimators,
             motor: &par.motor,
             J: par.J,
@@ -239,26 +236,28 @@ impl SensorlessController {
             starts_by_injection: start.mode == StartMode::Injection,
             weakens: par.weakening.used,
             tell: &tell,
-        })?;
-        current::validate(par)?;
+        };
+        options::validate(*estimator, &setup)?;
+        estimator.validate(&setup)?;
+        checks::current(par)?;
         if start.mode == StartMode::CurrentFrequency && start.i > limit.i {
             return Err(above_limit(par, |p| &mut p.start.i));
         }
         if start.mode == StartMode::Injection {
-            polarity::validate(par)?;
+            checks::polarity(par)?;
         }
         // A running drive has to live with its DC link.
         let u_dc = if self.state.samples == 0 { u_dc } else { 0.0 };
-        weakening::validate(par, u_dc)?;
-        trip::validate(par, u_dc)?;
-        commissioning::validate(par)?;
-        battery::validate(par)?;
+        checks::weakening(par, u_dc)?;
+        checks::trip(par, u_dc)?;
+        checks::commissioning(par)?;
+        checks::dc_limits(par)?;
         // The start value is accepted with an estimator that does not read it.
         let reads = estimator.class() == Class::FluxObserver;
         if zero_speed.i_0 > limit.i && (reads || zero_speed.i_0 > ZeroSpeed::default().i_0) {
             return Err(above_limit(par, |p| &mut p.zero_speed.i_0));
         }
-        zero_speed::validate(par)
+        checks::zero_speed(par)
     }
 }
 
@@ -285,7 +284,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 16;
+    const STATE_VERSION: u16 = 17;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -366,6 +365,9 @@ impl Sampled for SensorlessController {
     }
 }
 
+/// Description of the torque reference.
+pub const TAU_REF: &str = "Torque reference; 0 holds the shaft at standstill with zero_speed.i_0";
+
 /// The warning of a torque reference (N.m) that was beyond these limits (N.m) for a second.
 pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {
     format!(
@@ -382,7 +384,7 @@ impl Warns for SensorlessController {
             return log.warn("tripped", || {
                 format!(
                     "{} beyond its limit: {stopped}, and the controller rests until enable falls",
-                    out.tripped.what(par)
+                    out.tripped.what(&par.trip)
                 )
             });
         }
@@ -398,12 +400,15 @@ impl Warns for SensorlessController {
             });
         }
         // Where the low-speed law acts.
-        if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && DcLimits::lowers(par, self.inputs.u_dc) {
-            log.warn("limit.i_dc_max", || DcLimits::lowered(par, self.inputs.u_dc));
+        if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && checks::lowers_i_0(par, self.inputs.u_dc) {
+            log.warn("limit.i_dc_max", || checks::lowered_i_0(par, self.inputs.u_dc));
         }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || clipped(tau_ref, [out.tau_min, out.tau_max]));
+        }
+        if let Some(time) = self.state.stands.reached(par) {
+            log.warn("stands", || stands::hidden(par, tau_ref, out.speed_est, time));
         }
         if out.lock_lost < 1.0 {
             return;
@@ -429,11 +434,11 @@ impl Warns for SensorlessController {
             return;
         }
         let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
-        // A wrong resistance changes the voltage by at most R_s i, which a back EMF of twice that outweighs.
-        let emf = psi_M * (f64::from(n_p) * out.speed_est).abs();
-        let tells = emf <= 2.0 * R_s * par.limit.i;
+        // A wrong resistance changes the voltage by at most R_s i, which a back EMF or a mismatch of twice that outweighs.
+        let emf = (psi_M * (f64::from(n_p) * out.speed_est).abs()).max(self.state.lock.voltage());
+        let matters = emf <= 2.0 * R_s * par.limit.i;
         log.warn("lock_lost", || {
-            let resistance = if tells { format!("R_s = {R_s} Ohm, ") } else { String::new() };
+            let resistance = if matters { format!("R_s = {R_s} Ohm, ") } else { String::new() };
             format!(
                 "lock_lost = {:.2}, 1 or more: the estimate does not fit the applied voltage, or the speed is not reached; \
                  the rotor is not where theta_est = {} rad and speed_est = {} rad/s say, the load exceeds the torque, or the \
@@ -452,7 +457,7 @@ const TABLE: &Table<Block<SensorlessController>> = &Table::new(ROWS);
 pub(crate) const ROWS: &[V] = const {
     &[
     V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
-    V::input("tau_ref", &NEWTON_METER, "Torque reference", |m| &mut m.model.inputs.tau_ref)
+    V::input("tau_ref", &NEWTON_METER, TAU_REF, |m| &mut m.model.inputs.tau_ref)
         .read_with("speed_loop.torque_mode", "true"),
     V::boolean_input("enable", "The controller runs; false: it commands 0 V, and starts anew when set to true", |m| {
         &mut m.model.inputs.enable

@@ -15,17 +15,14 @@
 //! derived here from the saturation of the plant. V in V, x in Wb, L in H, s_2 in A/Wb2.
 
 use crate::estimator::{Context, Sample};
-use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::{SECOND, VOLT};
-use fmu_core::{Fault, Row, Table, table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Duration of the pauses in units of L/R.
 const REST: f64 = 4.0;
-/// Minimum difference of the peaks, computed from the controller's estimates, in units of x / L_d.
-const MIN_DIFFERENCE: f64 = 0.02;
 
 /// The parameters with the prefix `polarity.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -42,37 +39,6 @@ impl Default for PolarityParameters {
     fn default() -> Self {
         Self { t_find: 0.2, voltage: 150.0, samples: 8 }
     }
-}
-
-/// Checks that the pulses distinguish the poles, given the estimated saturation coefficient, and stay within the
-/// current limit.
-///
-/// # Errors
-/// States which parameters do not fit.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let x = par.polarity.voltage * par.T_s * f64::from(par.polarity.samples);
-    let (linear, saturated) = (x / par.motor.L_d, par.s_2 * x * x);
-    let pulses = || {
-        let voltage = PARAMETERS.tell(par, |p| &mut p.polarity.voltage);
-        let samples = PARAMETERS.tell(par, |p| &mut p.polarity.samples);
-        format!("{voltage} for {samples} of {}", PARAMETERS.tell(par, |p| &mut p.T_s))
-    };
-    if 2.0 * saturated.abs() < MIN_DIFFERENCE * linear {
-        return Err(Fault::new(format!(
-            "{}: {} make peaks of {linear} A that differ by {} A only; the ends of the magnet differ by saturation \
-             alone, and the start by injection needs {} A",
-            PARAMETERS.tell(par, |p| &mut p.s_2),
-            pulses(),
-            2.0 * saturated.abs(),
-            MIN_DIFFERENCE * linear
-        )));
-    }
-    if linear + saturated.abs() > par.limit.i {
-        let peak = linear + saturated.abs();
-        let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
-        return Err(Fault::new(format!("{} make a current of {peak} A, above {limit}", pulses())));
-    }
-    Ok(())
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@
 //! sqrt(psi_M^2 / 4 + (dL i_q)^2)). This function is odd in i_q and convex for i_q > 0; Newton's method solves it from
 //! above. Without saliency, i_d = 0.
 
-use crate::tables::Limits;
+use crate::limits::Limits;
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 

@@ -56,7 +56,7 @@ pub struct SettledAt<'a> {
 }
 
 impl SettledAt<'_> {
-    /// Least and greatest torque in N.m that the references may ask for: the outputs `tau_min` and `tau_max`.
+    /// Minimum and maximum torque in N.m that the references may ask for: the outputs `tau_min` and `tau_max`.
     #[inline]
     pub fn limits(&self) -> [f64; 2] {
         self.limits

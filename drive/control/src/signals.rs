@@ -92,9 +92,9 @@ pub struct ControllerOutputs {
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.
     pub current_limited: bool,
-    /// Greatest torque in N.m that the references may ask for.
+    /// Maximum torque in N.m that the references may ask for.
     pub tau_max: f64,
-    /// Least torque in N.m that the references may ask for.
+    /// Minimum torque in N.m that the references may ask for.
     pub tau_min: f64,
     /// Voltage that the current loop requests, as a share of u_dc / sqrt(3).
     pub u_share: f64,

@@ -9,6 +9,7 @@ use crate::polarity::{PolaritySearch, SearchStep};
 use crate::sensor::Offset;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::{SpeedController, SpeedGains};
+use crate::stands::Stands;
 use crate::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::tables::ControllerParameters;
 use crate::trip::Trip;
@@ -86,7 +87,7 @@ pub(super) struct References {
     pub(super) i: DqHat,
     /// Whether a limit reduced them.
     pub(super) limited: bool,
-    /// Greatest magnitude of negative and of positive torque in N.m.
+    /// Maximum magnitude of negative and of positive torque in N.m.
     pub(super) tau: (f64, f64),
     /// Whether field weakening lowers i_d.
     pub(super) weakens: bool,
@@ -126,6 +127,8 @@ pub(super) struct State {
     pub(super) battery: Battery,
     /// Time in s for which a limit has reduced the references, while field weakening or limits of the DC link are in use.
     pub(super) limited_for: f64,
+    /// Time in s for which a torque has been asked for and the estimate has shown no speed; [`Stands`](crate::stands).
+    pub(super) stands: Stands,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
     /// The outputs of the last sample wait for the next sample instant.

@@ -1,44 +1,27 @@
 //! The controller's parameters, and the tables of its parameters and outputs.
 
 use crate::battery::{DC_LIMITS, DcLimits};
+use crate::commission::CommissionSetup;
 use crate::commissioning::{COMMISSION, CommissionParameters};
 use crate::current::{CURRENT_LOOP, CurrentLoop};
 use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
+use crate::limits::Limits;
 use crate::lock::{LOCK, LockParameters};
 use crate::polarity::{POLARITY, PolarityParameters};
 use crate::sensor::{SENSOR, Sensor};
 use crate::signals::ControllerOutputs;
 use crate::speed::{SPEED_LOOP, SpeedLoop};
 use crate::start::{START, StartParameters};
+use crate::tracking::LeastTracker;
 use crate::trip::{TRIP, TripParameters};
 use crate::weakening::{WEAKENING, WeakeningParameters};
 use crate::zero_speed::{ZERO_SPEED, ZeroSpeed};
-use drive_base::math::{at_least, at_most};
 use drive_base::motor::A_PER_WB2;
 use drive_base::motor::{MOTOR, Motor};
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Field, Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
-
-/// Limits of the current references.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Limits {
-    /// Maximum |i_q| in A, > 0.
-    pub i_q: f64,
-    /// Maximum phase current (peak) in A, > 0.
-    pub i: f64,
-    /// Maximum magnitude of the torque reference in N.m, > 0.
-    pub tau: f64,
-}
-
-impl Limits {
-    /// Maximum |i_q| in A that `i_d` (A), which has priority, leaves.
-    #[inline]
-    pub fn i_q_beside(&self, i_d: f64) -> f64 {
-        at_most(at_least(self.i * self.i - i_d * i_d, 0.0).sqrt(), self.i_q)
-    }
-}
 
 /// Dead-time compensation, added to the command, and the voltage that the estimators receive. With u_loss(i) of
 /// [`modulation`](drive_base::modulation) (V, stator axes, at the currents i in A):
@@ -186,7 +169,26 @@ impl ControllerParameters {
         if lost { self.fallback } else { self.estimator }
     }
 
-    /// Whether the drive reads a sensor that it can lose.
+    /// The minimum bandwidth of the tracker while field weakening acts.
+    pub(crate) fn least_tracker(&self) -> LeastTracker {
+        let Self { estimator, estimators, speed_loop, motor, J, T_s, .. } = self;
+        LeastTracker::new(*estimator, estimators, speed_loop, motor.n_p, (*J, *T_s))
+    }
+
+    /// What the sequence of the self-commissioning is given.
+    pub(crate) fn commission_setup(&self) -> CommissionSetup {
+        CommissionSetup {
+            mode: self.commission.mode,
+            n_p: self.motor.n_p,
+            T_s: self.T_s,
+            delay: self.delay,
+            i: self.commission.i,
+            speed: f64::from(self.motor.n_p) * self.commission.speed,
+            t_max: self.commission.t_max,
+        }
+    }
+
+    /// Whether a fallback estimator exists for the shaft sensor.
     #[inline]
     pub(crate) fn has_fallback(&self) -> bool {
         self.estimator == Kind::Sensored && self.fallback != Kind::Sensored
@@ -276,12 +278,15 @@ pub const ESTIMATES: &Table<ControllerOutputs> = table![
 
 /// The limits and the state of the control, of the controller and of `PmsmDrive`.
 pub const STATUS: &Table<ControllerOutputs> = table![
-    O::discrete_output("tau_max", &NEWTON_METER, "Greatest torque that the references may ask for now", |o| {
+    O::discrete_output("tau_max", &NEWTON_METER, "Maximum torque that the references may ask for now", |o| {
         &mut o.tau_max
     }),
-    O::discrete_output("tau_min", &NEWTON_METER, "Least torque that the references may ask for now, 0 or less", |o| {
-        &mut o.tau_min
-    },),
+    O::discrete_output(
+        "tau_min",
+        &NEWTON_METER,
+        "Minimum torque that the references may ask for now, 0 or less",
+        |o| { &mut o.tau_min },
+    ),
     O::discrete_output(
         "u_share",
         &ONE,

@@ -13,9 +13,9 @@
 //! require, with the margin m: rho / m >= w_s (1/2 + 2 / t_is) + A / rho. m is 1.5, or less where the set bandwidth leaves less at A = 0; rho is at
 //! most a third of the EMF's bandwidth, and 0.05 / T_s.
 
-use crate::estimator::Kind;
 use crate::estimator::tracker::TrackerKind;
-use crate::tables::ControllerParameters;
+use crate::estimator::{EstimatorParameters, Kind};
+use crate::speed::SpeedLoop;
 use serde::{Deserialize, Serialize};
 
 /// The least bandwidth of a tracker.
@@ -25,21 +25,27 @@ pub struct LeastTracker {
     half: f64,
     /// Its square per c in rad2/s2 per N.m/rad.
     per_slope: f64,
-    /// Greatest bandwidth in rad/s.
+    /// Maximum bandwidth in rad/s.
     most: f64,
 }
 
 /// Margin m of the tracker's bandwidth.
 const MARGIN: f64 = 1.5;
 
-/// Greatest product of the tracker's bandwidth and T_s that field weakening requires.
+/// Maximum product of the tracker's bandwidth and T_s that field weakening requires.
 const MOST_PER_SAMPLE: f64 = 0.05;
 
 impl LeastTracker {
-    /// For the estimator and the loops of `par`.
-    pub fn new(par: &ControllerParameters) -> Self {
-        let ControllerParameters { estimator, estimators, speed_loop, motor, J, T_s, .. } = par;
-        let (inertia, hybrid) = (J / f64::from(motor.n_p), *estimator == Kind::Hybrid);
+    /// For the `estimator` with its parameters, the speed loop, the number of pole pairs `n_p`, the inertia `J` (kg.m2) and the sample
+    /// period `T_s` (s).
+    pub fn new(
+        estimator: Kind,
+        estimators: &EstimatorParameters,
+        speed_loop: &SpeedLoop,
+        n_p: i32,
+        (J, T_s): (f64, f64),
+    ) -> Self {
+        let (inertia, hybrid) = (J / f64::from(n_p), estimator == Kind::Hybrid);
         let rho = if hybrid { estimators.hybrid.bandwidth } else { estimators.tracker.bandwidth };
         // These two have no filter of the EMF.
         let by_flux = matches!(estimator, Kind::FluxObserver | Kind::GradientObserver);
@@ -54,7 +60,7 @@ impl LeastTracker {
         Self { half: 0.5 * margin * part, per_slope: margin / inertia, most }
     }
 
-    /// Least bandwidth in rad/s where the torque grows by `slope` (N.m/rad) with the angle.
+    /// Minimum bandwidth in rad/s where the torque grows by `slope` (N.m/rad) with the angle.
     #[inline]
     pub fn at(&self, slope: f64) -> f64 {
         (self.half + (self.half * self.half + self.per_slope * slope.max(0.0)).sqrt()).min(self.most)
@@ -75,15 +81,15 @@ mod tests {
         (par.speed_loop.bandwidth, par.speed_loop.t_is) = (40.0, 4.0);
         let (part, inertia) = (40.0, par.J / f64::from(par.motor.n_p));
         for slope in [0.0, 5.0, 40.0] {
-            let (A, rho) = (slope / inertia, LeastTracker::new(&par).at(slope));
+            let (A, rho) = (slope / inertia, par.least_tracker().at(slope));
             assert!((rho / MARGIN - part - A / rho).abs() < 1e-9 || rho >= MOST_PER_SAMPLE / par.T_s, "{slope}: {rho}");
         }
         par.estimators.tracker.kind = TrackerKind::MechanicalObserver;
-        let (A, rho) = (5.0 / inertia, LeastTracker::new(&par).at(5.0));
+        let (A, rho) = (5.0 / inertia, par.least_tracker().at(5.0));
         assert!((rho * rho - 0.375 * MARGIN * A).abs() < 1e-6 * rho * rho, "{rho}");
         par.estimators.emf.bandwidth = 90.0;
-        assert!((LeastTracker::new(&par).at(1e9) - 30.0).abs() < 1e-9, "a third of the EMF's bandwidth");
-        assert!(LeastTracker::new(&par).at(-5.0).abs() < 1e-12, "no torque by angle, no bound");
+        assert!((par.least_tracker().at(1e9) - 30.0).abs() < 1e-9, "a third of the EMF's bandwidth");
+        assert!(par.least_tracker().at(-5.0).abs() < 1e-12, "no torque by angle, no bound");
     }
 
     /// Where the set bandwidth leaves less than the margin of 1.5, weakening does not raise it at A = 0.
@@ -94,7 +100,7 @@ mod tests {
         (par.speed_loop.bandwidth, par.speed_loop.t_is) = (40.0, 4.0);
         for (rho, expected) in [(50.0, 50.0), (60.0, 60.0), (90.0, 60.0)] {
             par.estimators.tracker.bandwidth = rho;
-            let least = LeastTracker::new(&par).at(0.0);
+            let least = par.least_tracker().at(0.0);
             assert!((least - expected).abs() < 1e-9, "{least} rad/s with {rho} rad/s");
         }
     }

@@ -11,11 +11,10 @@
 //! w is the speed of the sensor if the estimator reads it, else the estimate at the trip. An active short circuit from
 //! full torque swings to currents beyond most limits, so a current does not trip a second time.
 
-use crate::signals::ControllerInputs;
-use crate::tables::{ControllerParameters, PARAMETERS};
 use drive_base::frame::Phases;
+use drive_base::motor::Motor;
 use fmu_core::unit::{AMPERE, VOLT};
-use fmu_core::{Fault, Row, Table, enumeration, table};
+use fmu_core::{Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
@@ -73,11 +72,11 @@ impl TripParameters {
 
 impl Cause {
     /// The limit that was exceeded, for messages.
-    pub(crate) fn what(self, par: &ControllerParameters) -> String {
+    pub(crate) fn what(self, par: &TripParameters) -> String {
         match self {
             Self::None => String::new(),
-            Self::OverCurrent => format!("trip: a phase current is (trip.i = {} A)", par.trip.i),
-            Self::OverVoltage => format!("trip: the DC link is (trip.u_dc = {} V)", par.trip.u_dc),
+            Self::OverCurrent => format!("trip: a phase current is (trip.i = {} A)", par.i),
+            Self::OverVoltage => format!("trip: the DC link is (trip.u_dc = {} V)", par.u_dc),
         }
     }
 }
@@ -99,34 +98,13 @@ impl Trip {
         Self { cause, shorts: false, speed }
     }
 
-    /// At a sample: whether the machine is short-circuited. `sensor`: the speed is measured.
-    pub fn update(&mut self, par: &ControllerParameters, inputs: &ControllerInputs, sensor: bool) {
-        if sensor {
-            self.speed = inputs.speed_meas;
-        }
-        let motor = &par.motor;
+    /// At a sample with the link's `u_dc` (V): whether the machine is short-circuited. `measured`: the speed (rad/s) of the sensor, if
+    /// there is one.
+    pub fn update(&mut self, par: &TripParameters, motor: &Motor, u_dc: f64, measured: Option<f64>) {
+        self.speed = measured.unwrap_or(self.speed);
         let emf = 3.0_f64.sqrt() * motor.psi_M * (f64::from(motor.n_p) * self.speed).abs();
-        self.shorts = par.trip.asc && emf > if self.shorts { END * inputs.u_dc } else { inputs.u_dc };
+        self.shorts = par.asc && emf > if self.shorts { END * u_dc } else { u_dc };
     }
-}
-
-/// Checks the limits of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.
-///
-/// # Errors
-/// A trip that normal operation would reach.
-pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
-    let (trip, table) = (&par.trip, PARAMETERS);
-    if !trip.used {
-        return Ok(());
-    }
-    if trip.i.is_nan() || trip.i <= par.limit.i {
-        let limit = table.tell(par, |p| &mut p.limit.i);
-        return Err(table.fault(par, |p| &mut p.trip.i, format!("above {limit}, the current limit")));
-    }
-    if trip.u_dc.is_nan() || trip.u_dc <= u_dc.max(0.0) {
-        return Err(table.fault(par, |p| &mut p.trip.u_dc, format!("above u_dc, {u_dc} V at the start")));
-    }
-    Ok(())
 }
 
 type P = Row<TripParameters>;
@@ -170,24 +148,21 @@ mod tests {
     /// by that at the trip.
     #[test]
     fn a_short_circuit_begins_and_ends_by_the_emf() {
-        let mut par = ControllerParameters::default();
-        par.trip.asc = true;
-        let at = 300.0 / (3.0_f64.sqrt() * par.motor.psi_M * 3.0);
+        let (mut par, motor) = (TripParameters { asc: true, ..TripParameters::default() }, Motor::default());
+        let at = 300.0 / (3.0_f64.sqrt() * motor.psi_M * 3.0);
         for side in [1.0, -1.0] {
             let mut trip = Trip::new(Cause::OverVoltage, 0.0);
             for (share, shorts) in [(0.95, false), (1.01, true), (0.91, true), (0.89, false), (0.99, false)] {
-                let inputs =
-                    ControllerInputs { u_dc: 300.0, speed_meas: side * share * at, ..ControllerInputs::default() };
-                trip.update(&par, &inputs, true);
+                trip.update(&par, &motor, 300.0, Some(side * share * at));
                 assert_eq!(trip.shorts, shorts, "{share} of the speed, {side}");
                 let mut without = Trip::new(Cause::OverVoltage, side * 1.01 * at);
-                without.update(&par, &inputs, false);
+                without.update(&par, &motor, 300.0, None);
                 assert!(without.shorts, "the speed at the trip stays");
             }
         }
-        par.trip.asc = false;
+        par.asc = false;
         let mut trip = Trip::new(Cause::OverVoltage, 2.0 * at);
-        trip.update(&par, &ControllerInputs { u_dc: 300.0, ..ControllerInputs::default() }, false);
+        trip.update(&par, &motor, 300.0, None);
         assert!(!trip.shorts);
     }
 }

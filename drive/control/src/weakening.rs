@@ -16,22 +16,22 @@
 //! The tracker's bandwidth while weakening: [`tracking`](crate::tracking).
 
 use crate::envelope::{Envelope, Limit, WarmStart};
-use crate::estimator::Kind;
-use crate::reference::{max_torque, max_torque_per_ampere};
-use crate::tables::{ControllerParameters, PARAMETERS};
+use crate::limits::Limits;
+use crate::reference::max_torque_per_ampere;
 use crate::tracking::LeastTracker;
 use drive_base::frame::DqHat;
+use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, RAD_PER_S};
-use fmu_core::{Fault, Row, Table, table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
-const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
+pub(crate) const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
 
-/// Least share of u_dc / sqrt 3 that the references may use.
+/// Minimum share of u_dc / sqrt 3 that the references may use.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Greatest trim, as a share of u_dc / sqrt 3.
+/// Maximum trim, as a share of u_dc / sqrt 3.
 pub const GREATEST_TRIM: f64 = 0.3;
 
 /// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
@@ -42,11 +42,8 @@ const LEAST_CHANGE: f64 = 0.01;
 /// Most steps from the plain reference to the voltage limit.
 const COLD: u32 = 40;
 
-/// Least electrical speed in rad/s that the limits are computed for.
+/// Minimum electrical speed in rad/s that the limits are computed for.
 const LEAST_SPEED: f64 = 1e-3;
-
-/// Least torque per ampere of i_q, as a share of that of the magnet alone.
-pub(super) const LEAST_TORQUE: f64 = 0.2;
 
 /// Parameters of field weakening.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,14 +74,13 @@ pub struct WeakeningGains {
     per_torque: f64,
     /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
     voltage: [f64; 3],
-    /// Least bandwidth of the tracker.
+    /// Minimum bandwidth of the tracker.
     pub(super) tracker: LeastTracker,
 }
 
 impl WeakeningGains {
     /// For a reference of up to `tau` (N.m), with maximum torque per ampere (`mtpa`) or i_d = 0.
-    pub fn new(par: &ControllerParameters, tau: f64, mtpa: bool) -> Self {
-        let ControllerParameters { motor, limit, .. } = par;
+    pub fn new(motor: &Motor, limit: &Limits, tau: f64, mtpa: bool, tracker: LeastTracker) -> Self {
         let end = if mtpa {
             max_torque_per_ampere(motor, tau)
         } else {
@@ -98,13 +94,13 @@ impl WeakeningGains {
             end,
             per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
-            tracker: LeastTracker::new(par),
+            tracker,
         }
     }
 }
 
 impl WeakeningGains {
-    /// Least bandwidth in rad/s of the tracker with the currents `i` (A).
+    /// Minimum bandwidth in rad/s of the tracker with the currents `i` (A).
     #[inline]
     pub fn tracker(&self, i: DqHat) -> f64 {
         self.tracker.at(self.envelope.slope(i))
@@ -153,7 +149,7 @@ pub struct Weakening {
 }
 
 impl Weakening {
-    /// Greatest magnitudes of negative and positive torque at the electrical speed `w` (rad/s), as i_q (A) of the magnet's
+    /// Maximum magnitudes of negative and positive torque at the electrical speed `w` (rad/s), as i_q (A) of the magnet's
     /// torque and at most `i`, where the DC link of `u_dc` (V) also feeds an injection of `injected` (V). `k` counts the
     /// samples.
     #[inline]
@@ -199,7 +195,7 @@ impl Weakening {
         (found, found.both(gains, w, i))
     }
 
-    /// Sets the voltage for the references, and tells whether all plain references fit it.
+    /// Sets the voltage for the references, and returns whether all plain references fit it.
     #[inline]
     fn fits(
         &mut self,
@@ -307,61 +303,6 @@ pub fn share(u: f64, u_dc: f64) -> f64 {
     if u_dc > 1e-3 { u * SQRT_3 / u_dc } else { 0.0 }
 }
 
-/// Checks that field weakening can work with the other parameters, on a DC link of `u_dc` (V).
-///
-/// # Errors
-/// States which parameters do not fit together, and what to do.
-pub fn validate(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
-    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
-    if !own.used {
-        return Ok(());
-    }
-    let table = PARAMETERS;
-    let estimator_is = table.tell(par, |p| &mut p.estimator);
-    let limit_is = table.tell(par, |p| &mut p.limit.i);
-    let use_is = table.tell(par, |p| &mut p.weakening.used);
-    if own.k_t < own.k_u {
-        let least = table.tell(par, |p| &mut p.weakening.k_u);
-        return Err(table.fault(par, |p| &mut p.weakening.k_t, format!("at least {least}")));
-    }
-    if *estimator == Kind::Hybrid && u_dc > 0.0 {
-        // Above this speed the references may need field weakening; an injection leaves them less voltage.
-        let gains = WeakeningGains::new(par, max_torque(motor, limit, par.current.mtpa), par.current.mtpa);
-        let onset = gains.onset(own.k_u * u_dc * INVERSE_SQRT_3 - par.estimators.square_wave.voltage);
-        if par.estimators.hybrid.w_high > onset {
-            let injected = table.tell(par, |p| &mut p.estimators.square_wave.voltage);
-            let allowed = format!(
-                "at most {onset:.4} rad/s, where field weakening begins with {use_is}, {injected} and a DC link of {u_dc} V; \
-                 lower it or the injected voltage, or raise the DC link's"
-            );
-            return Err(table.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
-        }
-    }
-    if *estimator == Kind::VoltageFeedback && (own.k_u > 0.9 || own.k_t > own.k_u) {
-        return Err(Fault::new(format!(
-            "{} and {} with {estimator_is}, which mistakes a saturated hexagon for an angle error: set both to the same \
-             value, at most 0.9",
-            table.tell(par, |p| &mut p.weakening.k_u),
-            table.tell(par, |p| &mut p.weakening.k_t)
-        )));
-    }
-    let most = 0.7 * motor.psi_M / motor.L_d;
-    if *estimator == Kind::VoltageModel && limit.i > most {
-        return Err(Fault::new(format!(
-            "{limit_is} with {estimator_is} and {use_is}: the estimator's gain has no bound near the current -psi_M / L_d; at \
-             most {most:.4} A (0.7 psi_M / L_d), or another estimator"
-        )));
-    }
-    let most = (1.0 - LEAST_TORQUE) * motor.psi_M / (motor.L_d - motor.L_q);
-    if motor.L_q < motor.L_d && limit.i > most {
-        return Err(Fault::new(format!(
-            "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
-             {most:.4} A (0.8 psi_M / (L_d - L_q))"
-        )));
-    }
-    Ok(())
-}
-
 type P = Row<WeakeningParameters>;
 
 /// Variables of field weakening; their owner supplies the prefix `weakening.`.
@@ -395,7 +336,11 @@ pub const WEAKENING: &Table<WeakeningParameters> = table![
 #[cfg(test)]
 mod tests {
     use super::*;
-    use drive_base::motor::Motor;
+    use crate::tables::ControllerParameters;
+
+    fn gains(par: &ControllerParameters, tau: f64, mtpa: bool) -> WeakeningGains {
+        WeakeningGains::new(&par.motor, &par.limit, tau, mtpa, LeastTracker::default())
+    }
 
     /// A request above k_t lowers the voltage of the references at the rate `bandwidth`, one below it raises it again, within
     /// its bounds.
@@ -406,7 +351,7 @@ mod tests {
         weakening.integrate(&par, (par.k_t + 0.02) * highest, u_dc, 1e-4);
         let expected = 1e-4 * par.bandwidth * 0.02 * highest;
         assert!((weakening.trim - expected).abs() < 1e-9, "{} V, not {expected} V", weakening.trim);
-        let gains = WeakeningGains::new(&ControllerParameters::default(), 3.0, false);
+        let gains = gains(&ControllerParameters::default(), 3.0, false);
         weakening.limits(&gains, &par, (1.0, u_dc, 10.0), 5.0, 0);
         assert!((weakening.U - (par.k_u * highest - expected - 10.0)).abs() < 1e-9, "{} V", weakening.U);
         for _ in 0..200_000 {
@@ -424,7 +369,7 @@ mod tests {
     fn the_onset_is_where_the_voltage_is_used_up() {
         let motor = Motor::IPMSM_2_2_KW;
         let par = ControllerParameters { motor: motor.clone(), ..ControllerParameters::default() };
-        let gains = WeakeningGains::new(&par, 14.0, true);
+        let gains = gains(&par, 14.0, true);
         let i = max_torque_per_ampere(&motor, 14.0);
         let w = gains.onset(200.0);
         let u = i * motor.R_s + DqHat::new(motor.psi_M + motor.L_d * i.d(), motor.L_q * i.q()).turned() * w;
@@ -440,7 +385,7 @@ mod tests {
     fn the_gains_count_the_magnet_along_d() {
         let motor = Motor::IPMSM_2_2_KW;
         let par = ControllerParameters { motor: motor.clone(), ..ControllerParameters::default() };
-        let gains = WeakeningGains::new(&par, 20.0, false);
+        let gains = gains(&par, 20.0, false);
         assert!((gains.per_torque * 1.5 * f64::from(motor.n_p) * motor.psi_M - 1.0).abs() < 1e-12);
     }
 }

@@ -5,12 +5,9 @@
 //! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q gives the rest of the
 //! torque; the greatest torque is that of the current limit.
 
-use crate::estimator::Class;
-use crate::tables::{ControllerParameters, PARAMETERS};
-use crate::weakening::LEAST_TORQUE;
 use drive_base::math::exp;
 use fmu_core::unit::{AMPERE, SPEED};
-use fmu_core::{Fault, Row, Table, table};
+use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Parameters of the law.
@@ -40,34 +37,6 @@ impl ZeroSpeed {
     pub fn i_d_ref(&self, speed_hat: f64) -> f64 {
         self.i_0 * self.share(speed_hat)
     }
-}
-
-/// Checks that i_q gives torque in spite of the law's i_d, where the references depend on it.
-///
-/// # Errors
-/// The reluctance torque cancels most of the magnet's torque.
-pub fn validate(par: &ControllerParameters) -> Result<(), Fault> {
-    let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, .. } = par;
-    let by_torque = current.mtpa || weakening.used || speed_loop.torque_mode;
-    let share = (motor.L_q - motor.L_d) / motor.psi_M;
-    if estimator.class() != Class::FluxObserver || !by_torque || zero_speed.i_0 * share <= 1.0 - LEAST_TORQUE {
-        return Ok(());
-    }
-    let table = PARAMETERS;
-    let with = if weakening.used {
-        table.tell(par, |p| &mut p.weakening.used)
-    } else if current.mtpa {
-        table.tell(par, |p| &mut p.current.mtpa)
-    } else {
-        table.tell(par, |p| &mut p.speed_loop.torque_mode)
-    };
-    Err(Fault::new(format!(
-        "{} with {}, {with} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
-         (0.8 psi_M / (L_q - L_d))",
-        table.tell(par, |p| &mut p.zero_speed.i_0),
-        table.tell(par, |p| &mut p.estimator),
-        (1.0 - LEAST_TORQUE) / share
-    )))
 }
 
 type P = Row<ZeroSpeed>;

@@ -7,6 +7,7 @@ mod random_machines;
 use drive_base::frame::DqHat;
 use drive_control::envelope::WarmStart;
 use drive_control::reference::max_torque_per_ampere;
+use drive_control::tracking::LeastTracker;
 use drive_control::weakening::{Weakening, WeakeningGains};
 use machines::Machine;
 use random_machines::{Brute, all};
@@ -53,7 +54,7 @@ fn the_currents() {
         let (par, U, motor) = (machine.parameters(), machine.U(0.95), &machine.motor);
         let envelope = machine.envelope();
         let most = envelope.settled(1e-3, 1.0, 1e9).tau;
-        let gains = WeakeningGains::new(&par, most, true);
+        let gains = WeakeningGains::new(&par.motor, &par.limit, most, true, LeastTracker::default());
         let i_most = most / motor.torque_constant();
         let base = envelope.base_speed(U);
         let at = |w: f64| brute(&machine, w).limit(1.0).0 / most;

@@ -34,7 +34,7 @@ fn the_row_dispatches_every_call() {
         let name = kind.name();
         let (mut estimator, estimate) = Estimator::start(kind, &context, &at(0, 0.3), 0.3, 0.0);
         assert!(format!("{estimator:?}").starts_with(name), "{name}: {estimator:?}");
-        assert!((estimate.theta - 0.3).abs() < 1e-12, "{name} starts where it is told: {}", estimate.theta);
+        assert!((estimate.theta - 0.3).abs() < 1e-12, "{name} starts at the given angle: {}", estimate.theta);
         let injects = estimate.injection != Injection::None;
         assert_eq!(injects, kind.class().injects(), "{name} injects at standstill: {injects}");
         let before = estimator.clone();

@@ -59,7 +59,7 @@ fn eq_36_is_exact_and_its_second_term_is_the_saliency() {
         small((i * R + of_35 * di + third - exact).norm(), "(36)");
     }
     let (at_rest, turned) = (inductance(0.0), inductance(0.5));
-    assert!((at_rest - turned).norm() > 1e-3, "the second term tells the angle at standstill");
+    assert!((at_rest - turned).norm() > 1e-3, "the second term has the angle at standstill");
 }
 
 /// (37) drops dL/dt i: nothing at standstill, w / w_h of the whole when turning.

@@ -6,11 +6,11 @@
 //! dw/dt    = (tau_e - tau_load - friction) / J      mechanics
 //! ```
 //!
-//! Stator axes: the flux linkage is the integral of a voltage that is held over a step, less the small part of the
-//! resistance, which alone follows the rotor. A step of Co-Simulation ([`integration`](crate::integration)), Model
+//! In stator axes, the flux linkage is the integral of a voltage that is constant over a step, minus the small resistive
+//! part, the only one that follows the rotor. A step of Co-Simulation ([`integration`](crate::integration)), Model
 //! Exchange ([`exchange`](crate::exchange)) with its energies, and the derivatives with respect to inputs and states
-//! (as [`Dual`](fmu_core::Dual) numbers) evaluate these equations and no others. What is held over a step is a type, so that
-//! the compiler leaves out what it does not have.
+//! (as [`Dual`](fmu_core::Dual) numbers) all evaluate these equations. What stays the same over a step is a type, so that
+//! the compiler omits absent effects.
 
 use crate::losses::Losses;
 use crate::losses::flow::{Drops, Flow, Path};
@@ -20,7 +20,7 @@ use crate::power::Energy;
 use drive_base::frame::{Axis, Rotor, Stator, Vector};
 use fmu_core::Scalar;
 
-/// What is held over an integration step.
+/// What stays constant over an integration step.
 pub(super) struct Circuit<'a, D, C, S = f64, const LINEAR: bool = false> {
     pub(super) machine: Machine<'a, S, LINEAR>,
     pub(super) path: Path<D, S>,
@@ -57,8 +57,8 @@ impl<S: Scalar, D: Drops<S>, C: Coulomb<S>, const LINEAR: bool> Circuit<'_, D, C
     }
 }
 
-/// Rates while the diodes block: the current `i` (A) of the flux linkage `psi` (Wb), which the magnet drives through the
-/// iron, brakes with the loss of the iron; no current flows at the terminals.
+/// Rates while the diodes block. No current flows at the terminals; the current `i` (A) of the flux linkage `psi` (Wb),
+/// which the magnet drives through the iron, brakes by the iron loss.
 pub(super) fn blocked_rates<S: Scalar, C: Coulomb<S>>(
     machine: &Machine<'_, S>,
     shaft: &Shaft<'_, C, S>,
@@ -73,7 +73,7 @@ pub(super) fn blocked_rates<S: Scalar, C: Coulomb<S>>(
     Rates { d_psi: none, acceleration, tau_given, p_in: 0.0.into(), losses, i: none }
 }
 
-/// What passes in a step.
+/// Energies and impulse transferred in a step.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Passed {
     pub(super) energy: Energy,
@@ -84,7 +84,7 @@ pub(super) struct Passed {
 }
 
 impl Passed {
-    /// Adds what passed in a further step.
+    /// Adds those of a further step.
     #[inline]
     pub(super) fn add(&mut self, step: &Self) {
         self.energy.add(&step.energy);
@@ -92,8 +92,8 @@ impl Passed {
         self.impulse += step.impulse;
     }
 
-    /// In a step of `h` (s) with these rates in its four stages, by the weights of the Runge-Kutta method, while the shaft
-    /// turns by `turned` (rad): the load torque is held, or the speed is imposed.
+    /// Of a step of `h` (s) with these rates in its four stages, by the weights of the Runge-Kutta method, while the shaft
+    /// turns by `turned` (rad): the load torque is constant, or the speed is imposed.
     #[expect(clippy::inline_always, reason = "as for `Circuit::rates`")]
     #[inline(always)]
     pub(super) fn over<D: Drops<f64>, C: Coulomb<f64>>(
@@ -120,6 +120,7 @@ impl Passed {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverter::Gates;
     use crate::legs::Legs;
     use crate::losses::flow::{Dissipation, Ideal, Switches};
     use crate::machine::Magnetics;
@@ -129,7 +130,7 @@ mod tests {
     use drive_base::frame::{AlphaBeta, Dq};
     use drive_base::motor::Motor;
 
-    /// A number in 0..1 that follows from `k`.
+    /// A pseudorandom number in 0..1 from the seed `k`.
     fn share(k: &mut u64) -> f64 {
         *k = k.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         f64::from(u32::try_from(*k >> 40).unwrap()) / f64::from(1_u32 << 24)
@@ -137,10 +138,10 @@ mod tests {
 
     #[test]
     fn what_the_compiler_leaves_out_would_add_nothing() {
-        // Linear machine, ideal legs and whole Coulomb torque, as types and as parameters, over random machines.
+        // Linear machine, ideal legs and full Coulomb torque, as types and as parameters, over random machines.
         let mut k = 1;
         for _ in 0..1000 {
-            let mut draw = |least: f64, greatest: f64| least * (greatest / least).powf(share(&mut k));
+            let mut draw = |low: f64, high: f64| low * (high / low).powf(share(&mut k));
             let motor = Motor {
                 n_p: 4,
                 R_s: draw(1e-3, 10.0),
@@ -162,7 +163,7 @@ mod tests {
                 path: Path { u, dissipation: Dissipation { R: motor.R_s, G: None }, drops: Ideal },
                 shaft: Shaft::new(&par.mechanics, tau_load, Whole::new(&par.mechanics, speed)),
             };
-            // A saturation and a dead time too small to be felt.
+            // A saturation and a dead time too small to have an effect.
             let (saturation, dead_time) = (Saturation { s_2: 1e-300, ..Saturation::default() }, 1e-300);
             let mut inverter = par.inverter.clone();
             inverter.dead_time = dead_time;
@@ -170,8 +171,8 @@ mod tests {
                 machine: Machine::<_, false>::new(&motor, Magnetics::Polynomial(&saturation)),
                 path: Path {
                     u,
-                    dissipation: Dissipation::at(&par, motor.R_s, 4.0 * speed),
-                    drops: Switches::new(&par, true, 300.0, Legs::switching(&inverter, 300.0)),
+                    dissipation: par.dissipation(motor.R_s, 4.0 * speed),
+                    drops: Switches::new(&inverter, Gates::Switch, 300.0, Legs::switching(&inverter, 300.0)),
                 },
                 shaft: Shaft::new(&par.mechanics, tau_load, Standstill::new(&par.mechanics, speed)),
             };
@@ -204,7 +205,7 @@ mod tests {
         let tau_e = 1.5 * 3.0 * (0.15 * 3.0 + (6e-3 - 9e-3) * -3.0);
         let acceleration = (tau_e - 0.5 - par.mechanics.friction(speed)) / par.mechanics.J;
         assert!((rates.acceleration - acceleration).abs() < 1e-9, "{} rad/s2", rates.acceleration);
-        // What comes in goes to copper and torque.
+        // The input power is copper loss and mechanical power.
         assert!((rates.p_in - rates.losses.cu - tau_e * speed).abs() < 1e-11, "{} W", rates.p_in);
     }
 }

@@ -1,24 +1,23 @@
-//! Energies and torque in Model Exchange: what passes between two points of the importer's solution.
+//! Energies and torque in Model Exchange: the integrals between two points of the importer's solution.
 //!
-//! The importer tells the states that its solver accepted, not the way between them. From one of these points to the next,
-//! the plant passes the interval once more by itself: it starts from the importer's states and integrates the equations of
-//! [`exchange`](crate::exchange), with the powers as further states, by the classical Runge-Kutta method in stator
-//! axes. The steps are those of Co-Simulation, at most 100 us and 0.25 rad of electrical angle, so the energies are as exact
-//! as there, however long the importer's steps are; the next interval begins at the importer's states again, and no error
-//! adds up. Between two points the inputs are taken as straight lines: an input that curves costs h^2/12 of its second
-//! derivative, h the importer's step. The gates, and whether the diodes block, change in events only.
+//! The importer passes on the states that its solver accepted, but not the path between them. The plant therefore integrates
+//! each interval once more: from the importer's states, it solves the equations of [`exchange`](crate::exchange), with the
+//! powers as further states, by the classical Runge-Kutta method in stator axes. The steps are those of Co-Simulation, at
+//! most 100 us and 0.25 rad of electrical angle, so the energies are as exact as there, however long the importer's steps
+//! are. The next interval starts from the importer's states again, so errors do not accumulate. Between two points the inputs
+//! are taken as straight lines: a curved input costs h^2/12 of its second derivative, with h the importer's step. The gates,
+//! and whether the diodes block, change in events only.
 //!
-//! With an imposed shaft, the angle is the integral of the speed. These are definitions; the tests compare them with
+//! With an imposed shaft, the angle is the integral of the speed. These are definitions; tests compare them with
 //! Co-Simulation.
 
 use crate::circuit::Rates;
 use crate::integration::LONGEST_STEP;
-use crate::losses::flow::Switches;
 use crate::machine;
 use crate::model::PmsmPlant;
 use crate::power::Energy;
 use crate::signals::PlantInputs;
-use crate::state::{Instant, State, axis_at};
+use crate::state::{Accepted, Instant, axis_at};
 use drive_base::frame::AlphaBeta;
 use drive_base::integrate::rk4;
 use drive_base::math::all_finite;
@@ -26,25 +25,15 @@ use fmu_core::{Account, Elapsed, Fault};
 use nalgebra::SVector;
 use serde::{Deserialize, Serialize};
 
-/// What has passed since the start.
+/// Energies and impulse since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Total {
     /// Energies in J.
     pub energy: Energy,
     /// Integral of the torque of the shaft on the load in N.m.s.
     pub impulse: f64,
-    /// Until then.
+    /// Time of the last point.
     pub time: Elapsed,
-}
-
-/// A point of the importer's solution.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(super) struct Point {
-    time: Elapsed,
-    inputs: PlantInputs,
-    state: State,
-    /// Integral of the torque of the shaft until then.
-    impulse: f64,
 }
 
 impl PmsmPlant {
@@ -59,7 +48,7 @@ impl PmsmPlant {
             self.energy.add(&energy);
             self.point.impulse += impulse;
         }
-        self.point = Point { time: now, inputs: inputs.clone(), state: self.state, impulse: self.point.impulse };
+        self.point = Accepted { time: now, inputs: inputs.clone(), state: self.state, impulse: self.point.impulse };
         Ok(())
     }
 
@@ -70,14 +59,14 @@ impl PmsmPlant {
         (self.energy, self.point) = counts;
     }
 
-    /// What has passed until the last point.
+    /// The totals at the last point.
     pub fn total(&self) -> Total {
         Total { energy: self.energy, impulse: self.point.impulse, time: self.point.time }
     }
 
     /// Energies and integral of the torque over the `h` (s) from the point `start` to the inputs at the `end`.
-    fn between(&self, start: &Point, end: &PlantInputs, h: f64) -> Result<(Energy, f64), Fault> {
-        let Point { inputs, state, .. } = start;
+    fn between(&self, start: &Accepted, end: &PlantInputs, h: f64) -> Result<(Energy, f64), Fault> {
+        let Accepted { inputs, state, .. } = start;
         let (imposed, motor) = (self.parameters.mechanics.imposed, &self.parameters.motor);
         let angle = if imposed { inputs.angle_shaft } else { state.angle };
         let psi = self.machine::<false>().to_stator(axis_at(motor, angle), state.psi);
@@ -87,7 +76,7 @@ impl PmsmPlant {
             self.count(h, LONGEST_STEP, speed)?
         } else {
             let legs = self.legs(inputs);
-            self.substeps(h, speed, &legs, &Switches::of(&self.parameters, inputs, legs))?
+            self.substeps(h, speed, &legs, &self.switches(inputs, legs))?
         };
         let step = h / left;
         let mut x = SVector::from([psi.alpha(), psi.beta(), state.speed, angle, 0.0, 0.0, 0.0, 0.0, 0.0]);

@@ -1,8 +1,8 @@
-//! Integration steps that are long beside the time constant of a current in the zone of the kinks.
+//! Integration steps that are long compared with the time constant of a current in the zone of the kinks.
 //!
 //! In the zone +-`inverter.i_zero`, a leg with dead time acts as a resistance of u_dead / i_zero, 65 Ohm for 6.5 V and 0.1 A.
-//! With an inductance of 0.1 mH the current settles in 1.5 us, and an explicit method would need steps as short for as long as
-//! the current stays, which at light load is most of the time. The exponential method of Cox and Matthews (2002,
+//! With an inductance of 0.1 mH the current settles in 1.5 us. An explicit method would need steps as short for as long as
+//! the current is in the zone, which at light load is most of the time. The exponential method of Cox and Matthews (2002,
 //! DOI 10.1006/jcph.2002.6995) solves this part exactly. With D the damping (1/s) of the flux linkage by the legs in the zone
 //! and Z = h D:
 //!
@@ -21,13 +21,13 @@ use drive_base::math::exp;
 
 /// How a Runge-Kutta step combines the derivatives of its stages.
 pub(super) trait Stages {
-    /// The flux linkage (Wb) at a stage with the d-axis on `axis`, which is `away` (Wb) from the `start`.
+    /// The flux linkage (Wb) at a stage with the d-axis on `axis`, at a distance of `away` (Wb) from the `start`.
     fn at(&self, start: AlphaBeta, away: AlphaBeta, axis: Axis<Rotor>) -> AlphaBeta;
     /// The derivative g (V) there, with the derivative `rate` (V) of the flux linkage and the electrical speed `w` (rad/s).
     fn beside(&self, rate: AlphaBeta, away: AlphaBeta, axis: Axis<Rotor>, w: f64) -> AlphaBeta;
     /// From the start to the middle of the step.
     fn half(&self, g: AlphaBeta) -> AlphaBeta;
-    /// From the start to the fourth stage, with the way `a` to the second and the derivatives of the first and third.
+    /// From the start to the fourth stage, with the difference `a` to the second and the derivatives of the first and third.
     fn last(&self, a: AlphaBeta, g_1: AlphaBeta, g_3: AlphaBeta) -> AlphaBeta;
     /// From the start to the end of the step.
     fn whole(&self, g: [AlphaBeta; 4]) -> AlphaBeta;
@@ -79,15 +79,15 @@ impl Matrix {
         AlphaBeta::new(a * v.alpha() + b * v.beta(), c * v.alpha() + d * v.beta())
     }
 
-    /// The eigenvalues, real and not negative, the greater one first.
+    /// The eigenvalues, real and not negative, the larger one first.
     fn eigenvalues(&self) -> [f64; 2] {
         let [[a, b], [c, d]] = self.0;
         let (half, determinant) = (0.5 * (a + d), a * d - b * c);
-        let greater = half + (half * half - determinant).max(0.0).sqrt();
-        [greater, if greater > 0.0 { (determinant / greater).max(0.0) } else { 0.0 }]
+        let larger = half + (half * half - determinant).max(0.0).sqrt();
+        [larger, if larger > 0.0 { (determinant / larger).max(0.0) } else { 0.0 }]
     }
 
-    /// A function of this matrix, by its values at the `eigenvalues`.
+    /// A function of this matrix, from its values at the `eigenvalues`.
     fn function(&self, [x, y]: [f64; 2], [f_x, f_y]: [f64; 2]) -> Self {
         let slope = if x - y > 1e-9 * x { (f_x - f_y) / (x - y) } else { 0.0 };
         let [[a, b], [c, d]] = self.0;
@@ -97,7 +97,7 @@ impl Matrix {
 
 /// [`Stages`] with a damping that is solved exactly.
 pub(super) struct Damped {
-    /// Flux linkage of the magnet in Wb, and that at the start.
+    /// Flux linkage of the magnet in Wb, and its vector at the start.
     psi_M: f64,
     magnet: AlphaBeta,
     damping: Matrix,
@@ -106,8 +106,8 @@ pub(super) struct Damped {
 }
 
 impl Damped {
-    /// Over a step of `h` (s) with the `damping` (1/s), whose eigenvalues are real and not negative, of the flux linkage beyond
-    /// that of the magnet, `psi_M` (Wb), which is on `axis` at the start.
+    /// Over a step of `h` (s) with the `damping` (1/s) of the flux linkage beyond that of the magnet, `psi_M` (Wb). The magnet
+    /// is on `axis` at the start; the eigenvalues of the damping are real and not negative.
     pub(super) fn new(h: f64, damping: Matrix, psi_M: f64, axis: Axis<Rotor>) -> Self {
         let eigenvalues = damping.eigenvalues();
         let [x, y] = eigenvalues.map(|d| phi(d * h));
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn the_phi_functions_are_their_definitions() {
-        // phi_k(-z) = 1/k! - z phi_k+1(-z), phi_0 = e^-z; both branches, and their meeting.
+        // phi_k(-z) = 1/k! - z phi_k+1(-z), phi_0 = e^-z; both branches and the point between them.
         for z in [0.0, 1e-9, 0.1, 0.999_999, 1.000_001, 5.0, 40.0, 1e6_f64] {
             let [first, second, third] = phi(z);
             assert!((1.0 - z * first - (-z).exp()).abs() < 2e-15 * (1.0 + z), "{z}");
@@ -187,7 +187,7 @@ mod tests {
         assert!((phi(0.0)[2] - 1.0 / 6.0).abs() < 1e-17 && (phi(1e-4)[2] - 1.0 / 6.0 + 1e-4 / 24.0).abs() < 1e-10);
     }
 
-    /// The end of a second of x' = -D x + (cos t, sin t), with the damping `known` to the method, in `n` steps.
+    /// x after 1 s of x' = -D x + (cos t, sin t), in `n` steps, with the damping `known` to the method.
     fn end(matrix: Matrix, known: Option<Matrix>, n: u32) -> AlphaBeta {
         fn run(stages: &impl Stages, matrix: Matrix, h: f64, n: u32) -> AlphaBeta {
             let mut x = AlphaBeta::new(1.0, -0.5);

@@ -1,4 +1,4 @@
-//! The documentation page of the plant, and its fragments, which the page of a whole drive contains too.
+//! The documentation page of the plant and its fragments, which are also part of the page of a whole drive.
 
 use drive_base::joined;
 

@@ -2,23 +2,22 @@
 //!
 //! In the rotor frame, d psi_d/dt = u_d - R_s i_d + w psi_q and d psi_q/dt = u_q - R_s i_q - w psi_d, from the same
 //! equations as a step of [`PmsmPlant`]. They are continuous in states and inputs, with kinks at the hexagon limit and at
-//! the edges of the dead-time zone. With an imposed shaft, speed_shaft and angle_shaft take the place of the two
-//! mechanical states; the stator flux linkage stays in the rotor frame, so angle_shaft must be the integral of
-//! speed_shaft between events.
+//! the edges of the dead-time zone. With an imposed shaft, speed_shaft and angle_shaft replace the two mechanical states;
+//! the stator flux linkage stays in the rotor frame, so angle_shaft must be the integral of speed_shaft between events.
 //!
 //! The energies are counted over completed steps of the solver ([`counters`](crate::counters)). Beyond the speed of
 //! any machine there are no derivatives: the solver tries a shorter step.
 //!
-//! Whether the diodes block is decided in events only. While they block, the current is zero. Two indicators tell when
-//! this ends, or begins: the greatest current over the zone of [`legs`](crate::legs), and the line-to-line back
-//! EMF over the DC-link voltage, both less 1.
+//! Whether the diodes block is decided in events only. While they block, the current is zero. Two indicators mark when
+//! blocking begins or ends: the maximum current divided by the zone of [`legs`](crate::legs), and the line-to-line back EMF
+//! divided by the DC-link voltage, both minus 1.
 
 use crate::circuit::{Circuit, Rates, blocked_rates};
-use crate::losses::flow::{Dissipation, Path, Switches};
+use crate::losses::flow::Path;
 use crate::machine;
 use crate::mechanics::{Shaft, Standstill};
 use crate::model::PmsmPlant;
-use crate::power::{Powers, dc_current};
+use crate::power::Powers;
 use crate::signals::{PlantInputs, PlantOutputs};
 use crate::state::Instant;
 use crate::tables::PlantParameters;
@@ -32,11 +31,11 @@ use fmu_core::{
     Scalar, State,
 };
 
-/// Shift of the indicators in the direction of the decision that an event took, so that none stays at 0.
+/// Shift of the indicators toward the decision of the last event, so that none stays at 0.
 const SHIFT: f64 = 1e-9;
 
 impl PmsmPlant {
-    /// The state of flux linkage (Wb), speed (rad/s) and angle (rad) as the equations see it under these `inputs`.
+    /// The instant of flux linkage (Wb), speed (rad/s) and angle (rad) under these `inputs`, as the equations use it.
     #[inline]
     fn instant<S: Scalar>(&self, inputs: &PlantInputs<S>, (psi, speed, angle): (Vector<Rotor, S>, S, S)) -> Instant<S> {
         let PlantParameters { mechanics, iron, thermal, .. } = &self.parameters;
@@ -48,7 +47,7 @@ impl PmsmPlant {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
         let idle = self.blocked && inputs.is_off();
-        // Its flux linkage follows the speed through the iron, and the temperature of the magnets.
+        // The flux linkage then follows the speed, through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
         let i = if idle { self.idle_current(motor, speed) } else { self.machine_of(motor).current(psi) };
@@ -80,8 +79,8 @@ impl PmsmPlant {
         }
         let path = Path {
             u: inputs.voltage(),
-            dissipation: Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(at.speed)),
-            drops: Switches::of(&self.parameters, inputs, self.legs(inputs)),
+            dissipation: self.parameters.dissipation(machine.resistance(), machine.electrical(at.speed)),
+            drops: self.switches(inputs, self.legs(inputs)),
         };
         let psi = machine.to_stator(at.axis, at.psi);
         Circuit { machine, path, shaft }.rates(at.axis, psi, at.speed)
@@ -109,7 +108,7 @@ impl PmsmPlant {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let p_in = p_in + 0.0.into();
         let currents = || Phases::from_stator(at.axis.to_stator(i));
-        let i_dc = dc_current(p_in, inputs, &self.legs(inputs), currents);
+        let i_dc = inputs.dc_current(p_in, &self.legs(inputs), currents);
         let powers = Powers { i_dc, p_in, p_mech, p_loss: losses.sum(), losses, tau_shaft };
         self.shown(inputs, at, i, self.temperatures(inputs), powers)
     }
@@ -128,7 +127,7 @@ impl PmsmPlant {
         }
         let slopes = self.slopes(inputs, &at);
         if !drive_base::math::all_finite(slopes) {
-            return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.tell())));
+            return Err(Fault::new(format!("the machine has no finite derivatives at {}", self.state.described())));
         }
         dx.copy_from_slice(&slopes);
         Ok(())
@@ -168,12 +167,12 @@ impl PmsmPlant {
         }
     }
 
-    /// Whether the gates are off and the diodes block the current that the flux linkage has.
+    /// Whether the gates are off and the diodes block the current of the flux linkage.
     pub(super) fn blocks(&self, inputs: &PlantInputs) -> bool {
         inputs.is_off() && self.diodes(inputs).0
     }
 
-    /// Whether diodes block the current that the flux linkage has, and by how much this is exceeded.
+    /// Whether diodes block the current of the flux linkage, and by how much the limits are exceeded.
     fn diodes(&self, inputs: &PlantInputs) -> (bool, [f64; 2]) {
         let motor = &self.motor(inputs);
         let Instant { psi, speed, axis, .. } = self.present(inputs);
@@ -231,11 +230,11 @@ impl Events for PmsmPlant {
     const INDICATORS: &'static [Indicator] = &[
         Indicator {
             name: "block_1",
-            description: "Gates off: greatest phase current over the zone in which diodes can block, less 1; else 1",
+            description: "Gates off: maximum phase current divided by the zone in which diodes can block, minus 1; otherwise 1",
         },
         Indicator {
             name: "block_2",
-            description: "Gates off: greatest line-to-line back EMF over the DC-link voltage, less 1; else 1",
+            description: "Gates off: maximum line-to-line back EMF divided by the DC-link voltage, minus 1; otherwise 1",
         },
     ];
 
@@ -245,12 +244,12 @@ impl Events for PmsmPlant {
 
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
         if self.parameters.thermal.mode == ThermalMode::Imposed {
-            self.judge_temperatures(&self.inputs)?;
+            self.check_temperatures(&self.inputs)?;
         }
         let Instant { psi, speed, angle, axis, .. } = self.present(&self.inputs);
         let mut state = crate::state::State { psi, speed, angle, axis };
         if !state.is_finite() {
-            return Err(Fault::new(format!("the machine's state is not finite: {}", state.tell())));
+            return Err(Fault::new(format!("the machine's state is not finite: {}", state.described())));
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {

@@ -6,19 +6,18 @@
 //! ```
 //!
 //! B are the cubic B-splines on a uniform grid (de Boor, A Practical Guide to Splines, 1978), so the current has a continuous
-//! derivative. A current that has an energy is reciprocal, d i_d/d psi_q = d i_q/d psi_d: no cycle yields energy, whatever the
-//! coefficients are. w is even in q: coefficients for q >= 0 suffice. Beyond the grid, the splines continue with constant
+//! derivative. A current with an energy is reciprocal, d i_d/d psi_q = d i_q/d psi_d: no cycle yields energy, for any
+//! coefficients. w is even in q: coefficients for q >= 0 suffice. Beyond the grid, the splines continue with constant
 //! curvature: the incremental inductances stay those of the edge.
 //!
-//! Limits: the map is a machine where its Hessian, the inverse of the incremental inductances, is positive definite; this
+//! Limits: the map describes a machine where its Hessian, the inverse of the incremental inductances, is positive definite; this
 //! is checked at all knots. It holds for one temperature: with another psi_M, the map moves along the d-axis. The effect of the
 //! rotor angle (slots, harmonics) is not part of it. `fmu tune` fits the coefficients to a table. Flux linkages in Wb, w in J.
 
-use crate::tables::{PARAMETERS, PlantParameters};
 use drive_base::frame::{Dq, Rotor, Vector};
 use drive_base::motor::Motor;
 use fmu_core::unit::{JOULE, WEBER};
-use fmu_core::{Fault, Row, Scalar, Table, table};
+use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Coefficients along the d-axis.
@@ -33,15 +32,15 @@ const INTERVALS: [usize; 2] = [D - 3, Q - 2];
 /// Parameters; not used at the start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FluxMap {
-    /// The map gives the current, in place of inductances and saturation.
+    /// The map gives the current, instead of inductances and saturation.
     pub used: bool,
-    /// The least d-axis flux linkage of the grid beyond that of the magnet in Wb, < 0.
+    /// Minimum d-axis flux linkage of the grid in Wb, relative to that of the magnet, < 0.
     pub d_min: f64,
-    /// The greatest in Wb, > 0.
+    /// Maximum in Wb, > 0.
     pub d_max: f64,
-    /// The greatest q-axis flux linkage of the grid in Wb, > 0.
+    /// Maximum q-axis flux linkage of the grid in Wb, > 0.
     pub q_max: f64,
-    /// Coefficients in J, the q-axis fastest.
+    /// Coefficients in J; the q-axis varies fastest.
     pub w: [[f64; Q]; D],
 }
 
@@ -51,7 +50,7 @@ impl Default for FluxMap {
     }
 }
 
-/// The four splines that are not zero in an interval, with first and second derivatives, and the first one's index.
+/// The four nonzero splines of an interval with their first and second derivatives, and the index of the first.
 struct Splines<S> {
     first: usize,
     value: [S; 4],
@@ -110,13 +109,13 @@ impl FluxMap {
         ([Splines::at(along_d, INTERVALS[0]), Splines::at(x.q() * (sign / q), INTERVALS[1])], sign)
     }
 
-    /// The sum of the coefficients, times these of the splines.
+    /// The sum of the coefficients weighted with these values of the splines.
     #[inline]
     fn sum<S: Scalar>(&self, [d, q]: &[Splines<S>; 2], by_d: &[S; 4], by_q: &[S; 4]) -> S {
         let mut sum = S::from(0.0);
         for (m, by_d) in by_d.iter().enumerate() {
             let row = &self.w[d.first + m];
-            // The coefficient left of q = 0 is that right of it.
+            // The coefficient on the left of q = 0 equals that on the right.
             let coefficient = |n: usize| row[(q.first + n).abs_diff(1)];
             let along_q = by_q[0] * coefficient(0)
                 + by_q[1] * coefficient(1)
@@ -136,7 +135,7 @@ impl FluxMap {
         Vector::new(i_d, self.sum(&splines, &d.value, &q.slope) * (sign / h_q))
     }
 
-    /// The energy (J) at the flux linkage `x` (Wb) beyond that of the magnet: 1.5 of the integral of i d psi from there.
+    /// The energy (J) at the flux linkage `x` (Wb) beyond that of the magnet: 1.5 times the integral of i d psi from there.
     pub fn energy(&self, x: Dq) -> f64 {
         let w = |x| {
             let (splines, _) = self.splines(x);
@@ -175,58 +174,16 @@ impl FluxMap {
     }
 
     /// The smallest eigenvalue (1/H) of the Hessian at the flux linkage `x` (Wb) beyond that of the magnet: the inverse of the
-    /// greatest incremental inductance.
+    /// maximum incremental inductance.
     pub fn least_curvature(&self, x: Dq) -> f64 {
         eigenvalues(self.hessian(x))[0]
     }
 
-    /// The first knot (Wb beyond the magnet's flux linkage) at which more flux takes less current in some direction.
+    /// The first knot (Wb beyond the magnet's flux linkage) at which more flux needs less current in some direction.
     pub fn flaw(&self) -> Option<Dq> {
         // The maximum of a NaN and 0 is 0.
         self.knots().find(|&x| self.least_curvature(x).max(0.0) == 0.0)
     }
-}
-
-/// Refuses a map in use that is not a machine's.
-///
-/// # Errors
-/// A limit of the grid on the wrong side of 0, a saturation besides, a current without flux linkage, or the knot at which the
-/// Hessian is not positive definite.
-pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
-    let map = &parameters.flux_map;
-    if !map.used {
-        return Ok(());
-    }
-    let (positive, negative) = ("greater than 0 with flux_map.use = true", "less than 0 with flux_map.use = true");
-    if map.d_min >= 0.0 {
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.d_min, negative));
-    }
-    if map.d_max <= 0.0 {
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.d_max, positive));
-    }
-    if map.q_max <= 0.0 {
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.q_max, positive));
-    }
-    if !parameters.saturation.is_none() {
-        let allowed =
-            "false with saturation.s_2, saturation.s_3 or saturation.s_dq: the map has the saturation; set these to 0";
-        return Err(PARAMETERS.fault(parameters, |p| &mut p.flux_map.used, allowed));
-    }
-    if let Some(x) = map.flaw() {
-        return Err(Fault::new(format!(
-            "flux_map.w is the map of no machine: at psi_d = psi_M {:+.4} Wb, psi_q = {:.4} Wb, more flux takes less current; fit \
-             the map with fmu tune",
-            x.d(),
-            x.q()
-        )));
-    }
-    let (rest, scale) = (map.current(Dq::ZERO).d(), map.current(Dq::new(map.d_max, 0.0)).d());
-    if rest.abs() > 1e-6 * scale.abs() {
-        return Err(Fault::new(format!(
-            "flux_map.w has a current of {rest} A at the flux linkage psi_M, where there must be none; fit the map with fmu tune"
-        )));
-    }
-    Ok(())
 }
 
 /// The eigenvalues of a symmetric matrix, the smaller one first.
@@ -235,10 +192,10 @@ fn eigenvalues([a, b, c]: [f64; 3]) -> [f64; 2] {
     [middle - radius, middle + radius]
 }
 
-/// What 1 J of a coefficient adds at a point, as a fit needs it.
+/// Effect of 1 J of a coefficient at a point, for a fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Contribution {
-    /// Place of the coefficient, the q-axis fastest.
+    /// Index of the coefficient; the q-axis varies fastest.
     pub place: usize,
     /// Current in A.
     pub current: Dq,
@@ -246,7 +203,7 @@ pub struct Contribution {
     pub hessian: [f64; 3],
 }
 
-/// The contributions of all coefficients that count at the flux linkage `x` (Wb) beyond that of the magnet.
+/// The contributions of all coefficients with an effect at the flux linkage `x` (Wb) beyond that of the magnet.
 pub fn contributions(map: &FluxMap, x: Dq) -> Vec<Contribution> {
     let (([d, q], sign), [h_d, h_q]) = (map.splines(x), map.interval());
     let mut all = Vec::with_capacity(16);
@@ -266,8 +223,8 @@ pub fn contributions(map: &FluxMap, x: Dq) -> Vec<Contribution> {
     all
 }
 
-/// The map of a linear machine, on a grid of these limits along the d-axis (Wb beyond the magnet's flux linkage) and up to `q_max` (Wb): splines
-/// have quadratic functions exactly.
+/// The map of a linear machine, on a grid with these limits along the d-axis (Wb beyond the magnet's flux linkage) and up to
+/// `q_max` (Wb): splines represent quadratic functions exactly.
 #[expect(clippy::cast_precision_loss, reason = "a few intervals")]
 pub fn linear(motor: &Motor, [d_min, d_max]: [f64; 2], q_max: f64) -> FluxMap {
     let mut map = FluxMap { used: true, d_min, d_max, q_max, ..FluxMap::default() };
@@ -287,17 +244,19 @@ type P = Row<FluxMap>;
 pub const FLUX_MAP: &Table<FluxMap> = table![
     P::boolean_parameter(
         "use",
-        "A map of the flux linkage gives the current, in place of motor.L_d, motor.L_q and saturation",
+        "A map of the flux linkage gives the current, instead of motor.L_d, motor.L_q and saturation",
         |p| &mut p.used,
     ),
-    P::parameter("d_min", &WEBER, "Least d-axis flux linkage of the grid, less motor.psi_M", |p| &mut p.d_min),
-    P::parameter("d_max", &WEBER, "Greatest d-axis flux linkage of the grid, less motor.psi_M", |p| { &mut p.d_max }),
-    P::parameter("q_max", &WEBER, "Greatest q-axis flux linkage of the grid", |p| &mut p.q_max),
+    P::parameter("d_min", &WEBER, "Minimum d-axis flux linkage of the grid, relative to motor.psi_M", |p| &mut p.d_min),
+    P::parameter("d_max", &WEBER, "Maximum d-axis flux linkage of the grid, relative to motor.psi_M", |p| {
+        &mut p.d_max
+    }),
+    P::parameter("q_max", &WEBER, "Maximum q-axis flux linkage of the grid", |p| &mut p.q_max),
     P::array_parameter(
         "w",
         &JOULE,
         "B-spline coefficients of the energy whose gradient is the current: 12 along the d-axis times 9 along the \
-                 q-axis from 0 on, the q-axis fastest; fmu tune fits them",
+                 q-axis from 0 on, with the q-axis varying fastest; fmu tune fits them",
         D * Q,
         |p| p.w.as_flattened_mut(),
     ),
@@ -309,7 +268,7 @@ mod tests {
     use super::*;
     use fmu_core::Dual;
 
-    /// Coefficients of a machine that saturates, with a bend in both axes.
+    /// Coefficients of a machine that saturates in both axes.
     fn bent() -> FluxMap {
         let mut map = FluxMap { used: true, d_min: -0.2, d_max: 0.15, q_max: 0.25, ..FluxMap::default() };
         for m in 0..D {
@@ -364,41 +323,5 @@ mod tests {
                 assert!((found - wanted).abs() < 1e-10 * (1.0 + wanted.abs()), "{x:?}");
             }
         }
-    }
-
-    #[test]
-    fn a_map_of_no_machine_is_refused() {
-        let with = |map: FluxMap| {
-            let parameters = PlantParameters { flux_map: map, ..PlantParameters::default() };
-            validate(&parameters).map_err(|fault| fault.message().to_owned())
-        };
-        let linear = || linear(&crate::tables::PlantParameters::default().motor, [-0.2, 0.2], 0.2);
-        assert_eq!(with(linear()), Ok(()));
-        assert_eq!(with(FluxMap { used: false, d_max: -1.0, ..linear() }), Ok(()));
-        let mut hollow = linear();
-        hollow.w[6][3] += 1.0;
-        let mut shifted = linear();
-        shifted.w.iter_mut().enumerate().for_each(|(m, row)| row.iter_mut().for_each(|w| *w += 0.01 * m as f64));
-        for (map, message) in [
-            (FluxMap { d_min: 0.0, ..linear() }, "flux_map.d_min = 0 Wb is not allowed: less than 0"),
-            (FluxMap { d_max: -0.1, ..linear() }, "flux_map.d_max = -0.1 Wb is not allowed: greater than 0"),
-            (FluxMap { q_max: 0.0, ..linear() }, "flux_map.q_max = 0 Wb is not allowed: greater than 0"),
-            (
-                FluxMap { w: [[0.0; Q]; D], ..linear() },
-                "flux_map.w is the map of no machine: at psi_d = psi_M -0.2000 Wb",
-            ),
-            (hollow, "more flux takes less current; fit the map with fmu tune"),
-            (shifted, "where there must be none"),
-        ] {
-            let error = with(map).unwrap_err();
-            assert!(error.contains(message), "{error}");
-        }
-        let mut parameters = PlantParameters { flux_map: linear(), ..PlantParameters::default() };
-        parameters.saturation.s_2 = 1.0;
-        let error = validate(&parameters).unwrap_err();
-        assert!(
-            error.message().starts_with("flux_map.use = true is not allowed: false with saturation.s_2"),
-            "{error}"
-        );
     }
 }

@@ -1,12 +1,12 @@
-//! When the plant's parameters and inputs act: a value that is set without effect is reported by name.
+//! Conditions under which the plant's parameters and inputs have an effect; setting one without effect is reported by name.
 //!
-//! Every parameter and every input is here once; `no_variable_is_forgotten` looks.
+//! Every parameter and every input is listed exactly once; `no_variable_is_forgotten` checks it.
 
 use crate::tables::PlantParameters as Par;
 use crate::thermal::ThermalMode;
 use fmu_core::idle::Acts;
 
-/// The plant's.
+/// Conditions of the plant.
 #[rustfmt::skip]
 pub const ACTS: &[Acts<Par>] = &[
     Acts { names: &[
@@ -40,10 +40,10 @@ pub const ACTS: &[Acts<Par>] = &[
         when: |p| p.thermal.mode == ThermalMode::Imposed, why: "no effect unless thermal.mode = Imposed" },
 ];
 
-/// Said of a link without voltage.
+/// Message for a link without voltage.
 pub const NO_VOLTAGE: &str = "the DC link has no voltage: feed u_dc";
 
-/// Said of an imposed shaft that nobody turns.
+/// Message for an imposed shaft at rest.
 pub const AT_REST: &str = "speed_shaft and angle_shaft are 0, and the shaft stands still: feed them";
 
 #[cfg(test)]

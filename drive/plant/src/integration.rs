@@ -28,9 +28,9 @@ impl PmsmPlant {
         (end, Passed::over::<D, C>(h, turned, [&a, &b, &c, &d], &circuit.shaft))
     }
 
-    /// One integration step of `h` (s) that is long beside the time constant of a current in the zone: two of half the length,
-    /// with the energies from the rates at their ends. In the stages, the voltage that makes the current settle is not yet
-    /// exact. The damping follows from the change of the rates with a `small` change of the flux linkage (Wb).
+    /// One integration step of `h` (s) that is long compared with the time constant of a current in the zone: two half steps,
+    /// with the energies from the rates at their ends, because the voltage that makes the current settle is not yet exact in
+    /// the stages. The damping follows from the change of the rates with a `small` change of the flux linkage (Wb).
     pub(super) fn integrate_damped<D: Drops<f64>, C: Coulomb<f64>, const LINEAR: bool>(
         &self,
         start: &State,
@@ -63,12 +63,12 @@ impl PmsmPlant {
         self.advance_by(start, h, circuit, stages)
     }
 
-    /// The state after `h` (s), by which the shaft has turned (rad), and the rates in the four stages: the flux linkage in stator axes, and the angle as the
-    /// deviation from a motion at constant speed.
+    /// The state after `h` (s), the angle (rad) by which the shaft has turned, and the rates in the four stages. The flux
+    /// linkage is integrated in stator axes, the angle as the deviation from a motion at constant speed.
     ///
-    /// In stator axes, the flux linkage is the integral of the held voltage minus R_s i. Only this small resistive part
-    /// follows the rotor, so a step is more exact than two of half its length in rotor axes. The axes of the motion at
-    /// constant speed do not wait for the stages, whose accelerations then turn them a little.
+    /// In stator axes, the flux linkage is the integral of the constant voltage minus R_s i. Only this small resistive part
+    /// follows the rotor, so a step is more exact than two half steps in rotor axes. The axes of the motion at constant
+    /// speed are known before the stages, whose accelerations then turn them slightly.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn advance_by<D: Drops<f64>, C: Coulomb<f64>, const LINEAR: bool>(
@@ -104,8 +104,8 @@ impl PmsmPlant {
     }
 }
 
-/// The rates at a stage with the d-axis on `axis`, where the flux linkage is `away` (Wb) from that at the start, `psi` (Wb), and
-/// the derivative of [`Stages`].
+/// The rates at a stage with the d-axis on `axis` and the flux linkage at a distance of `away` (Wb) from that at the start,
+/// `psi` (Wb), and the derivative of [`Stages`].
 #[expect(clippy::inline_always, reason = "as for `PmsmPlant::integrate`")]
 #[inline(always)]
 fn stage<D: Drops<f64>, C: Coulomb<f64>, const LINEAR: bool>(

@@ -4,7 +4,7 @@
 //! has an error of -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero, the current crosses zero within
 //! the dead time (ripple, switch capacitances) and the error falls linearly: -u_dead i / i_zero.
 //!
-//! [`modulation`](drive_base::modulation) computes the voltages. The dead-time model is the field's usual mean-value model;
+//! [`modulation`](drive_base::modulation) computes the voltages. This is the usual mean-value model of the dead time;
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};
@@ -37,6 +37,17 @@ impl Inverter {
     pub fn u_dead(&self, u_dc: f64) -> f64 {
         self.dead_time / self.T_pwm * u_dc
     }
+}
+
+/// State of the inverter's transistors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Gates {
+    /// They switch and produce the voltage references.
+    Switch,
+    /// All upper or all lower transistors conduct: the terminals of the machine are short-circuited.
+    Short,
+    /// Only the diodes conduct.
+    Off,
 }
 
 type P = Row<Inverter>;

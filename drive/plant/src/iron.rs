@@ -1,7 +1,7 @@
-//! Iron loss: a conductance G parallel to the flux linkage, explicit and without a state of its own.
+//! Iron loss: a conductance G parallel to the flux linkage, explicit and without a further state.
 //!
 //! ```text
-//! e      = d psi/dt + j w psi = (u - R i_m) / (1 + R G)     voltage behind the resistance, i_m the current of psi
+//! e      = d psi/dt + j w psi = (u - R i_m) / (1 + R G)     voltage behind the resistance, i_m is the current of psi
 //! i_s    = i_m + G e                                         current at the terminals
 //! p_iron = 1.5 G |e|^2                                       p_cu = 1.5 R |i_s|^2        tau_e = 1.5 n_p psi x i_m
 //! G(w)   = G_e + G_h / sqrt(w^2 + w_0^2)
@@ -9,11 +9,11 @@
 //!
 //! In steady state e = j w psi, so p_iron = 1.5 (G_e w^2 + G_h |w|) |psi|^2: eddy currents with the square of the speed,
 //! hysteresis in proportion to it (Bertotti 1988 with the exponent 2 for hysteresis and without the excess term). w_0
-//! bounds the conductance at standstill. At the shaft, p_iron is a torque that is missing: 1.5 n_p psi x i_s - tau_e =
-//! p_iron / w_m. R G is about 1e-3, so the poles of the machine stay where they are.
+//! bounds the conductance at standstill. At the shaft, p_iron reduces the torque: 1.5 n_p psi x i_s - tau_e = p_iron / w_m.
+//! R G is about 1e-3, so the poles of the machine hardly move.
 //!
-//! Gates off and diodes blocking: i_s = 0, and the magnet drives i_m through G. Its time constant L G is some 10 us, so
-//! i_m follows the speed without delay: with g = G w, i_mq = -g psi_M / (1 + g^2 L_d L_q), i_md = g L_q i_mq; the
+//! With the gates off and the diodes blocking, i_s = 0, and the magnet drives i_m through G. The time constant L G is about
+//! 10 us, so i_m follows the speed without delay: with g = G w, i_mq = -g psi_M / (1 + g^2 L_d L_q), i_md = g L_q i_mq; the
 //! machine brakes with p_iron / w_m.
 //!
 //! The equations are derived here from the circuit; Modelica's `Electrical.Machines.Losses` has the same core loss with

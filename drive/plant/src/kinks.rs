@@ -6,51 +6,50 @@
 use crate::circuit::{Circuit, Passed};
 use crate::integration::LONGEST_STEP;
 use crate::legs::Legs;
-use crate::losses::flow::{Dissipation, Drops, Path, Switches};
+use crate::losses::flow::{Drops, Path, Switches};
 use crate::losses::sides::{OneSided, Sides};
 use crate::mechanics::{Coulomb, SHORTEST_STEP, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
 use crate::state::State;
 use drive_base::frame::{AlphaBeta, Dq};
 
-/// Shortest integration step in s that looks for a kink; where the zone asks for shorter ones, as long as those.
+/// Minimum integration step in s for which a kink is searched, unless the zone requires shorter steps.
 const SHORTEST_AT_KINK: f64 = 0.5e-6;
 
-/// Longest integration step that follows a current in the zone, as a share of its time constant.
+/// Maximum integration step that resolves a current in the zone, as a share of its time constant.
 const RESOLVED: f64 = 0.5;
 
-/// Largest electrical angle in rad in an integration step with losses: the energies are then in balance to 1e-7 over a drive
-/// cycle.
+/// Maximum electrical angle in rad of an integration step with losses: the energies then balance to 1e-7 over a drive cycle.
 const LARGEST_TURN_WITH_LOSSES: f64 = 0.0625;
 
-/// [`LARGEST_TURN_WITH_LOSSES`] with a current in the zone, where a damped step is two of half its length.
+/// [`LARGEST_TURN_WITH_LOSSES`] with a current inside the zone: a damped step there is two half steps.
 const LARGEST_TURN_DAMPED: f64 = 0.125;
 
-/// Longest damped step in s.
+/// Maximum damped step in s.
 const LONGEST_STEP_DAMPED: f64 = 50e-6;
 
-/// An integration step of `h` (s) under the voltage `u` (V), with the legs' voltages if the currents keep their sides.
+/// An integration step of `h` (s) under the voltage `u` (V); `one_sided` are the legs if the currents keep their sides.
 struct Step<'a> {
     h: f64,
     u: AlphaBeta,
     switches: &'a Switches,
     one_sided: Option<&'a OneSided>,
-    /// The step is long beside the time constant of a current in the zone.
+    /// The step is long compared with the time constant of a current in the zone.
     damped: bool,
 }
 
-/// Most steps per second that are taken again to end at a kink: they bound the work of a step whatever the parameters are.
+/// Maximum number per second of steps that are repeated to end at a kink: it bounds the work of a step for any parameters.
 const MOST_SEARCHES: f64 = 1e6;
 
-/// Longest step that follows a current in the zone in s, below which steps are damped: they take three times the time.
+/// Time in s below which a step that resolves a current in the zone is replaced by damped ones, which cost three times as much.
 const SHORTEST_RESOLVED: f64 = 10e-6;
 
-/// Difference of the flux linkage from which the damping is found, as a share of that of the zone's current.
+/// Difference of the flux linkage for the damping, as a share of the flux linkage of the zone's current.
 const DIFFERENCE: f64 = 1e-3;
 
 impl PmsmPlant {
-    /// The integration steps over `h` (s) from `state` on with these `switches` under the voltage `u` (V), and the current (A)
-    /// by the iron at their end.
+    /// Integrates over `h` (s) from `state` on with these `switches` under the voltage `u` (V); returns what passed, and the
+    /// current (A) by the iron at the end.
     pub(super) fn pass_kinks(
         &self,
         state: &mut State,
@@ -63,7 +62,7 @@ impl PmsmPlant {
         let (zone, kinks) = (legs.i_zone(), switches.kinks());
         let time = legs.time(self.warm.least_inductance, parameters.inverter.devices.threshold());
         let resolved = LONGEST_STEP.min(RESOLVED * time);
-        let dissipation = |speed| Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
+        let dissipation = |speed| parameters.dissipation(machine.resistance(), machine.electrical(speed));
         let at_start = dissipation(state.speed);
         let guide = |state: &State, one_sided: Option<&OneSided>| {
             let psi = machine.to_stator(state.axis, state.psi);
@@ -76,7 +75,7 @@ impl PmsmPlant {
         let (mut passed, mut left, mut start) = (Passed::default(), h, guide(state, None));
         let mut sides = Sides::of(start, zone);
         let mut one_sided = switches.one_sided(u, &sides);
-        // The time since the last kink, or since the voltage changed; and how long the next step may be.
+        // Time since the last kink or change of the voltage, and maximum length of the next step.
         let (mut since, mut limit) = (0.0, f64::INFINITY);
         let mut searches = 1000.0 + h * MOST_SEARCHES;
         loop {
@@ -130,8 +129,8 @@ impl PmsmPlant {
         }
     }
 
-    /// Longest integration step in s with a current in the zone that settles with this `time` constant (s), `since` (s) the
-    /// voltage changed. Damped steps begin with 1.5 and 4.5 time constants, so that the energies of the settling are right, too.
+    /// Maximum integration step in s with a current in the zone that settles with this `time` constant (s), `since` (s) after
+    /// the voltage changed. The first two damped steps are 1.5 and 4.5 time constants long, for the energies of the settling.
     fn longest_after(since: f64, time: f64) -> f64 {
         if RESOLVED * time > SHORTEST_RESOLVED {
             return LONGEST_STEP.min(RESOLVED * time);
@@ -158,7 +157,7 @@ impl PmsmPlant {
         state.axis.from_stator(path.flow(psi, i, machine.electrical(state.speed)).i - i)
     }
 
-    /// An integration step with resistance and conductance of the speed in its middle.
+    /// An integration step with the resistance and conductance at the speed in its middle.
     #[inline(never)]
     fn integrate_kinks<C: Coulomb<f64>>(
         &self,
@@ -170,7 +169,7 @@ impl PmsmPlant {
         let shaft = Shaft::new(&parameters.mechanics, self.inputs.tau_load, coulomb);
         let tau_e = machine.torque(start.psi, machine.current(start.psi));
         let speed = start.speed + 0.5 * h * shaft.motion(start.speed, tau_e).acceleration;
-        let dissipation = Dissipation::at(parameters, machine.resistance(), machine.electrical(speed));
+        let dissipation = parameters.dissipation(machine.resistance(), machine.electrical(speed));
         if let Some(&drops) = one_sided {
             let path = Path { u, dissipation, drops };
             self.integrate(start, h, &Circuit { machine, path, shaft })

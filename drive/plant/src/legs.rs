@@ -6,7 +6,7 @@
 //!
 //! Blocking diodes: if no current exceeds i_zone and no line-to-line back EMF exceeds u_dc, the currents become and
 //! stay zero. The energy of the remaining current, 0.75 L i_zone^2, is lost at once. i_zone is `inverter.i_zero`, or
-//! larger if the machine would leave that zone faster than the shortest substep resolves.
+//! larger if the machine would leave that zone faster than the minimum substep resolves.
 //!
 //! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
@@ -17,7 +17,7 @@ use drive_base::modulation::{clamp_unit, dead_time_loss};
 use drive_base::motor::Motor;
 use fmu_core::Scalar;
 
-/// Shortest substep in s that the diodes require.
+/// Minimum substep in s that the diodes require.
 const SHORTEST_SUBSTEP: f64 = 1e-6;
 
 /// Voltage drop of the legs at a given DC-link voltage.
@@ -29,7 +29,7 @@ pub struct Legs<S = f64> {
     u: S,
     /// Current in A below which the drop falls linearly.
     i_zone: S,
-    /// Threshold voltage of the diode in V, which the back EMF must exceed besides the link.
+    /// Threshold voltage of the diode in V, which the back EMF must exceed in addition to the link.
     u_diode: f64,
 }
 
@@ -41,7 +41,7 @@ impl<S: Scalar> Legs<S> {
         Self { share, u: u_dc * share, i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
     }
 
-    /// For legs that short-circuit the machine: nothing switches, so no dead time costs a voltage.
+    /// For legs that short-circuit the machine: nothing switches, so dead time costs no voltage.
     #[inline]
     pub fn shorted(inverter: &Inverter) -> Self {
         Self { share: 0.0, u: 0.0.into(), i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
@@ -77,7 +77,7 @@ impl<S: Scalar> Legs<S> {
     pub fn feed(&self, i: Phases<S>) -> S {
         let leg = |i: S| clamp_unit(i / self.i_zone) * i;
         let current = leg(i.a) + leg(i.b) + leg(i.c);
-        // Zero current for any dead time, however large.
+        // Without current it is 0 for any dead time.
         if self.share > 0.0 && current.value() > 0.0 { current * self.share } else { 0.0.into() }
     }
 }
@@ -89,9 +89,8 @@ impl Legs {
         signs.to_stator() * self.u
     }
 
-    /// Time constant in s of a current within the zone with the smallest inductance (H) of the machine, where the legs,
-    /// which drop `threshold` (V) in their devices, act
-    /// as resistances; infinite without a voltage.
+    /// Time constant in s of a current within the zone, with the smallest inductance (H) of the machine: the legs, which drop
+    /// `threshold` (V) in their devices, act as resistances there. Infinite without a voltage.
     #[inline]
     pub fn time(&self, least_inductance: f64, threshold: f64) -> f64 {
         self.i_zone * least_inductance / (self.u + threshold)
@@ -104,19 +103,19 @@ impl Legs {
 
     /// Whether diodes block the current `i` (A) of a machine that turns at the electrical speed `w` (rad/s).
     pub fn block(&self, motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> bool {
-        let (greatest, span) = Self::extent(motor, axis, i, w);
-        greatest <= self.i_zone && span < self.opening()
+        let (highest, span) = Self::extent(motor, axis, i, w);
+        highest <= self.i_zone && span < self.opening()
     }
 
-    /// What opens blocking diodes, each above 0: the greatest current over the zone, and the line-to-line back EMF over
-    /// the DC-link voltage, both less 1.
+    /// Quantities that open blocking diodes when either is above 0: the maximum current divided by the zone, and the
+    /// line-to-line back EMF divided by the DC-link voltage, both minus 1.
     pub fn excess(&self, motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> [f64; 2] {
-        let (greatest, span) = Self::extent(motor, axis, i, w);
+        let (highest, span) = Self::extent(motor, axis, i, w);
         // Without a DC link the diodes never block.
-        [greatest / self.i_zone - 1.0, if self.drop() { (span / self.opening() - 1.0).min(1.0) } else { 1.0 }]
+        [highest / self.i_zone - 1.0, if self.drop() { (span / self.opening() - 1.0).min(1.0) } else { 1.0 }]
     }
 
-    /// The greatest phase current (A) and the greatest line-to-line back EMF (V).
+    /// The maximum phase current (A) and the maximum line-to-line back EMF (V).
     fn extent(motor: &Motor, axis: Axis<Rotor>, i: Dq, w: f64) -> (f64, f64) {
         let phases = |v: Dq| Phases::from_stator(axis.to_stator(v));
         let Phases { a, b, c } = phases(i);
@@ -134,7 +133,7 @@ mod tests {
         let (motor, mut inverter) = (Motor::default(), Inverter::default());
         inverter.devices.u_diode = 10.0;
         let legs = Legs::off(&inverter, motor.L_d, 300.0);
-        // Along phase a, the line-to-line voltage of the EMF on the q-axis is the greatest.
+        // Along phase a, the line-to-line voltage of the EMF on the q-axis is at its maximum.
         let axis = Axis::<Rotor>::at(0.0);
         for (share, blocks) in [(0.99, true), (1.01, false)] {
             let w = share * 320.0 / (3.0_f64.sqrt() * motor.psi_M);
@@ -142,6 +141,6 @@ mod tests {
             let [current, voltage] = legs.excess(&motor, axis, Dq::ZERO, w);
             assert!((current + 1.0).abs() < 1e-12 && (voltage - share + 1.0).abs() < 1e-12, "{current} {voltage}");
         }
-        assert!(!legs.block(&motor, axis, Dq::new(2.0 * legs.i_zone(), 0.0), 0.0), "it carries a current");
+        assert!(!legs.block(&motor, axis, Dq::new(2.0 * legs.i_zone(), 0.0), 0.0), "the diodes carry a current");
     }
 }

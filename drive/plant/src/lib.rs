@@ -6,7 +6,7 @@
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.
 #![allow(non_snake_case)]
 
-// A unit test shares its machines with tests outside.
+// A unit test shares its machines with integration tests.
 #[cfg(test)]
 extern crate self as drive_plant;
 
@@ -27,6 +27,7 @@ pub mod machine;
 pub mod mechanics;
 pub mod model;
 pub mod power;
+pub mod rules;
 pub mod saturation;
 pub mod signals;
 mod state;
@@ -34,5 +35,6 @@ mod step;
 pub mod tables;
 pub mod terminals;
 pub mod thermal;
+mod warming;
 
 pub use model::PmsmPlant;

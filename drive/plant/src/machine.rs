@@ -64,7 +64,7 @@ pub fn least_inductance(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> f64
         return motor.L_d.min(motor.L_q);
     }
     let [d, cross, q] = slope(motor, magnetics, psi);
-    // The greatest eigenvalue.
+    // The larger eigenvalue.
     1.0 / (0.5 * (d + q) + (0.25 * (d - q) * (d - q) + cross * cross).sqrt())
 }
 
@@ -86,7 +86,7 @@ impl Inverse {
 /// The machine with constants for many evaluations.
 #[derive(Clone, Copy, Debug)]
 pub struct Machine<'a, S = f64, const LINEAR: bool = false> {
-    /// Never asked if `LINEAR`.
+    /// Unused if `LINEAR`.
     magnetics: Magnetics<'a>,
     psi_M: S,
     R_s: S,
@@ -103,7 +103,7 @@ impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
         Self::with(motor, magnetics, Inverse::of(motor))
     }
 
-    /// With the reciprocals at hand.
+    /// With known reciprocals of the inductances.
     #[inline]
     pub fn with(motor: &Motor<S>, magnetics: Magnetics<'a>, Inverse { d, q }: Inverse) -> Self {
         let Motor { n_p, R_s, L_d: _, L_q: _, psi_M } = *motor;
@@ -192,7 +192,7 @@ mod tests {
         assert!((current(&motor, Magnetics::Linear, psi).q() - 4.0).abs() < 1e-14);
     }
 
-    /// Saturation adds to the current, in either axes.
+    /// Saturation adds to the current, in rotor and in stator axes.
     #[test]
     fn saturation_adds_to_the_current() {
         let motor = Motor { L_q: 9e-3, ..Motor::default() };

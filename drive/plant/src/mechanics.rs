@@ -45,41 +45,41 @@ impl Mechanics {
         viscous(self.B, self.k_w, speed) + coulomb
     }
 
-    /// The Coulomb torque where it is not the whole one.
+    /// The Coulomb torque close to standstill.
     fn near<S: Scalar>(&self, speed: S) -> S {
         Standstill::new(self, speed.value()).coulomb(speed)
     }
 
-    /// Torque of the shaft on the load in N.m: `tau_load`, or with an imposed speed what the machine gives, `given` (N.m).
+    /// Torque of the shaft on the load in N.m: `tau_load`, or with an imposed speed the torque `given` (N.m) by the machine.
     #[inline]
     pub fn tau_shaft<S>(&self, given: S, tau_load: S) -> S {
         if self.imposed { given } else { tau_load }
     }
 
-    /// Whether the Coulomb torque is the whole one at this `speed` (rad/s): the nearest number to tanh is +-1.
+    /// Whether the Coulomb torque is at its full value at this `speed` (rad/s): tanh rounds to +-1.
     #[inline]
     pub fn is_whole(&self, speed: f64) -> bool {
         speed.abs() > 20.0 * self.w_coulomb
     }
 }
 
-/// Speed over w_coulomb up to which a step resolves the Coulomb torque: from here on, it is the whole one but for 1e-3.
+/// Speed divided by w_coulomb up to which steps resolve the Coulomb torque; above, it is at its full value to 1e-3.
 const RESOLVED: f64 = 4.0;
 
-/// Shortest step in s that is looked for, there and at the kinks of the inverter: it bounds the work whatever the parameters are.
+/// Minimum step in s, there and at the kinks of the inverter: it bounds the work for any parameters.
 pub const SHORTEST_STEP: f64 = 1e-9;
 
-/// Greatest change of the speed in a step there, over w_coulomb.
+/// Maximum change of the speed in a step there, divided by w_coulomb.
 const LARGEST_CHANGE: f64 = 0.25;
 
 impl Mechanics {
-    /// How long (s) a step may be that took `h` (s) from one speed to the other (rad/s), if it was too long for a Coulomb
-    /// torque that changes its sign: it ends where that begins, or is a small part of it. `None` if it was not.
+    /// A shorter length (s) for a step of `h` (s) between these speeds (rad/s) that was too long for a Coulomb torque that
+    /// changes its sign: the step then ends at the zone's edge, or covers a small part of the zone. `None` if it was short enough.
     #[inline]
     pub fn shorter(&self, h: f64, from: f64, to: f64) -> Option<f64> {
         let (edge, small) = (RESOLVED * self.w_coulomb, LARGEST_CHANGE * self.w_coulomb);
         let (beyond, change) = (from.min(to) > edge || from.max(to) < -edge, (to - from).abs());
-        // A greater change, or none that is a number, is that of a coupling that diverges.
+        // A larger change, or NaN, comes from a coupling that diverges.
         let diverges = change.is_nan() || change >= 1e5 * small.max(1.0);
         if beyond || diverges || h <= SHORTEST_STEP || change <= 1.01 * small || self.tau_coulomb == 0.0 || self.imposed
         {
@@ -101,7 +101,7 @@ pub trait Coulomb<S> {
     fn coulomb(&self, speed: S) -> S;
 }
 
-/// The whole Coulomb torque in N.m, with the sign of the speed: where [`Mechanics::is_whole`].
+/// The full Coulomb torque in N.m, with the sign of the speed, valid where [`Mechanics::is_whole`].
 #[derive(Clone, Copy, Debug)]
 pub struct Whole(f64);
 
@@ -120,7 +120,7 @@ impl<S: Scalar> Coulomb<S> for Whole {
     }
 }
 
-/// The Coulomb torque at any speed, quick close to that at which a step begins.
+/// The Coulomb torque at any speed, fast close to the speed at which a step begins.
 #[derive(Clone, Copy, Debug)]
 pub struct Standstill {
     tau_coulomb: f64,
@@ -132,7 +132,7 @@ pub struct Standstill {
 }
 
 impl Standstill {
-    /// Greatest change of x for which the series serves: the first term left out is below 2e-16.
+    /// Maximum change of x for the series: the first omitted term is below 2e-16.
     const REACH: f64 = 1e-3;
 
     /// Close to this `speed` (rad/s). The coefficients of y = tanh x follow from y' = 1 - y^2.
@@ -235,7 +235,7 @@ pub const MECHANICS: &Table<Mechanics> = table![
         .at_least(0.0),
     P::boolean_parameter(
         "imposed",
-        "The drive train imposes speed_shaft and angle_shaft and takes tau_shaft; the inertia is its own. false: the \
+        "The drive train imposes speed_shaft and angle_shaft, receives tau_shaft and includes the inertia; false: the \
                  shaft turns freely under tau_load",
         |m| &mut m.imposed,
     ),

@@ -1,31 +1,35 @@
-//! The model `PmsmPlant`: inverter, machine and mechanics, integrated with held inputs.
+//! The model `PmsmPlant`: inverter, machine and mechanics, integrated with constant inputs.
 
-use crate::counters::Point;
-use crate::flux_map;
 use crate::idle;
+use crate::inverter::Gates;
 use crate::legs::Legs;
+use crate::losses::flow::Switches;
 use crate::losses::{Losses, efficiency};
 use crate::machine;
-use crate::power::Energy;
-use crate::power::Powers;
-use crate::signals::{Gates, PlantInputs, PlantOutputs};
-use crate::state::{Instant, State};
-use crate::tables::{PARAMETERS, PlantParameters, TABLE};
+use crate::power::{Energy, Powers};
+use crate::rules;
+use crate::signals::{PlantInputs, PlantOutputs};
+use crate::state::{Accepted, Instant, State};
+use crate::tables::{FLUX, OUTPUTS, PARAMETERS, PlantParameters};
 use crate::thermal::warm::Warm;
-use crate::thermal::{self, Temperatures, ThermalMode};
+use crate::thermal::{THERMAL_INPUTS, Temperatures, ThermalMode};
 use drive_base::connection::Measured;
 use drive_base::frame::{Dq, Phases, Rotor, Vector};
 use drive_base::math::wrap;
 use drive_base::motor::Motor;
 use fmu_core::idle::why;
 use fmu_core::log::Warnings;
-use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Interface, Kept, Model, Scalar, Step, Table, Terminal, Warns};
+use fmu_core::unit::{NEWTON_METER, RADIAN, SPEED, VOLT};
+use fmu_core::{
+    Block, Elapsed, Experiment, Fault, Info, Interface, Kept, Model, Part, Row, Scalar, Step, Table, Terminal, Warns,
+    table,
+};
 use serde::{Deserialize, Serialize};
 
 /// Permanent-magnet synchronous machine with an average inverter and one inertia.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PmsmPlant {
-    /// Inputs, held over a communication step.
+    /// Inputs, constant over a communication step.
     pub inputs: PlantInputs,
     /// Parameters; a step never changes them.
     pub parameters: PlantParameters,
@@ -38,11 +42,11 @@ pub struct PmsmPlant {
     /// Since the start.
     pub(super) energy: Energy,
     /// In Model Exchange, the last point of the importer's solution, and the counts of earlier ones.
-    pub(super) point: Point,
-    pub(super) kept: Kept<(Energy, Point)>,
-    /// Temperatures and the machine at them, held over a step.
+    pub(super) point: Accepted,
+    pub(super) kept: Kept<(Energy, Accepted)>,
+    /// Temperatures and the machine at them, constant over a step.
     pub(super) warm: Warm,
-    /// Current (A) at the terminals less that of the flux linkage, at the end of a step.
+    /// Current (A) at the terminals minus that of the flux linkage, at the end of a step.
     pub(super) by_iron: Dq,
 }
 
@@ -58,7 +62,13 @@ impl PmsmPlant {
         }
     }
 
-    /// The current (A) that the flux linkage of this `motor` has while the diodes block, at the mechanical `speed` (rad/s).
+    /// These `legs` with devices and switching losses.
+    #[inline]
+    pub(super) fn switches<S: Scalar>(&self, inputs: &PlantInputs<S>, legs: Legs<S>) -> Switches<S> {
+        Switches::new(&self.parameters.inverter, inputs.gates(), inputs.u_dc, legs)
+    }
+
+    /// The current (A) of the flux linkage of this `motor` while the diodes block, at the mechanical `speed` (rad/s).
     #[inline]
     pub(super) fn idle_current<S: Scalar>(&self, motor: &Motor<S>, speed: S) -> Vector<Rotor, S> {
         let iron = &self.parameters.iron;
@@ -89,7 +99,7 @@ impl PmsmPlant {
         (at, i)
     }
 
-    /// The current (A) at the terminals less that of the flux linkage.
+    /// The current (A) at the terminals minus that of the flux linkage.
     pub(super) fn current_by_iron(&self) -> Dq {
         let (_, i) = self.reached_with_iron();
         i - self.reached().i
@@ -150,7 +160,7 @@ impl PmsmPlant {
         (speed, 3.0_f64.sqrt() * psi_M * (f64::from(*n_p) * speed).abs())
     }
 
-    /// What the sensors of a controller measure: the same as in the outputs, to the last bit.
+    /// Measured values for a controller: bit for bit those of the outputs.
     #[inline]
     pub fn measured(&self) -> Measured {
         let Instant { i, speed, angle, axis, .. } = self.reached();
@@ -207,9 +217,8 @@ impl Model for PmsmPlant {
             let allowed = format!("at most {fastest} rad/s in magnitude, the speed of any machine with this motor.n_p");
             return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.initial.speed, allowed));
         }
-        flux_map::validate(&self.parameters)?;
-        thermal::validate(&self.parameters)?;
-        self.judge_temperatures(&self.inputs)
+        rules::validate(&self.parameters)?;
+        self.check_temperatures(&self.inputs)
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -228,7 +237,7 @@ impl Model for PmsmPlant {
         };
         let psi = if self.inputs.is_off() { self.idle_flux(motor, speed) } else { machine::flux(motor, Dq::ZERO) };
         self.state = State::new(motor, psi, speed, angle);
-        (self.energy, self.point, self.kept) = (Energy::default(), Point::default(), Kept::default());
+        (self.energy, self.point, self.kept) = (Energy::default(), Accepted::default(), Kept::default());
         self.blocked = self.blocks(&self.inputs);
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
@@ -264,8 +273,8 @@ impl Warns for PmsmPlant {
         if map.used && !map.holds(psi - Dq::new(self.warm.motor.psi_M, 0.0)) {
             log.warn("flux_map", || {
                 format!(
-                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map: the inductances of its edge go on there; limit the current, \
-                     or fit a map to a table of greater currents",
+                    "psi_d = {} Wb, psi_q = {} Wb is beyond the flux map, which continues with the inductances of its edge; limit the \
+                     current, or fit a map to a table with larger currents",
                     psi.d(),
                     psi.q()
                 )
@@ -274,137 +283,37 @@ impl Warns for PmsmPlant {
     }
 }
 
+type V = Row<Block<PmsmPlant>>;
+
+/// All variables of `PmsmPlant`.
+const TABLE: &Table<Block<PmsmPlant>> = table![
+    V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| { &mut m.model.inputs.u.a }),
+    V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
+    V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
+    V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
+    V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
+        &mut m.model.inputs.enable
+    })
+    .optional(),
+    V::boolean_input(
+        "asc",
+        "Active short circuit: all upper or all lower transistors conduct, regardless of enable",
+        |m| &mut m.model.inputs.asc,
+    )
+    .optional(),
+    V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
+        &mut m.model.inputs.tau_load
+    }),
+    V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
+        .read_with("mechanics.imposed", "true"),
+    V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
+        .unbounded()
+        .read_with("mechanics.imposed", "true"),
+    V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
+    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
+    V::part("", &Part { table: FLUX, lens: |m| m.model.flux_mut() }),
+    V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
+];
+
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use drive_base::frame::AlphaBeta;
-
-    /// Current (A) of `motor` after each of 20 samples of 0.1 ms in steps of `h`, at the `speed` (rad/s), with a voltage that
-    /// jumps at every sample.
-    pub(super) fn currents(motor: &Motor, speed: f64, h: f64) -> Vec<Dq> {
-        let mut block = Block::<PmsmPlant>::default();
-        block.model.parameters.motor = motor.clone();
-        (block.model.parameters.initial.speed, block.model.parameters.mechanics.J) = (speed, 1e-2);
-        block.initialize();
-        let w = f64::from(motor.n_p) * speed;
-        let mut now = Elapsed::ZERO;
-        let sample = |k: u32| {
-            let theta = w * 1e-4 * f64::from(k) + 1.8;
-            let e = motor.psi_M * w;
-            block.model.inputs.u_dc = 1e4;
-            block.model.inputs.u =
-                Phases::from_stator(AlphaBeta::new(e * theta.cos(), e * theta.sin() + f64::from(k % 3)));
-            let mut done = 0.0;
-            while done < 1e-4 - 0.5 * h {
-                let step = Step { start: now, h };
-                block.step(&step).unwrap();
-                now = step.end();
-                done += h;
-            }
-            Dq::new(block.out.i_d, block.out.i_q)
-        };
-        (0..20).map(sample).collect()
-    }
-
-    #[test]
-    fn a_step_of_a_sample_period_is_as_good_as_64() {
-        // With two steps in rotor axes instead of one in stator axes, the errors are 8.5, 0.9 and 92 uA.
-        let servo = Motor { n_p: 4, R_s: 0.2, L_d: 1.2e-3, L_q: 1.2e-3, psi_M: 0.09 };
-        // At 20 000 rpm, the rotor turns 0.84 rad in a sample: four steps.
-        for (motor, rpm, allowed) in [
-            (&Motor::default(), 4500.0, 2e-6),
-            (&Motor::IPMSM_2_2_KW, 3000.0, 3e-7),
-            (&servo, 4500.0, 1e-5),
-            (&servo, 20_000.0, 1e-5),
-        ] {
-            let speed = rpm * std::f64::consts::PI / 30.0;
-            let (coarse, fine) = (currents(motor, speed, 1e-4), currents(motor, speed, 1e-4 / 64.0));
-            let error = coarse.iter().zip(&fine).map(|(&a, &b)| (a - b).magnitude()).fold(0.0, f64::max);
-            assert!(error < allowed && error > 0.0, "{error} A with {motor:?} at {rpm} rpm");
-            assert!(fine[19].magnitude() > 0.1, "the current is not trivial: {:?}", fine[19]);
-        }
-    }
-
-    #[test]
-    fn a_voltage_that_depends_on_the_currents_is_integrated_in_short_steps() {
-        // Within 2 ms, the phase currents pass the zone of the dead time, +-0.5 A.
-        let after = |h: f64, steps: u32| {
-            let mut block = Block::<PmsmPlant>::default();
-            let PlantParameters { inverter, initial, .. } = &mut block.model.parameters;
-            (inverter.dead_time, inverter.i_zero, initial.speed) = (4e-6, 0.5, 200.0);
-            block.model.inputs.u = Phases::from_stator(AlphaBeta::new(-80.0, 60.0));
-            block.initialize();
-            let mut now = Elapsed::ZERO;
-            for _ in 0..steps {
-                let step = Step { start: now, h };
-                block.step(&step).unwrap();
-                now = step.end();
-            }
-            Dq::new(block.out.i_d, block.out.i_q)
-        };
-        let (coarse, fine) = (after(2e-3, 1), after(1e-6, 2000));
-        let error = (coarse - fine).magnitude();
-        // The kinks at the edges of the zone cost the method its order: 0.6 mA; with substeps of 400 us, 4 mA.
-        assert!(error < 1e-3 && fine.magnitude() > 1.0, "{error} A, {fine:?}");
-    }
-
-    #[test]
-    fn dead_time_stops_a_current_at_zero() {
-        // A voltage below u_dead, 6.5 V, in every leg drives no more than the zone's current, however narrow the zone is.
-        for i_zero in [0.1, 1e-3] {
-            let mut block = Block::<PmsmPlant>::default();
-            let inverter = &mut block.model.parameters.inverter;
-            (inverter.dead_time, inverter.i_zero) = (2e-6, i_zero);
-            block.model.inputs.u = Phases { a: 4.0, b: -2.0, c: -2.0 };
-            block.initialize();
-            let mut now = Elapsed::ZERO;
-            for _ in 0..100 {
-                let step = Step { start: now, h: 1e-4 };
-                block.step(&step).unwrap();
-                now = step.end();
-                assert!(block.out.i.a.abs() < i_zero, "{} A with a zone of {i_zero} A", block.out.i.a);
-            }
-        }
-    }
-
-    #[test]
-    fn power_is_balanced() {
-        // Over 20 ms: electrical energy in = copper loss + friction + change of magnetic and kinetic energy.
-        let mut block = Block::<PmsmPlant>::default();
-        block.model.inputs.u = Phases { a: 20.0, b: -10.0, c: -10.0 };
-        block.model.parameters.motor.L_q = 9e-3;
-        block.model.parameters.initial.theta_e = 0.9;
-        block.initialize();
-        let energy = |b: &Block<PmsmPlant>| {
-            let PlantParameters { motor, mechanics, .. } = &b.model.parameters;
-            let (i_d, i_q) = (b.out.i_d, b.out.i_q);
-            0.75 * (motor.L_d * i_d * i_d + motor.L_q * i_q * i_q) + 0.5 * mechanics.J * b.out.speed * b.out.speed
-        };
-        let power = |b: &Block<PmsmPlant>| {
-            let u = b.model.inputs.u;
-            let input = u.a * b.out.i.a + u.b * b.out.i.b + u.c * b.out.i.c;
-            let loss = 1.5 * b.model.parameters.motor.R_s * (b.out.i_d * b.out.i_d + b.out.i_q * b.out.i_q);
-            input - loss - b.model.parameters.mechanics.friction(b.out.speed) * b.out.speed
-        };
-        let (mut now, mut work, mut last) = (Elapsed::ZERO, 0.0, power(&block));
-        let h = 1e-6;
-        for _ in 0..20_000 {
-            let step = Step { start: now, h };
-            block.step(&step).unwrap();
-            now = step.end();
-            let next = power(&block);
-            work += 0.5 * h * (last + next);
-            last = next;
-        }
-        assert!((energy(&block) - work).abs() < 1e-6 * work.abs(), "{} J stored, {work} J net in", energy(&block));
-        assert!(energy(&block) > 0.01);
-    }
-
-    #[test]
-    fn a_step_beyond_all_measure_is_refused() {
-        let mut block = Block::<PmsmPlant>::default();
-        block.initialize();
-        let fault = block.step(&Step { start: Elapsed::ZERO, h: 1e300 }).unwrap_err();
-        assert!(fault.message().contains("at most 1000 s"), "{fault}");
-    }
-}
+mod tests;

@@ -8,17 +8,17 @@
 //!
 //! u_x is the voltage that the leg supplies on average over a PWM period, after the hexagon limit and the dead-time
 //! loss, or the voltage of its diodes while the gates are off, but before the drop of its devices
-//! ([`losses`](crate::losses)). With a switching loss, i_dc is greater by p_sw / u_dc. The magnetic energy is
+//! ([`losses`](crate::losses)). A switching loss increases i_dc by p_sw / u_dc. The magnetic energy is
 //! 0.75 (L_d i_d^2 + L_q i_q^2) without saturation. With an imposed speed, tau_shaft is tau_e minus friction and the
 //! kinetic energy belongs to the drive train; otherwise tau_shaft is tau_load, and J stores the rest.
 //!
-//! With a held voltage and a turning rotor, power and torque change within the step, so an instantaneous value does not
-//! represent them. The outputs are therefore means over the plant's last step, integrated with the state by the same
-//! method; `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
+//! With a constant voltage and a turning rotor, power and torque change within the step, so an instantaneous value does not
+//! represent them. The outputs are therefore means over the plant's last step, integrated by the same method as the state;
+//! `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
 //! tau_shaft over the angle of its shaft receives `energy_mech`. Before the first step, the powers are the initial values.
 //! In Model Exchange, where the importer integrates, the powers and tau_shaft are those of the instant, and the energies are
-//! counted over the importer's steps ([`counters`](crate::counters)). i_dc is also defined for u_dc = 0 V: the link still carries
-//! the current of the legs connected to it; in this case it is the value at the end of the step.
+//! counted over the importer's steps ([`counters`](crate::counters)). i_dc is also defined for u_dc = 0 V, where the link
+//! still carries the current of the legs connected to it: it is then the value at the end of the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
 //! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.
@@ -26,12 +26,9 @@
 //! These are definitions; the balance is derived from the voltage equation of [`machine`](crate::machine) and
 //! tested.
 
-use crate::legs::Legs;
 use crate::losses::{LOSSES, Losses};
-use crate::signals::{Gates, PlantInputs};
-use drive_base::frame::Phases;
 use fmu_core::unit::{AMPERE, JOULE, WATT};
-use fmu_core::{Part, Row, Scalar, Table, table};
+use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// Powers; motor sign, from the DC link to the load.
@@ -52,27 +49,19 @@ pub struct Powers<S = f64> {
 }
 
 impl Powers {
-    /// Means over a step of `h` (s) in which `energy` passed, with its `losses` and the mean torque `tau_shaft` (N.m); `i` gives
-    /// the stator currents (A) at its end.
+    /// Means over a step of `h` (s) with this `energy` and these `losses` (J) and the mean torque `tau_shaft` (N.m); `i_dc` gives
+    /// the current (A) from the DC link at the power from there (W).
     #[inline]
-    pub fn mean(
-        energy: &Energy,
-        losses: Losses,
-        tau_shaft: f64,
-        h: f64,
-        inputs: &PlantInputs,
-        legs: &Legs,
-        i: impl FnOnce() -> Phases,
-    ) -> Self {
+    pub fn mean(energy: &Energy, losses: Losses, tau_shaft: f64, h: f64, i_dc: impl FnOnce(f64) -> f64) -> Self {
         // -0 W, the product of no current and a negative voltage, is 0 W.
         let rate = 1.0 / h;
         let p_in = energy.r#in * rate + 0.0;
-        let i_dc = dc_current(p_in, inputs, legs, i);
+        let i_dc = i_dc(p_in);
         let (p_mech, p_loss) = (energy.mech * rate, energy.loss * rate);
         Self { i_dc, p_in, p_mech, p_loss, losses: losses.map(|e| e * rate), tau_shaft }
     }
 
-    /// The mean of this value and `last`, which has the weight `share` (0..1).
+    /// The mean of this value and `last`, with the weight `share` (0..1) on `last`.
     #[inline]
     pub fn with(self, last: Self, share: f64) -> Self {
         let mean = |a: f64, b: f64| a + (b - a) * share;
@@ -87,23 +76,6 @@ impl Powers {
     }
 }
 
-/// Current (A) that the inverter draws from the DC link at the power `p_in` (W), or without a link voltage with the
-/// stator currents `i` (A).
-#[inline]
-pub fn dc_current<S: Scalar>(p_in: S, inputs: &PlantInputs<S>, legs: &Legs<S>, i: impl FnOnce() -> Phases<S>) -> S {
-    if inputs.u_dc.value() > 0.0 { p_in / inputs.u_dc } else { link_current(inputs, legs, i()) }
-}
-
-/// [`dc_current`] without a link voltage.
-fn link_current<S: Scalar>(inputs: &PlantInputs<S>, legs: &Legs<S>, i: Phases<S>) -> S {
-    let (u, span, zero) = (&inputs.u, inputs.u.span(), S::from(0.0));
-    let switches = inputs.gates() == Gates::Switch;
-    let full = if inputs.u_dc.value() > span.value() { inputs.u_dc } else { span };
-    // The currents sum to zero, so a common part of the voltages has no power.
-    let apparent = if switches { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
-    if full.value() > 0.0 { apparent / full - legs.feed(i) + zero } else { zero - legs.feed(i) }
-}
-
 /// Transferred energy in J; motor sign, from the DC link to the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
@@ -116,7 +88,7 @@ pub struct Energy {
 }
 
 impl From<Powers> for Energy {
-    /// What a second at these powers passes on.
+    /// The energies of one second at these powers.
     fn from(powers: Powers) -> Self {
         Self { r#in: powers.p_in, mech: powers.p_mech, loss: powers.p_loss }
     }
@@ -177,7 +149,7 @@ pub const ENERGY: &Table<Energy> = table![
         "in",
         &JOULE,
         "Energy from the DC link since the start, the integral of p_in; in Model Exchange up to the last completed integrator step \
-                 or event, as exact as in Co-Simulation with inputs that are held or ramp between two of them",
+                 or event, as exact as in Co-Simulation if inputs are constant or linear between two of them",
         |e| &mut e.r#in,
     ),
     E::output(

@@ -5,9 +5,9 @@
 //!
 //! s_2 > 0 distinguishes the magnet's poles: a positive d-axis current (x > 0) sees a smaller inductance than a
 //! negative one.
-//! Limits: the polynomial is usable about as long as d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 is positive.
+//! Limits: the polynomial is usable roughly as long as d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 is positive.
 //!
-//! Neither paper includes saturation: this polynomial is chosen here because it has an energy. Flux linkages in Wb, s_2
+//! Neither paper includes saturation; this polynomial was chosen because it has an energy. Flux linkages in Wb, s_2
 //! and s_dq in A/Wb2, s_3 in A/Wb3.
 
 use drive_base::frame::{Dq, Rotor, Vector};
@@ -49,7 +49,7 @@ impl Saturation {
         [by_d, self.s_dq * q, 1.0 / motor.L_q + self.s_dq * x]
     }
 
-    /// The energy (J) beyond the linear machine's at the flux linkage `psi` (Wb): 1.5 of the integral of i d psi.
+    /// The energy (J) beyond the linear machine's at the flux linkage `psi` (Wb): 1.5 times the integral of i d psi.
     #[inline]
     pub fn energy(&self, motor: &Motor, psi: Dq) -> f64 {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());
@@ -87,10 +87,10 @@ mod tests {
             let direction = Dq::new(angle.cos(), angle.sin());
             1.0 / by(direction * h).dot(direction)
         };
-        let least = (0..3600).map(|k| of(f64::from(k).to_radians() / 10.0)).fold(f64::INFINITY, f64::min);
+        let lowest = (0..3600).map(|k| of(f64::from(k).to_radians() / 10.0)).fold(f64::INFINITY, f64::min);
         assert!(
-            (machine::least_inductance(&motor, Magnetics::Polynomial(&s), psi) / least - 1.0).abs() < 1e-5,
-            "{least} H"
+            (machine::least_inductance(&motor, Magnetics::Polynomial(&s), psi) / lowest - 1.0).abs() < 1e-5,
+            "{lowest} H"
         );
         let along = |x: f64| current(Dq::new(motor.psi_M + x, 0.0)).d();
         assert!(along(0.1) > 0.0 && along(0.1) > -along(-0.1));

@@ -1,5 +1,7 @@
 //! Inputs and outputs of the plant.
 
+use crate::inverter::Gates;
+use crate::legs::Legs;
 use crate::losses::efficiency;
 use crate::power::{Energy, Powers};
 use crate::thermal::{Heat, Temperatures, ThermalInputs};
@@ -9,18 +11,7 @@ use drive_base::modulation::limit_to_hexagon;
 use fmu_core::{Dual, Scalar};
 use serde::{Deserialize, Serialize};
 
-/// What the transistors of the inverter do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Gates {
-    /// They switch, and make the voltage references.
-    Switch,
-    /// All upper or all lower ones conduct: the terminals of the machine are short-circuited.
-    Short,
-    /// None conducts; only the diodes do.
-    Off,
-}
-
-/// Inputs, held over a communication step.
+/// Inputs, constant over a communication step.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlantInputs<S = f64> {
     /// Stator voltage references in V, averages over a PWM period.
@@ -35,7 +26,7 @@ pub struct PlantInputs<S = f64> {
     pub angle_shaft: S,
     /// Whether the gates switch; false: only the diodes conduct.
     pub enable: bool,
-    /// Active short circuit: all upper or all lower transistors conduct, whatever `enable` says.
+    /// Active short circuit: all upper or all lower transistors conduct, regardless of `enable`.
     pub asc: bool,
     /// Temperatures in K.
     pub thermal: ThermalInputs<S>,
@@ -49,7 +40,7 @@ impl Default for PlantInputs {
 }
 
 impl<S: Scalar> PlantInputs<S> {
-    /// What the transistors do.
+    /// What the transistors do under these inputs.
     #[inline]
     pub fn gates(&self) -> Gates {
         if self.asc {
@@ -67,7 +58,7 @@ impl<S: Scalar> PlantInputs<S> {
         !(self.enable || self.asc)
     }
 
-    /// Voltage (V) that the legs make, before any drop.
+    /// Voltage (V) of the legs before any drop.
     #[inline]
     pub fn voltage(&self) -> Vector<Stator, S> {
         match self.gates() {
@@ -75,10 +66,27 @@ impl<S: Scalar> PlantInputs<S> {
             Gates::Short | Gates::Off => Vector::fixed(Vector::ZERO),
         }
     }
+
+    /// Current (A) that the inverter draws from the DC link at the power `p_in` (W), or without a link voltage with the stator
+    /// currents `i` (A).
+    #[inline]
+    pub fn dc_current(&self, p_in: S, legs: &Legs<S>, i: impl FnOnce() -> Phases<S>) -> S {
+        if self.u_dc.value() > 0.0 { p_in / self.u_dc } else { self.link_current(legs, i()) }
+    }
+
+    /// [`dc_current`](Self::dc_current) without a link voltage.
+    fn link_current(&self, legs: &Legs<S>, i: Phases<S>) -> S {
+        let (u, span, zero) = (&self.u, self.u.span(), S::from(0.0));
+        let switches = self.gates() == Gates::Switch;
+        let full = if self.u_dc.value() > span.value() { self.u_dc } else { span };
+        // The currents sum to zero, so a common part of the voltages has no power.
+        let apparent = if switches { (u.a - u.c) * i.a + (u.b - u.c) * i.b } else { zero };
+        if full.value() > 0.0 { apparent / full - legs.feed(i) + zero } else { zero - legs.feed(i) }
+    }
 }
 
 impl PlantInputs {
-    /// Takes the voltages and the gates that a controller commands.
+    /// Applies the voltages and gates that a controller commands.
     #[inline]
     pub fn apply(&mut self, Commanded { u, enable, asc }: Commanded) {
         (self.u, self.enable, self.asc) = (u, enable, asc);
@@ -95,7 +103,7 @@ impl PlantInputs {
         self.zip(along, Dual::new)
     }
 
-    /// On the straight line from these inputs to those at its `end`, at the `share` (0..1) of the way; the gates stay.
+    /// Inputs at the `share` (0..1) of the straight line from these to those at its `end`; the gates stay.
     pub fn toward(&self, end: &Self, share: f64) -> Self {
         self.zip(end, |a, b| a + (b - a) * share)
     }
@@ -146,7 +154,7 @@ pub struct PlantOutputs<S = f64> {
 }
 
 impl PlantOutputs {
-    /// What sensors measure of these outputs.
+    /// Measured values for a controller.
     #[inline]
     pub fn measured(&self) -> Measured {
         Measured { i: self.i, theta_e: self.theta_e, speed: self.speed }
@@ -159,7 +167,7 @@ impl PlantOutputs {
 }
 
 impl PlantOutputs<Dual> {
-    /// The change of the outputs; no energy changes.
+    /// The change of the outputs; the energies do not change.
     pub fn change(&self) -> PlantOutputs {
         let Self { i, powers, .. } = self;
         PlantOutputs {

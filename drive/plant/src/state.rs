@@ -1,8 +1,10 @@
-//! The state of machine and shaft, and an instant of it.
+//! The state of machine and shaft, an instant of it, and a point of the importer's solution.
 
+use crate::signals::PlantInputs;
 use drive_base::frame::{Axis, Dq, Rotor, Vector};
 use drive_base::math::all_finite;
 use drive_base::motor::Motor;
+use fmu_core::Elapsed;
 use serde::{Deserialize, Serialize};
 
 /// The state of machine and shaft.
@@ -29,7 +31,7 @@ impl State {
     }
 
     /// For messages.
-    pub(super) fn tell(&self) -> String {
+    pub(super) fn described(&self) -> String {
         let Self { psi, speed, angle, .. } = self;
         format!("psi_d = {} Wb, psi_q = {} Wb, speed = {speed} rad/s, angle = {angle} rad", psi.d(), psi.q())
     }
@@ -41,7 +43,7 @@ pub(super) fn axis_at(motor: &Motor, angle: f64) -> Axis<Rotor> {
     Axis::at(f64::from(motor.n_p) * angle)
 }
 
-/// The state at an instant, with or without its change.
+/// The state at an instant; as [`Dual`](fmu_core::Dual) numbers, with its change.
 pub(super) struct Instant<S = f64> {
     /// Stator flux linkage in Wb.
     pub(super) psi: Vector<Rotor, S>,
@@ -55,4 +57,14 @@ pub(super) struct Instant<S = f64> {
     pub(super) axis: Axis<Rotor, S>,
     /// The diodes block: there is no current at the terminals.
     pub(super) idle: bool,
+}
+
+/// Model Exchange: a point of the solution that the importer accepted.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Accepted {
+    pub(super) time: Elapsed,
+    pub(super) inputs: PlantInputs,
+    pub(super) state: State,
+    /// Integral of the torque of the shaft up to here.
+    pub(super) impulse: f64,
 }

@@ -21,14 +21,14 @@ use nalgebra::SVector;
 /// Maximum number of substeps in one communication step: 1000 s of simulated time.
 const MAX_SUBSTEPS: f64 = 1e7;
 
-/// Greatest electrical speed in rad/s, 160 kHz: nine times that of the fastest drives there are, which turn at a million rpm
-/// with one pole pair. Only a diverging coupling gets there. It bounds the work of a step, whatever the inputs are: at most
-/// 4e6 integration steps per second of its size, and 16e6 with losses.
+/// Maximum electrical speed in rad/s, 160 kHz: nine times that of the fastest drives, which turn at a million rpm with one
+/// pole pair. Only a diverging coupling reaches it. It bounds the work of a step for any inputs: at most 4e6 integration
+/// steps per second of its size, and 16e6 with losses.
 const FASTEST: f64 = 1e6;
 
 impl PmsmPlant {
-    /// The state at the beginning of a step and what passes until it is reached: an imposed shaft takes the angle of the
-    /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
+    /// The state at the beginning of a step, and the energy transferred on the way there: an imposed shaft takes the angle of
+    /// the drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
@@ -48,11 +48,11 @@ impl PmsmPlant {
     }
 
     /// Number of integration steps in a step of `h` (s) that begins at the mechanical `speed` (rad/s), with a voltage that
-    /// follows the currents.
+    /// depends on the currents.
     pub(super) fn substeps(&self, h: f64, speed: f64, legs: &Legs, switches: &Switches) -> Result<f64, Fault> {
         let inverter = &self.parameters.inverter;
         let longest = if switches.kinks() {
-            // Half of a time constant in the zone: no kink is looked for, so that the energies need shorter steps.
+            // Half a time constant in the zone: kinks are not searched, so the energies need shorter steps.
             0.5 * LONGEST_STEP.min(legs.time(self.warm.least_inductance, inverter.devices.threshold()))
         } else {
             LONGEST_STEP
@@ -81,7 +81,7 @@ impl PmsmPlant {
         let (motor, machine) = (&self.warm.motor, self.machine::<false>());
         let shaft = self.shaft(start.speed);
         let Some(lost) = self.remaining(start, legs) else {
-            let dissipation = Dissipation::at(&self.parameters, machine.resistance(), machine.electrical(start.speed));
+            let dissipation = self.parameters.dissipation(machine.resistance(), machine.electrical(start.speed));
             let path = Path { u: AlphaBeta::ZERO, dissipation, drops: switches };
             return self.integrate_switches(start, h, &Circuit { machine, path, shaft });
         };
@@ -182,7 +182,7 @@ impl PmsmPlant {
         Ok((state, passed))
     }
 
-    /// Whether one integration step does for `h` (s) at the electrical speed `w` (rad/s).
+    /// Whether one integration step suffices for `h` (s) at the electrical speed `w` (rad/s).
     #[inline]
     fn is_one_step(h: f64, w: f64) -> bool {
         h <= LONGEST_STEP && w.abs() * h <= LARGEST_TURN
@@ -193,7 +193,7 @@ impl PmsmPlant {
     fn advance_general(&mut self, h: f64) -> Result<(), Fault> {
         let conducts = !self.inputs.is_off();
         let legs = self.legs(&self.inputs);
-        let switches = Switches::of(&self.parameters, &self.inputs, legs);
+        let switches = self.switches(&self.inputs, legs);
         let (mut state, mut passed) = self.at_the_shaft();
         let count = self.substeps(h, state.speed, &legs, &switches)?;
         let (mut lost, mut by_iron) = (None, Dq::ZERO);
@@ -223,7 +223,7 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// A communication step of `h` (s) with temperatures that stay.
+    /// A communication step of `h` (s) at constant temperatures.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     pub(super) fn advance_at_temperature(&mut self, h: f64) -> Result<(), Fault> {
@@ -235,7 +235,7 @@ impl PmsmPlant {
         self.conclude(h, state, &passed, false, &legs)
     }
 
-    /// A communication step of `h` (s) with temperatures that change.
+    /// A communication step of `h` (s) with changing temperatures.
     #[inline(never)]
     pub(super) fn advance_with_temperatures(&mut self, h: f64) -> Result<(), Fault> {
         let mode = self.parameters.thermal.mode;
@@ -249,7 +249,7 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// Takes the `state` at the end of a step of `h` (s) and what `passed` in it.
+    /// Sets the `state` at the end of a step of `h` (s), in which `passed` was transferred.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     pub(super) fn conclude(
@@ -270,7 +270,8 @@ impl PmsmPlant {
         (self.state, self.blocked) = (state, blocked);
         self.energy.add(energy);
         let tau_shaft = self.parameters.mechanics.tau_shaft(passed.impulse * (1.0 / h), self.inputs.tau_load);
-        self.powers = Powers::mean(energy, passed.losses, tau_shaft, h, &self.inputs, legs, || self.currents());
+        let i_dc = |p_in| self.inputs.dc_current(p_in, legs, || self.currents());
+        self.powers = Powers::mean(energy, passed.losses, tau_shaft, h, i_dc);
         Ok(())
     }
 
@@ -298,8 +299,8 @@ impl PmsmPlant {
     #[inline(never)]
     pub(super) fn diverged(&self, h: f64) -> Fault {
         Fault::new(format!(
-            "the machine's state left the finite numbers within a step of {h} s; the step before it ended with {}",
-            self.state.tell()
+            "the machine's state is no longer finite after a step of {h} s; the previous step ended with {}",
+            self.state.described()
         ))
     }
 
@@ -319,7 +320,7 @@ mod tests {
     use drive_base::frame::Phases;
     use fmu_core::{Block, Elapsed, Step};
 
-    /// With the gates off, the current flows back through the diodes, then these block, and what is left is lost in the copper.
+    /// With the gates off, the current flows back through the diodes until these block; the rest is lost in the copper.
     #[test]
     fn every_loss_is_in_the_sum() {
         let mut block = Block::<PmsmPlant>::default();

@@ -3,17 +3,17 @@
 use crate::flux_map::{FLUX_MAP, FluxMap};
 use crate::inverter::{INVERTER, Inverter};
 use crate::iron::{IRON, Iron};
+use crate::losses::flow::{Dissipation, Winding};
 use crate::machine::Magnetics;
 use crate::mechanics::{MECHANICS, Mechanics};
-use crate::model::PmsmPlant;
 use crate::power::{ENERGY, POWERS};
 use crate::saturation::{SATURATION, Saturation};
 use crate::signals::PlantOutputs;
-use crate::thermal::{THERMAL, THERMAL_INPUTS, THERMAL_OUTPUTS, Thermal};
+use crate::thermal::{HEAT, TEMPERATURES, THERMAL, Thermal};
 use drive_base::frame::Dq;
 use drive_base::motor::{MOTOR, Motor};
-use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, VOLT, WEBER};
-use fmu_core::{Block, Part, Row, Table, table};
+use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, WEBER};
+use fmu_core::{Part, Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
 /// The parameters of machine, inverter and shaft.
@@ -23,7 +23,7 @@ pub struct PlantParameters {
     pub motor: Motor,
     /// Its saturation.
     pub saturation: Saturation,
-    /// A map in place of inductances and saturation.
+    /// A map instead of inductances and saturation.
     pub flux_map: FluxMap,
     /// Inertia and friction.
     pub mechanics: Mechanics,
@@ -40,7 +40,7 @@ pub struct PlantParameters {
 }
 
 impl PlantParameters {
-    /// How the current follows from the flux linkage.
+    /// The relation between current and flux linkage.
     #[inline]
     pub fn magnetics(&self) -> Magnetics<'_> {
         if self.flux_map.used {
@@ -52,23 +52,41 @@ impl PlantParameters {
         }
     }
 
-    /// Whether the inductances alone give the current.
+    /// Whether the current follows from the inductances alone.
     #[inline]
     pub fn is_linear(&self) -> bool {
         self.saturation.is_none() && !self.flux_map.used
+    }
+
+    /// Whether the legs are ideal and the constant resistance of the winding is the only loss of the machine, which allows the
+    /// fastest step. Every parameter is named, so a new one does not compile until it is considered here.
+    pub fn is_ideal(&self) -> bool {
+        let Self {
+            motor: _,
+            saturation: _,
+            flux_map: _,
+            inverter,
+            mechanics: _,
+            initial: _,
+            iron,
+            winding,
+            thermal: _,
+        } = self;
+        let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
+        let Winding { k_ac } = winding;
+        *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
+    }
+
+    /// Resistance and conductance with the stator resistance `R_s` (Ohm) at standstill, at the electrical speed `w` (rad/s).
+    #[inline]
+    pub fn dissipation<S: Scalar>(&self, R_s: S, w: S) -> Dissipation<S> {
+        Dissipation::at(&self.winding, &self.iron, R_s, w)
     }
 
     /// The smallest inductance in H, over all states of a map.
     pub fn least_inductance(&self) -> f64 {
         if self.flux_map.used { self.flux_map.least_inductance() } else { self.motor.L_d.min(self.motor.L_q) }
     }
-}
-
-/// The winding beyond its resistance.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Winding {
-    /// Growth of the resistance with the square of the electrical speed, in s2/rad2: R = R_s (1 + k_ac w^2), >= 0.
-    pub k_ac: f64,
 }
 
 /// Initial position and speed of the rotor.
@@ -112,7 +130,8 @@ pub const OUTPUTS: &Table<PlantOutputs> = table![
     )
     .mean(),
     O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
-    O::part("", &Part { table: THERMAL_OUTPUTS, lens: |o| o }),
+    O::part("", &Part { table: TEMPERATURES, lens: |o| &mut o.temperatures }),
+    O::part("", &Part { table: HEAT, lens: |o| &mut o.heat }),
 ];
 
 type P = Row<PlantParameters>;
@@ -163,36 +182,4 @@ type S = Row<Dq>;
 pub const FLUX: &Table<Dq> = table![
     S::state("psi_d", &WEBER, "d-axis stator flux linkage", |psi| psi.parts_mut().0).nominal(0.1),
     S::state("psi_q", &WEBER, "q-axis stator flux linkage", |psi| psi.parts_mut().1).nominal(0.1),
-];
-
-type V = Row<Block<PmsmPlant>>;
-
-/// All variables of `PmsmPlant`.
-pub const TABLE: &Table<Block<PmsmPlant>> = table![
-    V::input("u_a", &VOLT, "Voltage reference of phase a, average over a PWM period", |m| { &mut m.model.inputs.u.a }),
-    V::input("u_b", &VOLT, "Voltage reference of phase b", |m| &mut m.model.inputs.u.b),
-    V::input("u_c", &VOLT, "Voltage reference of phase c", |m| &mut m.model.inputs.u.c),
-    V::input("u_dc", &VOLT, "DC-link voltage", |m| &mut m.model.inputs.u_dc).at_least(0.0),
-    V::boolean_input("enable", "The inverter switches; false: gates off, only the diodes conduct", |m| {
-        &mut m.model.inputs.enable
-    })
-    .optional(),
-    V::boolean_input(
-        "asc",
-        "Active short circuit: all upper or all lower transistors conduct, whatever enable says",
-        |m| &mut m.model.inputs.asc,
-    )
-    .optional(),
-    V::input("tau_load", &NEWTON_METER, "Load torque at the shaft, positive against positive speed", |m| {
-        &mut m.model.inputs.tau_load
-    }),
-    V::input("speed_shaft", &SPEED, "Mechanical speed of the shaft", |m| &mut m.model.inputs.speed_shaft)
-        .read_with("mechanics.imposed", "true"),
-    V::input("angle_shaft", &RADIAN, "Mechanical angle of the shaft", |m| &mut m.model.inputs.angle_shaft)
-        .unbounded()
-        .read_with("mechanics.imposed", "true"),
-    V::part("", &Part { table: THERMAL_INPUTS, lens: |m| &mut m.model.inputs.thermal }),
-    V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
-    V::part("", &Part { table: FLUX, lens: |m| m.model.flux_mut() }),
-    V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
 ];

@@ -1,7 +1,7 @@
 //! Terminals of the plant: connections to its controller, its load, its DC link and its cooling.
 //!
-//! At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum
-//! to zero with those of the connected component. Heat is positive out of the model. The terminals that the controller
+//! At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum to zero with those of
+//! the connected component. Heat is positive out of the model. The terminals that the controller
 //! mirrors are in [`connection`](drive_base::connection).
 
 use drive_base::connection::{PHASES, SENSOR, phases};
@@ -34,7 +34,7 @@ pub(crate) const PLANT: &[Terminal] = &[
 /// The shaft end: the load receives speed and angle and returns its torque.
 pub const SHAFT: Terminal = Terminal::plug(
     "shaft",
-    "The shaft's end, turning freely: speed and angle to the load, the torque that it takes",
+    "The shaft's end, turning freely: speed and angle to the load, torque from the load",
     &[Member::signal("speed"), Member::signal("angle"), Member::outflow("tau").of("tau_load")],
 )
 .drawn(&icon::SHAFT, 100.0, 40.0);
@@ -42,7 +42,7 @@ pub const SHAFT: Terminal = Terminal::plug(
 /// The shaft end in the reverse direction, with `mechanics.imposed`.
 pub const SHAFT_IMPOSED: Terminal = Terminal::plug(
     "shaft_imposed",
-    "The shaft's end with speed and angle imposed by the drive train (mechanics.imposed): the torque that it receives",
+    "The shaft's end with speed and angle imposed by the drive train (mechanics.imposed), and the torque to the drive train",
     &[
         Member::signal("speed").of("speed_shaft"),
         Member::signal("angle").of("angle_shaft"),

@@ -1,5 +1,5 @@
-//! Every parameter of the plant acts, and acts alike in Co-Simulation and in Model Exchange: each is moved away from its start
-//! value, alone and together with another one. An effect that one of the two does not know fails here.
+//! Every parameter of the plant has an effect, and the same one in Co-Simulation and in Model Exchange: each is changed from its
+//! start value, alone and together with another one. An effect that one of the two omits fails here.
 
 use drive_base::frame::{AlphaBeta, Phases};
 use drive_plant::PmsmPlant;
@@ -7,7 +7,7 @@ use drive_plant::tables::{PARAMETERS, PlantParameters};
 use drive_plant::thermal::ThermalMode;
 use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Slot, Step, Table, integrate};
 
-/// Moved values, as a factor of the start value, or as the value itself where the start value has no effect.
+/// Changed values, as a factor of the start value, or as the value itself if the start value has no effect.
 const MOVED: &[(&str, f64)] = &[
     ("saturation.s_2", 20.0),
     ("saturation.s_3", 200.0),
@@ -37,7 +37,7 @@ fn is_elsewhere(name: &str) -> bool {
         || name == "motor.n_p"
 }
 
-/// A parameter that acts only where this one has its moved value.
+/// Parameters whose changed values this one needs to have an effect.
 fn needs(name: &str) -> &'static [&'static str] {
     match name {
         "inverter.i_zero" | "inverter.T_pwm" => &["inverter.dead_time"],
@@ -86,7 +86,7 @@ fn run(names: &[&str], exchange: bool) -> Vec<f64> {
         let step = Step { start: now, h: 1e-4 };
         if exchange {
             let Block { model, out } = &mut block;
-            // The end of the event at which the inputs changed, as an importer tells it.
+            // The end of the event at which the inputs changed, as an importer reports it.
             model.complete(now).unwrap();
             integrate::hybrid::<PmsmPlant, 4>(model, &step, 2e-6).unwrap();
             model.complete(step.end()).unwrap();
@@ -100,7 +100,7 @@ fn run(names: &[&str], exchange: bool) -> Vec<f64> {
         if k == 39 {
             let (energy, heat) = (&out.energy, &out.heat);
             seen.extend([energy.r#in, energy.mech, energy.loss]);
-            // Instantaneous in Model Exchange: compared with itself only.
+            // Instantaneous in Model Exchange: not compared between the two.
             if exchange {
                 seen.extend([out.powers.losses.iron, heat.magnet, out.powers.p_in]);
             }
@@ -109,19 +109,19 @@ fn run(names: &[&str], exchange: bool) -> Vec<f64> {
     seen
 }
 
-/// The greatest difference of two runs, as a share of the values.
+/// The maximum difference of two runs, as a share of the values.
 fn apart(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| (a - b).abs() / (0.05 + a.abs().max(b.abs()))).fold(0.0, f64::max)
 }
 
-/// The names of all parameters that this test moves.
+/// The names of all parameters that this test changes.
 fn names() -> Vec<String> {
     let table: &Table<PlantParameters> = PARAMETERS;
     let names = (0..table.len()).map(|k| table.locate(k).unwrap().0.clone());
     names.filter(|name| !is_elsewhere(name)).collect()
 }
 
-/// Moves these and compares; returns what the first changes.
+/// Changes these and compares the interfaces; returns the effect of the first.
 fn compare(moved: &[&str], without: &[f64]) -> f64 {
     let exchanged = run(moved, true);
     let error = apart(&run(moved, false), &exchanged);
@@ -154,7 +154,7 @@ fn every_pair() {
     let names = names();
     let without = run(&[], true);
     for (k, first) in names.iter().enumerate() {
-        // Each with the three that follow, in turns: all neighbors, and all groups with each other.
+        // Each with three others in turn: all neighbors, and all groups with each other.
         for second in [1, 5, 13].map(|n| &names[(k + n) % names.len()]) {
             let mut moved = needs(first).to_vec();
             moved.extend(needs(second));

@@ -1,4 +1,4 @@
-//! A map of the flux linkage in the plant: of a linear machine, of one that saturates, in both interfaces, over temperature.
+//! Flux maps in the plant: of a linear machine and of one that saturates, in both interfaces, over temperature.
 #![expect(clippy::cast_precision_loss, reason = "a few intervals")]
 
 use drive_base::frame::{Dq, Phases};
@@ -10,7 +10,7 @@ use drive_plant::tables::PlantParameters;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Step, Warns, integrate};
 
-/// The plant with what `set` changes, after 40 steps of 0.1 ms under a voltage that turns, in Co-Simulation or Model Exchange.
+/// The plant after `set` and 40 steps of 0.1 ms under a rotating voltage, in Co-Simulation or Model Exchange.
 fn run(exchange: bool, set: impl Fn(&mut PlantParameters)) -> Block<PmsmPlant> {
     let mut block = Block::<PmsmPlant>::default();
     set(&mut block.model.parameters);
@@ -37,7 +37,7 @@ fn apart(a: &Block<PmsmPlant>, b: &Block<PmsmPlant>) -> f64 {
     of(a).iter().zip(of(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// A map with the inductances of the default machine in the middle that fall outward.
+/// A map with the inductances of the default machine in the middle and lower ones outward.
 fn saturating() -> FluxMap {
     let mut map = linear(&Motor::default(), [-0.2, 0.1], 0.12);
     for (m, row) in map.w.iter_mut().enumerate() {
@@ -54,7 +54,7 @@ fn saturating() -> FluxMap {
 
 #[test]
 fn the_map_of_a_linear_machine_is_that_machine() {
-    // The flux linkage leaves the grid, beyond which the inductances go on.
+    // The flux linkage leaves the grid, beyond which the inductances continue.
     for exchange in [false, true] {
         let map = run(exchange, |par| par.flux_map = linear(&par.motor, [-0.02, 0.01], 0.01));
         let machine = run(exchange, |_| ());
@@ -68,7 +68,7 @@ fn both_interfaces_have_the_map() {
     let (stepped, exchanged) = (run(false, set), run(true, set));
     assert!(apart(&stepped, &exchanged) < 2e-5, "{}", apart(&stepped, &exchanged));
     assert!(apart(&stepped, &run(false, |_| ())) > 0.1, "the map saturates");
-    // Every parameter of the map is felt.
+    // Every parameter of the map has an effect.
     for set in [
         (|par| par.flux_map.d_min -= 0.05) as fn(&mut PlantParameters),
         |par| par.flux_map.d_max += 0.05,

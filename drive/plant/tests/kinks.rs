@@ -1,4 +1,4 @@
-//! Currents and energies with dead time and losses, in steps of a sample period, against steps of a 64th.
+//! Currents and energies with dead time and losses, in steps of a sample period against steps of a 64th.
 
 use drive_base::frame::{AlphaBeta, Phases};
 use drive_base::motor::Motor;
@@ -10,7 +10,7 @@ use fmu_core::{Block, Elapsed, Step};
 const T_S: f64 = 1e-4;
 const DEAD_TIME: f64 = 2e-6;
 
-/// A machine that turns at a constant speed under the voltage for a current, with dead time and with losses or without.
+/// A machine at constant speed under the voltage for a current, with dead time, with or without losses.
 struct Case {
     name: &'static str,
     motor: Motor,
@@ -49,7 +49,7 @@ fn run(case: &Case, parts: u32) -> (Vec<AlphaBeta>, f64) {
     let mut angle = 0.0;
     let mut currents = Vec::new();
     for k in 0..200_u32 {
-        // What a controller with a current of i_q = i would command, with its feedforward of dead time.
+        // The command of a controller for i_q = i, with its feedforward of dead time.
         let ahead = angle * f64::from(m.n_p) + 0.5 * w * T_S;
         let i = case.i * (1.0 + 0.02 * f64::from(k % 7));
         let (u_d, u_q) = (-w * m.L_q * i, m.R_s * i + w * m.psi_M);

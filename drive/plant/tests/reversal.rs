@@ -1,4 +1,4 @@
-//! A reversal under fast acceleration through a narrow zone of Coulomb friction.
+//! Reversal with fast acceleration through a narrow zone of Coulomb friction.
 
 use drive_base::frame::{AlphaBeta, Phases};
 use drive_plant::PmsmPlant;
@@ -29,7 +29,7 @@ fn run(tau_coulomb: f64, dead_time: f64, parts: u32) -> Vec<[f64; 3]> {
 
 #[test]
 fn the_zone_of_coulomb_friction_is_resolved() {
-    // It takes 33 us at 3e4 rad/s2, a third of an integration step.
+    // At 3e4 rad/s2 the zone takes 33 us, a third of an integration step.
     for (tau_coulomb, dead_time) in [(0.1, 0.0), (1.0, 0.0), (0.0, 0.0), (0.1, 2e-6)] {
         let (coarse, fine) = (run(tau_coulomb, dead_time, 1), run(tau_coulomb, dead_time, 64));
         let error = |k: usize| coarse.iter().zip(&fine).map(|(a, b)| (a[k] - b[k]).abs()).fold(0.0, f64::max);

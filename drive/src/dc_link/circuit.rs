@@ -1,16 +1,16 @@
-//! The circuit of the DC link over a piece of time in which the inverter draws a constant current, solved exactly.
+//! The circuit of the DC link over an interval with a constant inverter current, solved exactly.
 //!
 //! ```text
 //! C du/dt = (U - u) / R - u / R_chopper - i          i int u dt = energy of the inverter
 //! ```
 //!
-//! u is an exponential with the time constant tau = C / (1/R + 1/R_chopper), so a stiff source asks for no shorter pieces, and
-//! the integrals of u and u^2, which the energies need, are closed forms. The inverter's energy over the piece is known
-//! from the plant; the current that takes it from this link is the smaller root of a quadratic equation. So no energy is
-//! lost between the two, and at rest u = (U + sqrt(U^2 - 4 R P)) / 2 holds exactly. U is the source's voltage, R its
-//! resistance, with that of the precharge while it acts.
+//! u is an exponential with the time constant tau = C / (1/R + 1/R_chopper), so a stiff source requires no shorter
+//! intervals, and the integrals of u and u^2 for the energies are closed forms. The inverter's energy over the interval is
+//! known from the plant; the current for it is the smaller root of a quadratic equation. So no energy is lost between the
+//! two, and u = (U + sqrt(U^2 - 4 R P)) / 2 holds exactly in steady state. U is the voltage of the source, R its resistance,
+//! including that of the precharge while it is active.
 //!
-//! With x = t / tau and s = du/dt at the beginning:
+//! With x = t / tau and s = du/dt at the start of the interval:
 //!
 //! ```text
 //! u(t) = u_0 + s t phi_1    int u = u_0 t + s t^2 phi_2    int u^2 = u_0^2 t + 2 u_0 s t^2 phi_2 + s^2 t^3 phi_3
@@ -19,8 +19,8 @@
 //!
 //! u, U in V, i in A, R in Ohm, C in F, energies in J.
 
-use crate::dc_link::LinkEnergy;
 use drive_base::math::exp;
+use serde::{Deserialize, Serialize};
 
 /// x below which the series are more exact than the closed forms.
 const SMALL: f64 = 0.01;
@@ -39,6 +39,26 @@ fn phi(x: f64) -> [f64; 3] {
     [gone / x, (x - gone) / (x * x), (x - 2.0 * gone + 0.5 * (1.0 - d * d)) / (x * x * x)]
 }
 
+/// Energies in J.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LinkEnergy {
+    /// From the source.
+    pub source: f64,
+    /// Lost in the resistances of source and precharge.
+    pub resistor: f64,
+    /// Lost in the chopper.
+    pub chopper: f64,
+}
+
+impl LinkEnergy {
+    /// Adds those of an interval.
+    pub(super) fn add(&mut self, piece: &Self) {
+        self.source += piece.source;
+        self.resistor += piece.resistor;
+        self.chopper += piece.chopper;
+    }
+}
+
 /// Source, capacitor and chopper.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Circuit {
@@ -52,7 +72,7 @@ pub(super) struct Circuit {
     pub(super) U: f64,
 }
 
-/// The end of a piece, and what passed in it.
+/// The end of an interval, and the energy and charge transferred in it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Piece {
     /// Voltage in V.
@@ -61,7 +81,7 @@ pub(super) struct Piece {
     pub(super) energy: LinkEnergy,
     /// Charge from the source in C.
     pub(super) charge: f64,
-    /// Energy in J that the inverter took, and that the link could not give.
+    /// Energy in J that the inverter took but the link could not supply.
     pub(super) owed: f64,
 }
 
@@ -71,13 +91,13 @@ impl Circuit {
         ((self.U - u) * self.source - u * self.chopper) / self.C
     }
 
-    /// Change of the voltage (V) that a constant current `i` (A) makes in `t` (s).
+    /// Change of the voltage (V) by a constant current `i` (A) in `t` (s).
     pub(super) fn change(&self, t: f64, i: f64) -> f64 {
         let [phi_1, ..] = phi(t * (self.source + self.chopper) / self.C);
         i.abs() * t * phi_1 / self.C
     }
 
-    /// From the voltage `u` (V) on over `t` (s), in which the inverter takes `energy` (J).
+    /// Starts at the voltage `u` (V) and covers `t` (s), in which the inverter takes `energy` (J).
     pub(super) fn over(&self, u: f64, t: f64, energy: f64) -> Piece {
         let &Self { C, source, chopper, U } = self;
         let [phi_1, phi_2, phi_3] = phi(t * (source + chopper) / C);

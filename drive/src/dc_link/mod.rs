@@ -4,19 +4,20 @@
 //! C du/dt = i_source - i_chopper - i_dc      i_source = (u_dc - u) / R      i_chopper = u / R_chopper while it is on
 //! ```
 //!
-//! `u_dc` is then the voltage of the source, the inverter and the controller see the capacitor's voltage u. With
-//! `dc_link.R_precharge` the capacitor is empty at the start and charges through this resistance besides R_source, until a
-//! sample measures 95 % of the source's voltage; the controller rests until then. The chopper switches on at
+//! `u_dc` is then the voltage of the source; inverter and controller have the capacitor's voltage u. With
+//! `dc_link.R_precharge` the capacitor is empty at the start and charges through this resistance in series with R_source,
+//! until a sample measures 95 % of the source's voltage; until then, the controller rests. The chopper switches on at
 //! `chopper.u_on` and off at `chopper.u_off`.
 //!
-//! In Co-Simulation the link advances with each piece of the plant's steps, from the energy that passed in it
-//! (`circuit`); the plant sees the voltage of the beginning of the piece. In Model Exchange u is a continuous state, the
-//! chopper's switching is a state event, and the energies are those of the same circuit between two points of the solution.
+//! In Co-Simulation the link advances with each interval of the plant's steps, from the energy transferred in it (`circuit`);
+//! the plant has the voltage at the start of the interval. In Model Exchange u is a continuous state, the switching of the
+//! chopper is a state event, and the energies are those of the same circuit between two points of the solution.
 
 mod circuit;
 mod parameters;
 pub mod ripple;
 
+pub use circuit::LinkEnergy;
 use circuit::{Circuit, Piece};
 use fmu_core::unit::{AMPERE, JOULE, VOLT, WATT};
 use fmu_core::{Account, Dual, Elapsed, Kept, Row, Scalar, Table, table};
@@ -26,39 +27,20 @@ use serde::{Deserialize, Serialize};
 /// Share of the source's voltage at which the precharge ends.
 const CHARGED: f64 = 0.95;
 
-/// Most switchings of the chopper in a piece; from then on it stays as it is until the end of the piece.
-const MOST_SWITCHINGS: u32 = 1000;
+/// Maximum number of switchings of the chopper in an interval; then it stays as it is until the end.
+const MAX_SWITCHINGS: u32 = 1000;
 
-/// Shift of the indicator in the direction of what the chopper does, so that it never stays at 0.
+/// Shift of the indicator toward the chopper's present state, so that it never stays at 0.
 const SHIFT: f64 = 1e-9;
 
-/// Largest change of the voltage in a piece by the current of the inverter, as a share.
+/// Maximum change of the voltage in an interval by the current of the inverter, as a share.
 const LARGEST_CHANGE: f64 = 0.1;
 
-/// Most pieces in a sample period.
-const MOST_PARTS: f64 = 50.0;
+/// Maximum number of intervals in a sample period.
+const MAX_PARTS: f64 = 50.0;
 
-/// Bisections that find a switching.
+/// Number of bisections to find a switching.
 const BISECTIONS: u32 = 40;
-
-/// Energies since the start in J.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct LinkEnergy {
-    /// From the source.
-    pub source: f64,
-    /// Lost in the resistances of source and precharge.
-    pub resistor: f64,
-    /// Lost in the chopper.
-    pub chopper: f64,
-}
-
-impl LinkEnergy {
-    fn add(&mut self, piece: &Self) {
-        self.source += piece.source;
-        self.resistor += piece.resistor;
-        self.chopper += piece.chopper;
-    }
-}
 
 /// State of the link.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -71,20 +53,20 @@ pub struct Link {
     pub chops: bool,
     /// Since the start.
     pub energy: LinkEnergy,
-    /// Duration in s of the communication step, and in it the charge from the source in C and the energy of the chopper in J.
+    /// Length in s of the communication step, and within it the charge from the source in C and the energy of the chopper in J.
     h: f64,
     charge: f64,
     chopped: f64,
     /// Energy in J that the inverter took from an empty capacitor.
     owed: f64,
     /// Model Exchange: the last point of the solution, and the counts of earlier ones.
-    point: Point,
-    kept: Kept<(LinkEnergy, Point)>,
+    point: Counted,
+    kept: Kept<(LinkEnergy, Counted)>,
 }
 
-/// A point of the importer's solution.
+/// The last point of the importer's solution, up to which the energies are counted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-struct Point {
+struct Counted {
     time: Elapsed,
     u: f64,
     /// Voltage of the source in V.
@@ -108,7 +90,8 @@ impl Link {
         }
         let precharges = par.dc_link.R_precharge > 0.0;
         let u = if precharges { 0.0 } else { u_dc };
-        let mut link = Self { u, precharges, point: Point { u, source: u_dc, ..Point::default() }, ..Self::default() };
+        let mut link =
+            Self { u, precharges, point: Counted { u, source: u_dc, ..Counted::default() }, ..Self::default() };
         link.event(par);
         link
     }
@@ -150,21 +133,21 @@ impl Link {
         (self.h, self.charge, self.chopped) = (h, 0.0, 0.0);
     }
 
-    /// The longest piece in s, of `h` (s) that are left of a sample period `T_s` (s), in which the inverter with the current
-    /// `i_dc` (A) changes the voltage by a tenth at most: it sees that of the beginning. A stiff source holds the voltage,
-    /// however small the capacitor is.
+    /// The maximum interval in s, within the remaining `h` (s) of a sample period `T_s` (s), in which the current `i_dc` (A) of
+    /// the inverter changes the voltage by at most a tenth: the inverter has the voltage at its start. A stiff source keeps
+    /// the voltage, however small the capacitor is.
     #[inline(never)]
     pub fn longest(&self, par: &LinkParameters, h: f64, T_s: f64, i_dc: f64) -> f64 {
         let parts = (self.circuit(par, 0.0).change(h, i_dc) / (LARGEST_CHANGE * self.u)).ceil();
-        // Without a voltage, as short as may be; NaN is one part.
-        (h / parts.max(1.0)).max(T_s / MOST_PARTS).min(h)
+        // Without a voltage, the minimum; NaN is one part.
+        (h / parts.max(1.0)).max(T_s / MAX_PARTS).min(h)
     }
 
-    /// Over a piece of `h` (s) on a source of `U` (V), in which the inverter took `energy` (J).
+    /// Advances by `h` (s) on a source of `U` (V), while the inverter takes `energy` (J).
     pub fn advance(&mut self, par: &LinkParameters, U: f64, h: f64, energy: f64) {
         let power = (energy + std::mem::take(&mut self.owed)) / h;
         let mut left = h;
-        for _ in 0..MOST_SWITCHINGS {
+        for _ in 0..MAX_SWITCHINGS {
             self.event(par);
             let circuit = self.circuit(par, U);
             let over = |t: f64| circuit.over(self.u, t, power * t);
@@ -196,22 +179,22 @@ impl Link {
         self.owed += piece.owed;
     }
 
-    /// Model Exchange: at a point of the solution, when the inverter has `taken` this energy (J) since the start, on a source of
-    /// `U` (V). What is lost since the last point is that of a constant power; with the voltage of the solution, the energy of
-    /// the source follows from the balance, which then holds for steps of any length and for any tolerance of the solver.
+    /// Model Exchange: a point of the solution, when the inverter has `taken` this energy (J) since the start, on a source of
+    /// `U` (V). The losses since the last point are those of a constant power; with the voltage of the solution, the energy
+    /// of the source follows from the balance, which then holds for any step and any tolerance of the solver.
     pub fn complete(&mut self, par: &LinkParameters, now: Elapsed, U: f64, taken: f64) {
         let h = now.since(self.point.time);
         if h > 0.0 {
-            let Point { u, source, taken: before, .. } = self.point;
+            let Counted { u, source, taken: before, .. } = self.point;
             let LinkEnergy { resistor, chopper, .. } =
                 self.circuit(par, 0.5 * (source + U)).over(u, h, taken - before).energy;
             let stored = 0.5 * par.dc_link.C * (self.u * self.u - u * u);
             self.energy.add(&LinkEnergy { source: resistor + chopper + taken - before + stored, resistor, chopper });
         }
-        self.point = Point { time: now, u: self.u, source: U, taken };
+        self.point = Counted { time: now, u: self.u, source: U, taken };
     }
 
-    /// Model Exchange: what was counted at the points of the solution is kept, or taken back.
+    /// Model Exchange: keeps the counts at the points of the solution, or takes them back.
     pub fn account(&mut self, account: Account) {
         let mut counts = (self.energy, self.point);
         self.kept.follow(account, &mut counts);
@@ -279,7 +262,7 @@ pub struct LinkOutputs<S = f64> {
 }
 
 impl<S: Scalar> LinkOutputs<S> {
-    /// Those of no link.
+    /// Outputs without a link.
     pub fn none() -> Self {
         let none = S::from(0.0);
         let energy = LinkEnergy::default();
@@ -288,7 +271,7 @@ impl<S: Scalar> LinkOutputs<S> {
 }
 
 impl LinkOutputs<Dual> {
-    /// The change of the outputs; no energy and no state changes.
+    /// The change of the outputs; energies and switching states do not change.
     pub fn change(&self) -> LinkOutputs {
         let &Self { u, i_source, p_chopper, i_rms, .. } = self;
         let [u, i_source, p_chopper, i_rms] = [u, i_source, p_chopper, i_rms].map(|x| x.change);

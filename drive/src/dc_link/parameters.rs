@@ -1,4 +1,4 @@
-//! Parameters of the DC link: what is in use, what is allowed, and their table.
+//! Parameters of the DC link: their table, and what is allowed.
 
 use fmu_core::unit::{FARAD, OHM, VOLT};
 use fmu_core::{Fault, Row, Table, table};
@@ -26,7 +26,7 @@ impl Default for DcLink {
 /// Brake chopper.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Chopper {
-    /// There is one.
+    /// The link has one.
     pub used: bool,
     /// Voltage in V at which it switches on.
     pub u_on: f64,
@@ -52,7 +52,7 @@ pub struct LinkParameters {
 }
 
 impl LinkParameters {
-    /// Checks what is in use, on a source of `u_dc` (V) at the start, or 0 later.
+    /// Checks the parts in use, on a source of `u_dc` (V) at the start, or 0 later.
     ///
     /// # Errors
     /// Names the variable, its value and what is allowed.
@@ -105,7 +105,7 @@ type P = Row<LinkParameters>;
 pub const LINK: &Table<LinkParameters> = table![
     P::boolean_parameter(
         "dc_link.use",
-        "The drive contains its DC link: u_dc is the voltage of the source; false: of inverter and controller",
+        "The drive contains its DC link, and u_dc is the voltage of the source; false: of inverter and controller",
         |p| &mut p.dc_link.used,
     ),
     P::parameter("dc_link.C", &FARAD, "Capacitance of the DC link", |p| &mut p.dc_link.C).nominal(1e-3),
@@ -113,7 +113,7 @@ pub const LINK: &Table<LinkParameters> = table![
     P::parameter(
         "dc_link.R_precharge",
         &OHM,
-        "Resistance besides R_source while the capacitor charges from 0 V; 0: it is charged at the start",
+        "Resistance in series with R_source while the capacitor charges from 0 V; 0: it is charged at the start",
         |p| &mut p.dc_link.R_precharge,
     ),
     P::boolean_parameter("chopper.use", "The DC link has a brake chopper; needs dc_link.use", |p| {

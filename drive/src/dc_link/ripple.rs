@@ -1,12 +1,12 @@
-//! Ripple current of the capacitor of the DC link, by the currents of the machine and the modulation:
+//! Ripple current of the DC-link capacitor, from the currents of the machine and the modulation:
 //!
 //! ```text
 //! i_cap,rms = I_rms sqrt(2 m (sqrt 3 / (4 pi) + cos^2 phi (sqrt 3 / pi - 9 m / 16))),  m = 2 |u| / u_dc
 //! ```
 //!
-//! I_rms of a phase, phi the angle from the current to the voltage: cos phi = p_in / (1.5 |u| |i|). It holds for sinusoidal
-//! currents without ripple of their own and a source that takes no ripple (Kolar); references with switched sine waves agree to
-//! 1e-4. u in V, i in A, p_in in W.
+//! I_rms is that of a phase, phi the angle from the current to the voltage: cos phi = p_in / (1.5 |u| |i|). Valid for purely
+//! sinusoidal currents and a source without ripple (Kolar); it agrees with switched sine waves to 1e-4. u in V, i in A, p_in
+//! in W.
 
 use drive_base::frame::{Stator, Vector};
 use fmu_core::Scalar;

@@ -17,7 +17,7 @@ use fmu_core::{
 };
 
 impl PmsmDrive {
-    /// Makes the outputs of the controller's last sample visible and applies them to the plant.
+    /// Shows the outputs of the controller's last sample and applies them to the plant.
     fn show(&mut self, now: Elapsed) {
         let Pair { plant, controller, .. } = &mut self.pair;
         controller.model.show();
@@ -35,7 +35,7 @@ impl PmsmDrive {
         (u, U): (S, S),
     ) -> LinkOutputs<S> {
         if !self.link_parameters.dc_link.used {
-            // The state shows what was set.
+            // The state keeps its set value.
             return LinkOutputs { u, i_source: plant.powers.i_dc, ..LinkOutputs::none() };
         }
         let i_rms = ripple(inputs.voltage(), plant.i.to_stator(), plant.powers.p_in, inputs.u_dc);
@@ -107,7 +107,7 @@ impl CompletedSteps for PmsmDrive {
 
 impl Differentiable for PmsmDrive {
     fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut DriveOutputs) -> Result<(), Fault> {
-        // The controller's outputs and the means are held.
+        // The controller's outputs and the means are constant.
         let linked = self.link_parameters.dc_link.used;
         let (u, U) = (Dual::new(self.link.u, along.link.u), Dual::new(self.inputs.u_dc, along.inputs.u_dc));
         let u_dc = if linked { along.link.u } else { along.inputs.u_dc };
@@ -140,7 +140,7 @@ impl Events for PmsmDrive {
         PmsmPlant::INDICATORS[1],
         Indicator {
             name: "chopper",
-            description: "Voltage of the capacitor over that at which the chopper switches next, less 1; without a chopper 1",
+            description: "Voltage of the capacitor divided by that at which the chopper switches next, minus 1; without a chopper 1",
         },
     ];
 
@@ -171,7 +171,7 @@ impl Events for PmsmDrive {
                 self.link.sample(self.inputs.u_dc);
                 self.set_inputs();
             }
-            // With iron loss, the currents depend on the voltages: the controller samples them before they change.
+            // With iron loss, the currents depend on the voltages: the controller samples before the voltages change.
             let Pair { plant, controller, .. } = &mut self.pair;
             let mut inputs = plant.model.inputs.clone();
             inputs.apply(self.before);

@@ -6,7 +6,7 @@ use fmu_core::unit::{NEWTON_METER, WATT};
 use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
-/// Means over the last sample period; 0 before the first is over.
+/// Means over the last sample period; 0 before the end of the first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Means {
     /// Power from the DC link in W.
@@ -24,18 +24,18 @@ pub struct Means {
 pub(super) struct Period {
     /// Mean over the last complete period.
     pub(super) last: Powers,
-    /// Whether there was one.
+    /// Whether a period is complete.
     over: bool,
     /// Mean over the current period so far.
     mean: Powers,
     /// Elapsed part of the current period in s.
     time: f64,
-    /// Model Exchange: what had passed when the current period began.
+    /// Model Exchange: the totals at the start of the current period.
     start: Total,
 }
 
 impl Period {
-    /// Before the first, with the `powers` at the start.
+    /// At the start, with the `powers` there.
     pub(super) fn new(powers: Powers) -> Self {
         Self { last: powers, ..Self::default() }
     }
@@ -43,7 +43,7 @@ impl Period {
     /// Adds the `powers` of a step of `h` (s), at whose end a period may end.
     pub(super) fn add(&mut self, powers: Powers, h: f64, ends: bool) {
         self.time += h;
-        // A step of a whole period is taken unchanged, to the last bit.
+        // The powers of a step over the whole period are used unchanged, bit for bit.
         let mean = if self.time > h { self.mean.with(powers, h / self.time) } else { powers };
         if ends {
             (self.last, self.over, self.time) = (mean, true, 0.0);
@@ -52,7 +52,7 @@ impl Period {
         }
     }
 
-    /// Model Exchange: a period ends, and `total` has passed since the start.
+    /// Model Exchange: ends a period, with the `total` since the start.
     pub(super) fn end(&mut self, total: Total) {
         let start = std::mem::replace(&mut self.start, total);
         let time = total.time.since(start.time);
@@ -65,7 +65,7 @@ impl Period {
         }
     }
 
-    /// What the means show.
+    /// The values of the outputs.
     pub(super) fn means(&self) -> Means {
         let Powers { p_in, p_mech, p_loss, tau_shaft, .. } = self.last;
         if self.over { Means { p_in, p_mech, p_loss, tau_shaft } } else { Means::default() }
@@ -79,7 +79,7 @@ pub(super) const MEANS: &Table<Means> = table![
     M::discrete_output(
         "p_in_mean",
         &WATT,
-        "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before the first is over",
+        "Power from the DC link, mean over the last T_s in Co-Simulation and in Model Exchange; 0 before the end of the first",
         |m| &mut m.p_in,
     ),
     M::discrete_output("p_mech_mean", &WATT, "Power delivered to the load at the shaft, mean as p_in_mean", |m| &mut m

@@ -4,7 +4,7 @@ use super::*;
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 
-/// Times in s of a speed step and a load step, on the grid of every step size compared.
+/// Times in s of a speed step and a load step, multiples of every compared step size.
 type Events = (f64, f64);
 
 /// Speed reference and load at `t` (s).
@@ -47,7 +47,7 @@ fn steps_of_many_samples_are_the_pair_bit_for_bit() {
 
 #[test]
 fn other_steps_also_stop_at_the_samples() {
-    // 0.7 and 3.3 samples: the pair would lose the angle or the drive; here only rounding of the pieces differs.
+    // 0.7 and 3.3 samples: the pair would lose the angle or the drive; here only the rounding of the time differs.
     let events = (0.0504, 0.399);
     let reference = drive(1e-4, 4200, events).out.plant;
     for (h, steps) in [(0.7e-4, 6000), (3.5e-4, 1200), (1.4e-3, 300)] {
@@ -62,7 +62,7 @@ fn an_imposed_shaft_turns_on_within_a_step() {
     // A drive train accelerates for 0.3 s in steps of 1 ms; the drive takes each in one step, the pair in ten.
     let mut pair = Pair::default();
     pair.plant.model.parameters.mechanics.imposed = true;
-    // With a sensor: a sensorless drive can lose a shaft that does not yield, and then amplifies rounding errors.
+    // With a sensor: a sensorless drive can lose an imposed shaft, and then amplifies rounding errors.
     pair.controller.model.parameters.estimator = crate::estimator::Kind::Sensored;
     let mut drive = Block::<PmsmDrive>::default();
     drive.model.pair = pair.clone();

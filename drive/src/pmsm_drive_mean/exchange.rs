@@ -1,8 +1,8 @@
 //! `PmsmDriveMean` for Model Exchange: the rates of its states; the energies are states too.
 //!
-//! The ramp of the speed reference follows it with the current loop's bandwidth, at most at its rate. Nothing switches, so the
-//! model has no events of its own: a solver takes steps as long as inputs and limits are smooth. The truth values of the controller
-//! are those of the importer's last event.
+//! The ramp follows the speed reference with the bandwidth of the current loop, limited to its rate. Nothing switches, so the
+//! model causes no events, and a solver can take long steps while inputs and limits are smooth. The Boolean outputs of the
+//! controller are those of the importer's last event.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
 use crate::pmsm_drive::Means;
@@ -16,7 +16,7 @@ const NEWTON_METER_PER_S: Quantity = Quantity::new("TorqueRate", Unit::si("N.m/s
 const AMPERE_PER_S: Quantity = Quantity::new("CurrentRate", Unit::si("A/s", Exponents::mechanical(0, 0, -1, 1)));
 
 impl PmsmDriveMean {
-    /// The speed reference of the loop: on its ramp, if there is one.
+    /// The state with the speed reference of the loop: on the ramp, if there is one.
     fn referred(&self) -> State {
         let ramp = self.drive.controller.speed_loop.ramp > 0.0;
         State { speed_ref: if ramp { self.state.speed_ref } else { self.inputs.speed_ref }, ..self.state }

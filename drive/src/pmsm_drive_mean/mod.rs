@@ -1,19 +1,20 @@
-//! The model `PmsmDriveMean`: the drive for system models, which takes the place of `PmsmDrive` by its file name.
+//! The model `PmsmDriveMean`: the drive for system models, a drop-in replacement for `PmsmDrive`.
 //!
-//! It has the variables of [`PmsmDrive`](crate::PmsmDrive) and the [steady state](crate::steady) of that drive at every
-//! instant; only the torque takes time. With the torque reference t of torque mode or speed loop:
+//! It has the variables of [`PmsmDrive`](crate::PmsmDrive) and, at every instant, the [steady state](crate::steady) of that
+//! drive; only the torque takes time. With the torque reference t of torque mode or speed loop:
 //!
 //! ```text
 //! t_lag dx/dt = min(max(t, tau_min), tau_max) - x,  t_lag = 1 / current.bandwidth       currents, voltage, powers: those of x
 //! J d speed/dt = tau_e - friction - tau_load, or with mechanics.imposed speed_shaft
 //! ```
 //!
-//! tau_min and tau_max are those of speed and u_dc. Nothing is sampled, so a step has any length: [`advance`] is exact for x
+//! tau_min and tau_max depend on speed and u_dc. Nothing is sampled, so steps can be of any length: [`advance`] is exact for x
 //! in torque mode, and stable and of second order for the speed. The energies are the integrals of the powers; all other
-//! outputs are those of the step's end. The estimates are the true values, the phase currents the sinusoids of i_d and i_q.
+//! outputs are values at the end of the step. The estimates are the true values, the phase currents the sinusoids of i_d and
+//! i_q.
 //!
-//! No estimator, start, sensor error or injection, and no oscillation of the current loop: those parameters are accepted, and
-//! [`Model::has_effect`] names the others. In Model Exchange the importer integrates the same equations.
+//! There is no estimator, start, sensor error or injection, and no oscillation of the current loop: their parameters are
+//! accepted, and [`Model::has_effect`] names those with an effect. In Model Exchange the importer integrates the same equations.
 //!
 //! [`advance`]: Model::advance
 
@@ -33,20 +34,20 @@ use drive_control::signals::ControllerOutputs;
 use drive_control::tables as control;
 use drive_plant::PmsmPlant;
 use drive_plant::power::{Energy, Powers};
+use drive_plant::rules::check_temperatures;
 use drive_plant::tables as plant;
-use drive_plant::thermal::{self, Temperatures, ThermalMode};
+use drive_plant::thermal::{Temperatures, ThermalMode};
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, SPEED};
 use fmu_core::{
     Block, Elapsed, Experiment, Fault, Info, Interface, Model, Part, Row, Step, Table, Terminal, Warns, table,
 };
-use motion::Passed;
 use serde::{Deserialize, Serialize};
 
 /// A drive of which only the torque and the shaft take time.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PmsmDriveMean {
-    /// Inputs, held over a communication step.
+    /// Inputs, constant over a communication step.
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub drive: Steady,
@@ -57,19 +58,20 @@ pub struct PmsmDriveMean {
     energy: Energy,
     /// Temperatures in K of the network.
     network: Temperatures,
-    /// The point at its end, what it answers, and whether it still does: a changed parameter ends that.
+    /// The point at the end of the last step, the question that it answers, and whether it is still valid: a changed parameter
+    /// invalidates it.
     point: Point,
     asked: Question,
     known: bool,
-    /// A step has been taken.
+    /// Whether a step was taken.
     moved: bool,
-    /// Model Exchange: what the controller shows since the last event.
+    /// Model Exchange: outputs of the controller since the last event.
     held: ControllerOutputs,
-    /// Whether there has been no such drive.
+    /// Whether no drive can operate like this.
     impossible: Happened,
     /// Time in s for which the torque reference has been beyond its limits.
     clipped_for: f64,
-    /// None: a drive in its steady state does not commission itself.
+    /// Always `None`: a drive in steady state does not commission itself.
     commissioning: Held,
 }
 
@@ -96,7 +98,7 @@ impl Default for PmsmDriveMean {
     }
 }
 
-/// What takes time.
+/// Quantities that take time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct State {
     /// Torque of the current loop in N.m: x.
@@ -111,7 +113,14 @@ struct State {
     angle: f64,
 }
 
-/// What decides on a point: the condition, the torque in N.m, and whether the drive is enabled.
+/// Result of a step: state and point at its end, and the mean powers.
+struct Passed {
+    state: State,
+    powers: Powers,
+    point: Point,
+}
+
+/// Inputs of a point: the condition, the torque in N.m, and whether the drive is enabled.
 type Question = (Condition, f64, bool);
 
 /// Outputs: those of `PmsmDrive`, and the flux linkage.
@@ -123,10 +132,10 @@ pub struct MeanOutputs {
     pub psi: Dq,
 }
 
-/// Share of u_dc / sqrt 3 above which a voltage is more than the link has.
+/// Share of u_dc / sqrt 3 above which a voltage exceeds the link.
 const FULL: f64 = 1.0 + 1e-6;
 
-/// Temperatures that cannot be.
+/// Remedy for impossible temperatures.
 const REMEDY: &str = "the network became too hot; reduce the torque, or raise thermal.G_ws and thermal.G_sc";
 
 impl PmsmDriveMean {
@@ -149,7 +158,7 @@ impl PmsmDriveMean {
         Condition { speed: self.speed(state), u_dc: self.inputs.u_dc, temperatures: at }
     }
 
-    /// What decides on the point in this state at the temperatures `at` (K).
+    /// The inputs of the point in this state at the temperatures `at` (K).
     fn question(&self, state: &State, at: Temperatures) -> Question {
         (self.condition(state, at), state.tau, self.inputs.enable)
     }
@@ -163,7 +172,7 @@ impl PmsmDriveMean {
         if self.inputs.enable { at.by_reference(state.tau) } else { at.off() }
     }
 
-    /// The powers of a point at the mechanical `speed` (rad/s): a shaft that turns freely gives its load what the load takes.
+    /// The powers of a point at the mechanical `speed` (rad/s); the torque of a free shaft is that of the load.
     fn powers_of(&self, point: &Point, speed: f64) -> Powers {
         if self.drive.plant.mechanics.imposed {
             return point.powers;
@@ -177,7 +186,7 @@ impl PmsmDriveMean {
         self.drive.controller.speed_loop.torque_mode && self.inputs.enable && (tau_ref > high || tau_ref < low)
     }
 
-    /// A plant with these parameters and inputs, for its rules.
+    /// A plant with these parameters and inputs, to validate them.
     fn plant(&self) -> PmsmPlant {
         let mut plant = PmsmPlant::default();
         plant.parameters.clone_from(&self.drive.plant);
@@ -186,11 +195,11 @@ impl PmsmDriveMean {
     }
 }
 
-/// Why the others have none.
+/// Reason for the parameters without effect.
 const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no DC link, no limits of its current, no estimator, start, sensor, \
-                                 trip, short circuit or commissioning: PmsmDrive has";
+                                 trip, short circuit or commissioning; use PmsmDrive";
 
-/// Parameters of the controller that have an effect: these, and those below these groups.
+/// Parameters and groups of parameters of the controller with an effect.
 const EFFECTIVE: [&str; 13] = [
     "T_s",
     "estimator",
@@ -286,11 +295,16 @@ impl Model for PmsmDriveMean {
         let thermal = &self.drive.plant.thermal;
         if thermal.mode == ThermalMode::Imposed {
             let names = ["T_winding_imposed", "T_magnet_imposed"];
-            thermal::check(&self.drive.plant, &temperatures, names, "temperatures are in K (20 degC are 293.15 K)")?;
+            check_temperatures(
+                &self.drive.plant,
+                &temperatures,
+                names,
+                "temperatures are in K (20 degC are 293.15 K)",
+            )?;
         }
         let Passed { state, powers, point } = self.pass(step.h, temperatures)?;
         if !all_finite([state.tau, state.integral, state.speed, state.angle, powers.p_in, powers.p_loss]) {
-            return Err(Fault::new(format!("the drive's state left the finite numbers within a step of {} s", step.h)));
+            return Err(Fault::new(format!("the drive's state is no longer finite after a step of {} s", step.h)));
         }
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
@@ -301,7 +315,7 @@ impl Model for PmsmDriveMean {
         if thermal.mode == ThermalMode::Network {
             let (heat, coolant) = (thermal.heat(&powers.losses), self.inputs.thermal.coolant);
             let next = thermal.network.step(&self.network, &heat, coolant, step.h);
-            thermal::check(&self.drive.plant, &next, ["T_winding", "T_magnet"], REMEDY)?;
+            check_temperatures(&self.drive.plant, &next, ["T_winding", "T_magnet"], REMEDY)?;
             self.network = next;
         }
         Ok(())
@@ -309,7 +323,7 @@ impl Model for PmsmDriveMean {
 }
 
 impl PmsmDriveMean {
-    /// Whether there is no such drive: no current fits the voltage of the link, or diodes conduct.
+    /// Whether no drive can operate like this: no current fits the voltage of the link, or diodes conduct.
     fn is_impossible(&self) -> bool {
         let DriveInputs { u_dc, enable, .. } = self.inputs;
         if enable {
@@ -330,8 +344,8 @@ impl Warns for PmsmDriveMean {
                     format!("the back EMF is above u_dc = {u_dc} V with the gates off")
                 };
                 format!(
-                    "{why} at {speed} rad/s: the diodes would conduct and the machine feed the link. PmsmDriveMean does not have \
-                     that, and its outputs are not those of a drive; PmsmDrive has it"
+                    "{why} at {speed} rad/s: the diodes would conduct and the machine feed the link. PmsmDriveMean does not \
+                     model this, and its outputs are not those of a drive; use PmsmDrive"
                 )
             });
         }

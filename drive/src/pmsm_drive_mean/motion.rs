@@ -1,24 +1,23 @@
 //! Torque and shaft over time: the rates of the states, and a step of any length.
 //!
 //! The speed loop is that of the controller without its samples ([`speed`](drive_control::speed)): wanted i_q = K_p (b w_ref -
-//! w) + I, dI/dt = K_i (w_ref - w). While a limit acts and the error drives further in, I holds; it does so within 1 % of the
-//! limit's torque beyond the limit, so that the rates are continuous. With field weakening it follows the limit at the speed loop's
-//! bandwidth, as the controller's.
+//! w) + I, dI/dt = K_i (w_ref - w). While a limit is active and the error drives I further into it, I is stopped, over a band
+//! of 1 % above the limit, so that the rates are continuous. With field weakening, I follows the limit at the bandwidth of the
+//! speed loop, as in the controller.
 //!
-//! A step: in torque mode, until a limit acts, x is an exponential, exactly, and the shaft sees its mean. Otherwise x, I and the speed
-//! go together by
-//! the Rosenbrock method of Verwer et al. 1999 (ROS2, DOI 10.1137/S1064827597326651), gamma = 1 - 1/sqrt 2: second order with any
-//! matrix, stable however fast the lag is. With the matrix M = 1 - gamma h J,
+//! A step: in torque mode, until a limit is active, x is exactly an exponential, and its mean acts on the shaft. Otherwise x, I
+//! and the speed advance together by the Rosenbrock method of Verwer et al. 1999 (ROS2, DOI 10.1137/S1064827597326651), gamma =
+//! 1 - 1/sqrt 2: second order with any matrix, and stable however fast the lag is. With the matrix M = 1 - gamma h J,
 //!
 //! ```text
 //! M k_1 = f(y),   M k_2 = f(y + h k_1) - 2 k_1,   y + h (3 k_1 + k_2)/2,   error about h (k_1 + k_2)/2
 //! ```
 //!
-//! A step with a greater error than [`SMALL`] is taken in parts. Losses are the trapezoid of both stages. The power from the link
-//! is what they, the load and the kinetic energy take, so that no energy is lost: the stages' own power from the link misses the
-//! change of the kinetic energy by the error of the speed, which a ramp collects with one sign.
+//! A step with an error above [`SMALL`] is divided into parts. Losses are the mean of both stages. The power from the link is
+//! the sum of the losses, the power to the load and the change of the kinetic energy, so that the energies balance: the mean of
+//! the stages would miss the change of the kinetic energy by the error of the speed, which accumulates on a ramp.
 
-use super::{PmsmDriveMean, State};
+use super::{Passed, PmsmDriveMean, State};
 use crate::pmsm_drive::DriveInputs;
 use crate::steady::{Point, Steady, within};
 use drive_base::math::exp;
@@ -28,22 +27,16 @@ use fmu_core::{Dual, Fault};
 
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
-/// Errors that a part of a step may have: of torque and integral part over the greatest torque, of the speed over itself plus 1 rad/s.
+/// Allowed errors of a part of a step: of torque and integral part relative to the maximum torque, of the speed relative to
+/// itself plus 1 rad/s.
 const SMALL: [f64; 2] = [2e-3, 1e-4];
 
-/// Shortest part in s, and most parts of a step.
+/// Minimum part in s, and maximum number of parts of a step.
 const SHORTEST: f64 = 1e-8;
-const MOST: u32 = 100_000;
+const MAX_PARTS: u32 = 100_000;
 
-/// Share of the limit beyond it in which the integral part comes to its hold.
+/// Width of the band above the limit, as a share of it, over which the integrator is brought to a stop.
 const BAND: f64 = 0.01;
-
-/// What a step gives: the state at its end, means over it, and the point at the end.
-pub(super) struct Passed {
-    pub(super) state: State,
-    pub(super) powers: Powers,
-    pub(super) point: Point,
-}
 
 /// An instant: rates of torque (N.m/s), integral part (A/s) and speed (rad/s2), and the point.
 pub(super) struct Rates {
@@ -51,10 +44,10 @@ pub(super) struct Rates {
     pub(super) integral: f64,
     pub(super) speed: f64,
     pub(super) point: Point,
-    /// Whether a limit acts.
+    /// Whether a limit is active.
     limited: bool,
-    /// The greatest torque reference in N.m.
-    greatest: f64,
+    /// The maximum torque reference in N.m.
+    highest: f64,
 }
 
 impl PmsmDriveMean {
@@ -73,10 +66,10 @@ impl PmsmDriveMean {
         let lag = controller.current.bandwidth;
         if !self.inputs.enable {
             let (tau, integral) = (-lag * state.tau, -lag * state.integral);
-            return Rates { tau, integral, speed: accelerate(&point), point, limited: true, greatest: 0.0 };
+            return Rates { tau, integral, speed: accelerate(&point), point, limited: true, highest: 0.0 };
         }
         let [low, high] = point.limits;
-        let greatest = high.max(-low);
+        let highest = high.max(-low);
         let (wanted, integral, limited) = if controller.speed_loop.torque_mode {
             (self.inputs.tau_ref, 0.0, true)
         } else {
@@ -85,12 +78,12 @@ impl PmsmDriveMean {
             let wanted = k * gains.wanted(state.integral, state.speed_ref, speed);
             let cut = wanted - within(wanted, point.limits);
             let [_, k_i] = gains.slopes();
-            let share = if cut * error > 0.0 { (1.0 - cut.abs() / (BAND * greatest.max(1e-9))).max(0.0) } else { 1.0 };
+            let share = if cut * error > 0.0 { (1.0 - cut.abs() / (BAND * highest.max(1e-9))).max(0.0) } else { 1.0 };
             let follow = if controller.weakening.used { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
             (wanted, share * k_i * error - follow, cut != 0.0)
         };
         let tau = lag * (within(wanted, point.limits) - state.tau);
-        Rates { tau, integral, speed: accelerate(&point), point, limited, greatest }
+        Rates { tau, integral, speed: accelerate(&point), point, limited, highest }
     }
 
     /// A step of `h` (s) with the temperatures `at` (K).
@@ -100,7 +93,7 @@ impl PmsmDriveMean {
             return Ok(self.pass_imposed(h, at));
         }
         let (mut state, mut done, mut part, mut powers) = (self.state, 0.0, h, Powers::default());
-        for _ in 0..MOST {
+        for _ in 0..MAX_PARTS {
             let left = h - done;
             let ends = part >= left * (1.0 - 1e-12);
             let length = if ends { left } else { part };
@@ -120,11 +113,13 @@ impl PmsmDriveMean {
             }
             part = length * (0.9 / error.max(1e-3).sqrt()).clamp(0.5, 5.0);
         }
-        Err(Fault::new(format!("a step of {h} s takes more than {MOST} parts: the coupling is unstable; shorten it")))
+        Err(Fault::new(format!(
+            "a step of {h} s takes more than {MAX_PARTS} parts: the coupling is unstable; shorten it"
+        )))
     }
 
-    /// Torque in N.m after `h` (s) from `start` (N.m) within these limits (N.m), with the held torque reference; and the share
-    /// of the start in its mean, the rest being that of the end.
+    /// Torque in N.m after `h` (s) from `start` (N.m) within these limits (N.m), with a constant torque reference; and the weight
+    /// of the start in its mean.
     fn lagging(&self, start: f64, limits: [f64; 2], h: f64) -> (f64, f64) {
         let target = within(self.inputs.tau_ref, limits);
         let x = h * self.drive.controller.current.bandwidth;
@@ -140,7 +135,7 @@ impl PmsmDriveMean {
         State { speed: speed_shaft, angle: angle_shaft + speed_shaft * h, ..state }
     }
 
-    /// A step of `h` (s) in torque mode, or without torque, on an imposed shaft: nothing is integrated.
+    /// A step of `h` (s) in torque mode, or disabled, on an imposed shaft: nothing is integrated.
     fn pass_imposed(&self, h: f64, at: Temperatures) -> Passed {
         let condition = self.condition(&self.state, at);
         let drive = self.drive.at(&condition);
@@ -149,11 +144,11 @@ impl PmsmDriveMean {
         let (tau, share) = self.lagging(self.state.tau, limits, h);
         let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
         let point = if enable { drive.by_reference(tau) } else { drive.off() };
-        // The powers go with the torque from the last step's end to this one's.
+        // The powers change with the torque, from the end of the last step to the end of this one.
         Passed { state: self.on_the_shaft(state, h), powers: point.powers.with(self.point.powers, share), point }
     }
 
-    /// A part of a step, of `h` (s): the state after it, the mean powers, and the error in units of the allowed one.
+    /// A part of a step, of `h` (s): the state after it, the mean powers, and the error relative to the allowed one.
     fn part(&self, start: &State, h: f64, at: Temperatures) -> (State, Powers, f64) {
         let free = |[low, high]: [f64; 2]| self.inputs.tau_ref >= low && self.inputs.tau_ref <= high;
         if !self.inputs.enable {
@@ -171,8 +166,8 @@ impl PmsmDriveMean {
         self.part_with(start, h, at, None).1
     }
 
-    /// [`part`](Self::part), with x as an exponential within these limits (N.m) or as one of the states; and the limits at
-    /// its end.
+    /// [`part`](Self::part), with x as an exponential within these limits (N.m) or as one of the states; also returns the limits
+    /// at its end.
     fn part_with(
         &self,
         start: &State,
@@ -185,7 +180,7 @@ impl PmsmDriveMean {
         let mut y = *start;
         let lag = controller.current.bandwidth;
         if !exact {
-            // The ramp is a straight line; the part sees its middle.
+            // The ramp is a straight line; the part uses its middle.
             let reached = controller.speed_loop.ramped(start.speed_ref, self.inputs.speed_ref, h);
             y.speed_ref = 0.5 * (if controller.speed_loop.ramp > 0.0 { start.speed_ref } else { reached } + reached);
         }
@@ -198,7 +193,7 @@ impl PmsmDriveMean {
         let (gains, k) = self.drive.settled().speed_loop();
         let [k_p, k_i] = gains.slopes();
         let g = GAMMA * h;
-        // Rows of the matrix: the lag, the speed loop by a limit that acts, the shaft.
+        // Rows of the matrix: the lag, the speed loop unless a limit is active, the shaft.
         let a = if exact { 0.0 } else { g * lag };
         let loops = if exact || one.limited { 0.0 } else { a * k };
         let c = if imposed { 0.0 } else { g / plant.mechanics.J };
@@ -212,7 +207,7 @@ impl PmsmDriveMean {
             [by * (tau - loops * (k_p * w - i)), i, w]
         };
         let lagging = |rate: f64| if exact { 0.0 } else { rate };
-        // Gates off, the integral part decays with the lag; nothing reads it.
+        // With the gates off, the integral part decays with the lag; nothing reads it.
         let enable = self.inputs.enable;
         let of_loop = |rate: f64| if enable { rate } else { 0.0 };
         let k_1 = solve(lagging(one.tau), of_loop(one.integral), one.speed);
@@ -224,7 +219,7 @@ impl PmsmDriveMean {
         let step = |n: usize| h * (1.5 * k_1[n] + 0.5 * k_2[n]);
         let off = |n: usize| 0.5 * h * (k_1[n] + k_2[n]).abs();
         let speed = y.speed + step(2);
-        let torque = off(0).max(k * off(1)) / (SMALL[0] * one.greatest.max(1e-6));
+        let torque = off(0).max(k * off(1)) / (SMALL[0] * one.highest.max(1e-6));
         let error = torque.max(off(2) / (SMALL[1] * (1.0 + speed.abs())));
         let state = State {
             tau: if exact { end_tau } else { y.tau + step(0) },
@@ -239,8 +234,8 @@ impl PmsmDriveMean {
         (two.point.limits, (state, powers, error))
     }
 
-    /// The mean `powers` of a part of a step of `h` (s) between two states, with what the shaft gives its load and keeps: the
-    /// rest is the link's, or without gates a loss.
+    /// The mean `powers` of a part of a step of `h` (s) between two states, balanced with the power to the load and the change
+    /// of the kinetic energy: by the power from the link, or with the gates off by the losses.
     fn balanced(&self, powers: Powers, [start, end]: [&State; 2], h: f64) -> Powers {
         let kept = 0.5 * self.drive.plant.mechanics.J * (end.speed * end.speed - start.speed * start.speed) / h;
         let p_mech = self.inputs.tau_load * 0.5 * (start.speed + end.speed);

@@ -1,4 +1,4 @@
-//! The outputs of `PmsmDriveMean`: those of `PmsmDrive` with their steady meaning.
+//! The outputs of `PmsmDriveMean`: those of `PmsmDrive` in steady state.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
 use crate::dc_link::LinkOutputs;
@@ -15,7 +15,7 @@ use drive_plant::signals::PlantOutputs;
 use drive_plant::thermal::Temperatures;
 
 impl PmsmDriveMean {
-    /// The outputs in this state with its point and these `temperatures` (K), but for those of the controller.
+    /// The outputs in this state with its point and these `temperatures` (K), except those of the controller.
     pub(super) fn show(&self, state: &State, point: &Point, temperatures: Temperatures, out: &mut MeanOutputs) {
         let plant = &self.drive.plant;
         let speed = self.speed(state);
@@ -50,7 +50,7 @@ impl PmsmDriveMean {
         (angle, theta, Axis::at(theta))
     }
 
-    /// What a controller shows whose estimates are the truth.
+    /// The outputs of a controller with exact estimates.
     pub(super) fn controller(&self, state: &State, point: &Point) -> ControllerOutputs {
         let enabled = self.inputs.enable;
         let (_, theta, axis) = self.angle(state);

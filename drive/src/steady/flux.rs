@@ -1,6 +1,6 @@
-//! The flux linkage of a terminal current in steady state.
+//! Flux linkage for a terminal current in steady state.
 //!
-//! The current at the terminals is that of the flux linkage and that of the iron, i_s = i(psi) + (h + j g) psi: g = G w, and h =
+//! The current at the terminals is the sum of that of the flux linkage and that of the iron, i_s = i(psi) + (h + j g) psi: g = G w, and h =
 //! 0 unless the voltage is behind the flux linkage's motion. Newton's method from psi = (L_d i_d + psi_M, L_q i_q); d i/d psi is
 //! symmetric. A machine without saturation is linear, and the first step is exact: with h = 0, i_md = (i_d + g L_q (i_q - g
 //! psi_M)) / (1 + g^2 L_d L_q). Derived here from the circuit of [`iron`](drive_plant::iron). i in A, psi in Wb, g and h in 1/H.
@@ -9,10 +9,10 @@ use drive_base::frame::Dq;
 use drive_base::motor::Motor;
 use drive_plant::machine::{self, Magnetics};
 
-/// Newton steps of a machine that is not linear, at most.
+/// Maximum number of Newton steps for a nonlinear machine.
 const STEPS: usize = 12;
 
-/// Residue as a share of the current at which they end.
+/// Residue at which they end, as a share of the current.
 const SMALL: f64 = 1e-14;
 
 /// The flux linkage (Wb) with the current `i_s` (A) at the terminals.

@@ -1,21 +1,23 @@
-//! Steady temperatures: those at which the network passes on the losses that the drive has at them.
+//! Steady temperatures: the network dissipates the losses of the drive at these temperatures.
 //!
-//! A fixed point: losses at the temperatures, temperatures of the losses ([`Network::steady`]), and again. Copper loss grows by
-//! alpha p (1/G_ws + 1/G_sc) of each change of the winding, p the loss at T_ref; from 1 on, the winding runs away.
+//! A fixed-point iteration: losses at the temperatures, temperatures from the losses ([`Network::steady`]), and so on. A change
+//! of the winding's temperature returns multiplied by alpha p (1/G_ws + 1/G_sc), p the copper loss at T_ref; from 1 on, the
+//! winding runs away.
 //!
 //! [`Network::steady`]: drive_plant::thermal::network::Network::steady
 
-use super::{At, Condition, Point, Steady};
+use super::drive::{Condition, Steady};
+use super::operating::{At, Point};
 use drive_plant::thermal::Temperatures;
 
-/// Rounds, at most, and the change in K at which they end.
-const MOST: usize = 400;
+/// Maximum number of iterations, and the change in K at which they end.
+const MAX_ITERATIONS: usize = 400;
 const SMALL: f64 = 1e-7;
 
 impl Steady {
-    /// The temperatures (K) that stay at the mechanical `speed` (rad/s) on a link of `u_dc` (V) with the coolant at `coolant` (K),
-    /// and the point there that `find` chooses under the condition, for example the one of a torque at the shaft. `None` where
-    /// the winding runs away, a heated part is insulated, or `find` has no point.
+    /// The steady temperatures (K) at the mechanical `speed` (rad/s) on a link of `u_dc` (V) with the coolant at `coolant` (K),
+    /// and the point that `find` selects under the condition, for example that of a torque at the shaft. `None` if the winding
+    /// runs away, a heated part is insulated, or `find` returns no point.
     pub fn warmed(
         &self,
         speed: f64,
@@ -25,7 +27,7 @@ impl Steady {
     ) -> Option<(Temperatures, Point)> {
         let thermal = &self.plant.thermal;
         let mut temperatures = Temperatures::all(coolant);
-        for _ in 0..MOST {
+        for _ in 0..MAX_ITERATIONS {
             let point = find(&self.at(&Condition { speed, u_dc, temperatures }))?;
             let next = thermal.network.steady(&thermal.heat(&point.powers.losses), coolant);
             let parts = |t: &Temperatures| [t.winding, t.stator, t.magnet, t.inverter];

@@ -1,7 +1,8 @@
-//! A point in steady state: the controller's currents, what the machine makes of them, and the powers.
+//! A point in steady state: the controller's currents, the machine's response, and the powers.
 
-use super::sampling::Held;
-use super::{Condition, SQRT_3, Steady, flux, within};
+use super::drive::{Condition, SQRT_3, Steady, within};
+use super::flux;
+use super::sampling::HeldVoltage;
 use drive_base::frame::Dq;
 use drive_base::motor::Motor;
 use drive_control::settled::SettledAt;
@@ -12,11 +13,11 @@ use drive_plant::machine;
 use drive_plant::power::Powers;
 use serde::{Deserialize, Serialize};
 
-/// Rounds for the drop of the devices, at most, and the change of their loss, as a share, at which they end.
-const MOST: u32 = 20;
+/// Maximum number of iterations for the drop of the devices, and the relative change of their loss at which they end.
+const MAX_ITERATIONS: u32 = 20;
 const SMALL: f64 = 1e-9;
 
-/// Where a point lies among the limits.
+/// Region of a point, by the active limits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Region {
     /// The plain reference: maximum torque per ampere, i_d = 0 or the low-speed law.
@@ -24,7 +25,7 @@ pub enum Region {
     Mtpa,
     /// Field weakening, within the limits.
     Weakening,
-    /// The greatest torque that the voltage gives, with less than the current limit.
+    /// Maximum torque per voltage, below the current limit.
     Mtpv,
     /// The limit of current or torque, or without field weakening that of the voltage.
     Limit,
@@ -47,7 +48,7 @@ impl Region {
 pub struct Point {
     /// Torque reference of the controller in N.m, after its limits.
     pub tau_ref: f64,
-    /// Least and greatest torque reference in N.m here: the outputs `tau_min` and `tau_max` of the drive.
+    /// Minimum and maximum torque reference in N.m under the condition: the outputs `tau_min` and `tau_max` of the drive.
     pub limits: [f64; 2],
     /// Current at the terminals in A, with [`Steady::sampled`] its mean.
     pub i: Dq,
@@ -55,17 +56,17 @@ pub struct Point {
     pub psi: Dq,
     /// Voltage at the terminals of the machine in V.
     pub u: Dq,
-    /// Magnitude in V of the voltage that the current loop requests: with the drop of the devices.
+    /// Magnitude in V of the voltage requested by the current loop, including the drop of the devices.
     pub requested: f64,
-    /// It as a share of u_dc / sqrt 3; 0 without a link.
+    /// `requested` as a share of u_dc / sqrt 3; 0 without a link voltage.
     pub u_share: f64,
     /// Electromagnetic torque in N.m.
     pub tau_e: f64,
     /// Powers, losses, link current and torque at the shaft.
     pub powers: Powers,
-    /// Efficiency, 0 where there is none ([`efficiency`]).
+    /// Efficiency, or 0 where it is not defined ([`efficiency`]).
     pub efficiency: f64,
-    /// Where it lies.
+    /// Its region.
     pub region: Region,
     /// Field weakening lowers i_d.
     pub weakens: bool,
@@ -83,20 +84,28 @@ pub struct At<'a> {
     /// Resistance in Ohm at this speed, and conductance of the iron in S.
     R: f64,
     G: f64,
-    held: Held,
+    held: HeldVoltage,
     /// Switching loss in W per ampere of the amplitude.
     sw: f64,
     friction: f64,
     settled: SettledAt<'a>,
 }
 
+impl Steady {
+    /// The drive under a condition.
+    #[inline]
+    pub fn at(&self, condition: &Condition) -> At<'_> {
+        At::new(self, condition)
+    }
+}
+
 impl<'a> At<'a> {
-    pub(super) fn new(drive: &'a Steady, condition: &Condition) -> Self {
+    fn new(drive: &'a Steady, condition: &Condition) -> Self {
         let Steady { plant, controller, settled, sampled } = drive;
         let &Condition { speed, u_dc, temperatures } = condition;
         let motor = plant.thermal.motor(&plant.motor, &temperatures);
         let w = f64::from(motor.n_p) * speed;
-        let Dissipation { R, G } = Dissipation::at(plant, motor.R_s, w);
+        let Dissipation { R, G } = plant.dissipation(motor.R_s, w);
         let inverter = &plant.inverter;
         let sw = switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) * switching::MEAN_OF_MAGNITUDES;
         Self {
@@ -106,7 +115,7 @@ impl<'a> At<'a> {
             w,
             R,
             G: G.unwrap_or(0.0),
-            held: if *sampled { Held::new(w * controller.T_s) } else { Held::NOT },
+            held: if *sampled { HeldVoltage::new(w * controller.T_s) } else { HeldVoltage::NOT },
             sw,
             friction: plant.mechanics.friction(speed),
             settled: settled.at(controller, speed, u_dc, 0.0),
@@ -118,7 +127,7 @@ impl<'a> At<'a> {
         &self.condition
     }
 
-    /// Least and greatest torque reference in N.m: the outputs `tau_min` and `tau_max` of the drive.
+    /// Minimum and maximum torque reference in N.m: the outputs `tau_min` and `tau_max` of the drive.
     #[inline]
     pub fn limits(&self) -> [f64; 2] {
         self.settled.limits()
@@ -142,12 +151,12 @@ impl<'a> At<'a> {
         if point.requested > self.allowed() { self.within_voltage(tau, point) } else { point }
     }
 
-    /// The points of least and greatest torque.
+    /// The points of minimum and maximum torque.
     pub fn ends(&self) -> [Point; 2] {
         self.limits().map(|tau| self.by_reference(tau))
     }
 
-    /// The point of the torque reference `tau` (N.m), whatever voltage it takes.
+    /// The point of the torque reference `tau` (N.m), regardless of the voltage.
     #[inline]
     pub(super) fn of_reference(&self, tau: f64) -> Point {
         let limits = self.settled.limits();
@@ -167,7 +176,7 @@ impl<'a> At<'a> {
         Point { tau_ref, limits, region, weakens, ..self.by_current(i) }
     }
 
-    /// The point of the current `i_s` (A) at the terminals, as the controller samples it; its torque reference is that of the
+    /// The point of the current `i_s` (A) at the terminals, as sampled by the controller; its torque reference follows from the
     /// controller's estimates.
     #[inline]
     pub fn by_current(&self, i_s: Dq) -> Point {
@@ -177,7 +186,7 @@ impl<'a> At<'a> {
             w,
             R,
             G,
-            held: Held { share: held, late, ripple },
+            held: HeldVoltage { share: held, late, ripple },
             ..
         } = self;
         let g = G * w;
@@ -186,7 +195,7 @@ impl<'a> At<'a> {
         let at_sample = psi.turned() * *w;
         let (mut e, mut rippled) = (at_sample, 0.0);
         if *held < 1.0 {
-            // What the held voltage would be as a flux linkage: with R i.
+            // The constant voltage, including R i, as a flux linkage.
             let chord = psi - i_s.turned() * (R / w);
             let [d, cross, q] = machine::slope(motor, plant.magnetics(), psi);
             let along = Dq::new(d * chord.d() + cross * chord.q(), cross * chord.d() + q * chord.q());
@@ -201,13 +210,13 @@ impl<'a> At<'a> {
         let (cond, drop) = self.conduction(u, i, amplitude);
         let losses = Losses {
             cu: 1.5 * R * (square + rippled),
-            // The held voltage has this magnitude all the time.
+            // The magnitude of the voltage is constant.
             iron: 1.5 * G * held * held * at_sample.dot(at_sample),
             cond,
             sw: self.sw * amplitude,
             friction: self.friction * self.condition.speed,
         };
-        // The current of the flux linkage is the rest of that at the terminals.
+        // The current of the flux linkage is that at the terminals minus that of the iron.
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i - e * *G);
         let requested = (i * (R + drop) + e).magnitude() / held;
         let u_share = share(requested, self.condition.u_dc);
@@ -218,16 +227,16 @@ impl<'a> At<'a> {
         )
     }
 
-    /// Loss (W) of the devices that conduct with the voltage `u` (V) at the machine and the current `i` (A) of this magnitude, and the drop
-    /// per ampere (Ohm), along the current. The legs have the voltage of the machine and the drop, which decides how long transistor and
-    /// diode conduct: a fixed point, whose rounds leave a share of about drop / u_dc each.
+    /// Conduction loss (W) with the voltage `u` (V) at the machine and the current `i` (A) of this amplitude, and the drop along
+    /// the current per ampere (Ohm). The voltage of the legs includes the drop and determines how long transistor and diode
+    /// conduct: a fixed point, whose error each iteration multiplies by about drop / u_dc.
     fn conduction(&self, u: Dq, i: Dq, amplitude: f64) -> (f64, f64) {
         let (devices, u_dc) = (&self.drive.plant.inverter.devices, self.condition.u_dc);
         let (mut loss, mut drop) = (0.0, 0.0);
         if devices.is_none() || amplitude == 0.0 {
             return (loss, drop);
         }
-        for _ in 0..MOST {
+        for _ in 0..MAX_ITERATIONS {
             let leg = u + i * drop;
             let magnitude = leg.magnitude();
             let product = amplitude * magnitude;
@@ -243,8 +252,8 @@ impl<'a> At<'a> {
         (loss, drop)
     }
 
-    /// The point with the gates off and diodes that block: iron and friction brake. Above the
-    /// [`diode_speed`](Steady::diode_speed) diodes conduct, which is not counted here.
+    /// The point with the gates off and blocking diodes: iron and friction brake. Conduction of the diodes above the
+    /// [`diode_speed`](Steady::diode_speed) is not included.
     pub fn off(&self) -> Point {
         let Self { drive: Steady { plant, .. }, motor, w, G, .. } = self;
         let i_m = plant.iron.idle_current(motor, *w);
@@ -254,7 +263,7 @@ impl<'a> At<'a> {
         let losses = Losses { iron, friction: self.friction * self.condition.speed, ..Losses::default() };
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i_m);
         let point = self.point(Point { psi, u: e, tau_e, ..Point::default() }, losses);
-        // Exactly nothing comes from the link.
+        // The link supplies exactly nothing.
         Point { powers: Powers { p_in: 0.0, i_dc: 0.0, ..point.powers }, efficiency: 0.0, ..point }
     }
 

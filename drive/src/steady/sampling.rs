@@ -1,46 +1,44 @@
-//! What it does that the controller holds its voltage over a sample period, while the rotor turns by x = w T_s.
+//! Effect of a voltage that is constant over a sample period, while the rotor turns by x = w T_s.
 //!
-//! The controller sees the currents at its samples, between which the flux linkage in stator axes moves on a straight line
-//! instead of on its circle. Without resistance, the mean of the flux linkage in rotor axes is
+//! The controller measures the currents at its samples, between which the flux linkage in stator axes moves on a straight
+//! line instead of a circle. Without resistance, the mean of the flux linkage in rotor axes is
 //!
 //! ```text
 //! psi = s^2 psi_sample,  u = s w psi_sample,  s = sin(x/2) / (x/2)
 //! ```
 //!
-//! so that the voltage and the mean are less than at the samples, by x^2/24 and x^2/12: 0.4 and 0.8 % for x = 0.31, 10 000 rpm
-//! with three pole pairs and 0.1 ms. The current of the mean is lower along the flux linkage, and the torque with it. The iron's
-//! current follows the voltage: at a sample, at the end of the period, it is s G j w psi_sample e^(-jx/2).
+//! so the voltage and the mean are lower than at the samples by x^2/24 and x^2/12: 0.4 and 0.8 % for x = 0.31, 10 000 rpm
+//! with three pole pairs and 0.1 ms. The mean current is lower along the flux linkage, and so is the torque. The current of the
+//! iron follows the voltage: at a sample, at the end of the period, it is s G j w psi_sample e^(-jx/2).
 //!
-//! Between the samples, the flux linkage leaves the mean along itself, by r psi with r = x^2/8 (1 - (2t/T_s)^2) less its mean; the
-//! mean of r^2 is (4/45) (x^2/8)^2. The current that belongs to it adds copper loss: 2 % of that of an idle machine without
-//! saliency that turns by 0.35 rad in a period.
-//!
-//! Derived here.
+//! Between the samples, the flux linkage differs from its mean by r psi, with r = x^2/8 (1 - (2t/T_s)^2) minus its mean; the
+//! mean of r^2 is (4/45) (x^2/8)^2. The corresponding current adds copper loss: 2 % of that of an idle machine without
+//! saliency that turns by 0.35 rad in a period. Derived here.
 
 use drive_base::math::sin_cos_small;
 
-/// x up to which the drive works; beyond, the factors stay.
-const MOST: f64 = 2.0;
+/// Maximum x at which the drive works; above, the factors stay constant.
+const MAX_TURN: f64 = 2.0;
 
 /// The factors of a sample period in which the rotor turns by x.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Held {
+pub(super) struct HeldVoltage {
     /// s.
     pub(super) share: f64,
     /// s e^(-jx/2).
     pub(super) late: [f64; 2],
-    /// Mean of the square of r, by which the flux linkage leaves its mean.
+    /// Mean of r^2.
     pub(super) ripple: f64,
 }
 
-impl Held {
+impl HeldVoltage {
     /// No sampling.
     pub(super) const NOT: Self = Self { share: 1.0, late: [1.0, 0.0], ripple: 0.0 };
 
     /// For x in rad.
     #[inline]
     pub(super) fn new(x: f64) -> Self {
-        let half = 0.5 * x.clamp(-MOST, MOST);
+        let half = 0.5 * x.clamp(-MAX_TURN, MAX_TURN);
         let (sin, cos) = sin_cos_small(half);
         let share = if half == 0.0 { 1.0 } else { sin / half };
         let bow = 0.5 * half * half;
@@ -50,7 +48,7 @@ impl Held {
 
 #[cfg(test)]
 mod tests {
-    /// The mean of a chord of the circle in the frame that turns.
+    /// The mean of a chord of the circle in the rotating frame.
     #[test]
     fn the_mean_of_a_chord() {
         for x in [1e-3_f64, 0.31, -0.8, 1.9] {
@@ -61,7 +59,7 @@ mod tests {
                 chord_cos * cos + 2.0 * t * chord_sin * sin
             };
             let mean = (0..count).map(at).sum::<f64>() / f64::from(count);
-            let super::Held { share: s, ripple, .. } = super::Held::new(x);
+            let super::HeldVoltage { share: s, ripple, .. } = super::HeldVoltage::new(x);
             assert!((s * s - mean).abs() < 1e-6 * x * x, "{x}: {s}");
             let square = (0..count).map(|k| (at(k) - mean) * (at(k) - mean)).sum::<f64>() / f64::from(count);
             assert!((ripple / square - 1.0).abs() < 1e-5 + 0.3 * x * x, "{x}: {ripple}, not {square}");

@@ -1,11 +1,11 @@
-//! Roots: the torque reference that gives a torque at the shaft, and the Illinois method for it.
+//! Root finding by the Illinois method: the torque reference for a torque at the shaft.
 
 use super::operating::{At, Point};
 
-/// Evaluations, at most.
-const MOST: usize = 60;
+/// Maximum number of evaluations.
+const MAX_EVALUATIONS: usize = 60;
 
-/// Residue of the torque at the shaft, as a share of the torque and in N.m.
+/// Allowed residue of the torque at the shaft, relative and in N.m.
 const SMALL: f64 = 1e-10;
 
 impl At<'_> {
@@ -13,7 +13,7 @@ impl At<'_> {
     pub fn by_shaft(&self, tau: f64) -> Option<Point> {
         let allowed = SMALL * (1.0 + tau.abs());
         let off = |point: &Point| point.powers.tau_shaft - tau;
-        // Iron and friction take about the same at every torque: two such steps are often enough.
+        // Iron and friction losses hardly depend on the torque, so two such steps are usually enough.
         let mut at = self.by_reference(tau);
         for _ in 0..3 {
             if off(&at).abs() <= allowed {
@@ -35,10 +35,10 @@ impl At<'_> {
     }
 }
 
-/// A root of `f` between two places where its values (second of each pair) have opposite signs, to |f| <= `small`: the secant
-/// through both ends, with half the value at an end that stays (Illinois).
+/// A root of `f` to |f| <= `small`, between two arguments at which its values (second of each pair) have opposite signs: the
+/// secant through both ends, with half the value at an end that stays (Illinois).
 pub(super) fn root([mut a, mut b]: [(f64, f64); 2], small: f64, f: impl Fn(f64) -> f64) -> f64 {
-    for _ in 0..MOST {
+    for _ in 0..MAX_EVALUATIONS {
         let x = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
         let y = f(x);
         let resolved = (b.0 - a.0).abs() <= 4.0 * f64::EPSILON * x.abs();

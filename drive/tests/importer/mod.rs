@@ -1,26 +1,26 @@
-//! An importer for Model Exchange in a few lines, for tests.
+//! A minimal importer for Model Exchange.
 #![allow(dead_code, reason = "each test program uses a part")]
 
 use fmu_core::{Block, CompletedSteps, Elapsed, Events, Model};
 
-/// Most states and most indicators of a model.
+/// Maximum number of states and of indicators of a model.
 const MOST: usize = 8;
 
-/// An importer for Model Exchange: Runge-Kutta steps of at most `longest` (s), which land on the model's events.
+/// An importer for Model Exchange, with Runge-Kutta steps of at most `longest` (s) that end at the model's events.
 pub(crate) struct Importer<M: Model> {
     pub(crate) block: Block<M>,
     pub(crate) now: Elapsed,
     longest: f64,
     /// Number of integration steps that the importer reports as one completed step; 0: it reports none.
-    told: u32,
+    reported: u32,
     done: u32,
 }
 
 impl<M: CompletedSteps + Events + Clone> Importer<M> {
-    pub(crate) fn new(model: M, longest: f64, told: u32) -> Self {
+    pub(crate) fn new(model: M, longest: f64, reported: u32) -> Self {
         let mut block = Block { model, ..Block::default() };
         block.initialize();
-        let mut importer = Self { block, now: Elapsed::ZERO, longest, told, done: 0 };
+        let mut importer = Self { block, now: Elapsed::ZERO, longest, reported, done: 0 };
         importer.event(|_| ());
         importer
     }
@@ -35,7 +35,7 @@ impl<M: CompletedSteps + Events + Clone> Importer<M> {
         model.complete(now).unwrap();
     }
 
-    /// Integrates over `h` (s) with inputs that `set` gives at every time (s), with an event at its end if one is due.
+    /// Integrates over `h` (s), with inputs from `set` at every time (s) and an event at the end if one is due.
     pub(crate) fn run(&mut self, h: f64, set: impl Fn(&mut M, f64)) {
         let end = self.now.plus(h);
         loop {
@@ -47,7 +47,7 @@ impl<M: CompletedSteps + Events + Clone> Importer<M> {
             let steps = (next / self.longest - 1e-9).ceil().max(1.0);
             let crossed = self.until_crossing(next / steps, &set);
             self.done += 1;
-            if self.told > 0 && self.done.is_multiple_of(self.told) {
+            if self.reported > 0 && self.done.is_multiple_of(self.reported) {
                 self.block.model.complete(self.now).unwrap();
             }
             if crossed || self.block.model.next(self.now).is_due(self.now) {
@@ -64,7 +64,7 @@ impl<M: CompletedSteps + Events + Clone> Importer<M> {
         z.map(|z| z > 0.0)
     }
 
-    /// A step of `h` (s), or a shorter one to where an indicator has just changed its sign; whether one has.
+    /// A step of `h` (s), or a shorter one to the first change of an indicator's sign; returns whether one changed.
     fn until_crossing(&mut self, h: f64, set: &impl Fn(&mut M, f64)) -> bool {
         let (start, now, signs) = (self.block.model.clone(), self.now, self.signs());
         self.rk4(h, set);

@@ -1,4 +1,4 @@
-//! The options, and the runs that show them.
+//! The options, and the runs that show their effect.
 
 use super::{RATED, SLOW, T_S, U_DEAD, command, drive, imposed, off, run, turning};
 use drive::Pair;
@@ -15,24 +15,24 @@ use drive::math::wrap;
 use drive::motor::Motor;
 use std::f64::consts::TAU;
 
-/// What an option changes: figures of a run.
+/// Figures of a run that an option changes.
 pub(super) type Figures = [f64; 2];
 
 /// An option.
 pub(super) struct Case {
     /// Name in the table.
     pub(super) option: &'static str,
-    /// A drive on which it shows.
+    /// A drive on which it has an effect.
     pub(super) on: fn(Kind) -> Pair,
     /// Turns it on.
     pub(super) ask: fn(&mut Par),
     /// Runs the drive.
     pub(super) figures: fn(Pair) -> Figures,
-    /// Whether figures without and with it are as they should be.
+    /// Whether the figures without and with it are as expected.
     pub(super) acts: fn(Kind, Figures, Figures) -> bool,
 }
 
-/// Integral in A.s of the error of i_q after a step of the torque, with a resistance that the controller does not know.
+/// Integral in A.s of the error of i_q after a step of the torque, with a wrong resistance in the controller.
 fn current_error(mut pair: Pair) -> Figures {
     pair.plant.model.parameters.motor.R_s *= 1.5;
     let mut sum = 0.0;
@@ -43,7 +43,7 @@ fn current_error(mut pair: Pair) -> Figures {
     [sum.abs(), 0.0]
 }
 
-/// The references after a torque of 10 N.m was asked for, and the greatest torque.
+/// The references after a request of 10 N.m, and the maximum torque.
 fn references(mut pair: Pair) -> Figures {
     pair.controller.model.inputs.tau_ref = 10.0;
     run(&mut pair, 0.1, |_, _| ());
@@ -89,7 +89,7 @@ fn after_load(mut pair: Pair) -> Figures {
     [sum / n, pair.controller.out.theta_est]
 }
 
-/// Mean torque in N.m under a request of 3 N.m, and its part that turns once in an electrical period.
+/// Mean torque in N.m under a request of 3 N.m, and its component at the electrical frequency.
 fn ripple(mut pair: Pair) -> Figures {
     let w = 3.0 * pair.plant.model.parameters.initial.speed;
     let (mut mean, mut sine, mut cosine, mut n) = (0.0, 0.0, 0.0, 0.0);
@@ -157,7 +157,7 @@ pub(super) const CASES: &[Case] = &[
     Case {
         option: "current.reference_feed_forward",
         on: slow,
-        // The command of the sample at which the torque is asked for.
+        // The command of the sample of the request.
         figures: |mut pair| {
             run(&mut pair, 0.1, |t, p| p.controller.model.inputs.tau_ref = if t > 0.09985 { 5.0 } else { 0.0 });
             [command(&pair).alpha(), command(&pair).beta()]
@@ -230,7 +230,7 @@ pub(super) const CASES: &[Case] = &[
         option: "compensation.u_dead",
         on: |kind| with_dead_time(slow(kind)),
         ask: |p| p.compensation.u_dead = U_DEAD,
-        // The PI has to give what the legs lose.
+        // The PI controller has to supply the voltage that the legs lose.
         figures: |mut pair| {
             let (mut sum, mut n) = (0.0, 0.0);
             pair.controller.model.inputs.tau_ref = 5.0;
@@ -251,7 +251,7 @@ pub(super) const CASES: &[Case] = &[
             pair
         },
         ask: |p| p.compensation.observe = true,
-        // The voltage that the estimators and lock_lost take for the machine's.
+        // The voltage that estimators and lock_lost use as that of the machine.
         figures: |mut pair| {
             let (mut sum, mut n) = (0.0, 0.0);
             pair.controller.model.inputs.tau_ref = 0.2;
@@ -262,7 +262,7 @@ pub(super) const CASES: &[Case] = &[
             });
             [sum / n, 0.0]
         },
-        // A carrier that crosses zero within a sample leaves its own error.
+        // A carrier that crosses zero within a sample causes an error.
         acts: |kind, [without, _], [with, _]| {
             with < without || kind.class().injects() && with < 0.2 && (with - without).abs() > 0.0
         },
@@ -299,7 +299,7 @@ pub(super) const CASES: &[Case] = &[
             run(&mut pair, T_S, |_, _| ());
             [command(&pair).alpha(), command(&pair).beta()]
         },
-        // The first command, the EMF at least, is turned by another w T_s.
+        // The first command, at least the EMF, is rotated by another w T_s.
         acts: |_, without, with| {
             let change = (with[0] - without[0]).hypot(with[1] - without[1]);
             change > 0.9 * (3.0 * SLOW).powi(2) * T_S * 0.545
@@ -324,7 +324,7 @@ pub(super) const CASES: &[Case] = &[
         on: slow,
         ask: |p| (p.dc.used, p.dc.max) = (true, 0.3),
         figures: |pair| [0.0, references(pair)[1]],
-        // The greatest torque takes 162 W, at a speed of 15.7 rad/s.
+        // The maximum torque takes 162 W, at a speed of 15.7 rad/s.
         acts: |_, _, [_, tau_max]| tau_max * SLOW < 162.0 && tau_max > 3.0,
     },
     Case {
@@ -344,7 +344,7 @@ pub(super) const CASES: &[Case] = &[
         },
         ask: |p| p.trip.asc = true,
         figures: over_voltage,
-        // On a link that a short circuit has discharged, any speed is above that of the diodes.
+        // On a link discharged by a short circuit, any speed is above the diode speed.
         acts: |_, without, with| are(without, [true, false]) && are(with, [true, true]),
     },
     Case {
@@ -416,7 +416,7 @@ pub(super) const CASES: &[Case] = &[
         },
         ask: |p| p.estimators.adaptation.resistance = true,
         figures: at_rest,
-        // A sensor needs no resistance, and the controller says that the option has no effect.
+        // A sensor needs no resistance, and the controller reports that the option has no effect.
         acts: |kind, [fixed, _], [adapted, _]| {
             kind == Kind::Sensored || (fixed / 3.24 - 1.0).abs() < 1e-9 && (adapted / 3.6 - 1.0).abs() < 0.03
         },
@@ -490,7 +490,7 @@ pub(super) const CASES: &[Case] = &[
             });
             [most, fast]
         },
-        // Rated load is held with the term, and lost without it where a tracker follows the EMF alone.
+        // Without the term, a drive whose tracker follows the EMF alone is lost under rated load.
         acts: |kind, [with, _], [without, _]| {
             let tracks = !matches!(kind, Kind::VoltageModel | Kind::CurrentModel | Kind::Hybrid);
             with < 15.0 && if tracks { without > 30.0 } else { without > 1.02 * with }

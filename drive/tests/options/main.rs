@@ -1,4 +1,4 @@
-//! Every option of the controller with every estimator: it acts as it says, or it is refused by name.
+//! Every option of the controller with every estimator has the described effect, or is refused by name.
 #![allow(missing_docs, non_snake_case)]
 
 mod cases;
@@ -19,7 +19,7 @@ const T_S: f64 = 1e-4;
 const RATED: f64 = TAU * 25.0;
 /// Speed in rad/s at which every method works.
 const SLOW: f64 = 0.1 * RATED;
-/// Voltage in V that a leg loses to the dead time of 2 us.
+/// Voltage in V lost per leg by a dead time of 2 us.
 const U_DEAD: f64 = 10.8;
 
 /// The 2.2 kW machine without friction, all options at their start values, with gains that suit the estimator.
@@ -50,7 +50,7 @@ fn drive(kind: Kind) -> Pair {
     pair
 }
 
-/// Turning at `speed` (rad/s), which the estimator knows.
+/// Turning at `speed` (rad/s), with the estimator at the same speed.
 fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair.plant.model.parameters.initial.speed = speed;
     pair.controller.model.parameters.speed_est = speed;
@@ -63,12 +63,12 @@ fn imposed(pair: Pair, speed: f64) -> Pair {
     let mut pair = turning(pair, speed);
     pair.plant.model.parameters.mechanics.imposed = true;
     pair.controller.model.parameters.speed_loop.torque_mode = true;
-    // Faster than that, the low-speed law is over.
+    // Above that speed, the low-speed law is inactive.
     pair.controller.model.parameters.zero_speed.w_0 = 1.0;
     pair
 }
 
-/// Runs for `seconds`; `each` sees the drive after every sample.
+/// Runs for `seconds` and calls `each` after every sample.
 fn run(pair: &mut Pair, seconds: f64, mut each: impl FnMut(f64, &mut Pair)) {
     pair.start().unwrap();
     let speed = pair.plant.model.parameters.initial.speed;

@@ -1,11 +1,11 @@
-//! The currents of a machine with saturation, read from a map over its flux linkages that the importer may replace by one of another
-//! size: arrays with structural parameters, and a terminal that says what belongs together (FMI-LS-STRUCT).
+//! The currents of a machine with saturation, read from a map over its flux linkages that the importer may replace by one of
+//! another size: arrays with structural parameters, and a terminal that groups them (FMI-LS-STRUCT).
 
 use fmu_core::unit::{AMPERE, WEBER};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Info, Member, Model, Resizable, Row, Step, Table, Terminal, table};
 use serde::{Deserialize, Serialize};
 
-/// Greatest number of points on an axis.
+/// Maximum number of points on an axis.
 const MOST: usize = 31;
 
 /// The map, and the point at which it is read. Tables are row by row: a row for each flux linkage of the d-axis.
@@ -31,7 +31,7 @@ impl Default for CurrentMap {
 }
 
 impl CurrentMap {
-    /// Makes a map of the sizes: a magnet of 0.1 Wb, 2 mH and 5 mH, and currents that grow faster where the iron saturates.
+    /// Creates a map of the sizes: a magnet of 0.1 Wb, 2 mH and 5 mH, and currents that grow faster where the iron saturates.
     fn fill(&mut self) {
         let [n_d, n_q] = [self.n_d, self.n_q].map(|n| usize::try_from(n).unwrap_or(0));
         self.psi_d_axis = axis(n_d, 0.02, 0.14);
@@ -63,7 +63,7 @@ fn axis(n: usize, from: f64, to: f64) -> Vec<f64> {
     points.into_iter().map(|i| from + i / last * (to - from)).collect()
 }
 
-/// The interval of an axis that a value is in, or the outermost one, and where in it.
+/// The interval of an axis that contains a value, or the outermost one, and the position in it.
 fn place(axis: &[f64], x: f64) -> (usize, f64) {
     let i = axis.partition_point(|point| *point <= x).clamp(1, axis.len() - 1) - 1;
     (i, (x - axis[i]) / (axis[i + 1] - axis[i]))

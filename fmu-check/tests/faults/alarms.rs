@@ -225,7 +225,7 @@ fn a_state_without_the_time() {
         assert!(matches!(verdict(&report, "T05"), Verdict::NotDetermined(_)), "{:?}", verdict(&report, "T05"));
         for id in ["F01b", "F02c", "F03a", "F04a"] {
             let Verdict::NotDetermined(why) = verdict(&report, id) else { panic!("{id}: {:?}", verdict(&report, id)) };
-            assert!(why.starts_with("as F02a: "), "{id}: {why}");
+            assert!(why.starts_with("see F02a: "), "{id}: {why}");
         }
     }
 }
@@ -293,7 +293,7 @@ fn what_fmi_2_requires() {
     assert!(listed(&report).contains("variable n: is a continuous Int32 by default"), "{}", listed(&report));
 }
 
-/// What the checker limits is not tried, and no fault of the FMU: here more files than it copies.
+/// What exceeds a limit of the checker is not tried, and is no fault of the FMU: here more files than it copies.
 #[test]
 fn our_own_limits() {
     let dir = tempfile::tempdir().unwrap();

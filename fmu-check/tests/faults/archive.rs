@@ -35,6 +35,12 @@ fn each_fault_is_found_by_its_check() {
         ("twice", &["Z01k"], |e| e.push(e[2].clone())),
         ("file and folder", &["Z01k", "Z02b"], |e| e.push(Entry::new("sources", b""))),
         ("other name inside", &["Z01k"], |e| e[2].local_name = Some("sources/xyz.c".into())),
+        ("a source that is missing", &["Z10"], |e| {
+            let sources = "><SourceFiles><File name=\"fmu.c\"/><File name=\"gone.c\"/></SourceFiles></CoSimulation>";
+            let xml =
+                XML.replacen("canSerializeFMUstate=\"true\"/>", &format!("canSerializeFMUstate=\"true\"{sources}"), 1);
+            e[0] = Entry::new("modelDescription.xml", xml.as_bytes());
+        }),
         ("no implementation", &["Z02a"], |e| {
             e.pop();
         }),

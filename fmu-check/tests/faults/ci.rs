@@ -26,6 +26,21 @@ fn archive(dir: &Path, name: &str, change: fn(&str) -> String) -> PathBuf {
     path
 }
 
+/// A rule of thumb does not count for a CI that asks for certain findings.
+#[test]
+fn findings_below_a_confidence_do_not_count() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = compile(2, "T03") else { return };
+    let path = pack(dir.path(), 2, "T03", &binary);
+    let run = |more: &[&str]| fmu_check(&[&[path.to_str().unwrap(), "--only", "T03", "--strict"], more].concat());
+    let (code, text, _) = run(&[]);
+    assert!(code == Some(1) && text.contains("T03    VIOLATED (hard, a hint)"), "{text}");
+    assert_eq!(run(&["--confidence", "certain"]).0, Some(0));
+    assert_eq!(run(&["--confidence", "hint"]).0, Some(1));
+    let (_, json, _) = run(&["--format", "json"]);
+    assert!(json.contains("\"confidence\": \"hint\""), "{json}");
+}
+
 /// Two findings at level must: S01 and X08.
 fn two_faults(xml: &str) -> String {
     let without = xml.replacen("<Outputs>\n      <Unknown index=\"4\"/>", "<Outputs>", 1);
@@ -55,7 +70,7 @@ fn known_findings_do_not_count() {
     let worse = archive(dir.path(), "worse.fmu", |xml| two_faults(xml).replace(" license=\"MIT\"", ""));
     let (code, text, _) = fmu_check(&[worse.to_str().unwrap(), "--only", STATIC, "--baseline", baseline]);
     assert!(code == Some(1) && text.contains("new: X06"), "{text}");
-    // What has been mended is named.
+    // A finding that no longer occurs is named.
     let better = archive(dir.path(), "better.fmu", |xml| {
         two_faults(xml).replace("<Outputs>", "<Outputs><Unknown index=\"4\"/>")
     });
@@ -206,7 +221,7 @@ fn the_whole_run_has_a_limit() {
     let Some(binary) = compile(2, "G07a") else { return };
     let path = pack(dir.path(), 2, "limit", &binary);
     let (_, text, _) = fmu_check(&[path.to_str().unwrap(), "--timeout", "0.2"]);
-    assert!(text.contains("the time limit of the run was used up (see --timeout)"), "{text}");
+    assert!(text.contains("the run reached its time limit (see --timeout)"), "{text}");
     assert_eq!(fmu_check(&[path.to_str().unwrap(), "--timeout", "-1"]).0, Some(2));
 }
 

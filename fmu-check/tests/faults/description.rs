@@ -26,6 +26,29 @@ fn unit(name: &str, base: &str) -> String {
     format!("<UnitDefinitions><Unit name=\"{name}\"><BaseUnit {base}/></Unit></UnitDefinitions><LogCategories>")
 }
 
+/// A unit of temperatures with a display unit of this offset.
+fn kelvin(offset: &str) -> String {
+    let display = format!("<DisplayUnit name=\"degC\" offset=\"{offset}\"/>");
+    format!("<UnitDefinitions><Unit name=\"K\"><BaseUnit K=\"1\"/>{display}</Unit></UnitDefinitions><LogCategories>")
+}
+
+/// A start value that is no item, and a tolerance that is not finite.
+#[test]
+fn faults_of_starts_and_tolerances() {
+    let mode = "<TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"a\" value=\"1\"/><Item name=\"b\" value=\"4\"/>\
+                </Enumeration></SimpleType></TypeDefinitions>\n  <LogCategories>";
+    let typed = include_str!("fmu.xml").replace("<LogCategories>", mode);
+    let typed = typed.replace("<Boolean start=\"false\"/>", "<Enumeration declaredType=\"Mode\" start=\"1\"/>");
+    each(
+        &typed,
+        &[
+            (&["V06a"], "\"Mode\" start=\"1\"", "\"Mode\" start=\"2\""),
+            (&[], "\"Mode\" start=\"1\"", "\"Mode\" start=\"4\""),
+        ],
+    );
+    each(include_str!("fmu3.xml"), &[(&["X10"], "stopTime=\"10\"", "stopTime=\"10\" tolerance=\"INF\"")]);
+}
+
 #[test]
 fn faults_of_fmi_2() {
     each(
@@ -39,6 +62,9 @@ fn faults_of_fmi_2() {
             (&["V09c"], "<LogCategories>", &unit("rpm", "rad=\"1\" s=\"-1\" factor=\"9.549296585513721\"")),
             (&[], "<LogCategories>", &unit("rpm", "rad=\"1\" s=\"-1\" factor=\"0.10471975511965977\"")),
             (&[], "<LogCategories>", &unit("1/min", "s=\"-1\" factor=\"0.016666666666666666\"")),
+            // degC with the offset of the other direction, and with its own.
+            (&["V09d"], "<LogCategories>", &kelvin("273.15")),
+            (&[], "<LogCategories>", &kelvin("-273.15")),
             (&["X01b", "X08"], "canGetAndSetFMUstate", "canGetAndSetFMUState"),
             (&["X01b"], "<Real start=\"0\"/>", "<Real start=\"0\" color=\"red\"/>"),
             (&["X01b"], "<DefaultExperiment startTime=\"0\" stopTime=\"10\" stepSize=\"0.01\"/>", "<Surprise/>"),
@@ -150,6 +176,8 @@ fn faults_of_aliases_and_clocked_states() {
                 "intervalVariability=\"triggered\"",
                 "intervalVariability=\"fixed\" intervalDecimal=\"0.1\" shiftDecimal=\"0.05\" priority=\"1\"",
             ),
+            // Milliseconds.
+            (&["V19"], "intervalVariability=\"triggered\"", "intervalVariability=\"fixed\" intervalDecimal=\"100\""),
             (&["V16"], TICK, "causality=\"local\" intervalVariability=\"triggered\" shiftDecimal=\"1\""),
             // An output clock with a priority, or with a period; a continuous variable on a clock; a local clock as an output.
             (&["V16", "S01"], TICK, "causality=\"output\" intervalVariability=\"triggered\" priority=\"1\""),

@@ -20,7 +20,7 @@ enum { INSTANTIATED = 1, INITIALIZATION = 2, EVENT = 4, CONTINUOUS = 8, STEP = 1
 typedef struct {
     double start, t, gain, u, x, d;
     int n, k, above, mode, exchange, events, early, evaluations;
-    double last_x, last_z, shown;
+    double last_x, last_z, last_t, last_dx, shown;
 } M;
 
 typedef struct { bool again, terminate, nominals, states, defined; double next; } Update;
@@ -61,6 +61,10 @@ static double slope(M *m) {
         dx += 1e-4 * (m->x - m->last_x);
         m->last_x = m->x;
     }
+    if (FAULT(E06k)) {
+        if (m->t == m->last_t && m->last_t) return m->last_dx;
+        m->last_t = m->t, m->last_dx = dx;
+    }
     if (FAULT(E06b)) dx *= 1 + 1e-14 * (m->evaluations++ % 5);
     return dx;
 }
@@ -85,6 +89,7 @@ static int enter_initialization(M *m, double start) {
 
 static int leave_initialization(M *m) {
     ENTER(INITIALIZATION);
+    if (FAULT(G09m) && m->exchange) m->x = 1;
     return m->mode = m->exchange || m->events ? EVENT : STEP, OK;
 }
 
@@ -183,6 +188,7 @@ static int get(M *m, const unsigned *vr, size_t n, double *to) {
 #endif
     for (size_t i = 0; i < n; i++) {
         double y = 2 * m->x + m->u, time = m->t;
+        if (FAULT(NOISE)) y += rand() % 1000 * 1e-3;
         if (FAULT(E08)) time = m->start;
         if (FAULT(E11)) y += m->d;
         if (FAULT(E11h)) y += m->d * (m->x - 1);
@@ -200,7 +206,7 @@ static int set(M *m, const unsigned *vr, size_t n, const double *from) {
         if (vr[i] == 1 && m->mode & (INSTANTIATED | INITIALIZATION)) m->gain = from[i];
         else if (vr[i] == 2 && FAULT(E05u) && m->mode == EVENT) continue;
         else if (vr[i] == 2) m->u = from[i];
-        else if (vr[i] == 3 && m->mode == CONTINUOUS) m->x = from[i];
+        else if (vr[i] == 3 && (m->mode == CONTINUOUS || (FAULT(STARTS) && m->mode == INSTANTIATED))) m->x = from[i];
         else if (vr[i] == 6 && m->mode != CONTINUOUS) m->d = from[i];
         else return fail(m);
     }

@@ -129,6 +129,27 @@ fn all(version: u8, faults: &[(&str, &[&str])]) {
     });
 }
 
+/// Derivatives that are computed once for each time, and a start value that Model Exchange alone loses.
+#[test]
+fn faults_of_a_time_and_of_a_start() {
+    let dir = tempfile::tempdir().unwrap();
+    let xml = include_str!("exchange2.xml");
+    let calculated = "initial=\"calculated\"><Real nominal=\"2\"";
+    let exact = xml.replace(calculated, "initial=\"exact\"><Real start=\"1\" nominal=\"2\"");
+    assert!(exact != xml);
+    let rows: [(&str, &str, &str, &[&str]); 4] = [
+        (xml, "NONE", "E06a", &[]),
+        (xml, "E06k", "E06a", &["E06a"]),
+        (&exact, "STARTS", "G09", &[]),
+        (&exact, "STARTS G09m", "G09", &["G09"]),
+    ];
+    for (xml, faults, id, expected) in rows {
+        let Some(binary) = library("exchange.c", &[], faults) else { return };
+        let report = check(&pack_with(dir.path(), "time", xml, &binary), &[id]);
+        assert_eq!(violated(&report), expected, "{faults}: {}", listed(&report));
+    }
+}
+
 #[test]
 fn each_fault_is_found_by_its_check() {
     all(2, FAULTS);

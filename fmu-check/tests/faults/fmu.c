@@ -59,6 +59,7 @@ typedef struct {
     Callbacks callbacks;
     const Callbacks *kept;
     int logging;
+    char *title;
     char *label;
     int set;
     char name[64];
@@ -85,6 +86,9 @@ static int say(Fmu *f, int status, const char *text) {
     if (FAULT(G_L1b)) category = "other";
     if (FAULT(G_L4)) environment = NULL;
     if (FAULT(G_L3b)) text = "something\n";
+#ifndef FMI3
+    if (FAULT(G_L3f) && f->data.steps) return c->logger(environment, f->name, status, category, "100%s of it"), status;
+#endif
 #ifdef FMI3
     ((void (*)(void *, int, const char *, const char *))c->logger)(environment, status, category, text);
 #else
@@ -104,6 +108,8 @@ static int fail(Fmu *f, const char *text) {
     if (!(f->data.state & (allowed))) return fail(f, "not allowed in this state")
 
 static int alive;
+/* Instances that were freed. */
+static int freed;
 /* The instance that was made first. */
 static Fmu *first;
 static void *volatile lost;
@@ -191,6 +197,7 @@ EXPORT const char *fmi2GetVersion(void) { return FAULT(X02b) ? "2.0.5" : "2.0"; 
 
 EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const char *where, const Callbacks *callbacks,
                              int visible, int logging) {
+    if (FAULT(RESERVES) && mmap(NULL, 8ull << 30, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0) == MAP_FAILED) return NULL;
     (void)where; (void)visible;
     if (!FAULT(L01a) && (!name || !*name || !guid)) return refuse(callbacks, name, logging, "no name or no GUID");
     if (!FAULT(X04) && guid && strcmp(guid, GUID)) return refuse(callbacks, name, logging, "another GUID");
@@ -244,6 +251,7 @@ EXPORT void *fmi2Instantiate(const char *name, int type, const char *guid, const
 }
 
 EXPORT void fmi2FreeInstance(void *c) {
+    freed++;
     if (FAULT(ONCE)) alive = 0;
     if (first == c) first = NULL;
     if (FAULT(L05)) ((Fmu *)c)->logging = 0;
@@ -350,6 +358,9 @@ EXPORT int fmi2GetReal(void *c, const unsigned vr[], size_t n, double values[]) 
         if (FAULT(S04) && f->data.state == INITIALIZATION) y = f->data.gain;
         if (FAULT(S04h) && f->data.state == INITIALIZATION) y += f->data.bias * f->data.u;
         if (FAULT(T10t)) y += time(NULL) % 1000;
+        if (FAULT(L04f)) y += freed;
+        if (FAULT(NOISE)) y += rand() % 1000 * 1e-3;
+        if (FAULT(CPU_TIME)) y += clock() * 1e-3;
         if (FAULT(L11) && f->data.state == INITIALIZATION && vr[i] == 3) y = f->data.y += 1e-6;
         if (FAULT(T10p)) y += getpid() * 1e-9;
         double now = FAULT(T06b) ? f->data.start : f->data.time;
@@ -399,7 +410,11 @@ EXPORT int fmi2GetString(void *c, const unsigned vr[], size_t n, const char *val
     ENTER(READABLE);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(FAULT(V12s) ? ~0u : 1)) return fail(f, "no such String");
+        if (FAULT(TITLE) && vr[i] == 1 && !FAULT(G05s)) {
+            values[i] = f->title ? f->title : "a";
+            continue;
+        }
+        if (!KNOWN(FAULT(V12s) ? ~0u : FAULT(TITLE) ? 2 : 1)) return fail(f, "no such String");
         values[i] = f->label ? f->label : f->data.label;
         if (FAULT(B07s)) values[i] = strcpy(malloc(3000 + strlen(values[i])), values[i]);
     }
@@ -465,7 +480,11 @@ EXPORT int fmi2SetString(void *c, const unsigned vr[], size_t n, const char *con
     ENTER(INSTANTIATED | INITIALIZATION | STEP);
     if (bad(vr, n, values)) return fail(f, "NULL");
     for (size_t i = 0; i < n; i++) {
-        if (!KNOWN(1)) return fail(f, "no such String");
+        if (FAULT(TITLE) && vr[i] == 1 && !FAULT(G05s)) {
+            f->title = strdup(values[i]);
+            continue;
+        }
+        if (!KNOWN(FAULT(TITLE) ? 2 : 1)) return fail(f, "no such String");
         if (!FAULT(G01n) && !values[i]) return fail(f, "NULL");
         if (f->data.state == STEP) return fail(f, "label is fixed");
         if (FAULT(G05)) {
@@ -488,7 +507,7 @@ EXPORT int fmi2GetFMUstate(void *c, void **state) {
     static Data only;
     if (FAULT(F01o)) *state = &only;
     if (FAULT(F01l)) *(volatile char *)malloc(700) = 1;
-    if (!*state) *state = malloc(sizeof(Data));
+    if (!*state || FAULT(F01e)) *state = malloc(sizeof(Data));
     *(Data *)*state = f->data;
     if (FAULT(F04b)) ((Data *)*state)->extra = (uint64_t)(uintptr_t)f;
     return OK;
@@ -601,7 +620,8 @@ EXPORT int fmi2DoStep(void *c, double t, double h, int no_prior) {
     if (FAULT(B08f)) __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040);
     if (FAULT(T05) && no_prior) d->y += 1e-2;
     if (FAULT(T05s) && no_prior) d->y *= 1 + 1e-12;
-    d->y += (d->gain * d->u + d->bias) * (FAULT(T03) ? 1 : FAULT(T03l) && h > 0.015 ? 0.01 : h);
+    double length = FAULT(T03r) ? 0.01 * (int)(h / 0.01 + 1e-9) : h;
+    d->y += (d->gain * d->u + d->bias) * (FAULT(T03) ? 1 : FAULT(T03l) && h > 0.015 ? 0.01 : length);
     if (FAULT(MEAN)) d->y = (t + 1) * (t + 1) + (t + 1) * h + h * h / 3;
     if (FAULT(G12)) d->u = 0;
     if (FAULT(G13)) d->gain *= 1.0001;

@@ -8,9 +8,11 @@ mod ci;
 mod description;
 mod exchange;
 mod findings;
+mod machine;
 mod sizes;
 mod starts;
 mod ticks;
+mod varying;
 mod zip;
 
 use findings::{check, check_within, listed, violated};
@@ -29,8 +31,8 @@ pub fn verdict(report: &Report, id: &str) -> Verdict {
     report.finding(id).map_or_else(|| panic!("{id} did not run"), |f| f.verdict.clone())
 }
 
-/// How the place for the names of faults begins in a library (`fault.h`), and how long it is.
-const PLACE: &[u8] = b"The faults of this library: ";
+/// Start of the buffer for the names of faults in a library (`fault.h`), and its length.
+const BUFFER: &[u8] = b"The faults of this library: ";
 const LONGEST: usize = 96;
 
 /// A library of a C file here with these faults, which are words between blanks; `None` without a compiler. It is compiled once for
@@ -51,8 +53,8 @@ pub fn library(source: &str, options: &[&str], faults: &str) -> Option<Vec<u8>> 
         compiled.insert(key.clone(), std::fs::read(out).unwrap());
     }
     let mut bytes = compiled[&key].clone();
-    let at = bytes.windows(PLACE.len()).position(|window| window == PLACE).unwrap() + PLACE.len();
-    assert!(PLACE.len() + faults.len() < LONGEST, "{faults}");
+    let at = bytes.windows(BUFFER.len()).position(|window| window == BUFFER).unwrap() + BUFFER.len();
+    assert!(BUFFER.len() + faults.len() < LONGEST, "{faults}");
     bytes[at..at + faults.len()].copy_from_slice(faults.as_bytes());
     bytes[at + faults.len()] = 0;
     Some(bytes)

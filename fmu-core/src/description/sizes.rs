@@ -23,7 +23,7 @@ pub(super) fn exchange<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Opt
     })
 }
 
-/// Every array has the length that its sizes say, from the start on.
+/// Checks that every array has the length given by its sizes, from the start on.
 pub(super) fn check_sizes<M: Model>(fresh: &Block<M>) -> Result<(), Fault> {
     if const { !M::TABLE.has_sizes() } {
         return Ok(());
@@ -33,7 +33,7 @@ pub(super) fn check_sizes<M: Model>(fresh: &Block<M>) -> Result<(), Fault> {
     M::TABLE.check_sizes(&mut started)
 }
 
-/// Gives every array that structural parameters size its extents at the start, and every derivative those of its state.
+/// Sets the extents of every array with structural sizes at the start, and of every derivative to those of its state.
 pub(super) fn size<M: Model>(can: &Capabilities<M>, variables: &mut [Variable]) -> Result<(), Fault> {
     if !M::TABLE.has_sizes() && !can.has_arrays() {
         return Ok(());

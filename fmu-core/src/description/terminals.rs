@@ -14,11 +14,11 @@ pub struct TerminalDescription {
     pub name: String,
     /// One sentence.
     pub description: String,
-    /// How members find each other.
+    /// How members are matched.
     pub rule: MatchingRule,
     /// The variables that it groups.
     pub members: Vec<MemberDescription>,
-    /// Where and how it is drawn.
+    /// Position and appearance.
     pub picture: Option<TerminalPicture>,
 }
 

@@ -1,8 +1,8 @@
 //! Euler's explicit method with a fixed step: x += s f(x) at the points k s of a grid that begins at the start of the simulation.
 //!
-//! A communication step takes the points in it, counted in integers, each with exactly the step s as weight; what is left of it
-//! waits for the next one, and until then the states are those of the last point. So the states at a point of the grid have the
-//! same bits for any communication step. An event is handled at the point that follows its instant; nothing locates it.
+//! A communication step takes the points in it, counted in integers, each with exactly the step s as weight; the remainder is
+//! left to the next step, and until then the states are those of the last point. So the states at a grid point have the same
+//! bits for any communication step. An event is handled at the grid point that follows it; it is not located.
 
 use super::{MAX_INDICATORS, MAX_SUBSTEPS, arrive, check_indicators, count, crossed, handle, states};
 use crate::rules::check_number;
@@ -18,14 +18,14 @@ use std::ops::Range;
 /// ```
 ///
 /// # Errors
-/// Those of [`ContinuousTime::derivatives`], a state that is not finite, or more points than anyone can wait for.
+/// Those of [`ContinuousTime::derivatives`], a state that is not finite, or an unreasonable number of points.
 pub fn euler<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, fixed: f64) -> Result<(), Fault> {
     const { check_number::<M>(N) };
     points(step, fixed)?.try_for_each(|k| forward::<M, N>(model, k, fixed))
 }
 
-/// [`euler`] for a model with events: a change of sign or a due time is handled at the next point of the grid, also where that is
-/// the end of the step. Every step begins with an event, because inputs may have changed; what is due then is done then.
+/// [`euler`] for a model with events: a change of sign or a due time is handled at the next point of the grid, even at the end
+/// of the step. Every step begins with an event, because inputs may have changed; an event due then is handled then.
 ///
 /// # Errors
 /// Those of [`euler`] and of [`Events::event`], [`Fault::end`] among them.
@@ -71,7 +71,7 @@ fn points(step: &Step, fixed: f64) -> Result<Range<u64>, Fault> {
     Ok(grid.first_after(step.start)..grid.first_after(step.end()))
 }
 
-/// Steps to the points that are left, up to the first with an event: its number.
+/// Steps to the remaining points, up to the first with an event; returns its number.
 fn walk<M: ContinuousTime + Events, const N: usize>(
     model: &mut M,
     left: &mut Range<u64>,

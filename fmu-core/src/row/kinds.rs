@@ -1,5 +1,5 @@
-//! Constructors of rows: each says who sets the variable and when it changes. [`integer`](crate::integer) has those of
-//! integers.
+//! Constructors of rows: each determines who sets the variable and when it changes. Those of integers are in
+//! [`integer`](crate::integer).
 
 use crate::bytes::Bytes;
 use crate::enumeration::{Enumerated, Field};
@@ -10,8 +10,8 @@ use crate::rules::demand;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Variability};
 
-/// Constructors with the same arguments (after their type parameters) and the same row: one a line, with its causality and
-/// its variability.
+/// Constructors with the same arguments (after their type parameters) and the same row: one per line, with causality and
+/// variability.
 macro_rules! constructors {
     ([$($generic:tt)*] $arguments:tt => $row:expr; $($(#[$doc:meta])* $name:ident $causality:ident $variability:ident;)*) => {
         constructors! { @ [$($generic)*] $arguments [$row] $([$(#[$doc])* $name $causality $variability])* }
@@ -66,7 +66,7 @@ constructors! {
 constructors! {
     [E: Enumerated] (name: &'static str, description: &'static str, field: &'static Field<W, E>)
         => Self::new(name, description, Kind::Enumeration(E::ENUMERATION), Access::Enumeration(field));
-    /// An enumeration input; `field` says where the model holds the enum.
+    /// An enumeration input; `field` locates the enum in the model.
     enumeration_input Input Discrete;
     /// An enumeration output.
     enumeration_output Output Discrete;
@@ -111,13 +111,13 @@ constructors! {
 constructors! {
     [T: Element] (name: &'static str, description: &'static str, dimension: usize, items: &'static Items<W, T>)
         => Self::new(name, description, T::KIND, Access::List(items)).of_dimension(dimension);
-    /// An array of inputs of another type than real numbers; `dimension` elements, and `items` says where the model holds them.
+    /// An array of inputs other than real numbers; `dimension` elements, and `items` locates them in the model.
     list_input Input Discrete;
-    /// An array of outputs of another type than real numbers; `dimension` elements.
+    /// An array of outputs other than real numbers; `dimension` elements.
     list_output Output Discrete;
-    /// An array of `dimension` variables other than outputs, of another type than real numbers.
+    /// An array of `dimension` variables, neither outputs nor real numbers.
     list_local Local Discrete;
-    /// A fixed array of parameters of another type than real numbers; `dimension` elements.
+    /// A fixed array of parameters other than real numbers; `dimension` elements.
     list_parameter Parameter Fixed;
 }
 
@@ -138,13 +138,13 @@ constructors! {
         most: usize,
         get: fn(&mut W) -> &mut Bytes,
     ) => Self::new(name, description, Kind::Binary { mime_type, most }, Access::Binary(get));
-    /// An input of `most` bytes at most (FMI 3.0), whose content has this MIME type.
+    /// An input of at most `most` bytes (FMI 3.0), whose content has this MIME type.
     binary_input Input Discrete;
-    /// An output of `most` bytes at most (FMI 3.0).
+    /// An output of at most `most` bytes (FMI 3.0).
     binary_output Output Discrete;
-    /// A variable of `most` bytes at most other than an output (FMI 3.0).
+    /// A variable, other than an output, of at most `most` bytes (FMI 3.0).
     binary_local Local Discrete;
-    /// A parameter of `most` bytes at most (FMI 3.0), fixed after initialization.
+    /// A parameter of at most `most` bytes (FMI 3.0), fixed after initialization.
     binary_parameter Parameter Fixed;
 }
 
@@ -162,7 +162,7 @@ impl<W: 'static> Row<W> {
         Self::new(name, description, kind, access).with(Causality::StructuralParameter, Variability::Fixed)
     }
 
-    /// A text output. The model keeps it or chooses among constants: reading it in a step does not allocate.
+    /// A text output. The model stores it or selects a constant: reading it in a step does not allocate.
     pub const fn text_output(name: &'static str, description: &'static str, say: fn(&W) -> &str) -> Self {
         Self::new(name, description, Kind::Text, Access::Said(say)).with(Causality::Output, Variability::Discrete)
     }

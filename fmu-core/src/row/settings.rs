@@ -1,4 +1,4 @@
-//! What a row states after its constructor; the compiler checks it.
+//! Settings of a row after its constructor; the compiler checks them.
 
 use crate::need::Need;
 use crate::reals::Interval;
@@ -99,8 +99,8 @@ impl<W: 'static> Row<W> {
     }
 
     /// Makes the extents of an array structural parameters of the same table, by their names: `&["n", "n"]`. Its number of
-    /// elements is the greatest, the product of their upper bounds; how many it has now is the length of what the model holds,
-    /// row by row. See [`Resizable`](crate::Resizable).
+    /// elements is the maximum, the product of their upper bounds; the present number is the length of the model's array,
+    /// stored row by row. See [`Resizable`](crate::Resizable).
     ///
     /// # Panics
     /// At compile time, if the variable is not an array, has a [`shape`](Self::shape) or is a constant; the table checks the names
@@ -122,7 +122,7 @@ impl<W: 'static> Row<W> {
     /// Values greater than `bound` only.
     ///
     /// # Panics
-    /// At compile time, as every bound: if the variable is not a number, or if no value is left.
+    /// At compile time, like every bound: if the variable is not a number, or if no value is left.
     #[track_caller]
     pub const fn above(mut self, bound: f64) -> Self {
         self.meta.range.min = bound;
@@ -210,7 +210,7 @@ impl<W: 'static> Row<W> {
         self
     }
 
-    /// The input need not be fed, because its start value is what is usually wanted. The description says so.
+    /// The input is optional, because its start value usually suits. The description says so.
     ///
     /// # Panics
     /// At compile time, if the variable is not an input.
@@ -219,8 +219,8 @@ impl<W: 'static> Row<W> {
         self.needed(Need::Never)
     }
 
-    /// The model reads the input only while a Boolean parameter is `true` or `false`, or an enumeration has the value of
-    /// this name. The description says so, with the parameter's full name.
+    /// The model reads the input only while a Boolean parameter is `true` or `false`, or while an enumeration has the named
+    /// value. The description says so, with the parameter's full name.
     ///
     /// # Panics
     /// At compile time, if the variable is not an input. Describing the model checks the parameter and the value.

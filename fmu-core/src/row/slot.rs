@@ -1,12 +1,12 @@
-//! A value that a table has found.
+//! Values found by a table.
 
 use crate::bytes::Bytes;
 use crate::enumeration::Choice;
-use crate::integer::Whole;
+use crate::integer::IntegerField;
 use crate::variable::{Kind, Meta};
 use std::hash::{DefaultHasher, Hasher as _};
 
-/// A value other than a text that nothing can set: a constant, or computed from the state.
+/// A read-only value other than a text: a constant, or computed from the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Constant {
     /// A real number.
@@ -29,7 +29,7 @@ pub enum Slot<'a> {
     /// A real number in single precision.
     Float32(&'a mut f32),
     /// An integer.
-    Integer(&'a mut dyn Whole),
+    Integer(&'a mut dyn IntegerField),
     /// A truth value.
     Boolean(&'a mut bool),
     /// An item of an enumeration.
@@ -47,7 +47,7 @@ pub enum Slot<'a> {
 }
 
 impl Slot<'_> {
-    /// Whether the value is one that the variable can be set to.
+    /// Whether the variable can be set to the value.
     pub fn is_allowed(&self, meta: &Meta) -> bool {
         match (self, meta.kind) {
             (Self::Real(x), _) => meta.range.contains(**x),

@@ -1,4 +1,4 @@
-//! Time that a call of some nanoseconds takes.
+//! Duration of a call of some nanoseconds.
 
 use fmu_export::abi::types::c_int;
 use std::time::Instant;

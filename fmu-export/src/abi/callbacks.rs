@@ -22,12 +22,12 @@ pub type Fmi3ClockUpdate = unsafe extern "C" fn(environment: *mut c_void);
 /// `fmi3LockPreemptionCallback`, `fmi3UnlockPreemptionCallback`.
 pub type Fmi3Preemption = unsafe extern "C" fn();
 
-/// Why the importer is called.
+/// Reason for a callback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Request {
     /// A part of a step is done.
     Intermediate(Pause),
-    /// A clock has ticked, or the time of its tick is known.
+    /// A clock has ticked, or the time of its next tick is known.
     Clocks,
 }
 
@@ -49,7 +49,7 @@ impl Callbacks {
     pub const NONE: Self =
         Self { environment: std::ptr::null_mut(), intermediate: None, clock_update: None, preemption: None };
 
-    /// Makes a call of the importer.
+    /// Calls the importer.
     pub(crate) fn call(&self, request: Request) -> Reply {
         match request {
             Request::Intermediate(update) => self.intermediate(update),

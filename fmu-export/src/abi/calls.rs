@@ -5,7 +5,7 @@ use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, References};
 use super::{Abi, Answer};
 use crate::lifecycle::State;
-use crate::value::Value;
+use crate::value::CValue;
 use crate::{blob, registry};
 use fmu_core::{Exported, Fault, Model};
 use std::ffi::c_char;
@@ -19,7 +19,7 @@ use std::ffi::c_char;
 #[allow(missing_docs, reason = "named as in the standards")]
 #[allow(clippy::missing_safety_doc, clippy::missing_errors_doc, reason = "the sections above cover all")]
 impl<E: Exported> Abi<'_, E> {
-    pub unsafe fn get<T: Value>(&mut self, vr: References, n: usize, values: *mut T, room_for: usize) -> Answer {
+    pub unsafe fn get<T: CValue>(&mut self, vr: References, n: usize, values: *mut T, room_for: usize) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (out, vr) = unsafe { (room(values, room_for, "values")?, array(vr, n, "value references")?) };
         if const { E::CAN.intermediate.is_some() } && self.0.current.life.state() == State::Intermediate {
@@ -31,14 +31,14 @@ impl<E: Exported> Abi<'_, E> {
         self.0.get(vr, out)
     }
 
-    pub unsafe fn set<T: Value>(&mut self, vr: References, n: usize, values: *const T, n_values: usize) -> Answer {
+    pub unsafe fn set<T: CValue>(&mut self, vr: References, n: usize, values: *const T, n_values: usize) -> Answer {
         // SAFETY: the importer's arrays, of these lengths.
         let (values, vr) = unsafe { (array(values, n_values, "values")?, array(vr, n, "value references")?) };
         self.inside(vr, true)?;
         self.0.set(vr, values)
     }
 
-    /// Judges the variables that the importer uses inside a step, or that are on clocks.
+    /// Checks the variables that the importer uses inside a step, or that are on clocks.
     #[inline]
     fn inside(&mut self, vr: &[u32], sets: bool) -> Answer {
         if const { E::CAN.clocked.is_some() } {
@@ -50,7 +50,7 @@ impl<E: Exported> Abi<'_, E> {
         Ok(())
     }
 
-    /// The texts stay where they are until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
+    /// The texts remain valid until the next getter of texts (FMI 2.0.5, 2.1.7; FMI 3.0.2, 2.2.7.2).
     pub unsafe fn get_texts(
         &mut self,
         vr: References,
@@ -82,8 +82,7 @@ impl<E: Exported> Abi<'_, E> {
         self.0.set_texts(vr, values.len(), |i| unsafe { text(values[i]) })
     }
 
-    /// The bytes stay where they are until the next call that sets or computes them (FMI 3.0.2, 2.2.7.2); their pointer is never
-    /// NULL.
+    /// The bytes remain valid until the next call that sets or computes them (FMI 3.0.2, 2.2.7.2); their pointer is never NULL.
     pub unsafe fn get_bytes(
         &mut self,
         vr: References,
@@ -106,7 +105,7 @@ impl<E: Exported> Abi<'_, E> {
         })
     }
 
-    /// Every size is judged before a pointer is looked at.
+    /// Every size is checked before a pointer is read.
     pub unsafe fn set_bytes(
         &mut self,
         vr: References,
@@ -120,7 +119,8 @@ impl<E: Exported> Abi<'_, E> {
         // SAFETY: the importer's array, of this length.
         let sizes = unsafe { array(sizes, n_values, "valueSizes")? };
         self.inside(vr, true)?;
-        // SAFETY: NULL or as many bytes as the size says, if the variables are bytes; others are refused before one is read.
+        // SAFETY: NULL or as many bytes as the size states, if the variables are bytes; others are refused before any byte is
+        // read.
         self.0.set_bytes(vr, sizes, |i| unsafe { array(values[i], sizes[i], "a binary value") })
     }
 
@@ -147,7 +147,7 @@ impl<E: Exported> Abi<'_, E> {
 
     /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
     pub unsafe fn save_state(&mut self, state: *mut FmuState) -> Answer {
-        // SAFETY: the importer's variable, which it has initialized as the standard says.
+        // SAFETY: the importer's variable, which it has initialized as the standard requires.
         let state = unsafe { place(state, "FMUState")?.assume_init_mut() };
         *state = handle(self.0.save(state.addr())?);
         Ok(())
@@ -158,12 +158,12 @@ impl<E: Exported> Abi<'_, E> {
         Ok(self.0.restore(state.addr())?)
     }
 
-    /// Ignores NULL and a variable that holds NULL.
+    /// Ignores NULL and a variable that is NULL.
     pub unsafe fn free_state(&mut self, state: *mut FmuState) -> Answer {
         if state.is_null() {
             return Ok(());
         }
-        // SAFETY: the importer's variable, which it has initialized as the standard says.
+        // SAFETY: the importer's variable, which it has initialized as the standard requires.
         let state = unsafe { place(state, "FMUState")?.assume_init_mut() };
         registry::free::<E::Model>(state.addr())?;
         *state = handle(0);

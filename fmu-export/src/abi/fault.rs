@@ -10,20 +10,20 @@ use std::sync::Mutex;
 
 static TEXT: Mutex<Option<CString>> = Mutex::new(None);
 
-/// Keeps what a panic says and where it was. Where a panic unwinds, the gate tells it, and nothing is kept.
+/// Keeps the message and location of a panic. Where a panic unwinds, the gate reports it, and nothing is kept.
 pub(super) fn keep(info: &PanicHookInfo<'_>) {
     if cfg!(panic = "unwind") {
         return;
     }
     let place = info.location().map(|at| format!(" ({}:{})", at.file(), at.line())).unwrap_or_default();
     let text = format!("{}{place}", panicked(info.payload()));
-    // A second panic while the first is told is not worth a deadlock.
+    // A second panic while the first is being reported must not cause a deadlock.
     if let Ok(mut kept) = TEXT.try_lock() {
         *kept = CString::new(text.replace('\0', " ")).ok();
     }
 }
 
-/// The text; it stays where it is until the next panic.
+/// The text; it remains valid until the next panic.
 pub(super) fn text() -> Text {
     TEXT.try_lock().ok().and_then(|kept| kept.as_ref().map(|text| text.as_ptr())).unwrap_or(null())
 }

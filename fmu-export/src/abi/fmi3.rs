@@ -69,8 +69,8 @@ impl<E: Exported> Abi<'_, E> {
         open::<E>(entry, Log::new(Box::new(sink), logging_on.0 != 0), judged, resources, interface, steps)
     }
 
-    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information. An instance whose importer
-    /// wants to be called inside the step goes through it in parts.
+    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information. If the importer has asked for
+    /// intermediate updates, the step is taken in parts.
     ///
     /// # Safety
     /// As [`enter`](Self::enter), and the importer's variables.
@@ -108,7 +108,7 @@ impl<E: Exported> Abi<'_, E> {
         }
     }
 
-    /// Takes a step or a part of it and writes how it ended, or returns what the importer is to be told inside it.
+    /// Takes a step or a part of it and writes how it ended, or returns the update for the importer inside it.
     #[inline]
     unsafe fn report_step(
         &mut self,
@@ -142,7 +142,7 @@ impl<E: Exported> Abi<'_, E> {
         Ok(None)
     }
 
-    /// FMI 3.0.2, 5.2.2. The importer is told of clocks that ticked, and of ticks to come, before the call returns.
+    /// FMI 3.0.2, 5.2.2. The importer is notified of clocks that ticked, and of future ticks, before the call returns.
     ///
     /// # Safety
     /// As [`enter`](Self::enter).
@@ -277,7 +277,7 @@ impl<E: Exported> Abi<'_, E> {
         Ok(())
     }
 
-    /// A sample that the importer did not ask for is taken by the next step; a clock that is active ticks now.
+    /// A sample that the importer did not request is taken by the next step; an active clock ticks now.
     pub fn fmi3_enter_step(&mut self) -> Answer {
         if const { E::CAN.clocked.is_some() } && self.0.has_active_clocks() {
             self.0.leave_event()?;
@@ -298,7 +298,7 @@ impl<E: Exported> Abi<'_, E> {
     }
 }
 
-/// Whether the model tells the importer of clocks.
+/// Whether the model notifies the importer of clocks.
 const fn announces<E: Exported>() -> bool {
     E::Model::TABLE.announces()
 }

@@ -1,5 +1,5 @@
-//! The gate: every call on an instance passes here. NULL, re-entry, standard and lifecycle are checked, panics caught,
-//! failures logged, and the state of the lifecycle follows. The only place where an instance's pointer is followed.
+//! The gate: every call on an instance passes through it. It checks NULL, re-entry, standard and lifecycle, catches panics,
+//! logs failures, and advances the lifecycle. Only this file dereferences an instance's pointer.
 
 use super::callbacks::{Callbacks, Lock, Request};
 use super::{Abi, Answer, Wanted};
@@ -39,14 +39,14 @@ impl Entry {
     }
 }
 
-/// A C function as a type: its entry is known while compiling, and its checks are compiled into it.
+/// A C function as a type: its entry is known at compile time, and its checks are compiled into it.
 pub trait Function {
     /// Its name and its row.
     const ENTRY: Entry;
 }
 
-/// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused. `calling` while a callback
-/// runs for a call that is under way: the lifecycle says what it may call.
+/// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused. `calling` while a callback runs
+/// for a call in progress: the lifecycle table lists the calls that it may make.
 struct Handle<E: Exported> {
     busy: AtomicBool,
     calling: AtomicBool,
@@ -55,7 +55,7 @@ struct Handle<E: Exported> {
 }
 
 impl<E: Exported> Handle<E> {
-    /// Whether this call has the instance for itself. In Scheduled Execution, threads come between each other.
+    /// Whether this call has exclusive access to the instance. In Scheduled Execution, calls of several threads interleave.
     #[inline]
     fn take(&self) -> bool {
         if const { E::CAN.scheduled } {
@@ -129,9 +129,9 @@ const fn calls_back<E: Exported>() -> bool {
     E::CAN.intermediate.is_some() || E::CAN.scheduled
 }
 
-/// Passes a call to the instance in parts. After each that wants it, the importer is called, while nothing of the instance is
-/// borrowed and it is not busy: what the callback may call is for the lifecycle to say. A call there that fails makes this
-/// one fail.
+/// Passes a call to the instance in parts. After a part that requests it, the importer is called, while nothing of the instance
+/// is borrowed and it is not busy; the lifecycle table lists the calls that the callback may make. If one of them fails, this
+/// call fails.
 ///
 /// # Safety
 /// As [`enter`].
@@ -142,7 +142,7 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
     if pointer.is_null() {
         return Status::Error as c_int;
     }
-    // SAFETY: the caller's promise; the instance lives on, because `close` leaves one alone that is calling.
+    // SAFETY: the caller's promise; the instance lives on, because `close` does not free an instance during a callback.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
     let _lock = handle.lock::<F>();
     let mut reply = None;
@@ -165,7 +165,7 @@ pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
             reply = handle.callbacks.call(request);
         }
         handle.calling.store(false, Relaxed);
-        // Another thread may be in a call, if the importer gave no lock.
+        // Another thread may be in a call, if the importer passed no lock.
         while !handle.take() {
             std::thread::yield_now();
         }
@@ -242,7 +242,7 @@ pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
 pub(crate) struct Steps<'a> {
     /// They may end early.
     pub(crate) early_return: bool,
-    /// The functions that it wants to be called.
+    /// The callback functions.
     pub(crate) callbacks: Callbacks,
     /// The variables that it uses inside a step.
     pub(crate) required: &'a [u32],

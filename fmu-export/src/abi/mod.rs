@@ -1,7 +1,8 @@
-//! The C interface: the only place with `unsafe`. It turns pointers into Rust values and decides nothing.
+//! The C interface: the only place with `unsafe`. It only turns pointers into Rust values.
 //!
-//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` holds the calls that both
-//! standards share, [`fmi2`] and [`fmi3`] the tables of their functions, from which [`export!`](crate::export) makes C functions.
+//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` contains the calls that both
+//! standards share; [`fmi2`] and [`fmi3`] are the tables of their functions, from which [`export!`](crate::export) generates C
+//! functions.
 
 pub mod callbacks;
 mod calls;
@@ -98,18 +99,18 @@ impl<E: Exported> Abi<'_, E> {
     }
 }
 
-/// Whether `load` changes more than resources: a reset would undo it, and a saved state would hold it.
+/// Whether `load` changes more than resources: a reset would undo the change, and a saved state would contain it.
 fn changes_on_loading<M: Model>(made: &Made<M>, resources: Option<&Path>) -> Result<bool, Fault> {
     let fresh = || Snapshot::of(Interface::CoSimulation, made.block.clone());
     let mut loaded = fresh();
     loaded.block.model.load(resources)?;
     let before = blob::write(&fresh())?;
-    // A model whose bytes differ by themselves, as those of a hash map do, tells nothing.
+    // A model whose bytes vary from run to run, such as those of a hash map, cannot be compared.
     Ok(before == blob::write(&fresh())? && before != blob::write(&loaded)?)
 }
 
-/// A panic becomes a log message, so the hook that would print it is silenced; where a panic ends the program, the hook keeps its
-/// text. The hook is the binary's own: a cdylib has its own standard library.
+/// A panic becomes a log message, so the hook that would print it is silenced; where a panic ends the program, the hook keeps
+/// its text. The hook belongs to the binary: a cdylib has its own standard library.
 pub fn quiet() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| set_hook(Box::new(fault::keep)));
@@ -121,11 +122,11 @@ pub fn fault() -> types::Text {
     fault::text()
 }
 
-/// What an importer says about the instance that it wants.
+/// The importer's arguments for a new instance.
 pub(crate) struct Wanted {
     /// Its name.
     name: String,
-    /// What stands after the model's token; empty without a preset.
+    /// The suffix of the model's token; empty without a preset.
     suffix: String,
 }
 
@@ -144,7 +145,7 @@ fn credentials<E: Exported>(name: Option<&CStr>, token: Option<&CStr>) -> Result
     }
 }
 
-/// What a model without a capability lacks.
+/// Messages for missing capabilities.
 #[doc(hidden)]
 pub fn lacks(capability: &str) -> &'static str {
     match capability {
@@ -153,8 +154,8 @@ pub fn lacks(capability: &str) -> &'static str {
     }
 }
 
-/// C functions from a table of them. One line of the table reads: name in C, arguments after the instance, row of the
-/// lifecycle table (and the capability without which the call is unsupported), function of [`Abi`] or of the instance with the arguments it gets.
+/// C functions from a table of them. One line of the table reads: name in C, arguments after the instance, row of the lifecycle
+/// table (and the capability without which the call is unsupported), function of [`Abi`] or of the instance with its arguments.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! functions {
@@ -188,8 +189,8 @@ macro_rules! functions {
 /// Turns the crate into the binary of an FMU: it exports all C functions of FMI 2.0 and FMI 3.0 for one model, and
 /// `fmu_description`, which passes its description to `fmu build`.
 ///
-/// After the model come its [capabilities](fmu_core::capability), each of which it must implement; without any, the FMU
-/// is for co-simulation.
+/// The model is followed by its [capabilities](fmu_core::capability), all of which it must implement; without any, the FMU is
+/// for co-simulation.
 ///
 /// ```ignore
 /// fmu_export::export!(drive::PmsmPlant: ContinuousTime + Events + Differentiable);

@@ -1,4 +1,4 @@
-//! From C pointers to slices, texts and places; every check that is possible is made.
+//! From C pointers to slices, texts and references, with every check that is possible.
 
 use fmu_core::Fault;
 use std::ffi::{CStr, c_char};
@@ -46,7 +46,7 @@ pub(crate) unsafe fn numbers<'a>(pointer: *mut f64, n: usize, name: &str) -> Res
     Ok(unsafe { slice::from_raw_parts_mut(room.as_mut_ptr().cast(), room.len()) })
 }
 
-/// A place for one value of the importer.
+/// A reference to one value of the importer.
 ///
 /// # Safety
 /// As [`room`] of one element.

@@ -47,7 +47,7 @@ pub struct Fmi2EventInfo {
     pub terminate_simulation: Fmi2Boolean,
     /// The nominal values changed; always false.
     pub nominals_of_continuous_states_changed: Fmi2Boolean,
-    /// A state has another value.
+    /// A state has changed.
     pub values_of_continuous_states_changed: Fmi2Boolean,
     /// There is a next time event.
     pub next_event_time_defined: Fmi2Boolean,

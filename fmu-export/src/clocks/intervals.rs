@@ -1,4 +1,4 @@
-//! Intervals and shifts of clocks (FMI 3.0.2, 2.2.8.4 and 2.3.3): what the importer asks for and what it sets.
+//! Intervals and shifts of clocks (FMI 3.0.2, 2.2.8.4 and 2.3.3): getters and setters of the importer.
 
 use super::{Found, Qualifier};
 use crate::instance::Instance;
@@ -12,7 +12,7 @@ impl<E: Exported> Instance<E> {
     /// Intervals of clocks, with their qualifiers.
     ///
     /// # Errors
-    /// A clock that does not tell its interval in this state.
+    /// A clock whose interval is not available in this state.
     pub fn get_intervals(
         &mut self,
         references: &[u32],
@@ -64,7 +64,7 @@ impl<E: Exported> Instance<E> {
         clock.timing.fraction.ok_or_else(|| Self::no(clock, "has no fraction: supportsFraction = false"))
     }
 
-    /// Before the start, the intervals follow what is set.
+    /// Before the start, the intervals follow the values set.
     fn refresh_clocks(&mut self) -> Result<(), Fault> {
         if self.current.life.state() == State::Initialization {
             self.refresh();
@@ -76,14 +76,14 @@ impl<E: Exported> Instance<E> {
     fn check_interval(&mut self, clock: Found) -> Result<(), Fault> {
         let (state, done) = (self.current.life.state(), self.tick_of(clock.number).is_some_and(|tick| tick.done));
         let start = state == State::Initialization;
-        let told = match clock.timing.ticks {
+        let known = match clock.timing.ticks {
             Ticks::Constant | Ticks::Fixed => start,
             Ticks::Tunable => start || matches!(state, State::Event | State::Activation),
             Ticks::Changing => start || done && matches!(state, State::Event | State::Activation),
             Ticks::Countdown => start || matches!(state, State::Event | State::ClockUpdate),
             Ticks::Triggered => false,
         };
-        if told { Ok(()) } else { Err(Self::no(clock, &format!("does not tell its interval in {state}"))) }
+        if known { Ok(()) } else { Err(Self::no(clock, &format!("has no interval to read in {state}"))) }
     }
 
     fn tell_interval(&mut self, clock: Found) -> (f64, Qualifier) {
@@ -92,11 +92,11 @@ impl<E: Exported> Instance<E> {
         if let Some(period) = period.filter(|period| period.to_bits() != tick.interval.to_bits()) {
             (tick.interval, tick.qualifier) = (period, Qualifier::Changed);
         }
-        let told = (tick.interval, tick.qualifier);
+        let answer = (tick.interval, tick.qualifier);
         if tick.qualifier == Qualifier::Changed {
             tick.qualifier = Qualifier::Unchanged;
         }
-        told
+        answer
     }
 
     /// Sets the intervals (s) of clocks: all of them or, on an error, none.

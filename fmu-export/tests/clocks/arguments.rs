@@ -1,4 +1,4 @@
-//! Arguments of the functions of clocks that are NULL, and how often these functions ask for memory.
+//! Arguments of the functions of clocks that are NULL, and the number of allocations of these functions.
 
 use super::counting::{calls, neighbor};
 use super::*;
@@ -99,7 +99,7 @@ fn a_null_pointer_is_an_error_of_its_instance_alone() {
                 assert_eq!((host.ticks(), unsafe { fmi3Reset(host.it.get()) }), (0, OK));
             }
         }
-        // What is without an effect needs no pointer.
+        // Arguments without effect need no pointer.
         let it = Host::in_state(kind, 'n');
         assert_eq!(unsafe { fmi3GetIntervalDecimal(it.it.get(), null(), 0, null_mut(), null_mut()) }, OK);
         assert_eq!(unsafe { fmi3SetIntervalDecimal(it.it.get(), null(), 0, null()) }, OK);
@@ -107,7 +107,7 @@ fn a_null_pointer_is_an_error_of_its_instance_alone() {
     }
 }
 
-/// Allocations of 20 calls of `work`, which also ran before.
+/// Allocations of 20 calls of `work`, which has run before.
 fn allocations(mut work: impl FnMut(f64)) -> u64 {
     work(0.0);
     let before = calls();

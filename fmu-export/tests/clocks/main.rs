@@ -24,7 +24,7 @@ use std::ffi::CString;
 use std::ptr::{null, null_mut};
 use std::rc::Rc;
 
-/// A model with a clock of every kind. What was computed at the last tick of `fixed` shows at the next one.
+/// A model with a clock of every kind. The result of the last tick of `fixed` becomes visible at the next one.
 #[derive(Clone, Serialize, Deserialize)]
 struct Kinds {
     fixed: f64,
@@ -173,7 +173,7 @@ type Act = Box<dyn Fn(&Host)>;
 /// An importer and its instance; the environment of the callbacks.
 #[repr(C)]
 struct Host {
-    // The first field: the logger takes the environment for a journal.
+    // The first field, because the logger treats the environment as a journal.
     journal: Journal,
     kind: Kind,
     it: Cell<InstancePointer>,
@@ -344,7 +344,7 @@ impl Drop for Host {
 }
 
 /// A call and, for the clocks in their order, the states that allow it: i n v s in Co-Simulation and Model Exchange, i n a in
-/// Scheduled Execution, in every one of which t and e allow nothing.
+/// Scheduled Execution, t and e allow nothing.
 type Cell3 = (&'static str, [&'static str; 8], fn(&Host, u32) -> bool);
 
 /// FMI 3.0.2, 2.2.8.4 and 2.3: no clock has ticked.
@@ -405,7 +405,8 @@ fn every_call_in_every_state_of_every_clock() {
     }
 }
 
-/// What is on a clock is for its ticks: while it is active in Event Mode; before the start, and in Scheduled Execution, always.
+/// Clocked variables can be used while their clock is active in Event Mode; before the start, and in Scheduled Execution,
+/// always.
 #[test]
 fn variables_on_clocks() {
     for kind in [Kind::Cs, Kind::Me, Kind::Se] {
@@ -434,7 +435,7 @@ fn variables_on_clocks() {
     }
 }
 
-/// What an active clock shows is of the tick before; inputs may be set again and again; the update ticks once.
+/// Outputs of an active clock belong to the tick before; inputs may be set repeatedly; the update ticks once.
 #[test]
 fn a_tick_in_event_mode() {
     for kind in [Kind::Cs, Kind::Me] {
@@ -500,13 +501,13 @@ fn intervals_and_qualifiers() {
         assert_eq!(host.get(14), Some(0.25), "T_fixed");
         assert_eq!(host.exit(), OK);
         if kind == Kind::Se {
-            // Afterwards, as `scheduled` has it.
+            // Afterwards, as in `scheduled`.
             continue;
         }
-        // A changing clock tells its interval where it ticked.
+        // A changing clock has an interval where it ticked.
         assert_eq!((host.set_clock(CHANGING, true), host.update()), (OK, OK));
         assert_eq!((host.interval(CHANGING), host.interval(CHANGING)), (Some((0.2, 2)), Some((0.2, 1))));
-        // A countdown begins at an event of another clock, and tells it once.
+        // A countdown begins at an event of another clock, and reports it once.
         assert_eq!(
             (host.interval(COUNTDOWN), host.set_clock(TRIGGERED, true), host.update()),
             (Some((0.0, 0)), OK, OK)
@@ -516,7 +517,7 @@ fn intervals_and_qualifiers() {
         assert_eq!(host.interval(COUNTDOWN), Some((0.25, 1)));
         assert_eq!((host.set_clock(COUNTDOWN, true), host.update()), (OK, OK));
         assert_eq!(host.interval(COUNTDOWN), Some((0.25, 0)), "the next tick is not known");
-        // Tunable: in Event Mode too, judged with the other parameters at the update.
+        // Tunable: in Event Mode too, checked with the other parameters at the update.
         assert_eq!((host.set_interval(TUNABLE, 0.5), host.interval(TUNABLE)), (OK, Some((0.5, 2))));
         assert_eq!(host.interval(CHANGING), None, "it did not tick here");
     }
@@ -528,7 +529,7 @@ fn intervals_and_qualifiers() {
     assert!(host.errors()[0].contains("fixed is too long"));
 }
 
-/// An output clock is active from the tick that makes it so to the update.
+/// An output clock is active from the tick that activates it to the update.
 #[test]
 fn an_output_clock_in_event_mode() {
     for kind in [Kind::Cs, Kind::Me] {
@@ -542,7 +543,7 @@ fn an_output_clock_in_event_mode() {
     }
 }
 
-/// A state saved in Event Mode holds which clocks are active and what was told of them, as a handle and as bytes.
+/// A state saved in Event Mode contains the active clocks and the reported intervals, as a handle and as bytes.
 #[test]
 fn a_saved_state_holds_the_clocks() {
     for kind in [Kind::Cs, Kind::Me] {

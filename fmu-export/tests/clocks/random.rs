@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 const DISCARD: c_int = 2;
 
-/// What an instance must be.
+/// The expected state of an instance.
 #[derive(Clone)]
 struct Twin {
     kind: Kind,
@@ -15,7 +15,7 @@ struct Twin {
     state: char,
     time: f64,
     model: Kinds,
-    /// The clocks that the importer made active, and those that have ticked in this Event Mode.
+    /// The clocks that the importer has activated, and those that have ticked in this Event Mode.
     active: [bool; 7],
     done: [bool; 7],
     /// Scheduled Execution: the last tick of each clock, and whether `trip` has ticked unseen.
@@ -104,7 +104,7 @@ const CALLS: [&str; 18] = [
     "restore",
 ];
 
-/// What an importer would do next, or anything.
+/// A plausible next call of an importer, or a random one.
 fn choose(twin: &Twin, draw: &mut Draw) -> &'static str {
     if draw.below(40) == 0 {
         return draw.of(&CALLS);
@@ -136,7 +136,7 @@ fn number(vr: u32) -> Option<usize> {
     CLOCKS[..7].iter().position(|clock| *clock == vr)
 }
 
-/// Two instances, what they must be, and saved states.
+/// Two instances, their expected states, and saved states.
 struct World {
     its: [Rc<Host>; 2],
     twins: [Twin; 2],
@@ -252,7 +252,7 @@ impl World {
             }
             "leave" => {
                 may = twin.is("v");
-                // What is active ticks, whether the importer updates or not.
+                // Active clocks tick, whether the importer updates or not.
                 twin.update();
                 twin.state = if twin.kind == Kind::Me { 'x' } else { 's' };
                 host.leave()
@@ -372,7 +372,7 @@ impl World {
         may
     }
 
-    /// What can always be read.
+    /// Variables that can always be read.
     fn look(&self, who: usize) {
         let (host, twin) = (&self.its[who], &self.twins[who]);
         assert_eq!(host.ticks(), twin.ticks(), "{who} {}", self.trace);

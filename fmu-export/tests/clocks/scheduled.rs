@@ -23,15 +23,15 @@ fn partitions_of_scheduled_execution() {
     assert_eq!((host.set_interval(TUNABLE, 0.4), host.interval(TUNABLE)), (OK, Some((0.4, 2))));
 }
 
-/// Ticks of output clocks, and times of countdowns, are told by the callback, which reads each once.
+/// Ticks of output clocks, and times of countdowns, are reported by the callback, which reads each once.
 #[test]
 fn clock_updates_in_scheduled_execution() {
     let host = Host::started(Kind::Se);
     let heard = Rc::new(RefCell::new(Vec::new()));
     let list = heard.clone();
     *host.act.borrow_mut() = Some(Box::new(move |host| {
-        let told = (host.clock(TRIP), host.clock(TRIP), host.interval(COUNTDOWN), host.interval(COUNTDOWN));
-        list.borrow_mut().push(told);
+        let reported = (host.clock(TRIP), host.clock(TRIP), host.interval(COUNTDOWN), host.interval(COUNTDOWN));
+        list.borrow_mut().push(reported);
     }));
     assert_eq!(host.activate(TRIGGERED, 1.0), OK);
     assert_eq!(host.activate(FIXED, 1.0), OK);
@@ -90,7 +90,7 @@ fn a_panic_in_a_tick_ends_one_instance() {
     }
 }
 
-/// The scheduler is locked around what it could interrupt, never twice; two threads with a lock do not disturb each other.
+/// The scheduler is locked around code that it could interrupt, never twice; two threads with a lock do not disturb each other.
 mod preemption {
     use super::*;
     use std::sync::Barrier;
@@ -195,8 +195,8 @@ mod preemption {
         unsafe { fmi3FreeInstance(it) };
     }
 
-    /// A call that finds the instance taken is an Error that changes nothing; one while a callback runs fails the call that
-    /// called back, whose tick has happened.
+    /// A call on a busy instance is an Error that changes nothing; a call during a callback makes the calling function fail,
+    /// whose tick has happened.
     #[test]
     fn two_threads_without_a_lock() {
         let mut it: InstancePointer = null_mut();

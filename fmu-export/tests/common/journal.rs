@@ -1,4 +1,4 @@
-//! What the importer's logger hears.
+//! Messages of the importer's logger.
 
 use fmu_export::abi::types::*;
 use std::cell::RefCell;
@@ -13,8 +13,8 @@ pub struct Message {
     pub text: String,
 }
 
-/// What the logger was told. Its address is the environment pointer, so it lives in an [`Rc`](std::rc::Rc): moving a `Box`
-/// asserts that no other pointer to the content is in use.
+/// Record of the logger. Its address is the environment pointer, so it lives in an [`Rc`](std::rc::Rc): moving a `Box` asserts
+/// that no other pointer to the content is in use.
 #[derive(Default)]
 pub struct Journal(pub RefCell<Vec<Message>>);
 
@@ -34,12 +34,12 @@ pub extern "C" fn log3(environment: *mut c_void, status: c_int, category: Text, 
     journal.0.borrow_mut().push(Message { instance: None, status, category, text });
 }
 
-/// Whether instances of a standard can have a logger here: Miri rightly refuses what [`variadic`] does.
+/// Whether instances of a standard can have a logger here: Miri rightly refuses [`variadic`].
 pub const fn has_logger(version: u8) -> bool {
     !(cfg!(miri) && version == 2)
 }
 
-/// A function with fixed arguments as the variadic logger: the first five go the same way on our platforms.
+/// A function with fixed arguments as the variadic logger: the first five are passed in the same way on our platforms.
 pub fn variadic(f: extern "C" fn(*mut c_void, Text, c_int, Text, Text)) -> Fmi2Logger {
     unsafe { std::mem::transmute(f) }
 }

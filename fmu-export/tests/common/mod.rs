@@ -75,7 +75,7 @@ impl Fmu {
             };
             let it =
                 unsafe { fmi2Instantiate(name, 1, token, null(), &callbacks, Fmi2Boolean(0), Fmi2Boolean(on.into())) };
-            // The importer may do with its struct what it likes afterwards (FMI 2.0.5, 2.1.5).
+            // The importer may reuse its struct afterwards (FMI 2.0.5, 2.1.5).
             unsafe { std::ptr::write_bytes(&mut callbacks, 0xdd, 1) };
             return it;
         }
@@ -301,7 +301,7 @@ impl Fmu {
         bytes
     }
 
-    /// The only message since the last look, which must be an error.
+    /// The only new message, which must be an error.
     pub fn error(&self) -> String {
         let messages: Vec<Message> = self.journal.0.borrow_mut().drain(..).collect();
         assert_eq!(messages.len(), 1, "{messages:?}");
@@ -309,7 +309,7 @@ impl Fmu {
         messages[0].text.clone()
     }
 
-    /// In which state the instance is, found out by what it allows, through the C interface alone.
+    /// The state of the instance, determined by the calls that it allows, only through the C interface.
     pub fn state(&self) -> char {
         let mut here = null_mut();
         if self.save(&mut here) == ERROR {

@@ -1,4 +1,4 @@
-//! A model with every kind of variable, that can be told to fail.
+//! A model with every kind of variable that fails on demand.
 
 use fmu_core::unit::{AMPERE, OHM, SPEED, VOLT};
 use fmu_core::{Block, Elapsed, Experiment, Fault, Field, Info, Model, Row, Step, Table, enumeration, table};

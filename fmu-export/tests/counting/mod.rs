@@ -1,4 +1,5 @@
-//! An allocator that counts the calls of each thread, and knows the largest: what the test runner's own thread does is not counted.
+//! An allocator that counts the calls of each thread, and records the largest: calls of the test runner's thread are not
+//! counted.
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an allocator that counts and passes on")]
 
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -36,12 +37,12 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// How often this thread asked for memory or gave some back.
+/// Number of allocations and deallocations of this thread.
 pub(crate) fn calls() -> u64 {
     CALLS.get()
 }
 
-/// The largest number of bytes that this thread asked for at once since the last call.
+/// The largest allocation of this thread since the last call, in bytes.
 #[allow(dead_code, reason = "a module of several test programs, one of which asks")]
 pub(crate) fn largest() -> usize {
     LARGEST.take()

@@ -1,5 +1,5 @@
-//! Intermediate update of FMI 3.0: the importer reads and sets variables inside a communication step, and ends it; what it may
-//! not call there fails, and disturbs nobody.
+//! Intermediate update of FMI 3.0: the importer reads and sets variables inside a communication step, and ends it; calls that
+//! are not allowed there fail, without effect on others.
 #![allow(missing_docs, clippy::float_cmp, clippy::borrow_as_ptr, clippy::type_complexity)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
@@ -93,7 +93,7 @@ use fmi::*;
 const OK: c_int = 0;
 const ERROR: c_int = 3;
 
-/// What the callback is told.
+/// The arguments of the callback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Heard {
     time: f64,
@@ -244,7 +244,7 @@ fn a_silent_callback_changes_no_bit() {
     }
 }
 
-/// Inside a step `x` follows; what is not intermediate keeps the value of the last communication point.
+/// Inside a step `x` follows; variables that are not intermediate keep the value of the last communication point.
 #[test]
 fn values_inside_are_those_of_the_instant() {
     let act = |it: InstancePointer, time: f64| {
@@ -288,7 +288,7 @@ fn a_ramp_that_is_set_inside_is_ten_times_better_than_one_that_is_held() {
 
 #[test]
 fn the_importer_ends_a_step() {
-    // (asked for at 30 ms, the step to 100 ms ends there)
+    // (requested at 30 ms, the step to 100 ms ends there)
     for (until, calls) in [(0.03, 3), (0.0425, 5), (0.1, 10)] {
         let act: Act = Box::new(move |_, time| (time == 0.03).then_some(until));
         let importer = Importer::start(true, &[], true, act);
@@ -349,7 +349,7 @@ fn only_variables_of_the_list_are_for_the_inside() {
     assert!(!importer.it.get().is_null());
 }
 
-/// What is for the time between two calls fails inside one, and the step with it. Nothing is freed; a reset leads out.
+/// Calls for the time between two calls fail inside one, and the step with it. Nothing is freed; a reset leads out.
 #[test]
 fn other_calls_are_refused_inside() {
     type Refused = fn(InstancePointer) -> c_int;
@@ -382,7 +382,7 @@ fn other_calls_are_refused_inside() {
             true,
             Box::new(move |it, _| {
                 assert_eq!(call(it), ERROR, "{name}");
-                // Not even what leads out of Error.
+                // Not even the calls that lead out of Error.
                 assert_eq!(unsafe { fmi3Reset(it) }, ERROR, "{name}");
                 assert_eq!(get(it, X), None, "{name}");
                 unsafe { fmi3FreeInstance(it) };

@@ -22,7 +22,7 @@ impl Plan {
     }
 }
 
-/// What an instance must be: i instantiated, n initialization, s step, t terminated, e error.
+/// The expected state of an instance: i instantiated, n initialization, s step, t terminated, e error.
 #[derive(Clone)]
 struct Twin {
     state: char,
@@ -55,7 +55,7 @@ impl Twin {
         true
     }
 
-    /// What a getter shows, `inside` a step or between two.
+    /// The value of a getter, `inside` a step or between two.
     fn value(&self, vr: u32, inside: bool) -> f64 {
         match vr {
             TIME => self.end,
@@ -66,10 +66,10 @@ impl Twin {
     }
 }
 
-/// An importer with one instance, what it must be, and what it does; the environment of its callback.
+/// An importer with one instance, its expected state, and its actions; the environment of its callback.
 #[repr(C)]
 struct Host {
-    // The first field: the logger takes the environment for a journal.
+    // The first field, because the logger treats the environment as a journal.
     journal: Journal,
     it: Cell<InstancePointer>,
     called: bool,
@@ -108,7 +108,7 @@ impl Shared {
     }
 }
 
-/// The callback: compares what it is told, then reads and sets variables, mostly in ways that are allowed.
+/// The callback: compares its arguments, then reads and sets variables, mostly in allowed ways.
 extern "C" fn inside(
     environment: *mut c_void,
     time: f64,
@@ -123,8 +123,8 @@ extern "C" fn inside(
     let all = &host.all;
     let mut plan = host.twin.borrow().plan.expect("a step is under way");
     let goes_on = plan.done < plan.parts && host.twin.borrow_mut().part(&mut plan);
-    let told = [set.0, get.0, finished.0, can_return.0];
-    assert!(goes_on && told == [1, 1, 1, host.early.into()], "{told:?} {}", all.trace.borrow());
+    let flags = [set.0, get.0, finished.0, can_return.0];
+    assert!(goes_on && flags == [1, 1, 1, host.early.into()], "{flags:?} {}", all.trace.borrow());
     assert_eq!(time.to_bits(), host.twin.borrow().end.to_bits(), "{time} {}", all.trace.borrow());
     for _ in 0..all.below(3) {
         if !host.act() {
@@ -141,7 +141,7 @@ extern "C" fn inside(
             () if !(time..=plan.end).contains(&end) => host.twin.borrow_mut().state = 'e',
             () => {
                 let early = plan.early || end < plan.end;
-                // Nothing is left of a step that ends here.
+                // A step that ends here leaves no trace.
                 let rest = Plan { done: 1.0, parts: 1.0, end, ..plan };
                 plan = if end > time { Plan::new(time, end - time) } else { rest };
                 (plan.early, plan.end) = (early, end);
@@ -233,7 +233,7 @@ impl Host {
         Stepped { status, early: early.0 == 1, end: last }
     }
 
-    /// A step, with what the callback does inside it.
+    /// A step, with the actions of the callback inside it.
     fn step(&self) -> bool {
         let all = &self.all;
         let h = if all.rarely() { all.of(&[0.0, -0.1, f64::NAN]) } else { all.of(&[0.1, 0.07, 0.005, 0.013, 1e-4]) };

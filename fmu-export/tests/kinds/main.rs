@@ -1,4 +1,4 @@
-//! Text inputs, lists and bytes through the C functions: what arrives, and what is refused before anything changes.
+//! Text inputs, lists and bytes through the C functions: values that arrive, and refusals before anything changes.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -30,7 +30,7 @@ enumeration! {
     }
 }
 
-/// Greatest number of bytes of `rx`.
+/// Maximum number of bytes of `rx`.
 const MOST: usize = 2048;
 const JSON: &str = "application/json";
 
@@ -292,13 +292,13 @@ fn bytes_are_copied() {
         assert_eq!((step(it, 0.1), bytes(it, TX)), (OK, Ok(vec![])));
         fmi3FreeInstance(it);
     }
-    // Four bytes at the output, whose row allows three: the model is wrong, and no importer sees it.
+    // Four bytes at the output, whose row allows three: a fault of the model that no importer sees.
     let it = started();
     assert_eq!((set_bytes(it, RX, &[0; 4]), step(it, 0.0), bytes(it, TX)), (OK, OK, Err(ERROR)));
     unsafe { fmi3FreeInstance(it) };
 }
 
-/// Sizes are judged before pointers: a page is not read, and nothing changes.
+/// Sizes are checked before pointers: a page is not read, and nothing changes.
 #[test]
 fn what_is_too_large_is_refused_at_once() {
     let nowhere = NonNull::<u8>::dangling().as_ptr().cast_const();
@@ -332,7 +332,7 @@ fn what_is_too_large_is_refused_at_once() {
     }
 }
 
-/// There is room for the greatest value from the start on, after a reset, and in a restored state.
+/// Memory for the maximum size is reserved from the start on, after a reset, and in a restored state.
 #[test]
 fn setting_bytes_does_not_allocate() {
     let _neighbor = counting::neighbor();

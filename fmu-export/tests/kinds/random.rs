@@ -9,7 +9,7 @@ const NO: Fmi3Boolean = Fmi3Boolean(0);
 /// No variable has it.
 const NOBODY: u32 = 99;
 
-/// What an instance must be.
+/// The expected state of an instance.
 #[derive(Clone, Default)]
 struct Twin {
     /// Instantiated, initialization (n), Step, terminated, Error.
@@ -42,14 +42,14 @@ impl Twin {
         self.set = false;
     }
 
-    /// Before the initialization ends, outputs fit what was set when they are read.
+    /// Before the initialization ends, outputs match the values set when they are read.
     fn show(&mut self) {
         if self.set && self.is(&[Instantiated, Initialization]) {
             self.compute();
         }
     }
 
-    /// After an error before the initialization ended, outputs may fit what was set or not.
+    /// After an error before the initialization ended, outputs may or may not match the values set.
     fn is_vague(&self) -> bool {
         self.set && self.state == State::Error
     }
@@ -113,7 +113,7 @@ const CALLS: [&str; 13] = [
     "get bytes",
 ];
 
-/// What a simulation would do next, or anything.
+/// A plausible next call of a simulation, or a random one.
 fn choose(state: State, draw: &mut Draw) -> &'static str {
     if draw.below(25) == 0 {
         return draw.of(&CALLS);
@@ -129,7 +129,7 @@ fn choose(state: State, draw: &mut Draw) -> &'static str {
 }
 
 fn instance() -> InstancePointer {
-    // The model does not panic: what panics here are assertions.
+    // The model does not panic: panics here are assertions.
     fmu_export::abi::quiet();
     drop(std::panic::take_hook());
     let token = CString::new(This::TOKEN.as_str()).unwrap();
@@ -137,7 +137,7 @@ fn instance() -> InstancePointer {
     unsafe { fmi3InstantiateCoSimulation(name, token, null(), NO, NO, NO, NO, null(), 0, null_mut(), None, None) }
 }
 
-/// Two instances, what they must be, and saved states.
+/// Two instances, their expected states, and saved states.
 struct World {
     its: [InstancePointer; 2],
     twins: [Twin; 2],
@@ -214,7 +214,7 @@ impl World {
         status == OK
     }
 
-    /// Every value of an instance but the output that may be too long.
+    /// Every value of an instance except the output that may be too long.
     fn look(&mut self, who: usize) {
         let (it, twin) = (self.its[who], &mut self.twins[who]);
         twin.show();
@@ -261,7 +261,7 @@ fn set_some_bytes(it: InstancePointer, twin: &mut Twin, draw: &mut Draw, trace: 
     let mut fits = !twin.is(&[Terminated, State::Error]);
     for _ in 0..draw.below(4) {
         let reference = if draw.rarely() { draw.of(&[TX, TITLE, COUNTS, NOBODY]) } else { draw.of(&[RX, RX, RX, KEY]) };
-        // Beyond the greatest size, nothing is read.
+        // Beyond the maximum size, nothing is read.
         let (size, value) = match draw.below(40) {
             0 => (draw.of(&[1 << 30, MOST + 1, usize::MAX]), nowhere),
             1 => (1, null()),
@@ -271,7 +271,7 @@ fn set_some_bytes(it: InstancePointer, twin: &mut Twin, draw: &mut Draw, trace: 
                 (size, CONTENT[draw.below(1 + MOST - size)..].as_ptr())
             }
         };
-        // A fixed parameter may be set to what it is.
+        // A fixed parameter may be set to its present value.
         let kept = reference == KEY && twin.is(&[State::Step]) && size <= MOST && *twin.model.rx == CONTENT[..size];
         fits &= [RX, KEY].contains(&reference) && (twin.open(reference == KEY) || kept);
         fits &= size <= MOST && (size == 0 || !value.is_null());
@@ -325,7 +325,7 @@ fn set_numbers(it: InstancePointer, twin: &mut Twin, draw: &mut Draw) -> (c_int,
     let n = draw.count(if kind == 0 { 3 } else { 2 });
     let mut fits = n == (if kind == 0 { 3 } else { 2 }) && twin.open(false);
     let (a, b) = (u8::try_from(draw.below(256)).unwrap(), draw.below(2));
-    // The last element is the wrong one: those before it stay what they were.
+    // The last element is the wrong one: those before it keep their values.
     let model = &mut twin.model;
     let status = unsafe {
         match kind {

@@ -33,7 +33,7 @@ pub(crate) enum Way {
 
 pub(crate) const WAYS: [Way; 4] = [Way::Two, Way::TwoExchange, Way::Three, Way::ThreeExchange];
 
-/// An instance, or what the logger was told.
+/// An instance, or the messages of the logger.
 pub(crate) fn open(way: Way, token: &str, resources: Option<&str>) -> Result<InstancePointer, String> {
     static LOUD: Once = Once::new();
     let (token, resources) = (CString::new(token).unwrap(), resources.map(|path| CString::new(path).unwrap()));
@@ -89,7 +89,7 @@ impl Folder {
         Self(path)
     }
 
-    /// As the standard of this way names it: a URI, or a path.
+    /// In the form of the standard: a URI, or a path.
     pub(crate) fn name(&self, way: Way) -> String {
         let path = self.0.to_str().unwrap();
         match way {
@@ -115,7 +115,7 @@ pub(crate) fn token(bytes: &[u8]) -> String {
     plain() + &preset::suffix(bytes)
 }
 
-/// An instance with a preset of these values, or why there is none.
+/// An instance with a preset of these values, or the reason why there is none.
 pub(crate) fn with(way: Way, values: &[(&str, &str)]) -> Result<InstancePointer, String> {
     let text = preset::write(values.iter().copied());
     let folder = Folder::new(text.as_bytes());
@@ -167,7 +167,7 @@ pub(crate) fn set(way: Way, it: InstancePointer, reference: u32, x: f64) {
     assert_eq!(status, 0);
 }
 
-/// All values as FMI 3.0 reads them; FMI 2.0 reads what fits an Integer.
+/// All values as read in FMI 3.0; FMI 2.0 reads those that fit an Integer.
 pub(crate) fn values(way: Way, it: InstancePointer) -> Vec<String> {
     let mut all: Vec<String> = [U, REAL, DOUBLED, Y, SEEN].map(|r| real(way, it, r).to_string()).to_vec();
     unsafe {

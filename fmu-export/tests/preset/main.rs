@@ -1,5 +1,5 @@
 //! Presets through the C functions: start values of every type from a file of the resources, before `load`, after a reset and
-//! beside saved states; and what is refused, with its cause.
+//! beside saved states; and refusals with their cause.
 #![allow(missing_docs)]
 #![allow(
     clippy::undocumented_unsafe_blocks,
@@ -72,7 +72,7 @@ fn every_type_starts_with_its_value_before_load_and_after_a_reset() {
     }
 }
 
-/// The preset is what an importer's sets would be.
+/// The preset has the effect of an importer's setters.
 #[test]
 fn a_preset_is_equal_to_sets() {
     for way in WAYS {
@@ -89,7 +89,7 @@ fn a_preset_is_equal_to_sets() {
             }
         }
         entered(way, set_later);
-        // What `load` saw is another matter.
+        // The data of `load` differ.
         let but_seen = |it| values(way, it).into_iter().enumerate().filter(|(i, _)| *i != 4).collect::<Vec<_>>();
         assert_eq!(but_seen(preset), but_seen(set_later));
         free(way, preset);
@@ -142,7 +142,7 @@ fn a_token_without_its_preset_is_refused_with_the_cause() {
         let it = entered(way, open(way, &token, Some(&folder.name(way))).unwrap());
         assert_eq!(real(way, it, REAL), 9.0);
         free(way, it);
-        // Another token is another token, preset or not.
+        // A wrong token is refused, preset or not.
         let wrong = [format!("{token}x"), format!("{}x", plain()), token[38..].to_owned(), format!("{}+", plain())];
         for wrong in wrong {
             let said = open(way, &wrong, Some(&folder.name(way))).unwrap_err();
@@ -192,7 +192,7 @@ fn names_and_values_that_are_not_allowed_are_refused_when_they_are_read() {
         assert!(described(&[(name, value)]).unwrap_err().contains(why));
     }
     let twice = with(Way::Three, &[("n", "2"), ("u", "1"), ("n", "2")]).unwrap_err();
-    assert!(twice.ends_with("line 4: n has a value already"), "{twice}");
+    assert!(twice.ends_with("line 4: n already has a value"), "{twice}");
     for bytes in [&b"nonsense"[..], b"fmu preset 1\nn\t2", b"fmu preset 9\n"] {
         let folder = Folder::new(bytes);
         let said = open(Way::Two, &token(bytes), Some(&folder.name(Way::Two))).unwrap_err();
@@ -232,7 +232,7 @@ fn the_description_has_the_start_values_and_the_token() {
     assert!(said.contains("has a character that XML does not have"), "{said}");
 }
 
-/// A state holds all values, and goes to every instance of the model; a reset returns to the instance's own preset.
+/// A state contains all values, and can be restored in every instance of the model; a reset returns to the instance's preset.
 #[test]
 fn saved_states_work() {
     let one = entered(Way::Three, with(Way::Three, &[("real", "6"), ("label", "one")]).unwrap());
@@ -252,7 +252,7 @@ fn saved_states_work() {
         assert_eq!(fmi3DeserializeFMUState(other, bytes.as_ptr(), length, &mut read), 0);
         assert_eq!(fmi3SetFMUState(other, read), 0);
         assert_eq!((real(Way::Three, other, REAL), real(Way::Three, other, U)), (6.0, 5.0));
-        // What `load` read is the instance's own.
+        // The data of `load` belong to the instance.
         assert_eq!(real(Way::Three, other, SEEN), 7.0);
         assert_eq!((fmi3FreeFMUState(one, &mut state), fmi3FreeFMUState(other, &mut read)), (0, 0));
         reset(Way::Three, other);
@@ -265,12 +265,12 @@ fn saved_states_work() {
 
 #[test]
 fn the_log_tells_what_differs_from_the_preset() {
-    for (value, told) in [(6.0, "all start values unchanged"), (2.0, "with real = 2")] {
+    for (value, expected) in [(6.0, "all start values unchanged"), (2.0, "with real = 2")] {
         let it = with(Way::Three, &[("real", "6")]).unwrap();
         set(Way::Three, it, REAL, value);
         entered(Way::Three, it);
         assert_eq!(exit(Way::Three, it), 0);
-        assert!(SAID.take().iter().any(|line| line.contains("initialized") && line.ends_with(told)));
+        assert!(SAID.take().iter().any(|line| line.contains("initialized") && line.ends_with(expected)));
         free(Way::Three, it);
     }
 }

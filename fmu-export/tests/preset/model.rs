@@ -1,4 +1,4 @@
-//! A model with parameters of every type, which keeps what `load` saw of them.
+//! A model with parameters of every type, which records their values in `load`.
 
 use fmu_core::unit::VOLT;
 use fmu_core::{
@@ -27,7 +27,7 @@ pub(crate) struct All {
     fan: Fan,
     label: String,
     weights: [f64; 4],
-    /// What `load` saw of the preset.
+    /// The preset as seen by `load`.
     seen: Resource<f64>,
     doubled: f64,
 }

@@ -1,5 +1,5 @@
 //! Random calls of both standards, right and wrong, on two instances in turn, against `reference.rs`: after every call the
-//! status, the message, the values, the state of the life cycle, and that the other instance noticed nothing.
+//! status, the message, the values, the state of the life cycle, and that the other instance is unaffected.
 //!
 //! 1e5 calls; `FMU_CALLS=10000000 cargo test --release -p fmu-export --test sequences` for more, `FMU_SEED=n` for others.
 #![allow(missing_docs)]
@@ -32,7 +32,7 @@ fn asked(name: &str, otherwise: u64) -> u64 {
 #[test]
 fn random_calls() {
     common::loud();
-    // The model's own panics are part of the game.
+    // Panics of the model are intended.
     let hook = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
         let text = info.payload().downcast_ref::<&str>().copied().unwrap_or_default();
@@ -44,7 +44,7 @@ fn random_calls() {
     let config = Config { cases: 100, failure_persistence: None, ..Config::default() };
     let seed = asked("FMU_SEED", 1);
     let tally = RefCell::new(Tally::default());
-    // Lengths that differ can be made shorter when something is found.
+    // Sequences of different lengths make a failure easier to shorten.
     let sequences = (2..=3_u8, 2..=3_u8, proptest::collection::vec(operation::operation(), 0..2 * LENGTH));
     for round in 0_u64.. {
         if tally.borrow().calls() >= calls {

@@ -1,10 +1,10 @@
-//! The calls of an importer that may be wrong in everything but what no binary can notice: pointers that lead nowhere.
+//! The calls of an importer that may be wrong in everything except invalid pointers, which no binary can detect.
 
 use crate::common::model::*;
 use proptest::prelude::*;
 use proptest::sample::select;
 
-/// A call and on what it is made.
+/// A call and its target.
 #[derive(Clone, Debug)]
 pub(crate) struct Operation {
     /// Which of the two instances.
@@ -12,11 +12,11 @@ pub(crate) struct Operation {
     /// As whose function.
     pub(crate) door: Door,
     pub(crate) call: Call,
-    /// Whether every variable and the state of the life cycle are looked at afterwards.
+    /// Whether every variable and the state of the life cycle are compared afterwards.
     pub(crate) look: bool,
 }
 
-/// Which function of which standard is called, on what.
+/// Function, standard and target of the call.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Door {
     /// That of the instance.
@@ -32,7 +32,7 @@ pub(crate) enum Door {
 pub(crate) enum Kind {
     Real,
     Integer,
-    /// In FMI 3.0 its own type, `Int64`.
+    /// In FMI 3.0 a separate type, `Int64`.
     Enumeration,
     Boolean,
     /// One of the types that no variable of this model has.
@@ -46,7 +46,7 @@ pub(crate) enum Arrays {
     NullReferences,
     NullValues,
     Misaligned,
-    /// One value more than there is (FMI 3.0 only).
+    /// One value too many (FMI 3.0 only).
     More,
     /// One less.
     Less,
@@ -73,14 +73,14 @@ pub(crate) enum Categories {
     NullOf(usize),
 }
 
-/// A place for a saved state.
+/// A variable for a saved state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Slot {
     /// A variable of the importer: NULL or a state.
     Own(usize),
     /// A state that was freed, by its age.
     Freed(usize),
-    /// A number that is no state.
+    /// A number that is not a state.
     Garbage(usize),
     /// No variable at all.
     Null,
@@ -94,7 +94,7 @@ pub(crate) enum Point {
     At(f64),
 }
 
-/// What is done to stored bytes before they are given back.
+/// Damage to stored bytes before they are restored.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Damage {
     None,
@@ -105,7 +105,7 @@ pub(crate) enum Damage {
 
 #[derive(Clone, Debug)]
 pub(crate) enum Call {
-    /// What a plain simulation would do next.
+    /// The next call of a plain simulation.
     Onward,
     /// The instance is freed, and another one made; first a try that is wrong in this way, 0 for none.
     New {
@@ -133,7 +133,7 @@ pub(crate) enum Call {
         values: Vec<Mixed>,
         arrays: Arrays,
     },
-    /// `null`: which of FMI 3.0's four places is NULL, 4 for none.
+    /// `null`: which of FMI 3.0's four results is NULL, 4 for none.
     Step {
         at: Point,
         h: f64,
@@ -147,7 +147,7 @@ pub(crate) enum Call {
         slot: Slot,
         null: bool,
     },
-    /// Into the blob of this number; `room`: bytes more than needed.
+    /// Into the blob of this number; `room`: additional bytes.
     Serialize {
         slot: Slot,
         blob: usize,
@@ -159,7 +159,7 @@ pub(crate) enum Call {
         damage: Damage,
         slot: Slot,
     },
-    /// FMI 2.0: the function by its number, the kind of status, a place that is NULL.
+    /// FMI 2.0: the function by its number, the kind of status, a NULL result.
     Status {
         function: u8,
         kind: i32,
@@ -168,7 +168,7 @@ pub(crate) enum Call {
     Unsupported(usize),
 }
 
-/// Slots and blobs that there are.
+/// Numbers of slots and blobs.
 pub(crate) const PLACES: usize = 3;
 
 fn real() -> impl Strategy<Value = f64> {

@@ -1,4 +1,4 @@
-//! The calls through the C interface, with what they wrote.
+//! The calls through the C interface, with their results.
 
 use crate::common::unsupported::{FMI2_UNSUPPORTED, FMI3_UNSUPPORTED};
 use crate::common::*;
@@ -66,7 +66,7 @@ pub(crate) fn reset(version: u8, it: InstancePointer) -> Done {
     either!(version, fmi2Reset(it), fmi3Reset(it))
 }
 
-/// A step; `null` is the place of FMI 3.0 that is missing.
+/// A step; `null` is the missing result of FMI 3.0.
 pub(crate) fn step(version: u8, it: InstancePointer, (t, h): (f64, f64), free: bool, null: usize) -> Done {
     let (mut flags, mut last) = ([Fmi3Boolean(7); 3], f64::NAN);
     let [a, b, c] = std::array::from_fn(|i| if i == null { null_mut() } else { &raw mut flags[i] });
@@ -82,14 +82,14 @@ pub(crate) fn step(version: u8, it: InstancePointer, (t, h): (f64, f64), free: b
     done
 }
 
-/// Bytes that no value has by accident.
+/// Bytes that do not occur by accident.
 const CANARY: u8 = 0xa5;
 
-/// Arrays of a getter or setter in memory that shows what was written where.
+/// Arrays of a getter or setter in memory with guard bytes.
 struct Memory {
     references: *const u32,
     n: usize,
-    /// Values that the importer says there are.
+    /// Number of values stated by the importer.
     m: usize,
     cells: Vec<u64>,
     misaligned: bool,
@@ -121,7 +121,7 @@ impl Memory {
         if self.null { null_mut() } else { start.wrapping_add(self.misaligned.into()).cast() }
     }
 
-    /// The values, and that nothing is written behind them.
+    /// The values; checks that nothing is written past them.
     fn read<T>(&self) -> Vec<u64> {
         let bytes: Vec<u8> = self.cells.iter().flat_map(|cell| cell.to_ne_bytes()).collect();
         let (values, rest) = bytes[usize::from(self.misaligned)..].split_at(self.m * size_of::<T>());
@@ -288,7 +288,7 @@ pub(crate) fn unsupported(version: u8, it: InstancePointer, number: usize) -> Do
     (call(it), name)
 }
 
-/// Tries to make an instance with something wrong; it must be NULL.
+/// Tries to create an instance with a wrong argument; it must be NULL.
 pub(crate) fn miscarry(version: u8, wrong: u8, environment: *mut c_void) -> &'static str {
     loud();
     let (token, other) = (token(), c"{00000000-0000-0000-0000-000000000000}");

@@ -1,4 +1,4 @@
-//! What must come out: FMI 2.0.5, 4.2.4 and FMI 3.0.2, 2.3 and 4.2 written down once more, by hand, and the model run
+//! The expected results: FMI 2.0.5, 4.2.4 and FMI 3.0.2, 2.3 and 4.2 written down once more, by hand, and the model run
 //! natively.
 
 use crate::common::model::*;
@@ -20,7 +20,7 @@ pub(crate) const SAVE: [&str; 2] = ["inst", "inst"];
 pub(crate) const STATUS: [&str; 2] = ["st", ""];
 pub(crate) const ANY: [&str; 2] = ["inste", "inste"];
 
-/// What a saved state must bring back.
+/// The values that a saved state must restore.
 #[derive(Clone)]
 pub(crate) struct Snapshot {
     pub(crate) state: char,
@@ -37,7 +37,7 @@ impl Snapshot {
         Self { state: 'i', experiment: None, elapsed: Elapsed::ZERO, end: 0.0, fresh: true, block: Block::default() }
     }
 
-    /// Bytes of a state with an output that is no number are not taken back.
+    /// Bytes of a state with a NaN output are refused.
     pub(crate) fn is_storable(&self) -> bool {
         !self.real(X).is_nan() && !self.real(DOUBLE_GAIN).is_nan()
     }
@@ -51,7 +51,7 @@ impl Snapshot {
         self.real(MAP) <= self.real(MAP + 2) && self.real(GAIN) * self.real(R) <= 50.0
     }
 
-    /// Looking at it would panic in the model.
+    /// Reading it would panic in the model.
     pub(crate) fn is_unlucky(&self) -> bool {
         self.fresh && self.integer(N) == 13
     }
@@ -77,7 +77,7 @@ impl Snapshot {
         self.slot(reference, |slot| if let Slot::Boolean(x) = slot { *x } else { unreachable!() })
     }
 
-    /// The value is that of a fixed parameter: in Step Mode such a set is taken and changes nothing.
+    /// The value is that of a fixed parameter: in Step Mode such a set is accepted and changes nothing.
     fn is_kept(&self, version: u8, kind: Kind, reference: u32, value: Mixed) -> bool {
         match (kind, reference) {
             // -0 equals 0.
@@ -101,7 +101,7 @@ impl Snapshot {
         }
     }
 
-    /// Before the start, outputs and calculated parameters fit what was set.
+    /// Before the start, outputs and calculated parameters match the values set.
     pub(crate) fn refresh(&mut self) -> Result<(), ()> {
         if self.fresh && "in".contains(self.state) {
             self.guarded(|it| {
@@ -131,7 +131,7 @@ impl Snapshot {
     }
 }
 
-/// How many values a reference stands for; `None`: an element of an array, which FMI 3.0 cannot name.
+/// Number of values of a reference; `None`: an element of an array, which FMI 3.0 cannot name.
 pub(crate) fn elements(version: u8, reference: u32) -> Option<usize> {
     match (version, reference) {
         (3, MAP) => Some(3),
@@ -164,9 +164,9 @@ fn settable(version: u8, kind: Kind, state: char, reference: u32, value: Mixed) 
 pub(crate) struct Reference {
     pub(crate) version: u8,
     pub(crate) now: Snapshot,
-    /// Categories that are heard: events, warning, discard, error, fatal.
+    /// Enabled categories: events, warning, discard, error, fatal.
     pub(crate) heard: [bool; 5],
-    /// The last call is taken with a warning, which is told once.
+    /// The last call is accepted with a warning, which is logged once.
     pub(crate) warns: bool,
     pub(crate) warned: bool,
     /// The first step has begun.
@@ -356,7 +356,7 @@ impl Reference {
                     now.block.model.derive();
                     now.fresh = false;
                 }
-                // A fault of the model shows in the mode; what it has done by then stays.
+                // A fault of the model appears in this mode; its changes until then remain.
                 if now.block.step(&step).is_ok() {
                     now.elapsed = elapsed;
                     now.end = t + h;

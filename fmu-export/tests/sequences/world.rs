@@ -11,7 +11,7 @@ use std::fmt;
 use std::ptr::{null, null_mut, without_provenance_mut};
 use std::rc::Rc;
 
-/// How often each function ended with OK, Discard and Error.
+/// How many calls of each function ended with OK, Discard and Error.
 #[derive(Default)]
 pub(crate) struct Tally(BTreeMap<&'static str, [u64; 3]>);
 
@@ -53,9 +53,9 @@ pub(crate) struct World {
     freed: Vec<FmuState>,
     /// States that the importer has forgotten, to be freed at the end.
     lost: Vec<FmuState>,
-    /// For looking without leaving traces.
+    /// For reading without side effects.
     glass: FmuState,
-    /// Bytes of a stored state: as many for every state of this model.
+    /// Size of a stored state in bytes: the same for every state of this model.
     size: usize,
     prints: [Vec<u8>; 2],
 }
@@ -89,7 +89,7 @@ impl World {
             let mut expected = Reference { warns: false, ..self.references[who].clone() };
             let done = match operation.door {
                 Door::Own => self.call(&call, own, it, &mut expected),
-                // Both end at the gate, so what the call would have done does not matter.
+                // Both end at the gate, so the effect of the call does not matter.
                 Door::Other | Door::Nobody => {
                     let (version, it) = if operation.door == Door::Other { (5 - own, it) } else { (own, null_mut()) };
                     let (status, name) = self.attempt(&call, version, it);
@@ -141,7 +141,7 @@ impl World {
         }
     }
 
-    /// Frees an instance and makes another, after one try with a mistake.
+    /// Frees an instance and creates another, after one try with a mistake.
     fn renew(&mut self, who: usize, version: u8, wrong: u8, tally: &mut Tally) {
         if wrong > 0 {
             let journal = Journal::default();
@@ -163,7 +163,7 @@ impl World {
         self.references[who] = Reference::new(version, logging);
     }
 
-    /// Makes the call; what came, what should have come, the function's name. `expected` follows.
+    /// Makes the call; returns the actual and expected results and the function's name. `expected` is updated.
     fn call(
         &mut self,
         call: &Call,
@@ -227,7 +227,7 @@ impl World {
         let who = usize::from(self.fmus[1].it == it);
         let now = self.references[who].now.clone();
         let (status, name) = self.attempt(call, version, it);
-        // What the importer now holds.
+        // The importer's present states.
         match (call, status) {
             (Call::Save(Slot::Own(i)), OK) => self.slots[*i].1 = Some(now),
             (Call::Free(Slot::Own(i)), OK) => self.slots[*i].1 = None,
@@ -249,7 +249,7 @@ impl World {
         }
     }
 
-    /// The call alone; slots and blobs follow.
+    /// Only the call; slots and blobs follow.
     fn attempt(&mut self, call: &Call, version: u8, it: InstancePointer) -> Done {
         match call {
             Call::Logging { on, categories } => perform::logging(version, it, *on, categories),
@@ -376,7 +376,7 @@ impl World {
         }
     }
 
-    /// All that the instance holds, as bytes, without changing it: its stored state, or after an error its values.
+    /// The content of the instance as bytes, without changing it: its stored state, or after an error its values.
     fn fingerprint(&mut self, who: usize) -> Vec<u8> {
         let (version, it) = (self.fmus[who].version, self.fmus[who].it);
         let mut bytes = vec![0; self.size];
@@ -402,7 +402,7 @@ impl World {
         lists(version).into_iter().flat_map(get).collect()
     }
 
-    /// Compares every value and the state of the life cycle with the reference, and leaves no trace.
+    /// Compares every value and the state of the life cycle with the reference, without side effects.
     fn look(&mut self, who: usize, operation: &Operation) {
         let mut now = self.references[who].now.clone();
         let (version, it) = (self.fmus[who].version, self.fmus[who].it);
@@ -427,7 +427,7 @@ impl World {
         self.fmus[who].journal.0.borrow_mut().clear();
     }
 
-    /// The state of the life cycle by what it allows; changes it.
+    /// The state of the life cycle, determined by the calls that it allows; changes it.
     fn state(&self, who: usize) -> char {
         let (fmu, version) = (&self.fmus[who], self.fmus[who].version);
         let restore = || assert_eq!(perform::restore(version, fmu.it, self.glass).0, OK);
@@ -452,7 +452,7 @@ impl Drop for World {
     }
 }
 
-/// The variables by type as a standard has them: FMI 2.0 knows no arrays.
+/// The variables by type in a standard: FMI 2.0 has no arrays.
 fn lists(version: u8) -> [(Kind, &'static [u32]); 4] {
     let reals: &[u32] = if version == 2 {
         &[U, K, X, R, MAP, MAP + 1, MAP + 2, GAIN, DOUBLE_GAIN]

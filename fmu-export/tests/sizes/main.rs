@@ -27,7 +27,7 @@ use std::ffi::CString;
 use std::ptr::{null, null_mut};
 use std::sync::Once;
 
-/// A map of any size, in a part: more elements than a table has places for.
+/// A map of any size, in a part: more elements than a table has indices.
 #[derive(Clone, Serialize, Deserialize)]
 struct Map {
     rows: u64,
@@ -199,7 +199,7 @@ impl It {
         value
     }
 
-    /// So many values, and what lies behind them.
+    /// The values, and the memory after them.
     fn get(&self, reference: u32, n: usize) -> (c_int, Vec<f64>) {
         let mut values = vec![-7.0; n + 2];
         let status = unsafe { fmi3GetFloat64(self.0, &reference, 1, values.as_mut_ptr(), n) };
@@ -253,7 +253,7 @@ fn counted(n: usize) -> Vec<f64> {
     (1_u8..).take(n).map(f64::from).collect()
 }
 
-/// One reference for every element at the greatest sizes.
+/// One reference for every element at the maximum sizes.
 #[test]
 fn references_do_not_move_with_the_sizes() {
     let d = Description::exported::<This>().unwrap();
@@ -280,7 +280,7 @@ fn references_do_not_move_with_the_sizes() {
     assert_eq!(d.variable("der(x)").unwrap().dependencies, Some(vec![X, X + 1]));
 }
 
-/// Every size, before the start and in the simulation: what has it, has it from the exit on, and one value more or less is an Error
+/// Every size, before the start and in the simulation: arrays have it from the exit on, and one value more or less is an Error
 /// that writes nothing.
 #[test]
 fn arrays_have_the_sizes_that_were_set() {
@@ -314,7 +314,7 @@ fn arrays_have_the_sizes_that_were_set() {
     }
 }
 
-/// A size above its bound is refused before memory is asked for: all that is asked for is the message.
+/// A size above its bound is refused before memory is allocated, except for the message.
 #[test]
 fn sizes_are_judged() {
     let it = It::new(false);
@@ -332,15 +332,15 @@ fn sizes_are_judged() {
             assert!(asked < 256, "{reference} = {size}: {asked} bytes");
         }
     }
-    // What no bound says, the model refuses; then nothing has changed.
+    // The model refuses combinations that no bound expresses; then nothing has changed.
     let it = It::new(false);
     assert_eq!((it.enter(), it.set_sizes(&[N, K], &[5, 4]), it.exit()), (OK, OK, ERROR));
     assert_eq!(it.values(GAINS, 4), [1.0; 4]);
     assert_eq!((unsafe { fmi3Reset(it.0) }, it.size(N), it.begin()), (OK, 2, OK));
 }
 
-/// A model that panics while it resizes: Error, in both modes. Nothing has changed, a reset makes the instance usable, and others do
-/// not notice.
+/// A model that panics while it resizes: Error, in both modes. Nothing has changed, a reset makes the instance usable, and
+/// others are unaffected.
 #[test]
 fn a_panic_while_sizes_change_is_an_error() {
     let other = It::begun(false);
@@ -420,7 +420,7 @@ fn saved_states_have_their_sizes() {
     }
 }
 
-/// All states in one array, in the order of the list; derivatives and sensitivities of those that there are.
+/// All states in one array, in the order of the list; derivatives and sensitivities of the present ones.
 #[test]
 fn the_number_of_states_follows() {
     let it = It::begun(true);
@@ -468,7 +468,7 @@ fn the_number_of_states_follows() {
     assert_eq!(unsafe { fmi3GetContinuousStates(wrong.0, [0.0; 6].as_mut_ptr(), 6) }, ERROR);
 }
 
-/// The reference of an inner element stands for nothing.
+/// The reference of an inner element is invalid.
 #[test]
 fn elements_have_no_reference_of_their_own() {
     for inner in [X + 1, DER_X + 1, DER_X + 4, GAINS + 19, VALUES + 1] {

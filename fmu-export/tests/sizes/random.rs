@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 const DISCARD: c_int = 2;
 
-/// What an instance must be.
+/// The expected state of an instance.
 #[derive(Clone)]
 struct Twin {
     exchange: bool,
@@ -33,7 +33,7 @@ impl Twin {
         states.contains(self.state)
     }
 
-    /// Before the initialization ends, values fit what was set; in Model Exchange, outputs fit the states.
+    /// Before the initialization ends, values match those set; in Model Exchange, outputs match the states.
     fn show(&mut self) {
         if self.is("in") && self.set {
             self.block.initialize();
@@ -144,7 +144,7 @@ const CALLS: [&str; 21] = [
     "restore",
 ];
 
-/// What a simulation would do next, or anything.
+/// A plausible next call of a simulation, or a random one.
 fn choose(twin: &Twin, draw: &mut Draw) -> &'static str {
     if draw.below(15) == 0 {
         return draw.of(&CALLS);
@@ -161,7 +161,7 @@ fn choose(twin: &Twin, draw: &mut Draw) -> &'static str {
     }
 }
 
-/// Two instances, what they must be, and saved states.
+/// Two instances, their expected states, and saved states.
 struct World {
     its: [It; 2],
     twins: [Twin; 2],
@@ -176,7 +176,7 @@ impl World {
         Self { its: kinds.map(It::new), twins: kinds.map(Twin::new), saved, trace: String::new() }
     }
 
-    /// Status, and the status that the call must have.
+    /// Status, and the expected status.
     #[expect(clippy::too_many_lines, reason = "a row for each call")]
     fn call(&mut self, draw: &mut Draw) -> [c_int; 2] {
         let who = draw.below(2);
@@ -184,7 +184,7 @@ impl World {
         let name = choose(twin, draw);
         let _ = write!(self.trace, "\n{who} {} {name}", twin.state);
         let before = twin.clone();
-        // In Model Exchange alone, and in these states.
+        // Only in Model Exchange, and in these states.
         let admits = |twin: &Twin, states: &str| twin.exchange && twin.is(states);
         let verdict = |fits: bool| if fits { OK } else { ERROR };
         let mut wanted = OK;
@@ -241,7 +241,7 @@ impl World {
                 let _ = write!(self.trace, " {n}");
                 let open = twin.is(if name == "map" { "in" } else { "insv" });
                 let fits = n == twin.values(reference).len() && values.iter().all(|x| x.is_finite());
-                // A fixed parameter, and in Continuous-Time Mode a tunable one, may be set to what it is.
+                // A fixed parameter, and in Continuous-Time Mode a tunable one, may be set to its present value.
                 let kept = twin.is("svx") && n > 0 && values == twin.values(reference);
                 wanted = verdict(
                     (open || kept) && fits || n == 0 && twin.values(reference).is_empty() && twin.is("icnsvxr"),
@@ -273,7 +273,7 @@ impl World {
                 let n = draw.count(expected.len());
                 let _ = write!(self.trace, " {reference} {n}");
                 let known = !(twin.is("cr") && [DER_X, DER_Z].contains(&reference));
-                // Without values, nothing is asked.
+                // Without values, there is nothing to get.
                 wanted = verdict(n == expected.len() && (known || n == 0));
                 let (status, values) = it.get(reference, n);
                 assert!(status != OK || wanted != OK || bits(&values) == bits(&expected), "{}", self.trace);

@@ -58,7 +58,7 @@ impl Kind {
     }
 }
 
-/// What an update of the discrete states says, nominals aside.
+/// Result of an update of the discrete states, nominals aside.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Update {
     pub again: bool,
@@ -67,7 +67,7 @@ pub struct Update {
     pub next: Option<f64>,
 }
 
-/// What a step says.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stepped {
     pub event: bool,
@@ -86,7 +86,7 @@ impl Fmu {
         Self::with(kind, true, false)
     }
 
-    /// With or without a logger, which is told everything or errors only.
+    /// With or without a logger, for all messages or only errors.
     pub fn with(kind: Kind, logger: bool, on: bool) -> Self {
         fmu_export::abi::quiet();
         drop(std::panic::take_hook());
@@ -420,12 +420,12 @@ impl Fmu {
         )
     }
 
-    /// The messages since the last look.
+    /// The new messages.
     pub fn messages(&self) -> Vec<Message> {
         self.journal.0.borrow_mut().drain(..).collect()
     }
 
-    /// The only message since the last look, which must be an error.
+    /// The only new message, which must be an error.
     pub fn error(&self) -> String {
         let messages = self.messages();
         assert_eq!(messages.len(), 1, "{messages:?}");
@@ -433,7 +433,7 @@ impl Fmu {
         messages[0].text.clone()
     }
 
-    /// In which state the instance is, found out by what it allows, through the C interface alone.
+    /// The state of the instance, determined by the calls that it allows, only through the C interface.
     pub fn state(&self) -> char {
         let mut here = null_mut();
         if self.save(&mut here) == ERROR {
@@ -441,7 +441,7 @@ impl Fmu {
         }
         let end = {
             let mut end = [0.0];
-            // FMI 2.0 has no variable for time, and tells the last communication point.
+            // FMI 2.0 has no variable for time, and reports the last communication point.
             let read = match self.kind.version() {
                 2 => unsafe { fmi2GetRealStatus(self.it, 2, &raw mut end[0]) },
                 _ => self.try_get(&[0], &mut end),

@@ -1,7 +1,7 @@
 //! Random calls of all interfaces, right and wrong, against a state machine written down once more by hand from
 //! FMI 2.0.5, 3.2.3 and 4.2.4 and FMI 3.0.2, 2.3, 3.2 and 4.2, which runs the model natively.
 //!
-//! Two instances that share saved states; after every call its status and what it wrote, and now and then every value and
+//! Two instances that share saved states; after every call its status and its results, and from time to time every value and
 //! the state of the lifecycle. 1e5 calls; `FMU_CALLS=10000000 cargo test --release -p fmu-export --test sampled_sequences
 //! --test continuous_sequences` for more, `FMU_SEED=n` for others.
 
@@ -83,7 +83,7 @@ impl<M: Twin> World<M> {
         }
     }
 
-    /// What a plain simulation would do next, or anything.
+    /// A plausible next call of a plain simulation, or a random one.
     fn choose(&self, who: usize, draw: &mut Draw) -> &'static str {
         let now = &self.now[who];
         if draw.below(12) == 0 {
@@ -161,7 +161,7 @@ impl<M: Twin> World<M> {
                 if name == "store"
                     && let Some(saved) = saved
                 {
-                    // Through bytes; a variable that is no number is refused.
+                    // Through bytes; a NaN is refused.
                     let bytes = fmu.serialized(handle);
                     let fits = saved.is_storable();
                     assert_eq!(fmu.deserialize(&bytes, &mut stored), if fits { OK } else { ERROR }, "{}", self.trace);
@@ -213,7 +213,7 @@ impl<M: Twin> World<M> {
         let (fmu, now) = (&self.fmus[who], &mut self.now[who]);
         if now.kind.version() == 3 || "nvcste".contains(now.state) {
             now.show();
-            // Time is a variable of FMI 3.0 alone.
+            // Time is a variable only in FMI 3.0.
             let here = |r| usize::try_from(r).unwrap() <= M::TABLE.len() && (r > 0 || now.kind.version() == 3);
             let references: Vec<u32> = M::REALS.iter().copied().filter(|&r| here(r)).collect();
             let expected: Vec<f64> = references.iter().flat_map(|&r| now.reals(r).unwrap()).collect();

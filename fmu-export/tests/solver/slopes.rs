@@ -3,7 +3,7 @@
 use super::ball::*;
 use super::*;
 
-/// How exact they are.
+/// Their accuracy.
 #[derive(Clone, Copy)]
 pub struct Exactness {
     /// Against differences of Set and Get at v = 0, where v |v| has a kink in its derivative; 1e-6 elsewhere.
@@ -12,7 +12,7 @@ pub struct Exactness {
     pub linear: f64,
 }
 
-/// What is wrong, and the call.
+/// The fault, and the call.
 type Wrong = (&'static str, fn(&Fmu) -> c_int);
 
 const KNOWNS: [u32; 3] = [U, H, V];
@@ -233,7 +233,7 @@ pub fn input_derivatives() {
     let fmu = ramped(0.4, true);
     let v = fmu.get(V);
     assert_eq!(fmu.get(U), 2.0, "the input is as it was set");
-    // They held for one step; a mean over the step is one over the whole step.
+    // They applied to one step; a mean over the step covers the whole step.
     let again = ramped(0.4, true);
     let h = again.get(H);
     assert_eq!((fmu.step(0.8, 0.4).0, again.input_derivatives(&[U], &[1], &[0.0])), (OK, OK));

@@ -7,7 +7,7 @@ use std::ffi::c_void;
 use std::marker::PhantomData;
 use std::ptr;
 
-/// The answer of a call: the function, and what it returned unless the library does not have it.
+/// The answer of a call: the function, and its result if the library has the function.
 pub(super) struct Answer<T = ()>(pub(super) &'static str, pub(super) Option<(Status, T)>);
 
 impl<T> Answer<T> {
@@ -43,13 +43,13 @@ impl Answer {
     }
 }
 
-/// The refusal of a call whose function the library does not have.
+/// The error of a call whose function is missing from the library.
 #[cold]
 fn missing(name: &str) -> Refusal {
     Refusal::Impossible(format!("the function {name} is missing"))
 }
 
-/// A pointer that an FMU gave out, to an instance or to a saved state, or NULL.
+/// A pointer from an FMU to an instance or to a saved state, or NULL.
 #[derive(Clone, Copy)]
 pub(super) struct Given<'a>(pub(super) *mut c_void, PhantomData<&'a ()>);
 
@@ -57,14 +57,14 @@ impl Given<'_> {
     pub(super) const NULL: Self = Self(ptr::null_mut(), PhantomData);
 
     /// # Safety
-    /// The library whose functions get the pointer gave it out and has not taken it back during the lifetime, or it is NULL.
+    /// The pointer comes from the library whose functions receive it and is not freed during the lifetime, or it is NULL.
     #[inline]
     pub(super) unsafe fn new(pointer: *mut c_void) -> Self {
         Self(pointer, PhantomData)
     }
 }
 
-/// An array that a function reads, with the count that goes with it.
+/// An array that a function reads, with its count.
 #[derive(Clone, Copy)]
 pub(super) struct Array<'a, T>(Option<&'a [T]>, pub(super) usize);
 
@@ -97,7 +97,7 @@ impl<'a, T> From<&'a [T]> for Array<'a, T> {
     }
 }
 
-/// An array that a function writes, with the count that goes with it.
+/// An array that a function writes, with its count.
 pub(super) struct ArrayMut<'a, T>(Option<&'a mut [T]>, pub(super) usize);
 
 impl<'a, T> ArrayMut<'a, T> {

@@ -7,10 +7,10 @@ use crate::standard::{Outcome, Refusal};
 use std::ptr;
 use std::slice;
 
-/// Greatest size of a value that is copied from an FMU, in bytes.
+/// Maximum size of a value that is copied from an FMU, in bytes.
 const MOST: usize = 1 << 30;
 
-/// Where the FMU keeps bytes, and how many they are.
+/// Address and number of bytes in the FMU.
 type Place = (*const u8, usize);
 
 impl Calls {
@@ -23,7 +23,7 @@ impl Calls {
             size if place.is_null() || size > MOST => {
                 Err(Refusal::Impossible(format!("the FMU gives {size} bytes at {place:?}")))
             }
-            // SAFETY: the FMU's bytes, as many as it says, which live until its next call.
+            // SAFETY: the FMU's bytes, as many as it states, valid until its next call.
             size => Ok(unsafe { slice::from_raw_parts(place, size) }.to_vec()),
         };
         places.into_iter().map(copy).collect()
@@ -34,7 +34,7 @@ impl Calls {
         self.put_binaries(i, &[reference], values).outcome()
     }
 
-    /// For the checker: a value for each reference, `None` for NULL and for more bytes than anyone copies.
+    /// For the checker: a value for each reference, `None` for NULL and for more bytes than the limit.
     pub(super) fn binaries(&self, i: Given<'_>, references: &[u32]) -> Option<(Status, Vec<Option<Vec<u8>>>)> {
         let (answer, places) = self.places(i, references, references.len());
         let status = answer.status()?;
@@ -54,7 +54,7 @@ impl Calls {
         self.set_binary_3.call(|f| unsafe { f(i.0, list, n, sizes.as_ptr(), places.as_ptr(), values.len()) })
     }
 
-    /// Where the FMU keeps the values.
+    /// Address of the values in the FMU.
     fn places(&self, i: Given<'_>, references: &[u32], count: usize) -> (Answer, Vec<Place>) {
         let (mut sizes, mut places) = (vec![0; count], vec![ptr::null(); count]);
         let (list, n) = (references.as_ptr(), references.len());

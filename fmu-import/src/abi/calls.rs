@@ -1,9 +1,9 @@
 //! Every call of both standards, once.
 //!
-//! Two users stand on these: [`Live`](super::live::Live), the instances of the facade, and [`Raw`](super::raw::Raw), the checker's
+//! Two types use them: [`Live`](super::live::Live), the instances of the facade, and [`Raw`](super::raw::Raw), the checker's
 //! calls with arguments that a well-behaved importer never passes. The argument types keep both from undefined behavior:
-//! [`Given`] is a pointer that the FMU gave out, [`Array`] and [`ArrayMut`] are NULL or at least as long as the count that goes
-//! with them. Getters, setters and instantiation take bare pointers and are `unsafe`.
+//! [`Given`] is a pointer from the FMU, [`Array`] and [`ArrayMut`] are NULL or at least as long as their count. Getters,
+//! setters and instantiation take bare pointers and are `unsafe`.
 
 use super::arguments::{Answer, Array, ArrayMut, Given};
 use super::functions::{CType, Calls, Function, Way};
@@ -26,14 +26,14 @@ pub(super) struct Request<'a> {
     pub(super) early_return: bool,
     /// FMI 2.0's.
     pub(super) callbacks: *const v2::Callbacks,
-    /// FMI 3.0's, with the environment that it gets.
+    /// FMI 3.0's, with its environment.
     pub(super) logger: Option<v3::LogMessage>,
     pub(super) environment: *mut c_void,
     /// FMI 3.0's callbacks that may call the FMU again, and the variables that are used in steps.
     pub(super) updates: Updates<'a>,
 }
 
-/// What an importer does while a call is under way (FMI 3.0).
+/// Actions of an importer during a call (FMI 3.0).
 #[derive(Default)]
 pub(super) struct Updates<'a> {
     pub(super) intermediate: Option<v3::IntermediateUpdate>,
@@ -54,7 +54,7 @@ impl Calls {
 
     /// Whether there is a function of this full name.
     pub(super) fn has(&self, name: &str) -> bool {
-        // SAFETY: only whether there is such a symbol is asked; nothing is called under this type.
+        // SAFETY: only the existence of the symbol is checked; nothing is called under this type.
         unsafe { self.library.get::<OfInstance>(name) }.is_ok()
     }
 
@@ -70,7 +70,7 @@ impl Calls {
     /// Creates an instance: the function's name, and the pointer that it returned; `None` if it is missing.
     ///
     /// # Safety
-    /// The callbacks are NULL or live as long as the instance, and so does what the environment leads to.
+    /// The callbacks are NULL or live as long as the instance, and so does the target of the environment.
     pub(super) unsafe fn instantiate(&self, r: &Request<'_>) -> (&'static str, Option<InstancePointer>) {
         let [name, token, resources] = r.texts.map(|text| text.map_or(ptr::null(), CStr::as_ptr));
         let (e, log, Updates { intermediate, required, clocks, preemption: [lock, unlock] }) =
@@ -154,8 +154,8 @@ impl Calls {
     /// Gets or sets values.
     ///
     /// # Safety
-    /// `values` is NULL or leads to as many values of the type as both counts say, to which a getter may write; texts that are set
-    /// are NULL or C strings.
+    /// `values` is NULL or points to values of the type, as many as both counts state, to which a getter may write; texts that
+    /// are set are NULL or C strings.
     #[inline]
     pub(super) unsafe fn transfer(
         &self,
@@ -167,7 +167,7 @@ impl Calls {
         n_values: usize,
     ) -> Answer {
         let (list, n) = (references.pointer(), references.1);
-        // SAFETY: of both: the standards' types, whatever the values are: they only differ in what the pointer leads to.
+        // SAFETY: of both: the standards' types for all values, which differ only in the target of the pointer.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.transfer_2[kind][way as usize].call(|f| f(i.0, list, n, values)),
@@ -176,7 +176,8 @@ impl Calls {
         }
     }
 
-    /// `DoStep`. `pointers` are FMI 3.0's: the results that do not get NULL; `before` is what the places hold before the call.
+    /// `DoStep`. `pointers` are FMI 3.0's: the results that do not get NULL; `before` is the content of the results before the
+    /// call.
     #[inline]
     pub(super) fn do_step(
         &self,
@@ -186,7 +187,7 @@ impl Calls {
         pointers: [bool; 4],
         before: StepResults,
     ) -> Answer<StepResults> {
-        // SAFETY: of both: the standard's type; the places are ours or NULL.
+        // SAFETY: of both: the standard's type; the variables are ours or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.do_step_2.write(before, |f, _| f(i.0, t, h, c_int::from(no_prior))),
@@ -200,10 +201,11 @@ impl Calls {
         }
     }
 
-    /// `fmi2Get...Status` with a place for any of its results; returns the first eight bytes of it, which hold `before` at first.
+    /// `fmi2Get...Status` with a buffer for any of its results; returns the first eight bytes of it, which are `before` at
+    /// first.
     pub(super) fn step_status(&self, name: StepStatus, i: Given<'_>, kind: c_int, before: u64) -> Answer<u64> {
         let full = StepStatus::ALL[name as usize][0];
-        // SAFETY: of both: FMI 2.0's type but for the place, which has room for each of its values.
+        // SAFETY: of both: FMI 2.0's type except for the buffer, which is large enough for each of its values.
         unsafe {
             Function(full, self.function::<v2::GetStatus<u64>>(full)).write(before, |f, place| f(i.0, kind, place))
         }
@@ -220,7 +222,7 @@ impl Calls {
         let list: Vec<*const c_char> =
             categories.unwrap_or_default().iter().map(|c| c.map_or(ptr::null(), CStr::as_ptr)).collect();
         let list = Array::of(categories.map(|_| &list[..]), n).pointer();
-        // SAFETY: of both: the standard's type; as many strings as said, or NULL.
+        // SAFETY: of both: the standard's type; as many strings as stated, or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.debug_logging_2.call(|f| f(i.0, c_int::from(on), n, list)),
@@ -229,12 +231,12 @@ impl Calls {
         }
     }
 
-    /// `GetFMUState`: offers a state, or NULL for a new one, to be overwritten; `None` passes NULL for the place.
+    /// `GetFMUState`: offers a state, or NULL for a new one, to be overwritten; `None` passes NULL for the pointer.
     pub(super) fn get_state(&self, i: Given<'_>, place: Option<Given<'_>>) -> Answer<StatePointer> {
         Self::with_place(&self.get_state, i, place)
     }
 
-    /// `FreeFMUState`: what the place holds then; `None` passes NULL for the place.
+    /// `FreeFMUState`: returns the content of the variable afterwards; `None` passes NULL for its address.
     ///
     /// # Safety
     /// Nothing uses the state after this.
@@ -243,7 +245,7 @@ impl Calls {
     }
 
     fn with_place(function: &Function<StatePlace>, i: Given<'_>, place: Option<Given<'_>>) -> Answer<StatePointer> {
-        // SAFETY: the standards' type; the place is ours or NULL, and the state alive or NULL.
+        // SAFETY: the standards' type; the variable is ours or NULL, and the state alive or NULL.
         function.write(place.unwrap_or(Given::NULL).0, |f, state| unsafe {
             f(i.0, if place.is_some() { state } else { ptr::null_mut() })
         })
@@ -257,25 +259,25 @@ impl Calls {
 
     /// `SerializedFMUStateSize`.
     pub(super) fn state_size(&self, i: Given<'_>, state: Given<'_>) -> Answer<usize> {
-        // SAFETY: the standards' type; the place is ours.
+        // SAFETY: the standards' type; the variable is ours.
         self.state_size.write(0, |f, size| unsafe { f(i.0, state.0, size) })
     }
 
     /// `SerializeFMUState`.
     pub(super) fn serialize(&self, i: Given<'_>, state: Given<'_>, mut bytes: ArrayMut<'_, u8>) -> Answer {
-        // SAFETY: the standards' type; the array is as long as said.
+        // SAFETY: the standards' type; the array is as long as stated.
         self.serialize.call(|f| unsafe { f(i.0, state.0, bytes.pointer(), bytes.1) })
     }
 
     /// `DeserializeFMUState`.
     pub(super) fn deserialize(&self, i: Given<'_>, bytes: Array<'_, u8>) -> Answer<StatePointer> {
-        // SAFETY: the standards' type; the array is NULL or as long as said; the place is ours.
+        // SAFETY: the standards' type; the array is NULL or as long as stated; the variable is ours.
         self.deserialize.write(ptr::null_mut(), |f, state| unsafe { f(i.0, bytes.pointer(), bytes.1, state) })
     }
 
-    /// `fmi3GetClock` of one clock, in a place that holds `before`.
+    /// `fmi3GetClock` of one clock, with a result that is `before` at first.
     pub(super) fn clock(&self, i: Given<'_>, clock: u32, before: u8) -> Answer<u8> {
-        // SAFETY: the standard's type; one reference, one place of ours.
+        // SAFETY: the standard's type; one reference, one variable of ours.
         self.get_clock.write(before, |f, active| unsafe { f(i.0, &raw const clock, 1, active) })
     }
 
@@ -287,7 +289,7 @@ impl Calls {
 
     /// `fmi3GetIntervalDecimal` of one clock: interval and qualifier.
     pub(super) fn interval(&self, i: Given<'_>, clock: u32) -> Answer<(f64, c_int)> {
-        // SAFETY: the standard's type; one reference, places of ours.
+        // SAFETY: the standard's type; one reference, variables of ours.
         self.get_interval
             .write((0.0, 0), |f, (interval, qualifier)| unsafe { f(i.0, &raw const clock, 1, interval, qualifier) })
     }
@@ -306,19 +308,19 @@ impl Calls {
 
     /// `fmi3GetShiftDecimal` of one clock.
     pub(super) fn shift(&self, i: Given<'_>, clock: u32) -> Answer<f64> {
-        // SAFETY: the standard's type; one reference, one place of ours.
+        // SAFETY: the standard's type; one reference, one variable of ours.
         self.get_shift.write(0.0, |f, shift| unsafe { f(i.0, &raw const clock, 1, shift) })
     }
 
-    /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`. `before` is what the places hold before the call; with `null`, all
-    /// results get NULL.
+    /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`. `before` is the content of the results before the call; with
+    /// `null`, all results get NULL.
     pub(super) fn update_discrete_states(
         &self,
         i: Given<'_>,
         null: bool,
         (fill, time): (u8, f64),
     ) -> Answer<UpdateResults> {
-        // SAFETY: of both: the standard's type; the places are ours or NULL.
+        // SAFETY: of both: the standard's type; the variables are ours or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => {
@@ -364,10 +366,10 @@ impl Calls {
         }
     }
 
-    /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation`, which hold `fill` before the call; with `null`, both
-    /// get NULL.
+    /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation`, which are `fill` before the call; with `null`,
+    /// both get NULL.
     pub(super) fn completed(&self, i: Given<'_>, no_prior: bool, null: bool, fill: u8) -> Answer<[i32; 2]> {
-        // SAFETY: of both: the standard's type; the places are ours or NULL.
+        // SAFETY: of both: the standard's type; the variables are ours or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.completed_2.write([c_int::from(fill); 2], |f, flags| {
@@ -396,7 +398,7 @@ impl Calls {
     /// `SetContinuousStates`.
     #[inline]
     pub(super) fn set_states(&self, i: Given<'_>, x: Array<'_, f64>) -> Answer {
-        // SAFETY: the standards' type; the array is NULL or as long as said.
+        // SAFETY: the standards' type; the array is NULL or as long as stated.
         self.set_states.call(|f| unsafe { f(i.0, x.pointer(), x.1) })
     }
 
@@ -404,7 +406,7 @@ impl Calls {
     #[inline]
     pub(super) fn vector(&self, name: Vector, i: Given<'_>, mut values: ArrayMut<'_, f64>) -> Answer {
         // SAFETY: all functions that `Vector` names have this type, up to the mutability of the array, which is ours, NULL or
-        // as long as said.
+        // as long as stated.
         self.vectors[name as usize].call(|f| unsafe { f(i.0, values.pointer(), values.1) })
     }
 
@@ -414,7 +416,7 @@ impl Calls {
             Count::GetNumberOfContinuousStates => &self.number_of_states,
             Count::GetNumberOfEventIndicators => &self.number_of_indicators,
         };
-        // SAFETY: FMI 3.0's type; the place is ours or NULL.
+        // SAFETY: FMI 3.0's type; the variable is ours or NULL.
         function.write(usize::MAX, |f, n| unsafe { f(i.0, if null { ptr::null_mut() } else { n }) })
     }
 
@@ -432,14 +434,14 @@ impl Calls {
             (FmiVersion::V2, Sensitivity::GetAdjointDerivative) => return Answer("fmi2GetAdjointDerivative", None),
             (FmiVersion::V2, Sensitivity::GetDirectionalDerivative) => {
                 let (s, to) = (seed.holding(n_k), results.holding(n_u));
-                // SAFETY: FMI 2.0's type; the lists tell the lengths of seed and results.
+                // SAFETY: FMI 2.0's type; the lists give the lengths of seed and results.
                 return self.directional_2.call(|f| unsafe { f(i.0, u, n_u, k, n_k, s, to) });
             }
             (FmiVersion::V3, Sensitivity::GetDirectionalDerivative) => &self.directional_3,
             (FmiVersion::V3, Sensitivity::GetAdjointDerivative) => &self.adjoint_3,
         };
         let (s, n_s, to, n) = (seed.pointer(), seed.1, results.pointer(), results.1);
-        // SAFETY: FMI 3.0's type; arrays are NULL or as long as said.
+        // SAFETY: FMI 3.0's type; arrays are NULL or as long as stated.
         function.call(|f| unsafe { f(i.0, u, n_u, k, n_k, s, n_s, to, n) })
     }
 
@@ -453,7 +455,7 @@ impl Calls {
     ) -> Answer {
         let (r, n, orders) = (references.as_ptr(), references.len(), Array::from(orders).holding(references.len()));
         let mut values = ArrayMut::from(values);
-        // SAFETY: of both: the standard's type; the arrays are as long as said.
+        // SAFETY: of both: the standard's type; the arrays are as long as stated.
         unsafe {
             match self.version {
                 FmiVersion::V2 => {
@@ -475,7 +477,7 @@ impl Calls {
     ) -> Answer {
         let (r, n) = (references.pointer(), references.1);
         let (orders, values) = (orders.holding(n), values.holding(n));
-        // SAFETY: FMI 2.0's type; arrays are NULL or as long as said.
+        // SAFETY: FMI 2.0's type; arrays are NULL or as long as stated.
         self.input_derivatives_2.call(|f| unsafe { f(i.0, r, n, orders, values) })
     }
 }

@@ -1,8 +1,8 @@
 //! Texts with the values of a C format (`printf`), for the log messages of FMI 2.0.
 //!
-//! The format is divided into conversions, and the C library writes each of them with its value, so a text is what C makes of
-//! it. `%n`, which writes, and `%L...`, whose values have no common size, are not followed; from there on the format stays as
-//! it is, and the text says so.
+//! The format is divided into conversions, and the C library formats each with its value, so the text is the same as in C.
+//! `%n`, which writes, and `%L...`, whose values have no common size, are not supported; from there on the format is copied
+//! unchanged, and the text says so.
 
 use std::ffi::{CStr, CString, c_char, c_int};
 
@@ -14,7 +14,7 @@ unsafe extern "C" {
 /// Maximum of a width or of a precision.
 const WIDEST: i32 = 4096;
 
-/// The arguments of a variadic call, where its caller put them.
+/// The arguments of a variadic call, where its caller has placed them.
 pub(super) struct Arguments<'a> {
     integers: std::slice::Iter<'a, u64>,
     floats: std::slice::Iter<'a, f64>,
@@ -67,7 +67,7 @@ enum Number {
     Argument,
 }
 
-/// Splits `n` bytes off, as many as there are in front that satisfy `is`.
+/// Splits off the leading bytes that satisfy `is`.
 fn run<'a>(rest: &mut &'a [u8], is: impl Fn(u8) -> bool) -> &'a [u8] {
     let n = rest.iter().position(|&c| !is(c)).unwrap_or(rest.len());
     let (front, back) = rest.split_at(n);
@@ -87,7 +87,7 @@ fn number(rest: &mut &[u8]) -> Number {
     Number::Is(std::str::from_utf8(digits).ok().and_then(|d| d.parse().ok()).unwrap_or(i32::MAX))
 }
 
-/// The conversion at the start of `format`, which is a `%`, and what follows.
+/// The conversion at the start of `format`, which is a `%`, and the rest.
 fn conversion(format: &[u8]) -> (Conversion<'_>, &[u8]) {
     let mut rest = &format[1..];
     let flags = run(&mut rest, |c| b"-+ #0".contains(&c));
@@ -108,7 +108,7 @@ fn conversion(format: &[u8]) -> (Conversion<'_>, &[u8]) {
 }
 
 impl Conversion<'_> {
-    /// The text of the next argument; `None` if this conversion is not followed or there is no argument left.
+    /// The text of the next argument; `None` if this conversion is not supported or no argument is left.
     ///
     /// # Safety
     /// The arguments are those of the format; one of `%s` is NULL or a C string, or as long as the precision.
@@ -188,7 +188,7 @@ fn pointer(word: u64) -> *const std::ffi::c_void {
     std::ptr::with_exposed_provenance(usize::try_from(word).unwrap_or(0))
 }
 
-/// What the C library makes of one conversion.
+/// One conversion as formatted by the C library.
 ///
 /// # Safety
 /// The format has one conversion, of the value's type.

@@ -12,7 +12,7 @@ use libloading::Library;
 use model_description::FmiVersion;
 use std::sync::Arc;
 
-/// A function with its full name; `None` if the library does not have it.
+/// A function with its full name; `None` if the library lacks it.
 pub(super) struct Function<T>(pub(super) &'static str, pub(super) Option<T>);
 
 impl<T: Copy> Function<T> {
@@ -22,7 +22,7 @@ impl<T: Copy> Function<T> {
         Answer(self.0, self.1.map(|function| (call(function), ())))
     }
 
-    /// Calls it and takes what it wrote to a place, which holds `value` before.
+    /// Calls it and returns its result, which is `value` before the call.
     #[inline]
     pub(super) fn write<V>(&self, mut value: V, call: impl FnOnce(T, &mut V) -> Status) -> Answer<V> {
         Answer(self.0, self.1.map(|function| (call(function, &mut value), value)))
@@ -37,7 +37,7 @@ const TYPES_2: [[&str; 2]; 4] = [
     ["fmi2GetString", "fmi2SetString"],
 ];
 
-/// The C types of getters and setters in FMI 3.0, but for those with other arguments.
+/// The C types of getters and setters in FMI 3.0, except those with other arguments.
 const TYPES_3: [[&str; 2]; 12] = [
     ["fmi3GetFloat64", "fmi3SetFloat64"],
     ["fmi3GetFloat32", "fmi3SetFloat32"],
@@ -68,17 +68,17 @@ impl CType {
     }
 }
 
-/// Whether a call gets or sets: the place in a row of the types.
+/// Whether a call gets or sets: the column in the table of types.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
     Get,
     Set,
 }
 
-/// Declares the functions, each with its C type and its names in FMI 2.0 and FMI 3.0; "" where the standard has none of this type.
+/// Declares the functions, each with its C type and its names in FMI 2.0 and FMI 3.0; "" where the standard lacks it.
 macro_rules! functions {
     ($($field:ident: $kind:ty = $two:literal $three:literal,)*) => {
-        /// A loaded library with its functions, and the folder that contains it, if that is to be kept.
+        /// A loaded library with its functions, and its folder, if that must be kept.
         pub(super) struct Calls {
             pub(super) version: FmiVersion,
             $(pub(super) $field: Function<$kind>,)*
@@ -103,7 +103,7 @@ macro_rules! functions {
                     Function(name, symbol.map(|symbol| *symbol))
                 }
                 let (v, l) = (usize::from(version == FmiVersion::V3), &library);
-                // SAFETY: every name stands beside the type that the standards give it.
+                // SAFETY: every name is listed with its type in the standards.
                 unsafe {
                     Self {
                         version,

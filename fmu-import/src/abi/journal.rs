@@ -1,8 +1,8 @@
-//! The call that an FMU is in, in memory that another process can read after this one has died. A call costs two stores.
+//! The current call of an FMU, in memory that another process can read after this one has died. A call costs two stores.
 
 macro_rules! calls {
     ($($name:ident = $text:literal,)*) => {
-        /// What the importer has an FMU do.
+        /// The kinds of calls.
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[expect(missing_docs, reason = "the texts tell")]
         pub enum Call { $($name,)* }
@@ -30,16 +30,16 @@ calls! {
     Write = "writing the results",
 }
 
-/// What a process did last.
+/// The last action of a process.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Last {
     /// Name of the instance, or path of the FMU that is loaded.
     pub name: String,
-    /// The call that it was in, or that it made last.
+    /// The current call, or the last one.
     pub call: Call,
-    /// The last communication point in s, once there was one.
+    /// The last communication point in s, if any.
     pub time: Option<f64>,
-    /// Changes with every communication point, and with every call that a run makes once.
+    /// Changes with every communication point, and with every call that a run makes only once.
     pub progress: u64,
 }
 
@@ -75,18 +75,18 @@ mod unix {
     static PAGE: OnceLock<Page> = OnceLock::new();
     static NAMED: OnceLock<Mutex<(u32, File)>> = OnceLock::new();
 
-    /// This process keeps its journal in a folder, from now on.
+    /// Keeps the journal of this process in a folder from now on.
     ///
     /// # Errors
     /// The files cannot be made.
     pub fn open(folder: &Path) -> io::Result<()> {
         let file = File::options().read(true).write(true).create(true).truncate(true).open(folder.join(CALL))?;
         file.set_len(BYTES as u64)?;
-        // SAFETY: a new mapping, at an address that the system chooses, takes nothing from anybody.
+        // SAFETY: a new mapping at an address that the system chooses overlaps no other memory.
         let page =
             unsafe { mmap(ptr::null_mut(), BYTES, ProtFlags::READ | ProtFlags::WRITE, MapFlags::SHARED, &file, 0) }?;
         // SAFETY: the mapping is aligned to pages, larger than three words, and never undone. Atomic words may be read and
-        // written by anybody at any time; whoever cuts the file short ends this process by a signal.
+        // written by other processes at any time; truncating the file would end this process by a signal.
         let page = unsafe { &*page.cast::<[AtomicU64; 3]>() };
         page[1].store(f64::NAN.to_bits(), Relaxed);
         let names = File::options().append(true).create(true).open(folder.join(NAMES))?;
@@ -131,7 +131,7 @@ mod unix {
         }
     }
 
-    /// What the process that keeps its journal in this folder did last; `None` before it has begun.
+    /// The last action of the process that keeps its journal in this folder; `None` before it has begun.
     pub fn read(folder: &Path) -> Option<Last> {
         let bytes = fs::read(folder.join(CALL)).ok()?;
         let word = |index: usize| Some(u64::from_ne_bytes(bytes.get(8 * index..8 * index + 8)?.try_into().ok()?));

@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Loads a shared library.
 pub(super) fn load(path: &Path) -> Result<Library, Error> {
-    // SAFETY: loading runs the library's initializers. That is what running an FMU means: its code has every right of
-    // this process, and the user named the file.
+    // SAFETY: loading runs the library's initializers. That is inherent in running an FMU: its code has every right of this
+    // process, and the user named the file.
     unsafe { Library::new(path) }.map_err(|e| Error::file(path, reason(&e)))
 }
 
@@ -24,7 +24,7 @@ type Describe = unsafe extern "C" fn(sink: Sink, context: *mut c_void, resources
 /// The description that a library made with `fmu_export::export!` returns, with the folder of the model's resources.
 ///
 /// # Errors
-/// The file is not a library for this platform, or was not made by this version of the exporter; the model refuses its
+/// The file is not a library for this platform, or was not built with this version of the exporter; or the model refuses its
 /// resources.
 pub fn describe(path: &Path, resources: Option<&Path>) -> Result<fmu_core::Description, Error> {
     extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {

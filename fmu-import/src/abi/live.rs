@@ -1,6 +1,6 @@
 //! An instance of the facade, over the calls of either standard. Dropping it frees the instance.
 
-use super::arguments::Given;
+use super::arguments::{Answer, Given};
 use super::calls::{Request, Updates};
 use super::functions::{CType, Calls, Way};
 use super::log::{Log, Message, Status, copy_text};
@@ -17,7 +17,10 @@ use std::ffi::{CStr, CString, c_char, c_void};
 use std::ptr;
 use std::sync::Arc;
 use std::sync::atomic::AtomicPtr;
+use std::time::Duration;
 
+/// `fmi2DoStepStatus`.
+const DO_STEP_STATUS: i32 = 0;
 /// `fmi2LastSuccessfulTime`, a status kind.
 const LAST_SUCCESSFUL_TIME: i32 = 2;
 /// `fmi2Terminated`, a status kind.
@@ -46,14 +49,14 @@ unsafe extern "C" fn log_message(
     Log::receive(environment, Message { status, category, text });
 }
 
-/// A pointer that an FMU gave out, to an instance or to a saved state. Only the FMU follows it.
+/// A pointer from an FMU to an instance or to a saved state. Only the FMU dereferences it.
 #[derive(Clone, Copy)]
 pub(crate) struct Pointer(*mut c_void);
 
 // SAFETY: an instance and its states go from thread to thread together, and every call takes the instance by `&mut`, so that
-// calls follow one another. More than that neither standard lets an FMU ask for: "FMI functions of one instance do not need to
-// be thread-safe", and the importer that calls them from several threads guarantees the calling sequence (FMI 2.0.5, 2.1;
-// FMI 3.0.2, 2.2.1).
+// calls follow one another. Neither standard lets an FMU require more: "FMI functions of one instance do not need to be
+// thread-safe", and the importer that calls them from several threads guarantees the calling sequence (FMI 2.0.5, 2.1; FMI
+// 3.0.2, 2.2.1).
 unsafe impl Send for Pointer {}
 
 /// An instance.
@@ -65,6 +68,8 @@ pub(crate) struct Live {
     experiment: Experiment,
     /// `lastSuccessfulTime` of the last step (FMI 3.0).
     last_successful_time: f64,
+    /// Number of saved states; without one the instance cannot return to an earlier time.
+    saved: usize,
     /// FMI 2.0 before its revision 5 let the FMU keep the pointer to the callbacks.
     _callbacks: Arc<Callbacks>,
 }
@@ -101,7 +106,7 @@ impl Live {
             environment,
             updates: Updates::default(),
         };
-        // SAFETY: the callbacks outlive the instance; the environment is a number that no one follows.
+        // SAFETY: the callbacks outlive the instance; the environment is a number that is never dereferenced.
         let (name, pointer) = unsafe { calls.instantiate(&request) };
         let missing = || Refusal::Impossible(format!("the function {name} is missing"));
         trace::note(name, || if pointer.is_some_and(|p| !p.is_null()) { "an instance" } else { "no instance" }.into());
@@ -111,7 +116,7 @@ impl Live {
         }
         let experiment = Experiment { start: 0.0, stop: None, tolerance: None };
         let (calls, instance) = (calls.clone(), Pointer(pointer));
-        Ok(Self { calls, instance, experiment, last_successful_time: 0.0, _callbacks: callbacks })
+        Ok(Self { calls, instance, experiment, last_successful_time: 0.0, saved: 0, _callbacks: callbacks })
     }
 
     fn is_v2(&self) -> bool {
@@ -238,12 +243,17 @@ impl Live {
         self.calls.simple(name, self.given()).outcome()
     }
 
-    /// "No set state before this point" is false: a state may be set at any time.
+    /// `noSetFMUStatePriorToCurrentPoint`: no earlier point was saved, so none can be returned to.
+    fn no_prior(&self) -> bool {
+        self.saved == 0
+    }
+
     #[inline]
     pub(crate) fn do_step(&mut self, t: f64, h: f64) -> Outcome<Stepped> {
         let before = StepResults { event: 0, terminate: 0, early: 0, last: t };
-        let answer = self.calls.do_step(self.given(), (t, h), false, [true; 4], before);
+        let answer = self.calls.do_step(self.given(), (t, h), self.no_prior(), [true; 4], before);
         if self.is_v2() {
+            let answer = self.awaited(answer);
             let terminate = answer.was(Status::DISCARD) && self.terminated();
             let last = if terminate { self.last_successful_time().unwrap_or(t + h) } else { t + h };
             let stepped = Stepped { terminate, event: false, early: false, last };
@@ -252,6 +262,29 @@ impl Live {
         let StepResults { event, terminate, early, last } = answer.outcome()?;
         self.last_successful_time = last;
         Ok(Stepped { terminate: terminate != 0, event: event != 0, early: early != 0, last })
+    }
+
+    /// The answer of a step of FMI 2.0 when the step is over: an FMU that runs asynchronously returns Pending before.
+    #[inline]
+    fn awaited(&self, answer: Answer<StepResults>) -> Answer<StepResults> {
+        if answer.was(Status::PENDING) { self.wait_for(answer) } else { answer }
+    }
+
+    #[cold]
+    fn wait_for(&self, answer: Answer<StepResults>) -> Answer<StepResults> {
+        let pending = u64::from(Status::PENDING.0.cast_unsigned());
+        loop {
+            let asked = self.calls.step_status(StepStatus::GetStatus, self.given(), DO_STEP_STATUS, pending).result();
+            let status = match asked {
+                Some((status, _)) if !status.is_ok() => status,
+                Some((_, value)) => Status((value & 0xffff_ffff) as i32),
+                None => return answer,
+            };
+            if status != Status::PENDING {
+                return Answer(answer.0, answer.1.map(|(_, results)| (status, results)));
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
     }
 
     /// Whether an FMU of FMI 2.0 discarded a step because it ends the simulation.
@@ -270,7 +303,9 @@ impl Live {
     }
 
     pub(crate) fn get_state(&mut self) -> Outcome<Pointer> {
-        self.calls.get_state(self.given(), Some(Given::NULL)).outcome().map(Pointer)
+        let state = self.calls.get_state(self.given(), Some(Given::NULL)).outcome().map(Pointer)?;
+        self.saved += 1;
+        Ok(state)
     }
 
     pub(crate) fn set_state(&mut self, state: Pointer) -> Outcome {
@@ -278,6 +313,7 @@ impl Live {
     }
 
     pub(crate) fn free_state(&mut self, state: Pointer) -> Outcome {
+        self.saved = self.saved.saturating_sub(1);
         // SAFETY: the facade forgets the state.
         unsafe { self.calls.free_state(self.given(), Some(Self::state(state))) }.outcome().map(drop)
     }
@@ -289,7 +325,9 @@ impl Live {
     }
 
     pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Outcome<Pointer> {
-        self.calls.deserialize(self.given(), bytes.into()).outcome().map(Pointer)
+        let state = self.calls.deserialize(self.given(), bytes.into()).outcome().map(Pointer)?;
+        self.saved += 1;
+        Ok(state)
     }
 
     pub(crate) fn update_discrete_states(&mut self) -> Outcome<Update> {
@@ -311,7 +349,7 @@ impl Live {
         self.calls.activate(self.given(), clock).outcome()
     }
 
-    /// The interval of a clock, if it has changed or was not told before.
+    /// The interval of a clock, if it has changed or was not yet reported.
     pub(crate) fn interval(&mut self, clock: u32) -> Outcome<Option<f64>> {
         /// `fmi3IntervalChanged`.
         const CHANGED: i32 = 2;
@@ -323,9 +361,8 @@ impl Live {
         self.calls.shift(self.given(), clock).outcome()
     }
 
-    /// "No set state before this point" is false: a state may be set at any time.
     pub(crate) fn completed_integrator_step(&mut self) -> Outcome<CompletedStep> {
-        let [event, terminate] = self.calls.completed(self.given(), false, false, 0).outcome()?;
+        let [event, terminate] = self.calls.completed(self.given(), self.no_prior(), false, 0).outcome()?;
         Ok(CompletedStep { enter_event_mode: event != 0, terminate: terminate != 0 })
     }
 
@@ -349,7 +386,7 @@ impl Live {
         self.vector(if self.is_v2() { Vector::GetDerivatives } else { Vector::GetContinuousStateDerivatives }, dx)
     }
 
-    /// Numbers of continuous states and event indicators; `None` where only the description has them.
+    /// Numbers of continuous states and event indicators; `None` if only the description has them.
     pub(crate) fn counts(&mut self) -> Outcome<Option<(usize, usize)>> {
         if self.is_v2() {
             return Ok(None);
@@ -402,7 +439,7 @@ impl Drop for Live {
     }
 }
 
-/// Integers as values of so many bits; `None` if one does not fit.
+/// Integers converted to the given number of bits; `None` if one does not fit.
 fn integers(base: BaseType, bits: usize, values: &[i128]) -> Option<Vec<u64>> {
     let unsigned = matches!(base, BaseType::UInt8 | BaseType::UInt16 | BaseType::UInt32 | BaseType::UInt64);
     let range = if unsigned { 0..1_i128 << bits } else { -1_i128 << (bits - 1)..1_i128 << (bits - 1) };
@@ -410,20 +447,20 @@ fn integers(base: BaseType, bits: usize, values: &[i128]) -> Option<Vec<u64>> {
     values.iter().map(|x| range.contains(x).then_some(*x as u64)).collect()
 }
 
-/// Largest serialized state in bytes, 1 GiB. The size is what an FMU says, and memory for it must not take the process down.
+/// Largest serialized state in bytes, 1 GiB. The FMU states the size, and reserving memory for it must not end the process.
 const LARGEST_STATE: usize = 1 << 30;
 
-/// What fills room for bytes.
+/// The fill byte of buffers.
 pub(super) const FILL: u8 = 0xc5;
 
-/// Room for a serialized state of this `size` with `more` bytes behind it.
+/// A buffer for a serialized state of this `size`, followed by `more` bytes.
 ///
 /// # Errors
 /// The size is more than [`LARGEST_STATE`], or there is no memory for it.
 pub(super) fn room(size: usize, more: usize) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     if size > LARGEST_STATE || bytes.try_reserve_exact(size + more).is_err() {
-        return Err(format!("the FMU state has {size} bytes, more than {LARGEST_STATE} or than there is memory for"));
+        return Err(format!("the FMU state has {size} bytes, more than {LARGEST_STATE} or than the available memory"));
     }
     bytes.resize(size + more, FILL);
     Ok(bytes)

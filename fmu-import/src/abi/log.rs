@@ -37,6 +37,9 @@ impl Status {
     /// No instance of this FMU can be used any more.
     pub const FATAL: Self = Self(4);
 
+    /// The step goes on (FMI 2.0).
+    pub const PENDING: Self = Self(5);
+
     /// Whether the call succeeded: OK or Warning.
     #[inline]
     pub fn is_ok(self) -> bool {
@@ -65,14 +68,14 @@ impl fmt::Debug for Status {
 }
 
 /// The messages of one instance. The callbacks receive a number as the instance environment and look the log up by it: an FMU
-/// may pass another pointer, or call back after its instance has gone, so that pointer is never followed.
+/// may pass another pointer, or call back after its instance was freed, so that pointer is never dereferenced.
 #[derive(Debug, Default)]
 pub(crate) struct Log(Mutex<Messages>);
 
 #[derive(Debug, Default)]
 struct Messages {
     all: VecDeque<Message>,
-    /// Number of latest messages that no error has reported yet.
+    /// Number of the latest messages that no error has included yet.
     fresh: usize,
 }
 
@@ -92,7 +95,7 @@ impl Log {
         log
     }
 
-    /// Its address, which no other living log has.
+    /// Its address, which is unique among living logs.
     fn number(&self) -> usize {
         ptr::from_ref(self).addr()
     }
@@ -117,8 +120,8 @@ impl Log {
         serious.or(last).map(|m| m.text.clone())
     }
 
-    /// Receives a message from an FMU. An environment that no living log has belongs to the only log alive, if there is one;
-    /// otherwise nobody can say whose message it is, and it is dropped.
+    /// Receives a message from an FMU. A message with an unknown environment goes to the only living log, if there is exactly
+    /// one; otherwise its sender is unknown, and it is dropped.
     pub(crate) fn receive(environment: *mut c_void, message: Message) {
         let log = {
             let logs = locked(&LOGS);
@@ -141,7 +144,7 @@ impl Drop for Log {
     }
 }
 
-/// Copies a C string; null is the empty string, and what is not UTF-8 is replaced.
+/// Copies a C string; null is the empty string, and invalid UTF-8 is replaced.
 ///
 /// # Safety
 /// `text` is null or ends with a null byte.
@@ -181,11 +184,11 @@ mod tests {
         let other = Log::new();
         Log::receive(strange[1], message(Status::OK, "whose?"));
         Log::receive(other.environment(), message(Status::OK, "mine"));
-        assert_eq!((log.take().len(), other.take().len()), (0, 1), "nobody can say whose");
+        assert_eq!((log.take().len(), other.take().len()), (0, 1), "the sender is unknown");
 
         let gone = log.environment();
         drop(log);
         Log::receive(gone, message(Status::OK, "late"));
-        assert_eq!(other.take().len(), 1, "an instance that has gone is like any other number");
+        assert_eq!(other.take().len(), 1, "a freed instance is like any other number");
     }
 }

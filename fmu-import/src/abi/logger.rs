@@ -1,17 +1,17 @@
 //! The log callback of FMI 2.0, which is variadic in C.
 //!
-//! A Rust function cannot be variadic. On the 64-bit platforms that FMUs are made for, the caller of a variadic function puts its
-//! arguments where it puts those of any function, and it cleans up. So the callback declares the registers and the words of
-//! the stack that they arrive in as parameters; those beyond what the FMU passed contain anything, and only the ones that the
-//! format asks for are used ([`format`](super::format)).
+//! A Rust function cannot be variadic. On the 64-bit platforms of FMUs, the caller of a variadic function passes arguments as
+//! for any function, and cleans up. So the callback declares as parameters the registers and the stack words in which they
+//! arrive; those beyond the arguments of the FMU are undefined, and only those that the format names are read
+//! ([`format`](super::format)).
 
 use super::format::{Arguments, formatted};
 use super::log::Status;
 use std::ffi::{CStr, c_char, c_void};
 
-/// A message as the FMU passed it. No pointer but the text's has been followed.
+/// A message as passed by the FMU. Only the pointer to the text has been dereferenced.
 pub(super) struct Called {
-    /// `componentEnvironment`: whatever the FMU chose to pass.
+    /// `componentEnvironment`: any pointer that the FMU passed.
     pub(super) environment: *mut c_void,
     /// `instanceName`.
     pub(super) instance: *const c_char,
@@ -33,11 +33,11 @@ pub(super) trait Listener {
 }
 
 /// Defines the callback with the parameters that follow the format on this platform: registers for integers, registers for
-/// floating-point numbers, words of the stack; before them, registers that no argument is in.
+/// floating-point numbers, words of the stack; before them, unused registers.
 macro_rules! logger {
     ([$($unused:ident)*], [$($integer:ident)*], [$($float:ident)*], [$($word:ident)*]) => {
         /// `fmi2CallbackLogger` of a listener.
-        #[allow(clippy::too_many_arguments, reason = "the places of a variadic call's arguments")]
+        #[allow(clippy::too_many_arguments, reason = "the registers and words of a variadic call")]
         pub(super) unsafe extern "C" fn logger<L: Listener>(
             environment: *mut c_void,
             instance: *const c_char,
@@ -81,7 +81,7 @@ logger!([], [], [], [w0 w1 w2 w3 w4 w5 w6 w7 w8 w9 w10 w11]);
 #[cfg(all(not(target_arch = "x86_64"), not(target_vendor = "apple")))]
 logger!([], [i0 i1 i2], [f0 f1 f2 f3 f4 f5 f6 f7], [w0 w1 w2 w3 w4 w5 w6 w7 w8 w9 w10 w11]);
 
-// Apple's ARM: what is variadic is on the stack alone, so three registers stay unused.
+// Apple's ARM: variadic arguments are on the stack only, so three registers are unused.
 #[cfg(all(not(target_arch = "x86_64"), target_vendor = "apple"))]
 logger!([u0 u1 u2], [], [], [w0 w1 w2 w3 w4 w5 w6 w7 w8 w9 w10 w11]);
 
@@ -113,7 +113,7 @@ mod tests {
     macro_rules! heard {
         ($format:expr $(, $argument:expr)*) => {{
             let format = CString::new($format).unwrap();
-            // SAFETY: a caller of a variadic function puts its arguments where the callback looks for them. As in an FMU, the
+            // SAFETY: a caller of a variadic function passes its arguments where the callback reads them. As in an FMU, the
             // compiler must not know which function is behind the pointer.
             unsafe {
                 let logger = transmute::<Logger, Variadic>(black_box(logger::<Ear> as Logger));

@@ -31,8 +31,7 @@ use std::sync::Arc;
 pub(crate) struct Functions(Arc<Calls>);
 
 impl Functions {
-    /// Loads the binary that a description with the interface of this kind promises, and keeps the folder as long as the
-    /// library is loaded.
+    /// Loads the binary of the description for this interface, and keeps the folder as long as the library is loaded.
     pub(crate) fn load(
         binary: &Path,
         version: FmiVersion,
@@ -56,7 +55,7 @@ impl Functions {
     }
 }
 
-/// Names the first function that is missing of those that an instance of this kind needs.
+/// Names the first missing function that an instance of this kind needs.
 fn promised(calls: &Calls, kind: Kind) -> Result<(), String> {
     match (calls.version, kind) {
         (FmiVersion::V2, Kind::CoSimulation { .. }) => present(calls, &["fmi2Instantiate", "fmi2DoStep"]),

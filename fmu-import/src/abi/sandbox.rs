@@ -1,13 +1,13 @@
 //! Takes the network away from this process.
 
-/// Moves this process, which must have one thread, to a network of its own, which leads nowhere.
+/// Moves this process, which must have one thread, to a separate network without connections.
 #[cfg(target_os = "linux")]
 pub(crate) fn enter() -> Result<(), String> {
     use rustix::thread::{UnshareFlags, unshare_unsafe};
     let (user, group) = (rustix::process::getuid().as_raw(), rustix::process::getgid().as_raw());
-    // SAFETY: the flags do not name the table of open files, which other threads could lose; there is one thread.
+    // SAFETY: the flags do not include the table of open files, which other threads could lose; there is one thread.
     unsafe { unshare_unsafe(UnshareFlags::NEWUSER | UnshareFlags::NEWNET | UnshareFlags::NEWIPC) }
-        .map_err(|e| format!("the kernel gives this user no namespaces: {e}"))?;
+        .map_err(|e| format!("the kernel does not allow this user namespaces: {e}"))?;
     // User and group keep their numbers inside; others do not exist there.
     for (file, text) in [
         ("/proc/self/setgroups", "deny".to_owned()),
@@ -19,8 +19,8 @@ pub(crate) fn enter() -> Result<(), String> {
     Ok(())
 }
 
-/// Other systems offer nothing like it to a process without privileges.
+/// Other systems offer no equivalent to a process without privileges.
 #[cfg(all(unix, not(target_os = "linux")))]
 pub(crate) fn enter() -> Result<(), String> {
-    Err("it needs the namespaces of Linux".into())
+    Err("it needs Linux namespaces".into())
 }

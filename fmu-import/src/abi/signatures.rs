@@ -96,7 +96,7 @@ pub(super) mod v3 {
     use super::{InstancePointer, Status, c_char, c_int, c_void};
 
     pub(in crate::abi) type LogMessage = unsafe extern "C" fn(*mut c_void, Status, *const c_char, *const c_char);
-    /// Flags of one byte, and places for `earlyReturnRequested` and `earlyReturnTime`.
+    /// Flags of one byte, and pointers to `earlyReturnRequested` and `earlyReturnTime`.
     pub(in crate::abi) type IntermediateUpdate =
         unsafe extern "C" fn(*mut c_void, f64, u8, u8, u8, u8, *mut u8, *mut f64);
     pub(in crate::abi) type ClockUpdate = unsafe extern "C" fn(*mut c_void);

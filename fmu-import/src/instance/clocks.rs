@@ -1,5 +1,6 @@
-//! Clocks of an instance (FMI 3.0.2, 2.2.8): the facade makes their ticks, so that whoever runs the instance sees time events. What
-//! is on a clock is read and set while the clock is active; before and after, reading gives the last value, and what is set waits.
+//! Clocks of an instance (FMI 3.0.2, 2.2.8): the facade generates their ticks, so that the user of an instance sees time
+//! events. Clocked variables are read and set while the clock is active; at other times, a read returns the last value, and a
+//! set value waits.
 
 use super::Instance;
 use crate::abi::journal::Call;
@@ -10,7 +11,7 @@ use model_description::IntervalVariability::{Changing, Countdown, Triggered};
 use model_description::{BaseType, Causality, ClockTiming, ModelDescription};
 use std::collections::BTreeMap;
 
-/// Fraction of an interval that rounding may take from the time of a tick.
+/// Fraction of an interval by which rounding may advance a tick.
 const SAME: f64 = 1e-6;
 
 /// A clock.
@@ -28,23 +29,23 @@ struct Clock {
     ticks: u32,
 }
 
-/// Which part of a run an instance is in.
+/// Phase of a run.
 #[derive(Clone, Copy, PartialEq)]
 enum Phase {
-    /// Before the end of the initialization: everything is open.
+    /// Before the end of the initialization: all variables can be used.
     Start,
     Event,
     Between,
 }
 
-/// The clocks of an instance and what is on them.
+/// The clocks of an instance and their variables.
 pub(super) struct Clocks {
     list: Vec<Clock>,
     /// The clocks of a variable, by value references.
     on: BTreeMap<u32, Vec<u32>>,
-    /// What was read last.
+    /// Last values read.
     read: BTreeMap<u32, Values>,
-    /// What waits to be set.
+    /// Values waiting to be set.
     waits: BTreeMap<u32, (BaseType, Values)>,
     phase: Phase,
     start: f64,
@@ -52,7 +53,7 @@ pub(super) struct Clocks {
 }
 
 impl Clocks {
-    /// The clocks of an FMU that has some.
+    /// The clocks of an FMU, if it has any.
     pub(super) fn of(description: &ModelDescription) -> Option<Box<Self>> {
         let clocks = description.variables.iter().filter(|v| v.base == BaseType::Clock);
         let list: Vec<Clock> = clocks
@@ -116,7 +117,7 @@ impl Clock {
 }
 
 impl Instance {
-    /// Asks for the first ticks, at the end of the initialization.
+    /// Reads the intervals to the first ticks, at the end of the initialization.
     pub(super) fn plan_clocks(&mut self) -> Result<(), Error> {
         let Some(mut clocks) = self.clocks.take() else { return Ok(()) };
         let start = clocks.start;
@@ -144,7 +145,7 @@ impl Instance {
         planned
     }
 
-    /// Event Mode has begun: activates the clocks that are due, and sets what waits for them.
+    /// Event Mode has begun: activates the due clocks, and sets the values that wait for them.
     pub(super) fn tick(&mut self) -> Result<(), Error> {
         let Some(mut clocks) = self.clocks.take() else { return Ok(()) };
         clocks.phase = Phase::Event;
@@ -171,7 +172,8 @@ impl Instance {
         Ok(())
     }
 
-    /// After an update: no clock is active; asks for the next ticks. A tick that is due at once follows in another update.
+    /// After an update: no clock is active; reads the intervals to the next ticks. A tick that is due at once follows in
+    /// another update.
     pub(super) fn tock(&mut self, mut update: Update) -> Result<Update, Error> {
         let Some(mut clocks) = self.clocks.take() else { return Ok(update) };
         let time = clocks.time;
@@ -184,8 +186,8 @@ impl Instance {
                 clock.proceed();
             }
             let reference = clock.reference;
-            let tells = clock.timing.ticks == Countdown || (clock.timing.ticks == Changing && ticked);
-            if tells && let Some(interval) = self.call(Call::Events, |s| s.interval(reference))? {
+            let has_interval = clock.timing.ticks == Countdown || (clock.timing.ticks == Changing && ticked);
+            if has_interval && let Some(interval) = self.call(Call::Events, |s| s.interval(reference))? {
                 (clock.interval, clock.due) = (interval, Some(time + interval));
             }
             Ok(())

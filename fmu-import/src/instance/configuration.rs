@@ -1,4 +1,4 @@
-//! Configuration Mode: structural parameters of FMI 3.0, and the sizes of arrays that they give.
+//! Configuration Mode: structural parameters of FMI 3.0, and the sizes of arrays.
 
 use super::Instance;
 use crate::abi::journal::Call;
@@ -8,7 +8,7 @@ use model_description::Causality;
 
 impl Instance {
     /// Sets structural parameters together, in Configuration Mode: before the initialization, or in Reconfiguration Mode, where
-    /// the FMU lets them change. Arrays that they size have lost their values then.
+    /// the FMU lets them change. Arrays sized by them lose their values.
     ///
     /// # Errors
     /// A variable does not exist, a value does not fit, or the FMU refuses.

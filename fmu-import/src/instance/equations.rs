@@ -8,7 +8,7 @@ use crate::abi::raw::{Sensitivity, Simple, Vector};
 use crate::standard::{CompletedStep, Directions, Stepped, Update};
 
 impl Instance {
-    /// Steps from `t` to `t + h`, or less far if the FMU was allowed to return early.
+    /// Steps from `t` to `t + h`, or to an earlier time if the FMU may return early.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -62,7 +62,8 @@ impl Instance {
         }
     }
 
-    /// Numbers of continuous states and of event indicators. FMI 3.0 asks the FMU, FMI 2.0 the description.
+    /// Numbers of continuous states and of event indicators. In FMI 3.0 they come from the FMU, in FMI 2.0 from the
+    /// description.
     ///
     /// # Errors
     /// The FMU refuses.
@@ -137,7 +138,7 @@ impl Instance {
     /// Partial derivatives of the unknowns in the direction of the seed of the knowns, both by value reference.
     ///
     /// # Errors
-    /// The FMU refuses or has none, or an array has another length than its list.
+    /// The FMU refuses or has none, or an array does not have the length of its list.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -182,7 +183,7 @@ impl Instance {
         self.call(Call::Evaluation, |s| s.set_input_derivatives(references, orders, values))
     }
 
-    /// An FMU without states or indicators is not asked for them.
+    /// An FMU without states or indicators is not queried for them.
     #[inline]
     fn vector(&mut self, which: Vector, values: &mut [f64]) -> Result<(), Error> {
         if values.is_empty() { Ok(()) } else { self.call(Call::Evaluation, |s| s.vector(which, values)) }

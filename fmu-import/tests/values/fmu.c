@@ -1,7 +1,8 @@
 /* An FMU that keeps what it gets and shows what it was told, for tests of the importer's calls.
 
-   Real variable 0 is a mask: bit k of it makes result k of DoStep, of an update and of a completed step true. Variables 1 to 5 hold
-   what EnterInitializationMode or SetupExperiment passed. Values of all other types share one store of bytes, so that one type can
+   Real variable 0 is a mask: bit k of it makes result k of DoStep, of an update and of a completed step true; with bit 5 a step of
+   FMI 2.0 is Pending, and discarded when GetStatus was asked three times. Variables 1 to 5 hold what EnterInitializationMode or
+   SetupExperiment passed, 6 whether the last step was one without a return to an earlier time, 7 how often GetStatus was asked. Values of all other types share one store of bytes, so that one type can
    read what another has written. */
 #include <stdbool.h>
 #include <stddef.h>
@@ -53,7 +54,10 @@ int fmi2GetBoolean(M *m, const uint32_t *r, size_t n, int *to) { return get(m, 4
 int fmi2SetBoolean(M *m, const uint32_t *r, size_t n, const int *from) { return set(m, 4, n, from); }
 int fmi2GetString(M *m, const uint32_t *r, size_t n, const char **to) { return get_texts(m, n, to); }
 int fmi2SetString(M *m, const uint32_t *r, size_t n, const char *const *from) { return set_texts(m, n, from); }
-int fmi2DoStep(M *m, double t, double h, int p) { return bit(m, 1) ? 2 : 0; }
+int fmi2DoStep(M *m, double t, double h, int p) { return m->real[6] = p, m->real[7] = 0, bit(m, 5) ? 5 : bit(m, 1) ? 2 : 0; }
+int fmi2GetStatus(M *m, int kind, int *to) { return *to = ++m->real[7] < 3 ? 5 : bit(m, 1) ? 2 : 0, kind == 0 ? 0 : 3; }
+int fmi2GetFMUstate(M *m, void **state) { return *state = m, 0; }
+int fmi2FreeFMUstate(M *m, void **state) { return *state = 0, 0; }
 int fmi2GetBooleanStatus(M *m, int kind, int *to) { return *to = kind == 3, 0; }
 int fmi2GetRealStatus(M *m, int kind, double *to) { return *to = kind == 2 ? 0.25 : -1, 0; }
 int fmi2NewDiscreteStates(M *m, EventInfo *e) {
@@ -87,8 +91,10 @@ TYPE(UInt64, uint64_t)
 TYPE(Boolean, uint8_t)
 int fmi3GetString(M *m, const uint32_t *r, size_t n, const char **to, size_t k) { return get_texts(m, k, to); }
 int fmi3SetString(M *m, const uint32_t *r, size_t n, const char *const *from, size_t k) { return set_texts(m, k, from); }
+int fmi3GetFMUState(M *m, void **state) { return *state = m, 0; }
+int fmi3FreeFMUState(M *m, void **state) { return *state = 0, 0; }
 int fmi3DoStep(M *m, double t, double h, bool p, bool *event, bool *terminate, bool *early, double *last) {
-    return *event = bit(m, 0), *terminate = bit(m, 1), *early = bit(m, 2), *last = t + h / 2, 0;
+    return m->real[6] = p, *event = bit(m, 0), *terminate = bit(m, 1), *early = bit(m, 2), *last = t + h / 2, 0;
 }
 int fmi3UpdateDiscreteStates(M *m, bool *again, bool *terminate, bool *nominals, bool *states, bool *defined, double *next) {
     *again = bit(m, 0), *terminate = bit(m, 1), *nominals = bit(m, 2), *states = bit(m, 3), *defined = bit(m, 4), *next = 7;

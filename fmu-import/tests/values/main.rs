@@ -1,4 +1,4 @@
-//! What the importer passes and receives, call by call, with an FMU in C that keeps and shows it (`fmu.c`).
+//! Values that the importer passes and receives, call by call, with an FMU in C that records and returns them (`fmu.c`).
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use fmu_import::{CompletedStep, Fmu, Instance, Stepped, Update, Values};
@@ -131,7 +131,7 @@ fn values_that_do_not_fit_are_refused() {
     });
 }
 
-/// Every result has its place: one at a time is true.
+/// Every result has its position: one at a time is true.
 #[test]
 fn results_have_their_places() {
     both(|it, version| {
@@ -151,7 +151,7 @@ fn results_have_their_places() {
             assert_eq!(it.completed_integrator_step().unwrap(), expected, "{version} {bit}");
             let stepped = it.advance(1.0, 0.5).unwrap();
             let of_3 = Stepped { event: flag(0), terminate: flag(1), early: flag(2), last: 1.25 };
-            // FMI 2.0 tells the time of the end by fmi2LastSuccessfulTime.
+            // FMI 2.0 reports the time of the end by fmi2LastSuccessfulTime.
             let last = if flag(1) { 0.25 } else { 1.5 };
             let of_2 = Stepped { event: false, terminate: flag(1), early: false, last };
             assert_eq!(stepped, if version == 2 { of_2 } else { of_3 }, "{version} {bit}");
@@ -169,11 +169,44 @@ fn times_have_their_places() {
         both(|it, version| {
             it.setup_with(start, stop, tolerance).unwrap();
             it.enter_initialization().unwrap();
-            let mut told = [0.0; 5];
-            it.get_reals(&[1, 2, 3, 4, 5], &mut told).unwrap();
+            let mut received = [0.0; 5];
+            it.get_reals(&[1, 2, 3, 4, 5], &mut received).unwrap();
             let has = |x: Option<f64>| f64::from(u8::from(x.is_some()));
             let expected = [has(tolerance), tolerance.unwrap_or(0.0), start, has(stop), stop.unwrap_or(0.0)];
-            assert_eq!(told.map(f64::to_bits), expected.map(f64::to_bits), "{version}");
+            assert_eq!(received.map(f64::to_bits), expected.map(f64::to_bits), "{version}");
         });
     }
+}
+
+fn real(it: &mut Instance, reference: u32) -> f64 {
+    let mut one = [f64::NAN];
+    it.get_reals(&[reference], &mut one).unwrap();
+    one[0]
+}
+
+/// An FMU that never has to return may forget: one of the public FMUs computes something else where it must not.
+#[test]
+fn only_a_saved_state_can_bring_back_an_earlier_time() {
+    both(|it, version| {
+        for (saved, expected) in [(false, 1.0), (true, 0.0), (false, 1.0)] {
+            let state = saved.then(|| it.get_state().unwrap());
+            assert!(it.do_step(0.0, 1.0).unwrap().is_continue());
+            assert_eq!(real(it, 6).to_bits(), f64::to_bits(expected), "FMI {version}");
+            if let Some(state) = state {
+                it.free_state(state).unwrap();
+            }
+        }
+    });
+}
+
+#[test]
+fn a_pending_step_is_awaited() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut it = instance(folder.path(), 2);
+    it.set_reals(&[0], &[32.0]).unwrap();
+    assert!(it.do_step(0.0, 1.0).unwrap().is_continue());
+    assert_eq!(real(&mut it, 7).to_bits(), 3.0_f64.to_bits());
+    // Discarded in the end, because the FMU ends the simulation.
+    it.set_reals(&[0], &[34.0]).unwrap();
+    assert!(it.do_step(1.0, 1.0).unwrap().is_break());
 }

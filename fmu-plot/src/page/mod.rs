@@ -24,13 +24,12 @@ pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// A dash in a color, to stand before a name.
+/// A dash in a color, placed before a name.
 pub fn swatch(ink: Ink) -> String {
     format!("<span class=\"swatch\" style=\"background:{ink}\"></span>")
 }
 
-/// A document with the common style and an additional `style`; `head` precedes it, and `body` is the content of the element of
-/// this name.
+/// A document with the common style and an additional `style`; `head` precedes it, and `body` is the content of `<body>`.
 pub fn document(title: &str, head: &str, style: &str, body: &str) -> String {
     let title = escape(title);
     format!(
@@ -103,8 +102,8 @@ impl Data {
         json!({ "name": name, "ink": ink, "opacity": opacity, "dashed": dashed, "lost": lost, "x": x, "y": y })
     }
 
-    /// Appends an array and returns its number. Coded are the differences of successive bit patterns, with the sign in the last
-    /// bit (zigzag), then all lowest bytes, all second bytes and so on: this order deflates best.
+    /// Appends an array and returns its number. The code stores the differences of successive bit patterns, with the sign in
+    /// the last bit (zigzag), then all lowest bytes, all second bytes and so on: this order compresses best.
     fn array(&mut self, values: impl Iterator<Item = f32>) -> usize {
         let mut last = 0_i32;
         let coded: Vec<[u8; 4]> = values
@@ -177,7 +176,7 @@ mod tests {
         assert_eq!(
             (arrays.len(), json["axes"].as_array().unwrap().len()),
             (4, 1),
-            "the axis is there once, in two parts"
+            "the axis is stored once, in two parts"
         );
         for k in 0..1000 {
             assert!((f64::from(arrays[0][k]) + f64::from(arrays[1][k]) - x[k]).abs() < 1e-9);

@@ -1,4 +1,5 @@
-//! Rows of a design: each is a function of the definition, the seed and its number alone, and is made without the other rows.
+//! Rows of a design: each is a function only of the definition, the seed and its number, and is computed without the other
+//! rows.
 
 mod list;
 mod normal;
@@ -18,7 +19,7 @@ const MOST: u64 = 1 << 40;
 
 /// The rows of a design.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Rows {
+pub struct DesignRows {
     columns: Vec<(String, Column)>,
     count: u64,
     kind: Kind,
@@ -39,7 +40,7 @@ enum Column {
     Tied { to: usize, times: f64 },
 }
 
-impl Rows {
+impl DesignRows {
     /// `number` reads a text as the number of a variable: names of enumerations, `true`.
     ///
     /// # Errors
@@ -67,7 +68,7 @@ impl Rows {
             let column = rows.column(vary, &mut free, &|text| number(name, text));
             let column = column.map_err(|cause| Error::Invalid(format!("vary: {name}: {cause}")))?;
             if rows.columns.iter().any(|(other, _)| other == name) {
-                return invalid(format!("vary: {name} is a column of the list already"));
+                return invalid(format!("vary: {name} is already a column of the list"));
             }
             rows.columns.push((name.clone(), column));
         }
@@ -157,7 +158,7 @@ impl Rows {
     /// The values of row `index`, one for each column.
     pub fn row(&self, index: u64, values: &mut Vec<f64>) {
         values.clear();
-        // Of a grid: what is left of the index for the columns before.
+        // In a grid: the remaining index for the preceding columns.
         let mut rest = index;
         let mut picked: Vec<u64> = Vec::new();
         if self.kind == Kind::Grid {
@@ -203,7 +204,7 @@ impl Rows {
     }
 }
 
-/// `u` in stratum `k` of `count`, also where rounding would leave it.
+/// `u` in stratum `k` of `count`, even where rounding would move it out.
 #[expect(clippy::cast_precision_loss, reason = "at most 2^40 rows")]
 fn stratified(k: u64, u: f64, count: u64) -> f64 {
     let count = count as f64;
@@ -216,13 +217,13 @@ mod tests {
     use super::*;
     use crate::definition::Definition;
 
-    fn rows(text: &str) -> Result<Rows, Error> {
+    fn rows(text: &str) -> Result<DesignRows, Error> {
         let definition = Definition::parse(text).unwrap();
         let number = |_: &str, text: &str| text.parse().map_err(|_| format!("{text} is not a number"));
-        Rows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &number)
+        DesignRows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &number)
     }
 
-    fn all(rows: &Rows) -> Vec<Vec<f64>> {
+    fn all(rows: &DesignRows) -> Vec<Vec<f64>> {
         let one = |k| {
             let mut values = Vec::new();
             rows.row(k, &mut values);
@@ -231,7 +232,7 @@ mod tests {
         (0..rows.count()).map(one).collect()
     }
 
-    fn design(kind: &str, runs: u64, seed: u64) -> Rows {
+    fn design(kind: &str, runs: u64, seed: u64) -> DesignRows {
         rows(&format!(
             "[design]\nkind = '{kind}'\nruns = {runs}\nseed = {seed}\n[vary]\na = {{ uniform = [0, 1] }}\n\
              b = {{ uniform = [-1, 1] }}\nc = {{ same = 'a', times = 2 }}\nd = {{ values = [1, 2, 3] }}"
@@ -271,7 +272,7 @@ mod tests {
         }
     }
 
-    /// In 100 rows of LHS, and in 128 of Sobol, each of as many strata of each variable has one point.
+    /// With 100 rows of LHS, or 128 of Sobol, each of as many strata of each variable has one point.
     #[test]
     fn every_stratum_has_one_point() {
         for (kind, count) in [("lhs", 100_u64), ("lhs", 1), ("lhs", 997), ("sobol", 128)] {
@@ -292,7 +293,7 @@ mod tests {
         assert!(stratified(6, 1.0 - 1e-16, 7) < 1.0);
     }
 
-    /// Designs have equal bits on every platform: they use exact operations and functions of the crate `libm` alone.
+    /// Designs have equal bits on every platform: they use only exact operations and functions of the crate `libm`.
     #[test]
     fn rows_have_these_bits() {
         #[rustfmt::skip]

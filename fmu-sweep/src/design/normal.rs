@@ -7,8 +7,8 @@ pub(super) fn cumulated(z: f64) -> f64 {
     0.5 * libm::erfc(-z / SQRT_2)
 }
 
-/// The number of standard deviations above the mean that a probability `p` between 0 and 1 belongs to: algorithm AS 241, PPND16
-/// (Wichura, *The percentage points of the normal distribution*, Applied Statistics 37, 1988), relative error 1e-16.
+/// The number of standard deviations above the mean for a probability `p` between 0 and 1: algorithm AS 241, PPND16 (Wichura,
+/// *The percentage points of the normal distribution*, Applied Statistics 37, 1988), relative error 1e-16.
 pub(super) fn quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {

@@ -1,4 +1,4 @@
-//! Random numbers as a function of where they are used: no generator, no order.
+//! Random numbers as a function of row and column: no generator, no order.
 
 /// 2^64 divided by the golden ratio, odd.
 const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;

@@ -7,10 +7,10 @@
 /// Most dimensions.
 pub(super) const DIMENSIONS: usize = NUMBERS.len() + 1;
 
-/// Bits of a coordinate: what a double holds exactly.
+/// Bits of a coordinate that a double represents exactly.
 pub(super) const BITS: usize = 52;
 
-/// What each bit of the Gray code of a point's index flips in one coordinate, in units of 2^-52.
+/// Direction numbers: the bits of a coordinate flipped by each bit of the Gray code of a point's index, in units of 2^-52.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Dimension([u64; BITS]);
 

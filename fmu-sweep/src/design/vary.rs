@@ -1,7 +1,7 @@
-//! How one variable varies: from a number between 0 and 1, or the number of a level, to its value.
+//! Variation of one variable: maps a number between 0 and 1, or the number of a level, to its value.
 
 use super::normal;
-use crate::definition::{Scalar, Vary};
+use crate::definition::{SetValue, Vary};
 
 /// A checked [`Vary`].
 #[derive(Clone, Debug, PartialEq)]
@@ -14,7 +14,7 @@ pub(super) enum Source {
         low: f64,
         high: f64,
     },
-    /// Truncated to `low..high`, which the probabilities `from` and `to` belong to.
+    /// Truncated to `low..high`, with the probabilities `from` and `to`.
     Normal {
         mean: f64,
         deviation: f64,
@@ -86,8 +86,8 @@ impl Source {
             if values.is_empty() {
                 return Err("values is empty".into());
             }
-            let read = |value: &Scalar| match value {
-                Scalar::Number(x) => Ok(*x),
+            let read = |value: &SetValue| match value {
+                SetValue::Number(x) => Ok(*x),
                 other => number(&other.to_string()),
             };
             return Ok(Self::Levels(values.iter().map(read).collect::<Result<_, _>>()?));
@@ -177,7 +177,7 @@ mod tests {
             (Vary { normal: Some([0.0, 1.0]), within: Some([50.0, 51.0]), ..v() }, "too far from the mean"),
             (Vary { uniform: Some([0.0, 1.0]), within: Some([0.0, 1.0]), ..v() }, "within belongs to normal"),
             (Vary { values: Some(vec![]), ..v() }, "values is empty"),
-            (Vary { values: Some(vec![Scalar::Text("x".into())]), ..v() }, "x is not a number"),
+            (Vary { values: Some(vec![SetValue::Text("x".into())]), ..v() }, "x is not a number"),
             (Vary { from: Some(0.0), to: Some(1.0), count: Some(0), ..v() }, "count = 0, expected 2 to"),
             (Vary { from: Some(0.0), ..v() }, "give from, to and count together"),
             (Vary { uniform: Some([0.0, 1.0]), times: Some(2.0), ..v() }, "times belongs to same"),

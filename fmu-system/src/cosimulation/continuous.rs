@@ -1,15 +1,15 @@
 //! Model Exchange: the master integrates all FMUs of a system as one, [`Fmus`](super::coupled::Fmus).
 //!
-//! Outputs are passed on to continuous inputs until nothing changes; a point of a schedule is an event. FMUs for Co-Simulation in
-//! the system step from one communication point to the next: between two, the others see their outputs of the first. There, all
-//! FMUs meet in an event.
+//! Outputs are passed on to continuous inputs until nothing changes; a point of a schedule is an event. FMUs for Co-Simulation
+//! in the system step from one communication point to the next: between two points, the other FMUs see their outputs of the
+//! first. A communication point is an event of all FMUs.
 
 use super::coupled::{Equations, Feed};
 use super::exchange::{Exchange, Inputs};
 use super::grid::Grid;
 use super::method::Integration;
-use super::point::{Ended, Point, end};
-use crate::integration::{Driver, Trial};
+use super::point::{CommunicationPoint, Ended, end};
+use crate::integration::{Driver, TrialError};
 use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;
 
@@ -35,7 +35,7 @@ pub(super) fn run(
     grid: &Grid,
     integration: &Integration,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let start = grid.settings().start;
     let mut ended = Ended { time: start, by: None };
@@ -69,18 +69,18 @@ pub(super) fn run(
         }
         ended.time = time;
         let (t, x) = driver.point();
-        equations.of(instances, exchange).place(t, x).map_err(Trial::into_error)?;
+        equations.of(instances, exchange).place(t, x).map_err(TrialError::into_error)?;
         exchange.read_all(instances)?;
         exchange.row(t, row);
         if index < grid.steps() {
             steppers.iter().try_for_each(|&i| exchange.write(i, &mut instances[i], time))?;
         }
-        let mut point = Point { index, time, values: row, instances, touched: false };
+        let mut point = CommunicationPoint { index, time, values: row, instances, touched: false };
         if hook(&mut point)?.is_break() {
             break;
         }
         if point.touched {
-            // The hook may have set what the derivatives depend on.
+            // The hook may have set variables on which the derivatives depend.
             equations.forget();
             driver.forget();
         }

@@ -1,17 +1,17 @@
 //! FMUs for Model Exchange as one system of differential equations with events.
 //!
-//! At every evaluation all FMUs get time and states, and a [`Feed`] gives their continuous inputs. Discrete inputs are set in event
-//! mode alone. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of discrete
-//! states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are left alone.
+//! At every evaluation all FMUs get time and states, and a [`Feed`] sets their continuous inputs. Discrete inputs are set in
+//! event mode alone. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of
+//! discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are left alone.
 
 use super::exchange::Inputs;
 use super::iteration::{Iterated, iterate};
 use super::method::Integration;
-use crate::integration::{Hybrid, Trial};
+use crate::integration::{HybridSystem, TrialError};
 use fmu_import::{CompletedStep, Error, Instance, Kind, Update};
 use std::ops::Range;
 
-/// What sets the inputs of FMUs for Model Exchange.
+/// Sets the inputs of FMUs for Model Exchange.
 pub trait Feed {
     /// Sets inputs at the time `t` (s) until nothing changes; returns whether a discrete input has changed.
     ///
@@ -19,7 +19,8 @@ pub trait Feed {
     /// An FMU refuses, or the inputs do not settle.
     fn settle(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<bool, Error>;
 
-    /// An event begins at the time `t` (s); the FMUs still have what holds before it. The end of the initialization is one.
+    /// An event begins at the time `t` (s); the FMUs still have the values before it. The end of the initialization is an
+    /// event.
     ///
     /// # Errors
     /// An FMU refuses.
@@ -29,29 +30,29 @@ pub trait Feed {
     fn next_point(&self, t: f64) -> Option<f64>;
 }
 
-/// What is known of the FMUs between two steps; any number of runs of it follow one another.
+/// State of the FMUs between two steps, for any number of successive runs.
 pub struct Equations {
     integration: Integration,
-    /// Where the states and the indicators of each instance are.
+    /// Ranges of the states and the indicators of each instance.
     states: Vec<Range<usize>>,
     indicators: Vec<Range<usize>>,
-    /// Which instances ask for completed steps.
+    /// Instances that need completed steps.
     completes: Vec<bool>,
     nominals: Vec<f64>,
     /// The instances for Model Exchange in the order of updates.
     order: Vec<usize>,
     outcomes: Vec<Iterated>,
-    /// Time and states that the FMUs have; the time is NaN when they are not known.
+    /// Time and states of the FMUs; the time is NaN when they are unknown.
     t: f64,
     x: Vec<f64>,
     /// The FMUs are in event mode from their initialization.
     initial: bool,
-    /// Index of the instance that asked to end the simulation.
+    /// Index of the instance that requested the end of the simulation.
     ended_by: Option<usize>,
 }
 
 impl Equations {
-    /// Asks instances that are initialized and in event mode.
+    /// Queries instances that are initialized and in event mode.
     ///
     /// # Errors
     /// An FMU refuses, or a nominal value is not positive.
@@ -108,7 +109,7 @@ impl Equations {
         }
     }
 
-    /// The name of a state of an instance; its number, from 1, where the description does not name it.
+    /// The name of a state of an instance, or its number, from 1, if the description does not name it.
     fn state(&self, instance: &Instance, index: usize, state: usize) -> String {
         let (description, count) = (instance.description(), self.states[index].len());
         match description.states().get(state) {
@@ -119,7 +120,7 @@ impl Equations {
 
     /// The first value that is not finite, as an error.
     fn finite(&self, instances: &[Instance], what: &str, values: &[f64], t: f64) -> Result<(), Error> {
-        // 0 times a number that is not finite is NaN: one branch for all, because this runs twice in an evaluation.
+        // 0 times a non-finite number is NaN: a single branch, because this runs twice in an evaluation.
         if values.iter().map(|x| 0.0 * x).sum::<f64>() == 0.0 {
             return Ok(());
         }
@@ -129,17 +130,17 @@ impl Equations {
         Err(Error::usage(instances[index].name(), format!("{what}{state} is {} at t = {t} s", values[at])))
     }
 
-    /// Index of the instance that asked to end the simulation.
+    /// Index of the instance that requested the end of the simulation.
     pub fn ended_by(&self) -> Option<usize> {
         self.ended_by
     }
 
-    /// The FMUs were used by others: what they have is not known.
+    /// Other code has used the FMUs: their time and states are unknown.
     pub fn forget(&mut self) {
         self.t = f64::NAN;
     }
 
-    /// The system for the next calls, with the instances that it was made of.
+    /// The system for the next calls, with its instances.
     pub fn of<'a, F: Feed>(&'a mut self, instances: &'a mut [Instance], feed: &'a mut F) -> Fmus<'a, F> {
         Fmus { equations: self, instances, feed }
     }
@@ -153,17 +154,17 @@ pub struct Fmus<'a, F> {
 }
 
 impl<F: Feed> Fmus<'_, F> {
-    /// Gives the FMUs this time, these states and the inputs that follow.
+    /// Sets this time, these states and the resulting inputs in the FMUs.
     ///
     /// # Errors
     /// An FMU refuses.
-    pub fn place(&mut self, t: f64, x: &[f64]) -> Result<(), Trial> {
+    pub fn place(&mut self, t: f64, x: &[f64]) -> Result<(), TrialError> {
         let Self { equations, instances, feed } = self;
         let same = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits());
         if t.to_bits() == equations.t.to_bits() && same(&equations.x, x) {
             return Ok(());
         }
-        equations.finite(instances, "", x, t).map_err(Trial::Discard)?;
+        equations.finite(instances, "", x, t).map_err(TrialError::Discard)?;
         equations.t = f64::NAN;
         for &index in &equations.order {
             instances[index].set_time(t).map_err(trial)?;
@@ -185,11 +186,11 @@ impl<F: Feed> Fmus<'_, F> {
 }
 
 /// A discarded call can be tried again with a shorter step.
-fn trial(error: Error) -> Trial {
-    if error.is_discard() { Trial::Discard(error) } else { Trial::Stop(error) }
+fn trial(error: Error) -> TrialError {
+    if error.is_discard() { TrialError::Discard(error) } else { TrialError::Stop(error) }
 }
 
-impl<F: Feed> Hybrid for Fmus<'_, F> {
+impl<F: Feed> HybridSystem for Fmus<'_, F> {
     fn nominals(&self) -> &[f64] {
         &self.equations.nominals
     }
@@ -203,15 +204,15 @@ impl<F: Feed> Hybrid for Fmus<'_, F> {
         self.equations.indicators.last().map_or(0, |range| range.end)
     }
 
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Trial> {
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), TrialError> {
         self.place(t, x)?;
         for (instance, range) in self.instances.iter_mut().zip(&self.equations.states) {
             instance.get_derivatives(&mut dx[range.clone()]).map_err(trial)?;
         }
-        self.equations.finite(self.instances, "the derivative of ", dx, t).map_err(Trial::Discard)
+        self.equations.finite(self.instances, "the derivative of ", dx, t).map_err(TrialError::Discard)
     }
 
-    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), Trial> {
+    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), TrialError> {
         self.place(t, x)?;
         for (instance, range) in self.instances.iter_mut().zip(&self.equations.indicators) {
             instance.get_event_indicators(&mut z[range.clone()]).map_err(trial)?;
@@ -224,7 +225,7 @@ impl<F: Feed> Hybrid for Fmus<'_, F> {
         if !self.equations.completes.contains(&true) {
             return Ok(all);
         }
-        self.place(t, x).map_err(Trial::into_error)?;
+        self.place(t, x).map_err(TrialError::into_error)?;
         for (index, instance) in self.instances.iter_mut().enumerate() {
             if !self.equations.completes[index] {
                 continue;
@@ -241,7 +242,7 @@ impl<F: Feed> Hybrid for Fmus<'_, F> {
     fn event(&mut self, t: f64, x: &mut [f64]) -> Result<Update, Error> {
         let first = std::mem::replace(&mut self.equations.initial, false);
         if !first {
-            self.place(t, x).map_err(Trial::into_error)?;
+            self.place(t, x).map_err(TrialError::into_error)?;
         }
         let Self { equations, instances, feed } = self;
         feed.event(instances, t)?;

@@ -1,21 +1,21 @@
 //! Co-Simulation of FMI 3.0 with event mode and early return.
 //!
-//! Between two communication points the master stops at every event: where an FMU says that its next event is, and where an FMU
-//! returns early. There outputs are passed on to inputs as at a communication point, and FMUs with event mode handle their
+//! Between two communication points the master stops at every event: at the next event time that an FMU announces, and where an
+//! FMU returns early. There, outputs are passed on to inputs as at a communication point, and FMUs with event mode handle their
 //! events with these inputs (FMI 3.0.2, 4.2.1). An FMU without event mode and early return is stepped to the same instants.
 //!
-//! FMUs that may return early step first; the others follow to where they came. If one of several returns before the others,
+//! FMUs that may return early step first; the others follow to the time reached. If one of several returns before the others,
 //! those go back to the saved state before the step: they need `canGetAndSetFMUState`.
 
 use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
-use super::point::{Ended, Point, end};
+use super::point::{CommunicationPoint, Ended, end};
 use fmu_import::{Error, FmuState, Instance, Kind, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
 
-/// Most stops at one instant, and early returns of one step.
+/// Maximum number of stops at one instant, and of early returns of one step.
 const STOPS: u32 = 100;
 
 /// The FMUs between two stops.
@@ -27,11 +27,11 @@ struct Fmus<'a> {
     early: Vec<usize>,
     plain: Vec<usize>,
     outcomes: Vec<Iterated>,
-    /// What the last step of each instance returned.
+    /// Result of the last step of each instance.
     stepped: Vec<Stepped>,
     /// Instants that are closer than this (s) are the same.
     near: f64,
-    /// Index of the instance that asked to end the simulation.
+    /// Index of the instance that requested the end of the simulation.
     ended_by: Option<usize>,
 }
 
@@ -44,8 +44,8 @@ impl Fmus<'_> {
 
     /// Event mode at the time `at` (s), and back to step mode. After the initialization, the instances are in event mode.
     fn event(&mut self, at: f64, initial: bool) -> Result<(), Error> {
-        // The time of the event itself, where a communication point is the same time but for rounding: schedules then give the
-        // same bits at any communication step.
+        // The time of the event itself where a communication point differs only by rounding, so that schedules give the same
+        // bits at any communication step.
         let next = self.with_events.iter().filter_map(|&i| self.outcomes[i].next);
         let t = next.filter(|next| (next - at).abs() <= self.near).fold(f64::INFINITY, f64::min);
         let t = if t.is_finite() { t } else { at };
@@ -64,7 +64,7 @@ impl Fmus<'_> {
         Ok(())
     }
 
-    /// Steps all instances from `t` by `h`, or to the earliest early return; returns the time (s) they came to.
+    /// Steps all instances from `t` by `h`, or to the earliest early return; returns the time (s) reached.
     fn step(&mut self, t: f64, to: f64, h: f64) -> Result<f64, Error> {
         let mut saved: Vec<Option<FmuState>> = vec![None; self.instances.len()];
         if self.early.len() > 1 {
@@ -92,7 +92,7 @@ impl Fmus<'_> {
         Ok(reached)
     }
 
-    /// Steps the instances that may return early until all have come to the same time.
+    /// Steps the instances that may return early until all have reached the same time.
     fn step_early(&mut self, t: f64, to: f64, h: f64, saved: &[Option<FmuState>]) -> Result<f64, Error> {
         let (mut goal, mut h) = (to, h);
         let mut came: Vec<Option<f64>> = vec![None; self.instances.len()];
@@ -115,12 +115,12 @@ impl Fmus<'_> {
             }
             let Some(time) = shorter else { return Ok(goal) };
             if time < t {
-                let cause = format!("a step from {t} s returned early at {time} s, before its begin");
+                let cause = format!("a step from {t} s returned early at {time} s, before its beginning");
                 return Err(Error::usage("early return", cause));
             }
             (goal, h) = (time, time - t);
             if h <= self.near {
-                // An instance returned where it began: those that stepped go back.
+                // An instance returned at its start time: those that stepped go back.
                 for (index, time) in came.iter().enumerate() {
                     if let Some(time) = time.filter(|time| *time > goal + self.near) {
                         self.go_back(index, time, goal, saved)?;
@@ -162,7 +162,7 @@ pub(super) fn run(
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let (start, near) = (grid.settings().start, 1e-9 * grid.settings().step);
     let of = |wanted: fn(Kind) -> bool| -> Vec<usize> {
@@ -188,7 +188,8 @@ pub(super) fn run(
         if index < grid.steps() {
             fmus.exchange.write_all(fmus.instances, time)?;
         }
-        let flow = hook(&mut Point { index, time, values: row, instances: fmus.instances, touched: false })?;
+        let flow =
+            hook(&mut CommunicationPoint { index, time, values: row, instances: fmus.instances, touched: false })?;
         if flow.is_break() || index == grid.steps() {
             break;
         }

@@ -1,25 +1,26 @@
-//! Moving values between FMUs: what is read from each, and where what is set comes from.
+//! Moving values between FMUs: the variables read from each FMU, and the sources of those set.
 
 use super::parts::Port;
 use super::sequence::Held;
 use super::{Schedule, loops};
 use fmu_import::{Error, Instance, Kind, Values};
+use model_description::Conversion;
 
 /// Source of an input.
 #[derive(Clone)]
 pub(super) enum Source {
-    /// A variable of another instance.
-    Port(Port),
+    /// A variable of another instance, converted to the unit of the target.
+    Port(Port, Option<Conversion>),
     /// A schedule.
     Schedule(Schedule),
 }
 
-/// An input and what feeds it.
+/// An input and its source.
 #[derive(Clone)]
 struct Feed {
     target: Port,
     source: Source,
-    /// The input is continuous: in Model Exchange it is set all the time, a discrete one at events.
+    /// The input is continuous: in Model Exchange it is set at every evaluation, a discrete one at events.
     continuous: bool,
 }
 
@@ -27,7 +28,7 @@ struct Feed {
 #[derive(Clone, Default)]
 pub(super) struct Wiring {
     feeds: Vec<Feed>,
-    /// Inputs that are not one number, with their values over time.
+    /// Inputs other than single numbers, with their values over time.
     held: Vec<(Port, Held)>,
 }
 
@@ -40,19 +41,28 @@ impl Wiring {
         self.held.push((target, values));
     }
 
-    /// These connections and schedules, and those of a copy of the instances, which are numbered from `instances` on.
+    /// These connections and schedules, together with those of a copy of the instances, numbered from `instances` on.
     pub(super) fn with_copy(&self, instances: usize) -> Self {
         let mut both = self.clone();
         both.feeds.extend(self.feeds.iter().map(|feed| Feed {
             target: feed.target.shifted(instances),
             source: match &feed.source {
-                Source::Port(port) => Source::Port(port.shifted(instances)),
+                Source::Port(port, conversion) => Source::Port(port.shifted(instances), *conversion),
                 schedule @ Source::Schedule(_) => schedule.clone(),
             },
             continuous: feed.continuous,
         }));
         both.held.extend(self.held.iter().map(|(port, held)| (port.shifted(instances), held.clone())));
         both
+    }
+
+    /// Inputs that are fed over time, with the times (s) at which their values jump.
+    pub(super) fn jumps(&self) -> impl Iterator<Item = (&Port, Vec<f64>)> {
+        let feeds = self.feeds.iter().filter_map(|feed| match &feed.source {
+            Source::Schedule(schedule) => Some((&feed.target, schedule.jumps().collect())),
+            Source::Port(..) => None,
+        });
+        feeds.chain(self.held.iter().map(|(target, held)| (target, held.times().collect())))
     }
 
     fn targets(&self) -> impl Iterator<Item = &Port> {
@@ -69,31 +79,31 @@ impl Wiring {
     }
 }
 
-/// Where a number is found during the run.
+/// Location of a number during the run.
 #[derive(Clone)]
 enum Place {
-    Read { instance: usize, slot: usize },
+    Read { instance: usize, slot: usize, conversion: Option<Conversion> },
     Schedule(Schedule),
 }
 
-/// What crosses the interface of one instance. Double-precision numbers go in one call, the rest one by one.
+/// Traffic of one instance. Double-precision numbers are passed in one call, other values one by one.
 #[derive(Clone, Default)]
 struct Traffic {
     read: Vec<u32>,
     read_singly: Vec<Port>,
-    /// How many of `read` and of `read_singly` feed inputs: these come first.
+    /// Numbers of variables in `read` and `read_singly` that feed inputs: these come first.
     feeding: [usize; 2],
     /// Values read last: those of `read`, then those of `read_singly`.
     values: Vec<f64>,
     write: Vec<(u32, Place)>,
     write_singly: Vec<(Port, Place)>,
-    /// How many of `write` and of `write_singly` are continuous: these come first.
+    /// Numbers of variables in `write` and `write_singly` that are continuous: these come first.
     continuous: [usize; 2],
     references: Vec<u32>,
     /// Values written last: those of `write`, then those of `write_singly`.
     buffer: Vec<f64>,
     singles: Vec<f64>,
-    /// Inputs that are not one number, and which of their values was written last.
+    /// Inputs other than single numbers, and the index of the value written last.
     held: Vec<(Port, Held, Option<usize>)>,
 }
 
@@ -104,22 +114,24 @@ pub(super) struct Exchange {
     row: Vec<Place>,
     /// Number of inputs that are fed.
     fed: usize,
-    /// Time (s) from which on steps of schedules are held; `None` where every exchange reads them.
+    /// Time (s) since which step schedules are held; `None` if they are read at every exchange.
     pub(super) since: Option<f64>,
 }
 
-/// An input that a pass changes.
+/// An input changed by a pass.
 pub(super) struct Unsettled {
     /// Its instance.
     pub(super) index: usize,
-    /// Where its value stands among those that are written in one call.
+    /// Position of its value among those written in one call.
     slot: usize,
     pub(super) reference: u32,
-    /// Instance and reference of what feeds it, if both are continuous double-precision numbers.
+    /// Instance and reference of its source, if both are continuous double-precision numbers.
     pub(super) source: Option<(usize, u32)>,
+    /// Change of the input for a change of what feeds it: not 1 between different units.
+    pub(super) factor: f64,
 }
 
-/// Which inputs are set.
+/// The inputs to be set.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Inputs {
     /// In event mode.
@@ -134,14 +146,13 @@ impl Exchange {
         let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
         // A fed input need not be read: its value is known here.
         let origin = |port: &Port| match fed(port) {
-            Some(Source::Port(source)) => Source::Port(source.clone()),
-            Some(Source::Schedule(schedule)) => Source::Schedule(schedule.clone()),
-            None => Source::Port(port.clone()),
+            Some(source) => source.clone(),
+            None => Source::Port(port.clone(), None),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
         let sources = wiring.feeds.iter().map(|feed| &feed.source).chain(&origins);
         for (index, source) in sources.enumerate() {
-            let Source::Port(port) = source else { continue };
+            let Source::Port(port, _) = source else { continue };
             let traffic = &mut traffic[port.instance];
             if !port.is_fast() {
                 if !traffic.read_singly.contains(port) {
@@ -155,7 +166,10 @@ impl Exchange {
             }
         }
         let place = |traffic: &[Traffic], source: &Source| match source {
-            Source::Port(port) => Place::Read { instance: port.instance, slot: traffic[port.instance].slot(port) },
+            Source::Port(port, conversion) => {
+                let slot = traffic[port.instance].slot(port);
+                Place::Read { instance: port.instance, slot, conversion: *conversion }
+            }
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
         };
         let row = origins.iter().map(|source| place(&traffic, source)).collect();
@@ -220,7 +234,7 @@ impl Exchange {
         self.hold(index, instance, t).map(drop)
     }
 
-    /// Sets the inputs that are not one number where they have another value; returns whether any has.
+    /// Sets changed inputs other than single numbers; returns whether any has changed.
     fn hold(&mut self, index: usize, instance: &mut Instance, t: f64) -> Result<bool, Error> {
         let (mut changed, t) = (false, self.since.unwrap_or(t));
         for (port, values, last) in &mut self.traffic[index].held {
@@ -241,7 +255,7 @@ impl Exchange {
             return Ok(false);
         }
         let mut discrete = false;
-        // Without a loop, each pass settles one more input at least.
+        // Without a loop, each pass settles at least one more input.
         for _ in 0..self.fed + 2 {
             let (settled, some) = self.pass(instances, t, inputs)?;
             discrete |= some;
@@ -252,7 +266,8 @@ impl Exchange {
         loops::solve(self, instances, t).map(|()| discrete)
     }
 
-    /// Reads what feeds inputs, and sets the inputs that have changed; returns whether none has, and whether a discrete one has.
+    /// Reads the sources of inputs, and sets the inputs that have changed; returns whether none has changed, and whether a
+    /// discrete one has.
     fn pass(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<(bool, bool), Error> {
         let (mut settled, mut discrete) = (true, false);
         self.read_feeding(instances)?;
@@ -279,26 +294,28 @@ impl Exchange {
             }
             for (slot, (reference, place)) in traffic.write.iter().enumerate() {
                 if self.value(place, t).to_bits() != traffic.buffer[slot].to_bits() {
-                    let source = match place {
-                        Place::Read { instance, slot } => {
-                            self.traffic[*instance].read.get(*slot).map(|r| (*instance, *r))
+                    let (source, factor) = match place {
+                        Place::Read { instance, slot, conversion } => {
+                            let source = self.traffic[*instance].read.get(*slot).map(|r| (*instance, *r));
+                            (source, conversion.map_or(1.0, |conversion| conversion.factor))
                         }
-                        Place::Schedule(_) => None,
+                        Place::Schedule(_) => (None, 1.0),
                     };
-                    let continuous = slot < traffic.continuous[0];
-                    all.push(Unsettled { index, slot, reference: *reference, source: source.filter(|_| continuous) });
+                    let source = source.filter(|_| slot < traffic.continuous[0]);
+                    all.push(Unsettled { index, slot, reference: *reference, source, factor });
                 }
             }
             for ((port, place), old) in traffic.write_singly.iter().zip(&traffic.singles) {
                 if self.value(place, t).to_bits() != old.to_bits() {
-                    all.push(Unsettled { index, slot: usize::MAX, reference: port.reference, source: None });
+                    let (slot, reference) = (usize::MAX, port.reference);
+                    all.push(Unsettled { index, slot, reference, source: None, factor: 1.0 });
                 }
             }
         }
         Ok(all)
     }
 
-    /// Sets inputs to these values, and returns what would be set next.
+    /// Sets inputs to these values, and returns the values that would be set next.
     pub(super) fn try_values(
         &mut self,
         instances: &mut [Instance],
@@ -314,7 +331,7 @@ impl Exchange {
         Ok(inputs.iter().map(|input| self.value(&self.traffic[input.index].write[input.slot].1, t)).collect())
     }
 
-    /// The values that these inputs have.
+    /// The present values of these inputs.
     pub(super) fn values_of(&self, inputs: &[Unsettled]) -> Vec<f64> {
         inputs.iter().map(|input| self.traffic[input.index].buffer[input.slot]).collect()
     }
@@ -331,7 +348,7 @@ impl Exchange {
         Ok(discrete)
     }
 
-    /// Sets the inputs of an instance that have changed; returns whether any has, and whether a discrete one has.
+    /// Sets the changed inputs of an instance; returns whether any has changed, and whether a discrete one has.
     fn pass_on(
         &mut self,
         index: usize,
@@ -395,7 +412,10 @@ impl Exchange {
 
     fn value(&self, place: &Place, t: f64) -> f64 {
         match place {
-            Place::Read { instance, slot } => self.traffic[*instance].values[*slot],
+            Place::Read { instance, slot, conversion } => {
+                let value = self.traffic[*instance].values[*slot];
+                conversion.map_or(value, |conversion| conversion.apply(value))
+            }
             Place::Schedule(schedule) => match self.since {
                 None => schedule.at(t),
                 Some(since) => schedule.held(since, t),
@@ -429,7 +449,7 @@ impl Traffic {
         Ok(())
     }
 
-    /// Where the value of a port is found among those that are read; the port is one of them.
+    /// Location of a port's value among those read; the port is one of them.
     fn slot(&self, port: &Port) -> usize {
         let fast = || self.read.iter().position(|reference| *reference == port.reference);
         let slow = || self.read_singly.iter().position(|p| p == port).map(|i| i + self.read.len());

@@ -1,8 +1,9 @@
 //! Communication points, counted in integers.
 
+use super::schedule::SAME;
 use fmu_import::limits::STEPS;
 
-/// When to start and stop, and how to step.
+/// Start, stop and step of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
     /// Start time in s.
@@ -20,6 +21,8 @@ pub struct Settings {
 pub(super) struct Grid {
     settings: Settings,
     steps: u32,
+    /// Relative tolerance for the solvers inside the FMUs; otherwise that of the default experiment of each.
+    pub(super) tolerance: Option<f64>,
 }
 
 impl Settings {
@@ -52,7 +55,7 @@ impl Settings {
             reason = "an integer in the range, see above"
         )]
         let steps = whole as u32;
-        Ok(Grid { settings: *self, steps })
+        Ok(Grid { settings: *self, steps, tolerance: None })
     }
 }
 
@@ -71,7 +74,21 @@ impl Grid {
         if k == self.steps { stop } else { start + f64::from(k) * step }
     }
 
-    /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, but for a short last one.
+    /// The communication point after the time `t` (s), if `t` lies within the simulation and is not a communication point.
+    pub(super) fn after(&self, t: f64) -> Option<f64> {
+        let Settings { start, stop, step, .. } = self.settings;
+        let nearest = start + ((t - start) / step).round() * step;
+        let inside = t > start && t < stop && (t - nearest).abs() > SAME;
+        inside.then(|| (start + ((t - start) / step).ceil() * step).min(stop))
+    }
+
+    /// The settings up to the last whole step, if the last one is shorter.
+    pub(super) fn without_short_step(&self) -> Option<Settings> {
+        let last = self.steps - 1;
+        (self.size(last) < self.settings.step).then(|| Settings { stop: self.time(last), ..self.settings })
+    }
+
+    /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, except for a short last one.
     pub(super) fn size(&self, k: u32) -> f64 {
         let rest = self.settings.stop - self.time(k);
         if k + 1 == self.steps && (rest - self.settings.step).abs() > 1e-3 * self.settings.step {
@@ -104,6 +121,9 @@ mod tests {
         assert_eq!((g.steps(), g.time(4)), (4, 2.0));
         assert!((g.size(3) - 0.1).abs() < 1e-12, "{}", g.size(3));
         assert_eq!(grid(0.0, 0.1, 0.3).unwrap().size(0), 0.1);
+        assert_eq!([g.after(1.31), g.after(1.6), g.after(1.95), g.after(2.5)], [Some(1.6), None, Some(2.0), None]);
+        assert_eq!(g.without_short_step().unwrap().stop, 1.0 + 3.0 * 0.3);
+        assert_eq!(grid(0.0, 1.0, 0.1).unwrap().without_short_step(), None);
     }
 
     #[test]
@@ -113,8 +133,8 @@ mod tests {
         {
             assert!(grid(start, stop, step).is_err(), "{start} {stop} {step}");
         }
-        let told = |step| grid(0.0, 1.0, step).unwrap_err();
-        assert_eq!(told(1e308), "the step 1e308 s is longer than the simulation of 1 s; give a shorter one");
-        assert!(told(1e-10).ends_with("takes 1e10 steps; the limit is 2147483648"), "{}", told(1e-10));
+        let refused = |step| grid(0.0, 1.0, step).unwrap_err();
+        assert_eq!(refused(1e308), "the step 1e308 s is longer than the simulation of 1 s; give a shorter one");
+        assert!(refused(1e-10).ends_with("takes 1e10 steps; the limit is 2147483648"), "{}", refused(1e-10));
     }
 }

@@ -5,7 +5,7 @@ use fmu_import::{Error, Instance};
 /// Largest number of updates of one event.
 const UPDATES: usize = 100;
 
-/// What an event left behind, for each instance.
+/// Result of an event for each instance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Iterated {
     /// Time (s) of the next time event.
@@ -15,9 +15,9 @@ pub(super) struct Iterated {
     again: bool,
 }
 
-/// Updates the instances in this order. Before the first update of any, and after each, `pass_on` passes outputs on to inputs and
-/// says whether a discrete input changed: then another update follows (FMI 2.0.5, 3.1; FMI 3.0.2, 2.3.5). Returns the index of
-/// an instance that asks to end the simulation.
+/// Updates the instances in this order. Before the first update of any, and after each, `pass_on` passes outputs on to inputs
+/// and returns whether a discrete input changed; then another update follows (FMI 2.0.5, 3.1; FMI 3.0.2, 2.3.5). Returns the
+/// index of an instance that requests the end of the simulation.
 pub(super) fn iterate(
     instances: &mut [Instance],
     order: &[usize],
@@ -36,7 +36,7 @@ pub(super) fn iterate(
                 return Ok(Some(index));
             }
             if update.next_event_time.is_some_and(f64::is_nan) {
-                let cause = format!("the next event time that it gave at t = {t} s is not a number");
+                let cause = format!("its next event time at t = {t} s is not a number");
                 return Err(Error::usage(instances[index].name(), cause));
             }
             let outcome = &mut outcomes[index];

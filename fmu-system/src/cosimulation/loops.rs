@@ -9,9 +9,9 @@ use model_description::Interface;
 
 /// Most iterations.
 const ITERATIONS: u32 = 40;
-/// Residual relative to the inputs at which a loop is solved at once.
+/// Residual relative to the inputs at which a loop counts as solved.
 const SOLVED: f64 = 1e-14;
-/// Residual at which a loop is solved if an iteration does not improve it.
+/// Residual at which a loop counts as solved if an iteration does not improve it.
 const NEARLY: f64 = 1e-11;
 
 /// Solves the loop among the inputs that are not settled.
@@ -73,7 +73,7 @@ fn matrix(
         let has = instance.description().model_exchange.as_ref().is_some_and(Interface::has_directional_derivatives);
         if has && instance.directional_derivative(&unknowns, &[known.reference], &[1.0], &mut column).is_ok() {
             for ((i, _), slope) in fed.iter().zip(&column) {
-                rows[*i][k] = -slope;
+                rows[*i][k] = -inputs[*i].factor * slope;
             }
         } else {
             let mut moved = u.to_vec();

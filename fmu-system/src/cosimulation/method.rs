@@ -1,10 +1,10 @@
-//! How the FMUs of a system are run.
+//! How to run the FMUs of a system.
 
 use crate::integration::Solver;
 use fmu_import::{Error, Fmu, Kind};
 use model_description::{FmiVersion, Interface};
 
-/// How the FMUs of a system are run.
+/// How to run the FMUs of a system.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Method {
     /// Co-Simulation: the FMUs step themselves.
@@ -31,18 +31,18 @@ impl Default for Method {
 pub struct Integration {
     /// How states are integrated.
     pub solver: Solver,
-    /// Names of the FMUs that step themselves all the same (Co-Simulation), from communication point to communication point.
+    /// Names of FMUs that still step themselves (Co-Simulation), from communication point to communication point.
     pub stepping: Vec<String>,
     /// At an event, the FMUs are updated from the last one added to the first.
     pub reversed: bool,
     /// Event mode is entered this time (s) after the time event of an FMU.
     pub late: f64,
-    /// Times (s) of events that no FMU asked for, rising.
+    /// Times (s) of additional events that no FMU requests, in ascending order.
     pub extra_events: Vec<f64>,
 }
 
 impl Method {
-    /// What an instance of this FMU is made for.
+    /// The interface for an instance of this FMU.
     pub(super) fn kind(&self, name: &str, fmu: &Fmu) -> Kind {
         let description = fmu.description();
         let can = |flag: fn(&Interface) -> bool| {
@@ -60,7 +60,7 @@ impl Method {
         }
     }
 
-    /// Refuses a method that none of the instances can follow, and settings that make no sense.
+    /// Refuses a method that none of the instances supports, and invalid settings.
     pub(super) fn check(&self, kinds: &[Kind], sequential: bool) -> Result<(), Error> {
         let wrong = |cause: String| Err(Error::usage("settings", cause));
         let any = |used: fn(&Kind) -> bool| kinds.iter().any(used);
@@ -86,7 +86,7 @@ impl Method {
             }
         }
         if sequential {
-            return wrong("FMUs are stepped one after the other in plain Co-Simulation alone".into());
+            return wrong("FMUs are stepped one after the other only in plain Co-Simulation".into());
         }
         Ok(())
     }

@@ -1,11 +1,11 @@
 //! A master for several FMUs: connects outputs to inputs, feeds inputs over time, runs, records.
 //!
-//! A [`Method`] says how: by default the FMUs step themselves (Co-Simulation); they can use event mode and early return of FMI
-//! 3.0, or the master integrates their states (Model Exchange).
+//! The [`Method`] determines how: by default the FMUs step themselves (Co-Simulation); they can use event mode and early return
+//! of FMI 3.0, or the master integrates their states (Model Exchange).
 //!
-//! At every communication point `t = start + k h` the master reads all outputs and sets all inputs; then it steps all
-//! FMUs (Jacobi), so that what is sent at `t` acts from `t` on. With [`Settings::sequential`] it steps them one after the
-//! other in the order they were added, each with what those before it have just computed (Gauss-Seidel).
+//! At every communication point `t = start + k h` the master reads all outputs and sets all inputs; then it steps all FMUs
+//! (Jacobi), so that values sent at `t` act from `t` on. With [`Settings::sequential`] it steps them one after the other in the
+//! order they were added, each with the new outputs of those before it (Gauss-Seidel).
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
@@ -25,7 +25,7 @@
 //! # Ok(()) }
 //! ```
 //!
-//! For many runs of one system there is [`Plan`].
+//! For many runs of one system there is [`SystemPlan`].
 
 mod continuous;
 mod coupled;
@@ -50,9 +50,9 @@ pub use coupled::{Equations, Feed, Fmus};
 pub use exchange::Inputs;
 pub use grid::Settings;
 pub use method::{Integration, Method};
-pub use plan::{Plan, Target, Worker};
-pub use point::{Ended, Point};
+pub use plan::{PlanTarget, SystemPlan, Worker};
+pub use point::{CommunicationPoint, Ended};
 pub use recording::{Column, Recording, TextColumn, cell, item};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
-pub use system::System;
+pub use system::{Crossing, System, Units};

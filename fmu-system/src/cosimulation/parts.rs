@@ -1,4 +1,4 @@
-//! The FMUs of a system with their names, and what is found in them by `instance.variable`.
+//! The FMUs of a system with their names, and their variables, written `instance.variable`.
 
 use super::Column;
 use fmu_core::variable::position;
@@ -18,12 +18,12 @@ pub(super) struct Port {
 }
 
 impl Port {
-    /// Whether it is a double-precision number with a value reference of its own.
+    /// Whether it is a double-precision number with a separate value reference.
     pub(super) fn is_fast(&self) -> bool {
         self.base == BaseType::Float64 && self.element.is_none()
     }
 
-    /// The variable in the instance that is `count` places later.
+    /// This variable in the instance `count` positions later.
     pub(super) fn shifted(&self, count: usize) -> Self {
         Self { instance: self.instance + count, ..self.clone() }
     }
@@ -52,17 +52,17 @@ impl Part {
         usize::try_from(*values.first()?).ok()
     }
 
-    /// Extents of a variable with the sizes that were set; empty if one is not known.
+    /// Extents of a variable with the sizes set; empty if one is unknown.
     fn shape(&self, variable: &ModelVariable) -> Vec<usize> {
         self.description().shape_with(variable, |reference| self.size(reference)).unwrap_or_default()
     }
 
-    /// The array and the index of its element that a name means, with the sizes that were set.
+    /// The array and element index denoted by a name, with the sizes set.
     fn element(&self, name: &str) -> Option<(&ModelVariable, usize)> {
         self.description().element_with(name, |reference| self.size(reference))
     }
 
-    /// Sets the structural parameters of an instance, if there are some, in one Configuration Mode.
+    /// Sets the structural parameters of an instance, if any, in one Configuration Mode.
     pub(super) fn configure(&self, instance: &mut Instance) -> Result<(), Error> {
         if self.sizes.is_empty() {
             return Ok(());
@@ -107,7 +107,7 @@ impl Parts {
         Ok(port)
     }
 
-    /// A port that is one number and takes a value before the initialization.
+    /// A port that is one number and accepts a value before the initialization.
     pub(super) fn settable(&self, text: &str) -> Result<Port, Error> {
         let port = self.scalar(text)?;
         if port.element.is_some() {
@@ -122,7 +122,7 @@ impl Parts {
         }
         let starts = matches!(variable.initial_or_default(), Some(Initial::Exact | Initial::Approx));
         if variable.variability == Variability::Constant || !(starts || variable.causality == Causality::Input) {
-            let cause = format!("is {} {} and takes no value", variable.variability, variable.causality);
+            let cause = format!("is {} {} and cannot be set", variable.variability, variable.causality);
             return Err(Error::usage(text, format!("{cause}: vary a parameter, an input or a start value")));
         }
         Ok(port)
@@ -140,8 +140,8 @@ impl Parts {
         self.variable(port.instance, &port.name).map_or(Causality::Local, |v| v.causality)
     }
 
-    /// The instance and what follows its name and a dot; an instance's name may itself have dots. A single instance need not be
-    /// named.
+    /// The instance and the text after its name and a dot; an instance's name may itself contain dots. A single instance need
+    /// not be named.
     pub(super) fn instance_and_rest<'a>(&self, text: &'a str, what: &str) -> Result<(usize, &'a str), Error> {
         let split = |(index, part): (usize, &Part)| {
             Some((index, part.name.len(), text.strip_prefix(&part.name)?.strip_prefix('.')?))

@@ -1,7 +1,7 @@
-//! A system made ready for many runs.
+//! A system prepared for many runs.
 //!
-//! A [`Plan`] is what all runs share, and threads share it. A [`Worker`] has instances of its own and runs one setting after
-//! another: it resets its instances where that works and makes new ones after an error.
+//! A [`SystemPlan`] contains the data shared by all runs and threads. A [`Worker`] owns its instances and runs one setting after
+//! another: it resets its instances where that works and creates new ones after an error.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
@@ -35,11 +35,11 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// What all runs of a system share: FMUs, connections, recorded variables, times, and the values that were set.
-pub struct Plan {
+/// Data shared by all runs of a system: FMUs, connections, recorded variables, times, and set values.
+pub struct SystemPlan {
     method: Method,
     parts: Parts,
-    /// The FMU of each part to make instances of.
+    /// The FMU of each part, for new instances.
     live: Vec<Arc<Live>>,
     wiring: Wiring,
     set: Vec<(Port, Values)>,
@@ -52,7 +52,7 @@ pub struct Plan {
 /// An FMU that is opened again after the status Fatal.
 struct Live {
     fmu: Mutex<Fmu>,
-    /// How often it was opened again.
+    /// Number of times it was opened again.
     generation: AtomicU32,
 }
 
@@ -68,12 +68,12 @@ impl Live {
 
 /// A variable of a plan that each run sets.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Target {
+pub struct PlanTarget {
     port: Port,
     written: String,
 }
 
-impl Target {
+impl PlanTarget {
     /// `instance.variable`.
     pub fn name(&self) -> &str {
         &self.written
@@ -81,17 +81,17 @@ impl Target {
 }
 
 impl System {
-    /// Makes the system ready for many runs from start to stop.
+    /// Prepares the system for many runs from start to stop.
     ///
     /// # Errors
     /// The settings make no sense.
-    pub fn into_plan(self, settings: &Settings) -> Result<Plan, Error> {
-        let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
+    pub fn into_plan(mut self, settings: &Settings) -> Result<SystemPlan, Error> {
+        let grid = self.grid(settings)?;
         let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let columns = self.columns().collect();
         let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });
         let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
-        Ok(Plan {
+        Ok(SystemPlan {
             live,
             exchange,
             grid,
@@ -110,29 +110,29 @@ impl System {
     }
 }
 
-impl Plan {
+impl SystemPlan {
     /// A variable to set in runs, written `instance.variable`.
     ///
     /// # Errors
     /// The variable does not exist, is not a number, cannot be set, or is fed.
-    pub fn target(&self, written: &str) -> Result<Target, Error> {
+    pub fn target(&self, written: &str) -> Result<PlanTarget, Error> {
         let port = self.parts.settable(written)?;
         if self.wiring.feeds(port.instance, &port.name) {
             return Err(Error::usage(written, "is fed by a connection or a schedule: remove that, or do not vary it"));
         }
-        Ok(Target { port, written: written.into() })
+        Ok(PlanTarget { port, written: written.into() })
     }
 
     /// Units and, of an enumeration, names of the values of a target.
-    pub fn column(&self, target: &Target) -> Column {
+    pub fn column(&self, target: &PlanTarget) -> Column {
         self.parts.column(&target.port, target.name())
     }
 
-    /// What a user writes for a target as the number that stands for it: `3.3`, `true`, or a name of an enumeration.
+    /// Converts user input for a target to a number: `3.3`, `true`, or a name of an enumeration.
     ///
     /// # Errors
     /// The text is not a value of the target's type.
-    pub fn number(&self, target: &Target, text: &str) -> Result<f64, Error> {
+    pub fn number(&self, target: &PlanTarget, text: &str) -> Result<f64, Error> {
         let Port { instance, name, .. } = &target.port;
         let part = &self.parts.0[*instance];
         let values = Values::read(text, self.parts.variable(*instance, name)?, part.description());
@@ -165,9 +165,9 @@ impl Plan {
         })
     }
 
-    /// The system and a copy of it beside it: neither feeds the other, the columns are those of the system, then those of the copy.
-    /// FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by these values
-    /// alone and not by the solver's choice of steps.
+    /// The system together with a copy of it: neither feeds the other, the columns are those of the system, then those of the
+    /// copy. FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by
+    /// these values alone and not by the solver's choice of steps.
     #[must_use]
     pub fn with_copy(&self) -> Self {
         let count = self.parts.0.len();
@@ -191,8 +191,8 @@ impl Plan {
 
     /// The variable of the copy in [`with_copy`](Self::with_copy) that a target of this plan is.
     #[must_use]
-    pub fn in_copy(&self, target: &Target) -> Target {
-        Target { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
+    pub fn in_copy(&self, target: &PlanTarget) -> PlanTarget {
+        PlanTarget { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
     }
 
     /// Whether the master integrates an FMU (Model Exchange).
@@ -205,7 +205,7 @@ impl Plan {
         self.grid.settings()
     }
 
-    /// The name of an FMU of which a process can have one instance only, if there is one: then there is one worker.
+    /// The name of an FMU that allows only one instance per process, if there is one; then there is one worker.
     pub fn only_one_instance(&self) -> Option<&str> {
         let flag = |interface: &Interface| interface.flag("canBeInstantiatedOnlyOncePerProcess");
         let interface = |part: &Part| match part.kind {
@@ -216,10 +216,10 @@ impl Plan {
         self.parts.0.iter().find(only_one).map(|part| part.name.as_str())
     }
 
-    /// Makes a worker that runs this plan on one thread.
+    /// Creates a worker that runs this plan on one thread.
     ///
     /// # Errors
-    /// An FMU refuses to make an instance.
+    /// An FMU refuses an instance.
     pub fn worker(self: &Arc<Self>) -> Result<Worker, Error> {
         let mut worker = Worker {
             plan: self.clone(),
@@ -236,7 +236,7 @@ impl Plan {
 
 /// Runs a plan again and again.
 pub struct Worker {
-    plan: Arc<Plan>,
+    plan: Arc<SystemPlan>,
     /// Empty after an error.
     instances: Vec<Instance>,
     /// Generation of the FMU of each instance.
@@ -248,18 +248,18 @@ pub struct Worker {
 
 impl Worker {
     /// The plan that this runs.
-    pub fn plan(&self) -> &Arc<Plan> {
+    pub fn plan(&self) -> &Arc<SystemPlan> {
         &self.plan
     }
 
-    /// Runs from start to stop with these values in addition to those that were set in the system. `hook` sees the time and the
-    /// recorded values of every communication point, and may end the run. A run does not depend on those before it.
+    /// Runs from start to stop with these values in addition to those set in the system. `hook` sees the time and the recorded
+    /// values of every communication point, and may end the run. A run does not depend on those before it.
     ///
     /// # Errors
     /// An FMU refuses a value or a call. The next run has new instances.
     pub fn run<'a>(
         &mut self,
-        values: impl IntoIterator<Item = (&'a Target, f64)>,
+        values: impl IntoIterator<Item = (&'a PlanTarget, f64)>,
         mut hook: impl FnMut(f64, &[f64]) -> ControlFlow<()>,
     ) -> Result<Ended, Error> {
         self.refresh()?;
@@ -278,7 +278,7 @@ impl Worker {
     ///
     /// # Errors
     /// As for [`run`](Self::run).
-    pub fn record<'a>(&mut self, values: impl IntoIterator<Item = (&'a Target, f64)>) -> Result<Recording, Error> {
+    pub fn record<'a>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> Result<Recording, Error> {
         let mut recording = Recording::new(self.plan.columns.iter().cloned());
         let ended = self.run(values, |time, values| {
             recording.push(time, values);
@@ -288,12 +288,12 @@ impl Worker {
         Ok(recording)
     }
 
-    /// Makes new instances, for an FMU whose reset leaves something behind.
+    /// Creates new instances, for an FMU whose reset is incomplete.
     ///
     /// # Errors
     /// An FMU refuses.
     pub fn renew(&mut self) -> Result<(), Error> {
-        // Before the new ones: of some FMUs there can be one at a time.
+        // Dropped before the new ones: some FMUs allow only one instance at a time.
         self.instances.clear();
         self.generations.clear();
         for (part, live) in self.plan.parts.0.iter().zip(self.plan.live.iter()) {
@@ -305,7 +305,7 @@ impl Worker {
         Ok(())
     }
 
-    /// Instances as after instantiation, with the values of the system.
+    /// Instances in their state after instantiation, with the values of the system.
     fn refresh(&mut self) -> Result<(), Error> {
         let Self { plan, instances, generations, .. } = self;
         let mut lost = instances.len() < plan.parts.0.len();
@@ -317,7 +317,7 @@ impl Worker {
             // Drops the messages of earlier runs.
             drop(instance.take_messages());
         }
-        // An FMU that cannot be reset runs all the same.
+        // An FMU that cannot be reset still runs.
         if lost || (self.used && instances.iter_mut().any(|instance| instance.reset().is_err())) {
             self.renew()?;
         }
@@ -330,8 +330,8 @@ impl Worker {
         Ok(())
     }
 
-    fn set<'a>(&mut self, values: impl IntoIterator<Item = (&'a Target, f64)>) -> Result<(), Error> {
-        for (Target { port, written }, value) in values {
+    fn set<'a>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> Result<(), Error> {
+        for (PlanTarget { port, written }, value) in values {
             let instance = &mut self.instances[port.instance];
             let outcome = if port.base == BaseType::Float64 {
                 instance.set_reals(&[port.reference], &[value])
@@ -350,7 +350,7 @@ impl Worker {
         for ((live, generation), instance) in self.plan.live.iter().zip(&self.generations).zip(&self.instances) {
             let mut fmu = live.fmu();
             if instance.is_dead() && live.generation() == *generation {
-                // If that fails, new instances of the old binary will tell what is wrong.
+                // If that fails, new instances of the old binary will report the fault.
                 if let Ok(again) = fmu.open_again() {
                     *fmu = again;
                     live.generation.fetch_add(1, Ordering::Release);

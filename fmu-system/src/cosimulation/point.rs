@@ -4,8 +4,8 @@ use super::exchange::Exchange;
 use fmu_import::{Error, Instance, Message};
 use std::ops::ControlFlow;
 
-/// A communication point, as a hook sees it: outputs are read, inputs are set, the step is to come.
-pub struct Point<'a> {
+/// A communication point as seen by a hook: outputs are read, inputs are set, the step has not been taken.
+pub struct CommunicationPoint<'a> {
     /// Number of the point, from 0.
     pub index: u32,
     /// Time in s.
@@ -17,8 +17,8 @@ pub struct Point<'a> {
     pub(super) touched: bool,
 }
 
-impl Point<'_> {
-    /// An instance by its name: to read more, or to set what is not connected.
+impl CommunicationPoint<'_> {
+    /// An instance by its name: to read further variables, or to set unconnected ones.
     pub fn instance(&mut self, name: &str) -> Option<&mut Instance> {
         self.touched = true;
         self.instances.iter_mut().find(|i| i.name() == name)
@@ -30,21 +30,21 @@ impl Point<'_> {
     }
 }
 
-/// How a run ended.
+/// The end of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ended {
     /// Time of the last communication point in s.
     pub time: f64,
-    /// The instance that asked to end the simulation, if one did.
+    /// The instance that requested the end of the simulation, if any.
     pub by: Option<String>,
 }
 
-/// The last point of a run that an instance has ended after the point `ended`: outputs are read, nothing is set.
+/// The last point of a run that an instance has ended: outputs are read, nothing is set.
 pub(super) fn end(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     (index, time): (u32, f64),
     ended: &mut Ended,
 ) -> Result<(), Error> {
@@ -52,8 +52,8 @@ pub(super) fn end(
         ended.time = time;
         exchange.read_all(instances)?;
         exchange.row(time, row);
-        // The run is over, whatever the hook says.
-        hook(&mut Point { index, time, values: row, instances, touched: false }).map(drop)?;
+        // The run is over, regardless of the hook's result.
+        hook(&mut CommunicationPoint { index, time, values: row, instances, touched: false }).map(drop)?;
     }
     Ok(())
 }

@@ -45,11 +45,11 @@ pub struct TextColumn {
 pub struct Recording {
     /// The communication points in s.
     pub time: Vec<f64>,
-    /// The recorded variables, in the order they were asked for.
+    /// The recorded variables, in the order of the requests.
     pub columns: Vec<Column>,
-    /// The recorded texts, in the order they were asked for.
+    /// The recorded texts, in the order of the requests.
     pub texts: Vec<TextColumn>,
-    /// The instance that asked to end the simulation, if one did.
+    /// The instance that requested the end of the simulation, if any.
     pub ended_by: Option<String>,
 }
 
@@ -68,8 +68,8 @@ impl Recording {
         self.columns.iter().find(|c| c.name == name)
     }
 
-    /// Comma-separated, one header line; every number reads back to the same double. Texts follow the numbers. Names and texts are
-    /// in quotation marks where they need them (RFC 4180); control characters of names are escaped, as a terminal shows them.
+    /// Comma-separated, one header line; every number reads back to the same double. Texts follow the numbers. Names and texts
+    /// are in quotation marks where needed (RFC 4180); control characters of names are escaped, as a terminal shows them.
     ///
     /// # Errors
     /// As the writer's.
@@ -88,7 +88,7 @@ impl Recording {
 
     /// The last values as a table, with the display unit where there is one.
     pub fn last_values(&self) -> String {
-        // Longer names of other tools break their own row alone.
+        // Longer names of other tools misalign only their own row.
         let texts = || self.texts.iter().filter_map(|c| Some((c.name.as_str(), c.values.last()?)));
         let names = self.columns.iter().map(|c| c.name.as_str()).chain(texts().map(|(name, _)| name));
         let width = names.map(str::len).max().unwrap_or(0).min(200);
@@ -105,14 +105,14 @@ impl Recording {
     }
 }
 
-/// A text as CSV has it, in quotation marks where it needs them (RFC 4180).
+/// A text in CSV form, in quotation marks where needed (RFC 4180).
 pub fn cell(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// The name of the value `x` among those of an enumeration.
 pub fn item(items: &[(i64, String)], x: f64) -> Option<&str> {
-    #[expect(clippy::cast_precision_loss, reason = "as the column has it")]
+    #[expect(clippy::cast_precision_loss, reason = "as in the column")]
     let named = items.iter().find(|(value, _)| (*value as f64).to_bits() == x.to_bits());
     named.map(|(_, name)| name.as_str())
 }

@@ -3,32 +3,39 @@
 use super::exchange::Exchange;
 use super::grid::{Grid, Settings};
 use super::method::Method;
-use super::point::{Ended, Point, end};
+use super::point::{CommunicationPoint, Ended, end};
 use super::recording::{Recording, TextColumn};
 use super::system::System;
 use super::{continuous, events};
 use fmu_import::{Error, Instance, Kind};
 use std::ops::ControlFlow;
 
-/// Simulates instances that have their values, from start to stop. `hook` sees every communication point, the last one
-/// included, and may end the run. All runs begin and end here.
+/// Simulates instances whose values are set, from start to stop. `hook` sees every communication point, the last one included,
+/// and may end the run. All runs begin and end here.
 pub(super) fn simulate(
     method: &Method,
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
     let kinds: Vec<Kind> = instances.iter().map(Instance::kind).collect();
     method.check(&kinds, settings.sequential)?;
     exchange.begin();
     for instance in instances.iter_mut() {
-        instance.setup(settings.start, Some(settings.stop))?;
+        let tolerance = match method {
+            // Of the algorithms inside an FMU that our solver calls.
+            Method::ModelExchange(integration) if instance.kind() == Kind::ModelExchange => {
+                integration.solver.tolerance()
+            }
+            _ => grid.tolerance.or(instance.description().default_experiment.tolerance),
+        };
+        instance.setup_with(settings.start, Some(settings.stop), tolerance)?;
         instance.enter_initialization()?;
     }
-    // An initial output may depend on an input, through as many FMUs as there are.
+    // An initial output may depend on an input through any number of FMUs.
     for _ in 0..instances.len() {
         exchange.read_all(instances)?;
         exchange.write_all(instances, settings.start)?;
@@ -55,7 +62,7 @@ fn step(
     exchange: &mut Exchange,
     grid: &Grid,
     row: &mut Vec<f64>,
-    hook: &mut impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+    hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
     let (mut ended, mut last) = (Ended { time: settings.start, by: None }, f64::INFINITY);
@@ -67,7 +74,7 @@ fn step(
         if index < grid.steps() {
             exchange.write_all(instances, time)?;
         }
-        let flow = hook(&mut Point { index, time, values: row, instances, touched: false })?;
+        let flow = hook(&mut CommunicationPoint { index, time, values: row, instances, touched: false })?;
         if flow.is_break() || index == grid.steps() {
             break;
         }
@@ -96,28 +103,43 @@ impl System {
     /// Simulates from start to stop. `hook` sees every communication point, the last one included, and may end the run.
     ///
     /// # Errors
-    /// The settings make no sense, or an FMU refuses.
+    /// The settings are invalid, or an FMU refuses.
     pub fn run(
         &mut self,
         settings: &Settings,
-        mut hook: impl FnMut(&mut Point<'_>) -> Result<ControlFlow<()>, Error>,
+        hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> Result<Recording, Error> {
-        let grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
-        let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
+        let (recording, outcome) = self.run_keeping(settings, hook);
+        outcome.map(|()| recording)
+    }
+
+    /// Like [`run`](Self::run); the recording ends before an error.
+    pub fn run_keeping(
+        &mut self,
+        settings: &Settings,
+        mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
+    ) -> (Recording, Result<(), Error>) {
         let mut recording = Recording::new(self.columns());
         recording.texts =
             self.texts.iter().map(|(_, name)| TextColumn { name: name.clone(), values: vec![] }).collect();
+        let grid = match self.grid(settings) {
+            Ok(grid) => grid,
+            Err(error) => return (recording, Err(error)),
+        };
+        let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
         let texts = &self.texts;
         let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
-            recording.push(point.time, point.values);
-            for ((port, _), column) in texts.iter().zip(&mut recording.texts) {
+            // Texts first: where one cannot be read, no column is longer than another.
+            let mut cells = Vec::with_capacity(texts.len());
+            for (port, _) in texts {
                 let (_, count) = port.element.unwrap_or((0, 1));
-                let value = point.instances[port.instance].get_at(port.base, port.reference, count)?;
-                column.values.push(value.cell());
+                cells.push(point.instances[port.instance].get_at(port.base, port.reference, count)?.cell());
             }
+            recording.push(point.time, point.values);
+            recording.texts.iter_mut().zip(cells).for_each(|(column, cell)| column.values.push(cell));
             hook(point)
-        })?;
-        recording.ended_by = ended.by;
-        Ok(recording)
+        });
+        let outcome = ended.map(|ended| recording.ended_by = ended.by);
+        (recording, outcome)
     }
 }

@@ -9,7 +9,7 @@ use std::fmt;
 pub struct Schedule {
     points: Vec<(f64, f64)>,
     linear: bool,
-    /// Unit of each value, where one has a unit; empty is that of the variable.
+    /// Unit of each value, if any has a unit; empty means that of the variable.
     units: Vec<String>,
 }
 
@@ -20,7 +20,7 @@ impl Schedule {
     /// Steps: each value holds from its time (s) on; before the first, the first value holds.
     ///
     /// # Errors
-    /// There is no point, a number is not finite, or times do not rise.
+    /// There is no point, a number is not finite, or times do not increase.
     pub fn steps(points: Vec<(f64, f64)>) -> Result<Self, String> {
         Self::new(points, false)
     }
@@ -46,7 +46,7 @@ impl Schedule {
         Ok(Self { points, linear, units: Vec::new() })
     }
 
-    /// Lines whose value jumps where two points have one time; the times do not fall.
+    /// Lines whose value jumps where two points have the same time; the times do not decrease.
     pub(super) fn jumping(points: Vec<(f64, f64)>, unit: &str) -> Result<Self, String> {
         if let Some((t, x)) = points.iter().find(|(_, x)| !x.is_finite()) {
             return Err(format!("{t}:{x} is not finite"));
@@ -74,7 +74,7 @@ impl Schedule {
     /// `0:0,0.1:52.36` for steps, `0:0~0.1:500rpm` for straight lines; a single number is a constant.
     ///
     /// # Errors
-    /// Names what is not a point; otherwise those of [`steps`](Self::steps).
+    /// Names the text that is not a point; otherwise those of [`steps`](Self::steps).
     pub fn parse(text: &str) -> Result<Self, String> {
         let linear = text.contains('~');
         if linear && text.contains(',') {
@@ -117,6 +117,15 @@ impl Schedule {
     /// one, and do not change before it.
     pub(super) fn held(&self, since: f64, t: f64) -> f64 {
         self.at(if self.linear { t } else { since })
+    }
+
+    /// Times (s) at which the value jumps.
+    pub(super) fn jumps(&self) -> impl Iterator<Item = f64> {
+        let linear = self.linear;
+        let jumps = move |pair: &&[(f64, f64)]| {
+            pair[0].1.to_bits() != pair[1].1.to_bits() && (!linear || pair[1].0 <= pair[0].0)
+        };
+        self.points.windows(2).filter(jumps).map(|pair| pair[1].0)
     }
 
     /// Time (s) of the first point after `t`.

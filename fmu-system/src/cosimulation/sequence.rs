@@ -1,4 +1,4 @@
-//! Values over time as a user writes them: of an input of any type, each held from its time on.
+//! User input of values over time, for an input of any type; each value is held from its time on.
 
 use super::schedule::{SAME, Schedule, last_before};
 use fmu_import::Values;
@@ -6,12 +6,12 @@ use model_description::{ModelDescription, ModelVariable};
 use std::path::Path;
 use std::sync::Arc;
 
-/// Texts over time: values of a variable whose type is not known yet.
+/// Texts over time: values of a variable whose type is not yet known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sequence {
-    /// Time (s), text, and where it stands.
+    /// Time (s), text, and its location in the file.
     points: Vec<(f64, String, String)>,
-    /// Unit of all values; empty is that of the variable.
+    /// Unit of all values; empty means that of the variable.
     unit: String,
 }
 
@@ -20,7 +20,7 @@ impl Sequence {
     /// only if a time and a colon follow it.
     ///
     /// # Errors
-    /// Names what is not a point; times that do not rise.
+    /// Names the text that is not a point, or the times that do not increase.
     pub fn parse(text: &str) -> Result<Self, String> {
         let time = |part: &str| part.split_once(':').and_then(|(t, _)| t.trim().parse::<f64>().ok());
         if time(text).is_none() {
@@ -39,8 +39,8 @@ impl Sequence {
         Self::new(points, String::new())
     }
 
-    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
-    /// `speed_ref [rpm]`. A cell may be in quotation marks (RFC 4180).
+    /// The columns of a CSV file: the first is time in s, or in another unit as in `time [ms]`; the header of each other names its
+    /// input, as in `speed_ref` or `speed_ref [rpm]`. A cell may be in quotation marks (RFC 4180).
     ///
     /// # Errors
     /// The file cannot be read, has no header, or a row does not have as many cells as the header.
@@ -59,7 +59,8 @@ impl Sequence {
                 first + 1
             ));
         }
-        let names: Vec<String> = cells(header).into_iter().skip(1).collect();
+        let mut names = cells(header);
+        let second = seconds(&names.remove(0)).map_err(|cause| format!("line {}: {cause}", first + 1))?;
         if names.is_empty() {
             return Err("has no column but time".into());
         }
@@ -75,16 +76,11 @@ impl Sequence {
             let mut row = row.into_iter();
             let time = row.next().unwrap_or_default();
             let t = time.parse::<f64>().map_err(|_| format!("{at}{time:?} is not a number"))?;
-            columns.iter_mut().zip(row).for_each(|(column, cell)| column.push((t, cell, at.clone())));
+            columns.iter_mut().zip(row).for_each(|(column, cell)| column.push((t * second, cell, at.clone())));
         }
         let column = |(name, points): (String, Vec<_>)| {
-            let (name, unit) = match name.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
-                Some((name, unit)) if unit.trim().parse::<f64>().is_err() && !unit.contains(',') => {
-                    (name.trim_end().to_owned(), unit.trim().to_owned())
-                }
-                _ => (name, String::new()),
-            };
-            Ok((name, Self::new(points, unit)?))
+            let (name, unit) = name_and_unit(&name);
+            Ok((name.to_owned(), Self::new(points, unit.to_owned())?))
         };
         names.into_iter().zip(columns).map(column).collect()
     }
@@ -102,7 +98,7 @@ impl Sequence {
         }
     }
 
-    /// The texts as numbers, which lines connect; a time that comes twice is a jump.
+    /// The texts as numbers, connected by lines; a time that occurs twice is a jump.
     ///
     /// # Errors
     /// Names the first text that is not a number, and its line.
@@ -125,12 +121,31 @@ impl Sequence {
         let value = |(t, text, at): &(f64, String, String)| {
             let number = |_: &String| Values::from_number(text.trim().parse().ok()?, variable.base).ok();
             let read = Values::read(text, variable, description);
-            // Tools write integers and truth values as 1.0 too.
+            // Tools also write integers and truth values as 1.0.
             let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));
             values.map(|values| (*t, values))
         };
         Ok(Held(self.points.iter().map(value).collect::<Result<_, _>>()?))
     }
+}
+
+/// `speed_ref [rpm]` as name and unit, which is empty for none. Brackets with numbers name an element of an array.
+fn name_and_unit(heading: &str) -> (&str, &str) {
+    match heading.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
+        Some((name, unit)) if unit.trim().parse::<f64>().is_err() && !unit.contains(',') => {
+            (name.trim_end(), unit.trim())
+        }
+        _ => (heading, ""),
+    }
+}
+
+/// The unit of the first column in s.
+fn seconds(heading: &str) -> Result<f64, String> {
+    const UNITS: [(&str, f64); 7] =
+        [("", 1.0), ("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
+    let (_, unit) = name_and_unit(heading);
+    let known = UNITS.iter().find(|(name, _)| *name == unit).map(|(_, second)| *second);
+    known.ok_or_else(|| format!("{heading}: the first column is time, in s, ms, us, ns, min or h"))
 }
 
 impl Schedule {
@@ -164,6 +179,10 @@ impl Held {
     }
 
     /// Time (s) of the first value after `t`.
+    pub(super) fn times(&self) -> impl Iterator<Item = f64> {
+        self.0.iter().skip(1).map(|(t, _)| *t)
+    }
+
     pub(super) fn next_point(&self, t: f64) -> Option<f64> {
         self.0.get(last_before(&self.0, t)).map(|(time, _)| *time)
     }

@@ -1,14 +1,38 @@
 //! FMUs and their connections, before a run.
 
 use super::exchange::{Source, Wiring};
+use super::grid::{Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port, kind};
 use super::point::take_messages;
 use super::schedule::Schedule;
 use super::sequence::Sequence;
 use fmu_core::Need;
-use fmu_import::{Error, Fmu, Instance, Message, Values};
-use model_description::{BaseType, Causality, ModelVariable, Variability};
+use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
+use model_description::{
+    BaseType, Causality, Conversion, Interface, Measured, ModelVariable, Passage, Variability, parse_number,
+};
+
+/// What a connection between different units does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Units {
+    /// It converts the number.
+    #[default]
+    Convert,
+    /// It passes the number on as it is.
+    PassOn,
+}
+
+/// How a value gets from an output to an input.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Crossing<'a> {
+    /// Whether units are converted.
+    pub units: Units,
+    /// Units of source and target, for an FMU that names none.
+    pub stated: [Option<Measured<'a>>; 2],
+    /// Conversion after that of the units.
+    pub transformation: Option<Conversion>,
+}
 
 /// FMUs and their connections.
 #[derive(Default)]
@@ -18,19 +42,107 @@ pub struct System {
     /// One of each part.
     pub(super) instances: Vec<Instance>,
     pub(super) wiring: Wiring,
-    /// Values that were set from outside.
+    /// Values set by the user.
     pub(super) set: Vec<(Port, Values)>,
     pub(super) records: Vec<Port>,
     /// Names of the recorded columns.
     pub(super) columns: Vec<String>,
     /// Texts that a single run records, with the names of their columns.
     pub(super) texts: Vec<(Port, String)>,
+    units: Units,
+    tolerance: Option<f64>,
+    notes: Vec<String>,
 }
 
 impl System {
-    /// A system that is run by this method.
+    /// A system to be run by this method.
     pub fn new(method: Method) -> Self {
         Self { method, ..Self::default() }
+    }
+
+    /// The system with other connections from here on: by default they convert units.
+    #[must_use]
+    pub fn with_units(self, units: Units) -> Self {
+        Self { units, ..self }
+    }
+
+    /// The system with this relative tolerance for the solvers inside FMUs for Co-Simulation; by default each has that of its default
+    /// experiment.
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// What connections between different units do.
+    pub fn units(&self) -> Units {
+        self.units
+    }
+
+    /// How the system is run.
+    pub fn method(&self) -> &Method {
+        &self.method
+    }
+
+    /// The settings that the FMUs can follow: where one cannot vary its step (`canHandleVariableCommunicationStepSize` is false), no
+    /// shorter last step. What that changes is a [note](Self::take_notes), and so is a step that an FMU's `fixedInternalStepSize`
+    /// does not divide, and an input that jumps between two communication points.
+    ///
+    /// # Errors
+    /// The settings make no sense, or leave no step.
+    pub fn feasible(&mut self, settings: &Settings) -> Result<Settings, Error> {
+        let wrong = |cause| Error::usage("settings", cause);
+        let grid = settings.grid().map_err(wrong)?;
+        let stepping = |i: &Instance| match i.kind() {
+            Kind::CoSimulation { .. } => i.description().co_simulation.clone().map(|of| (i.name().to_owned(), of)),
+            Kind::ModelExchange => None,
+        };
+        let interfaces: Vec<(String, Interface)> = self.instances.iter().filter_map(stepping).collect();
+        for (name, interface) in &interfaces {
+            let internal = interface.attribute("fixedInternalStepSize").and_then(parse_number).filter(|h| *h > 0.0);
+            let count = internal.map_or(1.0, |internal| settings.step / internal);
+            if count < 0.5 || (count - count.round()).abs() > 1e-6 * count {
+                let h = internal.unwrap_or_default();
+                let cause = format!(
+                    "its fixedInternalStepSize is {h} s, and the step of {} s is not a multiple",
+                    settings.step
+                );
+                self.notes.push(format!("{name}: {cause}"));
+            }
+        }
+        let late = self.wiring.jumps().filter_map(|(port, times)| {
+            let instance = &self.instances[port.instance];
+            let stepped = matches!(instance.kind(), Kind::CoSimulation { event_mode: false, .. });
+            let (t, after) = times.into_iter().find_map(|t| Some((t, grid.after(t)?))).filter(|_| stepped)?;
+            let cause = format!("the value of {t} s, between two communication points, acts from {after} s on");
+            Some(format!("{}.{}: {cause}", instance.name(), port.name))
+        });
+        let late: Vec<String> = late.collect();
+        self.notes.extend(late);
+        let fixed = interfaces.iter().find(|(_, of)| !of.flag("canHandleVariableCommunicationStepSize"));
+        let (Some((name, _)), Some(shorter)) = (fixed, grid.without_short_step()) else { return Ok(*settings) };
+        let cause = format!("{name} cannot vary its step (canHandleVariableCommunicationStepSize is false)");
+        if shorter.stop <= shorter.start {
+            return Err(wrong(format!("{cause}, and the simulation is shorter than one step of {} s", settings.step)));
+        }
+        self.notes.push(format!("{cause}: the simulation ends with the last whole step, at {} s", shorter.stop));
+        Ok(shorter)
+    }
+
+    /// The communication points of a run.
+    pub(super) fn grid(&mut self, settings: &Settings) -> Result<Grid, Error> {
+        let mut grid = self.feasible(settings)?.grid().map_err(|cause| Error::usage("settings", cause))?;
+        grid.tolerance = self.tolerance;
+        Ok(grid)
+    }
+
+    /// Adds a note.
+    pub(crate) fn note(&mut self, text: String) {
+        self.notes.push(text);
+    }
+
+    /// What was noticed since the last call: units that are not known.
+    pub fn take_notes(&mut self) -> Vec<String> {
+        std::mem::take(&mut self.notes)
     }
 
     /// Adds an instance of an FMU.
@@ -70,11 +182,11 @@ impl System {
         Ok(self.parts.causality(&self.parts.port(port)?) == Causality::StructuralParameter)
     }
 
-    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode. Arrays
-    /// have other sizes then, so this comes before everything that names variables; values that were set are set again.
+    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode.
+    /// Arrays then have other sizes, so call this before anything that names variables; values already set are set again.
     ///
     /// # Errors
-    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, an array that was set has
+    /// A variable does not exist or is not a structural parameter, a text is not a value of its type, an array already set has
     /// another size now, or the FMU refuses.
     pub fn configure<'a>(&mut self, sizes: impl IntoIterator<Item = (&'a str, &'a str)>) -> Result<(), Error> {
         let mut changed = vec![false; self.instances.len()];
@@ -96,8 +208,9 @@ impl System {
         Ok(())
     }
 
-    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. An element of an array
-    /// leaves the others as they were set, or as they start. [`configure`](Self::configure) sets several structural parameters.
+    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. Setting an element
+    /// of an array keeps the set or start values of the others. [`configure`](Self::configure) sets several structural
+    /// parameters.
     ///
     /// # Errors
     /// The variable does not exist, the text is not a value of its type, or the FMU refuses.
@@ -128,19 +241,57 @@ impl System {
         Ok(())
     }
 
-    /// Connects an output to an input, both written `instance.variable`.
+    /// Connects an output to an input, both written `instance.variable`. A number in another unit of the same quantity is converted
+    /// (see [`with_units`](Self::with_units)); without a unit on one side it passes unchanged, with a [note](Self::take_notes).
     ///
     /// # Errors
-    /// A variable does not exist, causalities or types do not fit, or the input is fed already.
+    /// A variable does not exist, causalities, types or units do not fit, or the input is already fed.
     pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
+        self.connect_by(from, to, &Crossing { units: self.units, ..Crossing::default() })
+    }
+
+    /// [`connect`](Self::connect), as a crossing says.
+    ///
+    /// # Errors
+    /// As [`connect`](Self::connect).
+    pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing<'_>) -> Result<(), Error> {
+        let Crossing { units, stated, transformation } = crossing;
         let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
         if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
             return Err(Error::usage(from, "is not an output"));
         }
-        if kind(source.base) != kind(target.base) {
+        let widens = matches!((kind(source.base), kind(target.base)), (Some('i'), Some('r')));
+        if kind(source.base) != kind(target.base) && !widens {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
-        self.feed(target, to, Source::Port(source))
+        self.check_fed(&target, to, false)?;
+        let conversion = match units {
+            Units::PassOn => None,
+            Units::Convert => match self.measured(from, stated[0])?.into_unit(self.measured(to, stated[1])?) {
+                Ok(Passage::Equal) => None,
+                Ok(Passage::Converted(conversion)) => Some(conversion),
+                Ok(Passage::Unknown(cause)) => {
+                    self.notes.push(format!("{from} to {to}: {cause}: the number passes unchanged"));
+                    None
+                }
+                Err(cause) => {
+                    let remedy = "connect variables of the same quantity, or pass the number without conversion";
+                    return Err(Error::usage(to, format!("cannot be fed by {from}: {cause}: {remedy}")));
+                }
+            },
+        };
+        self.feed(target, to, Source::Port(source, Conversion::then(conversion, *transformation)))
+    }
+
+    /// What is known of the unit of a variable, written `instance.variable`; what is `stated` elsewhere if its FMU names none.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn measured<'a>(&'a self, port: &str, stated: Option<Measured<'a>>) -> Result<Measured<'a>, Error> {
+        let port = self.parts.port(port)?;
+        let variable = self.parts.variable(port.instance, &port.name)?;
+        let own = self.parts.0[port.instance].description().measured(variable);
+        Ok(stated.filter(|_| own.unit.is_none()).unwrap_or(own))
     }
 
     /// Connects every input that nothing feeds to the output of the same name of another FMU; returns the connections.
@@ -188,7 +339,7 @@ impl System {
         self.feed(target, port, Source::Schedule(schedule))
     }
 
-    /// Records a variable at every communication point. A connected input is recorded as what it is connected to.
+    /// Records a variable at every communication point. A connected input is recorded as its source.
     ///
     /// # Errors
     /// The variable does not exist or is not a number.
@@ -276,7 +427,7 @@ impl System {
         Ok(self.wiring.feeds(port.instance, &port.name))
     }
 
-    /// The inputs of an instance that must be fed and are neither fed nor set: they keep their start values.
+    /// The inputs of an instance that must be fed but are neither fed nor set: they keep their start values.
     pub fn untouched(&self, instance: usize) -> Vec<&ModelVariable> {
         let reference = |name: &str| self.parts.variable(instance, name).map(|v| v.value_reference).ok();
         let touched =
@@ -291,7 +442,7 @@ impl System {
         self.instances[instance].description().variables.iter().filter(is_free).filter(needed).collect()
     }
 
-    /// The elements of an array of which `port` is one, if sizes were set: its start values are gone.
+    /// The elements of the array of `port`, if sizes were set: its start values are lost.
     fn present(&mut self, port: &Port) -> Result<Option<Values>, Error> {
         let part = &self.parts.0[port.instance];
         if part.sizes.is_empty() || port.element.is_none() {
@@ -301,7 +452,7 @@ impl System {
         self.instances[port.instance].get(name).map(Some)
     }
 
-    /// The value that was set last.
+    /// The value set last.
     fn value_set(&self, instance: usize, name: &str) -> Option<&Values> {
         let of = |(port, _): &&(Port, Values)| port.instance == instance && port.name == name;
         self.set.iter().rev().find(of).map(|(_, values)| values)

@@ -1,7 +1,8 @@
-//! Which variables are connected when two terminals are (FMI 3.0.2, 2.4.9.2).
+//! The variables connected by connecting two terminals (FMI 3.0.2, 2.4.9.2).
 //!
-//! Each side's matching rule must be content. A signal belongs to a signal, an inflow to an outflow: then both sides have the
-//! same value, and one output to one input is all that it takes. Two inflows would need the opposite sign and are refused.
+//! The matching rules of both sides must be satisfied. A signal is connected to a signal, an inflow to an outflow: both sides
+//! then have the same value, so one connection from output to input suffices. Two inflows would need opposite signs and are
+//! refused.
 
 use super::parts::Part;
 use super::system::System;
@@ -57,7 +58,7 @@ impl System {
 fn pairs(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> {
     for t in [a, b] {
         if !t.streams.is_empty() {
-            return Err(format!("{} has stream members, which take a balance and no connection", t.name));
+            return Err(format!("{} has stream members, which need a balance and not a connection", t.name));
         }
     }
     let mut pairs = match (rule(a)?, rule(b)?) {
@@ -92,7 +93,7 @@ fn pairs(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> {
             }
         }
     }
-    if pairs.is_empty() { Err("no member of the one is in the other".into()) } else { Ok(pairs) }
+    if pairs.is_empty() { Err("they have no member in common".into()) } else { Ok(pairs) }
 }
 
 fn rule(t: &Terminal) -> Result<&str, String> {
@@ -121,7 +122,7 @@ fn by_name(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> 
 mod tests {
     use super::*;
 
-    /// A terminal from its rule and `name=variable:kind`, words apart.
+    /// A terminal from its rule and `name=variable:kind`, separated by spaces.
     fn terminal(rule: &str, members: &str) -> Terminal {
         let member = |word: &str| {
             let (names, kind) = word.split_once(':').unwrap_or((word, "signal"));
@@ -142,13 +143,13 @@ mod tests {
         }
     }
 
-    fn told(a: &Terminal, b: &Terminal) -> Result<String, String> {
+    fn matched(a: &Terminal, b: &Terminal) -> Result<String, String> {
         let said = |(m, n): (Member, Member)| format!("{}-{}", m.variable, n.variable);
         Ok(pairs(a, b)?.into_iter().map(said).collect::<Vec<_>>().join(" "))
     }
 
     fn of(a: (&str, &str), b: (&str, &str)) -> Result<String, String> {
-        told(&terminal(a.0, a.1), &terminal(b.0, b.1))
+        matched(&terminal(a.0, a.1), &terminal(b.0, b.1))
     }
 
     #[test]
@@ -183,8 +184,8 @@ mod tests {
         let nested =
             |rule: &str, members: &str, inner: Vec<Terminal>| Terminal { terminals: inner, ..terminal(rule, members) };
         let one = nested("plug", "x=a", vec![terminal("plug", "y=b")]);
-        assert_eq!(told(&one, &nested("plug", "x=c", vec![terminal("plug", "y=d")])).unwrap(), "a-c b-d");
-        assert!(told(&one, &terminal("plug", "x=c")).unwrap_err().contains("there is no terminal t"));
-        assert_eq!(told(&nested("bus", "x=a", one.terminals), &terminal("plug", "x=c")).unwrap(), "a-c");
+        assert_eq!(matched(&one, &nested("plug", "x=c", vec![terminal("plug", "y=d")])).unwrap(), "a-c b-d");
+        assert!(matched(&one, &terminal("plug", "x=c")).unwrap_err().contains("there is no terminal t"));
+        assert_eq!(matched(&nested("bus", "x=a", one.terminals), &terminal("plug", "x=c")).unwrap(), "a-c");
     }
 }

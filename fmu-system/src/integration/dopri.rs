@@ -4,7 +4,7 @@
 //! output and step control: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer
 //! 1993, II.4 to II.6. The last stage is the derivative at the end, with which the next step begins.
 
-use super::hybrid::{Hybrid, Trial};
+use super::hybrid::{HybridSystem, TrialError};
 use super::steps::Step;
 
 /// Weights of the result.
@@ -24,7 +24,7 @@ const D: [f64; 7] = [
 ];
 
 /// Steps from `step.t` to `step.t_end`.
-pub(super) fn step<H: Hybrid>(system: &mut H, step: &mut Step) -> Result<(), Trial> {
+pub(super) fn step<H: HybridSystem>(system: &mut H, step: &mut Step) -> Result<(), TrialError> {
     step.stage(system, 0, 1.0 / 5.0, &[1.0 / 5.0])?;
     step.stage(system, 1, 3.0 / 10.0, &[3.0 / 40.0, 9.0 / 40.0])?;
     step.stage(system, 2, 4.0 / 5.0, &[44.0 / 45.0, -56.0 / 15.0, 32.0 / 9.0])?;
@@ -41,7 +41,7 @@ fn slopes(step: &Step, i: usize) -> [f64; 7] {
     [step.f[i], a, b, c, d, e, step.f_end[i]]
 }
 
-/// The error estimate relative to the tolerance, root mean square over the states: a step with at most 1 is good.
+/// The error estimate relative to the tolerance, root mean square over the states: a step with at most 1 is accepted.
 pub(super) fn error(step: &Step, rtol: f64, nominals: &[f64]) -> f64 {
     let h = step.t_end - step.t;
     let of = |(i, nominal): (usize, &f64)| {

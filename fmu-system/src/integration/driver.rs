@@ -1,22 +1,22 @@
 //! Steps a system to communication points and handles its events.
 
-use super::hybrid::{Hybrid, Trial};
+use super::hybrid::{HybridSystem, TrialError};
 use super::locate::{crossed, first_crossing};
 use super::steps::Step;
 use super::{dopri, rk4};
 use fmu_import::Error;
 use std::ops::ControlFlow;
 
-/// Most events at one instant.
+/// Maximum number of events at one instant.
 const EVENTS: u32 = 100;
-/// Width of the interval that a state event is located in, relative to the step.
+/// Width of the interval in which a state event is located, relative to the step.
 const WIDTH: f64 = 1e-10;
 
-/// How states are integrated.
+/// The integration method.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Solver {
-    /// The classical Runge-Kutta method of order 4, with the communication step as its step; a step that an event, an input or
-    /// a communication point cuts is shorter.
+    /// The classical Runge-Kutta method of order 4, with the communication step as its step; a step cut by an event, an input
+    /// or a communication point is shorter.
     Rk4,
     /// The method of Dormand and Prince of order 5, with an adaptive step.
     Dopri {
@@ -32,18 +32,28 @@ impl Default for Solver {
     }
 }
 
-/// Why the driver stopped.
+impl Solver {
+    /// Relative tolerance, if the step is adaptive.
+    pub(crate) fn tolerance(&self) -> Option<f64> {
+        match self {
+            Self::Rk4 => None,
+            Self::Dopri { rtol } => Some(*rtol),
+        }
+    }
+}
+
+/// The reason why the driver stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
+pub enum StopReason {
     /// The target is reached.
     Target,
     /// An event was handled, at or before the target.
     Event,
-    /// The system asks to end the simulation.
+    /// The system requests the end of the simulation.
     End,
 }
 
-impl Stop {
+impl StopReason {
     fn of(flow: ControlFlow<()>, otherwise: Self) -> Self {
         if flow.is_break() { Self::End } else { otherwise }
     }
@@ -69,12 +79,12 @@ pub struct Driver {
 }
 
 impl Driver {
-    /// Begins with the event that ends the initialization; breaks if the system asks to end the simulation.
+    /// Begins with the event that ends the initialization; breaks if the system requests the end of the simulation.
     ///
     /// # Errors
     /// The system cannot handle the event.
     pub fn start(
-        system: &mut impl Hybrid,
+        system: &mut impl HybridSystem,
         solver: Solver,
         longest: f64,
         t: f64,
@@ -107,12 +117,12 @@ impl Driver {
         self.known = false;
     }
 
-    /// Integrates to the time `until`, and over an event that is at the same time but for rounding. Breaks if the system asks
-    /// to end the simulation.
+    /// Integrates to the time `until`, and over an event that differs from it only by rounding. Breaks if the system requests
+    /// the end of the simulation.
     ///
     /// # Errors
     /// The system cannot be integrated to that time.
-    pub fn run_to(&mut self, system: &mut impl Hybrid, until: f64) -> Result<ControlFlow<()>, Error> {
+    pub fn run_to(&mut self, system: &mut impl HybridSystem, until: f64) -> Result<ControlFlow<()>, Error> {
         self.all_towards(system, until, true)
     }
 
@@ -120,7 +130,7 @@ impl Driver {
     ///
     /// # Errors
     /// As for [`run_to`](Self::run_to).
-    pub fn stop_at(&mut self, system: &mut impl Hybrid, until: f64) -> Result<Stop, Error> {
+    pub fn stop_at(&mut self, system: &mut impl HybridSystem, until: f64) -> Result<StopReason, Error> {
         self.towards(system, until, true)
     }
 
@@ -128,26 +138,26 @@ impl Driver {
     ///
     /// # Errors
     /// As for [`run_to`](Self::run_to).
-    pub fn run_before(&mut self, system: &mut impl Hybrid, until: f64) -> Result<ControlFlow<()>, Error> {
+    pub fn run_before(&mut self, system: &mut impl HybridSystem, until: f64) -> Result<ControlFlow<()>, Error> {
         self.all_towards(system, until, false)
     }
 
     fn all_towards(
         &mut self,
-        system: &mut impl Hybrid,
+        system: &mut impl HybridSystem,
         until: f64,
         events_there: bool,
     ) -> Result<ControlFlow<()>, Error> {
         loop {
             match self.towards(system, until, events_there)? {
-                Stop::Target => return Ok(ControlFlow::Continue(())),
-                Stop::Event => {}
-                Stop::End => return Ok(ControlFlow::Break(())),
+                StopReason::Target => return Ok(ControlFlow::Continue(())),
+                StopReason::Event => {}
+                StopReason::End => return Ok(ControlFlow::Break(())),
             }
         }
     }
 
-    fn towards(&mut self, system: &mut impl Hybrid, until: f64, events_there: bool) -> Result<Stop, Error> {
+    fn towards(&mut self, system: &mut impl HybridSystem, until: f64, events_there: bool) -> Result<StopReason, Error> {
         loop {
             let near = near(self.step.t, until);
             let last = if events_there { until + near } else { until - near };
@@ -161,32 +171,32 @@ impl Driver {
                 }
             } else if event {
                 self.step.t = self.step.t.max(target);
-                return Ok(Stop::of(self.event(system)?, Stop::Event));
+                return Ok(StopReason::of(self.event(system)?, StopReason::Event));
             } else {
-                return Ok(Stop::Target);
+                return Ok(StopReason::Target);
             }
         }
     }
 
-    /// Handles an event at the time reached, whether the system asked for it or something outside of it has changed.
+    /// Handles an event at the time reached, requested by the system or caused by a change outside it.
     ///
     /// # Errors
     /// The system cannot handle the event.
-    pub fn interrupt(&mut self, system: &mut impl Hybrid) -> Result<ControlFlow<()>, Error> {
+    pub fn interrupt(&mut self, system: &mut impl HybridSystem) -> Result<ControlFlow<()>, Error> {
         self.event(system)
     }
 
     /// One step towards `target`, to its end or to the first state event in it, with the event there.
-    fn advance(&mut self, system: &mut impl Hybrid, target: f64) -> Result<Option<Stop>, Error> {
+    fn advance(&mut self, system: &mut impl HybridSystem, target: f64) -> Result<Option<StopReason>, Error> {
         if !self.known {
             let Step { t, x, f, .. } = &mut self.step;
-            system.derivatives(*t, x, f).map_err(Trial::into_error)?;
+            system.derivatives(*t, x, f).map_err(TrialError::into_error)?;
             self.known = true;
         }
         self.accepted_step(system, target)?;
         let mut event = false;
         if !self.z.is_empty() {
-            system.indicators(self.step.t_end, &self.step.x_end, &mut self.z_end).map_err(Trial::into_error)?;
+            system.indicators(self.step.t_end, &self.step.x_end, &mut self.z_end).map_err(TrialError::into_error)?;
             event = crossed(&self.z, &self.z_end);
         }
         if event {
@@ -196,14 +206,14 @@ impl Driver {
         std::mem::swap(&mut self.z, &mut self.z_end);
         let completed = system.completed_step(self.step.t, &self.step.x)?;
         if completed.terminate {
-            return Ok(Some(Stop::End));
+            return Ok(Some(StopReason::End));
         }
         let event = event || completed.enter_event_mode;
-        if event { Ok(Some(Stop::of(self.event(system)?, Stop::Event))) } else { Ok(None) }
+        if event { Ok(Some(StopReason::of(self.event(system)?, StopReason::Event))) } else { Ok(None) }
     }
 
-    /// A step that the system computes and whose error is small enough.
-    fn accepted_step(&mut self, system: &mut impl Hybrid, target: f64) -> Result<(), Error> {
+    /// A step that the system can compute and whose error is small enough.
+    fn accepted_step(&mut self, system: &mut impl HybridSystem, target: f64) -> Result<(), Error> {
         let t = self.step.t;
         let rest = target - t;
         let mut h = match self.solver {
@@ -213,7 +223,7 @@ impl Driver {
         };
         let mut may_grow = true;
         loop {
-            // A millionth more is rounding.
+            // An excess of a millionth is rounding.
             let whole = h >= rest * (1.0 - 1e-6);
             self.step.t_end = if whole { target } else { t + h };
             let size = self.step.t_end - t;
@@ -227,13 +237,13 @@ impl Driver {
                 Ok(error) if error <= 1.0 => {
                     let factor = dopri::factor(error);
                     let next = size * if may_grow { factor } else { factor.min(1.0) };
-                    // A step that only a target cut says nothing against the size before.
+                    // A step cut only by a target does not reduce the previous size.
                     self.proposed = if whole && self.proposed.is_finite() { next.max(self.proposed) } else { next };
                     return Ok(());
                 }
                 Ok(error) => size * dopri::factor(error).min(0.9),
-                Err(Trial::Discard(_)) => 0.5 * size,
-                Err(Trial::Stop(error)) => return Err(error),
+                Err(TrialError::Discard(_)) => 0.5 * size,
+                Err(TrialError::Stop(error)) => return Err(error),
             };
             may_grow = false;
             self.proposed = h;
@@ -260,7 +270,7 @@ impl Driver {
     }
 
     /// Ends the step just behind the first state event in it.
-    fn cut_at_crossing(&mut self, system: &mut impl Hybrid) -> Result<(), Error> {
+    fn cut_at_crossing(&mut self, system: &mut impl HybridSystem) -> Result<(), Error> {
         let Self { step, z, z_end, solver, .. } = self;
         let (t, h) = (step.t, step.t_end - step.t);
         let interpolate = match solver {
@@ -271,7 +281,7 @@ impl Driver {
         let width = WIDTH.max(4.0 * f64::EPSILON * t.abs().max(step.t_end.abs()) / h);
         let theta = first_crossing(z, z_end, width, |theta, z| {
             interpolate(step, theta, &mut x);
-            system.indicators(t + theta * h, &x, z).map_err(Trial::into_error)
+            system.indicators(t + theta * h, &x, z).map_err(TrialError::into_error)
         })?;
         if theta < 1.0 {
             interpolate(step, theta, &mut x);
@@ -281,8 +291,8 @@ impl Driver {
         Ok(())
     }
 
-    /// Handles the event at this time, and begins anew.
-    fn event(&mut self, system: &mut impl Hybrid) -> Result<ControlFlow<()>, Error> {
+    /// Handles the event at this time, and restarts.
+    fn event(&mut self, system: &mut impl HybridSystem) -> Result<ControlFlow<()>, Error> {
         let t = self.step.t;
         self.events = if t - self.last_event <= near(t, t) { self.events + 1 } else { 1 };
         self.last_event = t;
@@ -297,7 +307,7 @@ impl Driver {
             return Err(Error::usage(&system.name(t), format!("more than {EVENTS} events at t = {t} s{next}")));
         }
         if !self.z.is_empty() {
-            system.indicators(t, &self.step.x, &mut self.z).map_err(Trial::into_error)?;
+            system.indicators(t, &self.step.x, &mut self.z).map_err(TrialError::into_error)?;
         }
         Ok(ControlFlow::Continue(()))
     }

@@ -2,15 +2,15 @@
 
 use fmu_import::{CompletedStep, Error, Update};
 
-/// Why a trial evaluation has no result.
-pub enum Trial {
-    /// The point is outside of what the system can compute: a shorter step may succeed.
+/// The reason why a trial evaluation has no result.
+pub enum TrialError {
+    /// The system cannot be computed at this point: a shorter step may succeed.
     Discard(Error),
     /// The run is over.
     Stop(Error),
 }
 
-impl Trial {
+impl TrialError {
     /// What it says.
     pub fn into_error(self) -> Error {
         match self {
@@ -20,7 +20,7 @@ impl Trial {
 }
 
 /// Ordinary differential equations with events.
-pub trait Hybrid {
+pub trait HybridSystem {
     /// Nominal values of the states, one for each.
     fn nominals(&self) -> &[f64];
 
@@ -34,15 +34,15 @@ pub trait Hybrid {
     ///
     /// # Errors
     /// The system cannot compute it.
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Trial>;
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), TrialError>;
 
     /// Event indicators: a change between positive and not positive is a state event.
     ///
     /// # Errors
     /// The system cannot compute it.
-    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), Trial>;
+    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), TrialError>;
 
-    /// A step ended here: asks for a step event.
+    /// A step ended here: returns whether there is a step event.
     ///
     /// # Errors
     /// The system cannot compute it.

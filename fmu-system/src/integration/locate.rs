@@ -1,4 +1,5 @@
-//! Location of a state event: the first instant in a step at which an event indicator has another sign than at its beginning.
+//! Location of a state event: the first instant in a step at which the sign of an event indicator differs from that at its
+//! beginning.
 
 use fmu_import::Error;
 

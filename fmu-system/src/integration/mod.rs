@@ -1,8 +1,8 @@
-//! Integration of ordinary differential equations with events, for Model Exchange: numerics that know no FMU.
+//! Integration of ordinary differential equations with events, for Model Exchange: numerics independent of FMUs.
 //!
-//! [`Hybrid`] is what is integrated; [`Driver`] steps it and handles its events: it lands on time events exactly, locates state
-//! events, which are changes of sign of indicators, and begins anew after each event. [`Solver`] selects how it steps:
-//! `rk4` with a fixed step, or `dopri` with a step that its error estimate controls.
+//! [`HybridSystem`] is the integrated system; [`Driver`] steps it and handles its events: it hits time events exactly, locates state
+//! events, which are changes of sign of indicators, and restarts after each event. [`Solver`] selects the method: `rk4` with a
+//! fixed step, or `dopri` with a step controlled by its error estimate.
 //!
 //! The integrators are our own: event location needs their stages and interpolants, every trial step may be discarded by an FMU,
 //! and together they are shorter than the adapters that a crate of integrators would need. Both are explicit: a stiff FMU runs
@@ -17,5 +17,5 @@ mod steps;
 #[cfg(test)]
 mod tests;
 
-pub use driver::{Driver, Solver, Stop};
-pub use hybrid::{Hybrid, Trial};
+pub use driver::{Driver, Solver, StopReason};
+pub use hybrid::{HybridSystem, TrialError};

@@ -3,11 +3,11 @@
 //! Source: E. Hairer, S. P. Nørsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., Springer 1993, table II.1.2.
 //! Between the ends of a step, the cubic Hermite polynomial of states and derivatives interpolates with order 3 (II.6).
 
-use super::hybrid::{Hybrid, Trial};
+use super::hybrid::{HybridSystem, TrialError};
 use super::steps::Step;
 
 /// Steps from `step.t` to `step.t_end`.
-pub(super) fn step<H: Hybrid>(system: &mut H, step: &mut Step) -> Result<(), Trial> {
+pub(super) fn step<H: HybridSystem>(system: &mut H, step: &mut Step) -> Result<(), TrialError> {
     step.stage(system, 0, 0.5, &[0.5])?;
     step.stage(system, 1, 0.5, &[0.0, 0.5])?;
     step.stage(system, 2, 1.0, &[0.0, 0.0, 1.0])?;

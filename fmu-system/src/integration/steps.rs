@@ -1,6 +1,6 @@
-//! One step of an integrator: what both share.
+//! One step of an integrator, shared by both methods.
 
-use super::hybrid::{Hybrid, Trial};
+use super::hybrid::{HybridSystem, TrialError};
 
 /// A step from `x` at `t`, where the derivative is `f`, to `x_end` at `t_end`, where it is `f_end`.
 pub(super) struct Step {
@@ -24,14 +24,20 @@ impl Step {
     }
 
     /// Stage `i`: the derivative at `t + c h` and the state `x + h (a_0 f + a_1 k_0 + a_2 k_1 + ...)`.
-    pub(super) fn stage(&mut self, system: &mut impl Hybrid, i: usize, c: f64, a: &[f64]) -> Result<(), Trial> {
+    pub(super) fn stage(
+        &mut self,
+        system: &mut impl HybridSystem,
+        i: usize,
+        c: f64,
+        a: &[f64],
+    ) -> Result<(), TrialError> {
         let h = self.t_end - self.t;
         combine(&mut self.trial, &self.x, h, a, &self.f, &self.k);
         system.derivatives(self.t + c * h, &self.trial, &mut self.k[i])
     }
 
     /// The end of the step, `x + h (b_0 f + b_1 k_0 + ...)`, with its derivative.
-    pub(super) fn finish(&mut self, system: &mut impl Hybrid, b: &[f64]) -> Result<(), Trial> {
+    pub(super) fn finish(&mut self, system: &mut impl HybridSystem, b: &[f64]) -> Result<(), TrialError> {
         let h = self.t_end - self.t;
         combine(&mut self.x_end, &self.x, h, b, &self.f, &self.k);
         system.derivatives(self.t_end, &self.x_end, &mut self.f_end)

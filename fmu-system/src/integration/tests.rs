@@ -17,14 +17,14 @@ struct Plain<F, Z, E> {
 }
 
 impl<F, Z, E> Plain<F, Z, E> {
-    /// A run of these systems makes some thousand calls: an integrator that goes round in a circle ends here, and does not hang.
+    /// A run of these systems makes some thousand calls: an endless loop of an integrator ends here instead of hanging.
     fn count(&mut self) {
         self.calls += 1;
-        assert!(self.calls < 1_000_000, "the integrator makes calls without end");
+        assert!(self.calls < 1_000_000, "the integrator makes an endless number of calls");
     }
 }
 
-impl<F, Z, E> Hybrid for Plain<F, Z, E>
+impl<F, Z, E> HybridSystem for Plain<F, Z, E>
 where
     F: FnMut(f64, &[f64], &mut [f64]) -> bool,
     Z: FnMut(f64, &[f64], &mut [f64]),
@@ -42,17 +42,17 @@ where
         self.indicators
     }
 
-    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Trial> {
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), TrialError> {
         self.count();
         self.evaluations += 1;
         if (self.f)(t, x, dx) {
             return Ok(());
         }
         self.discards += 1;
-        Err(Trial::Discard(Error::usage("plain", "out of range")))
+        Err(TrialError::Discard(Error::usage("plain", "out of range")))
     }
 
-    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), Trial> {
+    fn indicators(&mut self, t: f64, x: &[f64], z: &mut [f64]) -> Result<(), TrialError> {
         self.count();
         (self.z)(t, x, z);
         Ok(())
@@ -70,7 +70,7 @@ where
 }
 
 /// A system without indicators, which begins at `x`.
-fn smooth(x: Vec<f64>, f: impl FnMut(f64, &[f64], &mut [f64]) -> bool) -> impl Hybrid {
+fn smooth(x: Vec<f64>, f: impl FnMut(f64, &[f64], &mut [f64]) -> bool) -> impl HybridSystem {
     Plain {
         nominals: vec![1.0; x.len()],
         indicators: 0,
@@ -87,7 +87,7 @@ fn smooth(x: Vec<f64>, f: impl FnMut(f64, &[f64], &mut [f64]) -> bool) -> impl H
 }
 
 /// x' = v, v' = -x from (1, 0): a cosine.
-fn oscillator() -> impl Hybrid {
+fn oscillator() -> impl HybridSystem {
     smooth(vec![1.0, 0.0], |_, x, dx| {
         dx.copy_from_slice(&[x[1], -x[0]]);
         true
@@ -133,7 +133,7 @@ fn dormand_prince_has_order_5_and_its_dense_output_order_4() {
 fn both_interpolants_meet_the_ends_with_their_slopes() {
     for (step_once, interpolate) in [
         (
-            rk4::step as fn(&mut Oscillator, &mut steps::Step) -> Result<(), Trial>,
+            rk4::step as fn(&mut Oscillator, &mut steps::Step) -> Result<(), TrialError>,
             rk4::interpolate as fn(&steps::Step, f64, &mut [f64]),
         ),
         (dopri::step, dopri::interpolate),
@@ -157,7 +157,7 @@ fn both_interpolants_meet_the_ends_with_their_slopes() {
 /// The oscillator as a type.
 struct Oscillator;
 
-impl Hybrid for Oscillator {
+impl HybridSystem for Oscillator {
     fn nominals(&self) -> &[f64] {
         &[1.0, 1.0]
     }
@@ -170,12 +170,12 @@ impl Hybrid for Oscillator {
         0
     }
 
-    fn derivatives(&mut self, _: f64, x: &[f64], dx: &mut [f64]) -> Result<(), Trial> {
+    fn derivatives(&mut self, _: f64, x: &[f64], dx: &mut [f64]) -> Result<(), TrialError> {
         dx.copy_from_slice(&[x[1], -x[0]]);
         Ok(())
     }
 
-    fn indicators(&mut self, _: f64, _: &[f64], _: &mut [f64]) -> Result<(), Trial> {
+    fn indicators(&mut self, _: f64, _: &[f64], _: &mut [f64]) -> Result<(), TrialError> {
         Ok(())
     }
 
@@ -289,7 +289,7 @@ fn location_is_fast_and_sure() {
     }
 }
 
-/// Time events are met exactly, also one that is at a communication point but for rounding.
+/// Time events are hit exactly, even one that differs from a communication point only by rounding.
 #[test]
 fn time_events_are_exact() {
     let (mut k, mut events) = (0, Vec::new());
@@ -321,7 +321,7 @@ fn time_events_are_exact() {
     }
 }
 
-/// What a system cannot compute is tried with a shorter step; where no step helps, the run ends with its message.
+/// A point that the system cannot compute is tried with a shorter step; if no step helps, the run ends with its message.
 #[test]
 fn discarded_steps_are_halved() {
     // Up to t = 1 the root is real.

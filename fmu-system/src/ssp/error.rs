@@ -2,21 +2,21 @@
 
 use std::fmt::Display;
 
-/// One line that names the file and the place in it, and the cause.
+/// One line that names the file, the location in it, and the cause.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// An FMU, or what it does not have.
+    /// An FMU, or something that it lacks.
     #[error(transparent)]
     Fmu(#[from] fmu_import::Error),
-    /// An FMU that refuses what a file says.
+    /// An FMU that refuses the content of a file.
     #[error("{place}: {error}")]
     Refused {
         /// The file, and the line in it.
         place: String,
-        /// What the FMU refuses.
+        /// The refusal of the FMU.
         error: fmu_import::Error,
     },
-    /// A file or a name that makes no sense.
+    /// An invalid file or name.
     #[error("{0}")]
     Invalid(String),
 }

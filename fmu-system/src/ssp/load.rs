@@ -2,12 +2,13 @@
 
 use super::DESCRIPTION;
 use super::error::{Error, invalid};
+use super::ssm;
 use super::ssv::{self, Parameter};
-use super::structure::{Binding, Connection, ConnectionEnd, Connector, ParameterValues, Structure};
+use super::structure::{Binding, Connection, ConnectionEnd, Connector, Mapping, ParameterValues, Structure};
 use super::values::{self, Given};
-use crate::cosimulation::{Method, Schedule, Sequence, Settings, System};
+use crate::cosimulation::{Crossing, Method, Schedule, Sequence, Settings, System, Units};
 use fmu_import::{Fmu, check_entries, document, limits};
-use model_description::{Experiment, decode};
+use model_description::{Element, Experiment, Measured, Passage, decode};
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -18,11 +19,11 @@ use zip::ZipArchive;
 pub struct Loaded {
     /// Its FMUs, connected and with their values.
     pub system: System,
-    /// Default experiments: its own times, the FMUs' steps.
+    /// Default experiments: the times of the file, the steps of the FMUs.
     pub experiments: Vec<Experiment>,
     /// The connectors of an SSP's system.
     pub connectors: Connectors,
-    /// Values for names that the system does not have, which SSP 1.0 lets pass (4.4, ParameterBindings).
+    /// Values for unknown names, which SSP 1.0 allows (4.4, ParameterBindings).
     pub notes: Vec<String>,
 }
 
@@ -31,15 +32,15 @@ pub struct Loaded {
 pub struct Connectors {
     /// Names of the inputs, each with the inputs `component.variable` that it feeds.
     pub inputs: Vec<(String, Vec<String>)>,
-    /// Names of the outputs, each with the output `component.variable` that it is.
+    /// Names of the outputs, each with its source `component.variable`.
     pub outputs: Vec<(String, String)>,
 }
 
 impl Connectors {
-    /// The ports that a name to set stands for: the inputs that one of the system feeds, or the name itself.
+    /// The ports denoted by a name to set: the inputs that an input of the system feeds, or the name itself.
     ///
     /// # Errors
-    /// The system has no input of this name, which has no dot.
+    /// The name has no dot, and the system has no such input.
     pub fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
         if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
             return Ok(targets.clone());
@@ -52,8 +53,7 @@ impl Connectors {
         Ok(vec![name.to_owned()])
     }
 
-    /// The port that a name to record stands for: an output of the system, one of the inputs that one of the system feeds, or
-    /// the name itself.
+    /// The port denoted by a name to record: an output of the system, an input fed by one of the system, or the name itself.
     ///
     /// # Errors
     /// As for [`ports`](Self::ports).
@@ -75,7 +75,7 @@ impl Package<'_> {
     fn bytes(&mut self, name: &str) -> Result<Vec<u8>, Error> {
         let of = || self.path.display();
         let mut bytes = Vec::new();
-        // What the headers claim is within the limits: see `check_entries`.
+        // The sizes in the headers are within the limits: see `check_entries`.
         match self.zip.by_name(name) {
             Ok(entry) => {
                 let read = entry.take(limits::UNPACKED.most).read_to_end(&mut bytes);
@@ -97,15 +97,15 @@ impl Package<'_> {
 }
 
 impl Loaded {
-    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Paths that are relative begin in `folder`.
+    /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Relative paths begin in `folder`.
     ///
     /// # Errors
     /// As [`open`](Self::open), or an SSP file is not alone.
     pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self, Error> {
-        Self::open_files_with(files, folder, logging, |_| Method::default())
+        Self::open_files_with(files, folder, logging, |_| System::default())
     }
 
-    /// Like [`open_files`](Self::open_files), run by the method that suits the FMUs.
+    /// Like [`open_files`](Self::open_files), in a system that suits the FMUs.
     ///
     /// # Errors
     /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
@@ -113,20 +113,21 @@ impl Loaded {
         files: &[String],
         folder: &Path,
         logging: bool,
-        method: impl FnOnce(&[(String, Fmu)]) -> Method,
+        system: impl FnOnce(&[(String, Fmu)]) -> System,
     ) -> Result<Self, Error> {
         let mut fmus = Vec::new();
         for text in files {
             let (name, path) = name_and_path(text)?;
+            let (path, variant) = variant(path);
             if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ssp")) {
                 if files.len() > 1 {
                     return invalid(format!("{}: an SSP is simulated alone: its FMUs are inside", path.display()));
                 }
-                return Self::open_with(&folder.join(path), logging, method);
+                return Self::open_with(&folder.join(path), variant, logging, system);
             }
             fmus.push((name, Fmu::open(folder.join(path))?));
         }
-        let mut loaded = Self { system: System::new(method(&fmus)), ..Self::default() };
+        let mut loaded = Self { system: system(&fmus), ..Self::default() };
         for (name, fmu) in &fmus {
             loaded.experiments.push(fmu.description().default_experiment);
             loaded.system.add(name, fmu, logging)?;
@@ -134,10 +135,12 @@ impl Loaded {
         Ok(loaded)
     }
 
-    /// Times that are not given come from the files: the latest stop, the shortest step.
+    /// Missing times come from the files: the latest stop, the shortest step. A later start keeps the duration of the files.
     pub fn settings(&self, start: Option<f64>, stop: Option<f64>, step: Option<f64>, sequential: bool) -> Settings {
-        let start = start.or_else(|| self.experiments.iter().find_map(|x| x.start)).unwrap_or(0.0);
+        let usual = self.experiments.iter().find_map(|x| x.start).unwrap_or(0.0);
+        let start = start.unwrap_or(usual);
         let latest = self.experiments.iter().filter_map(|x| x.stop).reduce(f64::max);
+        let latest = latest.map(|stop| if stop > start { stop } else { start + (stop - usual) });
         let stop = stop.or(latest).unwrap_or(start + 1.0);
         let shortest = self.experiments.iter().filter_map(|x| x.step).reduce(f64::min);
         let step = step.or(shortest).unwrap_or((stop - start) / 1000.0);
@@ -147,13 +150,18 @@ impl Loaded {
     /// Opens an SSP file.
     ///
     /// # Errors
-    /// Names the file, the place in it, what is wrong and what to do.
+    /// Names the file, the location in it, the fault and the remedy.
     pub fn open(path: &Path, logging: bool) -> Result<Self, Error> {
-        Self::open_with(path, logging, |_| Method::default())
+        Self::open_with(path, DESCRIPTION, logging, |_| System::default())
     }
 
-    /// Like [`open`](Self::open), run by the method that suits the FMUs.
-    fn open_with(path: &Path, logging: bool, method: impl FnOnce(&[(String, Fmu)]) -> Method) -> Result<Self, Error> {
+    /// Like [`open`](Self::open), in a system that suits the FMUs.
+    fn open_with(
+        path: &Path,
+        description: &str,
+        logging: bool,
+        system: impl FnOnce(&[(String, Fmu)]) -> System,
+    ) -> Result<Self, Error> {
         let of = || path.display();
         let within = |cause: String| Error::Invalid(format!("{}: {cause}", of()));
         let unreadable = |e: std::io::Error| within(e.to_string());
@@ -161,9 +169,20 @@ impl Loaded {
         limits::ARCHIVE.check(file.metadata().map_err(unreadable)?.len()).map_err(within)?;
         let mut zip = ZipArchive::new(file).map_err(|e| within(format!("not a ZIP archive, or cut short: {e}")))?;
         check_entries(&mut zip).map_err(within)?;
+        let names = zip.file_names().filter_map(Result::ok).map(std::borrow::Cow::into_owned);
+        let mut variants: Vec<String> =
+            names.filter(|name| Path::new(name).extension().is_some_and(|e| e == "ssd")).collect();
+        variants.sort_unstable();
+        if !variants.iter().any(|name| name == description) && !variants.is_empty() {
+            let (all, file) = (variants.join(", "), path.file_name().unwrap_or_default().display());
+            return Err(within(format!(
+                "has no {description}; its variants are {all}: name one, as in {file}#{}",
+                variants[0]
+            )));
+        }
         let mut package = Package { path, zip };
-        let text = package.text(DESCRIPTION)?;
-        let in_description = |cause: String| within(format!("{DESCRIPTION}: {cause}"));
+        let text = package.text(description)?;
+        let in_description = |cause: String| within(format!("{description}: {cause}"));
         let structure = Structure::read(&text).map_err(in_description)?;
         let mut fmus = Vec::new();
         let temporary = |e: std::io::Error| within(format!("no temporary folder: {e}"));
@@ -174,18 +193,18 @@ impl Loaded {
             let fmu = Fmu::open(&fmu).map_err(|e| within(format!("{}: {}", component.source, e.cause())))?;
             fmus.push((component.name.clone(), fmu));
         }
-        let method = method(&fmus);
+        let system = system(&fmus);
         if let (Method::CoSimulation { .. }, Some(component)) =
-            (&method, structure.components.iter().find(|component| component.model_exchange))
+            (system.method(), structure.components.iter().find(|component| component.model_exchange))
         {
             let cause = "implementation=\"ModelExchange\" is not Co-Simulation: simulate it with --me";
             return Err(in_description(format!("line {}: {cause}", component.line)));
         }
-        let mut loaded = Self { system: System::new(method), ..Self::default() };
+        let mut loaded = Self { system, ..Self::default() };
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
         for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
             let experiment = fmu.description().default_experiment;
-            // The system's times go before those of its parts.
+            // The system's times take precedence over those of its parts.
             let times = structure.start.or(structure.stop).is_some();
             let part = Experiment { step: experiment.step, ..Experiment::default() };
             loaded.experiments.push(if times { part } else { experiment });
@@ -201,12 +220,12 @@ impl Loaded {
         for component in &structure.components {
             for binding in &component.bindings {
                 let (file, parameters) = package.parameters(binding)?;
-                given.extend(loaded.bound(&file, &parameters, &format!("{}.", component.name)));
+                given.extend(loaded.bound(&file, &parameters, &format!("{}.", component.name), &structure)?);
             }
         }
         for binding in &structure.bindings {
             let (file, parameters) = package.parameters(binding)?;
-            given.extend(loaded.bound(&file, &parameters, ""));
+            given.extend(loaded.bound(&file, &parameters, "", &structure)?);
         }
         values::set(&mut loaded.system, &given)?;
         Ok(loaded)
@@ -215,7 +234,7 @@ impl Loaded {
     /// Feeds an input over time: one of the system's, or `component.variable`.
     ///
     /// # Errors
-    /// There is none of this name, or it is fed already.
+    /// There is none of this name, or it is already fed.
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
@@ -223,10 +242,10 @@ impl Loaded {
         Ok(())
     }
 
-    /// Feeds an input of any type over time, as [`input`](Self::input), from the texts that a user or a file has.
+    /// Feeds an input of any type over time, as [`input`](Self::input), from texts of a user or a file.
     ///
     /// # Errors
-    /// There is none of this name, it is fed already, or a text is not a value of its type.
+    /// There is none of this name, it is already fed, or a text is not a value of its type.
     pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.sequence(&port, texts)?;
@@ -234,8 +253,8 @@ impl Loaded {
         Ok(())
     }
 
-    /// Feeds an input over time from what a user writes: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input
-    /// of another type.
+    /// Feeds an input over time from user input: see [`Schedule::parse`] for a number, and [`Sequence::parse`] for an input of
+    /// another type.
     ///
     /// # Errors
     /// As [`input`](Self::input), or the text has another form.
@@ -274,7 +293,7 @@ impl Loaded {
         Ok(self.system.record_as(&port, name)?)
     }
 
-    /// Records all outputs of the system, or those of all FMUs where it has none.
+    /// Records all outputs of the system, or those of all FMUs if it has none.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -313,38 +332,22 @@ impl Loaded {
     }
 
     fn connect(&mut self, structure: &Structure, c: &Connection) -> Result<(), String> {
-        let (start, end) = (find(structure, &c.start)?, find(structure, &c.end)?);
-        let kind = |end: &ConnectionEnd, connector: &Connector| (end.element.is_some(), connector.kind.clone());
-        let (one, other) = (kind(&c.start, start), kind(&c.end, end));
-        // What comes out of an element or into the system sends; start and end say nothing of direction.
-        let sends = |(element, kind): &(bool, String)| kind == if *element { "output" } else { "input" };
-        let takes = |(element, kind): &(bool, String)| kind == if *element { "input" } else { "output" };
-        let (from, to) = match (sends(&one) && takes(&other), sends(&other) && takes(&one)) {
-            (true, _) => (&c.start, &c.end),
-            (_, true) => (&c.end, &c.start),
-            _ => {
-                return Err(format!(
-                    "connects {} ({}) with {} ({}): expected an output and an input of components, or one of them and the \
-                     same kind of the system",
-                    c.start, start.kind, c.end, end.kind
-                ));
-            }
-        };
-        if let (Some(a), Some(b), false) = (&start.unit, &end.unit, c.no_conversion)
-            && a != b
-        {
-            return Err(format!(
-                "connects {} in {a} with {} in {b}: units are not converted, give both in one",
-                c.start, c.end
-            ));
-        }
+        // `flat` has determined the direction.
+        let (from, to) = (&c.start, &c.end);
+        let (start, end) = (find(structure, from)?, find(structure, to)?);
+        let units = if c.no_conversion { Units::PassOn } else { self.system.units() };
+        let stated = [start, end].map(|end| structure.measured(end));
         let port = |end: &ConnectionEnd| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
         match (port(from), port(to)) {
             (_, Some(target)) if self.is_fed(&target)? => {
                 Err(format!("{target} is fed twice: remove one of the connections"))
             }
-            (Some(source), Some(target)) => self.system.connect(&source, &target).map_err(|e| e.to_string()),
+            (Some(source), Some(target)) => {
+                let crossing = Crossing { units, stated, transformation: c.transformation };
+                self.system.connect_by(&source, &target, &crossing).map_err(|e| e.to_string())
+            }
             (None, Some(target)) => {
+                self.check_unit(&target, units, stated)?;
                 match self.connectors.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
                     Some((_, targets)) => targets.push(target),
                     None => self.connectors.inputs.push((from.connector.clone(), vec![target])),
@@ -358,10 +361,32 @@ impl Loaded {
                         to.connector
                     ));
                 }
+                self.check_unit(&source, units, [stated[1], stated[0]])?;
                 self.connectors.outputs.push((to.connector.clone(), source));
                 Ok(())
             }
             (None, None) => Err("connects the system with itself, which is not supported: remove it".into()),
+        }
+    }
+
+    /// A connector of the system has the unit of the variable that it stands for. `stated` are the units of the connector of the
+    /// system and of that of the component.
+    fn check_unit(&mut self, port: &str, units: Units, stated: [Option<Measured<'_>>; 2]) -> Result<(), String> {
+        let [Some(of_system), _] = stated else { return Ok(()) };
+        if units == Units::PassOn {
+            return Ok(());
+        }
+        match of_system.into_unit(self.system.measured(port, stated[1]).map_err(|e| e.to_string())?) {
+            Ok(Passage::Converted(_)) => Err(format!(
+                "the connector of the system is in {}, and {port} in another unit: give both in one",
+                of_system.unit.unwrap_or_default()
+            )),
+            Ok(Passage::Unknown(cause)) => {
+                self.system.note(format!("the system to {port}: {cause}: the number passes unchanged"));
+                Ok(())
+            }
+            Ok(Passage::Equal) => Ok(()),
+            Err(cause) => Err(format!("{port}: {cause}")),
         }
     }
 
@@ -370,23 +395,36 @@ impl Loaded {
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
-    /// The values of a binding; names begin with `prefix` and those of the system's connectors stand for themselves.
-    fn bound(&mut self, file: &str, parameters: &[Parameter], prefix: &str) -> Vec<Given> {
+    /// The values of a binding; names begin with `prefix`; those of a system's connectors mean the variables behind them.
+    fn bound(
+        &mut self,
+        file: &str,
+        parameters: &[Parameter],
+        prefix: &str,
+        structure: &Structure,
+    ) -> Result<Vec<Given>, Error> {
         let mut given = Vec::new();
         for p in parameters {
             let full = format!("{prefix}{}", p.name);
-            let ports = match self.connectors.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name) {
-                Some((_, targets)) => targets.clone(),
-                None => vec![full],
+            let input = self.connectors.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name);
+            let reached = structure.reach.iter().find(|(name, _)| *name == full);
+            let ports = match (input, reached) {
+                (Some((_, targets)), _) => targets.iter().map(|target| (target.clone(), None)).collect(),
+                (None, Some((_, targets))) => targets.clone(),
+                (None, None) => vec![(full, None)],
             };
-            for port in ports {
+            for (port, conversion) in ports {
                 let has = |i: &fmu_import::Instance| {
                     let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
                     values::find(i.description(), variable).map(|_| (i.name().to_owned(), variable.to_owned()))
                 };
                 match self.system.instances().iter().find_map(has) {
                     Some((instance, name)) => {
-                        let parameter = Parameter { name, ..p.clone() };
+                        let mut parameter = Parameter { name, ..p.clone() };
+                        if let Some(conversion) = &conversion {
+                            let wrong = |cause| Error::Invalid(format!("{file}: line {}: {}: {cause}", p.line, p.name));
+                            parameter.value = ssm::transformed(&p.value, conversion).map_err(wrong)?;
+                        }
                         given.push(Given { instance, file: file.into(), parameter });
                     }
                     None => {
@@ -395,7 +433,7 @@ impl Loaded {
                 }
             }
         }
-        given
+        Ok(given)
     }
 }
 
@@ -416,13 +454,21 @@ pub fn name_and_path(text: &str) -> Result<(String, &Path), Error> {
     Ok((stem.to_string_lossy().into_owned(), path))
 }
 
+/// `a.ssp#B.ssd` as the file and the name of the description in it.
+fn variant(path: &Path) -> (&Path, &str) {
+    match path.to_str().and_then(|text| text.rsplit_once('#')) {
+        Some((file, name)) if file.to_lowercase().ends_with(".ssp") => (Path::new(file), name),
+        _ => (path, DESCRIPTION),
+    }
+}
+
 /// The connector at an end of a connection.
 fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connector, String> {
     let (of, connectors) = match &end.element {
         None => (format!("the system {}", structure.name), &structure.connectors),
         Some(element) => {
             let names: Vec<&str> = structure.components.iter().map(|c| c.name.as_str()).collect();
-            let none = || format!("there is no component {element}; there are {}", names.join(", "));
+            let none = || format!("there is no component {element}; available: {}", names.join(", "));
             (element.clone(), &structure.component(element).ok_or_else(none)?.connectors)
         }
     };
@@ -432,7 +478,7 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
 }
 
 impl Package<'_> {
-    /// The values of a binding, its prefix before every name, with what to call their file.
+    /// The values of a binding, its prefix before every name, with a name for their file.
     fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
         let path = self.path.display().to_string();
         let (file, parameters) = match &binding.values {
@@ -441,6 +487,17 @@ impl Package<'_> {
                 let file = format!("{path}: {name}");
                 let read = ssv::read(&self.text(name)?).map_err(|cause| Error::Invalid(format!("{file}: {cause}")))?;
                 (file, read)
+            }
+        };
+        let parameters = match &binding.mapping {
+            None => parameters,
+            Some(Mapping::Inline(entries)) => ssm::apply(entries, &parameters)
+                .map_err(|cause| Error::Invalid(format!("{path}: {DESCRIPTION}: {cause}")))?,
+            Some(Mapping::File(name)) => {
+                let wrong = |cause: String| Error::Invalid(format!("{path}: {name}: {cause}"));
+                let root = Element::parse(&self.text(name)?).map_err(|e| wrong(e.to_string()))?;
+                let entries = ssm::read(&root).map_err(wrong)?;
+                ssm::apply(&entries, &parameters).map_err(wrong)?
             }
         };
         let named = |p: Parameter| Parameter { name: format!("{}{}", binding.prefix, p.name), ..p };
@@ -469,6 +526,7 @@ mod tests {
         let two = of(&[experiment(Some(2.0), Some(1e-4)), experiment(Some(3.0), Some(2e-4))]);
         let s = two.settings(None, None, None, true);
         assert_eq!((s.start, s.stop, s.step, s.sequential), (0.0, 3.0, 1e-4, true));
+        assert!((two.settings(Some(5.0), None, None, false).stop - 8.0).abs() < 1e-12);
         let s = of(&[experiment(None, None)]).settings(None, Some(4.0), None, false);
         assert_eq!((s.stop, s.step), (4.0, 0.004));
     }

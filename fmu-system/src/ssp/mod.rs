@@ -1,10 +1,14 @@
 //! Systems of FMUs as one file: System Structure and Parameterization, SSP 1.0.
 //!
-//! [`structure`]: the structure of any system; [`load`]: a system made ready for co-simulation; [`values`] and [`ssv`]:
-//! parameter values from SSV files.
+//! [`structure`]: the structure of any system; [`load`]: a system prepared for co-simulation; [`values`], [`ssv`] and [`ssm`]:
+//! parameter values from SSV files and their mappings.
 
+mod component;
+mod element;
 mod error;
+mod flat;
 pub mod load;
+pub mod ssm;
 pub mod ssv;
 pub mod structure;
 pub mod values;

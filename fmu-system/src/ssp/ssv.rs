@@ -1,16 +1,19 @@
 //! Parameter values from a file of SSP 1.0 (System Structure Parameter Values).
 
-use model_description::Element;
+use super::element::{unit, units};
+use model_description::{BaseUnit, Element};
 
 /// A value of a file.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
     /// Name of the variable.
     pub name: String,
-    /// Its value, as a user writes it.
+    /// Its value, as in user input.
     pub value: String,
-    /// Its unit, where the file tells it.
+    /// Its unit, if the file gives one.
     pub unit: Option<String>,
+    /// The relation of the unit to the SI base units, if the file defines it.
+    pub base: Option<BaseUnit>,
     /// Line of the element.
     pub line: usize,
 }
@@ -32,6 +35,7 @@ pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
     if local(root) != "ParameterSet" {
         return Err(format!("line {}: <{}> is not a ParameterSet of SSP", root.line, root.name));
     }
+    let defined = units(root)?;
     let sets = root.children.iter().filter(|c| local(c) == "Parameters");
     sets.flat_map(|set| &set.children)
         .filter(|c| local(c) == "Parameter")
@@ -40,8 +44,9 @@ pub fn parameters(root: &Element) -> Result<Vec<Parameter>, String> {
             let name = parameter.get("name").ok_or_else(|| at("a parameter without a name"))?;
             let typed = parameter.children.iter().find(|c| !["Annotations", "MetaData"].contains(&local(c).as_str()));
             let value = typed.and_then(|v| v.get("value")).ok_or_else(|| at(&format!("{name} has no value")))?;
-            let unit = typed.and_then(|v| v.get("unit")).map(str::to_owned);
-            Ok(Parameter { name: name.to_owned(), value: value.to_owned(), unit, line: parameter.line })
+            let unit = typed.and_then(unit);
+            let base = defined.iter().find(|(name, _)| unit.as_ref() == Some(name)).map(|(_, base)| *base);
+            Ok(Parameter { name: name.to_owned(), value: value.to_owned(), unit, base, line: parameter.line })
         })
         .collect()
 }

@@ -2,8 +2,11 @@
 //! its line, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
-use super::ssv::{self, Parameter};
-use model_description::{Element, parse_number};
+pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Mapping, ParameterValues};
+use super::element::{at, child, list, local, required, unit, units};
+use super::flat::{Flat, Level, Reach, flat};
+use super::{ssm, ssv};
+use model_description::{BaseUnit, Element, Measured, parse_number};
 
 /// A system of FMUs.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,115 +17,18 @@ pub struct Structure {
     pub start: Option<f64>,
     /// Stop time in s.
     pub stop: Option<f64>,
-    /// Its FMUs.
+    /// Its FMUs; those of inner systems have their names before their own, as in `in.b`.
     pub components: Vec<Component>,
     /// Connectors of the system itself.
     pub connectors: Vec<Connector>,
     /// Connections between connectors.
     pub connections: Vec<Connection>,
-    /// Values by names `component.variable`, and of the system's own connectors.
+    /// Values by names `component.variable`, and of the system's connectors.
     pub bindings: Vec<Binding>,
-}
-
-/// An FMU of the system.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Component {
-    /// Name, by which connections refer to it.
-    pub name: String,
-    /// Its archive, a path within the SSP.
-    pub source: String,
-    /// Variables that can be connected.
-    pub connectors: Vec<Connector>,
-    /// Values of its variables.
-    pub bindings: Vec<Binding>,
-    /// It is made for Model Exchange alone.
-    pub model_exchange: bool,
-    /// Line of the element.
-    pub line: usize,
-}
-
-/// A variable that can be connected.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Connector {
-    /// Name; of a component, that of the variable.
-    pub name: String,
-    /// `input`, `output`, `parameter`, `calculatedParameter` or `inout`.
-    pub kind: String,
-    /// Unit, where the file tells it.
-    pub unit: Option<String>,
-    /// Line of the element.
-    pub line: usize,
-}
-
-/// Two connectors; which of them sends follows from their kinds.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Connection {
-    /// One end.
-    pub start: ConnectionEnd,
-    /// The other.
-    pub end: ConnectionEnd,
-    /// Whether values pass without conversion, whatever the units.
-    pub no_conversion: bool,
-    /// Line of the element.
-    pub line: usize,
-}
-
-/// An end of a connection.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct ConnectionEnd {
-    /// The component; `None` for the system itself.
-    pub element: Option<String>,
-    /// Name of the connector.
-    pub connector: String,
-}
-
-impl std::fmt::Display for ConnectionEnd {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match &self.element {
-            Some(element) => write!(f, "{element}.{}", self.connector),
-            None => write!(f, "{} of the system", self.connector),
-        }
-    }
-}
-
-/// Parameter values of a component or of the system.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Binding {
-    /// File within the SSP, or the values themselves.
-    pub values: ParameterValues,
-    /// Prefix of every name.
-    pub prefix: String,
-}
-
-/// Location of values.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ParameterValues {
-    /// In a file of the archive.
-    File(String),
-    /// In the description itself.
-    Inline(Vec<Parameter>),
-}
-
-/// Name without its namespace prefix.
-fn local(element: &Element) -> &str {
-    element.name.rsplit(':').next().unwrap_or_default()
-}
-
-fn child<'a>(parent: &'a Element, name: &str) -> Option<&'a Element> {
-    parent.children.iter().find(|c| local(c) == name)
-}
-
-/// The children of a child, or none.
-fn list<'a>(parent: &'a Element, name: &str) -> impl Iterator<Item = &'a Element> {
-    child(parent, name).into_iter().flat_map(|e| &e.children).filter(|e| local(e) != "Annotations")
-}
-
-fn at(e: &Element, what: impl std::fmt::Display) -> String {
-    format!("line {}: {what}", e.line)
-}
-
-fn required(e: &Element, name: &str) -> Result<String, String> {
-    e.get(name).map(str::to_owned).ok_or_else(|| at(e, format!("<{}> has no attribute {name}", e.name)))
+    /// Units that the file defines.
+    pub units: Vec<(String, BaseUnit)>,
+    /// Parameters of systems, and connectors of inner systems: the variables behind them.
+    pub(super) reach: Reach,
 }
 
 /// An unsupported feature, and the remedy.
@@ -134,7 +40,7 @@ impl Structure {
     /// Reads the text of a SystemStructure.ssd.
     ///
     /// # Errors
-    /// The line, and what is missing, wrong or not supported there.
+    /// The line, and the element that is missing, wrong or not supported.
     pub fn read(text: &str) -> Result<Self, String> {
         let root = Element::parse(text).map_err(|e| e.to_string())?;
         if local(&root) != "SystemStructureDescription" {
@@ -145,9 +51,6 @@ impl Structure {
         }
         let system =
             child(&root, "System").ok_or_else(|| at(&root, format!("<{}> has no element <System>", root.name)))?;
-        if let Some(e) = child(system, "SignalDictionaries") {
-            return Err(unsupported(e, "signal dictionaries are not supported: connect the components directly"));
-        }
         let experiment = child(&root, "DefaultExperiment");
         let time = |name: &str| {
             let read = |text: &str| parse_number(text).ok_or_else(|| format!("{name}={text:?} is not a number"));
@@ -156,20 +59,25 @@ impl Structure {
                 .map(|(e, text)| read(text).map_err(|w| at(e, w)))
                 .transpose()
         };
-        let components = list(system, "Elements").map(component).collect::<Result<Vec<_>, _>>()?;
-        let twice = components.iter().enumerate().find(|(k, c)| components[..*k].iter().any(|b| b.name == c.name));
-        if let Some((_, Component { name, line, .. })) = twice {
-            return Err(format!("line {line}: two components have the name {name}: rename one"));
-        }
+        let Flat { components, connectors, connections, bindings, reach } = flat(&level(system, String::new())?)?;
         Ok(Self {
             name: required(system, "name")?,
             start: time("startTime")?,
             stop: time("stopTime")?,
             components,
-            connectors: connectors(system)?,
-            connections: list(system, "Connections").map(connection).collect::<Result<_, _>>()?,
-            bindings: bindings(system)?,
+            connectors,
+            connections,
+            bindings,
+            units: units(&root)?,
+            reach,
         })
+    }
+
+    /// What the file says of the unit of a connector.
+    pub fn measured<'a>(&self, connector: &'a Connector) -> Option<Measured<'a>> {
+        let unit = connector.unit.as_deref()?;
+        let base = self.units.iter().find(|(name, _)| name == unit).map(|(_, base)| *base);
+        Some(Measured { unit: Some(unit), base, relative: false })
     }
 
     /// The component of this name.
@@ -178,12 +86,36 @@ impl Structure {
     }
 }
 
-fn component(e: &Element) -> Result<Component, String> {
+/// A system with what is inside it.
+fn level(e: &Element, path: String) -> Result<Level, String> {
+    if let Some(e) = child(e, "SignalDictionaries") {
+        return Err(unsupported(e, "signal dictionaries are not supported: connect the components directly"));
+    }
+    let (mut components, mut inner): (Vec<Component>, Vec<Level>) = (Vec::new(), Vec::new());
+    for element in list(e, "Elements") {
+        if local(element) == "System" {
+            inner.push(level(element, format!("{path}{}.", required(element, "name")?))?);
+        } else {
+            components.push(component(element, &path)?);
+        }
+    }
+    let twice = components.iter().enumerate().find(|(k, c)| components[..*k].iter().any(|b| b.name == c.name));
+    if let Some((_, Component { name, line, .. })) = twice {
+        return Err(format!("line {line}: two components have the name {name}: rename one"));
+    }
+    Ok(Level {
+        components,
+        connectors: connectors(e)?,
+        connections: list(e, "Connections").map(connection).collect::<Result<_, _>>()?,
+        bindings: bindings(e)?,
+        path,
+        inner,
+    })
+}
+
+fn component(e: &Element, path: &str) -> Result<Component, String> {
     if local(e) != "Component" {
-        return Err(unsupported(
-            e,
-            "only components are supported: put the parts of an inner system beside each other",
-        ));
+        return Err(unsupported(e, "only components and systems are supported"));
     }
     let source = required(e, "source")?;
     let kind = e.get("type").unwrap_or(FMU_TYPE);
@@ -191,8 +123,8 @@ fn component(e: &Element) -> Result<Component, String> {
         return Err(at(e, format!("type={kind:?} is not supported, expected {FMU_TYPE}")));
     }
     Ok(Component {
-        name: required(e, "name")?,
-        source: path(e, &source)?,
+        name: format!("{path}{}", required(e, "name")?),
+        source: within(e, &source)?,
         connectors: connectors(e)?,
         bindings: bindings(e)?,
         model_exchange: e.get("implementation") == Some("ModelExchange"),
@@ -201,7 +133,7 @@ fn component(e: &Element) -> Result<Component, String> {
 }
 
 /// A relative URI as a path within the archive.
-fn path(e: &Element, uri: &str) -> Result<String, String> {
+fn within(e: &Element, uri: &str) -> Result<String, String> {
     let bad =
         || at(e, format!("source={uri:?} is not a file within the archive, expected for example resources/plant.fmu"));
     let mut bytes = Vec::new();
@@ -222,16 +154,20 @@ fn path(e: &Element, uri: &str) -> Result<String, String> {
 
 fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
     let one = |c: &Element| {
-        let unit = c.children.iter().find_map(|kind| kind.get("unit")).map(str::to_owned);
+        let unit = c.children.iter().find_map(unit);
         Ok(Connector { name: required(c, "name")?, kind: required(c, "kind")?, unit, line: c.line })
     };
     list(e, "Connectors").map(one).collect()
 }
 
 fn connection(e: &Element) -> Result<Connection, String> {
-    if let Some(t) = e.children.iter().find(|c| local(c).ends_with("Transformation")) {
-        return Err(unsupported(t, "transformations are not supported: remove it, or put it into a component"));
-    }
+    let transformation = match e.children.iter().find(|c| local(c).ends_with("Transformation")) {
+        None => None,
+        Some(t) if local(t) == "LinearTransformation" => Some(ssm::linear(t)?),
+        Some(t) => {
+            return Err(unsupported(t, "only LinearTransformation is supported: put the table into a component"));
+        }
+    };
     let end = |element: &str, connector: &str| {
         Ok::<_, String>(ConnectionEnd {
             element: e.get(element).map(str::to_owned),
@@ -242,6 +178,7 @@ fn connection(e: &Element) -> Result<Connection, String> {
         start: end("startElement", "startConnector")?,
         end: end("endElement", "endConnector")?,
         no_conversion: matches!(e.get("suppressUnitConversion"), Some("true" | "1")),
+        transformation,
         line: e.line,
     })
 }
@@ -251,24 +188,27 @@ fn bindings(e: &Element) -> Result<Vec<Binding>, String> {
 }
 
 fn binding(e: &Element) -> Result<Binding, String> {
-    if let Some(mapping) = child(e, "ParameterMapping") {
-        return Err(unsupported(
-            mapping,
-            "mappings are not supported: give the values under the names of the variables",
-        ));
-    }
+    let mapping = child(e, "ParameterMapping").map(|mapping| {
+        if let Some(source) = mapping.get("source") {
+            return Ok::<_, String>(Mapping::File(within(mapping, source)?));
+        }
+        let inline = child(mapping, "ParameterMapping");
+        let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
+        Ok(Mapping::Inline(ssm::read(inline)?))
+    });
+    let mapping = mapping.transpose()?;
     if e.get("sourceBase") == Some("component") {
         return Err(at(e, "sourceBase=\"component\" is not supported: put the file beside the FMU"));
     }
     let values = if let Some(source) = e.get("source") {
-        ParameterValues::File(path(e, source)?)
+        ParameterValues::File(within(e, source)?)
     } else {
         let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
         ParameterValues::Inline(ssv::parameters(
             set.ok_or_else(|| at(e, "a binding without source and without values"))?,
         )?)
     };
-    Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into() })
+    Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into(), mapping })
 }
 
 #[cfg(test)]
@@ -288,7 +228,8 @@ mod tests {
             <s:ParameterBindings><s:ParameterBinding prefix='a.' source='./resources/a%20b.ssv'/><s:ParameterBinding>
             <s:ParameterValues><v:ParameterSet><v:Parameters><v:Parameter name='a.x'><v:Real value='3' unit='V'/></v:Parameter>
             </v:Parameters></v:ParameterSet></s:ParameterValues></s:ParameterBinding></s:ParameterBindings>
-            <s:Elements><s:Component name='a' source='resources/a.fmu'/></s:Elements>
+            <s:Elements><s:Component name='a' source='resources/a.fmu'><s:Connectors><s:Connector name='v' kind='input'/>
+            </s:Connectors></s:Component></s:Elements>
             <s:Connections><s:Connection startConnector='u' endElement='a' endConnector='v'/></s:Connections>",
         )
         .unwrap();
@@ -310,7 +251,7 @@ mod tests {
         let component = |attributes: &str| system(&format!("<Elements><Component name='a' {attributes}/></Elements>"));
         for (structure, part) in [
             (Structure::read("<a/>"), "line 1: the root element is <a>"),
-            (system("<Elements><System name='i'/></Elements>"), "line 2: <System>: only components"),
+            (system("<Elements><System/></Elements>"), "line 2: <System> has no attribute name"),
             (
                 system("<Elements><SignalDictionaryReference name='i'/></Elements>"),
                 "line 2: <SignalDictionaryReference>",
@@ -327,15 +268,15 @@ mod tests {
             ),
             (
                 system(
-                    "<Connections><Connection startConnector='a' endConnector='b'><LinearTransformation/></Connection></Connections>",
+                    "<Connections><Connection startConnector='a' endConnector='b'><EnumerationMappingTransformation/></Connection></Connections>",
                 ),
-                "<LinearTransformation>: transformations",
+                "<EnumerationMappingTransformation>: only LinearTransformation",
             ),
             (
                 system(
                     "<ParameterBindings><ParameterBinding source='a'><ParameterMapping/></ParameterBinding></ParameterBindings>",
                 ),
-                "<ParameterMapping>: mappings",
+                "line 2: a mapping without source and without entries",
             ),
             (system("<ParameterBindings><ParameterBinding/></ParameterBindings>"), "without source and without values"),
         ] {

@@ -3,7 +3,8 @@
 use super::error::{Error, invalid};
 use super::ssv::Parameter;
 use crate::cosimulation::System;
-use model_description::{ModelDescription, ModelVariable};
+use fmu_import::quantity;
+use model_description::{Measured, ModelDescription, ModelVariable, Passage, format_number, parse_number};
 
 /// A value of an SSV file for an instance.
 #[derive(Clone, Debug)]
@@ -28,8 +29,8 @@ impl Given {
     }
 }
 
-/// Sets the values in their order, each judged by its FMU; before them the structural parameters of all files, those of an instance
-/// in one Configuration Mode.
+/// Sets the values in their order, each checked by its FMU; first come the structural parameters of all files, those of an
+/// instance in one Configuration Mode.
 ///
 /// # Errors
 /// Names file and line: the variable does not exist, has another unit or type, or the FMU refuses the value.
@@ -48,21 +49,59 @@ pub fn set(system: &mut System, given: &[Given]) -> Result<(), Error> {
 }
 
 fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<(), Error> {
-    let name = &p.name;
+    let (name, mut value, mut notes) = (&p.name, std::borrow::Cow::from(&p.value), Vec::new());
     if let Some(i) = system.instances().iter().find(|i| i.name() == instance) {
         let model = &i.description().model_name;
         let Some(variable) = find(i.description(), name) else {
             return invalid(format!("{model} has no variable {name}: correct the name, or remove the parameter"));
         };
-        let unit = variable.unit.as_deref().unwrap_or("1");
-        if let Some(given) = p.unit.as_deref().filter(|given| *given != unit) {
-            return invalid(format!("{name} is given in {given}, and {model} has it in {unit}: convert the value"));
+        match in_unit_of(p, variable, i.description()) {
+            Ok((converted, note)) => {
+                value = converted.map_or(value, Into::into);
+                notes.extend(note.map(|note| format!("{instance}.{name}: {note}")));
+            }
+            Err(cause) => return invalid(format!("{name} {cause}")),
         }
     }
-    Ok(system.set(&format!("{instance}.{name}"), &p.value)?)
+    for note in notes {
+        system.note(note);
+    }
+    Ok(system.set(&format!("{instance}.{name}"), &value)?)
 }
 
-/// The variable of this name, or the array before its brackets, whose size may be one that was set.
+/// The value in the unit of the variable, if that is another one, and a note if one of them is not known.
+fn in_unit_of(
+    p: &Parameter,
+    variable: &ModelVariable,
+    description: &ModelDescription,
+) -> Result<(Option<String>, Option<String>), String> {
+    let Some(unit) = p.unit.as_deref() else { return Ok((None, None)) };
+    let each = |convert: &dyn Fn(f64) -> Result<f64, String>| {
+        let number = |text: &str| {
+            let number = parse_number(text).ok_or_else(|| format!("= {text:?} in {unit} is not a number"))?;
+            Ok::<_, String>(format_number(convert(number)?))
+        };
+        Ok::<_, String>(p.value.split_whitespace().map(number).collect::<Result<Vec<_>, _>>()?.join(" "))
+    };
+    if let (None, Some(own)) = (p.base, variable.unit.as_deref()) {
+        if own == unit {
+            return Ok((None, None));
+        }
+        let model = &description.model_name;
+        let unknown = |_| {
+            format!("is given in {unit}, and {model} has it in {own}: define {unit} in the file, or convert the value")
+        };
+        return Ok((Some(each(&|x| quantity::convert(x, unit, variable, description).map_err(unknown))?), None));
+    }
+    let given = Measured { unit: Some(unit), base: p.base, relative: variable.relative };
+    match given.into_unit(description.measured(variable)).map_err(|cause| format!("does not fit: {cause}"))? {
+        Passage::Equal => Ok((None, None)),
+        Passage::Unknown(why) => Ok((None, Some(format!("{why}: the number passes unchanged")))),
+        Passage::Converted(conversion) => Ok((Some(each(&|x| Ok(conversion.apply(x)))?), None)),
+    }
+}
+
+/// The variable of this name, or the array before its brackets, whose size may have been set.
 pub(super) fn find<'a>(description: &'a ModelDescription, name: &str) -> Option<&'a ModelVariable> {
     description.variable(name).or_else(|| description.variable(name.rsplit_once('[')?.0))
 }

@@ -13,7 +13,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, Z, N };
+enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, Z, TOLERANCE, N };
 enum { OK, WARNING, DISCARD, ERROR };
 enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL, NO_SOLUTION };
 
@@ -38,7 +38,7 @@ static M *make(bool exchange, bool events, bool early, void *environment, Log3 l
 
 /* A run of these models makes some thousand calls: an importer that goes round in a circle ends here, and does not hang. */
 static void count(M *m) {
-    if (++m->calls > 1000000) fputs("the importer makes calls without end\n", stderr), abort();
+    if (++m->calls > 1000000) fputs("the importer makes an endless number of calls\n", stderr), abort();
 }
 
 static bool fault(M *m, int which) { return m->v[FAULT] == which; }
@@ -149,7 +149,7 @@ void *fmi2Instantiate(const char *n, int type, const char *g, const char *r, con
     return make(type == 0, false, false, c->environment, NULL);
 }
 void fmi2FreeInstance(M *m) { free(m); }
-int fmi2SetupExperiment(M *m, int a, double b, double start, int c, double d) { return m->start = m->t = start, OK; }
+int fmi2SetupExperiment(M *m, int a, double b, double start, int c, double d) { return m->v[TOLERANCE] = a ? b : -1, m->start = m->t = start, OK; }
 int fmi2EnterInitializationMode(M *m) { return OK; }
 int fmi2ExitInitializationMode(M *m) { return leave_initialization(m); }
 int fmi2Terminate(M *m) { return OK; }
@@ -203,7 +203,7 @@ void *fmi3InstantiateModelExchange(const char *n, const char *t, const char *r, 
 }
 #endif
 void fmi3FreeInstance(M *m) { free(m); }
-int fmi3EnterInitializationMode(M *m, bool a, double b, double start, bool c, double d) { return m->start = m->t = start, OK; }
+int fmi3EnterInitializationMode(M *m, bool a, double b, double start, bool c, double d) { return m->v[TOLERANCE] = a ? b : -1, m->start = m->t = start, OK; }
 int fmi3ExitInitializationMode(M *m) { return leave_initialization(m); }
 int fmi3Terminate(M *m) { return OK; }
 int fmi3Reset(M *m) { return ERROR; }

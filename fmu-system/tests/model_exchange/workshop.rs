@@ -64,6 +64,7 @@ fn description(name: &str, version: u32) -> String {
         ("count", "output", "discrete", ""),
         ("fault", "parameter", "fixed", "0"),
         ("z", "output", "continuous", ""),
+        ("tolerance", "output", "continuous", ""),
     ];
     let state = name == "plant";
     let variable = |(index, (name, causality, variability, start)): (usize, &(&str, &str, &str, &str))| {
@@ -90,7 +91,8 @@ fn description(name: &str, version: u32) -> String {
     let step = if version == 2 { "" } else { "needsCompletedIntegratorStep='true'" };
     format!(
         "<fmiModelDescription {root} modelName='{name}'><ModelExchange modelIdentifier='x' {step}/>\
-         <CoSimulation modelIdentifier='x' {capabilities}/><ModelVariables>{variables}</ModelVariables>\
+         <CoSimulation modelIdentifier='x' canHandleVariableCommunicationStepSize='true' {capabilities}/>\
+         <DefaultExperiment tolerance='1e-5'/><ModelVariables>{variables}</ModelVariables>\
          <ModelStructure>{structure}</ModelStructure></fmiModelDescription>"
     )
 }

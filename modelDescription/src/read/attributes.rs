@@ -1,4 +1,4 @@
-//! Attributes by type; an error names the element, the attribute, the value and what was expected.
+//! Attributes by type; an error names the element, the attribute, its value and the expected one.
 
 use crate::error::Error;
 use crate::number::parse;
@@ -66,7 +66,7 @@ pub(super) fn boolean(element: &Element, attribute: &str) -> Result<Option<bool>
     element.get(attribute).map(read).transpose()
 }
 
-/// One of the words of an enumeration, given as all of them with their texts.
+/// A word of an enumeration, selected from all its words.
 pub(super) fn word<T: Copy>(
     element: &Element,
     attribute: &str,

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::xml::Element;
 
-/// The text of a document, which both standards want in UTF-8.
+/// The text of a document; both standards require UTF-8.
 ///
 /// # Errors
 /// It is in another encoding: names UTF-16 and UTF-32, which have a byte order mark or null bytes.

@@ -8,10 +8,10 @@ use crate::xml::{Element, parse};
 
 /// Reads terminalsAndIcons.xml of an FMU of either standard; the bytes must be UTF-8.
 ///
-/// Like [`read`](crate::read()), it does not judge: it accepts a variable that the FMU does not have.
+/// Like [`read`](crate::read()), it does not check the content: it accepts unknown variables.
 ///
 /// # Errors
-/// Gives the line, what was found and what was expected.
+/// States the line, the content found and expected.
 pub fn read_terminals(xml: impl AsRef<[u8]>) -> Result<TerminalsAndIcons, Error> {
     let root = parse(decode(xml.as_ref())?)?;
     of_kind(&root, "fmiTerminalsAndIcons")?;

@@ -15,19 +15,25 @@ pub(super) fn units(root: &Element) -> Result<Vec<Unit>, Error> {
 fn unit(element: &Element) -> Result<Unit, Error> {
     Ok(Unit {
         name: required(element, "name")?.into(),
-        base: element.child("BaseUnit").map(base_unit).transpose()?,
+        base: element.child("BaseUnit").map(BaseUnit::read).transpose()?,
         display_units: element.all("DisplayUnit").map(display_unit).collect::<Result<_, _>>()?,
         line: element.line,
     })
 }
 
-fn base_unit(element: &Element) -> Result<BaseUnit, Error> {
-    let mut exponents = [0; 8];
-    for (exponent, name) in exponents.iter_mut().zip(BaseUnit::NAMES) {
-        *exponent = integer(element, name)?.unwrap_or(0);
+impl BaseUnit {
+    /// Reads an element `BaseUnit` of FMI or SSP.
+    ///
+    /// # Errors
+    /// An attribute is not a number.
+    pub fn read(element: &Element) -> Result<Self, Error> {
+        let mut exponents = [0; 8];
+        for (exponent, name) in exponents.iter_mut().zip(Self::NAMES) {
+            *exponent = integer(element, name)?.unwrap_or(0);
+        }
+        let factor = number(element, "factor")?.unwrap_or(1.0);
+        Ok(Self { exponents, factor, offset: number(element, "offset")?.unwrap_or(0.0) })
     }
-    let factor = number(element, "factor")?.unwrap_or(1.0);
-    Ok(BaseUnit { exponents, factor, offset: number(element, "offset")?.unwrap_or(0.0) })
 }
 
 fn display_unit(element: &Element) -> Result<DisplayUnit, Error> {

@@ -43,7 +43,7 @@ pub(super) fn variables(
     Ok(variables)
 }
 
-/// The number of values of all variables, which whoever reads them keeps in memory.
+/// The number of values of all variables, which a reader keeps in memory.
 fn values(variables: &[ModelVariable]) -> Result<(), Error> {
     let arrays = || variables.iter().filter(|v| v.is_array());
     let sizes: BTreeMap<u32, u64> = if arrays().next().is_none() {
@@ -77,7 +77,7 @@ fn variable(
     let declared_type = owned(typed, "declaredType");
     let declared = declared_type.as_deref().and_then(|name| types.get(name).copied());
     let unit = owned(typed, "unit");
-    // A display unit belongs to a unit: the type's does not suit a variable that has another unit.
+    // A display unit belongs to a unit: that of the type does not apply to a variable with another unit.
     let same_unit = unit.is_none() || unit.as_ref() == declared.and_then(|t| t.unit.as_ref());
     let inherited = |of: fn(&TypeDefinition) -> &Option<String>| declared.and_then(|t| of(t).clone());
     let start_texts: Vec<String> = element.all("Start").filter_map(|e| owned(e, "value")).collect();
@@ -111,7 +111,7 @@ fn variable(
     })
 }
 
-/// FMI 3.0.2, 2.4.4. The fraction says what the decimal says; what is not as the standard has it is for a checker.
+/// FMI 3.0.2, 2.4.4. The fraction equals the decimal; violations are left to a checker.
 fn timing(element: &Element) -> Option<ClockTiming> {
     let number = |name: &str| element.get(name)?.trim().parse::<f64>().ok();
     let of = |counter: &str, decimal: &str| {

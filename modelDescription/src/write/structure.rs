@@ -1,4 +1,4 @@
-//! `ModelStructure`: which variables are outputs and initial unknowns, and on what they depend.
+//! `ModelStructure`: outputs and initial unknowns, and their dependencies.
 //!
 //! FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8. FMI 2.0 counts scalar variables from 1, FMI 3.0 names value references.
 
@@ -23,7 +23,7 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
             let known = numbering.between(v);
             outputs.extend(numbers.iter().map(|&number| (number, known.clone())));
         }
-        // All of them are initial="calculated". FMI 2.0 wants them in the order of the variables.
+        // All of them are initial="calculated". FMI 2.0 requires the order of the variables.
         if v.initial_dependencies.is_some() {
             initial.extend(numbers.iter().map(|&number| (number, numbering.at_start(v))));
         }
@@ -71,7 +71,7 @@ fn unknown(element: &str, attribute: &str, (number, dependencies): &Unknown) -> 
 struct Numbering<'a> {
     /// Every variable with its numbers: one, or one per element of an array in FMI 2.0.
     variables: Vec<(&'a Variable, Vec<u32>)>,
-    /// From the value reference of what an unknown may depend on (inputs, parameters, states, time), array elements too.
+    /// By value reference of the knowns (inputs, parameters, states, time), array elements included.
     known: BTreeMap<u32, u32>,
     /// Parameters may be knowns between events (FMI 3.0).
     parameters: bool,
@@ -83,7 +83,7 @@ impl<'a> Numbering<'a> {
     fn of(description: &'a Description, version: FmiVersion) -> Self {
         let states = description.model_exchange.as_ref().map_or(&[][..], |exchange| &exchange.states);
         let mut index = 0;
-        // FMI 2.0 has no variable for time, so nothing can name it there.
+        // In FMI 2.0, time is not a variable and cannot be named.
         let mut known: BTreeMap<u32, u32> = (version == FmiVersion::V3).then_some((TIME, TIME)).into_iter().collect();
         let mut variables = Vec::new();
         for v in &description.variables {
@@ -109,8 +109,8 @@ impl<'a> Numbering<'a> {
         (!self.has_wide(of)).then(|| self.numbers(of.iter().copied()))
     }
 
-    /// Whether a wide array is among these: FMI 2.0 would have to name each of its elements, so nothing is said, which means that
-    /// all count. One whose sizes can change is wide by its greatest size, and shows by its first element alone.
+    /// Whether a wide array is among these: FMI 2.0 would have to list each of its elements, so the list is omitted, which
+    /// means that all count. An array of variable size counts by its maximum size, and is recognized by its first element.
     fn has_wide(&self, references: &[u32]) -> bool {
         let alone = |r: u32| !references.contains(&(r + 1));
         let is_wide = |v: &Variable, n: usize| n > DENSE || n > 1 && !v.sized.is_empty() && alone(v.value_reference);

@@ -10,7 +10,7 @@ use fmu_core::Description;
 use fmu_core::description::{MemberDescription, TerminalDescription};
 use fmu_core::terminal::{MatchingRule, MemberKind};
 
-/// What FMI-LS-STRUCT 1.0.0-rc.1 calls its parts.
+/// The names of the parts in FMI-LS-STRUCT 1.0.0-rc.1.
 const STRUCT: &str = "org.fmi-standard.fmi-ls-struct.map";
 
 /// terminalsAndIcons.xml for an FMU of this standard; `None` for a model without terminals and icon. FMI 2.0 has no maps, whose

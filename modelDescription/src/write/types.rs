@@ -34,7 +34,7 @@ pub(super) fn units(description: &Description, version: FmiVersion) -> Option<El
     (!units.is_empty()).then(|| Element::new("UnitDefinitions").children(units))
 }
 
-/// `base value = factor * value`; what is not written is 0, or 1 for the factor.
+/// `base value = factor * value`; omitted attributes are 0, or 1 for the factor.
 fn unit(name: &str, exponents: Exponents, factor: f64) -> Element {
     let Exponents { kg, m, s, ampere, kelvin, mol, cd, rad } = exponents;
     let mut base = Element::new("BaseUnit");
@@ -73,11 +73,11 @@ pub(super) fn definitions(description: &Description, version: FmiVersion) -> Opt
 
 fn definition(kind: &VariableKind, version: FmiVersion) -> Option<Element> {
     let (name, description, base, three) = match kind {
-        // FMI 3.0 has other types for single precision; its variables say the same themselves.
+        // FMI 3.0 has other types for single precision; its variables carry the attributes themselves.
         VariableKind::Real { single: true, .. } if version == FmiVersion::V3 => return None,
         VariableKind::Real { quantity, unit, display, relative, .. } if !quantity.is_empty() => {
             let display = display.as_ref().map(|(name, ..)| name.as_str()).filter(|_| !unit.is_empty());
-            // A number without a unit measures no quantity either.
+            // A number without a unit has no quantity either.
             let measured = Some(quantity.as_str()).filter(|_| !unit.is_empty());
             let base = Element::new("Real")
                 .with_some("quantity", measured)

@@ -54,7 +54,7 @@ fn scalars(v: &Variable, description: &Description) -> Vec<Element> {
             VariableKind::Integer(_) => "Integer",
             VariableKind::Boolean => "Boolean",
             VariableKind::Enumeration { .. } => "Enumeration",
-            // No archive of FMI 2.0 has them.
+            // They do not occur in archives of FMI 2.0.
             VariableKind::Text | VariableKind::Binary { .. } | VariableKind::Clock(_) => "String",
         });
         typed.attributes = type_attributes(v, FmiVersion::V2);
@@ -221,7 +221,7 @@ fn type_attributes(v: &Variable, version: FmiVersion) -> Vec<(String, String)> {
                 .with_some("reinit", v.reinit.then(|| "true".to_owned()))
         }
         VariableKind::Integer(of) => {
-            // Rounded inwards, and omitted where the type has no value beyond: in FMI 2.0 that is xs:int for all of them.
+            // Rounded inwards, and omitted where the type has no value outside: in FMI 2.0 that is xs:int for all of them.
             let carried = if version == FmiVersion::V2 { IntegerType::Int32 } else { *of };
             let ((low, high), (least, greatest)) =
                 (of.within(&Range { above: false, below: false, ..v.range() }), carried.bounds());

@@ -1,9 +1,9 @@
 //! An element: name, attributes, children.
 
-/// An element of an XML document, as the file has it.
+/// An element of an XML document, as in the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
-    /// Name, with its namespace prefix where it has one.
+    /// Name, with its namespace prefix if it has one.
     pub name: String,
     /// Attributes in the order of the file, values unescaped.
     pub attributes: Vec<(String, String)>,

@@ -1,4 +1,4 @@
-//! Reads an element tree. Any input gives a tree or an error: no panic, no unbounded recursion, no entity expansion, no
+//! Parses an element tree. Any input gives a tree or an error: no panic, no unbounded recursion, no entity expansion, no
 //! external file.
 
 use super::element::Element;
@@ -89,7 +89,7 @@ fn start(tag: &BytesStart<'_>) -> Result<Element, quick_xml::Error> {
         let value = attribute.normalized_value(XmlVersion::Implicit1_0)?;
         element.attributes.push((attribute.key.as_ref().into(), value.into_owned()));
     }
-    // A description is mostly this.
+    // The most frequent case in a description.
     element.attributes.shrink_to_fit();
     Ok(element)
 }

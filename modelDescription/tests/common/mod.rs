@@ -1,4 +1,4 @@
-//! A description with every kind of variable, made by hand: no model stands behind it.
+//! A description with every kind of variable, written by hand: it has no model.
 
 #![allow(dead_code)] // each test file uses its own part
 
@@ -13,7 +13,7 @@ use model_description::{FmiVersion, Generation, write};
 /// Both standards.
 pub(crate) const VERSIONS: [FmiVersion; 2] = [FmiVersion::V2, FmiVersion::V3];
 
-/// Everything that XML gives a meaning, and what a careless writer loses.
+/// Every character with a meaning in XML, and those that a careless writer loses.
 pub(crate) const AWKWARD: &str = "a < b & c > d, \"quoted\" 'and' \u{3c8}_M\u{b2} \u{1f50b}\n\tsecond line";
 
 pub(crate) fn generation() -> Generation {
@@ -209,7 +209,7 @@ pub(crate) fn sampled_sample() -> Description {
     Description { name: "Sampled".into(), model_exchange: Some(exchange), ..description }
 }
 
-/// A picture of nothing.
+/// An empty picture.
 pub(crate) const SVG: &str = "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"8\" height=\"8\"/>";
 
 /// One drawn, one not; every kind of member.

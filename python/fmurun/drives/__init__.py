@@ -1,7 +1,7 @@
 """The drives of the wheel, and values for machines.
 
 `fmurun.drives.PmsmDrive` is the path of the archive of FMI 3.0, `fmurun.drives.fmi2.PmsmDrive` that of FMI 2.0; `machines` has the
-motor files by their names. `tune` gives start values that `fmurun` and FMPy take:
+motor files by their names. `tune` returns start values for `fmurun` and FMPy:
 
     from fmurun import drives, simulate_fmu
 
@@ -37,7 +37,7 @@ machines = {path.stem: str(path) for path in sorted((_FOLDER / "motors").glob("*
 
 
 def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
-    """Start values of an FMU for a machine, by the rules of `fmu tune`: a dictionary that FMPy and `fmurun` take.
+    """Start values of an FMU for a machine, by the rules of `fmu tune`: a dictionary for FMPy and `fmurun`.
 
     Args:
         motor: a motor file, or the name of one of `machines`
@@ -46,7 +46,7 @@ def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
         fmi: 2 or 3: in FMI 2.0 each element of an array has its own name
 
     Raises:
-        FmuError: the file cannot be read or makes no sense; the message names file, line and value
+        FmuError: the file cannot be read or is invalid; the message names file, line and value
         ValueError: an argument is none of those
 
     >>> values = tune("ipmsm-2.2kw")
@@ -57,7 +57,7 @@ def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
     if fmu not in models:
         raise ValueError(f"fmu must be one of {', '.join(models)}, not {fmu!r}")
     if estimator is not None and fmu == "PmsmPlant":
-        raise ValueError(f"estimator = {estimator!r}: PmsmPlant has no estimator; leave it out")
+        raise ValueError(f"estimator = {estimator!r}: PmsmPlant has no estimator; omit it")
     if fmi not in (2, 3):
         raise ValueError(f"fmi must be 2 or 3, not {fmi!r}")
     path = machines.get(motor, os.fspath(motor))
@@ -80,4 +80,4 @@ def __dir__():
     return ["fmi2", "machines", "tune", *_archives("fmi3")]
 
 
-from . import fmi2  # noqa: E402, F401  It takes its archives from here.
+from . import fmi2  # noqa: E402, F401  It gets its archives from here.

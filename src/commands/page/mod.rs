@@ -21,12 +21,13 @@ use std::path::{Path, PathBuf};
 
 /// Writes pages that run FMUs in a web browser.
 ///
-/// A page is one HTML file that needs no network and no installation: it holds the model's own code as WebAssembly, sliders for its
-/// inputs and parameters, plots, presets, and a link that repeats a run bit for bit. It opens with a double click. Without names, the
-/// command writes a page for every FMU of the package or workspace around the current folder, as `fmu build` builds them.
+/// A page is one HTML file that needs no network and no installation: it contains the model's code as WebAssembly, sliders for
+/// its inputs and parameters, plots, presets, and a link that repeats a run bit for bit. It opens with a double click. Without
+/// names, the command writes a page for every FMU of the package or workspace around the current folder, as `fmu build` builds
+/// them.
 ///
-/// A FILE.fmu of `fmu build` or `fmu preset` gives its start values and its default experiment to the page; its code is that
-/// of the workspace, which must be the one that built it.
+/// From a FILE.fmu of `fmu build` or `fmu preset`, the page takes the start values and the default experiment; the code comes
+/// from the workspace, which must be the one that built it.
 ///
 /// page.toml beside the package's Cargo.toml chooses inputs, plots, vectors and presets (docs/pages.md). Without it, the page has a plot
 /// for each unit of the outputs and the default experiment.
@@ -55,18 +56,18 @@ pub struct Page {
     /// Write all pages of the workspace to this folder
     #[arg(long, value_name = "DIR", conflicts_with_all = ["fmus", "package", "out", "module"])]
     pub site: Option<PathBuf>,
-    /// Module that is already built, instead of compiling the one FMU
+    /// Existing module, instead of compiling the FMU
     #[arg(long, value_name = "FILE.wasm")]
     pub module: Option<PathBuf>,
 }
 
-/// A model of which a page is made.
+/// A model for a page.
 struct Model {
     description: Description,
     plain: Description,
     package: String,
     folder: PathBuf,
-    /// Text of the inputs of the default experiment, where they are not those of the package.
+    /// Text of the inputs of the default experiment, if they differ from those of the package.
     stimuli: Option<Vec<u8>>,
 }
 
@@ -89,7 +90,7 @@ pub fn run(args: &Page) -> Result<Vec<PathBuf>> {
         "{} pages need a folder, and a module each: --out DIR",
         models.len()
     );
-    // What is wrong with a page.toml is told before anything is compiled for it.
+    // Errors in page.toml are reported before anything is compiled.
     for model in &models {
         page::is_possible(&model.description)?;
         own(model)?;
@@ -132,7 +133,7 @@ fn write(workspace: &Workspace, model: &Model, module: &[u8], out: &Path) -> Res
     pack::write(out, html.as_bytes())
 }
 
-/// The `page.toml` of a model, compared with it.
+/// The `page.toml` of a model, checked against it.
 fn own(model: &Model) -> Result<Option<(PathBuf, String)>> {
     let path = model.folder.join(FILE);
     if !path.is_file() {
@@ -178,10 +179,10 @@ fn models(workspace: &Workspace, args: &Page) -> Result<Vec<Model>> {
     Ok(models)
 }
 
-/// A model that reads files when it is instantiated has none in a page.
+/// A model that reads files at instantiation has none in a page.
 fn reads_files(folder: &Path, cause: fmu_import::Error) -> anyhow::Error {
     if folder.join("resources").is_dir() {
-        return Failed(format!("the model reads resources/ at instantiation, which a page cannot give: {cause}"))
+        return Failed(format!("the model reads resources/ at instantiation, which a page cannot provide: {cause}"))
             .into();
     }
     cause.into()

@@ -1,4 +1,4 @@
-//! `fmu page --site`: the pages of a whole workspace as a folder that a server, or a double click, shows.
+//! `fmu page --site`: the pages of a whole workspace as a folder for a server or for a double click.
 
 use super::{Model, archive, write};
 use crate::commands::atlas::{self, Atlas};
@@ -73,7 +73,7 @@ fn link(workspace: &Workspace, model: &Model, module: &[u8], out: &Path, folder:
     Ok((file, name.into(), model.description.description.clone()))
 }
 
-/// The documentation page of an archive, with what it links to.
+/// The documentation page of an archive, with the files that it links.
 fn document(file: &Path, model: &Model, out: &Path) -> Result<Link> {
     let (_, files) = fmu_import::contents(file)?;
     let name = model.description.model_name();
@@ -124,7 +124,11 @@ fn results(out: &Path) -> Result<Vec<Link>> {
     })?;
     Ok(vec![
         ("compare/compare.html".into(), "Estimators compared".into(), "every estimator through every scenario".into()),
-        ("atlas/atlas.html".into(), "Atlas".into(), "where a drive with wrong estimates is lost at low speed".into()),
+        (
+            "atlas/atlas.html".into(),
+            "Atlas".into(),
+            "where a drive with wrong estimates loses the rotor at low speed".into(),
+        ),
     ])
 }
 
@@ -144,7 +148,7 @@ fn no_dead_link(out: &Path) -> Result<()> {
                 {
                     let file = target.split('#').next().unwrap_or_default();
                     if !folder.join(file).exists() {
-                        bail!("{}: a link to {target}, which is not there", path.display());
+                        bail!("{}: a link to {target}, which does not exist", path.display());
                     }
                 }
             }

@@ -2,7 +2,7 @@
 
 use crate::commands::tune::place;
 use crate::message;
-use crate::preset::{Course, PresetFmu};
+use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
@@ -10,12 +10,12 @@ use drive_study::tune::{
 };
 use fmu_core::Description;
 
-/// Sets the values of the machine, also those that equal the model's own, because the FMU may be a preset for another machine. A
-/// note names the values that stay from that one. Returns the default experiment.
+/// Sets the values of the machine, even those that equal the model's start values, because the FMU may be a preset for another
+/// machine. A note lists the values of that machine that remain. Returns the default experiment.
 ///
 /// # Errors
 /// The FMU is not one of the drive's.
-pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
+pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<NewExperiment> {
     let named = |settings: &[Setting]| settings.iter().map(|s| (s.name.to_owned(), s.value.clone())).collect();
     let values: Vec<(String, Value)> = match place(preset.own())? {
         Some(0) => joined(&tuned.plant, &tuned.controller),
@@ -39,16 +39,16 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<Course> {
     }
     let stay = preset.earlier().join(", ");
     if !stay.is_empty() {
-        message::note(&format!("values of the earlier preset that {} does not have stay: {stay}", tuned.name));
+        message::note(&format!("values of the earlier preset that {} does not have remain: {stay}", tuned.name));
     }
     Ok(course(preset.own(), tuned))
 }
 
-/// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of the
-/// rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth of that
-/// torque and a third of the voltage for its largest current at standstill; the controller alone gets a tenth of the speed and an
-/// eighth of its largest current.
-fn course(own: &Description, tuned: &Tuned) -> Course {
+/// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of
+/// the rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth
+/// of that torque and a third of the voltage for its maximum current at standstill; the controller alone gets a tenth of the
+/// speed and an eighth of its maximum current.
+fn course(own: &Description, tuned: &Tuned) -> NewExperiment {
     let of = |settings: &[Setting], wanted: &str| {
         settings.iter().find_map(|s| match s.value {
             Value::Real(x) if s.name == wanted => Some(x),
@@ -89,5 +89,5 @@ fn course(own: &Description, tuned: &Tuned) -> Course {
         let value = |(_, one, two): &(&str, f64, f64)| [0.0, *one, *two][which].to_string();
         lines.push(std::iter::once(t.to_string()).chain(columns.iter().map(value)).collect());
     }
-    Course { stimuli: lines.into_iter().map(|line| line.join(",") + "\n").collect(), stop, step }
+    NewExperiment { stimuli: lines.into_iter().map(|line| line.join(",") + "\n").collect(), stop, step }
 }

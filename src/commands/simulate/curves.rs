@@ -6,7 +6,7 @@ use fmu_plot::ink::{CURVES, Ink, REFERENCE};
 use fmu_system::cosimulation::Recording;
 use std::rc::Rc;
 
-/// Colors before they repeat in a paler tone; gray is for references that have no curve of their own.
+/// Colors, repeated in a paler tone if needed; gray is for references without a curve.
 const COLORS: usize = CURVES.len() - 1;
 
 /// All columns of a recording. The reference of a variable is dashed, in the color of the variable.

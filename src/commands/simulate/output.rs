@@ -8,8 +8,8 @@ use fmu_system::cosimulation::Recording;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes the files that the arguments ask for. Returns the text for the user: the last values, and the files. `alone` is
-/// the name of the only instance.
+/// Writes the files that the arguments request. Returns the text for the user: the last values, and the files. `alone` is the
+/// name of the only instance.
 pub(super) fn write(
     mut recording: Recording,
     for_plot: usize,
@@ -69,7 +69,7 @@ pub(super) fn write(
     Ok(lines.join("\n"))
 }
 
-/// How to open a page: with the command of this system, and in any browser.
+/// Instructions to open a page: with the command of this system, and in any browser.
 fn how_to_open(page: &Path) -> String {
     let path = page.display().to_string();
     let command = if cfg!(windows) {

@@ -1,4 +1,4 @@
-//! The first plot of a run: speed, torque, currents, angle error and power of any drive with these names.
+//! The default plot of a run: speed, torque, currents, angle error and power of any drive with these names.
 
 use drive::math::wrap;
 use fmu_plot::figure::{Curve, Figure};
@@ -13,13 +13,13 @@ const PANELS: [&[&str]; 4] = [
     &["p_in", "p_mech", "p_loss"],
 ];
 
-/// Inputs that the first plot shows if something feeds them.
+/// Inputs that the default plot shows if they are fed.
 pub(super) const INPUTS: [&str; 3] = ["speed_ref", "tau_load", "tau_ref"];
 
-/// Greatest number of panels, and of curves in a panel, for a run with none of these names.
+/// Maximum number of panels, and of curves in a panel, for a run with none of these names.
 const MOST: (usize, usize) = (5, 6);
 
-/// The columns that the first plot shows, with the angle error if there are `theta_est` and `theta_e`.
+/// The columns of the default plot, with the angle error if there are `theta_est` and `theta_e`.
 pub(super) fn overview(recording: &Recording) -> Recording {
     let named = |name: &&str| recording.columns.iter().find(|c| last(&c.name) == *name);
     let mut columns: Vec<Column> = PANELS.concat().iter().filter_map(named).cloned().collect();
@@ -43,7 +43,7 @@ pub(super) fn overview(recording: &Recording) -> Recording {
     Recording { columns, time: recording.time.clone(), ended_by: recording.ended_by.clone(), ..Recording::default() }
 }
 
-/// The last values of the first plot: a line per panel, in its unit. Names of variables omit the instance `alone`.
+/// The last values of the default plot: a line per panel, in its unit. Names of variables omit the instance `alone`.
 pub(super) fn at_the_end(figure: &Figure, alone: Option<&str>) -> String {
     let time = figure.panels.first().map_or(f64::NAN, |panel| panel.window.1);
     let mut text = format!("at {} s:", four(time));

@@ -11,20 +11,20 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
-/// How often the user has pressed Ctrl-C: the first time ends the run at the next communication point, the second the process.
+/// Number of times the user has pressed Ctrl-C: the first ends the run at the next communication point, the second the process.
 static INTERRUPTS: AtomicU32 = AtomicU32::new(0);
 
 /// File for the status and the error of the worker, below its folder for temporary files.
 const RESULT: &str = "result";
 
-/// File there for what the command prints to standard output. It is made when the run is over: nothing that an FMU writes to
-/// descriptors of the process gets into it.
+/// File there for the standard output of the command. It is created after the run, so output that an FMU writes to descriptors
+/// of the process cannot get into it.
 const OUTPUT: &str = "output";
 
 /// Time between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// File there that tells the worker to end the run.
+/// File there whose existence ends the run of the worker.
 const INTERRUPT: &str = "interrupt";
 
 /// Runs the same command as a worker.
@@ -32,7 +32,7 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
     let timeout = Duration::try_from_secs_f64(args.timeout).map_err(|e| anyhow!("--timeout {}: {e}", args.timeout))?;
     let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
     let mut command = guard::command(&std::env::current_exe()?, allowance);
-    // What the FMUs print goes to standard error.
+    // Output of the FMUs goes to standard error.
     command.args(["simulate", "--worker"]).args(std::env::args_os().skip(2)).stdout(io::stderr());
     let mut worker = Guarded::start(command)?;
     let folder = worker.folder().to_owned();
@@ -98,7 +98,7 @@ pub(super) fn catch_interrupts() -> Result<()> {
     Ok(())
 }
 
-/// Whether the run must end. Every communication point asks; the answer is cheap, because it is looked up ten times a second.
+/// Whether the run must end. Called at every communication point; cheap, because the file is checked only ten times a second.
 pub(super) fn look(args: &Simulate) -> impl FnMut() -> bool + use<> {
     let (mut looked, worker, interrupt) = (Instant::now(), args.worker, std::env::temp_dir().join(INTERRUPT));
     move || {
@@ -110,7 +110,7 @@ pub(super) fn look(args: &Simulate) -> impl FnMut() -> bool + use<> {
     }
 }
 
-/// A file that is made when the first byte is written to it.
+/// A file that is created when the first byte is written to it.
 struct Later {
     path: PathBuf,
     file: Option<File>,
@@ -130,7 +130,7 @@ impl io::Write for Later {
     }
 }
 
-/// The worker. It leaves its status and its error in a file, because an FMU may have closed everything else.
+/// The worker. It writes its status and its error to a file, because an FMU may have closed the standard streams.
 pub(super) fn work(args: &Simulate) -> Result<()> {
     guard::end_with_parent();
     let folder = std::env::temp_dir();

@@ -1,1 +1,1 @@
-"""Host sins against the C interface, each in its own process: crashes and hangs are results, not lost runs."""
+"""Misuse of the C interface, each case in its own process, so that a crash or a hang is a result."""

@@ -1,6 +1,6 @@
 """The C interface of an unpacked FMU through ctypes alone, the same for FMI 2.0 and FMI 3.0.
 
-Nothing here is polite: every argument can be wrong. Calls return the status; what a case expects, it asserts.
+Nothing is checked here: every argument can be wrong. Calls return the status; the cases assert what they expect.
 """
 
 import ctypes as c
@@ -84,7 +84,7 @@ def library(folder, version, identifier):
 
 
 class Fmu:
-    """A loaded binary and what its XML says."""
+    """A loaded binary and the content of its XML."""
 
     def __init__(self, folder):
         self.folder = Path(folder)
@@ -131,7 +131,7 @@ class Fmu:
         return [v for v in wanted if v.type == REAL[self.version]] if real else wanted
 
     def find(self, name):
-        """The variable of this name, with or without the prefix of a part in front; None if there is none."""
+        """The variable of this name, with or without the prefix of a component; None if there is none."""
         matches = [v for v in self.variables.values() if v.name == name or v.name.endswith("." + name)]
         return matches[0] if matches else None
 
@@ -140,7 +140,7 @@ class Fmu:
         return self.of("input", "parameter", real=False)
 
     def instance(self, name=b"it", **arguments):
-        """A fresh instance that must come to be; arguments as of `instantiate`."""
+        """A fresh instance; instantiation must succeed. The arguments are those of `instantiate`."""
         it = Instance(self, name, **arguments)
         assert it.handle, f"instantiation was refused: {it.messages}"
         return it
@@ -202,7 +202,7 @@ class Instance:
         return self.access("Set", suffix, [variable.reference], (kind * 1)(value))
 
     def reals(self, way, variables, values=None):
-        """Get (the bytes come back) or Set all these real variables in one call that must succeed."""
+        """Gets (returned as bytes) or sets all these real variables in one call that must succeed."""
         array = (c.c_double * len(variables))(*(values or []))
         references = [v.reference for v in variables]
         assert self.access(way, REAL[self.version], references, array) == OK, self.messages
@@ -224,13 +224,13 @@ class Instance:
         return self.call(name, 0, 0.0, start, stop is not None, stop or 0.0)
 
     def enter(self, start=0.0, stop=None):
-        """Into initialization; must succeed."""
+        """Enters initialization; must succeed."""
         assert self.set_up(start, stop) == OK, self.messages
         assert self.version == 3 or self.call("EnterInitializationMode") == OK, self.messages
         return self
 
     def begin(self, start=0.0, stop=None):
-        """To the first step; must succeed."""
+        """Completes the initialization; must succeed."""
         self.enter(start, stop)
         assert self.call("ExitInitializationMode") == OK, self.messages
         return self
@@ -274,7 +274,7 @@ class Instance:
         return state
 
     def restore(self, state):
-        """Back to a saved state; the status."""
+        """Restores a saved state; the status."""
         return self.state_call("SetFMUState", state)
 
     def forget(self, state):

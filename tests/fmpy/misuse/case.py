@@ -6,7 +6,7 @@ CASES = {}
 def case(function=None, *, witness=True):
     """Registers a case: a function of the loaded `Fmu`, named after what it does.
 
-    While it runs, an untouched `witness` instance waits in the same process; its trajectory must not notice.
+    While it runs, an untouched `witness` instance waits in the same process; its trajectory must not change.
     """
     if function is None:
         return lambda f: case(f, witness=witness)

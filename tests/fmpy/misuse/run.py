@@ -1,4 +1,4 @@
-"""What the cases share: a run that excites every input and returns all outputs, bit for bit."""
+"""The common run of the cases: it excites every input and returns all outputs, bit for bit."""
 
 import math
 
@@ -8,7 +8,7 @@ SWING = 20.0  # V, A, rad/s or N.m: enough to turn the rotor and to move the est
 
 
 def excite(it, k):
-    """Sets every real input but the DC-link voltage and the temperatures to its own sine at step `k`."""
+    """Sets every real input, except the DC-link voltage and the temperatures, to a different sine at step `k`."""
     inputs = [v for v in it.fmu.of("input") if v.name != "u_dc" and not v.name.startswith("T_")]
     it.reals("Set", inputs, [SWING * math.sin(0.01 * k * (n + 2) + n) for n in range(len(inputs))])
 
@@ -33,7 +33,8 @@ def alone(fmu, steps=60):
 
 
 def refused(it, status, *words):
-    """A call was refused as it must be: Error, said once or more, naming all `words`; and no step any more."""
+    """A call was refused properly: Error, with at least one message, all `words` in the messages, and no further
+    step."""
     assert status == ERROR, f"status {status} instead of {ERROR}; log: {it.messages}"
     assert it.errors(), "an error without a message"
     text = it.errors()[-1]
@@ -43,7 +44,7 @@ def refused(it, status, *words):
 
 
 def recovers(it, trace):
-    """After any misuse, a reset leads to the first run again, bit for bit."""
+    """After any misuse, a reset gives the first run again, bit for bit."""
     assert it.call("Reset") == OK, it.messages
     it.messages.clear()
     assert run(it.begin(), len(trace) // (8 * len(it.fmu.of("output")))) == trace, "the run after a reset differs"

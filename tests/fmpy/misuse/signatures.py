@@ -1,7 +1,7 @@
 """Every function of fmi2Functions.h (2.0.5) and fmi3Functions.h (3.0.2) with its argument types.
 
 One letter per argument: p pointer (instance, array, text, callback), n size_t, d double, u value reference, i int or
-enumeration, b the standard's Boolean. All return a status but those in RETURNS: "text", "instance" or "nothing".
+enumeration, b the standard's Boolean. All return a status, except those in RETURNS: "text", "instance" or "nothing".
 """
 
 RETURNS = {

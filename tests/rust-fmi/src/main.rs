@@ -32,7 +32,7 @@ struct Trace {
 
 /// An FMU with its value references by name.
 struct Unit {
-    // Before `import`, whose folder holds the library: fields are dropped in this order.
+    // Before `import`, whose folder contains the library: fields are dropped in this order.
     instance: InstanceCS,
     references: BTreeMap<String, u32>,
     _import: Fmi2Import,

@@ -1,10 +1,10 @@
-//! A model with a clock of every kind, which writes down when each ticks.
+//! A model with a clock of every kind, which records the ticks of each.
 
 use fmu_core::unit::SECOND;
 use fmu_core::{Block, Clock, Clocked, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table, table};
 use serde::{Deserialize, Serialize};
 
-/// Clocks that the importer ticks, and how many ticks of each are written down.
+/// Clocks that the importer ticks, and the number of recorded ticks of each.
 const CLOCKS: usize = 7;
 const TICKS: usize = 8;
 
@@ -12,7 +12,7 @@ const TICKS: usize = 8;
 struct EveryClock {
     fixed: f64,
     tunable: f64,
-    /// Times (s) from the start; -1 where there was none.
+    /// Times (s) from the start; -1 if there was none.
     times: [[f64; TICKS]; CLOCKS],
     /// Time (s) of the tick of `countdown` that follows `triggered`.
     due: Option<f64>,
@@ -53,7 +53,7 @@ impl Model for EveryClock {
         V::clock("tunable", "Every 0.3 s", Clock::tunable(|m| &mut m.model.tunable)),
         V::clock("changing", "After 0.1 s, then 0.2 s, then 0.3 s", Clock::changing()),
         V::clock("countdown", "0.025 s after triggered", Clock::countdown()),
-        V::clock("triggered", "When the importer likes", Clock::triggered()),
+        V::clock("triggered", "At any time", Clock::triggered()),
         V::clock_output("trip", "Every second tick of constant"),
         V::array_output("times", &SECOND, "When each clock ticked", CLOCKS * TICKS, |m| {
             m.model.times.as_flattened_mut()

@@ -1,4 +1,4 @@
-//! A model with a variable of every type and causality, and with its own file: every constructor of the table.
+//! A model with a variable of every type and causality, and with a resource file: every constructor of the table.
 
 use fmu_core::unit::{KELVIN, ONE, PER_SECOND, Quantity, SECOND, VOLT};
 use fmu_core::{
@@ -109,7 +109,7 @@ struct Outputs {
 }
 
 impl EveryType {
-    /// The square of `n` as the file has it.
+    /// The square of `n` from the file.
     fn square(&self, n: f64) -> f64 {
         self.squares.iter().find(|[x, _]| *x >= n).map_or(f64::MAX, |[_, y]| *y)
     }

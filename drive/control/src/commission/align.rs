@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! along phi        PI on the current
-//! across           u_q = 0, with R known 0.5 R i_q: the machine brakes its own swing, whatever J is
+//! across           u_q = 0, with R known 0.5 R i_q: the machine brakes its swing, for every J
 //!                  u_q = -2 K_p (i_q -+ 0.35 I) beyond 0.35 I
 //! at rest          means of i_q over 10 ms within 0.002 I + 4 sigma / sqrt N for 0.4 s
 //! ```

@@ -9,11 +9,11 @@
 use super::bench::Bench;
 use super::excitation::{Excitation, Record};
 use super::least_squares::Normal;
-use crate::commission::Fault;
+use super::status::CommissionFault as Fault;
 use drive_base::math::atan2;
 use serde::{Deserialize, Serialize};
 
-/// Least ratio of the inductances that shows the axis of a free rotor, whose alignment shows it too, and of a blocked one.
+/// Minimum ratio of the inductances that shows the axis of a free rotor, whose alignment shows it too, and of a blocked one.
 const SALIENT: [f64; 2] = [1.15, 1.03];
 
 /// Ratio of the inductances above which the angle of the rest has shown which of them is the magnet's.

@@ -1,7 +1,7 @@
 //! What the parts of the commissioning share: the test conditions, and what earlier parts have found.
 
 use super::curve::Curve;
-use super::probe::Tensor;
+use super::tensor::Tensor;
 use drive_base::frame::AlphaBeta;
 use serde::{Deserialize, Serialize};
 
@@ -27,7 +27,7 @@ pub(super) struct Bench {
     pub(super) T: f64,
     /// Samples from the command to its action.
     pub(super) delay: f64,
-    /// Greatest current in A of the commissioning.
+    /// Maximum current in A of the commissioning.
     pub(super) I: f64,
     /// u_dc / sqrt 3 at the start in V.
     pub(super) U: f64,

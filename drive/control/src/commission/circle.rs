@@ -8,7 +8,7 @@
 //!
 //! For any course of the angle, a_2 of a least squares is its acceleration averaged with the weight (1 - tau^2)^2: the
 //! second integral of the quadratic Legendre polynomial. Speed and torque are averaged with the same weight, so that
-//! J w' + B w + tau_coulomb = tau holds for the means exactly, whatever cogging and control do in the part, and what has
+//! J w' + B w + tau_coulomb = tau holds for the means exactly, in spite of cogging and control in the part, and what has
 //! a period much shorter than the part vanishes. The torque 1.5 n_p (p - c - d tau) x i needs neither L_q nor psi_M.
 //!
 //! At most 256 points; when they are full, every second one goes. The circle is Kasa's (1976, IEEE Trans. Instrum. Meas.
@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 
 /// Points of a part.
 const POINTS: usize = 256;
-/// Fewest points.
+/// Minimum number of points.
 const FEWEST: usize = 24;
 /// Fits of the center.
 const PASSES: usize = 4;

@@ -97,7 +97,7 @@ impl Curve {
         )
     }
 
-    /// Greatest slope in Ohm.
+    /// Maximum slope in Ohm.
     pub(super) fn steepest(&self) -> f64 {
         self.l[0] / self.i_0
     }

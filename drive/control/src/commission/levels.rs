@@ -22,10 +22,11 @@
 
 use super::bench::{Bench, Sample};
 use super::circle::{Part, Points};
+use super::identified::Identified;
 use super::mechanics::Mechanics;
-use super::results::Identified;
+use super::results::Results;
+use super::status::CommissionFault as Fault;
 use super::turning::Turning;
-use crate::commission::{Fault, Results};
 use drive_base::frame::{AlphaBeta, DqHat};
 use drive_base::math::within;
 use serde::{Deserialize, Serialize};
@@ -42,11 +43,11 @@ const ALONG: f64 = -0.06;
 /// Shortest part in turns, longest in s.
 const TURNS: f64 = 2.2;
 const LONGEST: f64 = 1.2;
-/// Greatest deviation of a part from a circle.
+/// Maximum deviation of a part from a circle.
 const DEVIATION: f64 = 0.05;
 /// Relative half-width of an L_d that is refused.
 const UNKNOWN: f64 = 0.1;
-/// Least relative half-width of psi_M.
+/// Minimum relative half-width of psi_M.
 const LEAST: f64 = 0.001;
 /// Speed off a level over that of the level: near enough to measure, and lost.
 const NEAR: f64 = 0.03;
@@ -121,7 +122,7 @@ fn part(w: f64, whole: f64) -> f64 {
     LONGEST.min(40.0 * turn).max(2.5 * turn).max(0.1 * whole)
 }
 
-/// Greatest current of a sweep in A.
+/// Maximum current of a sweep in A.
 fn most(bench: &Bench, turning: &Turning) -> f64 {
     (0.3 * turning.motor.psi_M / turning.motor.L_q).min(SWEEP * bench.I)
 }

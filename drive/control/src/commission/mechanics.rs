@@ -9,13 +9,13 @@
 //! the loss of the legs at small currents, is not white. w and w' are mechanical here, in rad/s and rad/s2; tau in N.m.
 
 use super::excitation::Rows;
+use super::identified::Identified;
 use super::least_squares::Normal;
-use super::results::Identified;
 use serde::{Deserialize, Serialize};
 
 /// Parts that are kept.
 const PARTS: usize = 192;
-/// Fewest parts, and greatest share of those left out.
+/// Minimum number of parts, and maximum share of those left out.
 const FEWEST: f64 = 8.0;
 const LEFT_OUT: f64 = 0.2;
 /// Standard deviations beyond which a part is left out.

@@ -16,7 +16,7 @@ use super::align::{Dc, is_still};
 use super::bench::{Bench, Sample};
 use super::curve::{Curve, OCTAVE, POINTS};
 use super::least_squares::{Normal, Solution};
-use crate::commission::Fault;
+use super::status::CommissionFault as Fault;
 use drive_base::frame::AlphaBeta;
 use drive_base::math::ln;
 use serde::{Deserialize, Serialize};

@@ -2,49 +2,28 @@
 
 use super::axes::Axes;
 use super::bench::Bench;
+use super::identified::Identified;
 use super::mechanics::Found;
 use super::output_error::Magnetization;
 use super::resistance::Line;
 use serde::{Deserialize, Serialize};
 
-/// Greatest residual of a loop over its amplitude, along d and q.
+/// Maximum residual of a loop over its amplitude, along d and q.
 const RESIDUAL: [f64; 2] = [0.02, 0.01];
-/// Greatest relative half-width of R_s.
+/// Maximum relative half-width of R_s.
 pub const LIMIT_R: f64 = 0.01;
-/// Greatest relative half-width of the inductances.
+/// Maximum relative half-width of the inductances.
 pub const LIMIT_L: f64 = 0.05;
-/// Greatest relative half-width of the dead time's values.
+/// Maximum relative half-width of the dead time's values.
 pub const LIMIT_DEAD: f64 = 0.5;
-/// Greatest relative half-width of s_2 and s_3.
+/// Maximum relative half-width of s_2 and s_3.
 pub const LIMIT_SATURATION: f64 = 0.5;
-/// Greatest relative half-width of psi_M.
+/// Maximum relative half-width of psi_M.
 const LIMIT_PSI: f64 = 0.02;
-/// Greatest relative half-width of J.
+/// Maximum relative half-width of J.
 const LIMIT_J: f64 = 0.05;
-/// Greatest relative half-width of the friction's values.
+/// Maximum relative half-width of the friction's values.
 const LIMIT_FRICTION: f64 = 0.15;
-
-/// A value and the half-width of its 95 % interval.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Identified {
-    /// Value in its SI unit; 0 until known or if it is refused.
-    pub value: f64,
-    /// Relative half-width; 1: refused.
-    pub u: f64,
-}
-
-impl Default for Identified {
-    fn default() -> Self {
-        Self { value: 0.0, u: 1.0 }
-    }
-}
-
-impl Identified {
-    /// The `value` if its relative half-width `u` is at most `limit`.
-    fn within(value: f64, u: f64, limit: f64) -> Self {
-        if u <= limit { Self { value, u } } else { Self::default() }
-    }
-}
 
 /// What the commissioning has found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -11,11 +11,12 @@ use super::offsets::Offsets;
 use super::output_error::{Along, Magnetization, OutputError, Progress};
 use super::probe::{Probe, Probed};
 use super::resistance::{Staircase, adopt};
+use super::results::Results;
 use super::setup::{CommissionSetup, Voltage};
 use super::starting::{Started, Starting};
+use super::status::{CommissionFault as Fault, CommissionMode, CommissionState};
 use super::swing::Swing;
 use super::turning::Turning;
-use super::{CommissionFault as Fault, CommissionMode, CommissionState, Results};
 use drive_base::frame::{AlphaBeta, Phases};
 use serde::{Deserialize, Serialize};
 

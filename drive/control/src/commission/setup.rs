@@ -1,6 +1,6 @@
 //! What the commissioning is given, and what it gives to the inverter.
 
-use super::CommissionMode;
+use super::status::CommissionMode;
 use drive_base::frame::AlphaBeta;
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,7 @@ pub struct CommissionSetup {
     pub T_s: f64,
     /// Samples from taking the currents to the voltage acting: 0, 1 or 2.
     pub delay: i32,
-    /// Greatest current of the commissioning in A, > 0: about the rated one to twice of it.
+    /// Maximum current of the commissioning in A, > 0: about the rated one to twice of it.
     pub i: f64,
     /// Rated electrical speed in rad/s, > 0.
     pub speed: f64,

@@ -15,8 +15,8 @@
 
 use super::align::{Dc, LONGEST, Rest};
 use super::bench::{Bench, Sample};
+use super::status::CommissionFault as Fault;
 use super::turning::Turning;
-use crate::commission::Fault;
 use crate::start::damping;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use serde::{Deserialize, Serialize};
@@ -215,7 +215,7 @@ impl Starting {
 mod tests {
     use super::*;
 
-    /// After coasting, the pulse of zero voltage tells a turning rotor, which coasts on, from one at rest.
+    /// After coasting, the pulse of zero voltage distinguishes a turning rotor, which coasts on, from one at rest.
     #[test]
     fn a_pulse_shows_a_turning_rotor() {
         let bench = Bench { T: 1e-4, delay: 1.0, I: 10.0, ..Bench::default() };

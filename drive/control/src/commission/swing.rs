@@ -6,7 +6,7 @@
 //! w_0     = 1.48 / t_50 ~ sqrt(n_p K 0.4 I / J)          t_50: half of the way
 //! ```
 //!
-//! A blocked rotor's p is a linear function of the current at every instant, whatever the saliency; a free rotor turns after
+//! A blocked rotor's p is a linear function of the current at every instant, with any saliency; a free rotor turns after
 //! the current has turned. The residual of a least squares of p on current and time, over the whole record, separates the two.
 
 use super::bench::{Bench, Sample};

@@ -11,7 +11,7 @@
 //! here.
 //! w_h in rad/s, T_s in s.
 
-use crate::estimator::{Context, Setup};
+use crate::estimator::contract::{ContextOf, SetupOf};
 use drive_base::frame::Vector;
 use drive_base::math::sin_cos;
 use fmu_core::unit::{ONE, RAD_PER_S, VOLT};
@@ -61,8 +61,8 @@ pub struct Carrier {
 impl Carrier {
     /// At sample `k`.
     #[inline]
-    pub fn at(context: &Context, k: u64) -> Self {
-        let par = &context.par.carrier;
+    pub fn at<All: AsRef<CarrierParameters>>(context: &ContextOf<All>, k: u64) -> Self {
+        let par = context.of::<CarrierParameters>();
         let phi = par.frequency * context.T_s;
         // A period is a whole number of samples. Integer counting keeps the phase from drifting.
         let samples = samples(par.frequency, context.T_s).unwrap_or(MIN_SAMPLES);
@@ -136,8 +136,8 @@ impl PeriodMean {
 ///
 /// # Errors
 /// The period is not a whole number of samples, or it has too few or too many samples.
-pub fn validate(setup: &Setup) -> Result<(), Fault> {
-    let (frequency, T_s) = (setup.par.carrier.frequency, setup.T_s);
+pub fn validate<All: AsRef<CarrierParameters>>(setup: &SetupOf<All>) -> Result<(), Fault> {
+    let (frequency, T_s) = (setup.of::<CarrierParameters>().frequency, setup.T_s);
     if samples(frequency, T_s).is_some() {
         return Ok(());
     }

@@ -12,9 +12,9 @@
 //! Limits: those of the voltage model, because the two models are equivalent and differ only in form. It holds rated load
 //! down to 0.010 of the rated speed, 0.010 with a compensated dead time.
 
-use crate::estimator::Context;
+use crate::estimator::contract::ContextOf;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::{Follower, Rows};
+use crate::estimator::follower::{Follower, MatsuiParameters, Rows};
 use crate::estimator::interval::Interval;
 use serde::{Deserialize, Serialize};
 
@@ -25,15 +25,15 @@ pub type CurrentModel = Follower<CurrentRows>;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurrentRows;
 
-impl Rows for CurrentRows {
+impl<All: AsRef<MatsuiParameters>> Rows<All> for CurrentRows {
     #[inline]
-    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
-        let Context { motor, par, T_s, .. } = *context;
+    fn rows(w: &mut f64, context: &ContextOf<All>, x: &Interval, slip: f64) -> f64 {
+        let ContextOf { motor, T_s, .. } = *context;
         let r_d = x.v.d() - motor.R_s * x.i.d() + (*w * motor.L_q + slip * motor.L_d) * x.i.q();
         let r_q = x.v.q() - motor.R_s * x.i.q() - (*w * motor.L_d + slip * motor.L_q) * x.i.d() - *w * motor.psi_M;
         let di_d = x.i_now.d() - (x.i_last.d() + T_s / motor.L_d * r_d);
         let di_q = x.i_now.q() - (x.i_last.q() + T_s / motor.L_q * r_q);
-        *w -= (1.0 - pole(par.matsui.filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
+        *w -= (1.0 - pole(context.of::<MatsuiParameters>().filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
         -di_d * motor.L_d / T_s
     }
 }

@@ -9,10 +9,10 @@
 //! holds rated load down to 0.020 of the rated speed, 0.030 with a compensated dead time. A reversal at light load is
 //! ambiguous by half a turn, unless `emf.hold_reversal` holds it.
 
-use crate::estimator::emf::{self, Direction, pole};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};
+use crate::estimator::emf::{self, Direction, EmfParameters, pole};
 use crate::estimator::interval::Interval;
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -26,29 +26,29 @@ pub struct DirectEmf {
     direction: Direction,
 }
 
-impl Estimating for DirectEmf {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for DirectEmf {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let e = DqHat::new(0.0, w * context.motor.psi_M);
         let tracker = Tracker::at(theta, w, context.T_s);
         (Self { tracker, e, direction: Direction::of(w) }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, par, T_s, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
         self.tracker.advance(T_s);
         let x = Interval::new(self.tracker.theta_last, self.tracker.theta, sample, T_s);
         let w = self.tracker.w;
-        let slip = par.emf.slip(&x, w);
+        let slip = context.of::<EmfParameters>().slip(&x, w);
         let e = DqHat::new(
             x.v.d() - motor.R_s * x.i.d() + (w * motor.L_q + slip * motor.L_d) * x.i.q(),
             x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d(),
         );
-        self.e += (e - self.e) * (1.0 - pole(par.emf.bandwidth, T_s));
+        self.e += (e - self.e) * (1.0 - pole(context.of::<EmfParameters>().bandwidth, T_s));
         emf::follow(&mut self.tracker, &mut self.direction, context, self.e, sample)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         emf::validate(setup)
     }
 }

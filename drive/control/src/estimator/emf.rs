@@ -25,9 +25,9 @@
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
 //! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
 
+use crate::estimator::contract::{ContextOf, Estimate, Sample, SetupOf};
 use crate::estimator::interval::Interval;
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::DqHat;
 use drive_base::math::{atan2, exp};
 use fmu_core::unit::RAD_PER_S;
@@ -98,15 +98,15 @@ pub fn angle_error(s: f64, e_d: f64, e_q: f64) -> f64 {
 
 /// The last step of the methods that observe the EMF `e` (V): the tracker follows its angle.
 #[inline]
-pub fn follow(
+pub fn follow<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(
     tracker: &mut Tracker,
     direction: &mut Direction,
-    context: &Context,
+    context: &ContextOf<All>,
     e: DqHat,
     sample: &Sample,
 ) -> Estimate {
-    let s = direction.update(tracker.w, context.par.emf.w_sign);
-    if !context.par.emf.hold_reversal {
+    let s = direction.update(tracker.w, context.of::<EmfParameters>().w_sign);
+    if !context.of::<EmfParameters>().hold_reversal {
         return tracker.follow(context, angle_error(s, e.d(), e.q()), sample);
     }
     let g = hold(tracker, context, e);
@@ -116,11 +116,11 @@ pub fn follow(
 
 /// Leads the speed through zero with the EMF `e` (V); returns the share g of standstill.
 #[inline]
-pub fn hold(tracker: &mut Tracker, context: &Context, e: DqHat) -> f64 {
-    let Context { motor, par, T_s, .. } = *context;
-    let least = par.emf.w_hold * motor.psi_M;
+pub fn hold<All: AsRef<EmfParameters>>(tracker: &mut Tracker, context: &ContextOf<All>, e: DqHat) -> f64 {
+    let ContextOf { motor, T_s, .. } = *context;
+    let least = context.of::<EmfParameters>().w_hold * motor.psi_M;
     let g = least * least / (e.dot(e) + least * least);
-    tracker.w += T_s * g * par.emf.bandwidth / 3.0 * (e.q() / motor.psi_M - tracker.w);
+    tracker.w += T_s * g * context.of::<EmfParameters>().bandwidth / 3.0 * (e.q() / motor.psi_M - tracker.w);
     g
 }
 
@@ -153,8 +153,8 @@ impl AxisObserver {
 ///
 /// # Errors
 /// States by how much the tracker is too fast.
-pub fn validate(setup: &Setup) -> Result<(), Fault> {
-    let (rho, w_o) = (setup.par.tracker.bandwidth, setup.par.emf.bandwidth);
+pub fn validate<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(setup: &SetupOf<All>) -> Result<(), Fault> {
+    let (rho, w_o) = (setup.of::<TrackerParameters>().bandwidth, setup.of::<EmfParameters>().bandwidth);
     if rho > w_o / 3.0 * (1.0 + 1e-9) {
         let observer = setup.tell("emf.bandwidth");
         let allowed = format!("at most a third of {observer}, or the tracker rings on the EMF's lag");
@@ -233,7 +233,7 @@ mod tests {
     fn a_reversal_is_held_near_standstill() {
         let (mut par, motor) = (crate::estimator::EstimatorParameters::default(), drive_base::motor::Motor::default());
         par.emf.hold_reversal = true;
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
         let rho = par.tracker.bandwidth;
         for (w, g) in [(par.emf.w_hold, 0.5), (3.0 * par.emf.w_hold, 0.1), (0.0, 1.0)] {
             let (mut tracker, mut direction) = (Tracker::at(0.0, w, 1e-4), Direction::of(w));
@@ -252,7 +252,7 @@ mod tests {
     fn the_direction_comes_from_a_small_emf() {
         let (mut par, motor) = (crate::estimator::EstimatorParameters::default(), drive_base::motor::Motor::default());
         par.emf.hold_reversal = true;
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
         for share in [0.9, 1.1] {
             // The rotor turns backwards, the tracker still forwards.
             let (mut tracker, mut direction) = (Tracker::at(0.0, 1.0, 1e-4), Direction::of(1.0));

@@ -10,10 +10,10 @@
 //! Limits: those of the extended EMF; for large angle errors, the neglected saliency slows convergence. It holds rated
 //! load down to 0.020 of the rated speed, 0.020 with a compensated dead time.
 
-use crate::estimator::emf::{self, AxisObserver, Direction, pole};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};
+use crate::estimator::emf::{self, AxisObserver, Direction, EmfParameters, pole};
 use crate::estimator::interval::Interval;
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -27,8 +27,8 @@ pub struct EmfObserver {
     direction: Direction,
 }
 
-impl Estimating for EmfObserver {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for EmfObserver {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let tracker = Tracker::at(theta, w, context.T_s);
         let now = Interval::new(tracker.theta_last, theta, sample, context.T_s).i_now;
         let observer = Self {
@@ -41,12 +41,12 @@ impl Estimating for EmfObserver {
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, par, T_s, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
         self.tracker.advance(T_s);
         let x = Interval::new(self.tracker.theta_last, self.tracker.theta, sample, T_s);
-        let (w, z) = (self.tracker.w, pole(par.emf.bandwidth, T_s));
-        let slip = par.emf.slip(&x, w);
+        let (w, z) = (self.tracker.w, pole(context.of::<EmfParameters>().bandwidth, T_s));
+        let slip = context.of::<EmfParameters>().slip(&x, w);
         let r_d = x.v.d() - motor.R_s * x.i.d() + (w * motor.L_q + slip * motor.L_d) * x.i.q();
         let r_q = x.v.q() - motor.R_s * x.i.q() - (w * motor.L_d + slip * motor.L_q) * x.i.d();
         let e_d = self.d.update(z, motor.L_d, T_s, r_d, x.i_now.d());
@@ -54,7 +54,7 @@ impl Estimating for EmfObserver {
         emf::follow(&mut self.tracker, &mut self.direction, context, DqHat::new(e_d, e_q), sample)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         emf::validate(setup)
     }
 }

@@ -15,10 +15,10 @@
 //! time. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated
 //! load shifts the angle by 5.8 deg. The speed that `emf.hold_reversal` takes from the EMF is e_q / (psi_M + (L_d - L_q) i_d).
 
-use crate::estimator::emf::{self, AxisObserver, Direction, pole};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};
+use crate::estimator::emf::{self, AxisObserver, Direction, EmfParameters, pole};
 use crate::estimator::interval::Interval;
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::DqHat;
 use drive_base::math::at_least;
 use fmu_core::Fault;
@@ -34,7 +34,7 @@ pub struct ExtendedEmfObserver {
 
 impl ExtendedEmfObserver {
     /// At the electrical speed `w` (rad/s) in a correctly aligned frame, with the currents of `now`.
-    pub fn start(context: &Context, now: &Interval, w: f64) -> Self {
+    pub fn start<All>(context: &ContextOf<All>, now: &Interval, w: f64) -> Self {
         let motor = context.motor;
         let e_q = w * (motor.psi_M + (motor.L_d - motor.L_q) * now.i_now.d());
         Self {
@@ -46,18 +46,18 @@ impl ExtendedEmfObserver {
 
     /// Angle error theta - theta^ in rad from one interval, at the speed estimate `w` (rad/s).
     #[inline]
-    pub fn angle_error(&mut self, context: &Context, x: &Interval, w: f64) -> f64 {
+    pub fn angle_error<All: AsRef<EmfParameters>>(&mut self, context: &ContextOf<All>, x: &Interval, w: f64) -> f64 {
         let e = self.emf(context, x, w);
-        let s = self.direction.update(w, context.par.emf.w_sign);
+        let s = self.direction.update(w, context.of::<EmfParameters>().w_sign);
         emf::angle_error(s, e.d(), e.q())
     }
 
     /// Extended EMF in V.
     #[inline]
-    fn emf(&mut self, context: &Context, x: &Interval, w: f64) -> DqHat {
-        let Context { motor, par, T_s, .. } = *context;
-        let z = pole(par.emf.bandwidth, T_s);
-        let cross = w * motor.L_q + par.emf.slip(x, w) * motor.L_d;
+    fn emf<All: AsRef<EmfParameters>>(&mut self, context: &ContextOf<All>, x: &Interval, w: f64) -> DqHat {
+        let ContextOf { motor, T_s, .. } = *context;
+        let z = pole(context.of::<EmfParameters>().bandwidth, T_s);
+        let cross = w * motor.L_q + context.of::<EmfParameters>().slip(x, w) * motor.L_d;
         let r = x.v - x.i * motor.R_s - x.i.turned() * cross;
         let e_d = self.d.update(z, motor.L_d, T_s, r.d(), x.i_now.d());
         let e_q = self.q.update(z, motor.L_d, T_s, r.q(), x.i_now.q());
@@ -65,7 +65,7 @@ impl ExtendedEmfObserver {
     }
 }
 
-/// Least flux linkage that makes the extended EMF, as a share of psi_M.
+/// Minimum flux linkage that makes the extended EMF, as a share of psi_M.
 const LEAST_FLUX: f64 = 0.2;
 
 /// State kept from one sample to the next.
@@ -75,8 +75,8 @@ pub struct ExtendedEmf {
     observer: ExtendedEmfObserver,
 }
 
-impl Estimating for ExtendedEmf {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for ExtendedEmf {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let tracker = Tracker::at(theta, w, context.T_s);
         let now = Interval::new(tracker.theta_last, theta, sample, context.T_s);
         let observer = ExtendedEmfObserver::start(context, &now, w);
@@ -84,12 +84,12 @@ impl Estimating for ExtendedEmf {
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         let Self { tracker, observer } = self;
         tracker.advance(context.T_s);
         let x = Interval::new(tracker.theta_last, tracker.theta, sample, context.T_s);
         let mut e = observer.emf(context, &x, tracker.w);
-        if context.par.emf.hold_reversal {
+        if context.of::<EmfParameters>().hold_reversal {
             // The EMF of the magnet alone, which is what the speed is taken from.
             let motor = context.motor;
             let active = motor.psi_M + (motor.L_d - motor.L_q) * x.i.d();
@@ -98,7 +98,7 @@ impl Estimating for ExtendedEmf {
         emf::follow(tracker, &mut observer.direction, context, e, sample)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         emf::validate(setup)
     }
 }

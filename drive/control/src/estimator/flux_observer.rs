@@ -36,9 +36,9 @@
 //! Limits: at w = 0 the angle is not observable; without current, neither is R. An offset of the current sensors acts like
 //! a wrong R^ that turns: 20 mA loses cells at 0.01 pu. L_q^ = 1.2 L_q loses rated motoring load at 0.02 and 0.05 pu.
 
-use crate::estimator::resistance::{FILTER, STANDSTILL};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Sample};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
+use crate::estimator::resistance::{FILTER, ResistanceParameters, STANDSTILL};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND};
@@ -47,7 +47,7 @@ use serde::{Deserialize, Serialize};
 
 /// Share of `rho_0` above which the magnet flux adapts more slowly.
 const MAGNET_ALONE: f64 = 0.3;
-/// Least |psi_a|^2 as a share of `psi_M`^2.
+/// Minimum |psi_a|^2 as a share of `psi_M`^2.
 const LEAST: f64 = 0.01;
 
 /// Parameters of the observer.
@@ -85,28 +85,31 @@ pub struct FluxObserver {
     w_f: f64,
 }
 
-impl Estimating for FluxObserver {
+impl<All: AsRef<FluxObserverParameters> + AsRef<ResistanceParameters> + AsRef<TrackerParameters>> Estimating<All>
+    for FluxObserver
+{
     /// The first resistance is on the safe side for Rasmussen's observer; in torque mode, it is `motor.R_s`.
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
-        let Context { motor, par, T_s, .. } = *context;
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let ContextOf { motor, T_s, .. } = *context;
         let axis = Axis::<Estimated>::at(theta);
         let psi = axis.to_stator(flux(motor, motor.psi_M, axis.from_stator(sample.i)));
-        let (R, psi_M) = (par.adaptation.first(motor, sample.speed_ref.is_none()), motor.psi_M);
+        let at_once = sample.speed_ref.is_none();
+        let (R, psi_M) = (context.of::<ResistanceParameters>().first(motor, at_once), motor.psi_M);
         let tracker = Tracker::at(theta, w, T_s);
         (Self { tracker, psi, R, psi_M, w_f: w, ..Self::default() }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, T_s, par, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
         self.tracker.advance(T_s);
         let axis = Axis::<Estimated>::at(self.tracker.theta);
         let half_way = axis.ahead(Turn::new(0.5 * (self.tracker.theta_last - self.tracker.theta)));
-        let R = self.resistance(par, motor);
+        let R = self.in_use(context);
         let mean = (sample.i_last + sample.i) * 0.5;
         self.psi += (sample.u - mean * R + half_way.to_stator(self.v)) * T_s;
 
-        if par.flux_observer.magnet == 0.0 {
+        if context.of::<FluxObserverParameters>().magnet == 0.0 {
             self.psi_M = motor.psi_M;
         }
         let (i, psi_M, dL) = (axis.from_stator(sample.i), self.psi_M, motor.L_d - motor.L_q);
@@ -118,44 +121,50 @@ impl Estimating for FluxObserver {
         let w = self.tracker.w;
         self.w_f += T_s * FILTER * (w - self.w_f);
         let c_0 = 0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q);
-        let mut c = c_0 + par.flux_observer.k_w * w.abs();
+        let mut c = c_0 + context.of::<FluxObserverParameters>().k_w * w.abs();
         let mut others = 0.0;
-        if par.adaptation.resistance {
+        if context.of::<ResistanceParameters>().resistance {
             let asked = sample.speed_ref.map_or(0.0, f64::abs);
             if asked >= STANDSTILL {
-                c = c.min(par.adaptation.k_c * self.w_f.abs().max(f64::from(motor.n_p) * asked));
+                c = c.min(context.of::<ResistanceParameters>().k_c * self.w_f.abs().max(f64::from(motor.n_p) * asked));
             }
             self.h += (half_way.to_stator(self.v_h) - mean) * T_s;
             let rho = inverse * psi_a.dot(axis.from_stator(self.h));
-            let rho_0 = par.adaptation.i / (c_0 * psi_M);
+            let rho_0 = context.of::<ResistanceParameters>().i / (c_0 * psi_M);
             self.adapt(context, r * rho / (rho * rho + rho_0 * rho_0));
             self.v_h = psi_a * (-c * rho);
             others = rho / (MAGNET_ALONE * rho_0);
         }
         self.v = psi_a * (c * r);
-        self.psi_M -= T_s * par.flux_observer.magnet * r * psi_M / (1.0 + others * others);
-        self.tracker.correct(context, par.tracker.bandwidth, -inverse * psi_a.cross(e), sample);
+        self.psi_M -= T_s * context.of::<FluxObserverParameters>().magnet * r * psi_M / (1.0 + others * others);
+        self.tracker.correct(context, context.of::<TrackerParameters>().bandwidth, -inverse * psi_a.cross(e), sample);
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 
     #[inline]
-    fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
-        if par.adaptation.resistance { self.R } else { motor.R_s }
+    fn resistance(&self, context: &ContextOf<All>) -> f64 {
+        self.in_use(context)
     }
 
     /// The adapted values of the machine stay.
-    fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
+    fn place(&mut self, context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) {
         *self = Self { R: self.R, ..Self::start(context, sample, theta, w).0 };
     }
 }
 
 impl FluxObserver {
+    /// Resistance in Ohm.
+    #[inline]
+    fn in_use<All: AsRef<ResistanceParameters>>(&self, context: &ContextOf<All>) -> f64 {
+        if context.of::<ResistanceParameters>().resistance { self.R } else { context.motor.R_s }
+    }
+
     /// Moves the resistance along its estimated error (Ohm), within the clamps, and the flux with it.
     #[inline]
-    fn adapt(&mut self, context: &Context, error: f64) {
-        let Context { motor, T_s, par, .. } = *context;
-        let R = self.R + T_s * par.adaptation.bandwidth * error;
-        let R = par.adaptation.within(motor, R);
+    fn adapt<All: AsRef<ResistanceParameters>>(&mut self, context: &ContextOf<All>, error: f64) {
+        let ContextOf { motor, T_s, .. } = *context;
+        let R = self.R + T_s * context.of::<ResistanceParameters>().bandwidth * error;
+        let R = context.of::<ResistanceParameters>().within(motor, R);
         self.psi += self.h * (R - self.R);
         self.R = R;
     }
@@ -186,6 +195,7 @@ pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = table![
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::EstimatorParameters;
     use crate::estimator::testing::{beside, comes_to_the_rotor, salient, with_L_q};
     use drive_base::frame::Dq;
 
@@ -236,7 +246,7 @@ mod tests {
         let (mut par, motor, T_s) = (EstimatorParameters::default(), salient(), 1e-4);
         par.adaptation.resistance = true;
         for w in [900.0, -900.0] {
-            let context = Context { par: &par, motor: &motor, J: 15e-3, T_s };
+            let context = ContextOf { par: &par, motor: &motor, J: 15e-3, T_s };
             let (mut observer, _) = FluxObserver::start(&context, &Sample::default(), 0.4, w);
             (observer.v, observer.v_h) = (DqHat::new(3.0, -2.0), DqHat::new(0.5, 1.5));
             let FluxObserver { psi, v, v_h, .. } = observer;
@@ -254,7 +264,7 @@ mod tests {
     /// One sample beside a rotor at `w` (rad/s), after which the flux is `error` (Wb) too long and h is `h` (Wb/Ohm), both along d.
     fn after(par: &EstimatorParameters, w: f64, error: f64, h: f64) -> FluxObserver {
         let (motor, T_s) = (salient(), 1e-4);
-        let context = Context { par, motor: &motor, J: 15e-3, T_s };
+        let context = ContextOf { par, motor: &motor, J: 15e-3, T_s };
         let (mut observer, _) =
             FluxObserver::start(&context, &Sample { speed_ref: Some(w), ..Sample::default() }, 0.4, w);
         let d = Axis::<Estimated>::at(0.4 + T_s * w);

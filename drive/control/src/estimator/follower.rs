@@ -5,9 +5,9 @@
 //! theta' = w + x + rho e, x' = rho^2/4 e. Without the integral x, a speed bias becomes an angle error bias / rho: with
 //! L_q + 20 %, the drive then loses synchronism at half the rated speed. Both angle poles are at -rho/2.
 
-use crate::estimator::emf::Direction;
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
+use crate::estimator::emf::{Direction, EmfParameters};
 use crate::estimator::interval::Interval;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -35,10 +35,10 @@ impl Default for MatsuiParameters {
 }
 
 /// Both rows of the machine's voltage equation in the estimated frame.
-pub trait Rows {
+pub trait Rows<All> {
     /// Smooths the electrical speed `w` (rad/s) with that of the q row, and returns the voltage -w psi_M sin theta~ (V) of
     /// the d row. `slip` is the frame-speed term in rad/s.
-    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64;
+    fn rows(w: &mut f64, context: &ContextOf<All>, x: &Interval, slip: f64) -> f64;
 }
 
 /// State at a sample.
@@ -58,16 +58,16 @@ pub struct Follower<R> {
     model: PhantomData<R>,
 }
 
-impl<R: Rows> Estimating for Follower<R> {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<R: Rows<All>, All: AsRef<MatsuiParameters> + AsRef<EmfParameters>> Estimating<All> for Follower<R> {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         (Self::at(theta, w, context.T_s), Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         self.advance(context.T_s);
         let x = Interval::new(self.theta_last, self.theta, sample, context.T_s);
-        let slip = context.par.emf.slip(&x, self.w);
+        let slip = context.of::<EmfParameters>().slip(&x, self.w);
         let e_d = R::rows(&mut self.w, context, &x, slip);
         self.correct(context, e_d);
         Estimate::new(self.theta, self.speed(), sample)
@@ -96,10 +96,10 @@ impl<R> Follower<R> {
 
     /// Corrects the state with the voltage -w psi_M sin theta~ (V) from the d row.
     #[inline]
-    pub fn correct(&mut self, context: &Context, e_d: f64) {
-        let par = &context.par.matsui;
-        let s = self.direction.update(self.w, context.par.emf.w_sign);
-        let e = -s * e_d / (context.motor.psi_M * self.w.abs().max(context.par.emf.w_sign));
+    pub fn correct<All: AsRef<MatsuiParameters> + AsRef<EmfParameters>>(&mut self, context: &ContextOf<All>, e_d: f64) {
+        let par = context.of::<MatsuiParameters>();
+        let s = self.direction.update(self.w, context.of::<EmfParameters>().w_sign);
+        let e = -s * e_d / (context.motor.psi_M * self.w.abs().max(context.of::<EmfParameters>().w_sign));
         let e = e.clamp(-CLIP, CLIP);
         if par.integral {
             self.x += context.T_s * 0.25 * par.bandwidth * par.bandwidth * e;
@@ -140,7 +140,7 @@ mod tests {
     fn both_poles_are_at_half_the_gain() {
         let (par, motor, w, off) = (EstimatorParameters::default(), Motor::default(), 300.0, 4.0);
         let (rho, T_s) = (par.matsui.bandwidth, 1e-6);
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s };
         for sign in [1.0, -1.0] {
             let mut follower = Follower::<()>::at(0.0, sign * w, T_s);
             let n = 2.0 / (rho * T_s);

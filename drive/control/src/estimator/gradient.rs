@@ -22,15 +22,15 @@
 //! speed, 0.010 with a compensated dead time. With the clamp, an angle error remains where eta^ leaves the circle but not
 //! the square.
 
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, Estimated};
 use drive_base::math::atan2;
 use fmu_core::unit::PER_SECOND;
 use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
 
-/// Least length of eta as a share of `psi_M`.
+/// Minimum length of eta as a share of `psi_M`.
 const LEAST: f64 = 0.1;
 
 /// Parameters of the observer.
@@ -56,39 +56,40 @@ pub struct GradientObserver {
     eta: AlphaBeta,
 }
 
-impl Estimating for GradientObserver {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<GradientParameters> + AsRef<TrackerParameters>> Estimating<All> for GradientObserver {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let axis = Axis::<Estimated>::at(theta);
         let eta = axis.along(length(context, axis, sample));
         (Self { tracker: Tracker::at(theta, w, context.T_s), eta }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, T_s, par, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
         self.tracker.advance(T_s);
         let axis = Axis::<Estimated>::at(self.tracker.theta);
         let psi_a = length(context, axis, sample);
         let mean = (sample.i_last + sample.i) * 0.5;
         self.eta += (sample.u - mean * motor.R_s) * T_s - (sample.i - sample.i_last) * motor.L_q;
-        if par.gradient.clamped {
+        if context.of::<GradientParameters>().clamped {
             let within = |x: f64| x.max(-psi_a).min(psi_a);
             self.eta = AlphaBeta::new(within(self.eta.alpha()), within(self.eta.beta()));
         } else {
             // At most the whole way: a state that is far off would overshoot.
             let off = 1.0 - self.eta.dot(self.eta) / (psi_a * psi_a);
-            let gain = 0.5 * T_s * par.gradient.bandwidth * psi_a * psi_a / (motor.psi_M * motor.psi_M);
+            let gain =
+                0.5 * T_s * context.of::<GradientParameters>().bandwidth * psi_a * psi_a / (motor.psi_M * motor.psi_M);
             self.eta = self.eta * (1.0 + (gain * off).max(-0.5));
         }
         let eta = axis.from_stator(self.eta);
-        self.tracker.correct(context, par.tracker.bandwidth, atan2(eta.q(), eta.d()), sample);
+        self.tracker.correct(context, context.of::<TrackerParameters>().bandwidth, atan2(eta.q(), eta.d()), sample);
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, i: sample.i, ..Estimate::default() }
     }
 }
 
 /// Length psi_a of eta in Wb.
 #[inline]
-fn length(context: &Context, axis: Axis<Estimated>, sample: &Sample) -> f64 {
+fn length<All>(context: &ContextOf<All>, axis: Axis<Estimated>, sample: &Sample) -> f64 {
     let motor = context.motor;
     (motor.psi_M + (motor.L_d - motor.L_q) * axis.from_stator(sample.i).d()).max(LEAST * motor.psi_M)
 }
@@ -145,7 +146,7 @@ mod tests {
         let (mut par, motor, T_s) = (EstimatorParameters::default(), salient(), 1e-4);
         for clamped in [false, true] {
             par.gradient = GradientParameters { bandwidth: 80.0, clamped };
-            let context = Context { par: &par, motor: &motor, J: 15e-3, T_s };
+            let context = ContextOf { par: &par, motor: &motor, J: 15e-3, T_s };
             let (mut observer, _) = GradientObserver::start(&context, &Sample::default(), 0.0, 0.0);
             observer.eta = observer.eta * 1.02;
             observer.update(&context, &Sample::default());

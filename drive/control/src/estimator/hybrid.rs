@@ -9,11 +9,12 @@
 //! Transition speeds: 0.1 and 0.2 of the rated speed; above them the injection lacks voltage, below them the EMF is too
 //! small. Limits: those of the active method; a machine without saliency needs another low-speed method.
 
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample, SetupOf};
+use crate::estimator::emf::EmfParameters;
 use crate::estimator::extended_emf::ExtendedEmfObserver;
 use crate::estimator::interval::Interval;
-use crate::estimator::square_wave::{SquareWave, SquareWaveInjection};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
+use crate::estimator::square_wave::{SquareWave, SquareWaveInjection, SquareWaveParameters};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Row, Table, table};
@@ -55,11 +56,15 @@ pub struct Hybrid {
 }
 
 impl Hybrid {
-    fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
+    fn estimate<All: AsRef<HybridParameters> + AsRef<SquareWaveParameters>>(
+        &self,
+        context: &ContextOf<All>,
+        sample: &Sample,
+        i: DqHat,
+    ) -> Estimate {
         let Tracker { theta, w, .. } = self.tracker;
-        let par = context.par;
-        let injection = if par.hybrid.share(w) < 1.0 {
-            Injection::Estimated(DqHat::new(par.square_wave.command(sample.k), 0.0))
+        let injection = if context.of::<HybridParameters>().share(w) < 1.0 {
+            Injection::Estimated(DqHat::new(context.of::<SquareWaveParameters>().command(sample.k), 0.0))
         } else {
             Injection::None
         };
@@ -68,8 +73,10 @@ impl Hybrid {
     }
 }
 
-impl Estimating for Hybrid {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<HybridParameters> + AsRef<SquareWaveParameters> + AsRef<EmfParameters> + AsRef<TrackerParameters>>
+    Estimating<All> for Hybrid
+{
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let tracker = Tracker::at(theta, w, context.T_s);
         let now = Interval::new(tracker.theta_last, theta, sample, context.T_s);
         let emf = ExtendedEmfObserver::start(context, &now, w);
@@ -78,20 +85,21 @@ impl Estimating for Hybrid {
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         let Self { tracker, injection, emf } = self;
         tracker.advance(context.T_s);
         let x = Interval::new(tracker.theta_last, tracker.theta, sample, context.T_s);
         let (e_injection, i) = injection.update(context, sample, tracker.theta_last, tracker.theta);
         let e_emf = emf.angle_error(context, &x, tracker.w);
-        let h = context.par.hybrid.share(tracker.w);
-        let rho = (1.0 - h) * context.par.tracker.bandwidth + h * context.par.hybrid.bandwidth;
+        let h = context.of::<HybridParameters>().share(tracker.w);
+        let rho =
+            (1.0 - h) * context.of::<TrackerParameters>().bandwidth + h * context.of::<HybridParameters>().bandwidth;
         tracker.correct(context, rho, (1.0 - h) * e_injection + h * e_emf, sample);
         self.estimate(context, sample, i)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
-        let HybridParameters { w_low, w_high, .. } = setup.par.hybrid;
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
+        let &HybridParameters { w_low, w_high, .. } = setup.of();
         if w_low >= w_high {
             let allowed = format!("above {}", setup.tell("hybrid.w_low"));
             return Err(setup.fault("hybrid.w_high", allowed));
@@ -139,7 +147,7 @@ mod tests {
     }
 
     /// Above w_high, the angle error follows e_0 (1 - rho t) e^{-rho t} with both poles at rho = `hybrid.bandwidth`,
-    /// whatever `tracker.bandwidth` is; the EMF observer adds its lag of about 2 ms.
+    /// for every `tracker.bandwidth`; the EMF observer adds its lag of about 2 ms.
     #[test]
     fn above_the_transition_the_pole_is_that_of_the_hybrid() {
         let (mut par, t, start) = (EstimatorParameters::default(), 0.02, 0.05);

@@ -4,7 +4,7 @@
 //! of the interval. R i and the cross terms use the mean of the two currents. The EMF then has no first-order bias in
 //! T_s.
 
-use crate::estimator::Sample;
+use crate::estimator::contract::Sample;
 use drive_base::frame::{Axis, DqHat, Estimated};
 
 /// Means over the interval, in the frame.

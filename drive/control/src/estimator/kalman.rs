@@ -38,7 +38,7 @@
 //! Limits: the angle requires an EMF. It holds rated load down to 0.010 of the rated speed, 0.010 with a compensated dead
 //! time. An error in L_q shifts the angle, as in every back-EMF method.
 
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::sin_cos;
 use drive_base::motor::Motor;
@@ -180,30 +180,30 @@ impl Kalman {
     }
 }
 
-impl Estimating for Kalman {
+impl<All: AsRef<KalmanParameters>> Estimating<All> for Kalman {
     /// The flux is uncertain only by the noise of the current sensors; angle and speed are uncertain.
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
-        let Context { motor, par, T_s, .. } = *context;
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let ContextOf { motor, T_s, .. } = *context;
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let psi = DqHat::new(motor.L_d * i.d() + motor.psi_M, motor.L_q * i.q());
         // Flux derivative with respect to the angle at the measured current: -j i converted to flux.
         let v = Vector4::new(motor.L_d * i.q(), -motor.L_q * i.d(), 0.0, 1.0) * THETA_DEVIATION;
-        let flux = par.kalman.current / T_s;
+        let flux = context.of::<KalmanParameters>().current / T_s;
         let own = Vector4::new(
             motor.L_d * motor.L_d * flux,
             motor.L_q * motor.L_q * flux,
-            WANDERING_TIME * par.kalman.acceleration,
+            WANDERING_TIME * context.of::<KalmanParameters>().acceleration,
             0.0,
         );
         (Self { psi, w, theta, P: v * v.transpose() + Matrix4::from_diagonal(&own) }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, par, T_s, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
         let F = self.predict(motor, sample, T_s);
-        self.spread(&F, &par.kalman, T_s);
-        let r = self.correct(motor, sample.i, par.kalman.current / T_s);
+        self.spread(&F, context.of::<KalmanParameters>(), T_s);
+        let r = self.correct(motor, sample.i, context.of::<KalmanParameters>().current / T_s);
         let innovation = DqHat::new(motor.L_d * r.d(), motor.L_q * r.q());
         if innovation.dot(innovation) > motor.psi_M * motor.psi_M {
             *self = Self::start(context, sample, self.theta, 0.0).0;
@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn the_covariance_stays_symmetric_and_positive() {
         let (motor, par) = (salient(), EstimatorParameters::default());
-        let context = Context { par: &par, motor: &motor, J: 15e-3, T_s: T_S };
+        let context = ContextOf { par: &par, motor: &motor, J: 15e-3, T_s: T_S };
         // Standstill, noise, and inconsistent voltages: the worst case for a drive that has lost synchronism.
         for size in [0.0, 1e-2, 1.0] {
             let mut last = AlphaBeta::ZERO;

@@ -12,9 +12,9 @@
 //! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; the controlled current
 //! has one sample of delay.
 
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample, SetupOf};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::atan2;
 use fmu_core::unit::VOLT;
@@ -55,7 +55,7 @@ fn product(a: DqHat, b: DqHat) -> DqHat {
 }
 
 impl NearPwmInjection {
-    fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
+    fn estimate<All: AsRef<NearPwmParameters>>(&self, context: &ContextOf<All>, sample: &Sample, i: DqHat) -> Estimate {
         const HALF_SQRT_3: f64 = 0.866_025_403_784_438_6;
         let direction = match sample.k % 3 {
             0 => AlphaBeta::new(1.0, 0.0),
@@ -63,20 +63,20 @@ impl NearPwmInjection {
             _ => AlphaBeta::new(-0.5, -HALF_SQRT_3),
         };
         let axis = Axis::<Estimated>::at(self.tracker.theta);
-        let injection = Injection::Stator(direction * context.par.near_pwm.voltage);
+        let injection = Injection::Stator(direction * context.of::<NearPwmParameters>().voltage);
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, half: None, i: axis.to_stator(i), injection }
     }
 }
 
-impl Estimating for NearPwmInjection {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<NearPwmParameters> + AsRef<TrackerParameters>> Estimating<All> for NearPwmInjection {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let this = Self { tracker: Tracker::at(theta, w, context.T_s), currents: [i; 2], ..Self::default() };
         (this, this.estimate(context, sample, i))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         let Self { tracker, response: last, u: u_last, products, currents } = self;
         tracker.advance(context.T_s);
         let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
@@ -87,7 +87,7 @@ impl Estimating for NearPwmInjection {
         *products = [newest, products[0]];
         let sign = Admittance::of(context.motor).difference.signum();
         let e = 0.5 * atan2(sign * sum.q(), sign * sum.d());
-        tracker.correct(context, context.par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample);
+        tracker.correct(context, context.of::<TrackerParameters>().bandwidth, e.clamp(-CLIP, CLIP), sample);
 
         let i = Axis::<Estimated>::at(tracker.theta).from_stator(sample.i);
         let free = (i + currents[0] + currents[1]) * (1.0 / 3.0);
@@ -95,7 +95,7 @@ impl Estimating for NearPwmInjection {
         self.estimate(context, sample, free)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         saliency::validate(setup)
     }
 }

@@ -11,10 +11,10 @@
 //! (45) is low by a factor of 2. Limits: the filters add delay; e has zeros at 0, 90 and 180 deg, of which 90 deg is
 //! unstable.
 
-use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
+use crate::estimator::carrier::{self, BandPass, Carrier, CarrierParameters, PeriodMean};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample, SetupOf};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use fmu_core::{Fault, Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
@@ -59,8 +59,10 @@ impl PulsatingInjection {
     }
 }
 
-impl Estimating for PulsatingInjection {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<CarrierParameters> + AsRef<PulsatingParameters> + AsRef<TrackerParameters>> Estimating<All>
+    for PulsatingInjection
+{
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let (tracker, notch) = (Tracker::at(theta, w, context.T_s), BandPass::start(i));
         let this = Self { tracker, notch, ..Self::default() };
@@ -68,24 +70,24 @@ impl Estimating for PulsatingInjection {
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
         let Self { tracker, notch, band_pass, low_pass } = self;
-        let Context { motor, T_s, par, .. } = *context;
+        let ContextOf { motor, T_s, .. } = *context;
         tracker.advance(T_s);
         let carrier = Carrier::at(context, sample.k);
         let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
         let x = band_pass.update(&carrier, response(motor, middle, sample, T_s));
-        let demodulated = if par.pulsating.demodulation == Demodulation::MeasurementAxes {
+        let demodulated = if context.of::<PulsatingParameters>().demodulation == Demodulation::MeasurementAxes {
             let magnitudes = ((x.d() + x.q()).abs() - (x.d() - x.q()).abs()) * FRAC_1_SQRT_2;
-            magnitudes * (0.5 * FRAC_PI_2 * SQRT_2) * par.carrier.voltage
+            magnitudes * (0.5 * FRAC_PI_2 * SQRT_2) * context.of::<CarrierParameters>().voltage
         } else {
             2.0 * x.q() * middle.from_stator(sample.u_injected).d()
         };
         let epsilon = low_pass.update(&carrier, demodulated);
-        let V = par.carrier.voltage;
+        let V = context.of::<CarrierParameters>().voltage;
         let e = epsilon / (2.0 * T_s * Admittance::of(motor).difference * V * V);
-        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample);
+        tracker.correct(context, context.of::<TrackerParameters>().bandwidth, e.clamp(-CLIP, CLIP), sample);
 
         let axis = Axis::<Estimated>::at(tracker.theta);
         let i = axis.from_stator(sample.i);
@@ -93,7 +95,7 @@ impl Estimating for PulsatingInjection {
         self.estimate(&carrier, free)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         carrier::validate(setup)?;
         saliency::validate(setup)
     }

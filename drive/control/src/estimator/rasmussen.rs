@@ -26,11 +26,16 @@
 //! 3 c_1 n_p^2 psi_M^2 / (4 J w_s w_n), for w well above w_n, and a little more below. There is no such loop in torque mode. The adaptation of the resistance
 //! removes the cause.
 //!
+//! **R^ < R swallows small torques.** In torque mode, a rotor without a load lies along the current, tan delta = i_q / i_d, and
+//! the frame turns on with w^ (psi_rd^ - psi_M cos delta) = (R - R^) i_q, psi_rd^ = psi_M + ((R - R^) i_d - w^ psi_M sin delta) / c_1.
+//! With a constant i_d = i_0 and a small delta, this has no solution above delta = (2 - sqrt 2) sqrt((R - R^) i_0 / (psi_M c_1)): the
+//! rotor turns. i_0 that falls with the speed lowers the threshold to 0.4 to 0.5 of that. `stands.rs` warns.
+//!
 //! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2). A resistance estimate
 //! above the true value diverges at standstill; one below it is safe.
 
-use crate::estimator::resistance::{Adapted, Resistance};
-use crate::estimator::{Context, Estimate, Estimating, EstimatorParameters, Injection, Sample};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample};
+use crate::estimator::resistance::{Adapted, Resistance, ResistanceParameters};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use drive_base::motor::Motor;
 use fmu_core::unit::{ONE, PER_SECOND, RAD_PER_S};
@@ -77,9 +82,9 @@ pub struct Rasmussen {
     resistance: Resistance,
 }
 
-impl Estimating for Rasmussen {
+impl<All: AsRef<RasmussenParameters> + AsRef<ResistanceParameters>> Estimating<All> for Rasmussen {
     /// The permanent-magnet flux linkage lies on the estimated d-axis.
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let (motor, i) = (context.motor, sample.i);
         let axis = Axis::<Estimated>::at(theta);
         let psi_s = axis.to_stator(DqHat::new(motor.psi_M, 0.0) + inductive(motor, axis.from_stator(i)));
@@ -89,11 +94,12 @@ impl Estimating for Rasmussen {
 
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "as for `SensorlessController::cycle`")]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, T_s, par: EstimatorParameters { rasmussen: par, .. }, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
+        let par = context.of::<RasmussenParameters>();
         self.theta += T_s * self.w;
         let axis = self.next;
-        let resistive = (self.i + sample.i) * (0.5 * self.resistance(context.par, motor));
+        let resistive = (self.i + sample.i) * (0.5 * self.in_use(context));
         self.psi_s += (sample.u - resistive + self.v) * T_s;
         self.i = sample.i;
 
@@ -104,8 +110,8 @@ impl Estimating for Rasmussen {
         self.w = 2.0 * par.zeta * w_q + self.w_i;
         self.next = Axis::at(self.theta + T_s * self.w);
         let x = psi_r.d() - motor.psi_M;
-        let Adapted { c_1, v_q } = if context.par.adaptation.resistance {
-            self.resistance.update(context, sample, x, axis.from_stator(sample.i), self.w)
+        let Adapted { c_1, v_q } = if context.of::<ResistanceParameters>().resistance {
+            self.resistance.update(context, par.c_1, sample, x, axis.from_stator(sample.i), self.w)
         } else {
             Adapted { c_1: par.c_1, v_q: 0.0 }
         };
@@ -115,18 +121,18 @@ impl Estimating for Rasmussen {
     }
 
     #[inline]
-    fn resistance(&self, par: &EstimatorParameters, motor: &Motor) -> f64 {
-        if par.adaptation.resistance { self.resistance.R } else { motor.R_s }
+    fn resistance(&self, context: &ContextOf<All>) -> f64 {
+        self.in_use(context)
     }
 
     /// The adapted resistance stays.
-    fn place(&mut self, context: &Context, sample: &Sample, theta: f64, w: f64) {
+    fn place(&mut self, context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) {
         *self = Self { resistance: self.resistance, ..Self::start(context, sample, theta, w).0 };
     }
 
     /// Keeps w^ = g_1 psi_rq^ + w_I constant when g_1 changes.
-    fn retune(&mut self, old: &Context, new: &Context) {
-        let g_1 = |context: &Context| context.par.rasmussen.g_1(context.motor);
+    fn retune(&mut self, old: &ContextOf<All>, new: &ContextOf<All>) {
+        let g_1 = |context: &ContextOf<All>| context.of::<RasmussenParameters>().g_1(context.motor);
         self.w_i += (g_1(old) - g_1(new)) * self.psi_r(new.motor, Axis::at(self.theta)).q();
     }
 }
@@ -144,6 +150,12 @@ impl Rasmussen {
     #[inline]
     pub fn knows_resistance(&self) -> bool {
         self.resistance.is_known()
+    }
+
+    /// Resistance in Ohm.
+    #[inline]
+    fn in_use<All: AsRef<ResistanceParameters>>(&self, context: &ContextOf<All>) -> f64 {
+        if context.of::<ResistanceParameters>().resistance { self.resistance.R } else { context.motor.R_s }
     }
 
     /// Estimated permanent-magnet flux linkage in Wb at the last sample, in the estimated frame on `axis`.
@@ -180,6 +192,7 @@ pub const RASMUSSEN: &Table<RasmussenParameters> = table![
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::estimator::EstimatorParameters;
     use drive_base::frame::Rotor;
     use drive_base::math::wrap;
 
@@ -191,8 +204,8 @@ mod tests {
         (seconds / T_S).round() as usize
     }
 
-    fn context<'a>(par: &'a EstimatorParameters, motor: &'a Motor) -> Context<'a> {
-        Context { par, motor, J: 1.5e-3, T_s: T_S }
+    fn context<'a>(par: &'a EstimatorParameters, motor: &'a Motor) -> ContextOf<'a, EstimatorParameters> {
+        ContextOf { par, motor, J: 1.5e-3, T_s: T_S }
     }
 
     /// Runs the observer next to a machine that turns at `w` (rad/s, electrical) with the current `i` in its rotor

@@ -53,7 +53,7 @@
 //!
 //! Not observable: R^ without current, while the reference is a speed, or while it is a torque; theta~ and psi_M^ at rest.
 
-use crate::estimator::{Context, Sample, Setup};
+use crate::estimator::contract::{ContextOf, Sample, SetupOf};
 use drive_base::frame::DqHat;
 use drive_base::motor::Motor;
 use fmu_core::unit::{AMPERE, ONE, PER_SECOND};
@@ -73,7 +73,7 @@ const LITTLE: f64 = 0.12;
 /// Current i_q that counts as no torque in torque mode, as a share of `adaptation.i`.
 const NO_TORQUE: f64 = 5e-3;
 
-/// Least c_1 in torque mode, as a share of c_1.
+/// Minimum c_1 in torque mode, as a share of c_1.
 const LEAST_C_1: f64 = 0.2;
 
 /// Share of R~ that may remain when a drive leaves its rest, and the longest rest in units of 1 / `bandwidth`.
@@ -166,17 +166,25 @@ pub struct Adapted {
 
 impl Resistance {
     /// The adaptation at the first sample, at the electrical speed `w` (rad/s).
-    pub fn start(context: &Context, sample: &Sample, w: f64) -> Self {
+    pub fn start<All: AsRef<ResistanceParameters>>(context: &ContextOf<All>, sample: &Sample, w: f64) -> Self {
         let at_once = sample.speed_ref.is_none() && w != 0.0;
-        Self { R: context.par.adaptation.first(context.motor, at_once), remaining: 1.0, w_f: w }
+        Self { R: context.of::<ResistanceParameters>().first(context.motor, at_once), remaining: 1.0, w_f: w }
     }
 
-    /// One sample with the flux error `x` (Wb), the current `i` (A) in the estimated frame, and the electrical speed
+    /// One sample with the observer's gain `c_1` (1/s), the flux error `x` (Wb), the current `i` (A) in the estimated frame, and the electrical speed
     /// `w` (rad/s).
     #[inline]
-    pub fn update(&mut self, context: &Context, sample: &Sample, x: f64, i: DqHat, w: f64) -> Adapted {
-        let Context { motor, T_s, par, .. } = *context;
-        let (par, c_1, n_p) = (&par.adaptation, par.rasmussen.c_1, f64::from(motor.n_p));
+    pub fn update<All: AsRef<ResistanceParameters>>(
+        &mut self,
+        context: &ContextOf<All>,
+        c_1: f64,
+        sample: &Sample,
+        x: f64,
+        i: DqHat,
+        w: f64,
+    ) -> Adapted {
+        let ContextOf { motor, T_s, .. } = *context;
+        let (par, n_p) = (context.of::<ResistanceParameters>(), f64::from(motor.n_p));
         self.w_f += T_s * FILTER * (w - self.w_f);
         // Whether nothing is asked for, the sign of what is, and the least speed at which c_1 is full.
         let (rest, asked, least) = match sample.speed_ref {
@@ -198,7 +206,7 @@ impl Resistance {
             return Adapted { c_1, v_q };
         }
         if par.tracking > 0.0 {
-            self.track(context, x, i.q());
+            self.track(context, c_1, x, i.q());
         }
         let low = c_1.min(par.k_c * self.w_f.abs().max(least));
         Adapted { c_1: low + self.remaining * self.remaining * (c_1 - low), v_q }
@@ -212,11 +220,11 @@ impl Resistance {
         self.remaining <= KNOWN
     }
 
-    /// A creeping sample with the flux error `x` (Wb) and the current `i_q` (A).
+    /// A creeping sample with the observer's gain `c_1` (1/s), the flux error `x` (Wb) and the current `i_q` (A).
     #[inline]
-    fn track(&mut self, context: &Context, x: f64, i_q: f64) {
-        let Context { motor, T_s, par, .. } = *context;
-        let (par, c_1) = (&par.adaptation, par.rasmussen.c_1);
+    fn track<All: AsRef<ResistanceParameters>>(&mut self, context: &ContextOf<All>, c_1: f64, x: f64, i_q: f64) {
+        let ContextOf { motor, T_s, .. } = *context;
+        let par = context.of::<ResistanceParameters>();
         let known = par.flux * motor.psi_M;
         let share = self.w_f * par.k_c / (2.0 * c_1);
         let fade = (1.0 - share * share).max(0.0);
@@ -231,8 +239,8 @@ impl Resistance {
 ///
 /// # Errors
 /// States which parameter is unsuitable, and what to do.
-pub fn validate(setup: &Setup) -> Result<(), Fault> {
-    let ResistanceParameters { resistance, start, min, max, .. } = &setup.par.adaptation;
+pub fn validate<All: AsRef<ResistanceParameters>>(setup: &SetupOf<All>) -> Result<(), Fault> {
+    let ResistanceParameters { resistance, start, min, max, .. } = setup.of();
     if !resistance {
         return Ok(());
     }
@@ -334,12 +342,13 @@ mod tests {
         par.adaptation.resistance = true;
         set(&mut par);
         let motor = Motor::default();
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: T_S };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s: T_S };
         let sample = Sample { speed_ref: Some(w / f64::from(motor.n_p)), ..Sample::default() };
         let mut resistance = Resistance { R: R_hat, ..Resistance::start(&context, &sample, w) };
         let (mut adapted, mut t) = (Adapted { c_1: par.rasmussen.c_1, v_q: 0.0 }, 0.0);
         while t < seconds {
-            adapted = resistance.update(&context, &sample, x(2.0 - resistance.R, adapted.c_1), i, w);
+            let of_error = x(2.0 - resistance.R, adapted.c_1);
+            adapted = resistance.update(&context, par.rasmussen.c_1, &sample, of_error, i, w);
             t += T_S;
         }
         (resistance, adapted)
@@ -384,13 +393,13 @@ mod tests {
         assert!((unknown.c_1 - 50.0).abs() < 1e-9 && (rest.c_1 - 50.0).abs() < 1e-12, "{unknown:?} {rest:?}");
         let par = EstimatorParameters::default();
         let (motor, i) = (Motor::default(), DqHat::new(5.0, 1.0));
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: T_S };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s: T_S };
         let at = |speed: f64| Sample { speed_ref: Some(speed), ..Sample::default() };
         let mut resistance = Resistance::start(&context, &at(0.0), 0.0);
         for _ in 0..20_000 {
-            resistance.update(&context, &at(0.0), 0.0, i, 0.0);
+            resistance.update(&context, par.rasmussen.c_1, &at(0.0), 0.0, i, 0.0);
         }
-        let creep = resistance.update(&context, &at(10.0 / 3.0), 0.0, i, 10.0);
+        let creep = resistance.update(&context, par.rasmussen.c_1, &at(10.0 / 3.0), 0.0, i, 10.0);
         assert!((creep.c_1 - par.adaptation.k_c * 10.0).abs() < 1e-3, "{creep:?}");
     }
 }

@@ -11,10 +11,10 @@
 //!
 //! Limits: the filters add delay; both axes carry carrier current.
 
-use crate::estimator::carrier::{self, BandPass, Carrier, PeriodMean};
+use crate::estimator::carrier::{self, BandPass, Carrier, CarrierParameters, PeriodMean};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample, SetupOf};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, Estimated, Stator};
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -37,17 +37,17 @@ impl RotatingInjection {
     }
 }
 
-impl Estimating for RotatingInjection {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<CarrierParameters> + AsRef<TrackerParameters>> Estimating<All> for RotatingInjection {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let (tracker, notch) = (Tracker::at(theta, w, context.T_s), BandPass::start(sample.i));
         let this = Self { tracker, notch, ..Self::default() };
         (this, this.estimate(&Carrier::at(context, sample.k), sample.i))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         let Self { tracker, notch, band_pass, low_pass } = self;
-        let Context { motor, T_s, par, .. } = *context;
+        let ContextOf { motor, T_s, .. } = *context;
         tracker.advance(T_s);
         let carrier = Carrier::at(context, sample.k);
         let middle = Axis::<Estimated>::at(0.5 * (tracker.theta_last + tracker.theta));
@@ -56,14 +56,14 @@ impl Estimating for RotatingInjection {
         // Im(x u): the part against the carrier becomes constant; the part with the carrier turns twice as fast.
         let epsilon = low_pass.update(&carrier, x.d() * u.q() + x.q() * u.d());
 
-        let (V, D) = (par.carrier.voltage, Admittance::of(motor).difference);
+        let (V, D) = (context.of::<CarrierParameters>().voltage, Admittance::of(motor).difference);
         let e = epsilon / (2.0 * T_s * D * V * V) + tracker.w * T_s / carrier.alpha;
-        tracker.correct(context, par.tracker.bandwidth, e.clamp(-CLIP, CLIP), sample);
+        tracker.correct(context, context.of::<TrackerParameters>().bandwidth, e.clamp(-CLIP, CLIP), sample);
         let free = sample.i - notch.update(&carrier, sample.i);
         self.estimate(&carrier, free)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         carrier::validate(setup)?;
         saliency::validate(setup)
     }

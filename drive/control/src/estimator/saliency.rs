@@ -8,7 +8,7 @@
 //!
 //! Kim & Sul 2011, eq (33) to (37), inverted: the paper gives the voltage as a function of the current. S and D in 1/H.
 
-use crate::estimator::{Sample, Setup};
+use crate::estimator::contract::{Sample, SetupOf};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use drive_base::motor::Motor;
 use fmu_core::Fault;
@@ -54,7 +54,7 @@ pub fn response(motor: &Motor, middle: Axis<Estimated>, sample: &Sample, T_s: f6
 ///
 /// # Errors
 /// The two inductances are too close to each other.
-pub fn validate(setup: &Setup) -> Result<(), Fault> {
+pub fn validate<All>(setup: &SetupOf<All>) -> Result<(), Fault> {
     let Motor { L_d, L_q, .. } = setup.motor;
     if (L_q - L_d).abs() < MIN_SALIENCY * (L_q + L_d) {
         return Err(Fault::new(format!(

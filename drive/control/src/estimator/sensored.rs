@@ -1,8 +1,8 @@
 //! The measured angle and speed (Kim & Sul, Fig. 1a): the reference for all estimators.
 //!
-//! Limits: none of its own; the sensor is ideal unless the importer adds errors.
+//! Limits: those of the sensor, which is ideal unless the importer adds errors.
 
-use crate::estimator::{Context, Estimate, Estimating, Sample};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
 use drive_base::math::wrap;
 use serde::{Deserialize, Serialize};
 
@@ -13,17 +13,17 @@ pub struct Sensored {
     theta: f64,
 }
 
-impl Estimating for Sensored {
-    fn start(_: &Context, sample: &Sample, _: f64, _: f64) -> (Self, Estimate) {
+impl<All> Estimating<All> for Sensored {
+    fn start(_: &ContextOf<All>, sample: &Sample, _: f64, _: f64) -> (Self, Estimate) {
         (Self { theta: sample.theta_meas }, Estimate::new(sample.theta_meas, sample.w_meas, sample))
     }
 
     #[inline]
-    fn update(&mut self, _: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, _: &ContextOf<All>, sample: &Sample) -> Estimate {
         self.theta += wrap(sample.theta_meas - self.theta);
         Estimate::new(self.theta, sample.w_meas, sample)
     }
 
     /// A sensor ignores an angle from another source.
-    fn place(&mut self, _: &Context, _: &Sample, _: f64, _: f64) {}
+    fn place(&mut self, _: &ContextOf<All>, _: &Sample, _: f64, _: f64) {}
 }

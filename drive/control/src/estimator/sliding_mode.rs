@@ -15,9 +15,9 @@
 //! Limits: those of the extended EMF. It holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead
 //! time. K below |E| loses the angle.
 
-use crate::estimator::emf::{self, Direction, pole};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};
+use crate::estimator::emf::{self, Direction, EmfParameters, pole};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::{atan2, sin_cos};
 use fmu_core::unit::{RAD_PER_S, VOLT};
@@ -50,20 +50,22 @@ pub struct SlidingMode {
     direction: Direction,
 }
 
-impl Estimating for SlidingMode {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
-        let Context { motor, par, T_s, .. } = *context;
+impl<All: AsRef<SlidingModeParameters> + AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All>
+    for SlidingMode
+{
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+        let ContextOf { motor, T_s, .. } = *context;
         let axis = Axis::<Estimated>::at(theta);
         let e = DqHat::new(0.0, w * (motor.psi_M + (motor.L_d - motor.L_q) * axis.from_stator(sample.i).d()));
-        let i = axis.to_stator(e) * (1.0 / (motor.L_d * par.sliding_mode.bandwidth));
+        let i = axis.to_stator(e) * (1.0 / (motor.L_d * context.of::<SlidingModeParameters>().bandwidth));
         let tracker = Tracker::at(theta, w, T_s);
         (Self { tracker, i, e, direction: Direction::of(w) }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, par, T_s, .. } = *context;
-        let SlidingModeParameters { gain, bandwidth } = par.sliding_mode;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
+        let &SlidingModeParameters { gain, bandwidth } = context.of();
         self.tracker.advance(T_s);
         let w = self.tracker.w;
         let slope = bandwidth * motor.L_d;
@@ -79,12 +81,12 @@ impl Estimating for SlidingMode {
         let (sin, cos) = sin_cos(w * T_s);
         let lag = atan2(keeps * sin, 1.0 - keeps * cos) + 0.5 * w * T_s;
         let z = Axis::<Estimated>::at(self.tracker.theta - lag).from_stator(sliding(self.i));
-        self.e += (z - self.e) * (1.0 - pole(par.emf.bandwidth, T_s));
+        self.e += (z - self.e) * (1.0 - pole(context.of::<EmfParameters>().bandwidth, T_s));
         emf::follow(&mut self.tracker, &mut self.direction, context, self.e, sample)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
-        let bandwidth = setup.par.sliding_mode.bandwidth;
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
+        let bandwidth = setup.of::<SlidingModeParameters>().bandwidth;
         if bandwidth * setup.T_s > 1.0 {
             let allowed = format!("at most 1 / T_s = {} rad/s, or the sampled observer chatters", 1.0 / setup.T_s);
             return Err(setup.fault("sliding_mode.bandwidth", allowed));

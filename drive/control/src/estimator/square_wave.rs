@@ -12,9 +12,9 @@
 //! Limits: above about 0.2 of the rated speed, the injection takes voltage that the drive needs; e has zeros at 0, 90
 //! and 180 deg, of which 90 deg is unstable.
 
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample, SetupOf};
 use crate::estimator::saliency::{self, Admittance, CLIP, response};
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Injection, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::{Axis, DqHat, Estimated};
 use fmu_core::unit::VOLT;
 use fmu_core::{Fault, Row, Table, table};
@@ -64,9 +64,15 @@ impl SquareWave {
     /// Angle error theta - theta^ (rad) and the current without the carrier (A) at this sample, with the frame at
     /// `theta_last` and `theta` (rad).
     #[inline]
-    pub fn update(&mut self, context: &Context, sample: &Sample, theta_last: f64, theta: f64) -> (f64, DqHat) {
-        let Context { motor, T_s, .. } = *context;
-        let par = &context.par.square_wave;
+    pub fn update<All: AsRef<SquareWaveParameters>>(
+        &mut self,
+        context: &ContextOf<All>,
+        sample: &Sample,
+        theta_last: f64,
+        theta: f64,
+    ) -> (f64, DqHat) {
+        let ContextOf { motor, T_s, .. } = *context;
+        let par = context.of::<SquareWaveParameters>();
         let half = usize::from(par.samples == 4);
         let middle = Axis::<Estimated>::at(0.5 * (theta_last + theta));
         let (x, u) = (response(motor, middle, sample, T_s).q(), middle.from_stator(sample.u_injected).d());
@@ -91,31 +97,36 @@ pub struct SquareWaveInjection {
 }
 
 impl SquareWaveInjection {
-    fn estimate(&self, context: &Context, sample: &Sample, i: DqHat) -> Estimate {
+    fn estimate<All: AsRef<SquareWaveParameters>>(
+        &self,
+        context: &ContextOf<All>,
+        sample: &Sample,
+        i: DqHat,
+    ) -> Estimate {
         let axis = Axis::<Estimated>::at(self.tracker.theta);
-        let injection = Injection::Estimated(DqHat::new(context.par.square_wave.command(sample.k), 0.0));
+        let injection = Injection::Estimated(DqHat::new(context.of::<SquareWaveParameters>().command(sample.k), 0.0));
         Estimate { theta: self.tracker.theta, axis, w: self.tracker.w, half: None, i: axis.to_stator(i), injection }
     }
 }
 
-impl Estimating for SquareWaveInjection {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<SquareWaveParameters> + AsRef<TrackerParameters>> Estimating<All> for SquareWaveInjection {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let this = Self { tracker: Tracker::at(theta, w, context.T_s), demodulation: SquareWave::start(i) };
         (this, this.estimate(context, sample, i))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
         let Self { tracker, demodulation } = self;
         tracker.advance(context.T_s);
         let (e, i) = demodulation.update(context, sample, tracker.theta_last, tracker.theta);
-        tracker.correct(context, context.par.tracker.bandwidth, e, sample);
+        tracker.correct(context, context.of::<TrackerParameters>().bandwidth, e, sample);
         self.estimate(context, sample, i)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
-        let samples = setup.par.square_wave.samples;
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
+        let samples = setup.of::<SquareWaveParameters>().samples;
         if samples != 2 && samples != 4 {
             return Err(setup.fault("square_wave.samples", "2 or 4"));
         }

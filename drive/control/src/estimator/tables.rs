@@ -70,3 +70,32 @@ pub const ESTIMATOR_PARAMETERS: &Table<EstimatorParameters> = table![
     P::part("near_pwm.", &Part { table: NEAR_PWM, lens: |p| &mut p.near_pwm }),
     P::part("hybrid.", &Part { table: HYBRID, lens: |p| &mut p.hybrid }),
 ];
+
+/// Each method takes its own part.
+macro_rules! parts {
+    ($($field:ident: $part:ty,)*) => {
+        $(impl AsRef<$part> for EstimatorParameters {
+            #[inline]
+            fn as_ref(&self) -> &$part {
+                &self.$field
+            }
+        })*
+    };
+}
+
+parts! {
+    rasmussen: RasmussenParameters,
+    adaptation: ResistanceParameters,
+    flux_observer: FluxObserverParameters,
+    tracker: TrackerParameters,
+    emf: EmfParameters,
+    matsui: MatsuiParameters,
+    kalman: KalmanParameters,
+    gradient: GradientParameters,
+    sliding_mode: SlidingModeParameters,
+    carrier: CarrierParameters,
+    pulsating: PulsatingParameters,
+    square_wave: SquareWaveParameters,
+    near_pwm: NearPwmParameters,
+    hybrid: HybridParameters,
+}

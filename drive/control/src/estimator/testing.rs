@@ -15,7 +15,7 @@ pub(crate) fn salient() -> Motor {
 /// current `i` (A, rotor frame) and turns at `w` (rad/s, electrical). The estimate starts `theta_tilde` (rad) behind
 /// with the correct speed; `hat` holds its machine values. The voltage of each interval is the exact mean; its
 /// resistive part uses the trapezoid that every estimator assumes between samples.
-pub(crate) fn beside<E: Estimating>(
+pub(crate) fn beside<E: Estimating<EstimatorParameters>>(
     par: &EstimatorParameters,
     hat: &Motor,
     (w, i): (f64, Dq),
@@ -43,7 +43,7 @@ pub(crate) fn beside<E: Estimating>(
 
 /// Starts 20 degrees off on either side, in both directions, loaded: the estimate must converge, slowest at `slowest`
 /// (rad/s).
-pub(crate) fn comes_to_the_rotor<E: Estimating>(slowest: f64) {
+pub(crate) fn comes_to_the_rotor<E: Estimating<EstimatorParameters>>(slowest: f64) {
     let par = EstimatorParameters::default();
     for w in [slowest, 235.0, 471.0, -235.0] {
         for i_q in [-5.59, 5.59] {
@@ -58,7 +58,7 @@ pub(crate) fn comes_to_the_rotor<E: Estimating>(slowest: f64) {
 }
 
 /// Angle error in degrees at w = 235 rad/s and the rated point with L_q^ = `factor` L_q.
-pub(crate) fn with_L_q<E: Estimating>(factor: f64) -> f64 {
+pub(crate) fn with_L_q<E: Estimating<EstimatorParameters>>(factor: f64) -> f64 {
     let hat = Motor { L_q: factor * salient().L_q, ..salient() };
     let point = (235.0, Dq::new(-0.84, 5.59));
     beside::<E>(&EstimatorParameters::default(), &hat, point, 0.0, 10_000).0.to_degrees()
@@ -68,7 +68,7 @@ pub(crate) fn with_L_q<E: Estimating>(factor: f64) -> f64 {
 /// electrical). Its only current comes from the estimator's injection, `delay` samples later. The estimate starts
 /// `theta_tilde` (rad) behind with the correct speed and the values of [`salient`]; `each` receives it after every
 /// sample.
-pub(crate) fn injected<E: Estimating>(
+pub(crate) fn injected<E: Estimating<EstimatorParameters>>(
     par: &EstimatorParameters,
     plant: &Motor,
     w: f64,
@@ -121,7 +121,7 @@ pub(crate) fn injected<E: Estimating>(
 
 /// Starts 40 degrees off on either side, at standstill and turning, with every delay: the estimate must converge to the
 /// rotor within `tolerance` (deg). From 130 degrees it must converge to the opposite pole.
-pub(crate) fn finds_the_rotor<E: Estimating>(par: &EstimatorParameters, tolerance: f64) {
+pub(crate) fn finds_the_rotor<E: Estimating<EstimatorParameters>>(par: &EstimatorParameters, tolerance: f64) {
     for delay in [0, 1, 2] {
         for w in [0.0, 47.0, -47.0] {
             for (from, to) in [(40.0_f64, 0.0), (-40.0, 0.0), (130.0, 180.0)] {

@@ -5,10 +5,10 @@
 //!   theta^ += T_s (w^ + 3 rho e), w^ += T_s (n_p / J (tau* - tau_L) + 3 rho^2 e), tau_L -= T_s J / n_p rho^3 e.
 //!
 //! The PLL follows a constant speed without an error. The mechanical observer follows a constant load without an error
-//! and, if J is correct, every change of its own torque, so its speed does not lag. Limits: after a filter or observer
+//! and, if J is correct, every change of the machine's torque, so its speed does not lag. Limits: after a filter or observer
 //! of bandwidth w_o, rho <= w_o / 3; below 2 pi 15 rad/s, a 50 % load step loses synchronism.
 
-use crate::estimator::{Context, Estimate, Sample, Setup};
+use crate::estimator::contract::{ContextOf, Estimate, Sample, SetupOf};
 use drive_base::math::at_least;
 use fmu_core::unit::RAD_PER_S;
 use fmu_core::{Fault, Field, Row, Table, enumeration, table};
@@ -70,9 +70,15 @@ impl Tracker {
     /// Corrects the state with the angle error `e` (rad) and the bandwidth `rho` (rad/s): the angle from the next
     /// sample on, the speed immediately. Field weakening may require a faster one.
     #[inline]
-    pub fn correct(&mut self, context: &Context, rho: f64, e: f64, sample: &Sample) {
+    pub fn correct<All: AsRef<TrackerParameters>>(
+        &mut self,
+        context: &ContextOf<All>,
+        rho: f64,
+        e: f64,
+        sample: &Sample,
+    ) {
         let (T_s, rho) = (context.T_s, at_least(rho, sample.rho));
-        if context.par.tracker.kind == TrackerKind::MechanicalObserver {
+        if context.of::<TrackerParameters>().kind == TrackerKind::MechanicalObserver {
             let inertia = context.J / f64::from(context.motor.n_p);
             self.w_frame = self.w + 3.0 * rho * e;
             self.w += T_s * ((sample.tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
@@ -88,8 +94,8 @@ impl Tracker {
 ///
 /// # Errors
 /// The mechanical observer has no inertia value.
-pub fn validate(setup: &Setup) -> Result<(), Fault> {
-    let observes_load = setup.par.tracker.kind == TrackerKind::MechanicalObserver;
+pub fn validate<All: AsRef<TrackerParameters>>(setup: &SetupOf<All>) -> Result<(), Fault> {
+    let observes_load = setup.of::<TrackerParameters>().kind == TrackerKind::MechanicalObserver;
     if observes_load && setup.J.partial_cmp(&0.0) != Some(Ordering::Greater) {
         return Err(Fault::new(format!(
             "{} and {}: that observer divides torque by inertia, which must be above 0",
@@ -104,8 +110,13 @@ impl Tracker {
     /// The common last step of the methods that calculate an angle error: the tracker follows `e` (rad) and supplies
     /// the estimated angle and speed.
     #[inline]
-    pub fn follow(&mut self, context: &Context, e: f64, sample: &Sample) -> Estimate {
-        self.correct(context, context.par.tracker.bandwidth, e, sample);
+    pub fn follow<All: AsRef<TrackerParameters>>(
+        &mut self,
+        context: &ContextOf<All>,
+        e: f64,
+        sample: &Sample,
+    ) -> Estimate {
+        self.correct(context, context.of::<TrackerParameters>().bandwidth, e, sample);
         Estimate::new(self.theta, self.w, sample)
     }
 }
@@ -142,7 +153,7 @@ mod tests {
             ..EstimatorParameters::default()
         };
         let motor = Motor::default();
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
         let mut tracker = Tracker::at(0.3, 0.0, context.T_s);
         let (mut theta, mut w) = (0.0, 50.0);
         for _ in 0..n {
@@ -182,7 +193,7 @@ mod tests {
                 tracker: TrackerParameters { kind, bandwidth: rho },
                 ..EstimatorParameters::default()
             };
-            let context = Context { par: &par, motor: &motor, J, T_s };
+            let context = ContextOf { par: &par, motor: &motor, J, T_s };
             let (start, a) = (if load > 0.0 { 0.0 } else { 1.0 }, -5.0 * load / J);
             let (mut tracker, mut theta, mut w) = (Tracker::at(0.0, 70.0, T_s), start, 70.0);
             for k in 1..=50_000_u32 {

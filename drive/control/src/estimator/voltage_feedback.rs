@@ -11,10 +11,10 @@
 //! as printed, without the frame term, to 0.120. A reversal at light load is ambiguous by half a turn, unless
 //! `emf.hold_reversal` holds it.
 
-use crate::estimator::emf::{self, Direction, pole};
+use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};
+use crate::estimator::emf::{self, Direction, EmfParameters, pole};
 use crate::estimator::interval::Interval;
-use crate::estimator::tracker::Tracker;
-use crate::estimator::{Context, Estimate, Estimating, Sample, Setup};
+use crate::estimator::tracker::{Tracker, TrackerParameters};
 use drive_base::frame::DqHat;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
@@ -31,34 +31,35 @@ pub struct VoltageFeedback {
     frame: f64,
 }
 
-impl Estimating for VoltageFeedback {
-    fn start(context: &Context, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
+impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for VoltageFeedback {
+    fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate) {
         let tracker = Tracker::at(theta, w, context.T_s);
         (Self { tracker, direction: Direction::of(w), frame: 0.0 }, Estimate::new(theta, w, sample))
     }
 
     #[inline]
-    fn update(&mut self, context: &Context, sample: &Sample) -> Estimate {
-        let Context { motor, par, T_s, .. } = *context;
+    fn update(&mut self, context: &ContextOf<All>, sample: &Sample) -> Estimate {
+        let ContextOf { motor, T_s, .. } = *context;
         self.tracker.advance(T_s);
         let x = Interval::new(self.tracker.theta_last, self.tracker.theta, sample, T_s);
         let w = self.tracker.w;
-        let s = self.direction.update(w, par.emf.w_sign);
-        let smoothing = 1.0 - pole(par.emf.bandwidth, T_s);
-        self.frame += smoothing * (par.emf.slip(&x, w) * motor.L_d * x.i.q() - self.frame);
+        let s = self.direction.update(w, context.of::<EmfParameters>().w_sign);
+        let smoothing = 1.0 - pole(context.of::<EmfParameters>().bandwidth, T_s);
+        self.frame += smoothing * (context.of::<EmfParameters>().slip(&x, w) * motor.L_d * x.i.q() - self.frame);
         let v_dfb = sample.u_pi.d() + self.frame;
-        let (mut s, mut fade, mut least) = (s, 1.0, par.emf.w_sign);
-        if par.emf.hold_reversal {
+        let (mut s, mut fade, mut least) = (s, 1.0, context.of::<EmfParameters>().w_sign);
+        if context.of::<EmfParameters>().hold_reversal {
             // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the rest.
             let e_q = w * motor.psi_M + sample.u_pi.q();
             let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
-            (s, fade, least) = (if g > 0.5 { 1.0_f64.copysign(e_q) } else { s }, 1.0 - g, par.emf.w_hold);
+            (s, fade, least) =
+                (if g > 0.5 { 1.0_f64.copysign(e_q) } else { s }, 1.0 - g, context.of::<EmfParameters>().w_hold);
         }
         let e = (-s * v_dfb / (motor.psi_M * w.abs().max(least))).clamp(-CLIP, CLIP);
         self.tracker.follow(context, fade * e, sample)
     }
 
-    fn validate(setup: &Setup) -> Result<(), Fault> {
+    fn validate(setup: &SetupOf<All>) -> Result<(), Fault> {
         if !setup.reference_feed_forward || setup.active_resistance {
             return Err(Fault::new(format!(
                 "{} and {}: {} reads the angle error from the output of the current controller's integrators; set the \
@@ -82,7 +83,7 @@ mod tests {
     #[test]
     fn the_estimate_turns_toward_the_rotor() {
         let (par, motor) = (EstimatorParameters::default(), Motor::default());
-        let context = Context { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
+        let context = ContextOf { par: &par, motor: &motor, J: 1.5e-3, T_s: 1e-4 };
         for w in [200.0, -200.0] {
             for start in [0.3, -0.3] {
                 let (mut theta, first) = (start, Sample::default());

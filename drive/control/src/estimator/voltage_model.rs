@@ -9,9 +9,9 @@
 //! shifts the angle by 5.5 deg and makes rated load oscillate above 0.75 of the rated speed. The derivative of the
 //! current makes the speed noisy.
 
-use crate::estimator::Context;
+use crate::estimator::contract::ContextOf;
 use crate::estimator::emf::pole;
-use crate::estimator::follower::{Follower, Rows};
+use crate::estimator::follower::{Follower, MatsuiParameters, Rows};
 use crate::estimator::interval::Interval;
 use serde::{Deserialize, Serialize};
 
@@ -22,14 +22,14 @@ pub type VoltageModel = Follower<VoltageRows>;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct VoltageRows;
 
-impl Rows for VoltageRows {
+impl<All: AsRef<MatsuiParameters>> Rows<All> for VoltageRows {
     #[inline]
-    fn rows(w: &mut f64, context: &Context, x: &Interval, slip: f64) -> f64 {
-        let Context { motor, par, T_s, .. } = *context;
+    fn rows(w: &mut f64, context: &ContextOf<All>, x: &Interval, slip: f64) -> f64 {
+        let ContextOf { motor, T_s, .. } = *context;
         let p_i = (x.i_now - x.i_last) * (1.0 / T_s);
         let w_cal = (x.v.q() - motor.R_s * x.i.q() - motor.L_q * p_i.q() - slip * motor.L_q * x.i.d())
             / (motor.psi_M + motor.L_d * x.i.d());
-        *w += (1.0 - pole(par.matsui.filter, T_s)) * (w_cal - *w);
+        *w += (1.0 - pole(context.of::<MatsuiParameters>().filter, T_s)) * (w_cal - *w);
         x.v.d() - motor.R_s * x.i.d() - motor.L_d * p_i.d() + (*w * motor.L_q + slip * motor.L_d) * x.i.q()
     }
 }

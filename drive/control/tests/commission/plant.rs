@@ -284,7 +284,7 @@ pub(crate) struct Bench {
     pub(crate) load: f64,
     /// Voltage over the command.
     pub(crate) gain: f64,
-    /// Greatest current so far in A.
+    /// Maximum current so far in A.
     pub(crate) most: f64,
 }
 

@@ -7,8 +7,10 @@ use drive_base::motor::Motor;
 use drive_control::current::CurrentLoop;
 use drive_control::envelope::{Envelope, Limit, WarmStart};
 use drive_control::estimator::Kind;
+use drive_control::limits::Limits;
 use drive_control::reference::max_torque_per_ampere;
-use drive_control::tables::{ControllerParameters, Limits};
+use drive_control::tables::ControllerParameters;
+use drive_control::tracking::LeastTracker;
 use drive_control::weakening::{Weakening, WeakeningGains, WeakeningParameters};
 use std::f64::consts::TAU;
 
@@ -93,7 +95,7 @@ impl Machine {
 pub(crate) fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
     let par = machine.parameters();
     let most = machine.limit(100.0, 1.0)[1].tau;
-    let gains = WeakeningGains::new(&par, most, true);
+    let gains = WeakeningGains::new(&par.motor, &par.limit, most, true, LeastTracker::default());
     let (w, mut state) = (machine.w(rpm), Weakening::default());
     let plain = max_torque_per_ampere(&par.motor, tau);
     let mut i = DqHat::ZERO;
@@ -104,7 +106,7 @@ pub(crate) fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakeni
     (i, state)
 }
 
-/// Greatest torque at a speed in rpm, motoring and generating in N.m: an independent calculation, k_u = 0.95.
+/// Maximum torque at a speed in rpm, motoring and generating in N.m: an independent calculation, k_u = 0.95.
 pub(crate) fn envelope_figures() -> [(Machine, f64, f64, f64); 19] {
     [
         (a(), 1000.0, 39.4584, 39.4584),

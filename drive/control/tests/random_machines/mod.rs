@@ -89,7 +89,7 @@ impl Brute<'_> {
         best
     }
 
-    /// Greatest magnitude (N.m) of the torque of sign `s`, with its currents (A); 0: none.
+    /// Maximum magnitude (N.m) of the torque of sign `s`, with its currents (A); 0: none.
     pub(crate) fn limit(&self, s: f64) -> (f64, [f64; 2]) {
         let motor = self.motor;
         let worth = |[d, q]: [f64; 2]| {

@@ -1,4 +1,4 @@
-//! Conduction loss of the inverter: the voltage that transistors and diodes drop.
+//! Conduction loss of the inverter: the voltage drop of transistors and diodes.
 //!
 //! A leg with the current i > 0 conducts for the share d of a PWM period through its upper transistor and for 1 - d through its
 //! lower diode; i < 0 is the mirror image with 1 - d for d:
@@ -8,8 +8,8 @@
 //! drop   = d (u_transistor + r_transistor i) + (1 - d) (u_diode + r_diode i)
 //! ```
 //!
-//! u_x is the leg's voltage with dead time, which moves d and loses no power. Below `inverter.i_zero` the constant part
-//! falls linearly, as the dead-time voltage does. Gates off: the diodes alone conduct. Over a period with a sinusoidal
+//! u_x is the leg's voltage with dead time, which shifts d without losing power. Below `inverter.i_zero` the constant part
+//! falls linearly, like the dead-time voltage. With the gates off, only the diodes conduct. Over a period with a sinusoidal
 //! current of amplitude I, modulation m = 2 |u| / u_dc and angle phi, six switches lose 6 times the sum over transistor
 //! (+) and diode (-) of
 //!
@@ -17,11 +17,10 @@
 //! u I (1/(2 pi) +- m cos phi / 8) + r I^2 (1/8 +- m cos phi / (3 pi) +- c_3),  c_3 = -(3 sqrt 3/(8 pi)) m cos(3 phi)/(15 pi)
 //! ```
 //!
-//! The two-level model of a device (threshold and resistance) is that of the data sheets; the closed form is the field's,
-//! and a test compares [`mean`] with the legs. u in V, i in A.
+//! The model of a device (threshold and resistance) is that of the data sheets, and the closed form is the usual one; a test
+//! compares [`mean`] with the legs. u in V, i in A.
 
-use crate::losses::sides::{Affine, symmetric};
-use drive_base::frame::{AlphaBeta, Phases, Stator, Vector};
+use drive_base::frame::{AlphaBeta, Phases, SQRT_3, Stator, Vector};
 use drive_base::modulation::clamp_unit;
 use fmu_core::Scalar;
 use fmu_core::unit::{AMPERE, JOULE, OHM, ONE, VOLT};
@@ -66,36 +65,60 @@ impl Default for Devices {
 }
 
 impl Devices {
-    /// Whether they lose nothing.
+    /// Whether they are lossless.
     #[inline]
     pub fn is_none(&self) -> bool {
         let &Self { u_transistor, r_transistor, u_diode, r_diode, E_sw, i_sw: _, u_sw: _, k_sw: _ } = self;
         u_transistor + r_transistor + u_diode + r_diode + E_sw == 0.0
     }
 
-    /// The greater threshold voltage in V.
+    /// The larger threshold voltage in V.
     #[inline]
     pub fn threshold(&self) -> f64 {
         self.u_transistor.max(self.u_diode)
     }
 }
 
-/// Greatest modulation m = 2 |u| / u_dc of a sinusoidal voltage: 2 / sqrt(3).
-const MOST_MODULATION: f64 = 1.154_700_538_379_251_5;
+/// Maximum modulation m = 2 |u| / u_dc of a sinusoidal voltage: 2 / sqrt(3).
+const MAX_MODULATION: f64 = 1.154_700_538_379_251_5;
 
 /// c_3 over m cos(3 phi), of a common-mode voltage of (max + min)/2.
 const THIRD: f64 = -3.0 * 1.732_050_807_568_877_2 / (120.0 * PI * PI);
 
-/// Mean loss (W) of six switches over a period with a sinusoidal current of amplitude `i` (A), at the modulation `m` = 2 |u| /
-/// u_dc and the cosine of the angle from the current to the voltage.
+/// Mean loss (W) of six switches over a period with a sinusoidal current of amplitude `i` (A), at the modulation
+/// `m` = 2 |u| / u_dc and the cosine `cos_phi` of the angle from the current to the voltage.
 pub fn mean(devices: &Devices, m: f64, cos_phi: f64, i: f64) -> f64 {
     let &Devices { u_transistor, r_transistor, u_diode, r_diode, .. } = devices;
-    let m = m.min(MOST_MODULATION);
+    let m = m.min(MAX_MODULATION);
     let cos_3_phi = (4.0 * cos_phi * cos_phi - 3.0) * cos_phi;
     let (u, r) = (m * cos_phi * 0.125, m * (cos_phi * (FRAC_1_PI / 3.0) + THIRD * cos_3_phi));
     let thresholds = (u_transistor + u_diode) * (0.5 * FRAC_1_PI) + (u_transistor - u_diode) * u;
     let resistances = (r_transistor + r_diode) * 0.125 + (r_transistor - r_diode) * r;
     6.0 * (thresholds + resistances * i) * i
+}
+
+/// A vector that is affine in the current (A).
+#[derive(Clone, Copy, Debug)]
+pub struct Affine {
+    /// Without current.
+    pub at_0: AlphaBeta,
+    /// Symmetric matrix per ampere: alpha alpha, alpha beta, beta beta.
+    pub by: [f64; 3],
+}
+
+impl Affine {
+    /// At the current `i` (A).
+    #[inline]
+    pub fn at(&self, i: AlphaBeta) -> AlphaBeta {
+        let Self { at_0, by: [x, y, z] } = self;
+        *at_0 + AlphaBeta::new(x * i.alpha() + y * i.beta(), y * i.alpha() + z * i.beta())
+    }
+}
+
+/// The matrix of resistances of the legs (Ohm) in stator axes: alpha alpha, alpha beta, beta beta.
+#[inline]
+fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
+    [(4.0 * a + b + c) * (1.0 / 6.0), (c - b) * (0.5 / SQRT_3), 0.5 * (b + c)]
 }
 
 /// Voltage drop of the conducting devices over an integration step.

@@ -1,24 +1,33 @@
-//! The way of the power from the link to the flux linkage at an instant: legs, devices, resistance, iron.
+//! The path of the power from the link to the flux linkage at an instant: legs, devices, resistance, iron.
 //!
 //! ```text
 //! e = (u - drop - R i_m) / (1 + R G), R = R_s (1 + k_ac w^2)          i_s = i_m + G e          p_in = 1.5 u i_s + p_sw
 //! ```
 //!
 //! u is the voltage of the legs with dead time, i_m the current of the flux linkage, G the conductance of the
-//! [`iron`](crate::iron). Dead time, and the diodes with the gates off, follow the current that i_s is in steady
-//! state, i_m + G j w psi; the devices' drop follows what i_s would be without it, from which i_s differs by G drop, mA. So
-//! everything is explicit, no loss is negative, and the balance p_in = p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds
-//! exactly. With i_m instead, the drops would be those of a current that is 10 % less at a fifth of the torque, and diodes
-//! would block the wrong current.
+//! [`iron`](crate::iron). Dead time, and the diodes with the gates off, depend on the value of i_s in steady state,
+//! i_m + G j w psi; the drop of the devices depends on i_s without that drop, a difference of G drop, mA. So everything is
+//! explicit, no loss is negative, and the balance p_in = p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds exactly. With i_m
+//! instead, the drops would be those of a current 10 % lower at a fifth of the torque, and diodes would block the wrong
+//! current.
 
+use crate::inverter::{Gates, Inverter};
+use crate::iron::Iron;
 use crate::legs::Legs;
 use crate::losses::conduction::Conduction;
 use crate::losses::{Losses, switching};
-use crate::tables::PlantParameters;
 use drive_base::frame::{AlphaBeta, Stator, Vector};
 use fmu_core::Scalar;
+use serde::{Deserialize, Serialize};
 
-/// What dissipates at a speed: the resistance of the winding and the conductance of the iron.
+/// The winding beyond its resistance.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Winding {
+    /// Growth of the resistance with the square of the electrical speed, in s2/rad2: R = R_s (1 + k_ac w^2), >= 0.
+    pub k_ac: f64,
+}
+
+/// Dissipation at a speed: the resistance of the winding and the conductance of the iron.
 #[derive(Clone, Copy, Debug)]
 pub struct Dissipation<S = f64> {
     /// Resistance in Ohm.
@@ -30,13 +39,12 @@ pub struct Dissipation<S = f64> {
 impl<S: Scalar> Dissipation<S> {
     /// With the resistance `R_s` (Ohm) at standstill, at the electrical speed `w` (rad/s).
     #[inline]
-    pub fn at(parameters: &PlantParameters, R_s: S, w: S) -> Self {
-        let (iron, k_ac) = (&parameters.iron, parameters.winding.k_ac);
-        let R = (w * w * k_ac + S::from(1.0)) * R_s;
+    pub fn at(winding: &Winding, iron: &Iron, R_s: S, w: S) -> Self {
+        let R = (w * w * winding.k_ac + S::from(1.0)) * R_s;
         Self { R, G: (!iron.is_none()).then(|| iron.conductance(w)) }
     }
 
-    /// Voltage (V) behind the resistance of a winding with iron parallel to it, where `u` (V) is applied.
+    /// Voltage (V) behind the resistance of a winding with iron parallel to it, under the voltage `u` (V).
     #[inline]
     fn behind(&self, u: Vector<Stator, S>) -> Vector<Stator, S> {
         self.G.map_or(u, |G| u.scaled(S::from(1.0) / (self.R * G + S::from(1.0))))
@@ -56,9 +64,9 @@ impl<S: Scalar> Dissipation<S> {
     }
 }
 
-/// What the legs take from the voltage reference.
+/// Voltages that the legs subtract from the reference.
 pub trait Drops<S> {
-    /// No device has a drop and nothing switches with a loss, known to the compiler.
+    /// Devices without drop and without switching loss, as a constant for the compiler.
     const IDEAL: bool = false;
 
     /// Voltage (V) of the legs with dead time, for the reference `u` (V); `steady` gives the current (A) at the terminals in
@@ -72,7 +80,7 @@ pub trait Drops<S> {
     fn switching(&self, i: Vector<Stator, S>) -> Option<S>;
 }
 
-/// Legs without dead time and without a loss.
+/// Legs without dead time and losses.
 pub struct Ideal;
 
 impl<S> Drops<S> for Ideal {
@@ -94,7 +102,7 @@ impl<S> Drops<S> for Ideal {
     }
 }
 
-/// Legs whose voltage follows the current: dead time or the diodes with the gates off, devices, switching.
+/// Legs whose voltage depends on the current: dead time or the diodes with the gates off, devices, switching.
 #[derive(Clone, Copy, Debug)]
 pub struct Switches<S = f64> {
     pub(super) legs: Legs<S>,
@@ -104,11 +112,13 @@ pub struct Switches<S = f64> {
 }
 
 impl<S: Scalar> Switches<S> {
-    /// With these `legs` at the DC-link voltage `u_dc` (V), switching or with the gates off.
-    pub fn new(parameters: &PlantParameters, switching: bool, u_dc: S, legs: Legs<S>) -> Self {
-        let inverter = &parameters.inverter;
-        let sw = if switching { switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc) } else { 0.0.into() };
-        Self { legs, conduction: Conduction::new(&inverter.devices, switching, u_dc, legs.i_zone()), sw }
+    /// With these `legs` and `gates` at the DC-link voltage `u_dc` (V). An active short circuit conducts through the transistors
+    /// of one side and their diodes; upper and lower ones alternate, so each leg has the mean drop of both.
+    #[inline]
+    pub fn new(inverter: &Inverter, gates: Gates, u_dc: S, legs: Legs<S>) -> Self {
+        let &Inverter { T_pwm, ref devices, .. } = inverter;
+        let sw = if gates == Gates::Switch { switching::per_ampere(devices, T_pwm, u_dc) } else { 0.0.into() };
+        Self { legs, conduction: Conduction::new(devices, gates != Gates::Off, u_dc, legs.i_zone()), sw }
     }
 
     /// Whether a voltage or a loss has a kink where a current changes its sign.
@@ -135,7 +145,7 @@ impl<S: Scalar> Drops<S> for Switches<S> {
     }
 }
 
-/// From the link to the flux linkage, under a held voltage.
+/// Path from the link to the flux linkage, under a constant voltage.
 pub struct Path<D, S = f64> {
     /// Voltage reference in stator axes, inside the hexagon, in V.
     pub u: Vector<Stator, S>,
@@ -184,8 +194,8 @@ impl<S: Scalar, D: Drops<S>> Path<D, S> {
 }
 
 impl<D: Drops<f64>> Path<D> {
-    /// The currents (A) whose signs the dead time follows, and those that the devices follow; arguments as for
-    /// [`flow`](Self::flow).
+    /// The currents (A) whose signs determine the dead-time voltage, and those that determine the drop of the devices;
+    /// arguments as for [`flow`](Self::flow).
     #[inline]
     pub fn guides(&self, psi: AlphaBeta, i: AlphaBeta, w: f64) -> [AlphaBeta; 2] {
         let Self { u, dissipation, drops } = self;
@@ -202,18 +212,18 @@ mod tests {
 
     #[test]
     fn in_steady_state_the_dead_time_follows_the_terminals() {
-        let mut par = PlantParameters::default();
-        (par.iron.G_e, par.iron.G_h, par.winding.k_ac) = (2e-3, 0.3, 1e-7);
+        let (winding, iron) = (Winding { k_ac: 1e-7 }, Iron { G_e: 2e-3, G_h: 0.3, ..Iron::default() });
+        let inverter = Inverter::default();
         let (psi, i, w) = (AlphaBeta::new(0.12, -0.05), AlphaBeta::new(1.5, 3.0), 400.0);
-        let dissipation = Dissipation::at(&par, 2.0, w);
-        // The voltage with which the flux linkage turns with the rotor.
+        let dissipation = Dissipation::at(&winding, &iron, 2.0, w);
+        // Voltage at which the flux linkage turns with the rotor.
         let steady = dissipation.steady(psi, i, w);
         let u = psi.turned() * w + steady * dissipation.R;
         let flow = Path { u, dissipation, drops: Ideal }.flow(psi, i, w);
         assert!((flow.d_psi - psi.turned() * w).magnitude() < 1e-12, "{:?}", flow.d_psi);
         assert!((flow.i - steady).magnitude() < 1e-13 && (steady - i).magnitude() > 0.1, "{:?}, {steady:?}", flow.i);
         let none: Vector<_> = AlphaBeta::ZERO;
-        let switches = Switches::new(&par, true, 300.0, Legs::switching(&par.inverter, 300.0));
+        let switches = Switches::new(&inverter, Gates::Switch, 300.0, Legs::switching(&inverter, 300.0));
         let path = Path { u: none, dissipation: Dissipation { R: 2.0, G: None }, drops: switches };
         assert_eq!(path.guides(psi, i, w), [i; 2], "without iron, both are the current of the flux linkage");
     }

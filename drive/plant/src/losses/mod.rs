@@ -1,14 +1,14 @@
-//! Where the power goes: the losses of copper, iron, inverter and friction, and the efficiency.
+//! The losses of copper, iron, inverter and friction, and the efficiency.
 //!
 //! ```text
 //! p_in = p_mech + p_cu + p_iron + p_cond + p_sw + p_friction + d/dt (magnetic energy + J speed^2 / 2)
 //! p_loss = p_cu + p_iron + p_cond + p_sw + p_friction
 //! ```
 //!
-//! [`iron`](crate::iron), [`conduction`] and [`switching`] have the equations; [`flow`] joins them; between
-//! two kinks, [`sides`] makes legs and devices affine. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0 elsewhere: where
-//! power comes in from both sides, where p_mech is below 1 uW, and where the ratio is above 1 because stored energy supplies
-//! the power.
+//! [`iron`](crate::iron), [`conduction`] and [`switching`] have the equations; [`flow`] joins them; between two kinks,
+//! [`sides`] makes legs and devices affine. The efficiency is p_mech / p_in of a motor, p_in / p_mech of a generator, and 0
+//! elsewhere: where power enters from both sides, where p_mech is below 1 uW, and where the ratio is above 1 because stored
+//! energy supplies the power.
 
 pub mod conduction;
 #[cfg(test)]
@@ -17,8 +17,6 @@ pub mod flow;
 pub mod sides;
 pub mod switching;
 
-use crate::inverter::Inverter;
-use crate::tables::{PlantParameters, Winding};
 use fmu_core::unit::WATT;
 use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
@@ -26,7 +24,7 @@ use serde::{Deserialize, Serialize};
 /// Losses: powers in W, or energies in J.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Losses<S = f64> {
-    /// Copper of the stator, with the current that blocking diodes end.
+    /// Copper of the stator, including the current that blocking diodes end.
     pub cu: S,
     /// Iron.
     pub iron: S,
@@ -39,7 +37,7 @@ pub struct Losses<S = f64> {
 }
 
 impl<S: Scalar> Losses<S> {
-    /// None.
+    /// No losses.
     #[inline]
     pub fn none() -> Self {
         let x = S::from(0.0);
@@ -52,7 +50,7 @@ impl<S: Scalar> Losses<S> {
         self.cu + self.iron + self.cond + self.sw + self.friction
     }
 
-    /// Each of them by `f`.
+    /// Applies `f` to each.
     #[inline]
     pub fn map<T>(self, f: impl Fn(S) -> T) -> Losses<T> {
         let Self { cu, iron, cond, sw, friction } = self;
@@ -67,7 +65,7 @@ impl Losses {
         *self = self.with(step, |a, b| a + b);
     }
 
-    /// Each of them by `f`, together with `other`.
+    /// Applies `f` to each and that of `other`.
     #[inline]
     pub fn with(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self {
@@ -80,26 +78,7 @@ impl Losses {
     }
 }
 
-/// Whether the legs are ideal and the winding's constant resistance is the machine's only loss: then a step is the quickest.
-/// Every parameter is named, so that a new one has to be thought of here.
-pub fn ideal(parameters: &PlantParameters) -> bool {
-    let PlantParameters {
-        motor: _,
-        saturation: _,
-        flux_map: _,
-        inverter,
-        mechanics: _,
-        initial: _,
-        iron,
-        winding,
-        thermal: _,
-    } = parameters;
-    let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
-    let Winding { k_ac } = winding;
-    *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
-}
-
-/// Efficiency of a drive that takes `p_in` (W) from the link and gives `p_mech` (W) to the load.
+/// Efficiency of a drive with the power `p_in` (W) from the link and `p_mech` (W) to the load.
 #[inline]
 pub fn efficiency<S: Scalar>(p_in: S, p_mech: S) -> S {
     let (link, shaft) = (p_in.value(), p_mech.value());

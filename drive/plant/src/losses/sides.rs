@@ -7,20 +7,21 @@
 //! drop = a + D i          a = sign u_0 + on u_1, D = r_0 + sign on r_1 of each leg          on = 2 d - 1
 //! ```
 //!
-//! with half of the sum (0) and of the difference (1) of transistor and diode: [`Switches`] with the signs held. A classical
-//! Runge-Kutta step that contains a kink closes the energy balance to its second order only; one that ends there keeps the
+//! with half of the sum (0) and of the difference (1) of transistor and diode: [`Switches`] with fixed signs. A classical
+//! Runge-Kutta step that contains a kink closes the energy balance to second order only; one that ends at the kink, to the
 //! fourth.
 
+use crate::losses::conduction::Affine;
 use crate::losses::flow::{Drops, Switches};
-use drive_base::frame::{AlphaBeta, Phases, SQRT_3};
+use drive_base::frame::{AlphaBeta, Phases};
 
-/// The side of the zone on which the current of each leg is: 1 above, -1 below, 0 within; first that which the dead time
-/// follows, then that which the devices follow ([`Path::guides`](super::flow::Path::guides)).
+/// The side of the zone for the current of each leg: 1 above, -1 below, 0 inside; first of the currents that determine the
+/// dead-time voltage, then of those that determine the drop of the devices ([`Path::guides`](super::flow::Path::guides)).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sides([[i8; 3]; 2]);
 
 impl Sides {
-    /// How far beyond its edge, as a share of the zone, a current may be at the end of a step.
+    /// Allowed distance of a current beyond its edge at the end of a step, as a share of the zone.
     const TOLERANCE: f64 = 0.02;
 
     /// The sides of the currents `i` (A) with the zone +-`zone` (A).
@@ -33,19 +34,19 @@ impl Sides {
         }))
     }
 
-    /// Whether no current is within the zone.
+    /// Whether no current is inside the zone.
     #[inline]
     pub fn apart(&self) -> bool {
         self.0.iter().flatten().all(|&side| side != 0)
     }
 
-    /// Where in a step, as a share of it, the first current meets the edge of its side, if one leaves it by more than the
-    /// tolerance: the currents go from `start` (A) to `end` (A). The point is half of the tolerance beyond the edge.
+    /// Share of a step after which the first current crosses the edge of its side, if one leaves its side by more than the
+    /// tolerance while the currents go from `start` (A) to `end` (A). The point is half the tolerance beyond the edge.
     #[inline]
     pub fn first_crossing(&self, start: [AlphaBeta; 2], end: [AlphaBeta; 2], zone: f64) -> Option<f64> {
         let tolerance = Self::TOLERANCE * zone;
         let leg = |side: i8, from: f64, to: f64| {
-            // The edges below and above: a side beyond the zone has one only.
+            // The edges below and above; a side beyond the zone has only one.
             let (below, above) = (if side > 0 { zone } else { -zone }, if side < 0 { -zone } else { zone });
             let edge = if side <= 0 && to > above + tolerance {
                 above + 0.5 * tolerance
@@ -70,29 +71,6 @@ fn phases(signs: [i8; 3]) -> Phases {
     Phases { a, b, c }
 }
 
-/// A vector that is affine in the current (A).
-#[derive(Clone, Copy, Debug)]
-pub struct Affine {
-    /// Without current.
-    pub at_0: AlphaBeta,
-    /// Symmetric matrix per ampere: alpha alpha, alpha beta, beta beta.
-    pub by: [f64; 3],
-}
-
-impl Affine {
-    #[inline]
-    fn at(&self, i: AlphaBeta) -> AlphaBeta {
-        let Self { at_0, by: [x, y, z] } = self;
-        *at_0 + AlphaBeta::new(x * i.alpha() + y * i.beta(), y * i.alpha() + z * i.beta())
-    }
-}
-
-/// The matrix of resistances of the legs (Ohm) in stator axes: alpha alpha, alpha beta, beta beta.
-#[inline]
-pub fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
-    [(4.0 * a + b + c) * (1.0 / 6.0), (c - b) * (0.5 / SQRT_3), 0.5 * (b + c)]
-}
-
 /// Legs and devices while the currents keep their sides.
 #[derive(Clone, Copy, Debug)]
 pub struct OneSided {
@@ -115,7 +93,7 @@ impl Switches {
         OneSided { u, drop, sw: devices.to_stator() * (1.5 * sw) }
     }
 
-    /// The currents (A) of [`Path::guides`](super::flow::Path::guides), each in place of another that has no kink.
+    /// The currents (A) of [`Path::guides`](super::flow::Path::guides), each also instead of one without a kink.
     #[inline]
     pub fn guided(&self, [dead_time, devices]: [AlphaBeta; 2]) -> [AlphaBeta; 2] {
         match (self.legs.drop(), self.conduction.is_some() || self.sw > 0.0) {
@@ -146,9 +124,10 @@ impl Drops<f64> for OneSided {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::inverter::Gates;
     use crate::legs::Legs;
     use crate::losses::conduction::Devices;
-    use crate::losses::flow::{Dissipation, Path};
+    use crate::losses::flow::Path;
     use crate::tables::PlantParameters;
 
     #[test]
@@ -164,9 +143,9 @@ mod tests {
             E_sw: 1e-3,
             ..Devices::default()
         };
-        let switches = Switches::new(&par, true, 325.0, Legs::switching(&par.inverter, 325.0));
+        let switches = Switches::new(&par.inverter, Gates::Switch, 325.0, Legs::switching(&par.inverter, 325.0));
         let (u, w) = (AlphaBeta::new(70.0, -90.0), 300.0);
-        let dissipation = Dissipation::at(&par, 2.0, w);
+        let dissipation = par.dissipation(2.0, w);
         for k in 0..6_u32 {
             let angle = 0.2 + std::f64::consts::FRAC_PI_3 * f64::from(k);
             let i = AlphaBeta::new(5.0 * angle.cos(), 5.0 * angle.sin());
@@ -191,7 +170,7 @@ mod tests {
         let half = 0.5 * Sides::TOLERANCE * 0.2;
         let share = sides.first_crossing(start, end, 0.2).unwrap();
         assert!((share - 0.4 - half / 0.5).abs() < 1e-12 && !sides.apart(), "{share}");
-        // b has left the zone: a is the next, and its edge is the upper one.
+        // b has left the zone; a is next, at the upper edge.
         let next = Sides::of(phases(1.4, 0.2 + half), 0.2);
         assert_eq!(next.0, [[1, 1, -1]; 2]);
         let share = next.first_crossing(start, end, 0.2).unwrap();

@@ -1,24 +1,19 @@
-//! Switching loss of the inverter: a current that the link supplies besides that of the legs.
+//! Switching loss of the inverter: a current from the link in addition to that of the legs.
 //!
 //! ```text
 //! p_sw = E_sw / T_pwm (u_dc / u_sw)^k_sw (|i_a| + |i_b| + |i_c|) / i_sw          i_dc += p_sw / u_dc
 //! ```
 //!
 //! E_sw is turn-on, turn-off and recovery together. With a sinusoidal current of amplitude I, the mean is 3 (2/pi) E_sw /
-//! T_pwm (u_dc / u_sw)^k_sw I / i_sw. No voltage belongs to it. Linear in the current and a power of the voltage: the
-//! field's usual scaling of a data sheet's figure. With the gates off, and in an active short circuit, nothing switches.
+//! T_pwm (u_dc / u_sw)^k_sw I / i_sw. It causes no voltage. Linear in the current and a power of the voltage: the usual
+//! scaling of data-sheet values. With the gates off, and in an active short circuit, nothing switches.
 
-use crate::legs::Legs;
-use crate::losses::conduction::{Conduction, Devices};
-use crate::losses::flow::Switches;
-use crate::signals::{Gates, PlantInputs};
-use crate::tables::PlantParameters;
+use crate::losses::conduction::Devices;
 use drive_base::frame::{Phases, Stator, Vector};
 use drive_base::math::{abs, exp, ln};
 use fmu_core::Scalar;
 
-/// Loss (W) per ampere of all phase currents' magnitudes, at the DC-link voltage `u_dc` (V) and the PWM period `T_pwm`
-/// (s).
+/// Loss (W) per ampere of [`magnitudes`], at the DC-link voltage `u_dc` (V) and the PWM period `T_pwm` (s).
 pub fn per_ampere<S: Scalar>(devices: &Devices, T_pwm: f64, u_dc: S) -> S {
     let &Devices { E_sw, i_sw, u_sw, k_sw, .. } = devices;
     if E_sw == 0.0 {
@@ -38,20 +33,6 @@ pub fn magnitudes<S: Scalar>(i: Vector<Stator, S>) -> S {
 
 /// Mean of [`magnitudes`] over a period with a sinusoidal current of amplitude 1 A: 3 (2/pi).
 pub const MEAN_OF_MAGNITUDES: f64 = 3.0 * std::f64::consts::FRAC_2_PI;
-
-impl<S: Scalar> Switches<S> {
-    /// These `legs` under these `inputs`. An active short circuit conducts through the transistors of one side and their
-    /// diodes; upper and lower ones are taken in turns, so each leg has the mean drop of both.
-    #[inline]
-    pub fn of(parameters: &PlantParameters, inputs: &PlantInputs<S>, legs: Legs<S>) -> Self {
-        let gates = inputs.gates();
-        if gates == Gates::Short {
-            let conduction = Conduction::new(&parameters.inverter.devices, true, inputs.u_dc, legs.i_zone());
-            return Self { legs, conduction, sw: 0.0.into() };
-        }
-        Self::new(parameters, gates == Gates::Switch, inputs.u_dc, legs)
-    }
-}
 
 #[cfg(test)]
 #[expect(clippy::float_cmp, reason = "exact numbers")]

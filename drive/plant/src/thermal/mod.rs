@@ -1,4 +1,4 @@
-//! Temperatures: where they come from, what they change in the machine, and the heat that the losses make.
+//! Temperatures: their sources, their effect on the machine, and the heat of the losses.
 //!
 //! ```text
 //! R_s(T) = R_s (1 + alpha_R (T_winding - T_ref))          psi_M(T) = psi_M (1 + alpha_psi (T_magnet - T_ref))
@@ -9,36 +9,34 @@
 //! | `thermal.mode` | temperatures | `Q_coolant` |
 //! |---|---|---|
 //! | Constant | `thermal.T_start` | all losses, at once |
-//! | Network | [`network`], which starts at `thermal.T_start` | what the network gives to the coolant |
+//! | Network | [`network`], which starts at `thermal.T_start` | heat flow from the network to the coolant |
 //! | Imposed | the inputs `T_winding_imposed` ... | 0: the heat leaves through the four parts |
 //!
-//! Temperatures, and with them R_s(T) and psi_M(T), hold over a step of the plant ([`warm`]). The controller keeps its own
-//! estimates of both. When psi_M changes by Delta, the stored energy changes by 1.5 i_d Delta at constant flux linkage:
-//! mJ over a warm-up, and in no loss.
+//! Temperatures, and with them R_s(T) and psi_M(T), are constant over a step of the plant ([`warm`]). The controller has
+//! separate estimates of both. When psi_M changes by Delta, the stored energy changes by 1.5 i_d Delta at constant flux
+//! linkage: mJ over a warm-up, which no loss contains.
 //!
-//! The coefficients are those of the field: copper 3.93e-3 /K, NdFeB -1.1e-3 /K, SmCo -0.4e-3 /K, ferrite -2e-3 /K at
+//! Usual coefficients: copper 3.93e-3 /K, NdFeB -1.1e-3 /K, SmCo -0.4e-3 /K, ferrite -2e-3 /K at
 //! 20 degC. T in K, Q in W, positive out of the part.
 
 pub mod network;
+pub mod parts;
 pub mod warm;
 
 use crate::losses::Losses;
-use crate::signals::PlantOutputs;
-use crate::tables::{PARAMETERS, PlantParameters};
 use drive_base::motor::Motor;
-use fmu_core::unit::{KELVIN, WATT};
-use fmu_core::{Fault, Field, Part, Row, Scalar, Table, enumeration, table};
+use fmu_core::unit::KELVIN;
+use fmu_core::{Field, Part, Row, Scalar, Table, enumeration, table};
 use network::{NETWORK, Network};
+use parts::T_20;
+pub use parts::{HEAT, Heat, TEMPERATURES, THERMAL_INPUTS, Temperatures, ThermalInputs};
 use serde::{Deserialize, Serialize};
-
-/// 20 degC in K: where inputs, parameters and temperatures start.
-const T_20: f64 = 293.15;
 
 enumeration! {
     /// Where the temperatures come from; values never change.
     #[derive(Serialize, Deserialize)]
     pub enum ThermalMode("ThermalMode", "Where the temperatures come from") {
-        1 Constant "thermal.T_start, whatever the losses";
+        1 Constant "thermal.T_start, regardless of the losses";
         2 Network "The thermal network of machine and inverter with the coolant at T_coolant; Co-Simulation only";
         3 Imposed "The inputs T_winding_imposed, T_stator_imposed, T_magnet_imposed, T_inverter_imposed";
     }
@@ -77,90 +75,7 @@ impl Default for Thermal {
     }
 }
 
-/// Temperatures in K.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Temperatures<S = f64> {
-    /// Winding.
-    pub winding: S,
-    /// Stator iron.
-    pub stator: S,
-    /// Magnets.
-    pub magnet: S,
-    /// Inverter.
-    pub inverter: S,
-}
-
-impl Temperatures {
-    /// One temperature `T` (K) for all parts.
-    pub fn all(T: f64) -> Self {
-        Self { winding: T, stator: T, magnet: T, inverter: T }
-    }
-
-    /// Each of them and of `other` by `f`.
-    fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> Temperatures<T> {
-        Temperatures {
-            winding: f(self.winding, other.winding),
-            stator: f(self.stator, other.stator),
-            magnet: f(self.magnet, other.magnet),
-            inverter: f(self.inverter, other.inverter),
-        }
-    }
-}
-
-impl<S: Scalar> Temperatures<S> {
-    /// Each of them by `f`.
-    pub fn map<T>(&self, f: impl Fn(S) -> T) -> Temperatures<T> {
-        let &Self { winding, stator, magnet, inverter } = self;
-        Temperatures { winding: f(winding), stator: f(stator), magnet: f(magnet), inverter: f(inverter) }
-    }
-}
-
-/// Heat in W, positive out of the part that makes it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Heat<S = f64> {
-    /// From the winding.
-    pub winding: S,
-    /// From the stator iron, with that of friction.
-    pub iron: S,
-    /// From the rotor with its magnets.
-    pub magnet: S,
-    /// From the inverter.
-    pub inverter: S,
-    /// To the coolant.
-    pub coolant: S,
-}
-
-impl<S: Scalar> Heat<S> {
-    /// Each of them by `f`.
-    pub fn map<T>(&self, f: impl Fn(S) -> T) -> Heat<T> {
-        let &Self { winding, iron, magnet, inverter, coolant } = self;
-        Heat { winding: f(winding), iron: f(iron), magnet: f(magnet), inverter: f(inverter), coolant: f(coolant) }
-    }
-}
-
-/// Inputs in K.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ThermalInputs<S = f64> {
-    /// Temperature of the coolant, of the network.
-    pub coolant: S,
-    /// Imposed temperatures.
-    pub imposed: Temperatures<S>,
-}
-
-impl Default for ThermalInputs {
-    fn default() -> Self {
-        Self { coolant: T_20, imposed: Temperatures::all(T_20) }
-    }
-}
-
-impl ThermalInputs {
-    /// Each of them and of `other` by `f`.
-    pub fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> ThermalInputs<T> {
-        ThermalInputs { coolant: f(self.coolant, other.coolant), imposed: self.imposed.zip(&other.imposed, f) }
-    }
-}
-
-/// A value at the temperature `T` (K) over its value at `T_ref` (K), with the coefficient `alpha` (1/K): exactly 1 for
+/// Ratio of a value at the temperature `T` (K) to that at `T_ref` (K), with the coefficient `alpha` (1/K): exactly 1 for
 /// alpha = 0.
 #[inline]
 pub fn factor<S: Scalar>(alpha: f64, T: S, T_ref: f64) -> S {
@@ -168,7 +83,7 @@ pub fn factor<S: Scalar>(alpha: f64, T: S, T_ref: f64) -> S {
 }
 
 impl Thermal {
-    /// The `motor` of the parameters with these temperatures.
+    /// The `motor` of the parameters at these temperatures.
     #[inline]
     pub fn motor<S: Scalar>(&self, motor: &Motor, at: &Temperatures<S>) -> Motor<S> {
         let &Motor { n_p, R_s, L_d, L_q, psi_M } = motor;
@@ -177,7 +92,7 @@ impl Thermal {
         Motor { n_p, R_s: resistance * R_s, L_d, L_q, psi_M: magnet * psi_M }
     }
 
-    /// The heat of the parts with these `losses`; that to the coolant is all of it.
+    /// The heat of the parts with these `losses`; the coolant receives all of it.
     #[inline]
     pub fn heat<S: Scalar>(&self, losses: &Losses<S>) -> Heat<S> {
         let magnet = losses.iron * self.rotor_share;
@@ -197,60 +112,6 @@ impl Thermal {
     }
 }
 
-/// Rejects a network without heat capacities.
-///
-/// # Errors
-/// Names the parameter and what to do.
-pub fn validate(par: &PlantParameters) -> Result<(), Fault> {
-    if par.thermal.mode != ThermalMode::Network {
-        return Ok(());
-    }
-    let capacities: [Get; 4] = [
-        |p| &mut p.thermal.network.C_winding,
-        |p| &mut p.thermal.network.C_stator,
-        |p| &mut p.thermal.network.C_rotor,
-        |p| &mut p.thermal.network.C_inverter,
-    ];
-    for get in capacities {
-        if *get(&mut par.clone()) <= 0.0 {
-            let mode = PARAMETERS.tell(par, |p| &mut p.thermal.mode);
-            let allowed = format!("greater than 0 with {mode}; set the heat capacity, or thermal.mode = 1 (Constant)");
-            return Err(PARAMETERS.fault(par, get, allowed));
-        }
-    }
-    Ok(())
-}
-
-/// Rejects temperatures at which the machine has no resistance or no magnet; `names` are those of the temperatures of
-/// winding and magnets.
-///
-/// # Errors
-/// Names the temperature, its effect and what to do.
-#[inline]
-pub fn check(par: &PlantParameters, at: &Temperatures, names: [&str; 2], remedy: &str) -> Result<(), Fault> {
-    let Motor { R_s, psi_M, .. } = par.thermal.motor(&par.motor, at);
-    let works = |x: f64| x > 0.0 && x.is_finite();
-    if !works(R_s) {
-        let effect = format!("resistance {R_s} Ohm");
-        return Err(refused(par, (names[0], at.winding), |p| &mut p.thermal.alpha_R, &effect, remedy));
-    }
-    if !works(psi_M) {
-        let effect = format!("permanent-magnet flux linkage {psi_M} Wb");
-        return Err(refused(par, (names[1], at.magnet), |p| &mut p.thermal.alpha_psi, &effect, remedy));
-    }
-    Ok(())
-}
-
-type Get = fn(&mut PlantParameters) -> &mut f64;
-
-#[cold]
-fn refused(par: &PlantParameters, (name, T): (&str, f64), alpha: Get, effect: &str, remedy: &str) -> Fault {
-    let [alpha, T_ref] = [PARAMETERS.tell(par, alpha), PARAMETERS.tell(par, |p| &mut p.thermal.T_ref)];
-    Fault::new(format!(
-        "{name} = {T} K with {alpha} and {T_ref} makes the {effect}, which must be greater than 0: {remedy}"
-    ))
-}
-
 type P = Row<Thermal>;
 
 /// Variables of the temperatures; their owner supplies the prefix `thermal.`.
@@ -259,65 +120,6 @@ pub const THERMAL: &Table<Thermal> = table![
     P::parameter("T_ref", &KELVIN, "Temperature of motor.R_s and motor.psi_M", |p| &mut p.T_ref).above(0.0),
     P::parameter("T_start", &KELVIN, "All temperatures at the start", |p| &mut p.T_start).above(0.0),
     P::part("", &Part { table: NETWORK, lens: |p| &mut p.network }),
-];
-
-type I = Row<ThermalInputs>;
-
-/// The temperatures that the importer sets.
-pub const THERMAL_INPUTS: &Table<ThermalInputs> = table![
-    I::input("T_coolant", &KELVIN, "Temperature of the coolant", |i| &mut i.coolant)
-        .at_least(0.0)
-        .nominal(300.0)
-        .read_with("thermal.mode", "Network"),
-    I::input("T_winding_imposed", &KELVIN, "Temperature of the winding", |i| &mut i.imposed.winding)
-        .at_least(0.0)
-        .nominal(300.0)
-        .read_with("thermal.mode", "Imposed"),
-    I::input("T_stator_imposed", &KELVIN, "Temperature of the stator iron", |i| &mut i.imposed.stator)
-        .at_least(0.0)
-        .nominal(300.0)
-        .read_with("thermal.mode", "Imposed"),
-    I::input("T_magnet_imposed", &KELVIN, "Temperature of the magnets", |i| &mut i.imposed.magnet)
-        .at_least(0.0)
-        .nominal(300.0)
-        .read_with("thermal.mode", "Imposed"),
-    I::input("T_inverter_imposed", &KELVIN, "Temperature of the inverter", |i| &mut i.imposed.inverter)
-        .at_least(0.0)
-        .nominal(300.0)
-        .read_with("thermal.mode", "Imposed"),
-];
-
-type O = Row<PlantOutputs>;
-
-/// Temperatures and heat.
-pub const THERMAL_OUTPUTS: &Table<PlantOutputs> = table![
-    O::output("T_winding", &KELVIN, "Temperature of the winding", |o| &mut o.temperatures.winding).nominal(300.0),
-    O::output("T_stator", &KELVIN, "Temperature of the stator iron", |o| &mut o.temperatures.stator).nominal(300.0),
-    O::output("T_magnet", &KELVIN, "Temperature of the magnets", |o| &mut o.temperatures.magnet).nominal(300.0),
-    O::output("T_inverter", &KELVIN, "Temperature of the inverter", |o| &mut o.temperatures.inverter).nominal(300.0),
-    O::output("Q_winding", &WATT, "Heat out of the winding, p_cu; a mean as p_cu is", |o| &mut o.heat.winding).mean(),
-    O::output(
-        "Q_iron",
-        &WATT,
-        "Heat out of the stator iron, (1 - iron.rotor_share) p_iron + p_friction; a mean as these are",
-        |o| &mut o.heat.iron,
-    )
-    .mean(),
-    O::output("Q_magnet", &WATT, "Heat out of rotor and magnets, iron.rotor_share p_iron; a mean as p_iron is", |o| {
-        &mut o.heat.magnet
-    },)
-    .mean(),
-    O::output("Q_inverter", &WATT, "Heat out of the inverter, p_cond + p_sw; a mean as these are", |o| {
-        &mut o.heat.inverter
-    })
-    .mean(),
-    O::output(
-        "Q_coolant",
-        &WATT,
-        "Heat to the coolant, out of the FMU: Constant all losses, Network what the network gives, Imposed 0",
-        |o| &mut o.heat.coolant,
-    )
-    .mean(),
 ];
 
 #[cfg(test)]

@@ -10,12 +10,12 @@
 //!
 //! The time constants are seconds to hours, so the network is not integrated with the machine: it advances once per
 //! step of the plant with the step's mean losses, by the trapezoidal rule, which is stable at any step. The copper loss
-//! grows with the winding's temperature; with the current held, alpha_R p (1/G_ws + 1/G_sc) >= 1, p the loss at T_ref,
-//! has no steady state: the winding runs away.
+//! grows with the winding's temperature; at constant current, alpha_R p (1/G_ws + 1/G_sc) >= 1, p the loss at T_ref, has
+//! no steady state: the winding runs away.
 //!
-//! Lumped networks of this size are the field's usual ones; the equations are heat balances. T in K, C in J/K, G in W/K.
+//! Lumped networks of this size are usual; the equations are heat balances. T in K, C in J/K, G in W/K.
 
-use super::{Heat, Temperatures};
+use super::parts::{Heat, Temperatures};
 use fmu_core::unit::{JOULE_PER_KELVIN, WATT_PER_KELVIN};
 use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
@@ -44,12 +44,12 @@ pub struct Network {
 impl Network {
     /// The temperatures after a step of `h` (s) with the `heat` (W) of its parts and the coolant at `coolant` (K).
     ///
-    /// The trapezoidal rule for the changes; winding and rotor, which touch the stator only, are eliminated.
+    /// Solves the trapezoidal rule for the changes; winding and rotor, which are connected to the stator only, are eliminated.
     pub fn step(&self, at: &Temperatures, heat: &Heat, coolant: f64, h: f64) -> Temperatures {
         let &Self { C_winding, C_stator, C_rotor, C_inverter, G_ws, G_sc, G_sr, G_inverter } = self;
         let half = 0.5 * h;
         let (to_stator, from_rotor) = (G_ws * (at.winding - at.stator), G_sr * (at.magnet - at.stator));
-        // Change by the net heat (W), with the stator held.
+        // Change by the net heat (W) at a constant stator temperature.
         let [by_winding, by_rotor] = [h / (C_winding + half * G_ws), h / (C_rotor + half * G_sr)];
         let (winding, rotor) = (by_winding * (heat.winding - to_stator), by_rotor * (heat.magnet - from_rotor));
         let net = heat.iron + to_stator + from_rotor - G_sc * (at.stator - coolant);
@@ -65,8 +65,8 @@ impl Network {
         }
     }
 
-    /// The temperatures (K) that stay with the `heat` (W) of its parts and the coolant at `coolant` (K); not finite where a part
-    /// that is heated is insulated.
+    /// The steady temperatures (K) with the `heat` (W) of its parts and the coolant at `coolant` (K); not finite if a heated
+    /// part is insulated.
     pub fn steady(&self, heat: &Heat, coolant: f64) -> Temperatures {
         let above = |heat: f64, G: f64| if heat == 0.0 { 0.0 } else { heat / G };
         let stator = coolant + above(heat.winding + heat.iron + heat.magnet, self.G_sc);
@@ -135,7 +135,7 @@ mod tests {
     const ZERO: f64 = 273.15;
     const ALPHA: f64 = 3.93e-3;
 
-    /// The networks of the reference's machines a, b, c: C of winding, stator, rotor; G_ws, G_sc, G_sr.
+    /// Networks of the machines a, b, c of `tests/lossy`: C of winding, stator, rotor; G_ws, G_sc, G_sr.
     fn networks() -> [Network; 3] {
         [
             [1200.0, 6000.0, 2500.0, 12.0, 6.0, 1.5],
@@ -182,7 +182,7 @@ mod tests {
         [[65.0, 661.23, 264.18], [86.204, 72.316, 75.619], [85.787, 71.957, 69.999], [795.6, 101.9, 30.84]],
     ];
 
-    /// The temperatures (degC) after `time` (s) with the copper loss that follows the winding, in steps of `h` (s).
+    /// The temperatures (degC) after `time` (s), in steps of `h` (s), with a copper loss that depends on the winding's.
     fn after(network: &Network, [coolant, p_20, iron]: [f64; 3], time: f64, h: f64) -> [f64; 3] {
         let coolant = coolant + ZERO;
         let mut at = Temperatures { winding: coolant, stator: coolant, magnet: coolant, inverter: coolant };
@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn above_a_current_the_winding_runs_away() {
-        // The current over that of the operating point at which alpha p (1/G_ws + 1/G_sc) is 1.
+        // Current, relative to that of the operating point, at which alpha p (1/G_ws + 1/G_sc) is 1.
         for (network, ([losses, ..], wanted)) in networks().iter().zip(FIGURES.iter().zip([2.374, 2.057, 4.061])) {
             let [coolant, p_20, iron] = *losses;
             let r = 1.0 / network.G_ws + 1.0 / network.G_sc;

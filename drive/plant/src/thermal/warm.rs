@@ -1,32 +1,22 @@
-//! How temperatures act in [`PmsmPlant`]: what holds over a step, and its change at the step's ends.
-//!
-//! A step begins with the imposed temperatures and ends with those of the network. In Model Exchange, the imposed
-//! temperatures act at once, and the derivatives depend on them.
+//! Temperatures and the values that follow from them and from the parameters, constant over a step.
 
-use super::{Heat, Temperatures, ThermalMode};
-use crate::losses::{self, Losses};
-use crate::machine::{Inverse, Machine};
-use crate::model::PmsmPlant;
-use crate::signals::PlantInputs;
-use crate::tables::PARAMETERS;
-#[cfg(doc)]
-use crate::tables::PlantParameters;
+use super::{T_20, Temperatures};
+use crate::machine::Inverse;
 use drive_base::motor::Motor;
-use fmu_core::{Fault, Interface, Scalar};
 use serde::{Deserialize, Serialize};
 
-/// Temperatures, and the machine that has them.
+/// Temperatures, and the machine at them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Warm {
     /// In K.
     pub at: Temperatures,
-    /// Resistance and permanent-magnet flux linkage are those at the temperatures.
+    /// With the resistance and the permanent-magnet flux linkage at these temperatures.
     pub motor: Motor,
-    /// Reciprocals of its inductances.
-    inverse: Inverse,
-    /// [`PlantParameters::least_inductance`] in H.
+    /// Reciprocals of the inductances.
+    pub(crate) inverse: Inverse,
+    /// The smallest inductance in H, over all states of a map.
     pub(crate) least_inductance: f64,
-    /// [`losses::ideal`].
+    /// Whether the legs are ideal and the constant resistance of the winding is the only loss of the machine.
     pub(crate) ideal: bool,
 }
 
@@ -34,119 +24,6 @@ impl Default for Warm {
     fn default() -> Self {
         let motor = Motor::default();
         let least_inductance = motor.L_d.min(motor.L_q);
-        Self { at: Temperatures::all(super::T_20), inverse: Inverse::of(&motor), motor, least_inductance, ideal: false }
-    }
-}
-
-/// What to do when the network leaves the possible temperatures.
-const RUNAWAY: &str = "the network became too hot; reduce the current, or raise thermal.G_ws and thermal.G_sc: with the \
-                       current held, the winding runs away where winding.alpha p_cu(T_ref) (1/G_ws + 1/G_sc) reaches 1";
-
-impl PmsmPlant {
-    /// The temperatures (K) under these `inputs`.
-    #[inline]
-    pub(crate) fn temperatures<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Temperatures<S> {
-        if self.parameters.thermal.mode == ThermalMode::Imposed {
-            return inputs.thermal.imposed;
-        }
-        self.warm.at.map(S::from)
-    }
-
-    /// The machine under these `inputs`.
-    #[inline]
-    pub(crate) fn motor<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Motor<S> {
-        if self.parameters.thermal.mode == ThermalMode::Imposed {
-            return self.parameters.thermal.motor(&self.parameters.motor, &inputs.thermal.imposed);
-        }
-        let Motor { n_p, R_s, L_d, L_q, psi_M } = self.warm.motor;
-        Motor { n_p, R_s: R_s.into(), L_d, L_q, psi_M: psi_M.into() }
-    }
-
-    /// The machine at its temperatures.
-    #[inline]
-    pub(crate) fn machine<const LINEAR: bool>(&self) -> Machine<'_, f64, LINEAR> {
-        Machine::with(&self.warm.motor, self.parameters.magnetics(), self.warm.inverse)
-    }
-
-    /// The machine of [`motor`](Self::motor), whose inductances no temperature changes.
-    #[inline]
-    pub(crate) fn machine_of<S: Scalar>(&self, motor: &Motor<S>) -> Machine<'_, S> {
-        Machine::with(motor, self.parameters.magnetics(), self.warm.inverse)
-    }
-
-    /// The heat (W) of these `losses` (W) at the temperatures `at` (K) under these `inputs`.
-    #[inline]
-    pub fn heat<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Temperatures<S>, losses: &Losses<S>) -> Heat<S> {
-        self.parameters.thermal.heat_at(inputs.thermal.coolant, at, losses)
-    }
-
-    /// From now on, the parts have these temperatures (K).
-    pub(crate) fn take(&mut self, at: Temperatures) {
-        let motor = self.parameters.thermal.motor(&self.parameters.motor, &at);
-        let (inverse, ideal) = (Inverse::of(&motor), losses::ideal(&self.parameters));
-        self.warm = Warm { at, motor, inverse, ideal, ..self.warm };
-    }
-
-    /// The temperatures (K) that parameters and `inputs` say, and the names of those of winding and magnets.
-    fn given(&self, inputs: &PlantInputs) -> (Temperatures, [&'static str; 2]) {
-        match self.parameters.thermal.mode {
-            ThermalMode::Imposed => (inputs.thermal.imposed, ["T_winding_imposed", "T_magnet_imposed"]),
-            _ => (Temperatures::all(self.parameters.thermal.T_start), ["thermal.T_start"; 2]),
-        }
-    }
-
-    /// The temperatures at the start act.
-    pub(crate) fn start_temperatures(&mut self) {
-        self.warm.least_inductance = self.parameters.least_inductance();
-        self.take(self.given(&self.inputs).0);
-    }
-
-    /// The imposed temperatures act from the beginning of a step on.
-    #[inline(never)]
-    pub(crate) fn impose(&mut self) -> Result<(), Fault> {
-        let at = self.inputs.thermal.imposed;
-        if at != self.warm.at {
-            self.judge_temperatures(&self.inputs)?;
-            self.change(at);
-        }
-        Ok(())
-    }
-
-    /// The network passes the step of `h` (s) with its mean losses.
-    #[inline(never)]
-    pub(crate) fn warm_up(&mut self, h: f64) -> Result<(), Fault> {
-        let thermal = &self.parameters.thermal;
-        let heat = thermal.heat(&self.powers.losses);
-        let at = thermal.network.step(&self.warm.at, &heat, self.inputs.thermal.coolant, h);
-        super::check(&self.parameters, &at, ["T_winding", "T_magnet"], RUNAWAY)?;
-        self.change(at);
-        Ok(())
-    }
-
-    /// The temperatures (K) change between two steps. The flux linkage cannot jump, but a machine whose diodes block has
-    /// none besides that of its magnets.
-    fn change(&mut self, at: Temperatures) {
-        self.take(at);
-        if self.blocked {
-            self.state.psi = self.idle_flux(&self.warm.motor, self.state.speed);
-        }
-    }
-
-    /// Refuses given temperatures that cannot be.
-    pub(crate) fn judge_temperatures(&self, inputs: &PlantInputs) -> Result<(), Fault> {
-        let (at, names) = self.given(inputs);
-        let remedy = "temperatures are in K (20 degC are 293.15 K); correct the temperature or the coefficient";
-        super::check(&self.parameters, &at, names, remedy)
-    }
-
-    /// Refuses the network in Model Exchange.
-    pub(crate) fn validate_network(&self, interface: Interface) -> Result<(), Fault> {
-        if interface != Interface::ModelExchange || self.parameters.thermal.mode != ThermalMode::Network {
-            return Ok(());
-        }
-        let allowed = "1 (Constant) or 3 (Imposed) in Model Exchange: the network advances with the steps of \
-                       Co-Simulation; use Co-Simulation, or connect a thermal model to the inputs T_winding_imposed ... \
-                       with thermal.mode = 3";
-        Err(PARAMETERS.fault(&self.parameters, |p| &mut p.thermal.mode, allowed))
+        Self { at: Temperatures::all(T_20), inverse: Inverse::of(&motor), motor, least_inductance, ideal: false }
     }
 }

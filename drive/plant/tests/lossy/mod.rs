@@ -1,7 +1,7 @@
 //! Three machines with all losses, and figures of their operating points: a is `motors/ipmsm-2.2kw.toml`, b
 //! `motors/reference.toml`, c the traction machine of gym-electric-motor's default (DOI 10.1109/TPEL.2020.3006779). Parameters
-//! of losses and inverters are assumed. The figures are those of an independent calculation with the closed forms of the
-//! inverter: MTPA or field weakening (k_u = 0.95) for a torque reference such that the shaft has the torque.
+//! of losses and inverters are assumed. The figures are an independent calculation with the closed forms of the inverter: MTPA
+//! or field weakening (k_u = 0.95), with the torque reference that gives the torque at the shaft.
 #![allow(dead_code, reason = "each test program uses a part")]
 
 use drive_base::motor::Motor;

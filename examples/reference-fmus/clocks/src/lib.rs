@@ -1,4 +1,4 @@
-//! Clocks of the Reference-FMUs: three partitions that count their activations; one asks for a tick of another, and all of them
+//! Clocks of the Reference-FMUs: three partitions that count their activations; one requests a tick of another, and all of them
 //! tick an output clock.
 
 use fmu_core::{Block, Clock, Clocked, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table, table};

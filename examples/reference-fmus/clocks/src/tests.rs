@@ -79,7 +79,7 @@ fn scheduled() {
         let (activate, mut ticked) = (|clock| unsafe { fmi3ActivateModelPartition(it, clock, t) }, false);
         let second = [0, 1, 8, 9].contains(&k);
         for (clock, due) in [(0, true), (1, second), (2, k == 4)] {
-            // Only inClock1 asks for inClock3, at 4 s.
+            // Only inClock1 requests inClock3, at 4 s.
             assert!(clock != 2 || due == (heard.1.replace(0) == 2), "{t}");
             if due {
                 assert_eq!(activate(IN[clock]), 0);

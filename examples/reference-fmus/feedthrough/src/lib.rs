@@ -56,7 +56,7 @@ struct Outputs {
 
 type V = Row<Block<Feedthrough>>;
 
-/// Type and greatest size of the bytes.
+/// Type and maximum size of the bytes.
 const BYTES: (&str, usize) = ("application/octet-stream", 128);
 
 impl Model for Feedthrough {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 /// The step of the solver in s.
 const STEP: f64 = 1e-3;
-/// Greatest number of inputs, of states and of outputs.
+/// Maximum number of inputs, of states and of outputs.
 const MOST: usize = 5;
 
 /// The matrices are row by row.
@@ -26,7 +26,7 @@ struct StateSpace {
     x0: Vec<f64>,
     u: Vec<f64>,
     x: Vec<f64>,
-    /// The numbers m, n and r that the arrays have.
+    /// The present numbers m, n and r of the arrays.
     sizes: [usize; 3],
 }
 

@@ -13,26 +13,26 @@ const UPDATE: &str = "2.0.5, 3.2.2; 3.0.2, 2.3.5";
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "E20", clause: UPDATE, levels: Levels::MUST, run: Run::Exchange(update_results),
-        requirement: "Every update of the discrete states returns Booleans of 0 or 1, and a time where it defines a next event (should: a finite one).",
+        requirement: "Every update of the discrete states returns Booleans that are 0 or 1, and a time if it defines a next event (should: a finite time).",
         tried: "Looks at the results of every update.", fix: "Write all results before returning OK." },
     Check { id: "E21", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(next_event_time),
         requirement: "The next time event, from the first update after initialization on, is an absolute time after now.",
         tried: "Looks at nextEventTime of every update.", fix: "Return an absolute time after now, from the first update on." },
     Check { id: "E22", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(renewed),
-        requirement: "An event before the next time event does not lose it: the update defines it anew.",
-        tried: "Makes an event before the next time event and looks at nextEventTime.", fix: "Compute the next time event in every update." },
+        requirement: "An event before the next time event does not cancel that time event: the update returns it again.",
+        tried: "Makes an event before the next time event and checks nextEventTime.", fix: "Compute the next time event in every update." },
     Check { id: "E23", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(ends),
-        requirement: "The iteration of an event comes to an end within 100 updates.",
+        requirement: "The iteration of an event ends within 100 updates.",
         tried: "Updates until no further update is needed.", fix: "End the iteration: newDiscreteStatesNeeded only if something has changed." },
     Check { id: "E24a", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(told_changes),
-        requirement: "An update that changes a state says so with valuesOfContinuousStatesChanged.",
+        requirement: "An update that changes a state sets valuesOfContinuousStatesChanged.",
         tried: "Compares states before and after every update.", fix: "Set valuesOfContinuousStatesChanged whenever a state is reinitialized." },
     Check { id: "E24b", clause: UPDATE, levels: Levels(Some(Level::Must), Some(Level::Should)), run: Run::Exchange(true_changes),
         requirement: "valuesOfContinuousStatesChanged is true only if a state has changed.",
-        tried: "Compares states before and after every update.", fix: "Clear the flag where no state is reinitialized." },
+        tried: "Compares states before and after every update.", fix: "Clear the flag if no state is reinitialized." },
     Check { id: "E24n", clause: UPDATE, levels: Levels::SHOULD, run: Run::Exchange(true_nominals),
         requirement: "nominalsOfContinuousStatesChanged is true only if a nominal has changed.",
-        tried: "Reads the nominals after every update that says so.", fix: "Clear the flag where no nominal changes." },
+        tried: "Reads the nominals after every update that sets the flag.", fix: "Clear the flag if no nominal changes." },
     Check { id: "E25", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, run: Run::Exchange(indicators),
         requirement: "After Event Mode no event indicator is 0.",
         tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis." },
@@ -56,7 +56,7 @@ fn each_event(
         STEPS,
         &mut |instance, event| {
             events += 1;
-            // One finding of a kind is enough, but the first event is unlike the others.
+            // One finding per kind is enough, but the first event differs from the others.
             if found < 3
                 && let Some(text) = rule(instance.time.get(), event)
             {
@@ -77,7 +77,7 @@ fn update_results(session: &Session) -> Result<(), NotDetermined> {
             let flags = [u.again, u.terminate, u.nominals_changed, u.states_changed, u.next_event_time_defined];
             let good = flags.iter().all(|f| matches!(f, 0 | 1));
             let time = u.next_event_time_defined == 0 || !u.next_event_time.is_nan();
-            // An event that never comes is odd, but an importer can integrate at most until then.
+            // An event at an infinite time never occurs, but an importer can still integrate up to it.
             if u.next_event_time_defined == 1 && u.next_event_time.is_infinite() && !infinite.replace(true) {
                 session.lesser(Level::Should, format!("{u:?}: the time of the next event is infinite"));
             }
@@ -128,8 +128,8 @@ fn true_nominals(session: &Session) -> Result<(), NotDetermined> {
         STEPS,
         &mut |instance, event| {
             let Ok((status, now, _)) = nominals(instance) else { return };
-            let told = event.updates.iter().any(|(u, _)| u.nominals_changed == 1);
-            if told && status.is_ok() && *last.borrow() == now {
+            let reported = event.updates.iter().any(|(u, _)| u.nominals_changed == 1);
+            if reported && status.is_ok() && *last.borrow() == now {
                 idle += 1;
                 if idle == 3 {
                     session.violated(format!(
@@ -165,6 +165,7 @@ fn discrete(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| {
         v.variability == Variability::Discrete
             && v.clocks.is_empty()
+            && session.is_steady(v)
             && matches!(v.causality, Causality::Output | Causality::Local)
     };
     let variables: Vec<_> = session.numeric().filter(fits).take(60).collect();
@@ -177,7 +178,7 @@ fn discrete(session: &Session) -> Result<(), NotDetermined> {
     let dt = session.integrator_step();
     let mut found = 0;
     session.record_calls(&format!("200 integrator steps of {dt} s with events"), || {
-        let mut held = instance.snapshot(&variables)?;
+        let mut last = instance.snapshot(&variables)?;
         for _ in 0..200 {
             if importer.over {
                 break;
@@ -185,14 +186,14 @@ fn discrete(session: &Session) -> Result<(), NotDetermined> {
             let event = importer.step(dt, &mut |_, _| ())?;
             let now = instance.snapshot(&variables)?;
             let end = if event { &importer.before } else { &now };
-            for (v, _) in variables.iter().zip(held.iter().zip(end)).filter(|(_, (old, new))| old != new) {
+            for (v, _) in variables.iter().zip(last.iter().zip(end)).filter(|(_, (old, new))| old != new) {
                 found += 1;
                 if found <= 10 {
                     let t = instance.time.get();
                     session.violated(format!("{}, discrete, changed in Continuous-Time Mode before t = {t:?}", v.name));
                 }
             }
-            held = now;
+            last = now;
         }
         Ok(())
     })
@@ -207,7 +208,7 @@ fn renewed(session: &Session) -> Result<(), NotDetermined> {
         if importer.over || next <= t {
             break;
         }
-        // To a time halfway, in short steps; a state event on the way may change what comes next.
+        // To half the time, in short steps; a state event on the way may change the next time event.
         let half = t + 0.5 * (next - t);
         let steps = ((half - t) / session.integrator_step()).ceil().clamp(1.0, 200.0);
         let mut disturbed = false;

@@ -8,10 +8,11 @@ use crate::checks::exchange::shared::evaluation::{
 use crate::checks::life::shared::calls::attempt;
 use crate::checks::life::shared::kept::set_all;
 use crate::checks::life::state::in_initialization;
-use crate::exchange::{Importer, UNSTABLE, deviation, differ};
+use crate::exchange::{Importer, UNSTABLE, UNTOUCHED, deviation, differ};
 use crate::instance::Instance;
 use crate::level::Level;
-use crate::session::{Line, NotDetermined, Session};
+use crate::lines::Line;
+use crate::session::{NotDetermined, Session};
 use crate::state::{Life, State};
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
@@ -25,50 +26,51 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "E00", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(minimal_run),
         requirement: "A minimal run of Model Exchange succeeds: initialization, event iteration, integrator steps, termination.",
         tried: "Initializes, iterates events, integrates with Euler's method, terminates.",
-        fix: "Look at the call that is named; the other checks of Model Exchange rest on this run." },
+        fix: "Start with the call named in the finding; the other checks of Model Exchange depend on this run." },
     Check { id: "E01", clause: TABLE, levels: Levels::MUST, run: Run::Exchange(allowed),
         requirement: "Every call that the state of a Model Exchange instance allows succeeds.",
-        tried: "Makes every allowed call in every state of Model Exchange.", fix: "Extend the table of allowed states by the call that is named." },
+        tried: "Makes every allowed call in every state of Model Exchange.", fix: "Add the named call to the table of allowed states." },
     Check { id: "E01i", clause: "2.0.5, 3.2.3; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(allowed_early),
         requirement: "States, derivatives, event indicators and nominals can be read in Initialization Mode.",
         tried: "Reads the vectors in Initialization Mode.", fix: "Compute them when they are read." },
     Check { id: "E02", clause: "3.0.2, 2.2.4", levels: Levels(Some(Level::Hard), Some(Level::Should)), run: Run::Exchange(refused),
-        requirement: "Every call that the state of a Model Exchange instance does not allow returns Error, or Discard where it sets a variable \
-            in Continuous-Time Mode; one that is taken all the same is told of by a message of status Warning.",
-        tried: "Makes every call in every state that does not allow it.", fix: "Check the state at the beginning of every function, log and return Error." },
+        requirement: "Every call that the state of a Model Exchange instance does not allow returns Error (Discard if it sets a variable in \
+            Continuous-Time Mode), or is accepted with a message of status Warning.",
+        tried: "Makes every call in every state that does not allow the call.",
+        fix: "Check the state at the beginning of every function, log and return Error." },
     Check { id: "E03", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::Exchange(counts),
-        requirement: "States, derivatives, event indicators and nominals are as many as the description has, and nothing is written past them.",
-        tried: "Reads the vectors with guards behind them, and in FMI 3.0 the numbers.",
+        requirement: "The vectors of states, derivatives, event indicators and nominals have the lengths of the description, and nothing is written past them.",
+        tried: "Reads the vectors into buffers with guard values behind them, and in FMI 3.0 their lengths.",
         fix: "Take the sizes from ModelStructure and numberOfEventIndicators." },
     Check { id: "E04a", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::MUST, run: Run::Exchange(positive_nominals),
         requirement: "The nominals of the continuous states are above 0.",
-        tried: "Reads the nominals.", fix: "Return 1 where nothing is known." },
+        tried: "Reads the nominals.", fix: "Return 1 if the nominal is unknown." },
     Check { id: "E04b", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(declared_nominals),
-        requirement: "The nominals of the continuous states are those of the description, or 1 where it has none.",
+        requirement: "The nominals of the continuous states are those of the description, or 1 if it gives none.",
         tried: "Compares the nominals with the description.", fix: "Generate both from one table." },
     Check { id: "E05", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(round_trip),
         requirement: "Continuous states that are set can be read back, as a vector and as variables (should: inputs too, in both modes).",
-        tried: "Sets states and inputs and reads them.", fix: "Store the states as they came, and mark what depends on them as old." },
+        tried: "Sets states and inputs and reads them.", fix: "Store the states unchanged, and invalidate what was computed from them." },
     Check { id: "E06a", clause: "2.0.5, 3.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(pure),
-        requirement: "Derivatives and event indicators depend on time, states and inputs alone: not on earlier evaluations, nor on the order of \
-            the Set calls (should: event indicators, and a time that goes back to the last completed step).",
-        tried: "Evaluates both in other orders, repeatedly and in another instance, and compares.",
-        fix: "Mark cached results as old in every Set function." },
+        requirement: "Derivatives and event indicators depend only on time, states and inputs: not on earlier evaluations, nor on the order of \
+            the Set calls (should: event indicators, and a time set back to the last completed step).",
+        tried: "Evaluates both in other orders, repeatedly, after other states at the same time, and in another instance, and compares.",
+        fix: "Invalidate cached results in every Set function." },
     Check { id: "E06b", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(same_bits),
         requirement: "Equal time, states and inputs give equal derivatives, bit for bit.",
-        tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed guess, and initialize memory." },
+        tried: "Compares the same evaluations bit for bit.", fix: "Start iterations from a fixed initial guess, and initialize memory." },
     Check { id: "E07", clause: "2.0.5, 3.2.2; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(completed_step),
-        requirement: "CompletedIntegratorStep succeeds, returns Booleans of 0 or 1, and without an event changes neither states, derivatives, inputs, \
-            parameters nor the time.",
+        requirement: "CompletedIntegratorStep succeeds, returns Booleans that are 0 or 1, and without an event changes no state, derivative, input, \
+            parameter or time.",
         tried: "Completes steps without an event and compares.", fix: "Return false for both flags, and change nothing." },
     Check { id: "E08", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::SHOULD, run: Run::Exchange(independent),
         requirement: "The independent variable is the time that SetTime set.",
         tried: "Sets the time and reads the independent variable.", fix: "Assign the argument of SetTime to it." },
     Check { id: "E09", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wild_states),
-        requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error, but Discard at most: with valid ones the derivatives are \
-            those of before.",
-        tried: "Sets states of NaN, infinity and 1e300, reads derivatives, then sets good ones.",
-        fix: "Return Discard, and keep nothing of the bad evaluation." },
+        requirement: "States that are NaN, infinite or huge cause no crash, no hang and no Error (Discard is allowed); with valid states, the derivatives \
+            are the same as before.",
+        tried: "Sets states of NaN, infinity and 1e300, reads derivatives, then sets valid states.",
+        fix: "Return Discard, and keep nothing from the failed evaluation." },
     Check { id: "E10", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(wrong_length),
         requirement: "A vector of the wrong length is refused with Error.",
         tried: "Passes vectors that are too long by one.", fix: "Compare the length with the number of states or indicators." },
@@ -77,18 +79,18 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Changes states and inputs one at a time and reads outputs and derivatives that do not name them.",
         fix: "Add them to dependencies, or leave dependencies out." },
     Check { id: "E15", clause: "2.0.5, 3.2.1; 3.0.2, 3.2.1", levels: Levels::MUST, run: Run::Exchange(both_ways),
-        requirement: "The vectors of states and derivatives have the values of the variables that are the states and derivatives.",
-        tried: "Reads both at several points and after events.", fix: "Let both functions read one value." },
+        requirement: "The vectors of states and derivatives agree with the variables that are these states and derivatives.",
+        tried: "Reads both at several points and after events.", fix: "Let both functions read the same value." },
     Check { id: "E16", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.5", levels: Levels::SHOULD, run: Run::Exchange(mode_alone),
-        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input or parameter, nor the time, and updates of an \
-            event no input or parameter.",
-        tried: "Reads them before and after each change of the mode, and before and after the updates.",
+        requirement: "EnterContinuousTimeMode and EnterEventMode change no state, derivative, input, parameter or time; updates of discrete states \
+            change no input or parameter.",
+        tried: "Reads them before and after each change of mode, and before and after the updates.",
         fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
         requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
         tried: "Runs 3 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "E18", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(start_times),
-        requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are after them.",
+        requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are later than the start time.",
         tried: "Integrates 20 steps from each.", fix: "Take the start time from its argument, and count time events from it." },
     Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
         requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
@@ -98,11 +100,11 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Saves in Event Mode and Continuous-Time Mode, restores, runs, and compares.",
         fix: "Save event counters, next event times and the mode too." },
     Check { id: "E14", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(foreign_states),
-        requirement: "A state of a Model Exchange instance does no harm to an instance for co-simulation, nor the reverse.",
+        requirement: "Setting a state of a Model Exchange instance in an instance for co-simulation, or the reverse, does no harm.",
         tried: "Sets a state of one kind of instance into the other.", fix: "Store the kind, and return Error." },
 ];
 
-/// Ten steps of the integrator; `None` where they run away from the start, as Euler's method does if they are too long.
+/// Ten steps of the integrator; `None` if the states diverge, as they do in Euler's method if the steps are too long.
 fn first_steps(session: &Session) -> Result<Option<(Instance<'_>, bool)>, NotDetermined> {
     let instance = session.exchange(State::Event)?;
     let mut importer = Importer::start(&instance)?;
@@ -117,7 +119,7 @@ fn first_steps(session: &Session) -> Result<Option<(Instance<'_>, bool)>, NotDet
     });
     let over = importer.over;
     match result {
-        // A model may refuse states that no trajectory has.
+        // A model may refuse states that no trajectory reaches.
         Err(_) | Ok(()) if away.get() => instance.free().map(|()| None),
         Err(NotDetermined(why)) if why == UNSTABLE => instance.free().map(|()| None),
         Err(why) => Err(why),
@@ -179,7 +181,6 @@ fn counts(session: &Session) -> Result<(), NotDetermined> {
             });
         }
     }
-    let untouched = 0xc5c5_c5c5_c5c5_c5c5;
     for (name, n) in [
         (Vector::GetContinuousStates, states),
         (instance.derivatives_name(), states),
@@ -191,7 +192,7 @@ fn counts(session: &Session) -> Result<(), NotDetermined> {
         }
         let (status, values, intact) = instance.vector(name, n)?;
         session.require(intact, || format!("{} wrote past the {n} values", name.as_str()));
-        session.require(!status.is_ok() || values.iter().all(|v| v.to_bits() != untouched), || {
+        session.require(!status.is_ok() || values.iter().all(|v| v.to_bits() != UNTOUCHED.to_bits()), || {
             format!("{} did not write all of the {n} values", name.as_str())
         });
     }
@@ -305,15 +306,16 @@ fn wild_states(session: &Session) -> Result<(), NotDetermined> {
         let instance = session.exchange(State::Continuous)?;
         let (x, f) = (instance.states()?, instance.derivatives()?);
         let set = instance.set_states(&vec![wild; x.len()])?;
-        let mut told = vec![("SetContinuousStates", set)];
+        let mut answers = vec![("SetContinuousStates", set)];
         if set.is_ok() {
-            told.push((instance.derivatives_name().as_str(), instance.vector(instance.derivatives_name(), x.len())?.0));
+            answers
+                .push((instance.derivatives_name().as_str(), instance.vector(instance.derivatives_name(), x.len())?.0));
             if session.indicators() > 0 {
                 let (status, ..) = instance.vector(Vector::GetEventIndicators, session.indicators())?;
-                told.push(("GetEventIndicators", status));
+                answers.push(("GetEventIndicators", status));
             }
         }
-        for (name, status) in told {
+        for (name, status) in answers {
             session.require(status.is_ok() || status == Status::DISCARD, || {
                 format!("{name} with states of {wild:e} returned {status}, which ends the simulation")
             });
@@ -359,7 +361,7 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
         let running = state == State::Continuous;
         let instance = session.exchange(if running { State::Initialization } else { state })?;
         if running {
-            // This check does not judge refusals.
+            // Refusals are not the subject of this check.
             if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
                 session.note(why);
             }
@@ -428,7 +430,7 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
         }
         Ok(())
     });
-    // In the middle of an event: the update that follows is the same.
+    // In the middle of an event: the update that follows must be the same.
     session.case(|| {
         let instance = session.excited()?;
         let mut importer = Importer::start(&instance)?;
@@ -465,7 +467,7 @@ fn foreign_states(session: &Session) -> Result<(), NotDetermined> {
         if status == Status::FATAL {
             return Ok(());
         }
-        // Whatever it answered, the next calls and a reset must not crash.
+        // Regardless of the status, the next calls and a reset must not crash.
         if to_simulation {
             let _ = to.step(session.h())?;
         } else {

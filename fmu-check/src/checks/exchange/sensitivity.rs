@@ -83,7 +83,7 @@ impl<'b> Variables<'b> {
     }
 }
 
-/// An instance in Continuous-Time Mode, some way into a run.
+/// An instance in Continuous-Time Mode after some steps.
 fn at_a_point(session: &Session) -> Result<Instance<'_>, NotDetermined> {
     let instance = session.excited()?;
     let mut importer = Importer::start(&instance)?;

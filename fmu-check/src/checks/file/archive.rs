@@ -1,7 +1,7 @@
 //! The archive, by its raw headers (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
 use crate::check::{Check, Levels, Run, Verdict};
-use crate::checks::file::shared::clock_rules::build_description;
+use crate::checks::file::shared::clock_rules::{build_description, source_files};
 use crate::checks::file::shared::layered::manifests;
 use crate::fmu_file::FmuFile;
 use crate::level::Level;
@@ -25,7 +25,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the names of all entries.", fix: "Use plain ASCII names; keep other letters inside the files." },
     Check { id: "Z01d", clause: ZIP, levels: Levels::MUST, run: Run::File(methods),
         requirement: "Entries are stored or deflated (method 0 or 8).",
-        tried: "Reads the compression methods in both headers of every entry.", fix: "Tell the ZIP library to deflate or to store." },
+        tried: "Reads the compression methods in both headers of every entry.", fix: "Set the ZIP library to deflate or store." },
     Check { id: "Z01e", clause: ZIP, levels: Levels::MUST, run: Run::File(descriptors),
         requirement: "A data descriptor (general purpose bit 3) occurs only with deflate.",
         tried: "Reads the general purpose bits in both headers of every entry.",
@@ -42,11 +42,11 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the disk numbers of the end record and of every entry.", fix: "Write the archive as one file." },
     Check { id: "Z01i", clause: ZIP, levels: Levels::MUST, run: Run::File(links),
         requirement: "The archive contains no symbolic links.",
-        tried: "Reads the file attributes of every entry.", fix: "Pack the file that the link points to." },
+        tried: "Reads the file attributes of every entry.", fix: "Pack the file itself instead of the link." },
     Check { id: "Z01j", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(contents),
         requirement: "Every entry unpacks and matches its checksum.",
         tried: "Unpacks every entry and compares its size and checksum with the headers.",
-        fix: "Write the archive again; check the disk and the transfer if it was whole before." },
+        fix: "Write the archive again; if it was intact before, check the disk and the transfer." },
     Check { id: "Z01k", clause: "APPNOTE 4.3", levels: Levels::HARD, run: Run::File(headers),
         requirement: "Entry names are unique, no file has the name of a folder, and local and central headers agree.",
         tried: "Compares the names of all entries, and the central header of each with its local header.",
@@ -67,7 +67,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Name the library modelIdentifier.so, .dll or .dylib, and use letters, digits and underscores only." },
     Check { id: "Z04a", clause: STRUCTURE, levels: Levels::SHOULD, run: Run::File(documentation),
         requirement: "The archive contains documentation/index.html.",
-        tried: "Looks for documentation/index.html.", fix: "Add a page that says what the model is and what its variables mean." },
+        tried: "Looks for documentation/index.html.", fix: "Add a page that describes the model and its variables." },
     Check { id: "Z04b", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.1.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(licenses),
         requirement: "documentation/licenses contains license.txt or license.html (in FMI 3.0 also license.spdx) as its entry point.",
         tried: "Looks for the entry point of documentation/licenses.", fix: "Add license.txt, license.html or in FMI 3.0 license.spdx." },
@@ -86,8 +86,12 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the names of the entries below sources/.",
         fix: "Add buildDescription.xml, and leave out the headers of the standard, which the importer has." },
     Check { id: "Z08", clause: "3.0.2, 2.4.10", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::File(build_description),
-        requirement: "sources/buildDescription.xml is well-formed, of the version of the FMU, and names files that exist, once for each model and platform.",
-        tried: "Reads it and looks its files up.", fix: "Generate it with the list of the sources." },
+        requirement: "sources/buildDescription.xml is well-formed, of the version of the FMU, and names existing files, with one build configuration \
+            per model and platform.",
+        tried: "Reads the file and looks up the files that it names.", fix: "Generate it with the list of the sources." },
+    Check { id: "Z10", clause: "2.0.5, 4.3.1", levels: Levels(Some(Level::Must), None), run: Run::File(source_files),
+        requirement: "Every file in SourceFiles is in the folder sources/.",
+        tried: "Looks each file of SourceFiles up in the archive.", fix: "Pack the file, or remove it from SourceFiles." },
     Check { id: "I03", clause: "3.0.2, 2.6", levels: Levels(None, Some(Level::Should)), run: Run::File(manifests),
         requirement: "A manifest of a layered standard (extra/*/fmi-ls-manifest.xml) is well-formed and gives name, version and description in its \
             namespace.",

@@ -18,12 +18,15 @@ use std::cell::Cell;
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "B00", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::Probe(loads),
-        requirement: "The archive contains a binary for this platform, and it loads (should, if it lacks a shared library of this machine).",
-        tried: "Loads the binary for this platform in a process of its own.",
+        requirement: "The archive contains a binary for this platform, and it loads (should, if a shared library is missing on this machine).",
+        tried: "Loads the binary for this platform in a separate process.",
         fix: "Link helpers statically or pack them beside the library, with the search path $ORIGIN; ldd shows what is missing." },
     Check { id: "B10", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::MUST, run: Run::File(format),
         requirement: "Every binary is a shared library for the platform of its folder.",
         tried: "Reads the format and the processor of every library.", fix: "Build each platform with its own compiler target, as a shared library." },
+    Check { id: "B13", clause: "2.0.5, 2.3", levels: Levels(Some(Level::Should), None), run: Run::File(expected_processor),
+        requirement: "Libraries in linux64 and win64 are for x86-64, which importers expect there.",
+        tried: "Reads the processor of every library in these folders.", fix: "Use a folder with the platform name of FMI 3.0, such as aarch64-linux." },
     Check { id: "B01", clause: "2.0.5, 2.3; 3.0.2, 2.5", levels: Levels::MUST, run: Run::File(exports),
         requirement: "Every binary exports all functions of the standard; in FMI 2.0, those of its interface types.",
         tried: "Compares the exported symbols with the functions of the interfaces.",
@@ -54,17 +57,17 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "A binary for x86_64 Linux requires no instruction set beyond x86-64-v1 (according to its note).",
         tried: "Reads the note .note.gnu.property.", fix: "Build for x86-64, not with -march=native." },
     Check { id: "B12", clause: "hardening", levels: Levels::HARD, run: Run::File(paths),
-        requirement: "Neither a binary nor the start value of a string names a file or folder in somebody's home folder, or a drive: other machines do not \
-            have it.",
+        requirement: "Neither a binary nor the start value of a string contains a path in a user's home folder or on a drive: other machines do not \
+            have that path.",
         tried: "Looks for such paths in the data of every library, without debug information and the names of sources, and in start values.",
-        fix: "Pack the file into resources/, and build its path from the one that the instantiation gets." },
+        fix: "Pack the file into resources/, and build its path from the resource path passed on instantiation." },
     Check { id: "X02b", clause: "2.0.5, 2.1.4; 3.0.2, 2.2.5", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(versions),
         requirement: "GetVersion returns 2.0 or 3.0, and GetTypesPlatform returns default.",
         tried: "Calls GetVersion, and in FMI 2.0 GetTypesPlatform.", fix: "Return the constants of the official headers." },
     Check { id: "B08", clause: "hardening", levels: Levels::HARD, run: Run::Silent(complete_run),
         requirement: "A complete run writes nothing to the console and creates no file in the working directory.",
         tried: "Runs 20 steps, provokes an Error, and watches console and working directory.",
-        fix: "Send messages to the log callback, and write files only where a parameter says so." },
+        fix: "Send messages to the log callback, and write files only to a path given by a parameter." },
 ];
 
 /// The verdict from the findings about each of these libraries; what a rule cannot read is not determined.
@@ -107,7 +110,7 @@ fn elf(fmu: &FmuFile, rule: impl Fn(&Binary, &ElfFile64<'_>) -> Result<Vec<Strin
 fn format(fmu: &FmuFile) -> Verdict {
     let mut findings = Vec::new();
     for binary in libraries(fmu) {
-        // The names of FMI 2.0 tell the bits, not the processor.
+        // The names of FMI 2.0 give the number of bits, not the processor.
         let expected = match binary.folder.as_str() {
             "linux64" => Some((BinaryFormat::Elf, &BITS_64[..])),
             "win64" => Some((BinaryFormat::Pe, &BITS_64[..])),
@@ -171,9 +174,18 @@ fn format(fmu: &FmuFile) -> Verdict {
     Verdict::of(findings)
 }
 
-/// Processors of 64 bits that FMUs are made for.
+/// FMI 2.0 names no processor, but importers take linux64 and win64 for x86-64; universal libraries of macOS are common.
+fn expected_processor(fmu: &FmuFile) -> Verdict {
+    each(fmu, |binary, file| {
+        let other = file.architecture() != Architecture::X86_64;
+        let found = other && ["linux64", "win64"].contains(&binary.folder.as_str());
+        if found { vec![format!("is for {:?}", file.architecture())] } else { Vec::new() }
+    })
+}
+
+/// 64-bit processors that FMUs are built for.
 const BITS_64: [Architecture; 2] = [Architecture::X86_64, Architecture::Aarch64];
-/// And of 32 bits.
+/// 32-bit processors.
 const BITS_32: [Architecture; 1] = [Architecture::I386];
 
 /// Names of exported symbols; macOS prefixes an underscore.
@@ -348,7 +360,7 @@ fn versions(session: &Session) -> Result<(), NotDetermined> {
 
 fn complete_run(session: &Session) -> Result<(), NotDetermined> {
     session.complete_run()?;
-    // What goes wrong is a matter of the log, too.
+    // An Error belongs in the log, not on the console.
     if session.description.co_simulation.is_some() {
         let _ = session.stepping()?.provoke();
     }

@@ -27,7 +27,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "InitialUnknowns are sorted by index.",
         tried: "Compares the indices of neighbors.", fix: "Sort the list by index before writing it." },
     Check { id: "S07", clause: "2.0.5, 2.2.8; 3.0.2, 2.4.8", levels: Levels::MUST, run: Run::File(lists),
-        requirement: "A list of the model structure has each entry once, and event indicators are continuous variables of the FMU's own.",
+        requirement: "A list of the model structure has each entry once, and event indicators are continuous output or local variables.",
         tried: "Compares the entries of each list, and looks the event indicators up.", fix: "List each once, and indicators as local continuous variables." },
     Check { id: "S03a", clause: CLAUSE, levels: Levels::MUST, run: Run::File(dependencies_exist),
         requirement: "Every dependency exists.",
@@ -40,7 +40,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "dependenciesKind has one word for each dependency; initial unknowns use only dependent and constant.",
         tried: "Counts dependenciesKind and reads its words.", fix: "Write one word for each dependency, or leave the attribute out." },
     Check { id: "S04", clause: CLAUSE, levels: Levels::MUST, run: Run::Probe(dependencies_hold),
-        requirement: "A variable that is not a dependency of an initial unknown does not change it.",
+        requirement: "An initial unknown changes only with the variables among its dependencies.",
         tried: "Changes one known at a time in Initialization Mode and reads the unknowns that do not name it.",
         fix: "Add the known to dependencies, or leave dependencies out, which means all." },
     Check { id: "S05", clause: CLAUSE, levels: Levels::MUST, run: Run::File(derivatives),
@@ -50,7 +50,7 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "S06", clause: "3.0.2, 2.4.8", levels: Levels(None, Some(Level::Must)), run: Run::File(clocked_states),
         requirement: "A clocked state is a discrete variable on a clock and refers to its previous value with the attribute previous; no two share one.",
         tried: "Follows the attribute previous of every clocked state.",
-        fix: "Give the state clocks and previous, and a variable of its own for the previous value." },
+        fix: "Give the state clocks and previous, and a separate variable for the previous value." },
 ];
 
 fn name(d: &ModelDescription, reference: u32) -> String {
@@ -115,7 +115,7 @@ fn sorted(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// Every entry of the lists: of what list it is, the place and the name for a finding.
+/// Every entry of the lists: the list, and line and name for a finding.
 fn entries(d: &ModelDescription) -> impl Iterator<Item = (&'static str, &Unknown, String)> {
     let lists: [(_, &[Unknown]); 3] =
         [("output", &d.outputs), ("derivative", &d.derivatives), ("initial unknown", &d.initial_unknowns)];

@@ -23,7 +23,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Correct the line that is named; fmiVersion is 3.0 in both standards." },
     Check { id: "I01n", clause: TERMINALS, levels: Levels::MUST, run: Run::File(names),
         requirement: "Terminal names are present and unique, and so are member names wherever members are matched by name.",
-        tried: "Compares the names of terminals and members.", fix: "Give each terminal and, for plug and bus, each member a name of its own." },
+        tried: "Compares the names of terminals and members.", fix: "Give each terminal and, for plug and bus, each member a unique name." },
     Check { id: "I01k", clause: TERMINALS, levels: Levels::MUST, run: Run::File(kinds),
         requirement: "Members are inputs, outputs or parameters; inflows and outflows are scalar; vendor-specific matching rules have reverse domain names.",
         tried: "Looks up what the members are, and the matching rules.",

@@ -2,16 +2,16 @@
 
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::checks::file::shared::clock_rules::{
-    intervals, kinds, names_of_types, references as references_of_clocks, reinit,
+    intervals, kinds, long_intervals, names_of_types, references as references_of_clocks, reinit,
 };
 use crate::checks::file::shared::clocked::alias_units;
 use crate::checks::file::shared::names::grammar;
-use crate::checks::file::shared::units;
+use crate::checks::file::shared::type_rules::{bases, definitions, displays, each, types, unique_units, unit_names};
 use crate::checks::file::xml::with_description;
 use crate::fmu_file::FmuFile;
 use crate::level::Level;
 use model_description::{
-    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, ModelVariable, Variability, parse_number,
+    BaseType, Causality, Dimension, FmiVersion, Initial, ModelVariable, Variability, parse_number,
 };
 use std::collections::HashMap;
 
@@ -33,7 +33,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Variables that share a value reference are true aliases: at most one can be set, constants alias only equal constants, and there is \
             one start value and one unit.",
         tried: "Compares variables of one base type that share a value reference.",
-        fix: "Give settable variables references of their own, and one start value and one unit to a set of aliases." },
+        fix: "Give each settable variable a separate reference, and one start value and one unit to a set of aliases." },
     Check { id: "V03", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::File(independent),
         requirement: "The independent variable is a continuous number without start and initial; FMI 3.0 requires exactly one, FMI 2.0 allows at most one.",
         tried: "Looks at the variables with causality independent.", fix: "Add one variable time, continuous, without start and initial." },
@@ -53,8 +53,9 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads variability of all variables that are not floating-point.",
         fix: "Write variability=\"discrete\" (or fixed, tunable, constant) at Integer, Boolean, String and Enumeration." },
     Check { id: "V06a", clause: "2.0.5, 2.2.3; 3.0.2, 2.4.4", levels: Levels::SHOULD, run: Run::File(ranges),
-        requirement: "min <= start <= max, and nominal is not 0.",
-        tried: "Compares min, start, max and nominal.", fix: "Correct the limits or the start value; leave nominal out if it is not known." },
+        requirement: "min <= start <= max, the start value of an enumeration is one of its items, and nominal is not 0.",
+        tried: "Compares min, start, max, items and nominal.",
+        fix: "Correct the limits or the start value; leave nominal out if it is not known." },
     Check { id: "V08a", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::File(types),
         requirement: "declaredType names a type definition of the same base type; every enumeration has one.",
         tried: "Looks declaredType up in TypeDefinitions.", fix: "Define the type with the base type of the variable." },
@@ -73,9 +74,9 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Compares the base units of about 100 common names with their meaning.",
         fix: "Correct exponents, factor and offset: value in base units = factor * value + offset." },
     Check { id: "V09d", clause: "2.0.5, 2.2.2; 3.0.2, 2.4.3", levels: Levels::SHOULD, run: Run::File(displays),
-        requirement: "A common display unit has the factor that its name implies (display = factor * value + offset).",
-        tried: "Compares the factors of common display units with their meaning.",
-        fix: "Correct the factor: display value = factor * value + offset, the opposite direction to BaseUnit." },
+        requirement: "A common display unit has the factor and offset that its name implies (display = factor * value + offset).",
+        tried: "Compares the factors of common display units, and the offsets of temperatures, with their meaning.",
+        fix: "Correct factor and offset: display value = factor * value + offset, the opposite direction to BaseUnit." },
     Check { id: "V10", clause: "3.0.2, 2.4.7.5", levels: Levels(None, Some(Level::Must)), run: Run::File(alias_units),
         requirement: "Only aliases of floating-point variables have a display unit, and it belongs to the unit of the variable.",
         tried: "Looks at the attribute displayUnit of aliases.", fix: "Define the display unit in the unit of the variable, or drop it." },
@@ -92,6 +93,9 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Periodic clocks, and no others, have an interval above 0 and no negative shift, and output clocks have no priority.",
         tried: "Reads the attributes of all clocks.",
         fix: "Give constant, fixed and tunable clocks an interval; drop what does not belong to the kind of clock." },
+    Check { id: "V19", clause: "3.0.2, 2.4.4", levels: Levels(None, Some(Level::Hard)), run: Run::File(long_intervals),
+        requirement: "A periodic clock ticks within the default experiment: its interval is in seconds.",
+        tried: "Compares intervalDecimal with the default experiment.", fix: "Give intervals in seconds, not in milliseconds." },
     Check { id: "V17", clause: "3.0.2, 2.2.8.2", levels: Levels(None, Some(Level::Should)), run: Run::File(kinds),
         requirement: "A clock is an input, an output or a local variable, and triggered if it is not an input.",
         tried: "Reads causality and intervalVariability of all clocks.", fix: "Make a clock that the FMU ticks a triggered output." },
@@ -107,14 +111,6 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Start values have the type of the variable and lie within the range of that type.",
         tried: "Parses start values as values of the variable's type.", fix: "Write numbers with a point, in the range of the type." },
 ];
-
-/// A finding for each variable that violates the rule.
-fn each(fmu: &FmuFile, rule: impl Fn(&ModelDescription, &ModelVariable) -> Option<String>) -> Verdict {
-    with_description(fmu, |d| {
-        let say = |v| rule(d, v).map(|why| format!("line {}: variable {}: {why}", v.line, v.name));
-        d.variables.iter().filter_map(say).collect()
-    })
-}
 
 fn names(fmu: &FmuFile) -> Verdict {
     with_description(fmu, |d| {
@@ -308,7 +304,7 @@ fn continuous(fmu: &FmuFile) -> Verdict {
 }
 
 fn ranges(fmu: &FmuFile) -> Verdict {
-    each(fmu, |_, v| {
+    each(fmu, |d, v| {
         if v.min.zip(v.max).is_some_and(|(min, max)| min > max) {
             return Some(format!("min = {} is greater than max = {}", v.min?, v.max?));
         }
@@ -318,97 +314,17 @@ fn ranges(fmu: &FmuFile) -> Verdict {
         if matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Boolean | BaseType::Clock) {
             return None;
         }
+        let items = v.declared_type.as_deref().and_then(|name| d.type_definition(name)).map(|t| &t.items);
+        if let Some(items) = items.filter(|_| v.base == BaseType::Enumeration) {
+            let is_item = |word: &&str| items.iter().any(|item| item.value.to_string() == *word);
+            if let Some(word) = v.start.as_deref()?.split_whitespace().find(|word| !is_item(word)) {
+                return Some(format!("start = {word} is not among the items of its type"));
+            }
+        }
         let numbers = v.start.as_deref()?.split_whitespace().filter_map(parse_number);
         let outside = |x: &f64| v.min.is_some_and(|min| *x < min) || v.max.is_some_and(|max| *x > max);
         numbers.into_iter().find(outside).map(|x| format!("start = {x} is outside min and max"))
     })
-}
-
-fn types(fmu: &FmuFile) -> Verdict {
-    each(fmu, |d, v| match &v.declared_type {
-        None => (v.base == BaseType::Enumeration).then(|| "is an enumeration without declaredType".into()),
-        Some(name) => match d.type_definition(name) {
-            None => Some(format!("there is no type {name:?}")),
-            Some(t) if t.base != v.base => Some(format!("is a {} but its type {name:?} is a {}", v.base, t.base)),
-            Some(_) => None,
-        },
-    })
-}
-
-fn definitions(fmu: &FmuFile) -> Verdict {
-    with_description(fmu, |d| {
-        let mut findings = Vec::new();
-        for (i, t) in d.types.iter().enumerate() {
-            if d.types[..i].iter().any(|other| other.name == t.name) {
-                findings.push(format!("line {}: there is another type {:?}", t.line, t.name));
-            }
-            if d.version == FmiVersion::V2 && d.variables.iter().any(|v| v.name == t.name) {
-                findings.push(format!("line {}: type {:?} has the name of a variable", t.line, t.name));
-            }
-            for (j, item) in t.items.iter().enumerate() {
-                if t.items[..j].iter().any(|other| other.name == item.name || other.value == item.value) {
-                    findings.push(format!(
-                        "line {}: type {:?}: {} = {} occurs twice",
-                        t.line, t.name, item.name, item.value
-                    ));
-                }
-            }
-        }
-        findings
-    })
-}
-
-fn unit_names(fmu: &FmuFile) -> Verdict {
-    let wrong = |d: &ModelDescription, unit: Option<&str>, display: Option<&str>| match (unit, display) {
-        (None, Some(display)) => Some(format!("the display unit {display:?} comes without a unit")),
-        (Some(unit), display) => match (d.unit(unit), display) {
-            (None, _) => Some(format!("the unit {unit:?} is not defined")),
-            // FMI 2.0 ignores a display unit that is not defined.
-            (Some(u), Some(display))
-                if d.version == FmiVersion::V3 && u.display_unit(display).is_none() && display != unit =>
-            {
-                Some(format!("the unit {unit:?} has no display unit {display:?}"))
-            }
-            _ => None,
-        },
-        _ => None,
-    };
-    with_description(fmu, |d| {
-        let of_types = d.types.iter().filter_map(|t| {
-            let why = wrong(d, t.unit.as_deref(), t.display_unit.as_deref())?;
-            Some(format!("line {}: type {}: {why}", t.line, t.name))
-        });
-        let of_variables = d.variables.iter().filter_map(|v| {
-            let why = wrong(d, v.unit.as_deref(), v.display_unit.as_deref())?;
-            Some(format!("line {}: variable {}: {why}", v.line, v.name))
-        });
-        of_types.chain(of_variables).collect()
-    })
-}
-
-fn unique_units(fmu: &FmuFile) -> Verdict {
-    with_description(fmu, |d| {
-        let mut findings = Vec::new();
-        for (i, unit) in d.units.iter().enumerate() {
-            if d.units[..i].iter().any(|u| u.name == unit.name) {
-                findings.push(format!("line {}: the unit {:?} occurs twice", unit.line, unit.name));
-            }
-            for (j, display) in unit.display_units.iter().enumerate() {
-                if unit.display_units[..j].iter().any(|u| u.name == display.name) {
-                    findings.push(format!("line {}: the display unit {:?} occurs twice", unit.line, display.name));
-                }
-            }
-        }
-        findings
-    })
-}
-
-fn bases(fmu: &FmuFile) -> Verdict {
-    with_description(fmu, units::wrong_bases)
-}
-
-fn displays(fmu: &FmuFile) -> Verdict {
-    with_description(fmu, units::wrong_displays)
 }
 
 fn flags(fmu: &FmuFile) -> Verdict {

@@ -16,13 +16,13 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the first three bytes.", fix: "Write UTF-8 without a mark; in .NET, new UTF8Encoding(false)." },
     Check { id: "X01b", clause: "2.0.5, 2.2; 3.0.2, 2.4", levels: Levels::MUST, run: Run::File(valid),
         requirement: "Elements and attributes are those of the standard, in its order and with values of its types.",
-        tried: "Compares elements, attributes and values with rules that have the content of the official schema.",
-        fix: "Validate the file against the XSD of the standard while you develop, and correct the line that is named." },
+        tried: "Compares elements, attributes and values with rules equivalent to the official schema.",
+        fix: "Validate the file against the XSD of the standard while you develop, and correct the line named in the finding." },
     Check { id: "X01s", clause: "3.0.2, 2.4.2", levels: Levels(None, Some(Level::Should)), run: Run::File(spelling),
-        requirement: "Capability flags are spelled as in the standard: its schema allows other attributes there, but importers take a misspelled flag for \
+        requirement: "Capability flags are spelled as in the standard: its schema allows other attributes there, but importers read a misspelled flag as \
             false.",
         tried: "Compares the attributes of the interfaces with those of the standard.",
-        fix: "Correct the spelling; store what is the tool's own in annotations." },
+        fix: "Correct the spelling; store data of the tool in annotations." },
     Check { id: "X02a", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version),
         requirement: "fmiVersion is 2.0 or 3.0, without a patch release.",
         tried: "Reads the attribute fmiVersion.", fix: "Write 2.0 or 3.0." },
@@ -31,13 +31,13 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads the attribute generationDateAndTime.", fix: "Write UTC with a Z, for example 2026-01-02T03:04:05Z, without fractions and offset." },
     Check { id: "X06", clause: "fmi-guides, 3", levels: Levels::SHOULD, run: Run::File(metadata),
         requirement: "The attributes description, author, version, copyright, license and generationTool are given.",
-        tried: "Reads the attributes of the root element.", fix: "Let users of the exporter give these texts, and write them." },
+        tried: "Reads the attributes of the root element.", fix: "Let users of the exporter enter these texts, and write them." },
     Check { id: "X08", clause: "2.0.5, 4.3.1; 3.0.2, 2.4.2", levels: Levels::MUST, run: Run::File(flags),
         requirement: "Every capability flag that requires another flag is accompanied by it.",
-        tried: "Reads the capability flags of the interfaces.", fix: "Set the flag that is required too, or drop the one that requires it." },
+        tried: "Reads the capability flags of the interfaces.", fix: "Set the required flag too, or drop the flag that requires it." },
     Check { id: "X10", clause: "2.0.5, 2.2.5; 3.0.2, 2.4.6", levels: Levels::SHOULD, run: Run::File(experiment),
-        requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, the tolerance is not \
-            negative, and fixedInternalStepSize is positive.",
+        requirement: "In the default experiment, stop follows start, the step is positive and shorter than the experiment, the tolerance is finite \
+            and not negative, and fixedInternalStepSize is positive.",
         tried: "Reads DefaultExperiment and fixedInternalStepSize.", fix: "Correct the numbers, or leave out those that are not known." },
     Check { id: "X11", clause: "2.0.5, 2.2.7", levels: Levels(Some(Level::Must), None), run: Run::File(reinit),
         requirement: "An FMU without model exchange does not use the attribute reinit.",
@@ -198,7 +198,11 @@ fn experiment(fmu: &FmuFile) -> Verdict {
             }
         }
         wrong(x.step.is_some_and(|h| h <= 0.0), "stepSize is not positive".into());
-        wrong(x.tolerance.is_some_and(|t| t < 0.0), "tolerance is negative".into());
+        let tolerance = x.tolerance.unwrap_or(0.0);
+        wrong(
+            !(tolerance >= 0.0 && tolerance.is_finite()),
+            format!("tolerance = {tolerance} is negative or not finite"),
+        );
         findings
     })
 }

@@ -13,29 +13,29 @@ use model_description::{BaseType, Causality, CoSimulation, Dimension, ModelVaria
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "C04", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Must)), run: Run::Probe(resized),
-        requirement: "After Configuration Mode, arrays have the sizes that were set in it, and the simulation runs.",
+        requirement: "After Configuration Mode, arrays have the sizes set there, and the simulation runs.",
         tried: "Changes each structural parameter, reads the arrays that it sizes, and makes 3 steps.",
-        fix: "Allocate arrays anew in ExitConfigurationMode, and loop up to their present sizes." },
+        fix: "Allocate arrays anew in ExitConfigurationMode, and loop up to their current sizes." },
     Check { id: "C05", clause: "3.0.2, 2.2.7.2", levels: Levels(None, Some(Level::Should)), run: Run::Probe(counts),
-        requirement: "The number of values of a resized array is judged by its present size, and nothing is written past the values.",
+        requirement: "The number of values passed for a resized array is checked against its current size, and nothing is written past the values.",
         tried: "Reads and sets resized arrays with one value more, one less, and as many as before.",
-        fix: "Compare nValues with the product of the present sizes before copying." },
+        fix: "Compare nValues with the product of the current sizes before copying." },
     Check { id: "C06", clause: "3.0.2, 2.3.6", levels: Levels(None, Some(Level::Should)), run: Run::Probe(closed),
         requirement: "In Configuration Mode, only structural parameters can be set, and no step is made.",
         tried: "Sets an input and a parameter in Configuration Mode, and calls DoStep.", fix: "Compare causality and state before assigning." },
     Check { id: "C07", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(bounds),
         requirement: "A structural parameter outside min and max is refused, at the latest when Configuration Mode ends.",
-        tried: "Sets each to values outside, up to the greatest of its type.", fix: "Compare with min and max before anything is allocated." },
+        tried: "Sets each to values outside the limits, up to the maximum of its type.", fix: "Compare with min and max before anything is allocated." },
     Check { id: "C08", clause: "3.0.2, 2.3.7", levels: Levels(None, Some(Level::Must)), run: Run::Probe(reconfigured),
-        requirement: "A tunable structural parameter can change in Reconfiguration Mode, and the simulation goes on.",
+        requirement: "A tunable structural parameter can be changed in Reconfiguration Mode, and the simulation continues.",
         tried: "Steps, changes each tunable one, reads the arrays that it sizes, and steps; tries a fixed one (should).",
         fix: "Allow EnterConfigurationMode in Step Mode, and compare the variability of what is set." },
     Check { id: "C09", clause: "3.0.2, 2.2.7.4", levels: Levels(None, Some(Level::Must)), run: Run::Probe(saved),
-        requirement: "A saved state brings its sizes along.",
+        requirement: "A saved state includes the array sizes.",
         tried: "Saves, changes each structural parameter, restores, and reads it and the arrays that it sizes.",
         fix: "Save structural parameters and arrays with their lengths." },
     Check { id: "C10", clause: "3.0.2, 2.3.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(reset),
-        requirement: "Reset restores the sizes of the start.",
+        requirement: "Reset restores the initial array sizes.",
         tried: "Changes each structural parameter, resets, and reads it and the arrays that it sizes.",
         fix: "Let Reset set structural parameters to their start values, and allocate arrays anew." },
 ];
@@ -201,7 +201,7 @@ fn closed(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn bounds(session: &Session) -> Result<(), NotDetermined> {
-    let greatest = |base| match base {
+    let maximum = |base| match base {
         BaseType::UInt64 => u64::MAX,
         BaseType::UInt32 => u32::MAX.into(),
         _ => i32::MAX.unsigned_abs().into(),
@@ -213,7 +213,7 @@ fn bounds(session: &Session) -> Result<(), NotDetermined> {
             values.push(bits(size.v.base, min - 1.0));
         }
         if max < 1e9 {
-            values.extend([bits(size.v.base, max + 1.0), greatest(size.v.base)]);
+            values.extend([bits(size.v.base, max + 1.0), maximum(size.v.base)]);
         }
         for value in values {
             let instance = session.fresh()?;

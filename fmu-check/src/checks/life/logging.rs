@@ -23,22 +23,23 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error." },
     Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors),
         requirement: "With logging on, every Error is accompanied by a message of that status.",
-        tried: "Provokes an Error with logging on, resets, and provokes another.", fix: "Log in the one place that returns Error." },
+        tried: "Provokes an Error with logging on, resets, and provokes another.", fix: "Log in the function through which every Error is returned." },
     Check { id: "G-L3c", clause: LOG, levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Any(refusals),
         requirement: "With logging on, an instantiation that returns NULL is accompanied by a message.",
         tried: "Instantiates with a wrong token.", fix: "Log the reason before returning NULL." },
     Check { id: "G-L3b", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts),
         requirement: "Messages are UTF-8, not empty, and have no trailing line break.",
-        tried: "Reads the messages of a run with an Error.", fix: "Write UTF-8 without a line break at the end." },
+        tried: "Reads the messages of a run with an Error.",
+        fix: "Write UTF-8 without a line break at the end; in FMI 2.0 a message is a printf format, so pass text with a % as the argument of \"%s\"." },
     Check { id: "G-L4", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity),
-        requirement: "Messages carry the environment, and in FMI 2.0 the name, that were passed on instantiation.",
+        requirement: "Messages have the environment, and in FMI 2.0 the instance name, that were passed on instantiation.",
         tried: "Reads environment and name of all messages, also of the first of two instances.", fix: "Store both per instance." },
     Check { id: "G-L5", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(silence),
         requirement: "With logging off, the FMU logs only errors.",
         tried: "Runs with an Error and logging off, resets, runs again, and reads the messages.", fix: "Check loggingOn before each message." },
     Check { id: "M01", clause: "2.0.5, 2.1.5", levels: Levels(Some(Level::Must), None), run: Run::Probe(memory),
         requirement: "With canNotUseMemoryManagementFunctions, the FMU does not call the memory functions of the importer, and they may be NULL.",
-        tried: "Runs with counting memory functions, then with NULL instead.", fix: "Use malloc and free, as the flag says, or drop the flag." },
+        tried: "Runs with counting memory functions, then with NULL instead.", fix: "Use malloc and free, or drop the flag." },
 ];
 
 /// The log of a run with an error, and the environment and name of its instance.
@@ -66,7 +67,11 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
 
 fn show(event: &LogCall) -> String {
     let category = event.category.as_deref().unwrap_or("NULL");
-    format!("{} [{category}] {:?}", Status(event.status), event.text.as_deref().unwrap_or("(none, or not UTF-8)"))
+    let text = event.text.as_deref().map_or_else(
+        || "(NULL, not UTF-8, or in FMI 2.0 a printf format with a % whose argument is missing)".into(),
+        |text| format!("{text:?}"),
+    );
+    format!("{} [{category}] {text}", Status(event.status))
 }
 
 fn categories(session: &Session) -> Result<(), NotDetermined> {

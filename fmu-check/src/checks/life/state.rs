@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::kept::{set_all, texts};
-use crate::checks::process::instances::leak;
+use crate::checks::process::instances::{LEFT_BY_STATE, leak};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
@@ -11,22 +11,25 @@ use crate::trajectory::difference;
 use fmu_import::Status;
 use fmu_import::raw::SavedState;
 use model_description::{Causality, CoSimulation, ModelVariable};
+use std::cell::Cell;
 
 const STATE: &str = "2.0.5, 2.1.8; 3.0.2, 2.2.7.4";
 
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "F01a", clause: STATE, levels: Levels::MUST, run: Run::Probe(in_every_state),
-        requirement: "A state can be read, set repeatedly and freed in every state of the life cycle, which goes on from there; freeing it returns NULL.",
+        requirement: "A state can be saved, restored repeatedly and freed in every state of the life cycle, and the life cycle continues; freeing \
+            sets the pointer to NULL.",
         tried: "Gets, sets twice and frees a state in each state of the life cycle, and makes the next call.",
-        fix: "Allow the calls in all these states, and write NULL after freeing." },
+        fix: "Allow the calls in all these states, and set the pointer to NULL after freeing." },
     Check { id: "F01b", clause: STATE, levels: Levels::MUST, run: Run::Probe(overwrite),
-        requirement: "Reading a state into an existing one overwrites that one and no other, and freeing NULL is ignored.",
+        requirement: "Saving into an existing state overwrites that state and no other, and freeing NULL is ignored.",
         tried: "Gets a state into an existing one, runs, restores, and compares; the same with the first of two states; frees NULL.",
-        fix: "Overwrite the memory that the pointer has; return OK for NULL." },
+        fix: "Overwrite the memory behind the pointer; return OK for NULL." },
     Check { id: "F01l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(state_leaks),
-        requirement: "Saving and freeing states leaks no memory.",
-        tried: "Saves and frees some thousand states and measures memory.", fix: "Free in FreeFMUState what GetFMUState allocated." },
+        requirement: "Saving and freeing states, and saving into an existing state, leak no memory.",
+        tried: "Saves and frees some thousand states, saves some thousand times into the same one, and measures memory.",
+        fix: "Free in FreeFMUState what GetFMUState allocated, and let GetFMUState reuse the memory of a state that it is given." },
     Check { id: "F02a", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state),
         requirement: "A run from a restored state equals the run from the time of saving.",
         tried: "Saves, runs 50 steps, restores twice, and compares.",
@@ -45,16 +48,16 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "A NULL state and a NULL pointer to a state give Error.",
         tried: "Passes NULL states and NULL pointers.", fix: "Check the pointers." },
     Check { id: "F04a", clause: STATE, levels: Levels::MUST, run: Run::Probe(serialized),
-        requirement: "A serialized state can be restored in another instance: the run from it is the same.",
+        requirement: "A serialized state can be restored in another instance, and the run from it is the same.",
         tried: "Serializes, deserializes in another instance, runs, and compares; in Initialization Mode all variables.",
-        fix: "Write every member by value, parameters and the state of the life cycle too." },
+        fix: "Write every member by value, including parameters and the state of the life cycle." },
     Check { id: "F04b", clause: "hardening", levels: Levels::HARD, run: Run::Probe(equal_bytes),
         requirement: "Equal states give equal bytes: no addresses and no uninitialized memory.",
         tried: "Serializes two instances after the same run and compares.", fix: "Write no addresses, and clear padding." },
     Check { id: "F04c", clause: "hardening", levels: Levels::HARD, run: Run::Probe(corrupted),
         requirement: "Bytes that are not a state (empty, truncated, altered) give Error and never crash the process.",
         tried: "Deserializes truncated, altered and random bytes, and steps if they are accepted.",
-        fix: "Begin with a mark, a version and a length, and end with a checksum." },
+        fix: "Start the bytes with a magic number, a version and a length, and end them with a checksum." },
     Check { id: "F04d", clause: "hardening", levels: Levels::HARD, run: Run::Probe(wrong_size),
         requirement: "A buffer of the wrong size gives Error, and the FMU writes nothing past it.",
         tried: "Serializes into buffers that are too small.", fix: "Compare the size before writing." },
@@ -167,7 +170,7 @@ fn report(
     }
 }
 
-/// Like [`rerun`], for a check that takes F02a for granted: where a run from a restored state differs anyway, it cannot decide.
+/// Like [`rerun`], for a check that relies on F02a: if a run from a restored state differs in any case, it cannot decide.
 fn rerun_given_f02a(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) -> Result<(), NotDetermined> {
     let (session, h) = (instance.session, instance.session.h());
     let same = |second: &Result<Vec<Vec<Vec<u64>>>, NotDetermined>, first: &[Vec<Vec<u64>>]| {
@@ -186,7 +189,7 @@ fn rerun_given_f02a(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str
         if same(&control.run(first.len(), h), &first) {
             return Ok(());
         }
-        Err(NotDetermined("as F02a: a run from a restored state differs anyway".into()))
+        Err(NotDetermined("see F02a: a run from a restored state differs in any case".into()))
     })?;
     report(instance, first, second, what);
     Ok(())
@@ -210,7 +213,7 @@ fn rerun_from_state(session: &Session) -> Result<(), NotDetermined> {
 fn variables(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let (instance, h) = (running_instance(session)?, session.h());
-    // The time of the next step is an argument; F02a tells whether it is accepted.
+    // The time of the next step is an argument; F02a checks whether it is accepted.
     let comparable = |v: &&ModelVariable| v.clocks.is_empty() && v.causality != Causality::Independent;
     let all: Vec<&ModelVariable> = session.numeric().filter(comparable).collect();
     let (state, time) = (instance.save()?, instance.time.get());
@@ -235,12 +238,12 @@ pub(crate) fn in_initialization<'b>(
     begin: &dyn Fn() -> Result<Instance<'b>, NotDetermined>,
     all: &[&ModelVariable],
 ) -> Result<(), NotDetermined> {
-    // Not from the start values, which a state may forget to have; where the FMU takes others.
+    // Not from the start values, which a state may omit unnoticed; from others if the FMU accepts them.
     let trial = begin()?;
     let instance = if set_all(&trial, 2.0).is_ok() { trial } else { begin()? };
     let (state, time) = (instance.save()?, instance.time.get());
     let (before, words) = (instance.snapshot(all)?, texts(&instance)?);
-    // This check does not judge refusals.
+    // Refusals are not the subject of this check.
     if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
         session.note(why);
     }
@@ -258,10 +261,18 @@ fn state_leaks(session: &Session) -> Result<(), NotDetermined> {
     needs!(session, can_get_and_set_state);
     let instance = session.stepping()?;
     instance.steps(1, session.h())?;
-    leak(session, "states", &|| {
+    leak(session, ("states", LEFT_BY_STATE), &|| {
         let mut state = instance.save()?;
         let status = instance.call("FreeFMUState", |raw| raw.free_state(instance.handle, Some(&mut state)))?;
         instance.must("FreeFMUState", status)
+    })?;
+    let state = Cell::new(instance.save()?);
+    leak(session, ("states saved into an existing one", LEFT_BY_STATE), &|| {
+        let mut again = state.get();
+        let status = instance
+            .call("GetFMUState(a state read before)", |raw| raw.get_state(instance.handle, Some(&mut again)))?;
+        state.set(again);
+        instance.must("GetFMUState", status)
     })
 }
 
@@ -359,7 +370,7 @@ fn serialized_variables(session: &Session) -> Result<(), NotDetermined> {
     for (old, new) in texts(&instance)?.iter().zip(&texts(&other)?).filter(|(old, new)| old != new) {
         session.violated(format!("deserialized, {} is {:?}; it was {:?} in the original", old.0, new.1, old.1));
     }
-    // The model may not take these values together.
+    // The model may reject these values in combination.
     if let (Ok(()), Err(why)) = (instance.exit(), other.exit()) {
         session.failed("deserialized in Initialization Mode", why);
     }

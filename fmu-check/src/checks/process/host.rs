@@ -18,12 +18,12 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "B08g", clause: "3.0.2, 2.2.1", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Any(settings),
         requirement: "A complete run changes no setting of the process: working directory, environment, umask, signals, locale, processors, priority, \
             timers and limits.",
-        tried: "Compares the settings before loading and after unloading.", fix: "Leave them alone, or restore them before returning." },
+        tried: "Compares the settings before loading and after unloading.", fix: "Do not change them, or restore them before returning." },
     Check { id: "B08r", clause: "3.0.2, 2.5.1.5", levels: Levels(Some(Level::Hard), Some(Level::Must)), run: Run::Any(written),
-        requirement: "A run neither writes nor removes files in the folder of the FMU, its resources included.",
-        tried: "Compares the folder before loading and after unloading.", fix: "Write where the importer says, for example to a path that is a parameter." },
+        requirement: "A run neither writes nor removes files in the folder of the FMU, including its resources.",
+        tried: "Compares the folder before loading and after unloading.", fix: "Write to a path given by the importer, for example as a parameter." },
     Check { id: "B08p", clause: "hardening", levels: Levels::HARD, run: Run::Any(left_behind),
-        requirement: "A complete run, from loading to unloading, leaves nothing behind: threads, child processes, open files, files in temporary folders.",
+        requirement: "A complete run, from loading to unloading, leaves nothing behind: no threads, child processes, open files, files in temporary folders.",
         tried: "Compares the process and these folders before loading and after unloading.",
         fix: "Close and remove files, end threads and processes." },
     Check { id: "Z09", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(unusual_path),
@@ -32,7 +32,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Runs from such a folder and compares.", fix: "Decode the URI in FMI 2.0, and use paths of any length." },
 ];
 
-/// Stack in bytes of the smallest thread that an importer may run the FMU in.
+/// Minimum stack, in bytes, of a thread in which an importer may run the FMU.
 const STACK: usize = 256 << 10;
 
 fn small_stack(session: &Session) -> Result<(), NotDetermined> {

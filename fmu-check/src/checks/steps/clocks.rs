@@ -15,41 +15,42 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "K00", clause: "3.0.2, 2.3.5", levels: MUST, run: Run::Probe(served),
-        requirement: "A simulation runs whose clocks tick when they are due: SetClock, UpdateDiscreteStates, GetIntervalDecimal and steps succeed.",
+        requirement: "A simulation in which clocks tick when they are due runs: SetClock, UpdateDiscreteStates, GetIntervalDecimal and steps succeed.",
         tried: "Ticks each clock when the description or GetIntervalDecimal says so, a triggered one at every third event, for 40 events.",
-        fix: "Accept SetClock in Event Mode for every clock with causality input, and tell intervals after the update." },
+        fix: "Accept SetClock in Event Mode for every clock with causality input, and return new intervals after the update." },
     Check { id: "K01", clause: "3.0.2, 2.3.5", levels: MUST, run: Run::Probe(deactivated),
         requirement: "After UpdateDiscreteStates, a clock that was active is inactive.",
-        tried: "Looks at each clock with GetClock in the same run.", fix: "Deactivate every clock at the end of UpdateDiscreteStates." },
+        tried: "Calls GetClock for each clock in the same run.", fix: "Deactivate every clock at the end of UpdateDiscreteStates." },
     Check { id: "K02", clause: "3.0.2, 2.2.8.4", levels: SHOULD, run: Run::Probe(activated),
-        requirement: "GetClock says which clocks the importer has made active: 1 for those, 0 for its others.",
+        requirement: "GetClock returns 1 for the input clocks that the importer has activated, and 0 for the others.",
         tried: "Calls GetClock of each input clock after SetClock.", fix: "Keep a flag for each clock, and return it." },
     Check { id: "K03", clause: "3.0.2, 2.2.8.2", levels: MUST, run: Run::Probe(described),
-        requirement: "Intervals and shifts of clocks with a period are those of the description, and of SetIntervalDecimal.",
+        requirement: "Intervals and shifts of periodic clocks are those of the description or of SetIntervalDecimal.",
         tried: "Calls GetIntervalDecimal and GetShiftDecimal in Initialization Mode; sets the intervals of fixed and tunable clocks.",
         fix: "Use one value for the description and the functions." },
     Check { id: "K04", clause: "3.0.2, 2.2.8.4", levels: MUST, run: Run::Probe(qualified),
-        requirement: "The qualifier of an interval is one of the three; Changed is told once; only a countdown clock has an interval that is not yet known.",
-        tried: "Calls GetIntervalDecimal twice after each update of a run.", fix: "Tell fmi3IntervalChanged at the first call after a change, then \
+        requirement: "The qualifier of an interval is one of the three values; Changed is returned once; only a countdown clock has an interval \
+            that is not yet known.",
+        tried: "Calls GetIntervalDecimal twice after each update of a run.", fix: "Return fmi3IntervalChanged at the first call after a change, then \
             fmi3IntervalUnchanged." },
     Check { id: "K05", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(counted),
-        requirement: "An interval that the FMU tells is finite and not negative.",
+        requirement: "An interval that the FMU returns is finite and not negative.",
         tried: "Looks at the intervals of a run.", fix: "Compute the interval from the time of the event." },
     Check { id: "K06", clause: "3.0.2, 2.3.5", levels: SHOULD, run: Run::Probe(refused),
         requirement: "SetClock of a clock that the FMU ticks, SetClock and GetClock in Step Mode return Error.",
-        tried: "Makes these calls.", fix: "Look at the causality of the clock and at the mode." },
+        tried: "Makes these calls.", fix: "Check the causality of the clock and the mode." },
     Check { id: "K07", clause: "3.0.2, 2.2.8.3", levels: SHOULD, run: Run::Probe(closed),
-        requirement: "What is on a clock can be set only while a clock of it is active.",
-        tried: "Sets each input on a clock in Event Mode while none of its clocks is active.", fix: "Look at the clocks of a variable before it is set." },
+        requirement: "A clocked variable can be set only while one of its clocks is active.",
+        tried: "Sets each input on a clock in Event Mode while none of its clocks is active.", fix: "Check the clocks of a variable before setting it." },
     Check { id: "K08", clause: "3.0.2, 2.3.1", levels: SHOULD, run: Run::Probe(with_event_mode),
-        requirement: "An FMU with clocks makes no instance for co-simulation without Event Mode.",
+        requirement: "An FMU with clocks refuses an instantiation for co-simulation without Event Mode.",
         tried: "Instantiates with eventModeUsed = false.", fix: "Return NULL." },
 ];
 
 /// Events of a run.
 const EVENTS: usize = 40;
 
-/// Ends a probe of an FMU without clocks, or that cannot be served.
+/// Ends a probe of an FMU without clocks, or whose clocks cannot be served.
 macro_rules! needs_clocks {
     ($session:ident) => {
         if clocks($session, true).is_empty() && clocks($session, false).is_empty() {
@@ -110,7 +111,7 @@ fn activated(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
-/// Whether two times in s are equal but for rounding.
+/// Whether two times in s are equal up to rounding.
 fn equal(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-12 * a.abs().max(b.abs())
 }
@@ -134,7 +135,7 @@ fn described(session: &Session) -> Result<(), NotDetermined> {
                 return Ok(());
             }
         }
-        // What the importer sets need not be told.
+        // An interval set by the importer need not be readable.
         if timing.ticks == Constant || timing.interval.is_none() {
             let (status, (interval, _)) = instance.interval(v)?;
             session.require(status.is_ok() && wanted.is_none_or(|wanted| equal(interval, wanted)), || {
@@ -153,24 +154,24 @@ fn described(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
-/// A clock, its kind, and the intervals with their qualifiers that two calls gave.
-type Told<'a> = (&'a ModelVariable, IntervalVariability, Vec<(f64, i32)>);
+/// A clock, its kind, and the intervals and qualifiers from two calls.
+type Answers<'a> = (&'a ModelVariable, IntervalVariability, Vec<(f64, i32)>);
 
-/// The intervals that the FMU tells in a run, each with what a second call gives; also of a run that ends too early.
-fn told(session: &Session) -> Result<Vec<Told<'_>>, NotDetermined> {
+/// The intervals that the FMU returns in a run, each with the result of a second call; also if the run ends too early.
+fn intervals(session: &Session) -> Result<Vec<Answers<'_>>, NotDetermined> {
     let mut served = Served::start(session)?;
     served.twice = true;
     let ended = served.run(EVENTS, &mut |_, _, _| Ok(()));
-    if served.told.is_empty() {
+    if served.intervals.is_empty() {
         ended?;
     }
     let clocks = &served.clocks;
-    Ok(served.told.into_iter().map(|(i, answers)| (clocks[i].v, clocks[i].timing.ticks, answers)).collect())
+    Ok(served.intervals.into_iter().map(|(i, answers)| (clocks[i].v, clocks[i].timing.ticks, answers)).collect())
 }
 
 fn qualified(session: &Session) -> Result<(), NotDetermined> {
     needs_clocks!(session);
-    for (v, ticks, answers) in told(session)? {
+    for (v, ticks, answers) in intervals(session)? {
         let qualifiers: Vec<i32> = answers.iter().map(|(_, qualifier)| *qualifier).collect();
         let good = match qualifiers[..] {
             [NOT_YET_KNOWN, second] => ticks == Countdown && second == NOT_YET_KNOWN,
@@ -187,7 +188,7 @@ fn qualified(session: &Session) -> Result<(), NotDetermined> {
 
 fn counted(session: &Session) -> Result<(), NotDetermined> {
     needs_clocks!(session);
-    for (v, _, answers) in told(session)? {
+    for (v, _, answers) in intervals(session)? {
         let wrong = answers.iter().find(|(x, qualifier)| *qualifier == CHANGED && !(x.is_finite() && *x >= 0.0));
         if let Some((interval, _)) = wrong {
             session.violated(format!("GetIntervalDecimal({}) gave {interval} s", v.name));

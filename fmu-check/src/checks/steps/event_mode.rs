@@ -18,18 +18,19 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "N01", clause: STEP, levels: MUST, run: Run::Probe(combinations),
-        requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed, after an early return the next from lastSuccessfulTime.",
+        requirement: "Steps succeed with every combination of eventModeUsed and earlyReturnAllowed; after an early return, the next step \
+            starts at lastSuccessfulTime.",
         tried: "Runs with each combination of the two flags, with steps of 1 and 5 communication steps.",
-        fix: "Start a step where the importer says: at lastSuccessfulTime after an early return, otherwise at the end of the last step." },
+        fix: "Start a step at the time that the importer passes: lastSuccessfulTime after an early return, otherwise the end of the last step." },
     Check { id: "N02", clause: STEP, levels: MUST, run: Run::Probe(permitted),
-        requirement: "A step returns early only if that is allowed, and asks for event handling only if event mode is used; Booleans are 0 or 1.",
-        tried: "Looks at the results of the same runs.", fix: "Return early and ask for events only if the instantiation allowed it." },
+        requirement: "A step returns early only if early return is allowed, and requests event handling only if event mode is used; Booleans are 0 or 1.",
+        tried: "Checks the results of the same runs.", fix: "Return early and request events only if the instantiation allowed it." },
     Check { id: "N03", clause: STEP, levels: MUST, run: Run::Probe(reached),
-        requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step (should: time goes on).",
-        tried: "Looks at the times of the same runs.", fix: "Write the time that was reached, between t and t + h." },
+        requirement: "After an early return lastSuccessfulTime lies between the communication point and the end of the step (should: time advances).",
+        tried: "Checks the times of the same runs.", fix: "Write the time that was reached, between t and t + h." },
     Check { id: "N03e", clause: STEP, levels: SHOULD, run: Run::Probe(truly_early),
         requirement: "earlyReturn is true only if the step ended before its end.",
-        tried: "Looks at earlyReturn of the same runs.", fix: "Set earlyReturn only if lastSuccessfulTime is before t + h." },
+        tried: "Checks earlyReturn of the same runs.", fix: "Set earlyReturn only if lastSuccessfulTime is before t + h." },
     Check { id: "N04", clause: "3.0.2, 2.2.4", levels: SHOULD, run: Run::Probe(without_event_mode),
         requirement: "Without eventModeUsed, EnterEventMode returns Error.",
         tried: "Calls EnterEventMode of an instance without event mode.", fix: "Return Error." },
@@ -38,10 +39,10 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Makes calls of the other mode.", fix: "Check the mode at the beginning of every function." },
     Check { id: "N06", clause: "3.0.2, 2.3.5", levels: SHOULD, run: Run::Probe(next_event_time),
         requirement: "The next event time of an update is after now, if it is defined.",
-        tried: "Looks at nextEventTime of the updates.", fix: "Return an absolute time after now." },
+        tried: "Checks nextEventTime of the updates.", fix: "Return an absolute time after now." },
     Check { id: "N07", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(round_trip),
-        requirement: "Entering and leaving Event Mode where there is no event changes no result.",
-        tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing where there is no event." },
+        requirement: "Entering and leaving Event Mode without an event changes no result.",
+        tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing if there is no event." },
 ];
 
 /// Ends a probe of an FMU without event mode.
@@ -216,7 +217,7 @@ fn reached(session: &Session) -> Result<(), NotDetermined> {
         standing.set(if stepped.last <= t { standing.get() + 1 } else { 0 });
         let good = stepped.last.is_finite() && stepped.last >= t && (!early || stepped.last <= end + 1e-9 * (end - t));
         let text = format!("gave earlyReturn={}, lastSuccessfulTime={:?}", stepped.early, stepped.last);
-        // An early return may reach no later time; time after time it is odd.
+        // An early return may leave the time unchanged, but not repeatedly.
         if good && standing.get() == 20 {
             session.lesser(Level::Should, format!("DoStep(t={t:?}), the 20th in succession, {text}"));
         }

@@ -17,26 +17,26 @@ const HARD: Levels = Levels(None, Some(Level::Hard));
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "U00", clause: CLAUSE, levels: MUST, run: Run::Probe(in_order),
-        requirement: "intermediateUpdate is called inside DoStep only, with the environment of the instance, flags that are 0 or 1, and times \
-            from the last finished internal step to the end of the step.",
+        requirement: "intermediateUpdate is called inside DoStep only, with the environment of the instance, flags of 0 or 1, and times \
+            between the last finished internal step and the end of the step.",
         tried: "Looks at the calls during 20 steps, and between them.", fix: "Call it after an internal step, with the time that was reached." },
     Check { id: "U01", clause: CLAUSE, levels: MUST, run: Run::Probe(outputs),
-        requirement: "Where intermediateVariableGetAllowed is true, the intermediate outputs that the importer asked for can be read.",
+        requirement: "If intermediateVariableGetAllowed is true, the intermediate outputs that the importer requested can be read.",
         tried: "Gets each intermediate output in the callbacks of 5 steps.", fix: "Allow getters while the callback runs." },
     Check { id: "U02", clause: CLAUSE, levels: MUST, run: Run::Probe(returned),
-        requirement: "Where canReturnEarly is true, the step ends early when the importer asks for it, from the time of the callback to the time that \
-            was asked for.",
-        tried: "Asks for a return at the time of the callback, in the middle of the rest, and at the end of the step.",
-        fix: "Look at earlyReturnRequested after each callback, and write earlyReturn and lastSuccessfulTime." },
+        requirement: "If canReturnEarly is true and the importer requests an early return, the step ends between the time of the callback and the \
+            requested time.",
+        tried: "Requests a return at the time of the callback, halfway to the end of the step, and at the end of the step.",
+        fix: "Check earlyReturnRequested after each callback, and write earlyReturn and lastSuccessfulTime." },
     Check { id: "U03", clause: CLAUSE, levels: MUST, run: Run::Probe(allowed),
         requirement: "canReturnEarly is true only if the instantiation allowed early returns; otherwise a request has no effect.",
-        tried: "Asks for a return with earlyReturnAllowed = false.", fix: "Pass earlyReturnAllowed on." },
+        tried: "Requests a return with earlyReturnAllowed = false.", fix: "Set canReturnEarly from earlyReturnAllowed." },
     Check { id: "U04", clause: CLAUSE, levels: SHOULD, run: Run::Probe(announced),
         requirement: "An FMU calls intermediateUpdate only if providesIntermediateUpdate is true.",
         tried: "Gives the callback to an FMU without the flag, and makes 5 steps.", fix: "Set the flag." },
     Check { id: "U05", clause: "hardening", levels: HARD, run: Run::Probe(refused),
         requirement: "In the callback, Terminate, EnterEventMode and EnterStepMode return Error.",
-        tried: "Calls each in the first callback.", fix: "Compare with a state of its own that the instance has while the callback runs." },
+        tried: "Calls each in the first callback.", fix: "Give the instance a separate state while the callback runs." },
     Check { id: "U06", clause: "hardening", levels: HARD, run: Run::Probe(silent),
         requirement: "A callback that does nothing changes no result.",
         tried: "Makes 20 steps with and without it, and compares the outputs.", fix: "Use the same internal steps in both." },
@@ -97,7 +97,7 @@ fn in_order(session: &Session) -> Result<(), NotDetermined> {
         }
         let (status, _, meanwhile, [t, end]) = instance.step_updated(&[])?;
         instance.must("DoStep", status)?;
-        let (near, mut least) = (1e-9 * (end - t), t);
+        let (near, mut earliest) = (1e-9 * (end - t), t);
         for heard in &meanwhile.heard {
             let Heard::Intermediate { environment, time, set_requested, get_allowed, finished, can_return } = *heard
             else {
@@ -105,13 +105,13 @@ fn in_order(session: &Session) -> Result<(), NotDetermined> {
             };
             calls += 1;
             let flags = [set_requested, get_allowed, finished, can_return];
-            let outside = !(time >= least - near && time <= end + near);
+            let outside = !(time >= earliest - near && time <= end + near);
             if outside || flags.iter().any(|flag| *flag > 1) || environment != own {
-                session.violated(format!("in the step from {t:?} to {end:?} after {least:?}: {heard:?}"));
+                session.violated(format!("in the step from {t:?} to {end:?} after {earliest:?}: {heard:?}"));
                 return Ok(());
             }
             if finished == 1 {
-                least = time;
+                earliest = time;
             }
         }
         let _ = instance.snapshot(&session.watched())?;

@@ -16,26 +16,26 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "P00", clause: "3.0.2, 5.2.1", levels: MUST, run: Run::Scheduled(activated),
-        requirement: "Partitions are activated when their clocks tick, and what they computed can be read.",
+        requirement: "Partitions can be activated when their clocks tick, and their results can be read.",
         tried: "Activates each partition when it is due, a triggered one at every third instant, at 12 instants; reads every variable on its clock.",
         fix: "Accept fmi3ActivateModelPartition for every clock with causality input, in Clock Activation Mode." },
     Check { id: "P01", clause: "3.0.2, 5.2.1", levels: SHOULD, run: Run::Scheduled(unknown),
         requirement: "fmi3ActivateModelPartition of a reference that is not an input clock returns Error.",
-        tried: "Calls it with an output clock, a variable, and a reference that nothing has.", fix: "Return Error unless the reference is that of an \
+        tried: "Calls it with an output clock, a variable, and a reference that does not exist.", fix: "Return Error unless the reference belongs to an \
             input clock." },
     Check { id: "P02", clause: "3.0.2, 5.2.1", levels: SHOULD, run: Run::Scheduled(too_early),
         requirement: "Before the initialization ends, fmi3ActivateModelPartition returns Error.",
         tried: "Calls it in Instantiated and in Initialization Mode.", fix: "Check the state at the beginning of the function." },
     Check { id: "P03", clause: "3.0.2, 5.1.2", levels: MUST, run: Run::Scheduled(locked),
         requirement: "Every lockPreemption is followed by one unlockPreemption before the call returns; a partition also runs without both.",
-        tried: "Counts them in every activation and getter of a run, and runs with NULL for both.", fix: "Unlock on every way out of the function." },
-    Check { id: "P04", clause: "3.0.2, 5.2.2", levels: MUST, run: Run::Scheduled(told),
+        tried: "Counts them in every activation and getter of a run, and runs with NULL for both.", fix: "Unlock before every return of the function." },
+    Check { id: "P04", clause: "3.0.2, 5.2.2", levels: MUST, run: Run::Scheduled(updated),
         requirement: "clockUpdate is called inside fmi3ActivateModelPartition only, with the environment of the instance; in it, GetClock and \
             GetIntervalDecimal succeed.",
         tried: "Asks for every output clock and countdown clock in each call of a run.", fix: "Allow both functions while clockUpdate runs." },
-    Check { id: "P05", clause: "3.0.2, 5.2.2", levels: MUST, run: Run::Scheduled(told_once),
-        requirement: "GetClock says once for each activation that an output clock is active.",
-        tried: "Calls GetClock twice in each clockUpdate of a run.", fix: "Set the clock to inactive when GetClock has told it." },
+    Check { id: "P05", clause: "3.0.2, 5.2.2", levels: MUST, run: Run::Scheduled(active_once),
+        requirement: "GetClock returns an output clock as active once for each activation.",
+        tried: "Calls GetClock twice in each clockUpdate of a run.", fix: "Deactivate the clock after GetClock has returned it as active." },
 ];
 
 /// Instants of a run.
@@ -114,13 +114,13 @@ impl<'b> Schedule<'b> {
                 self.must(&activation)?;
                 self.clocks[i].ticked(now);
                 if self.clocks[i].timing.ticks == Changing {
-                    let (status, told) = self.instance.interval(self.clocks[i].v)?;
+                    let (status, answer) = self.instance.interval(self.clocks[i].v)?;
                     self.instance.must("GetIntervalDecimal", status)?;
-                    self.clocks[i].hear(told, now);
+                    self.clocks[i].hear(answer, now);
                 }
                 for (act, (status, interval, qualifier)) in &activation.meanwhile.answers {
-                    let told = |c: &&mut Ticking<'_>| *act == Inside::Interval(c.v.value_reference);
-                    if let Some(clock) = self.clocks.iter_mut().find(told).filter(|_| status.is_ok()) {
+                    let asked = |c: &&mut Ticking<'_>| *act == Inside::Interval(c.v.value_reference);
+                    if let Some(clock) = self.clocks.iter_mut().find(asked).filter(|_| status.is_ok()) {
                         clock.hear((*interval, *qualifier), now);
                     }
                 }
@@ -229,7 +229,7 @@ fn locked(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-fn told(session: &Session) -> Result<(), NotDetermined> {
+fn updated(session: &Session) -> Result<(), NotDetermined> {
     let mut schedule = Schedule::start(session, true, 1)?;
     let own = session.environment();
     let (mut found, mut calls) = (false, 0);
@@ -262,15 +262,15 @@ fn told(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-fn told_once(session: &Session) -> Result<(), NotDetermined> {
+fn active_once(session: &Session) -> Result<(), NotDetermined> {
     if clocks(session, false).is_empty() {
         return session.not_applicable("there is no output clock");
     }
     let mut found = false;
     Schedule::start(session, true, 2)?.run(&mut |_, Activation { clock, meanwhile, .. }| {
-        let told = meanwhile.answers.iter().filter(|(act, _)| matches!(act, Inside::Clock(_)));
-        let told: Vec<_> = told.map(|(act, (status, active, _))| (act, status.is_ok(), *active)).collect();
-        for pair in told.chunks(2) {
+        let answers = meanwhile.answers.iter().filter(|(act, _)| matches!(act, Inside::Clock(_)));
+        let answers: Vec<_> = answers.map(|(act, (status, active, _))| (act, status.is_ok(), *active)).collect();
+        for pair in answers.chunks(2) {
             if let [(act, true, _), (_, true, again)] = pair
                 && *again != 0.0
                 && !std::mem::replace(&mut found, true)

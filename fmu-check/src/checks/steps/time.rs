@@ -4,6 +4,8 @@ use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::kept::derivatives_are_slopes;
 use crate::checks::life::shared::starts::{ended, no_step_after};
 use crate::checks::steps::shared::derivatives::{input_derivatives, output_derivatives, slopes};
+use crate::checks::steps::shared::plain_runs::determinism;
+use crate::checks::steps::shared::step_sizes::step_sizes;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{ENDED, NotDetermined, Session};
@@ -21,9 +23,9 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "Steps succeed from start times of 0, -1, 1000 and 1e6, and the independent variable has the time of the step.",
         tried: "Runs 20 steps from each start time.", fix: "Use startTime instead of 0." },
     Check { id: "T01b", clause: STEP, levels: Levels::HARD, run: Run::Probe(gap),
-        requirement: "A communication point other than the end of the last step gives Error.",
+        requirement: "A step that does not start at the end of the last step gives Error.",
         tried: "Makes a step that does not begin where the last ended.",
-        fix: "Compare currentCommunicationPoint with the time of the FMU, with room for rounding." },
+        fix: "Compare currentCommunicationPoint with the time of the FMU, with a tolerance for rounding." },
     Check { id: "T01c", clause: STEP, levels: Levels::MUST, run: Run::Probe(accumulated),
         requirement: "A time that the importer accumulates, t = t + h, is accepted for many steps, and so is t = t_0 + k h.",
         tried: "Makes up to 100000 steps within the default experiment, with t = t + h.",
@@ -36,20 +38,21 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Makes steps of NaN, infinity and 1e300, and from times of NaN and infinity.",
         fix: "Write the condition so that NaN fails it: !(h > 0 && h < limit)." },
     Check { id: "T03", clause: STEP, levels: Levels::HARD, run: Run::Probe(step_sizes),
-        requirement: "Halving or doubling the communication step gives approximately the same results with inputs held.",
-        tried: "Runs 40 steps whole, in halves and in pairs, and compares to 10 %.", fix: "Integrate with internal steps; note an output that is a mean." },
+        requirement: "Communication steps of 1/2, 3/2 and 2 times the usual size give approximately the same results with constant inputs.",
+        tried: "Runs with both sizes to the same times, and compares: to 10 % of the largest value, and to half of the change over the run.",
+        fix: "Divide each communication step into internal steps, the last one shorter, and lose no remainder." },
     Check { id: "T04", clause: "2.0.5, 4.3.1; 3.0.2, 4.4", levels: Levels::SHOULD, run: Run::Probe(variable),
         requirement: "With canHandleVariableCommunicationStepSize, steps of 0.05 to 3 times the usual size succeed.",
         tried: "Makes 200 steps of random sizes.", fix: "Divide the step into internal ones, the last of them shorter." },
     Check { id: "T05", clause: "2.0.5, 4.2.2; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(no_set_state_before),
         requirement: "With noSetFMUStatePriorToCurrentPoint, steps succeed, and the state at the current point can still be saved and set (should: no \
             result changes).",
-        tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Treat the flag as a hint for result buffers only." },
+        tried: "Runs with and without the flag, saves and restores, and compares.", fix: "Use the flag only as a hint for result buffers." },
     Check { id: "T06a", clause: "3.0.2, 4.2.1", levels: Levels(None, Some(Level::Must)), run: Run::Probe(step_results),
         requirement: "After OK, all results are written, Booleans are 0 or 1, and the step has neither returned early \
         nor asked for events without permission (should: \
             lastSuccessfulTime is less than a step from t + h).",
-        tried: "Makes 20 steps and looks at the four results.", fix: "Write all four results before returning OK." },
+        tried: "Makes 20 steps and checks the four results.", fix: "Write all four results before returning OK." },
     Check { id: "T06b", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::SHOULD, run: Run::Probe(independent),
         requirement: "The independent variable equals the time of the last communication point.",
         tried: "Reads the independent variable after steps.", fix: "Assign t + h to it at the end of a step." },
@@ -58,7 +61,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Passes NULL for each result.", fix: "Check the pointers before writing." },
     Check { id: "T07", clause: "2.0.5, 4.2.3", levels: Levels(Some(Level::Should), None), run: Run::Probe(statuses),
         requirement: "fmi2GetRealStatus and the related functions return Discard for unavailable information and do no harm.",
-        tried: "Asks each function for each kind of status.", fix: "Return Discard for what is not available." },
+        tried: "Asks each function for each kind of status.", fix: "Return Discard for unavailable information." },
     Check { id: "T09", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::MUST, run: Run::Probe(output_derivatives),
         requirement: "With maxOutputDerivativeOrder above 0, first derivatives of continuous outputs can be read.",
         tried: "Reads first derivatives of all continuous outputs.", fix: "Implement the function, or set maxOutputDerivativeOrder to 0." },
@@ -80,9 +83,11 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "T12s", clause: "hardening", levels: Levels::HARD, run: Run::Probe(no_step_after),
         requirement: "No step succeeds after the FMU has ended the simulation.",
         tried: "Steps on after the end.", fix: "Return Error until the FMU is reset." },
-    Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Probe(determinism),
-        requirement: "Two consecutive runs with the same inputs are equal bit for bit.",
-        tried: "Runs twice in one process and compares bits.", fix: "Initialize all memory." },
+    Check { id: "T10", clause: "hardening", levels: Levels::HARD, run: Run::Any(determinism),
+        requirement: "Two instances with the same inputs give the same results bit for bit.",
+        tried: "Runs two instances one after the other, in each interface, and compares all variables; no other check compares a variable in which \
+            they differ.",
+        fix: "Initialize all memory, share no data between instances, and give random numbers a seed; a measured time always differs." },
     Check { id: "T10p", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes),
         requirement: "Two processes with different addresses give the same results bit for bit.",
         tried: "Runs in two processes and compares hashes.", fix: "Let nothing depend on addresses, time or the process." },
@@ -123,7 +128,7 @@ fn gap(session: &Session) -> Result<(), NotDetermined> {
 
 fn accumulated(session: &Session) -> Result<(), NotDetermined> {
     many_steps(session)?;
-    // Nor is it a matter of rounding: another importer multiplies.
+    // Rounding must not matter either: another importer multiplies.
     let (instance, h, start) = (session.stepping()?, session.h(), session.start());
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
     for k in 0..200 {
@@ -142,7 +147,7 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
 
 fn many_steps(session: &Session) -> Result<(), NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
-    // Beyond its default experiment, an FMU may lack data: what happens there shows nothing.
+    // Beyond its default experiment, an FMU may lack data: a failure there proves nothing.
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
     let began = Instant::now();
     session.record_calls(&format!("up to 100000 steps of {h}, t = t + h"), || {
@@ -156,7 +161,7 @@ fn many_steps(session: &Session) -> Result<(), NotDetermined> {
                 session.note(format!("the FMU ended the simulation after {k} steps"));
                 return Ok(());
             }
-            // A part of a step may be all that the model can do (Discard).
+            // The model may be able to complete only a part of a step (Discard).
             if !status.is_ok() && status != Status::DISCARD {
                 session.violated(format!("step {k}, DoStep(t={:?}, h={h:?}), returned {status}", instance.time.get()));
                 return Ok(());
@@ -197,47 +202,6 @@ fn non_finite_step(session: &Session) -> Result<(), NotDetermined> {
         });
         Ok(())
     })
-}
-
-fn step_sizes(session: &Session) -> Result<(), NotDetermined> {
-    if !session.flag("canHandleVariableCommunicationStepSize") {
-        return session.not_applicable("the communication step may not change");
-    }
-    compare_steps(session, false)?;
-    compare_steps(session, true)
-}
-
-/// Compares a run with one in steps of half the size, or of twice the size.
-fn compare_steps(session: &Session, longer: bool) -> Result<(), NotDetermined> {
-    let (h, n) = (session.h(), if longer { 20 } else { 40 });
-    let fits = |v: &&&ModelVariable| v.base == BaseType::Float64 && !v.is_array();
-    let all = session.watched();
-    let watched: Vec<_> = all.iter().filter(fits).copied().collect();
-    let run = |steps: usize, h: f64| {
-        let instance = session.stepping()?;
-        instance.change_inputs(3)?;
-        (0..n)
-            .map(|_| {
-                instance.steps(steps, h)?;
-                instance.snapshot(&watched)
-            })
-            .collect::<Result<Vec<_>, _>>()
-    };
-    let other = if longer { 2.0 * h } else { h / 2.0 };
-    let (whole, half) = if longer { (run(2, h)?, run(1, other)?) } else { (run(1, h)?, run(2, other)?) };
-    let number = |bits: &[u64]| bits.first().map_or(0.0, |b| f64::from_bits(*b));
-    for (i, v) in watched.iter().enumerate() {
-        let scale = whole.iter().map(|row| number(&row[i]).abs()).fold(v.nominal.unwrap_or(0.0).abs(), f64::max);
-        let largest_difference =
-            whole.iter().zip(&half).map(|(a, b)| (number(&a[i]) - number(&b[i])).abs()).fold(0.0, f64::max);
-        session.require(largest_difference <= 0.1 * scale + 1e-9, || {
-            format!(
-                "{} ({}): results with steps of {h} and {other} differ by {largest_difference}; the scale is {scale}",
-                v.name, v.variability
-            )
-        });
-    }
-    Ok(())
 }
 
 fn variable(session: &Session) -> Result<(), NotDetermined> {
@@ -369,13 +333,6 @@ fn statuses(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-fn determinism(session: &Session) -> Result<(), NotDetermined> {
-    let run = || trajectory(&session.stepping()?, 30);
-    let (first, second) = (run()?, run()?);
-    session.compare("the second run", &first, &second);
-    Ok(())
-}
-
 /// Notes a hash of all outputs, which the parent process compares.
 fn two_processes(session: &Session) -> Result<(), NotDetermined> {
     let values = trajectory(&session.stepping()?, 30)?.into_iter().flatten().flatten();
@@ -412,7 +369,7 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     let (a, b) = (run(&unrestricted, 0, false)?, run(&restricted, 0, true)?);
     // For the text the flag is a hint: that it changes no result is not said.
     if let Some(found) = difference(&session.watched(), &a, &b) {
-        let text = format!("with noSetFMUStatePriorToCurrentPoint an output differs after {} steps", found.step + 1);
+        let text = format!("with noSetFMUStatePriorToCurrentPoint an output differs{}", found.text());
         session.deviates_at(Some(Level::Should), found.largest, &text);
     }
     if !saves {

@@ -17,7 +17,7 @@ impl<M: Twin> Turn<'_, M> {
         let mut expected = Vec::new();
         let mut verdict = if may { OK } else { ERROR };
         if may {
-            // The number of values is judged first, then the values are looked at.
+            // The number of values is checked first, then the values.
             if version == 3 && references.iter().any(|&r| is_element::<M>(r)) {
                 verdict = ERROR;
             } else {
@@ -38,7 +38,7 @@ impl<M: Twin> Turn<'_, M> {
         (status, verdict)
     }
 
-    /// The `name` says which: states, derivatives, indicators or nominals.
+    /// The `name` selects states, derivatives, indicators or nominals.
     pub fn values(&mut self, name: &str) -> Call {
         let right = if name == "indicators" { M::CAN.indicators().len() } else { M::CAN.states().len() };
         let n = self.n(right);

@@ -1,4 +1,4 @@
-//! One call of one instance with arguments that are right or wrong, and the status that the standard demands.
+//! One call of one instance with arguments that are right or wrong, and the status that the standard requires.
 
 use super::super::*;
 use super::Draw;
@@ -9,7 +9,7 @@ use std::fmt::Write;
 /// Status of a call, and the one it should have.
 pub type Call = (c_int, c_int);
 
-/// Whose turn it is, and what is drawn and told.
+/// The instance of this turn, its random choices and its results.
 pub struct Turn<'a, M: Twin> {
     pub fmu: &'a Fmu,
     pub now: &'a mut Snapshot<M>,

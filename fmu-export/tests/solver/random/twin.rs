@@ -6,7 +6,7 @@ use fmu_core::{
     capability::ToEvent,
 };
 
-/// What the driver must know of a model, besides its capabilities.
+/// Facts about a model for the driver, besides its capabilities.
 pub trait Twin: Model + PartialEq {
     const CAN: Capabilities<Self>;
     /// Interfaces that the FMU has.
@@ -15,11 +15,11 @@ pub trait Twin: Model + PartialEq {
     const REALS: &'static [u32];
     /// Variables that are set most.
     const SET: &'static [u32];
-    /// Values that they are set to, besides wrong ones.
+    /// Valid values for them.
     const VALUES: &'static [f64];
-    /// Whether the next call of the model can succeed: parameters fit together, inputs lead to no fault.
+    /// Whether the next call of the model can succeed: parameters are consistent, inputs cause no fault.
     fn is_healthy(&self) -> bool;
-    /// The parameters fit together.
+    /// The parameters are consistent.
     fn fits(&self) -> bool;
 }
 
@@ -63,7 +63,7 @@ impl<M: Twin> Snapshot<M> {
         }
     }
 
-    /// What a getter shows.
+    /// The value of a getter.
     pub fn show(&mut self) {
         if "in".contains(self.state) && self.fresh {
             self.initialize();
@@ -245,8 +245,8 @@ impl<M: Twin> Snapshot<M> {
         Ok(stepped)
     }
 
-    /// The step of a model with states: the first event inside it ends it if it may, and otherwise the step goes on from there. Who
-    /// handles no events leaves those at the end to the model.
+    /// The step of a model with states: the first event inside it ends it if it may, and otherwise the step goes on from there.
+    /// Without Event Mode, those at the end are left to the model.
     fn stop(&mut self, to_event: ToEvent<M>, (event, early): (bool, bool), t: f64, h: f64) -> Result<Stepped, c_int> {
         let (events, end) = (M::CAN.events.as_ref().unwrap(), self.elapsed.plus(h));
         let model = &mut self.block.model;
@@ -295,7 +295,7 @@ impl<M: Twin> Snapshot<M> {
         }
     }
 
-    /// The value is what the variable has, which cannot change now.
+    /// The value equals that of the variable, which cannot change now.
     fn is_held(&mut self, index: usize, value: f64) -> bool {
         let tunes = self.state != 'c';
         match M::TABLE.entry(&mut self.block, index) {

@@ -33,7 +33,7 @@ impl Buffer {
         Self::with_bits(base, version, bits)
     }
 
-    /// Like [`of`](Self::of), for pointers too.
+    /// Like [`of`](Self::of), also for pointers.
     pub(in crate::abi) fn with_bits(base: BaseType, version: FmiVersion, bits: &[u64]) -> Self {
         let mut buffer = Self::room(base, version, bits.len());
         for (i, value) in bits.iter().enumerate() {

@@ -20,7 +20,7 @@ pub struct LogCall {
     pub category: Option<String>,
     /// The message; `None` for NULL and for text that is not UTF-8.
     pub text: Option<String>,
-    /// It came through a struct of callbacks that was no longer valid (FMI 2.0 only).
+    /// The FMU used a struct of callbacks that was no longer valid (FMI 2.0 only).
     pub late: bool,
 }
 
@@ -32,7 +32,7 @@ pub fn take_events() -> Vec<LogCall> {
     std::mem::take(&mut *EVENTS.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// How often the FMU used the importer's memory functions.
+/// Number of calls of the importer's memory functions.
 pub fn allocations() -> usize {
     ALLOCATIONS.load(Ordering::Relaxed)
 }
@@ -86,6 +86,6 @@ pub(super) unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_vo
 
 pub(super) unsafe extern "C" fn release(memory: *mut c_void) {
     ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-    // SAFETY: the FMU passes what `allocate` gave, or NULL.
+    // SAFETY: the FMU passes a pointer from `allocate`, or NULL.
     unsafe { free(memory) }
 }

@@ -79,7 +79,7 @@ impl Raw {
                 preemption: [a.locks.then_some(lock_preemption as _), a.locks.then_some(unlock_preemption as _)],
             },
         };
-        // SAFETY: the struct of callbacks lives on; no callback follows the environment.
+        // SAFETY: the struct of callbacks lives on; no callback dereferences the environment.
         let (name, made) = unsafe { self.calls.instantiate(&request) };
         if !a.lasting {
             // The struct still has valid functions: an FMU that reads it again is detected and does not crash.

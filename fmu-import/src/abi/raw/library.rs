@@ -49,7 +49,7 @@ impl Raw {
         library.map(|library| Self::of(library.into(), version)).map_err(|e| e.to_string())
     }
 
-    /// The table, for one call: the calls of a `Raw` follow one another, whatever thread they come from.
+    /// The table, locked for one call: the calls of a `Raw` follow one another, even from several threads.
     pub(super) fn owned(&self) -> MutexGuard<'_, Owned> {
         // A refusal changes nothing, so the table is good after it.
         self.owned.lock().unwrap_or_else(PoisonError::into_inner)
@@ -89,7 +89,7 @@ impl Raw {
     pub fn free(&self, instance: Handle) -> Option<()> {
         let mut owned = self.owned();
         let pointer = owned.forget_instance(instance);
-        // SAFETY: an instance of this FMU, which the table forgot with its states, or NULL.
+        // SAFETY: an instance of this FMU, already removed from the table with its states, or NULL.
         unsafe { self.calls.free(pointer) }
     }
 
@@ -140,7 +140,7 @@ impl Raw {
         values: Option<&mut Buffer>,
         n_values: usize,
     ) -> Option<Status> {
-        // A getter may have left pointers there, which are the FMU's.
+        // A getter may have left pointers of the FMU there.
         let null = |buffer: &&mut Buffer| buffer.words[..n.max(n_values)].iter().all(|word| *word == 0);
         assert!(base != BaseType::String || values.as_ref().is_none_or(null), "a pointer that is not ours");
         self.transfer(&self.owned(), Way::Set, instance, base, references, n, values, n_values)
@@ -167,8 +167,8 @@ impl Raw {
             buffer.words.as_mut_ptr().cast()
         });
         let (i, kind, list) = (owned.pointer(instance), CType::named(kind, self.version())?, Array::of(references, n));
-        // SAFETY: the values are NULL or a buffer of this type that has room for both counts; `set` and `set_strings` pass texts
-        // that are NULL or C strings.
+        // SAFETY: the values are NULL or a buffer of this type, large enough for both counts; `set` and `set_strings` pass
+        // texts that are NULL or C strings.
         unsafe { self.calls.transfer(way, i, kind, list, values, n_values) }.status()
     }
 
@@ -183,7 +183,7 @@ impl Raw {
         for word in &mut buffer.words[..count] {
             *word = 0;
         }
-        // Held until the texts are copied, which the next call may end.
+        // Locked until the texts are copied, because the next call may free them.
         let owned = self.owned();
         let (list, n) = (Some(references), references.len());
         let status = self.transfer(&owned, Way::Get, instance, BaseType::String, list, n, Some(&mut buffer), count)?;
@@ -218,7 +218,7 @@ impl Raw {
 
     /// Bytes of variables, `None` where the FMU gives NULL (FMI 3.0).
     pub fn get_binaries(&self, instance: Handle, references: &[u32]) -> Option<(Status, Vec<Option<Vec<u8>>>)> {
-        // Held until the bytes are copied, which the next call may end.
+        // Locked until the bytes are copied, because the next call may free them.
         let owned = self.owned();
         self.calls.binaries(owned.pointer(instance), references)
     }
@@ -264,7 +264,7 @@ impl Raw {
         self.calls.debug_logging(self.owned().pointer(instance), on, categories, n).status()
     }
 
-    /// `fmi2Get...Status` with a place for any of its results; returns the first eight bytes of it.
+    /// `fmi2Get...Status` with a buffer for any of its results; returns its first eight bytes.
     pub fn step_status(&self, name: StepStatus, instance: Handle, kind: c_int) -> Option<(Status, u64)> {
         self.calls.step_status(name, self.owned().pointer(instance), kind, CANARY).result()
     }

@@ -1,11 +1,11 @@
 //! Raw calls of an FMU's binary, for the checker: every function of both standards, with arguments that a well-behaved
 //! importer would never pass.
 //!
-//! No argument that safe code can form makes a call undefined behavior by itself. Instances and saved states are places in
-//! a table that [`Raw`] owns: one that is freed, or of another binary, is refused before the call. Arrays are at least as
-//! long as the count that goes with them, or NULL; pointers to texts come from [`CStr`](std::ffi::CStr) only; a function is named by a type
-//! whose values all have one C signature. The calls of a `Raw` follow one another. The checker tests how the FMU reacts to
-//! NULL, to unknown value references, to a call in the wrong state; it calls from a process of its own.
+//! No argument that safe code can form makes a call undefined behavior by itself. Instances and saved states are entries of a
+//! table that [`Raw`] owns: one that is freed, or of another binary, is refused before the call. Arrays are at least as long as
+//! their count, or NULL; pointers to texts come from [`CStr`](std::ffi::CStr) only; a function is named by a type whose values
+//! all have one C signature. The calls of a `Raw` follow one another. The checker tests how the FMU reacts to NULL, to unknown
+//! value references, to a call in the wrong state; it makes these calls in a separate process.
 //!
 //! # Panics
 //! Every call panics if its instance or its state is freed or of another binary.

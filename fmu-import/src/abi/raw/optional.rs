@@ -42,7 +42,7 @@ impl Raw {
         }
     }
 
-    /// A function that is called here only: for binary values, clocks, and dependencies of elements.
+    /// A function that is called only here: for binary values, clocks, and dependencies of elements.
     fn unused(&self, function: Optional, instance: Handle, reference: u32) -> Option<Status> {
         use Optional as O;
         type Ref = *const u32;
@@ -58,8 +58,8 @@ impl Raw {
         let owned = self.owned();
         let (vr, i, name) = (&raw const reference, owned.pointer(instance).0, self.name(function.as_str()));
         let calls = &self.calls;
-        // SAFETY: every type is that of the standard, up to what a pointer to data leads to; each place has 512 bytes, more than
-        // one value needs.
+        // SAFETY: every type is that of the standard, except for the target of data pointers; each buffer has 512 bytes, more
+        // than one value needs.
         Some(unsafe {
             match function {
                 O::GetBinary | O::SetBinary => calls.function::<Binary>(&name)?(i, vr, 1, a, b, 1),

@@ -1,13 +1,13 @@
-//! What an FMU gave out and has not taken back: instances and saved states, as places in a table.
+//! The living instances and saved states of an FMU, as entries of a table.
 //!
-//! Safe code holds no address, so it cannot pass one to the FMU that is wild, freed, or of another binary.
+//! Safe code has no address, so it cannot pass a wild or freed one, or one of another binary, to the FMU.
 
 use crate::abi::arguments::Given;
 use std::ffi::c_void;
 use std::ptr;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A place in the table of one [`Raw`](super::Raw).
+/// An entry of the table of one [`Raw`](super::Raw).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Place {
     /// Number of the `Raw`.
@@ -38,14 +38,14 @@ impl SavedState {
 struct Held {
     /// 0 after it was freed.
     address: usize,
-    /// Index of the instance, with which the state ends.
+    /// Index of its instance; the state is freed with it.
     instance: Option<usize>,
 }
 
 /// Instances and states of one [`Raw`](super::Raw).
 #[derive(Debug)]
 pub(super) struct Owned {
-    /// Number of the `Raw`, unlike that of every other.
+    /// Unique number of the `Raw`.
     of: u64,
     /// Addresses of the instances; 0 after they were freed.
     instances: Vec<usize>,
@@ -58,7 +58,7 @@ impl Owned {
         Self { of: NEXT.fetch_add(1, Ordering::Relaxed), instances: Vec::new(), states: Vec::new() }
     }
 
-    /// Index of an instance that is alive; `None` for NULL.
+    /// Index of a living instance; `None` for NULL.
     ///
     /// # Panics
     /// The instance is freed or of another binary.
@@ -79,7 +79,7 @@ impl Owned {
         unsafe { Given::new(ptr::with_exposed_provenance_mut(address)) }
     }
 
-    /// Index of a state that is alive; `None` for NULL.
+    /// Index of a living state; `None` for NULL.
     fn state_index(&self, state: SavedState) -> Option<usize> {
         let Place { of, index } = state.0?;
         assert!(of == self.of, "the state is of another binary");

@@ -1,4 +1,4 @@
-//! What a call must not change: the floating-point control of the processor, the locale and the timers of the process.
+//! Settings that a call must not change: the floating-point control of the processor, the locale and the timers of the process.
 
 /// Floating-point control of this thread: rounding, masks of exceptions, flushing to zero; without the flags that every
 /// calculation sets. `None` where this is not known.
@@ -6,7 +6,7 @@ pub fn float_control() -> Option<u64> {
     #[cfg(target_arch = "x86_64")]
     {
         let (mut sse, mut x87) = (0_u32, 0_u16);
-        // SAFETY: both instructions store a control word to the place given, which is ours and large enough.
+        // SAFETY: both instructions store a control word to the given address, which is ours and large enough.
         unsafe {
             std::arch::asm!("stmxcsr [{}]", in(reg) &raw mut sse, options(nostack, preserves_flags));
             std::arch::asm!("fnstcw [{}]", in(reg) &raw mut x87, options(nostack, preserves_flags));
@@ -24,7 +24,7 @@ pub fn float_control() -> Option<u64> {
     None
 }
 
-/// The locale of this process, as `setlocale` tells it; `None` on systems where the number of all categories is not known.
+/// The locale of this process, from `setlocale`; `None` on systems where the number of LC_ALL is not known.
 pub fn locale() -> Option<String> {
     #[cfg(target_os = "linux")]
     {
@@ -49,7 +49,7 @@ pub fn armed_timers() -> Option<Vec<&'static str>> {
         }
         let is_armed = |which: c_int| {
             let mut value = [0; 4];
-            // SAFETY: it writes a `struct itimerval`, which has four longs on Linux of 64 bits, to a place that is ours.
+            // SAFETY: it writes a `struct itimerval`, which has four longs on 64-bit Linux, to a variable of ours.
             let read = unsafe { getitimer(which, &raw mut value) };
             read == 0 && value[2..] != [0, 0]
         };

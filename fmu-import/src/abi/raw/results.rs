@@ -1,6 +1,6 @@
 //! Results of calls, as the FMU wrote them.
 
-/// What a byte or an integer holds before a call.
+/// Value of a byte or an integer before a call.
 pub(super) const UNTOUCHED: u8 = 0xc5;
 
 /// Which results of `fmi3DoStep` get a pointer; the others get NULL.

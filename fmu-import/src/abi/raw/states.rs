@@ -10,8 +10,8 @@ use super::owned::{Handle, SavedState};
 const GUARD: usize = 256;
 
 impl Raw {
-    /// `GetFMUState`; `None` for the place passes NULL. A state in the place is offered to the FMU to be overwritten. The
-    /// place keeps its value if the FMU refuses.
+    /// `GetFMUState`; `None` passes NULL. An existing state is offered to the FMU to be overwritten. The variable keeps its
+    /// value if the FMU refuses.
     pub fn get_state(&self, instance: Handle, place: Option<&mut SavedState>) -> Option<Status> {
         let mut owned = self.owned();
         let (i, before) = (owned.pointer(instance), place.as_ref().map(|place| owned.state(**place)));
@@ -26,12 +26,12 @@ impl Raw {
         Some(status)
     }
 
-    /// `FreeFMUState`; `None` for the place passes NULL. The place becomes [`SavedState::NULL`] if the FMU writes NULL;
-    /// otherwise it keeps its value, which no call accepts any more.
+    /// `FreeFMUState`; `None` passes NULL. The variable becomes [`SavedState::NULL`] if the FMU writes NULL; otherwise it keeps
+    /// its value, which no call accepts any more.
     pub fn free_state(&self, instance: Handle, place: Option<&mut SavedState>) -> Option<Status> {
         let mut owned = self.owned();
         let state = place.as_ref().map(|place| owned.forget_state(**place));
-        // SAFETY: the table has forgotten the state, freed or not.
+        // SAFETY: the table no longer contains the state, freed or not.
         let (status, pointer) = unsafe { self.calls.free_state(owned.pointer(instance), state) }.result()?;
         if let Some(place) = place
             && pointer.is_null()
@@ -41,7 +41,7 @@ impl Raw {
         Some(status)
     }
 
-    /// `SetFMUState`; the state of another instance is what the checker wants to pass.
+    /// `SetFMUState`; the checker also passes the state of another instance.
     pub fn set_state(&self, instance: Handle, state: SavedState) -> Option<Status> {
         let owned = self.owned();
         self.calls.set_state(owned.pointer(instance), owned.state(state)).status()
@@ -57,7 +57,7 @@ impl Raw {
     /// values.
     ///
     /// # Errors
-    /// The size, which may be what the FMU said, is more than 1 GiB.
+    /// The size, possibly stated by the FMU, is more than 1 GiB.
     pub fn serialize(
         &self,
         instance: Handle,

@@ -1,8 +1,7 @@
 //! The callbacks of FMI 3.0 in which an importer may call the FMU again: `intermediateUpdate` in a step, `clockUpdate` in the
 //! activation of a partition; and the two that lock the scheduler.
 //!
-//! What is called in them is said before the step or the activation, for one call of it. While that is under way, the instance
-//! cannot be freed.
+//! The calls made in them are planned before the step or the activation. During that call, the instance cannot be freed.
 
 use super::super::functions::{CType, Calls, Way};
 use super::super::log::Status;
@@ -41,14 +40,14 @@ pub enum Heard {
     Unlock,
 }
 
-/// What the importer does in `intermediateUpdate` and in `clockUpdate`.
+/// Actions of the importer in `intermediateUpdate` and in `clockUpdate`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Inside {
-    /// Asks, if it may, that the step ends at this time in s.
+    /// Requests, if it may, that the step ends at this time in s.
     Return(f64),
     /// Gets a Float64.
     Get(u32),
-    /// Calls a function of the instance alone.
+    /// Calls a function that takes only the instance.
     Call(Simple),
     /// Gets whether a clock is active.
     Clock(u32),
@@ -56,19 +55,19 @@ pub enum Inside {
     Interval(u32),
 }
 
-/// The answer to a call in a callback: its status, the value that it got, the qualifier of an interval.
+/// The answer to a call in a callback: its status, the value, the qualifier of an interval.
 pub type Answered = (Status, f64, i32);
 
-/// Everything that a call under way leads to.
+/// Record of a call in progress.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Meanwhile {
     /// The callbacks, in their order.
     pub heard: Vec<Heard>,
-    /// The answers to what was done in them, in its order.
+    /// The answers to the calls made in them, in their order.
     pub answers: Vec<(Inside, Answered)>,
 }
 
-/// The call that is under way: the functions and the instance, by their addresses, and what the importer does.
+/// The call in progress: the functions and the instance, by their addresses, and the plan of the importer.
 #[derive(Clone)]
 struct Plan {
     calls: usize,
@@ -88,7 +87,7 @@ fn scene() -> MutexGuard<'static, Scene> {
     SCENE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Records a callback; the call that is under way.
+/// Records a callback; returns the call in progress.
 fn hear(heard: Heard) -> Option<Plan> {
     let mut scene = scene();
     if scene.meanwhile.heard.len() < 100_000 {
@@ -98,7 +97,7 @@ fn hear(heard: Heard) -> Option<Plan> {
 }
 
 impl Plan {
-    /// Does what the importer planned; the time at which the step is to end, if it wants that.
+    /// Executes the importer's plan; returns the time at which the step is to end, if requested.
     fn play(&self) -> Option<f64> {
         // SAFETY: `Raw::under_way` lends the functions and the instance until it takes the plan back.
         let (calls, instance) = unsafe {
@@ -119,8 +118,8 @@ impl Plan {
                     value = active.into();
                     status
                 }),
-                Inside::Interval(clock) => calls.interval(instance, clock).result().map(|(status, told)| {
-                    (value, qualifier) = told;
+                Inside::Interval(clock) => calls.interval(instance, clock).result().map(|(status, answer)| {
+                    (value, qualifier) = answer;
                     status
                 }),
             };
@@ -145,7 +144,7 @@ pub(super) unsafe extern "C" fn intermediate_update(
     let environment = environment.addr();
     let heard = Heard::Intermediate { environment, time, set_requested, get_allowed, finished, can_return };
     let end = hear(heard).and_then(|plan| plan.play()).filter(|_| can_return != 0);
-    // SAFETY: NULL, or places of the FMU, as the standard says.
+    // SAFETY: NULL, or variables of the FMU, as the standard prescribes.
     unsafe {
         if let Some(requested) = return_requested.as_mut() {
             *requested = end.is_some().into();
@@ -171,14 +170,14 @@ pub(super) unsafe extern "C" fn unlock_preemption() {
 }
 
 impl Raw {
-    /// The callbacks since the last time, outside of the calls below.
+    /// The callbacks since the previous query, outside of the calls below.
     pub fn take_heard(&self) -> Vec<Heard> {
         std::mem::take(&mut scene().meanwhile).heard
     }
 
-    /// Makes a call, in whose callbacks the importer does what it plans.
+    /// Makes a call, in whose callbacks the importer executes its plan.
     fn under_way<T>(&self, instance: Handle, acts: &[Inside], call: impl FnOnce(Given<'_>) -> T) -> (T, Meanwhile) {
-        // Locked until the plan is taken back: nobody frees the instance.
+        // Locked until the plan is cleared, so that the instance is not freed.
         let owned = self.owned();
         let given = owned.pointer(instance);
         let (calls, address) = (ptr::from_ref(&self.calls).expose_provenance(), given.0.expose_provenance());
@@ -189,7 +188,7 @@ impl Raw {
         (result, std::mem::take(&mut scene.meanwhile))
     }
 
-    /// `DoStep` of an instance with `intermediateUpdate`, in which the importer does these things.
+    /// `DoStep` of an instance with `intermediateUpdate`, in which the importer takes these actions.
     pub fn do_step_updated(
         &self,
         instance: Handle,
@@ -202,7 +201,7 @@ impl Raw {
         result.map(|(status, stepped)| (status, (stepped, meanwhile)))
     }
 
-    /// `fmi3ActivateModelPartition`; in `clockUpdate`, the importer does these things.
+    /// `fmi3ActivateModelPartition`; in `clockUpdate`, the importer takes these actions.
     pub fn activate_partition(
         &self,
         instance: Handle,

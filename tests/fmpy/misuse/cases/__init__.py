@@ -1,3 +1,3 @@
-"""The cases by theme."""
+"""The cases by subject."""
 
 from . import arguments, binary, instances, lifecycle, log, state, stored, time, values  # noqa: F401

@@ -1,4 +1,4 @@
-"""Null pointers, wrong tokens, empty names: what can be wrong before an instance knows what is wanted."""
+"""Null pointers, wrong tokens, empty names: wrong arguments of instantiation and of every call."""
 
 import ctypes as c
 
@@ -15,7 +15,7 @@ def nothing(letters):
 
 @case
 def null_instance(fmu):
-    """Every function of both standards with nothing but zeros."""
+    """Every function of both standards with zeros only."""
     for name, letters in ALL.items():
         result = getattr(fmu.library, name)(*nothing(letters))
         match RETURNS.get(name, "status"):
@@ -35,7 +35,7 @@ def versions(fmu):
 
 @case
 def null_arguments(fmu):
-    """A valid instance in Step Mode and null for every pointer, one for every count."""
+    """A valid instance in Step Mode, with null for every pointer and 1 for every count."""
     trace = run(fmu.instance().begin(), 20)
     for name, letters in FUNCTIONS[fmu.version].items():
         pointers = letters.count("p") - letters.startswith("p")
@@ -44,7 +44,7 @@ def null_arguments(fmu):
         it = fmu.instance().begin()
         rest = [1 if letter == "n" else value for letter, value in zip(letters[1:], nothing(letters[1:]))]
         status = getattr(fmu.library, name)(it.handle, *rest)
-        if "FreeFMU" in name:  # free of null is nothing, as in C
+        if "FreeFMU" in name:  # freeing null does nothing, as in C
             assert status == OK, name
         elif name.endswith("Status"):
             assert status in (DISCARD, ERROR), name
@@ -56,7 +56,7 @@ def null_arguments(fmu):
 
 @case
 def null_arrays_of_nothing(fmu):
-    """No value at all is asked for: fine, even without arrays."""
+    """A call for no values is allowed, even without arrays."""
     it = fmu.instance().begin()
     size = (0,) if fmu.version == 3 else ()
     for suffix in ("Real", "Integer", "Boolean", "String") if fmu.version == 2 else ("Float64", "Int32", "Boolean", "String"):
@@ -79,7 +79,7 @@ def null_half(fmu):
 
 @case
 def null_out_pointers_of_a_step(fmu):
-    """FMI 3.0: every one of the four results of a step is missing in turn."""
+    """FMI 3.0: each of the four results of a step is missing in turn."""
     if fmu.version == 2:
         return
     for missing in range(4):
@@ -92,7 +92,7 @@ def null_out_pointers_of_a_step(fmu):
 
 @case
 def numbers_of_values(fmu):
-    """FMI 3.0: more or fewer values than references; nothing is written beyond or at all."""
+    """FMI 3.0: more or fewer values than references; nothing is written, inside or outside the array."""
     if fmu.version == 2:
         return
     outputs = fmu.of("output")
@@ -124,7 +124,7 @@ def refusal(fmu, *words, name=b"it", **arguments):
 
 @case
 def wrong_token(fmu):
-    """Another token, none, an empty one, one that is longer; the message shows both where there are two."""
+    """A wrong token, none, an empty one, a longer one; the message shows both tokens where there are two."""
     word = "guid" if fmu.version == 2 else "token"
     wrong = "{00000000-0000-0000-0000-000000000000}"
     refusal(fmu, word, wrong, fmu.token, token=wrong.encode())
@@ -132,7 +132,7 @@ def wrong_token(fmu):
     refusal(fmu, word, token=fmu.token.encode()[:-1])
     refusal(fmu, word, token=b"\xff\xfe")
     refusal(fmu, word, token=c.create_string_buffer(b""))
-    refusal(fmu, word, token=b"")  # handed over as NULL
+    refusal(fmu, word, token=b"")  # passed as NULL
 
 
 @case
@@ -144,7 +144,7 @@ def wrong_name(fmu):
 
 @case
 def wrong_kind(fmu):
-    """A type that does not exist, Event Mode where there is none, scheduled execution."""
+    """A type that does not exist, Event Mode where it is not supported, scheduled execution."""
     if fmu.version == 2:
         refusal(fmu, "fmuType", "fmi2CoSimulation", "fmi2ModelExchange", type=17)
         refusal(fmu, "fmuType", type=-1)
@@ -177,7 +177,7 @@ def exchange(fmu):
 
 @case
 def nonsense_in_model_exchange(fmu):
-    """Null pointers, wrong counts, numbers that are none: an Error or Discard, never a crash; a reset heals."""
+    """Null pointers, wrong counts, NaN: an Error or Discard, never a crash; a reset recovers the instance."""
     it, handle = exchange(fmu)
     derivatives = "GetDerivatives" if fmu.version == 2 else "GetContinuousStateDerivatives"
     states, nan, room = fmu.states, float("nan"), (c.c_double * 16)()

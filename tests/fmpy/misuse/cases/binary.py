@@ -1,4 +1,4 @@
-"""The binary itself: what it exports, what it leaves behind."""
+"""The binary itself: its exports, its memory and its side effects."""
 
 import _ctypes
 import os
@@ -56,7 +56,7 @@ def exports(fmu):
 
 @case(witness=False)
 def load_and_unload(fmu):
-    """Three hundred times a life and an unload: gone each time, no memory kept, the same run."""
+    """Three hundred cycles of load, run and unload: unmapped each time, no memory leak, the same run."""
     trace = alone(fmu, 10)
     for cycle in range(300):
         it = fmu.instance().begin()
@@ -75,7 +75,7 @@ def load_and_unload(fmu):
 
 @case
 def instances_are_freed(fmu):
-    """Thousands of lives, errors and states included: no memory kept."""
+    """Thousands of instances, with errors and saved states: no memory leak."""
     for n in range(3000):
         it = fmu.instance()
         it.begin()
@@ -94,7 +94,7 @@ def instances_are_freed(fmu):
 
 @case
 def nothing_is_opened(fmu):
-    """A whole life opens no file, no socket, and leaves directory, locale and umask alone."""
+    """A complete run opens no file and no socket, and does not change directory, locale and umask."""
     folder = Path("/proc/self/fd")
     before = (sorted(os.listdir(folder)) if folder.exists() else None, os.getcwd(), os.umask(0o22), dict(os.environ))
     it = fmu.instance().begin()

@@ -1,4 +1,4 @@
-"""Many instances, one after another, beside each other, in several threads."""
+"""Many instances, one after another, side by side, in several threads."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -10,7 +10,7 @@ from ..run import alone, run
 
 @case
 def two_interleaved(fmu):
-    """Step by step in turn, with different parameters: each as if alone."""
+    """Stepped in turn, with different parameters: each gives the same as alone."""
     plain, flux = alone(fmu), fmu.find("motor.psi_M").name
     one, two = fmu.instance(b"one"), fmu.instance(b"two")
     assert two.set(flux, 0.1) == OK
@@ -45,7 +45,7 @@ def a_hundred(fmu):
 
 @case
 def in_threads(fmu):
-    """Eight threads with an instance each, at the same time, states included."""
+    """Eight threads with an instance each, at the same time, with saved states."""
     plain = alone(fmu)
 
     def work(_):
@@ -62,7 +62,7 @@ def in_threads(fmu):
 
 @case
 def through_threads(fmu):
-    """Made in one thread, run in others one after another, freed in yet another."""
+    """Created in one thread, run in others one after another, freed in yet another."""
     plain, it, traces = alone(fmu), [], []
     for work in (
         lambda: it.append(fmu.instance()),
@@ -78,7 +78,7 @@ def through_threads(fmu):
 
 @case
 def small_stack(fmu):
-    """A whole life on a stack of 128 KiB."""
+    """A complete run on a stack of 128 KiB."""
     traces, before = [], threading.stack_size(128 * 1024)
     thread = threading.Thread(target=lambda: traces.append(alone(fmu)))
     thread.start()
@@ -89,7 +89,7 @@ def small_stack(fmu):
 
 @case
 def one_fails(fmu):
-    """An error in one is not an error in another, nor is a reset or a restored state."""
+    """An error, a reset or a restored state of one instance does not affect another."""
     plain = alone(fmu)
     good, bad = fmu.instance(b"good").begin(), fmu.instance(b"bad").begin()
     trace = run(good, 20)
@@ -105,7 +105,7 @@ def one_fails(fmu):
 
 @case
 def same_name(fmu):
-    """Names need not differ."""
+    """Several instances may have the same name."""
     plain = alone(fmu, 20)
     one, two = fmu.instance().begin(), fmu.instance().begin()
     assert run(one, 20) == plain == run(two, 20)

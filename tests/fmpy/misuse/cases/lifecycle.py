@@ -1,4 +1,4 @@
-"""Every function in every state, and what leads out of an error."""
+"""Every function in every state, and the ways out of an error."""
 
 import ctypes as c
 
@@ -47,7 +47,7 @@ def reach(fmu, state):
 
 
 def perform(it, call, saved):
-    """Makes a call with arguments that are right; the status."""
+    """Makes a call with valid arguments; the status."""
     fmu = it.fmu
     parameter = next(v for v in fmu.of("parameter") if v.variability == "fixed" and v.type == REAL[it.version] and float(v.start))
     match call:
@@ -89,7 +89,7 @@ def perform(it, call, saved):
 
 @case
 def every_call_in_every_state(fmu):
-    """Allowed: OK. Not allowed: Error with a message, then nothing but get, reset, states and free."""
+    """Allowed: OK. Not allowed: Error with a message, after which only get, reset, states and free are allowed."""
     trace, saved = alone(fmu, 10), reach(fmu, "S").save()
     for call, where in ALLOWED.items():
         where = where.get(fmu.version) if isinstance(where, dict) else where
@@ -113,7 +113,7 @@ def every_call_in_every_state(fmu):
 
 @case
 def unsupported_functions(fmu):
-    """What the FMU does not offer is refused in every state, with null arrays and with arrays."""
+    """Functions that the FMU does not support are refused in every state, with null arrays and with arrays."""
     assert set(UNSUPPORTED[fmu.version]) <= set(FUNCTIONS[fmu.version])
     trace, room = alone(fmu, 10), (c.c_uint8 * 256)()
     reference = fmu.of("output")[0].reference
@@ -138,7 +138,7 @@ def unsupported_functions(fmu):
 
 @case
 def status_functions(fmu):
-    """FMI 2.0: a synchronous FMU knows its time; what it does not know is Discard, and no error."""
+    """FMI 2.0: a synchronous FMU reports its time; other requests give Discard, without an error."""
     if fmu.version == 3:
         return
     it = fmu.instance().begin()
@@ -185,7 +185,7 @@ def free_in_every_state(fmu):
 
 @case
 def skipped_steps_of_life(fmu):
-    """Initialization left out, half done, done twice; FMI 2.0 without times."""
+    """Initialization omitted, incomplete, done twice; FMI 2.0 without times."""
     refused(it := fmu.instance(), it.step())
     refused(it := fmu.instance().enter(), it.step())
     refused(it := fmu.instance(), it.call("ExitInitializationMode"))
@@ -200,7 +200,7 @@ def skipped_steps_of_life(fmu):
 
 @case
 def reset_from_every_state(fmu):
-    """The first run again, regardless of what was set and of the start time."""
+    """A reset gives the first run again, regardless of the values set and of the start time."""
     trace = alone(fmu)
     for state in STATES:
         it = reach(fmu, state)
@@ -217,7 +217,7 @@ def reset_from_every_state(fmu):
 
 @case
 def error_is_final(fmu):
-    """After an error every call but the ways out fails, again and again, and changes nothing."""
+    """After an error, every call except the ways out fails, repeatedly, and changes nothing."""
     it = fmu.instance().begin()
     run(it, 5)
     outputs = it.reals("Get", fmu.of("output"))
@@ -233,7 +233,7 @@ def error_is_final(fmu):
 
 @case
 def initialization_is_iterated(fmu):
-    """Set and get in any order give what one set gives."""
+    """Sets and gets in any order give the same as a single set."""
     parameter = (fmu.find("initial.theta_e") or fmu.find("initial.theta_est")).name
     output = parameter.rsplit(".", 1)[-1]
     it = fmu.instance().enter()

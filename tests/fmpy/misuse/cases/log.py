@@ -1,4 +1,4 @@
-"""What is said, to whom, and what is not."""
+"""Messages: which ones are logged, and to which logger."""
 
 import ctypes as c
 
@@ -14,7 +14,7 @@ def categories(*names):
 
 @case
 def silent_without_logging(fmu):
-    """loggingOn = false: a whole life without a word; an error is said all the same, once."""
+    """loggingOn = false: a complete run without a message; an error is still logged, once."""
     it = fmu.instance(logging=False).begin()
     run(it)
     it.forget(it.save())
@@ -28,7 +28,7 @@ def silent_without_logging(fmu):
 
 @case
 def environment_and_name(fmu):
-    """The environment pointer comes back as it was given; FMI 2.0 also names the instance, from a copy."""
+    """The environment pointer is passed back unchanged; FMI 2.0 also names the instance, from a copy."""
     name = c.create_string_buffer(b"Antrieb 1")
     it = Instance(fmu, c.addressof(name) if fmu.version == 3 else c.cast(name, c.c_void_p))
     c.memset(name, 0xDD, len(name))
@@ -42,7 +42,7 @@ def environment_and_name(fmu):
 
 @case
 def callbacks_overwritten(fmu):
-    """FMI 2.0: the struct is the importer's again after instantiation."""
+    """FMI 2.0: the importer may change the struct after instantiation."""
     if fmu.version == 3:
         return
     it = fmu.instance()
@@ -55,7 +55,7 @@ def callbacks_overwritten(fmu):
 
 @case
 def token_overwritten(fmu):
-    """Token and resource location are the importer's again after instantiation."""
+    """The importer may change token and resource location after instantiation."""
     token, place = c.create_string_buffer(fmu.token.encode()), c.create_string_buffer(b"file:///tmp/resources")
     it = Instance(fmu, b"it", token=token, resources=c.cast(place, c.c_void_p))
     assert it.handle, it.messages
@@ -66,7 +66,8 @@ def token_overwritten(fmu):
 
 @case
 def categories_of_the_xml(fmu):
-    """Only categories that the XML lists, and errors and warnings in theirs; one line of UTF-8, no format left in it."""
+    """Only categories that the XML lists, and errors and warnings in theirs; one line of UTF-8, without format
+    specifiers."""
     it = fmu.instance(b"50 %s #1")
     run(it.begin(), 5)
     state = it.save()
@@ -92,7 +93,7 @@ def categories_of_the_xml(fmu):
 
 @case
 def switched(fmu):
-    """Off and on again, all categories or one; errors are always said."""
+    """Off and on again, all categories or one; errors are always logged."""
     it = fmu.instance()
     assert it.call("SetDebugLogging", 0, 0, None) == OK
     it.messages.clear()
@@ -115,7 +116,7 @@ def switched(fmu):
 
 @case
 def unknown_category(fmu):
-    """One that does not exist, an empty one, a null one: refused, and the message names it."""
+    """A category that does not exist, an empty one, a null pointer: refused, and the message names it."""
     for bad in (b"nonsense", b"", b"logstatuserror", b"\xff\xfe"):
         it = fmu.instance()
         refused(it, it.call("SetDebugLogging", 1, 1, categories(bad)), *([bad.decode()] if bad == b"nonsense" else []))
@@ -139,7 +140,7 @@ def every_error_is_said_once(fmu):
 
 @case
 def logger_that_calls_back(fmu):
-    """A logger that sins: it steps, sets, resets and frees the instance that logs. Refused, no crash."""
+    """A logger that steps, sets, resets and frees the instance that logs: refused, no crash."""
     it = fmu.instance()
     run(it.begin(), 5)
     found, remember = [], it.messages.append

@@ -1,4 +1,4 @@
-"""Saved states: complete, reusable, exchangeable, and harmless when they are not ours."""
+"""Saved states: complete, reusable, exchangeable; foreign pointers are refused."""
 
 import ctypes as c
 
@@ -12,7 +12,7 @@ NOT_OURS = (1, 7, 0xDEAD_BEEF, 2**47 - 8, 2**63, 2**64 - 1)
 
 @case
 def state_continues(fmu):
-    """Save, run on, restore, run on: the same bits, twice from the same state, and as if nothing had been saved."""
+    """Save, continue, restore, continue: the same bits, twice from the same state, and the same as without saving."""
     it = fmu.instance().begin()
     first, k, t = run(it, 30), it.k, it.t
     state = it.save()
@@ -29,7 +29,7 @@ def state_continues(fmu):
 
 @case
 def state_in_every_state(fmu):
-    """A state brings back where in its life the instance was."""
+    """A state also restores the mode of the instance."""
     trace = alone(fmu, 20)
     for where in "INST":
         it = reach(fmu, where)
@@ -56,7 +56,7 @@ def state_in_every_state(fmu):
 
 @case
 def state_holds_parameters_and_inputs(fmu):
-    """Values that were set come back, values that were not go away."""
+    """A state restores the values set before it, and drops those set after it."""
     it, resistance = fmu.instance(), fmu.find("motor.R_s").name
     assert it.set(resistance, 1.5) == OK
     it.begin()
@@ -68,7 +68,7 @@ def state_holds_parameters_and_inputs(fmu):
     assert other.restore(state) == OK
     assert other.get(resistance) == [1.5]
     assert other.reals("Get", fmu.of("input")) == inputs
-    it.free()  # the state outlives the instance that made it
+    it.free()  # the state outlives the instance that created it
     other.t = other.k = 0
     assert run(other, 10) != alone(fmu, 10)
     assert other.forget(state) == OK
@@ -76,7 +76,7 @@ def state_holds_parameters_and_inputs(fmu):
 
 @case
 def state_of_another_instance(fmu):
-    """What one instance saved, another continues, bit for bit."""
+    """Another instance continues from a saved state, bit for bit."""
     it, other = fmu.instance().begin(), fmu.instance(b"other").begin(start=5.0)
     run(it, 30), run(other, 7)
     state, other.t, other.k = it.save(), it.t, it.k
@@ -86,7 +86,7 @@ def state_of_another_instance(fmu):
 
 @case
 def state_leads_out_of_an_error(fmu):
-    """Restore after an error: the run goes on as if it had not happened."""
+    """Restore after an error: the run continues as if the error had not happened."""
     it = fmu.instance().begin()
     run(it, 30)
     state, k, t = it.save(), it.k, it.t
@@ -114,7 +114,7 @@ def state_is_overwritten(fmu):
 
 @case
 def state_pointers_that_are_not_ours(fmu):
-    """Null, garbage, this very instance, a buffer: an error for every function that takes a state."""
+    """Null, garbage, the instance itself, a buffer: an error for every function that takes a state."""
     trace, buffer = alone(fmu, 10), (c.c_uint8 * 4096)()
     it = fmu.instance().begin()
     for pointer in (None, *NOT_OURS, it.handle, c.addressof(buffer), c.cast(it.logger, c.c_void_p).value):
@@ -141,7 +141,7 @@ def state_pointers_that_are_not_ours(fmu):
 
 @case
 def state_freed(fmu):
-    """A copy of a freed pointer is refused everywhere; the pointer itself became null and may be freed again."""
+    """A copy of a freed pointer is refused everywhere; the pointer itself is null and may be freed again."""
     it = fmu.instance().begin()
     state = it.save()
     copy = c.c_void_p(state.value)

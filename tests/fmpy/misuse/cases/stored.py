@@ -1,4 +1,4 @@
-"""States as bytes: the same everywhere, and never trusted."""
+"""States as bytes: the same in every process, and checked when they are read."""
 
 import ctypes as c
 import hashlib
@@ -23,7 +23,7 @@ def stored(fmu, steps=30):
 
 @case
 def stored_state_continues(fmu):
-    """In another instance, bit for bit; the bytes depend on nothing but the state and have one size."""
+    """In another instance, bit for bit; the bytes depend only on the state, and their size is constant."""
     it, data = stored(fmu)
     assert stored(fmu)[1] == data
     assert len(stored(fmu, 2000)[1]) == len(data)
@@ -38,7 +38,7 @@ def stored_state_continues(fmu):
 
 @case
 def stored_state_in_another_process(fmu):
-    """Written here, continued there, where every address differs."""
+    """Written in one process, continued in another, where every address differs."""
     it, data = stored(fmu)
     with tempfile.TemporaryDirectory() as folder:
         Path(folder, "state").write_bytes(data)
@@ -70,7 +70,7 @@ def stored_state_holds_no_address(fmu):
 
 @case
 def stored_state_of_another_size(fmu):
-    """One byte less, one more, none, null: refused on the way out and on the way in."""
+    """One byte less, one more, none, null: refused when written and when read."""
     it, data = stored(fmu)
     state, room = it.save(), (c.c_uint8 * (len(data) + 64))()
     for size in (0, 1, len(data) - 1, len(data) + 1):
@@ -86,7 +86,7 @@ def stored_state_of_another_size(fmu):
 
 @case
 def flipped_bits(fmu):
-    """Each bit of the first bytes and one of each further byte: refused, and the null in the pointer stays."""
+    """Each bit of the first bytes and one of each further byte: refused, and the pointer stays null."""
     it, data = stored(fmu)
     for position in range(len(data)):
         for bit in range(8) if position < 64 else [position % 8]:
@@ -100,7 +100,7 @@ def flipped_bits(fmu):
 
 @case
 def foreign_bytes(fmu):
-    """Zeros, noise, texts, the other FMU's state: refused with a message."""
+    """Zeros, noise, text, a state of the other FMU: refused with a message."""
     it, data = stored(fmu)
     noise = random.Random(1)
     for junk in (b"", b"\0", bytes(len(data)), b"\xff" * len(data), b"hello", noise.randbytes(len(data)), bytes(1_000_000)):
@@ -115,7 +115,7 @@ def foreign_bytes(fmu):
 
 @case
 def forged_bytes(fmu):
-    """Random changes under a checksum that is right: refused or a state that can be run; no crash, no hang."""
+    """Random changes with a correct checksum: refused, or a state that runs; no crash, no hang."""
     it, data = stored(fmu)
     dice, body = random.Random(2), data[:-4]
     assert zlib.crc32(body).to_bytes(4, "little") == data[-4:], "the layout has changed: adapt this case"
@@ -142,5 +142,5 @@ def forged_bytes(fmu):
 
 @case
 def stored_states_are_frugal(fmu):
-    """The bytes differ between two states only where the states do: the same run twice has one hash."""
+    """The bytes of two states differ only where the states differ: the same run twice has one hash."""
     assert len({hashlib.sha256(stored(fmu)[1]).digest() for _ in range(5)}) == 1

@@ -1,4 +1,4 @@
-"""Steps and times that are not right."""
+"""Invalid steps and times."""
 
 import math
 import time as clock
@@ -12,7 +12,7 @@ H = 1e-4
 
 @case
 def step_sizes(fmu):
-    """Nothing, backwards, not a number, endless, below the resolution: an error at once."""
+    """Zero, negative, NaN, infinite, below the resolution: an error at once."""
     trace = alone(fmu, 10)
     for h in (0.0, -0.0, -H, math.nan, math.inf, -math.inf, 5e-324, -5e-324, 1e-310):
         it = fmu.instance().begin()
@@ -26,7 +26,7 @@ def step_sizes(fmu):
 
 @case
 def huge_steps(fmu):
-    """Longer than anybody waits for: refused at once; longer than usual: done or refused, in bounded time."""
+    """Extremely long: refused at once; longer than usual: done or refused, in bounded time."""
     trace = alone(fmu, 10)
     for h in (1e9, 1e15, 1e300, 1.7e308):
         it = fmu.instance().begin()
@@ -78,7 +78,7 @@ def first_communication_point(fmu):
 
 @case
 def stop_time(fmu):
-    """Up to it, rounding included, and not beyond; a last step may be cut short."""
+    """Steps up to the stop time, with rounding, and not beyond; the last step may be shorter."""
     for start in (0.0, 7.3):
         it = fmu.instance().begin(start, start + 10 * H)
         run(it, 10)
@@ -93,7 +93,7 @@ def stop_time(fmu):
 
 @case
 def many_steps_to_the_stop_time(fmu):
-    """Time added up by the importer drifts, and still meets the stop time."""
+    """Time summed up by the importer drifts, and still reaches the stop time."""
     it = fmu.instance().begin(0.0, 10.0)
     for _ in range(100_000):
         assert it.step(H) == OK, it.messages
@@ -102,7 +102,7 @@ def many_steps_to_the_stop_time(fmu):
 
 @case
 def experiments(fmu):
-    """Start and stop times that make no sense."""
+    """Invalid start and stop times."""
     for start in (math.nan, math.inf, -math.inf):
         refused(it := fmu.instance(), it.set_up(start), "startTime")
     for stop in (math.nan, math.inf, 0.5, 1.0):
@@ -111,7 +111,7 @@ def experiments(fmu):
 
 @case
 def tolerances(fmu):
-    """A fixed-step FMU has no use for one: no value changes anything."""
+    """A fixed-step FMU ignores the tolerance: no value changes anything."""
     trace = alone(fmu, 10)
     for defined, tolerance in ((0, math.nan), (1, 1e-6), (0, -1.0)):
         it = fmu.instance()
@@ -135,7 +135,8 @@ def start_times(fmu):
 
 @case
 def time_after_a_step(fmu):
-    """The last communication point is t + h as the importer computes it: FMI 3.0 says so in the step's results, too."""
+    """The last communication point is t + h as the importer computes it: FMI 3.0 also returns it as a result of the
+    step."""
     for start in (0.0, -1.0, 12.3):
         it = fmu.instance().begin(start)
         assert it.time() == (OK, start)

@@ -1,4 +1,4 @@
-"""Value references and values that are not right, and those that are."""
+"""Invalid value references and values, and valid ones."""
 
 import ctypes as c
 import math
@@ -13,7 +13,7 @@ RANGE_WORDS = ("greater than", "at least", "less than", "at most", "finite", "Ra
 
 
 def types(version):
-    """Suffixes of getters and setters with a C type each."""
+    """Suffixes of getters and setters, each with its C type."""
     if version == 2:
         return {"Real": c.c_double, "Integer": c.c_int32, "Boolean": c.c_int32, "String": c.c_char_p}
     special = {"Boolean": c.c_uint8, "String": c.c_char_p, "Float32": c.c_float, "Float64": c.c_double}
@@ -146,7 +146,7 @@ def zero_where_it_must_not_be(fmu):
 
 @case
 def enumeration_values(fmu):
-    """Only values that exist; the message lists them."""
+    """Only values of the enumeration; the message lists them."""
     estimator = fmu.find("estimator")
     if estimator is None:
         return
@@ -171,7 +171,8 @@ def parameters_that_do_not_fit_together(fmu):
 
 @case
 def not_settable(fmu):
-    """Outputs and time never, fixed parameters not after initialization, unless the value is the one they have; it stays."""
+    """Outputs and time never; fixed parameters not after initialization, unless the value is the present one, which
+    remains."""
     for variable in fmu.variables.values():
         if variable.causality == "input" or variable.variability == "tunable":
             continue
@@ -188,7 +189,8 @@ def not_settable(fmu):
 
 @case
 def fixed_parameters_set_to_what_they_are(fmu):
-    """Some importers write all parameters after the initialization: taken with one warning, and the run stays the same."""
+    """Some importers write all parameters after the initialization: accepted with one warning, and the run stays the
+    same."""
     trace = alone(fmu, 10)
     it = fmu.instance().begin()
     it.messages.clear()
@@ -249,7 +251,7 @@ def odd_booleans(fmu):
 
 @case
 def extreme_numbers(fmu):
-    """Denormal, -0.0 and enormous inputs: OK or an error, never a hang, NaN never comes out; a reset heals."""
+    """Denormal, -0.0 and enormous inputs: OK or an error, never a hang or NaN; a reset recovers the instance."""
     trace = alone(fmu, 10)
     it = fmu.instance()
     for variable in fmu.of("input", "parameter"):

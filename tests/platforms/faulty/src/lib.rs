@@ -1,4 +1,4 @@
-//! An FMU whose steps can be made to fail and to panic: what `tests/platforms.rs` runs on every platform.
+//! An FMU whose steps can be made to fail and to panic: `tests/platforms.rs` runs it on every platform.
 #![allow(missing_docs, dead_code, unreachable_pub)]
 
 mod model;

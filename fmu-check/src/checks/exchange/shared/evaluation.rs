@@ -11,7 +11,7 @@ use crate::state::State;
 use fmu_import::raw::{Arguments, Interface, Simple};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 
-/// States near those given, one of them or all moved a little.
+/// States near those given: one of them, or all, moved slightly.
 pub(crate) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
     let nominal = session.description.states();
     let size = |i: usize| nominal.get(i).and_then(|v| v.nominal).unwrap_or(1.0).abs().max(x[i].abs());
@@ -21,7 +21,7 @@ pub(crate) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
 /// Values at one point, each evaluated after something else has happened: what, the derivatives, and the event indicators.
 type Evaluations = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
-/// Values at a point; nothing, if time cannot go back to it: then the reason.
+/// Values at a point, or the reason why time cannot be set back to it.
 fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDetermined> {
     let begin = || -> Result<_, NotDetermined> {
         let instance = session.excited()?;
@@ -54,7 +54,10 @@ fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDete
         }
         Ok(())
     };
-    let read = |instance: &Instance<'_>| Ok::<_, NotDetermined>((instance.derivatives()?, instance.indicators()?));
+    let of = session.derivative_variables();
+    let read = |instance: &Instance<'_>| {
+        Ok::<_, NotDetermined>((session.steady(&of, instance.derivatives()?), instance.indicators()?))
+    };
     let away = |k: usize| -> Result<(), NotDetermined> {
         instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, k))?)?;
         let _ = read(&instance)?;
@@ -62,7 +65,7 @@ fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDete
         let _ = read(&instance)?;
         Ok(())
     };
-    // As an integrator does that tries a shorter step.
+    // Like an integrator that retries with a shorter step.
     away(usize::MAX)?;
     let back = instance.set_time(t)?;
     if !back.is_ok() {
@@ -80,6 +83,13 @@ fn evaluations(session: &Session) -> Result<Result<Evaluations, String>, NotDete
         point(&instance, [1, 2, 0])?;
         add(what, read(&instance)?);
     }
+    // Other states at the same time, as an integrator of several stages sets them.
+    away(usize::MAX)?;
+    point(&instance, [0, 1, 2])?;
+    instance.must("SetContinuousStates", instance.set_states(&moved(session, &x, usize::MAX))?)?;
+    let _ = read(&instance)?;
+    instance.must("SetContinuousStates", instance.set_states(&x)?)?;
+    add("after other states at the same time", read(&instance)?);
     let (other, _) = begin()?;
     point(&other, [2, 1, 0])?;
     add("in another instance, set in another order", read(&other)?);
@@ -123,8 +133,15 @@ pub(crate) fn same_bits(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
+/// The states and the derivatives that can be compared.
+fn vectors(instance: &Instance<'_>) -> Result<[Vec<f64>; 2], NotDetermined> {
+    let session = instance.session;
+    let states = session.steady(&session.description.states(), instance.states()?);
+    Ok([states, session.steady(&session.derivative_variables(), instance.derivatives()?)])
+}
+
 /// Inputs, parameters and the time, with their values.
-struct Held<'a, 'b> {
+struct Snapshot<'a, 'b> {
     instance: &'a Instance<'b>,
     variables: Vec<&'b ModelVariable>,
     values: Vec<Vec<u64>>,
@@ -132,7 +149,7 @@ struct Held<'a, 'b> {
     vectors: [Vec<f64>; 2],
 }
 
-impl<'a, 'b> Held<'a, 'b> {
+impl<'a, 'b> Snapshot<'a, 'b> {
     fn read(instance: &'a Instance<'b>) -> Result<Self, NotDetermined> {
         let fits = |v: &&ModelVariable| {
             v.clocks.is_empty()
@@ -140,13 +157,13 @@ impl<'a, 'b> Held<'a, 'b> {
         };
         let variables: Vec<_> = instance.session.numeric().filter(fits).take(200).collect();
         let values = instance.snapshot(&variables)?;
-        Ok(Self { instance, variables, values, vectors: [instance.states()?, instance.derivatives()?] })
+        Ok(Self { instance, variables, values, vectors: vectors(instance)? })
     }
 
     /// Requires that a call has changed nothing of it.
     fn require(&self, call: &str) -> Result<(), NotDetermined> {
         let session = self.instance.session;
-        let now = [self.instance.states()?, self.instance.derivatives()?];
+        let now = vectors(self.instance)?;
         for (what, (before, after)) in ["states", "derivatives"].iter().zip(self.vectors.iter().zip(&now)) {
             session
                 .require(!differ(before, after), || format!("{call}: the {what} were {before:?}, and are {after:?}"));
@@ -174,7 +191,7 @@ pub(crate) fn completed_step(session: &Session) -> Result<(), NotDetermined> {
     }
     for _ in 0..5 {
         instance.must("SetTime", instance.set_time(instance.time.get() + 1e-3 * session.integrator_step())?)?;
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         let (status, flags) = instance.completed()?;
         session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
             format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
@@ -194,7 +211,7 @@ pub(crate) fn independent(session: &Session) -> Result<(), NotDetermined> {
     };
     let instance = session.exchange(State::Continuous)?;
     for _ in 0..3 {
-        // Forth and back, as an integrator does that tries a shorter step.
+        // Forward and back, like an integrator that retries with a shorter step.
         let t = instance.time.get() + 0.1 * session.integrator_step();
         instance.must("SetTime", instance.set_time(t + session.integrator_step())?)?;
         instance.must("SetTime", instance.set_time(t)?)?;
@@ -210,19 +227,19 @@ pub(crate) fn independent(session: &Session) -> Result<(), NotDetermined> {
 pub(crate) fn mode_alone(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.excited()?;
     for _ in 0..3 {
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         let event = instance.iterate()?;
         before.require_but_states("the updates of an event")?;
         if event.terminates() || !event.ended() {
             return Ok(());
         }
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         instance.perform(Simple::EnterContinuousTimeMode)?;
         before.require("EnterContinuousTimeMode")?;
         let t = instance.time.get() + session.integrator_step();
         let next = event.next().unwrap_or(f64::INFINITY);
         instance.must("SetTime", instance.set_time(t.min(next))?)?;
-        let before = Held::read(&instance)?;
+        let before = Snapshot::read(&instance)?;
         instance.perform(Simple::EnterEventMode)?;
         before.require("EnterEventMode")?;
     }
@@ -239,7 +256,7 @@ pub(crate) fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     for k in 0..3 {
         let interface = Interface::ModelExchange;
         let Some(instance) = session.instantiate(&Arguments { interface, ..session.arguments("probe") })? else {
-            session.violated(format!("instance {} could not be created beside {} others", k + 2, k + 1));
+            session.violated(format!("instance {} could not be created while {} others existed", k + 2, k + 1));
             return Ok(());
         };
         instance.bring_to(State::Event)?;

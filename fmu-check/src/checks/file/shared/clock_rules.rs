@@ -115,7 +115,7 @@ pub(crate) fn kinds(fmu: &FmuFile) -> Verdict {
             found.push(format!("is a clock with causality {causality}"));
         }
         if causality != "input" && kind != "triggered" {
-            found.push(format!("is a {kind} {causality} clock: who makes it tick is the FMU, so it is triggered"));
+            found.push(format!("is a {kind} {causality} clock: the FMU makes it tick, so it must be triggered"));
         }
         found
     })
@@ -153,7 +153,7 @@ pub(crate) fn names_of_types(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// Lists of the model structure: each entry once, and event indicators that are continuous and the FMU's own.
+/// Lists of the model structure: each entry once, and event indicators that are continuous outputs or local variables.
 pub(crate) fn lists(fmu: &FmuFile) -> Verdict {
     let Some(root) = fmu.root() else { return Verdict::NotDetermined("the description is not well-formed XML".into()) };
     let Some(structure) = root.child("ModelStructure") else {
@@ -187,7 +187,7 @@ pub(crate) fn lists(fmu: &FmuFile) -> Verdict {
         if !continuous || parameter {
             let name = v.get("name").unwrap_or_default();
             found.push(format!(
-                "line {}: the event indicator {name} is not a continuous variable of the FMU's own",
+                "line {}: the event indicator {name} is not a continuous output or local variable",
                 indicator.line
             ));
         }
@@ -243,4 +243,36 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
         }
     }
     Verdict::of(found)
+}
+
+/// Files that modelDescription.xml of FMI 2.0 lists.
+pub(crate) fn source_files(fmu: &FmuFile) -> Verdict {
+    let Some(root) = fmu.root() else { return Verdict::NotDetermined("the description is not well-formed XML".into()) };
+    let interfaces = ["CoSimulation", "ModelExchange"].into_iter().filter_map(|name| root.child(name));
+    let lists: Vec<_> = interfaces.filter_map(|interface| interface.child("SourceFiles")).collect();
+    if lists.is_empty() {
+        return Verdict::NotApplicable("there are no SourceFiles".into());
+    }
+    let files = lists.iter().flat_map(|list| list.all("File"));
+    let missing = files.filter_map(|file| {
+        let name = file.get("name").unwrap_or_default();
+        let there = fmu.zip.find(&format!("sources/{name}")).is_some();
+        (!there).then(|| format!("line {}: the file sources/{name} is missing", file.line))
+    });
+    Verdict::of(missing.collect())
+}
+
+/// Intervals that no default experiment reaches, as milliseconds give them.
+pub(crate) fn long_intervals(fmu: &FmuFile) -> Verdict {
+    let experiment = fmu.description.as_ref().ok().map(|d| d.default_experiment);
+    let Some(span) = experiment.and_then(|x| Some(x.stop? - x.start.unwrap_or(0.0))) else {
+        return Verdict::NotApplicable("the default experiment has no stopTime".into());
+    };
+    each(fmu, |v, _| {
+        let interval = v.get("intervalDecimal").and_then(|text| parse_number(text.trim()));
+        let long = interval.filter(|x| v.name == "Clock" && *x > span);
+        long.map(|x| format!("has an interval of {x} s, and the default experiment takes {span} s"))
+            .into_iter()
+            .collect()
+    })
 }

@@ -8,4 +8,5 @@ pub(crate) mod names;
 pub(crate) mod paths;
 pub(crate) mod schema;
 pub(crate) mod schema_rules;
+pub(crate) mod type_rules;
 pub(crate) mod units;

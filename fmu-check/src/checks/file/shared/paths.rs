@@ -1,4 +1,4 @@
-//! Paths that only the machine has on which an FMU was made: files below somebody's home folder.
+//! Paths that exist only on the machine where the FMU was built: files below a user's home folder.
 
 use crate::check::Verdict;
 use crate::checks::file::shared::libraries::libraries;
@@ -7,11 +7,11 @@ use fmu_import::machine;
 use model_description::BaseType;
 use object::{Object, ObjectSection, SectionKind};
 
-/// Where home folders are, on Linux, macOS and Windows; after those of Unix there is the user's name, but for root.
+/// Where home folders are, on Linux, macOS and Windows; on Unix a user name follows, except for root.
 const HOMES: [&str; 4] = ["/home/", "/Users/", "/root/", ":\\Users\\"];
 
 /// Endings of sources and of what compilers make of them. Messages of a panic or an assertion name a source, and a library may name
-/// the file of its symbols: nobody opens them.
+/// the file of its symbols: no program opens them.
 const SOURCES: [&str; 28] = [
     "rs", "c", "h", "cc", "cpp", "cxx", "c++", "hh", "hpp", "hxx", "inc", "inl", "s", "asm", "f", "f90", "for", "mo",
     "mos", "py", "pyx", "go", "java", "pas", "adb", "o", "obj", "pdb",
@@ -20,7 +20,7 @@ const SOURCES: [&str; 28] = [
 /// Folders of packages and compilers, whose sources stand in messages too.
 const TOOLS: [&str; 4] = ["/.cargo/", "/.rustup/", "\\.cargo\\", "\\.rustup\\"];
 
-/// Findings in one place are alike.
+/// Further findings in one library are alike.
 const MOST: usize = 5;
 
 /// Reads what a program reads from its library, without the information for a debugger, and the start values of strings.

@@ -61,12 +61,25 @@ pub(crate) fn wrong_bases(description: &ModelDescription) -> Vec<String> {
     description.units.iter().filter_map(say).collect()
 }
 
-/// Display units whose factor contradicts their name, for example because it is the reciprocal.
+/// Display units of the temperature in K, with their factor and offset.
+const TEMPERATURES: [(&str, f64, f64); 3] = [("degC", 1.0, -273.15), ("degF", 1.8, -459.67), ("degR", 1.8, 0.0)];
+
+/// Display units whose factor or offset contradicts their name, for example because it is the reciprocal or has the other sign.
 pub(crate) fn wrong_displays(description: &ModelDescription) -> Vec<String> {
     let mut findings = Vec::new();
     for unit in &description.units {
         let Some(base) = unit.base else { continue };
         for display in unit.display_units.iter().filter(|d| !d.inverse) {
+            let temperature = TEMPERATURES.iter().find(|(name, ..)| unit.name == "K" && *name == display.name);
+            if let Some(&(_, factor, offset)) = temperature {
+                if differ(display.factor, factor) || (display.offset - offset).abs() > 0.01 {
+                    findings.push(format!(
+                        "line {}: display unit {:?} of \"K\" has factor {} and offset {}, expected {factor} and {offset}",
+                        unit.line, display.name, display.factor, display.offset
+                    ));
+                }
+                continue;
+            }
             let per_second = base.exponents[..RADIAN] == [0, 0, -1, 0, 0, 0, 0];
             let factor = match display.name.as_str() {
                 name if REVOLUTIONS_NAMES.contains(&name) => {

@@ -62,7 +62,7 @@ const CALLS: &[Call] = &[
     Call("GetFMUState",                   Session::exchange_saves, ["",  "",     "+++++", "+++++", ""  ], get_state),
 ];
 
-/// Whether an FMU that takes a call which the state does not allow says so: with logging on, by a message of status Warning.
+/// Whether an FMU that accepts a call that the state does not allow logs a message of status Warning (with logging on).
 fn warned(session: &Session, life: Life, state: State, make: Make) -> Result<bool, NotDetermined> {
     let instance = session.in_state(life, state)?;
     let _ = instance.call("SetDebugLogging", |raw| raw.debug_logging(instance.handle, true, None, 0))?;

@@ -14,7 +14,8 @@ use std::ffi::CString;
 const STEPS: u32 = 20;
 
 fn scalars(session: &Session, base: BaseType, fits: impl Fn(&ModelVariable) -> bool) -> Vec<&ModelVariable> {
-    session.numeric().filter(|v| v.base == base && !v.is_array() && v.clocks.is_empty() && fits(v)).take(12).collect()
+    let fits = |v: &&ModelVariable| v.base == base && !v.is_array() && v.clocks.is_empty() && fits(v);
+    session.numeric().filter(|v| session.is_steady(v)).filter(fits).take(12).collect()
 }
 
 /// The values of several variables, each alone and all in one call, in both orders.
@@ -26,7 +27,7 @@ pub(crate) fn several(session: &Session) -> Result<(), NotDetermined> {
     let mut tried = 0;
     for &base in BaseType::ALL {
         let mut list = scalars(session, base, |_| true);
-        list.retain(|v| instance.get(v).is_ok_and(|(status, _)| status.is_ok()));
+        list.retain(|v| instance.get(v).is_ok_and(|(status, bits)| status.is_ok() && !bits.is_empty()));
         if list.len() < 2 {
             continue;
         }
@@ -35,12 +36,14 @@ pub(crate) fn several(session: &Session) -> Result<(), NotDetermined> {
             let turned = |n: usize| if order == "in order" { n } else { list.len() - 1 - n };
             let references: Vec<u32> = (0..list.len()).map(|n| list[turned(n)].value_reference).collect();
             let mut buffer = Buffer::room(base, version, list.len());
+            let untouched = buffer.clone();
             let call = format!("Get({} variables of the type {base}, {order})", list.len());
             let status = instance.call(&call, |raw| {
                 raw.get(instance.handle, base, Some(&references), list.len(), Some(&mut buffer), list.len())
             })?;
             session.require(status.is_ok(), || format!("{call} returned {status}"));
-            if !status.is_ok() {
+            session.require(!status.is_ok() || buffer != untouched, || format!("{call} returned OK and wrote nothing"));
+            if !status.is_ok() || buffer == untouched {
                 return Ok(());
             }
             tried += 1;
@@ -58,7 +61,7 @@ pub(crate) fn several(session: &Session) -> Result<(), NotDetermined> {
     if tried == 0 { session.not_applicable("no type has several variables") } else { Ok(()) }
 }
 
-/// What is set in one call reads back as if it had been set alone.
+/// Values set in one call read back as if each had been set alone.
 fn several_set(session: &Session) -> Result<(), NotDetermined> {
     let version = session.description.version;
     for &base in BaseType::ALL {
@@ -83,7 +86,7 @@ fn several_set(session: &Session) -> Result<(), NotDetermined> {
         let status = instance.call(&call, |raw| {
             raw.set(instance.handle, base, Some(&references), list.len(), Some(&mut buffer), list.len())
         })?;
-        // Together they may be values that the model does not take.
+        // The model may reject these values in combination.
         if !status.is_ok() {
             return Ok(());
         }
@@ -98,7 +101,7 @@ fn several_set(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// Runs with changing inputs and looks after each step, until something is found.
+/// Runs with changing inputs and calls `look` after each step, until it finds something.
 fn look_at(
     session: &Session,
     look: &mut dyn FnMut(&Instance<'_>, u32) -> Result<bool, NotDetermined>,
@@ -136,7 +139,7 @@ pub(crate) fn written(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
-/// Continuous outputs at both sides of the end of the initialization.
+/// Continuous outputs before and after the end of the initialization.
 pub(crate) fn initialized(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| v.variability == Variability::Continuous && v.causality == Causality::Output;
     let outputs: Vec<_> = session.watched().into_iter().filter(fits).collect();
@@ -249,6 +252,7 @@ pub(crate) fn parameters_keep(session: &Session) -> Result<(), NotDetermined> {
         v.causality == Causality::Parameter
             && matches!(v.variability, Variability::Fixed | Variability::Tunable)
             && v.clocks.is_empty()
+            && session.is_steady(v)
     };
     let all: Vec<_> = session.numeric().filter(fits).collect();
     if all.is_empty() {
@@ -266,7 +270,7 @@ pub(crate) fn parameters_keep(session: &Session) -> Result<(), NotDetermined> {
         session.require(old.is_empty() || new.is_empty() || *old == new, || {
             let [old, new] = [old, &new].map(|bits| show(v, session.description.version, bits));
             format!(
-                "line {}: the parameter {} was {old} and is {new} after steps, and nobody has set it",
+                "line {}: the parameter {} was {old} and is {new} after steps, although the importer did not set it",
                 v.line, v.name
             )
         });
@@ -277,7 +281,8 @@ pub(crate) fn parameters_keep(session: &Session) -> Result<(), NotDetermined> {
 /// Derivatives that are variables, and their states, against the slope over steps in which the derivative hardly changes.
 pub(crate) fn derivatives_are_slopes(session: &Session) -> Result<(), NotDetermined> {
     let d = &session.description;
-    let real = |v: &ModelVariable| v.base == BaseType::Float64 && !v.is_array() && v.clocks.is_empty();
+    let real =
+        |v: &ModelVariable| v.base == BaseType::Float64 && !v.is_array() && v.clocks.is_empty() && session.is_steady(v);
     let pairs: Vec<(&ModelVariable, &ModelVariable)> = d
         .variables
         .iter()
@@ -306,7 +311,7 @@ pub(crate) fn derivatives_are_slopes(session: &Session) -> Result<(), NotDetermi
         for (n, (der, state)) in pairs.iter().enumerate() {
             let [d0, d1, x0, x1] = [before[2 * n], after[2 * n], before[2 * n + 1], after[2 * n + 1]];
             let (slope, scale) = ((x1 - x0) / h, d0.abs().max(d1.abs()));
-            // Where the derivative itself changes, or rounding matters, a slope shows nothing.
+            // If the derivative itself changes, or rounding dominates, a slope proves nothing.
             let rough = (d1 - d0).abs() > 0.2 * scale || scale * h <= 1e-9 * x0.abs().max(x1.abs()).max(1e-9);
             if rough || !slope.is_finite() {
                 continue;
@@ -331,14 +336,14 @@ pub(crate) fn derivatives_are_slopes(session: &Session) -> Result<(), NotDetermi
     Ok(())
 }
 
-/// Texts of all string variables, as far as they can be read.
+/// Texts of all string variables that can be read.
 pub(crate) fn texts(instance: &Instance<'_>) -> Result<Vec<(String, Option<String>)>, NotDetermined> {
     let session = instance.session;
     let strings = session
         .description
         .variables
         .iter()
-        .filter(|v| v.base == BaseType::String && !v.is_array() && v.clocks.is_empty());
+        .filter(|v| v.base == BaseType::String && !v.is_array() && v.clocks.is_empty() && session.is_steady(v));
     let mut all = Vec::new();
     for v in strings {
         let call = format!("GetString({})", v.name);
@@ -351,12 +356,12 @@ pub(crate) fn texts(instance: &Instance<'_>) -> Result<Vec<(String, Option<Strin
     Ok(all)
 }
 
-/// Sets what can be set to something else: numbers and texts.
+/// Sets all settable numbers and texts to other values.
 pub(crate) fn set_all(instance: &Instance<'_>, scale: f64) -> Result<(), NotDetermined> {
     let session = instance.session;
     for v in session.description.variables.iter().filter(|v| settable(v)) {
         if v.base == BaseType::String && !v.is_array() {
-            // Longer than what an FMU may have room for, and another one for another scale.
+            // Longer than a fixed buffer of an FMU may be, and different for each scale.
             let text = CString::new(format!("another text {scale} ").repeat(6)).unwrap_or_default();
             let _ = instance.call(&format!("SetString({})", v.name), |raw| {
                 raw.set_strings(instance.handle, &[v.value_reference], &[Some(&text)])

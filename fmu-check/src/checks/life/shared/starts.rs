@@ -6,7 +6,7 @@ use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::subjects::settable;
 use fmu_import::Status;
-use fmu_import::raw::{Raw, Simple, StepStatus};
+use fmu_import::raw::{Arguments, Interface, Raw, Simple, StepStatus};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 
 /// `fmi2LastSuccessfulTime`, a status kind.
@@ -15,7 +15,7 @@ const LAST_SUCCESSFUL_TIME: i32 = 2;
 /// The variables that start exactly, constants aside.
 fn exact(session: &Session) -> Vec<&ModelVariable> {
     let of_model = |v: &&ModelVariable| matches!(v.causality, Causality::Output | Causality::Local);
-    session.numeric().filter(of_model).filter(|v| settable(v)).collect()
+    session.numeric().filter(of_model).filter(|v| settable(v) && session.is_steady(v)).collect()
 }
 
 /// What was set when the FMU was instantiated is the value in the initialization, and the start value is back after a reset.
@@ -25,9 +25,13 @@ pub(crate) fn stand(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("no output or local variable starts exactly");
     }
     let version = session.description.version;
-    session.cases(all, |v| {
+    let simulates = session.description.co_simulation.is_some().then_some(Interface::CoSimulation);
+    let exchanges = session.exchanges_here().then_some(Interface::ModelExchange);
+    let each = [simulates, exchanges].into_iter().flatten().flat_map(|i| all.iter().map(move |v| (i, *v)));
+    session.cases(each.collect::<Vec<_>>(), |(interface, v)| {
         let Some(values) = session.different_value(v, 1.0) else { return Ok(()) };
-        let instance = session.fresh()?;
+        let new = || session.prepare(|| session.made(&Arguments { interface, ..session.arguments("probe") }));
+        let instance = new()?;
         let must = |status: Status, what: &str| session.require(status.is_ok(), || format!("{what} returned {status}"));
         let status = instance.set(v, &values)?;
         must(status, &format!("Set({}) of an instance in the state Instantiated", v.name));
@@ -36,10 +40,11 @@ pub(crate) fn stand(session: &Session) -> Result<(), NotDetermined> {
         }
         let compare = |instance: &Instance<'_>, wanted: &[u64], when: &str| {
             let (status, found) = instance.get(v)?;
-            must(status, &format!("Get({}) {when}", v.name));
+            let of = if interface == Interface::ModelExchange { "Model Exchange: " } else { "" };
+            must(status, &format!("{of}Get({}) {when}", v.name));
             session.require(!status.is_ok() || same(v, version, wanted, &found), || {
                 let [wanted, got] = [wanted, &found].map(|bits| show(v, version, bits));
-                format!("{} = {got} {when}, expected {wanted}", v.name)
+                format!("{of}{} = {got} {when}, expected {wanted}", v.name)
             });
             Ok::<_, NotDetermined>(())
         };
@@ -50,7 +55,8 @@ pub(crate) fn stand(session: &Session) -> Result<(), NotDetermined> {
         if v.variability == Variability::Continuous {
             compare(&instance, &values, "at the end of the initialization, after it was set")?;
         }
-        let fresh = session.initializing()?;
+        let fresh = new()?;
+        fresh.enter()?;
         let (_, start) = fresh.get(v)?;
         instance.perform(Simple::Reset)?;
         instance.enter()?;

@@ -32,7 +32,7 @@ pub(crate) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         let Some(values) = session.different_value(v, 1.0) else { continue };
         let status = instance.set(v, &values)?;
         if !status.is_ok() {
-            // The model may refuse a value; other checks judge refusals. The variables that follow are looked at all the same.
+            // The model may refuse a value, which other checks report; the remaining variables are still checked.
             if status == Status::ERROR {
                 refused.push(format!(
                     "Set({} = {}) returned {status}",
@@ -81,7 +81,7 @@ fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64
     let instance = session.fresh()?;
     let kept: Vec<_> = kept.iter().filter(|(v, _)| fits(v)).collect();
     for (v, values) in &kept {
-        // L07 looks at the call. All these values together may be none that the model takes.
+        // L07 checks the call. The model may reject these values in combination.
         if !instance.set(v, values)?.is_ok() {
             return Ok(());
         }
@@ -134,13 +134,56 @@ pub(crate) fn strings(session: &Session) -> Result<(), NotDetermined> {
         if !status.is_ok() {
             return Err(NotDetermined(format!("GetString({}) returned {status}", v.name)));
         }
-        if back.first().is_none_or(|b| b.as_deref() != Some(text)) {
-            let finding = format!("{}: a string of {} bytes did not read back", v.name, text.len());
-            // The standards set no limit, but nobody needs a text of this length.
+        let got = back.first().and_then(Option::as_deref);
+        if got != Some(text) {
+            let finding = format!("{}: a string of {} bytes {}", v.name, text.len(), read_back(text, got));
+            // The standards set no limit, but no application needs a text of this length.
             if text.len() > LONG { session.lesser(Level::Should, finding) } else { session.violated(finding) }
         }
         Ok(())
-    })
+    })?;
+    session.case(|| several_strings(session));
+    Ok(())
+}
+
+/// How a string that was set reads back.
+fn read_back(set: &str, got: Option<&str>) -> String {
+    match got {
+        None => "reads back as NULL".into(),
+        Some(got) if set.starts_with(got) => format!("is cut: its first {} bytes read back", got.len()),
+        Some(got) => format!("reads back as {:?}", got.chars().take(40).collect::<String>()),
+    }
+}
+
+/// Strings that are set in one call keep a value each.
+fn several_strings(session: &Session) -> Result<(), NotDetermined> {
+    let fits = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
+    let all: Vec<_> = session.description.variables.iter().filter(fits).take(20).collect();
+    if all.len() < 2 {
+        return Ok(());
+    }
+    let instance = session.initializing()?;
+    let texts: Vec<_> = (0..all.len()).map(|k| format!("text {k}")).collect();
+    let references: Vec<_> = all.iter().map(|v| v.value_reference).collect();
+    let c_texts: Vec<_> = texts.iter().map(|text| CString::new(text.as_str()).unwrap_or_default()).collect();
+    let given: Vec<_> = c_texts.iter().map(|text| Some(text.as_c_str())).collect();
+    let call = format!("SetString({} variables)", all.len());
+    // The model may reject these values in combination.
+    if !instance.call(&call, |raw| raw.set_strings(instance.handle, &references, &given))?.is_ok() {
+        return Ok(());
+    }
+    drop(c_texts);
+    let call = format!("GetString({} variables)", all.len());
+    let (status, back) = instance.call_for(&call, |raw| raw.get_strings(instance.handle, &references, all.len()))?;
+    if !status.is_ok() {
+        return Ok(());
+    }
+    for ((v, text), got) in all.iter().zip(&texts).zip(&back) {
+        session.require(got.as_deref() == Some(text), || {
+            format!("{}: {text:?}, set with other strings, {}", v.name, read_back(text, got.as_deref()))
+        });
+    }
+    Ok(())
 }
 
 /// A binary variable that can be set.
@@ -167,7 +210,7 @@ pub(crate) fn binaries(session: &Session) -> Result<(), NotDetermined> {
         if !status.is_ok() {
             return Err(NotDetermined(format!("GetBinary({}) returned {status}", v.name)));
         }
-        // Where there are no bytes, there need be no place.
+        // Without bytes, the pointer may be NULL.
         let back = back.first().map(|found| found.as_deref().unwrap_or_default());
         session.require(back == Some(&bytes[..]), || format!("{}: {size} bytes did not read back", v.name));
         Ok(())
@@ -254,7 +297,8 @@ pub(crate) fn booleans(session: &Session) -> Result<(), NotDetermined> {
         let status = instance.set(v, &[value])?;
         if status.is_ok() {
             if let Some(back) = instance.get_back(v)? {
-                session.require(back[0] <= 1, || format!("{}: set to {value}, got {}", v.name, back[0]));
+                let got = back.first().copied().unwrap_or(0);
+                session.require(got <= 1, || format!("{}: set to {value}, got {got}", v.name));
             }
             let _ = instance.simple(Simple::ExitInitializationMode)?;
             let _ = instance.step(session.h())?;
@@ -305,7 +349,7 @@ pub(crate) fn iterated_initialization(session: &Session) -> Result<(), NotDeterm
         let (Some(first), Some(last)) = (session.different_value(v, 3.0), session.different_value(v, 1.0)) else {
             continue;
         };
-        // This check does not judge refusals.
+        // Refusals are not the subject of this check.
         if iterated.set(v, &first)?.is_ok() && iterated.set(v, &last)?.is_ok() {
             let _ = iterated.snapshot(&watched)?;
             let _ = plain.set(v, &last)?;

@@ -78,11 +78,11 @@ pub(crate) fn slopes(session: &Session) -> Result<(), NotDetermined> {
                 "GetOutputDerivatives returned {status}, or a second short step failed"
             )));
         }
-        let mut held = 0;
+        let mut constant = 0;
         for (((v, derivative), before), after) in outputs.iter().zip(&derivatives).zip(&before).zip(values()?) {
             // An output that a sampling part of the FMU holds has no slope in a short step.
             if *derivative != 0.0 && after.to_bits() == before.to_bits() {
-                held += 1;
+                constant += 1;
                 continue;
             }
             let slope = (after - before) / short_step;
@@ -92,8 +92,8 @@ pub(crate) fn slopes(session: &Session) -> Result<(), NotDetermined> {
                 format!("the FMU returns {derivative} as the derivative of {}, but its slope is {slope}", v.name)
             });
         }
-        if held > 0 {
-            session.note(format!("{held} outputs did not change in a short step and were not compared"));
+        if constant > 0 {
+            session.note(format!("{constant} outputs did not change in a short step and were not compared"));
         }
         Ok(())
     });

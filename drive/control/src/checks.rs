@@ -1,0 +1,222 @@
+//! Checks of parameters that belong to several parts of the controller: each part knows its own values only.
+
+use crate::battery::DcLimits;
+use crate::commission::CommissionMode;
+use crate::estimator::{Class, Kind};
+use crate::reference::max_torque;
+use crate::tables::{ControllerParameters, PARAMETERS};
+use crate::weakening::{INVERSE_SQRT_3, WeakeningGains};
+use drive_base::math::sin_cos;
+use fmu_core::Fault;
+use std::f64::consts::PI;
+
+/// Minimum torque per ampere of i_q, as a share of that of the magnet alone.
+const LEAST_TORQUE: f64 = 0.2;
+
+/// Maximum w_c T_s as a share of the gain at which a loop without resistance oscillates: 2 pi 0.06 with one sample of delay.
+const GREATEST_GAIN: f64 = 0.12 * PI;
+
+/// Checks that the sample period is short enough for the bandwidth.
+///
+/// A sampled integrator with d samples of delay oscillates at the gain w_c T_s = 2 sin(pi / (4 d + 2)): 2, 1 and 0.618 for d
+/// = 0, 1 and 2. With active resistance, which doubles the gain, it does at 2, 0.456 and 0.268.
+///
+/// # Errors
+/// The loop would oscillate, or nearly so.
+pub(crate) fn current(par: &ControllerParameters) -> Result<(), Fault> {
+    let critical = 2.0 * sin_cos(PI / f64::from(4 * par.delay + 2)).0;
+    let most = GREATEST_GAIN * critical / par.T_s;
+    if par.current.bandwidth <= most * (1.0 + 1e-9) {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    let allowed = format!(
+        "at most {most:.4} rad/s (2 pi {:.3} / T_s) with {} and {}, or the current oscillates; lower it or T_s",
+        0.06 * critical,
+        table.tell(par, |p| &mut p.T_s),
+        table.tell(par, |p| &mut p.delay)
+    );
+    Err(table.fault(par, |p| &mut p.current.bandwidth, allowed))
+}
+
+/// Minimum difference of the peaks, computed from the controller's estimates, in units of x / L_d.
+const MIN_DIFFERENCE: f64 = 0.02;
+
+/// Checks that the pulses distinguish the poles, given the estimated saturation coefficient, and stay within the
+/// current limit.
+///
+/// # Errors
+/// States which parameters do not fit.
+pub(crate) fn polarity(par: &ControllerParameters) -> Result<(), Fault> {
+    let x = par.polarity.voltage * par.T_s * f64::from(par.polarity.samples);
+    let (linear, saturated) = (x / par.motor.L_d, par.s_2 * x * x);
+    let pulses = || {
+        let voltage = PARAMETERS.tell(par, |p| &mut p.polarity.voltage);
+        let samples = PARAMETERS.tell(par, |p| &mut p.polarity.samples);
+        format!("{voltage} for {samples} of {}", PARAMETERS.tell(par, |p| &mut p.T_s))
+    };
+    if 2.0 * saturated.abs() < MIN_DIFFERENCE * linear {
+        return Err(Fault::new(format!(
+            "{}: {} make peaks of {linear} A that differ by {} A only; the ends of the magnet differ by saturation \
+             alone, and the start by injection needs {} A",
+            PARAMETERS.tell(par, |p| &mut p.s_2),
+            pulses(),
+            2.0 * saturated.abs(),
+            MIN_DIFFERENCE * linear
+        )));
+    }
+    if linear + saturated.abs() > par.limit.i {
+        let peak = linear + saturated.abs();
+        let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
+        return Err(Fault::new(format!("{} make a current of {peak} A, above {limit}", pulses())));
+    }
+    Ok(())
+}
+
+/// Checks that field weakening can work with the other parameters, on a DC link of `u_dc` (V).
+///
+/// # Errors
+/// States which parameters do not fit together, and what to do.
+pub(crate) fn weakening(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
+    if !own.used {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    let estimator_is = table.tell(par, |p| &mut p.estimator);
+    let limit_is = table.tell(par, |p| &mut p.limit.i);
+    let use_is = table.tell(par, |p| &mut p.weakening.used);
+    if own.k_t < own.k_u {
+        let least = table.tell(par, |p| &mut p.weakening.k_u);
+        return Err(table.fault(par, |p| &mut p.weakening.k_t, format!("at least {least}")));
+    }
+    if *estimator == Kind::Hybrid && u_dc > 0.0 {
+        // Above this speed the references may need field weakening; an injection leaves them less voltage.
+        let mtpa = par.current.mtpa;
+        let gains = WeakeningGains::new(motor, limit, max_torque(motor, limit, mtpa), mtpa, par.least_tracker());
+        let onset = gains.onset(own.k_u * u_dc * INVERSE_SQRT_3 - par.estimators.square_wave.voltage);
+        if par.estimators.hybrid.w_high > onset {
+            let injected = table.tell(par, |p| &mut p.estimators.square_wave.voltage);
+            let allowed = format!(
+                "at most {onset:.4} rad/s, where field weakening begins with {use_is}, {injected} and a DC link of {u_dc} V; \
+                 lower it or the injected voltage, or raise the DC link's"
+            );
+            return Err(table.fault(par, |p| &mut p.estimators.hybrid.w_high, allowed));
+        }
+    }
+    if *estimator == Kind::VoltageFeedback && (own.k_u > 0.9 || own.k_t > own.k_u) {
+        return Err(Fault::new(format!(
+            "{} and {} with {estimator_is}, which mistakes a saturated hexagon for an angle error: set both to the same \
+             value, at most 0.9",
+            table.tell(par, |p| &mut p.weakening.k_u),
+            table.tell(par, |p| &mut p.weakening.k_t)
+        )));
+    }
+    let most = 0.7 * motor.psi_M / motor.L_d;
+    if *estimator == Kind::VoltageModel && limit.i > most {
+        return Err(Fault::new(format!(
+            "{limit_is} with {estimator_is} and {use_is}: the estimator's gain has no bound near the current -psi_M / L_d; at \
+             most {most:.4} A (0.7 psi_M / L_d), or another estimator"
+        )));
+    }
+    let most = (1.0 - LEAST_TORQUE) * motor.psi_M / (motor.L_d - motor.L_q);
+    if motor.L_q < motor.L_d && limit.i > most {
+        return Err(Fault::new(format!(
+            "{limit_is} with {use_is} and L_q < L_d: the torque of i_q vanishes at the current -psi_M / (L_d - L_q); at most \
+             {most:.4} A (0.8 psi_M / (L_d - L_q))"
+        )));
+    }
+    Ok(())
+}
+
+/// Checks the limits of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.
+///
+/// # Errors
+/// A trip that normal operation would reach.
+pub(crate) fn trip(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let (trip, table) = (&par.trip, PARAMETERS);
+    if !trip.used {
+        return Ok(());
+    }
+    if trip.i.is_nan() || trip.i <= par.limit.i {
+        let limit = table.tell(par, |p| &mut p.limit.i);
+        return Err(table.fault(par, |p| &mut p.trip.i, format!("above {limit}, the current limit")));
+    }
+    if trip.u_dc.is_nan() || trip.u_dc <= u_dc.max(0.0) {
+        return Err(table.fault(par, |p| &mut p.trip.u_dc, format!("above u_dc, {u_dc} V at the start")));
+    }
+    Ok(())
+}
+
+/// Checks that the parameters fit together.
+///
+/// # Errors
+/// Names the current and its limit.
+pub(crate) fn commissioning(par: &ControllerParameters) -> Result<(), Fault> {
+    if par.commission.mode == CommissionMode::Off || par.commission.i <= par.limit.i {
+        return Ok(());
+    }
+    let limit = PARAMETERS.tell(par, |p| &mut p.limit.i);
+    Err(PARAMETERS.fault(par, |p| &mut p.commission.i, format!("at most {limit}")))
+}
+
+/// Checks the limits, where they are in use.
+///
+/// # Errors
+/// A limit of the wrong sign.
+pub(crate) fn dc_limits(par: &ControllerParameters) -> Result<(), Fault> {
+    let DcLimits { used, max, min } = par.dc;
+    if used && max < 0.0 {
+        return Err(PARAMETERS.fault(par, |p| &mut p.dc.max, "at least 0 A: at no speed could the drive keep it"));
+    }
+    if used && min > 0.0 {
+        return Err(PARAMETERS.fault(par, |p| &mut p.dc.min, "at most 0 A: at no speed could the drive keep it"));
+    }
+    Ok(())
+}
+
+/// Checks that i_q gives torque in spite of the law's i_d, where the references depend on it.
+///
+/// # Errors
+/// The reluctance torque cancels most of the magnet's torque.
+pub(crate) fn zero_speed(par: &ControllerParameters) -> Result<(), Fault> {
+    let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, .. } = par;
+    let by_torque = current.mtpa || weakening.used || speed_loop.torque_mode;
+    let share = (motor.L_q - motor.L_d) / motor.psi_M;
+    if estimator.class() != Class::FluxObserver || !by_torque || zero_speed.i_0 * share <= 1.0 - LEAST_TORQUE {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    let with = if weakening.used {
+        table.tell(par, |p| &mut p.weakening.used)
+    } else if current.mtpa {
+        table.tell(par, |p| &mut p.current.mtpa)
+    } else {
+        table.tell(par, |p| &mut p.speed_loop.torque_mode)
+    };
+    Err(Fault::new(format!(
+        "{} with {}, {with} and L_q > L_d: the torque of i_q vanishes at the current psi_M / (L_q - L_d); at most {:.4} A \
+         (0.8 psi_M / (L_q - L_d))",
+        table.tell(par, |p| &mut p.zero_speed.i_0),
+        table.tell(par, |p| &mut p.estimator),
+        (1.0 - LEAST_TORQUE) / share
+    )))
+}
+
+/// Whether the limits lower `zero_speed.i_0` on a link of `u_dc` (V).
+pub(crate) fn lowers_i_0(par: &ControllerParameters, u_dc: f64) -> bool {
+    par.dc.used && par.estimator.class() == Class::FluxObserver && par.zero_speed.i_0 > par.dc.i_0(&par.motor, u_dc)
+}
+
+/// The warning of this.
+pub(crate) fn lowered_i_0(par: &ControllerParameters, u_dc: f64) -> String {
+    let (i_0, most) = (par.zero_speed.i_0, par.dc.i_0(&par.motor, u_dc));
+    let alone = 1.5 * par.motor.R_s * i_0 * i_0 / u_dc;
+    format!(
+        "{}: {} alone would take 1.5 R_s i_0^2 / u_dc = {alone:.3} A at standstill, more than half of it; i_0 is {most:.3} A, \
+         which holds a load of up to {:.3} N.m",
+        PARAMETERS.tell(par, |p| &mut p.dc.max),
+        PARAMETERS.tell(par, |p| &mut p.zero_speed.i_0),
+        par.motor.torque_constant() * most
+    )
+}

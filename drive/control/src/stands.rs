@@ -1,0 +1,74 @@
+//! Torque mode: whether a torque that is asked for moves anything that the estimate can show.
+//!
+//! A resistance that is off by dR hides a rotor whose back EMF is below |dR| i: the estimated frame stands or creeps beside it, the
+//! current acts on the wrong axis, and the torque is not that of the references (the heads of
+//! [`rasmussen`](crate::estimator::rasmussen) and [`flux_observer`](crate::estimator::flux_observer) have the threshold). The
+//! controller cannot tell such a rotor from a blocked one. It counts the time t in which
+//!
+//! ```text
+//! |tau| > 2 % of the limit        psi_M |w^| < 0.3 R^ |i|        w^ smoothed over 0.3 s
+//! ```
+//!
+//! and warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M). A rotor that
+//! takes the whole torque is faster than w_s by then.
+//!
+//! Derived here. tau in N.m, w in rad/s (electrical), w_s in rad/s (mechanical).
+
+use crate::estimator::Class;
+use crate::tables::ControllerParameters;
+use drive_base::frame::DqHat;
+use serde::{Deserialize, Serialize};
+
+/// Share of R^ by which the resistance may be wrong: that of `lock_lost`.
+const RESISTANCE: f64 = 0.3;
+/// Minimum torque as a share of the limit.
+const LITTLE: f64 = 0.02;
+/// Time constant of the speed in s.
+const SMOOTH: f64 = 0.3;
+/// Minimum time in s.
+const SHORTEST: f64 = 1.0;
+/// Time in s after which a warning is not repeated.
+const SAID: f64 = 0.5;
+
+/// State at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Stands {
+    /// Time in s.
+    time: f64,
+    /// Magnitude of the torque asked for in N.m.
+    tau: f64,
+    /// Mechanical speed in rad/s that the resistance may hide.
+    hidden: f64,
+    /// Estimated mechanical speed in rad/s, smoothed: a rotor beside the frame swings.
+    speed: f64,
+}
+
+impl Stands {
+    /// After a sample with the references `i` (A) at the estimated mechanical `speed` (rad/s), where the limits leave `most` (N.m);
+    /// `works`: no start sequence is under way.
+    #[inline(never)]
+    pub(crate) fn update(&mut self, par: &ControllerParameters, works: bool, speed: f64, i: DqHat, most: f64) {
+        let motor = &par.motor;
+        let tau = motor.torque(i.d(), i.q()).abs();
+        let hidden = RESISTANCE * motor.R_s * i.magnitude() / (f64::from(motor.n_p) * motor.psi_M);
+        let speed = self.speed + (speed - self.speed) * (par.T_s / (par.T_s + SMOOTH));
+        let time = if works && tau > LITTLE * most && speed.abs() < hidden { self.time + par.T_s } else { 0.0 };
+        *self = Self { time, tau, hidden, speed };
+    }
+
+    /// The time in s for which nothing has moved, when it is long enough for the warning.
+    pub(crate) fn reached(&self, par: &ControllerParameters) -> Option<f64> {
+        let knows = matches!(par.estimator.class(), Class::FluxObserver | Class::BackEmf);
+        let after = SHORTEST.max(2.0 * self.hidden * par.J / self.tau);
+        (knows && self.time >= after && self.time < after + SAID).then_some(self.time)
+    }
+}
+
+/// The warning of a torque reference (N.m) that has moved nothing for a `time` (s); `speed_est` in rad/s.
+pub(crate) fn hidden(par: &ControllerParameters, tau_ref: f64, speed_est: f64, time: f64) -> String {
+    format!(
+        "tau_ref = {tau_ref} N.m has moved nothing for {time:.1} s that the estimate can show: speed_est = {speed_est:.3} rad/s; the shaft is \
+         blocked or takes the torque, or motor.R_s = {} Ohm does not fit the machine and hides the rotor, and the torque is not tau_ref",
+        par.motor.R_s
+    )
+}

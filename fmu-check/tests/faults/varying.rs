@@ -1,0 +1,49 @@
+//! An output that two runs cannot reproduce is one finding: no other check compares it, and the others still find their faults.
+#![cfg(all(target_os = "linux", target_arch = "x86_64"))]
+
+use crate::binary::{compile, pack};
+use crate::{check, library, listed, pack_with, violated};
+use fmu_check::{Confidence, Level};
+
+#[test]
+fn noise_and_a_measured_time_are_one_finding() {
+    let dir = tempfile::tempdir().unwrap();
+    for (version, property) in [(2, "NOISE"), (2, "CPU_TIME"), (3, "NOISE")] {
+        let Some(binary) = compile(version, property) else { return };
+        let report = check(&pack(dir.path(), version, property, &binary), &[]);
+        assert_eq!(violated(&report), ["T10"], "{property}: {}", listed(&report));
+        assert_eq!(report.varying, ["y"], "{property}");
+        let finding = report.finding("T10").unwrap();
+        assert_eq!((finding.level, finding.confidence), (Level::Hard, Confidence::Certain));
+        assert!(report.text(false).contains("Not compared, because two plain runs differ (T10): y."));
+    }
+}
+
+#[test]
+fn noise_in_model_exchange_is_one_finding() {
+    let dir = tempfile::tempdir().unwrap();
+    for (xml, options) in [(include_str!("exchange2.xml"), &[][..]), (include_str!("exchange3.xml"), &["-DFMI3"])] {
+        let Some(binary) = library("exchange.c", options, "NOISE") else { return };
+        let alone: Vec<_> = xml.lines().filter(|line| !line.contains("<CoSimulation")).collect();
+        let groups = ["S04", "G10", "G16", "time", "exchange", "events", "derivatives", "instances"];
+        let report = check(&pack_with(dir.path(), "noise", &alone.join("\n"), &binary), &groups);
+        assert_eq!(
+            (violated(&report), &report.varying[..]),
+            (vec!["T10"], &["y".to_owned()][..]),
+            "{}",
+            listed(&report)
+        );
+    }
+}
+
+/// A fault in another variable is found beside the noise.
+#[test]
+fn noise_hides_no_fault_of_another_variable() {
+    let dir = tempfile::tempdir().unwrap();
+    for (fault, id) in [("G13", "G13"), ("L06e", "L06"), ("F02", "F02b"), ("L04g", "L04a")] {
+        let Some(binary) = compile(2, &format!("NOISE {fault}")) else { return };
+        let report = check(&pack(dir.path(), 2, fault, &binary), &["T10", id]);
+        assert_eq!(violated(&report).len(), 2, "{fault}: {}", listed(&report));
+        assert!(violated(&report).contains(&id), "{fault}: {}", listed(&report));
+    }
+}
