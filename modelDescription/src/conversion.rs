@@ -26,7 +26,7 @@ impl Conversion {
     }
 }
 
-/// What is known of the unit of a number.
+/// The known part of the unit of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured<'a> {
     /// Name of the unit.
@@ -37,7 +37,7 @@ pub struct Measured<'a> {
     pub relative: bool,
 }
 
-/// How a number gets from one side of a connection to the other.
+/// The path of a number from one side of a connection to the other.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Passage {
     /// Unchanged: the units are equal.
@@ -49,7 +49,7 @@ pub enum Passage {
 }
 
 impl Measured<'_> {
-    /// How a number of this unit becomes one of the other.
+    /// The conversion of a number of this unit to the other.
     ///
     /// # Errors
     /// The units belong to different quantities, or one number is a difference and the other is not.

@@ -504,12 +504,12 @@ fn the_tolerance_of_the_description_or_of_the_user_reaches_the_fmu() {
     let workshop = Workshop::new();
     for version in [2, 3] {
         let fmu = workshop.plain("plant", version);
-        let told = |system| ran(system, &fmu, "tolerance", 0.2).unwrap().0;
+        let received = |system| ran(system, &fmu, "tolerance", 0.2).unwrap().0;
         let exchange = |solver| System::new(Method::ModelExchange(Integration { solver, ..Integration::default() }));
-        assert_eq!(told(System::default()), 1e-5);
-        assert_eq!(told(System::default().with_tolerance(Some(1e-3))), 1e-3);
-        assert_eq!(told(exchange(Solver::Dopri { rtol: 1e-8 })), 1e-8);
-        assert_eq!(told(exchange(Solver::Rk4)), -1.0);
+        assert_eq!(received(System::default()), 1e-5);
+        assert_eq!(received(System::default().with_tolerance(Some(1e-3))), 1e-3);
+        assert_eq!(received(exchange(Solver::Dopri { rtol: 1e-8 })), 1e-8);
+        assert_eq!(received(exchange(Solver::Rk4)), -1.0);
     }
 }
 
