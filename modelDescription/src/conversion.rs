@@ -145,6 +145,17 @@ mod tests {
     }
 
     #[test]
+    fn two_conversions_are_one_after_the_other() {
+        let [first, second] = [(2.0, 3.0), (5.0, 7.0)].map(|(factor, offset)| Conversion { factor, offset });
+        let both = Conversion::then(Some(first), Some(second)).unwrap();
+        assert!((both.apply(11.0) - second.apply(first.apply(11.0))).abs() < 1e-12);
+        assert_eq!(
+            (Conversion::then(Some(first), None), Conversion::then(None, Some(second))),
+            (Some(first), Some(second))
+        );
+    }
+
+    #[test]
     fn other_quantities_are_refused() {
         let cause = RADIANS.into_unit(NEWTON).unwrap_err();
         assert_eq!(cause, "the source is in rad/s = s-1.rad, the target in N = kg.m.s-2");

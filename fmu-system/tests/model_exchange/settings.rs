@@ -2,8 +2,9 @@
 
 use crate::workshop::Workshop;
 use fmu_import::Fmu;
-use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, Solver, System};
+use fmu_system::cosimulation::{Crossing, Integration, Method, Schedule, Settings, Solver, System};
 use fmu_system::ssp::load::Loaded;
+use model_description::Conversion;
 use std::ops::ControlFlow;
 
 /// The last value of `variable` of a plant, the last time, and the notes.
@@ -188,4 +189,31 @@ fn what_was_recorded_before_an_error_is_kept() {
     });
     assert!(outcome.unwrap_err().to_string().contains("stops here"));
     assert_eq!((recording.time.len(), recording.columns[0].values.len()), (4, 4));
+}
+
+/// z = 1 - 2 u in a loop whose one connection takes 4 z + 3: a = 1 - 2 b, b = 7 - 8 a, so a = 13/15 and b = 1/15. The derivatives of the
+/// FMU count with the factor of the connection.
+#[test]
+fn a_loop_through_a_conversion_is_solved() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let name = if version == 2 { "providesDirectionalDerivative" } else { "providesDirectionalDerivatives" };
+        for flag in [String::new(), format!("{name}='true' ")] {
+            let xml = |xml: String| xml.replace("<ModelExchange ", &format!("<ModelExchange {flag}"));
+            let fmu = workshop.fmu("plant", version, &[], xml);
+            let mut system = System::new(Method::ModelExchange(Integration::default()));
+            for name in ["a", "b"] {
+                system.add(name, &fmu, false).unwrap();
+                system.record(&format!("{name}.u")).unwrap();
+            }
+            let transformation = Some(Conversion { factor: 4.0, offset: 3.0 });
+            system.connect_by("a.z", "b.u", &Crossing { transformation, ..Crossing::default() }).unwrap();
+            system.connect("b.z", "a.u").unwrap();
+            let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
+            let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+            let last: Vec<f64> = recording.columns.iter().map(|column| *column.values.last().unwrap()).collect();
+            let expected = [13.0 / 15.0, 1.0 / 15.0];
+            assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-9), "FMI {version}, {flag}: {last:?}");
+        }
+    }
 }
