@@ -4,7 +4,7 @@
 use fmu::commands::build::{self, Build};
 use fmu_check::Level;
 use fmu_import::Fmu;
-use fmu_system::cosimulation::{Recording, Schedule, Settings, System};
+use fmu_system::cosimulation::{Recording, Schedule, Settings, System, Units};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -60,7 +60,8 @@ fn a_chain_is_consistent_at_the_start() {
     for file in archives() {
         let fmu = Fmu::open(file).unwrap();
         for order in [["a", "b", "c"], ["c", "b", "a"]] {
-            let mut system = System::default();
+            // The current of one is the voltage of the next.
+            let mut system = System::default().with_units(Units::PassOn);
             for name in order {
                 system.add(name, &fmu, false).unwrap();
             }

@@ -41,7 +41,7 @@ fn fails(targets: &str, path: &str, environment: &[(&str, &str)], parts: &[&str]
 fn targets_that_are_none() {
     fails("x86_64-plan9", "", &[], &["x86_64-plan9: rustc has no such target", "rustc --print target-list"]);
     fails("wasm32-unknown-unknown", "", &[], &["is not a supported platform of FMUs; available: x86_64-linux, "]);
-    fails("x86_64-unknown-linux-musl", "", &[], &["for musl", "take x86_64-unknown-linux-gnu"]);
+    fails("x86_64-unknown-linux-musl", "", &[], &["for musl", "use x86_64-unknown-linux-gnu"]);
     // The second of several, in either spelling.
     fails("x86_64-plan9,wasm32-unknown-unknown", "", &[], &["x86_64-plan9"]);
 }

@@ -415,8 +415,8 @@ fn a_lost_rotor_is_warned_of() {
     };
     let mut block = controller();
     let mut now = Elapsed::ZERO;
-    // A voltage without any current. At speed, no wrong resistance explains it.
-    for (speed_ref, resistance) in [(10.0, true), (100.0, false)] {
+    // A voltage without any current: a wrong resistance explains it only beside a current limit that is large for it.
+    for (speed_ref, limit, resistance) in [(10.0, 1e3, true), (10.0, 10.0, false), (100.0, 10.0, false)] {
         (block, now) = (controller(), Elapsed::ZERO);
         assert_eq!(warnings(&block.model), []);
         block.model.inputs = ControllerInputs { speed_ref, ..ControllerInputs::default() };
@@ -426,8 +426,8 @@ fn a_lost_rotor_is_warned_of() {
             now = step.end();
             assert!(now.seconds() < 1.0);
         }
+        block.model.parameters.limit.i = limit;
         let found = warnings(&block.model);
-        println!("{found:?}");
         assert!(found.len() == 1 && found[0].0 == "lock_lost", "{found:?}");
         assert!(found[0].1.contains("rad/s") && found[0].1.contains("L_q = 0.006 H"), "{found:?}");
         assert_eq!(found[0].1.contains("R_s = 1.8 Ohm"), resistance, "{found:?}");

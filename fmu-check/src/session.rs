@@ -13,7 +13,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
 use std::ffi::CString;
 use std::fs::File;
-use std::io::{Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -177,7 +177,9 @@ impl Session {
     pub(super) fn write(&self, line: &Line) {
         if let Ok(text) = serde_json::to_string(line) {
             let written = writeln!(self.lines.borrow_mut(), "{text}");
-            self.lost.set(self.lost.get() || written.is_err());
+            // Not where the FMU has closed the file: that is its fault.
+            let full = |e: std::io::Error| matches!(e.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
+            self.lost.set(self.lost.get() || written.is_err_and(full));
         }
     }
 

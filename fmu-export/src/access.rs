@@ -284,7 +284,7 @@ impl<E: Exported> Instance<E> {
             && self.states.contains(&index)
     }
 
-    /// Whether the variable [keeps](keeps) its value now: a checked value is the same.
+    /// Whether the variable [keeps](keeps) its value now: a value that passes the check equals it.
     pub(crate) fn stays(&mut self, index: usize) -> bool {
         let (state, sets) = (self.current.life.state(), self.sets_state(index));
         let found = table::<E>().entry(&mut self.current.block, index);

@@ -476,7 +476,8 @@ mod unix {
                 name: printable(stat.get(name + 1..rest)?).into_owned(),
                 alive: !matches!(*fields.first()?, "Z" | "X"),
                 parent: number(1)?,
-                group: Pid::from_raw(number(2)?)?,
+                // -1 for a process that is being removed.
+                group: number(2).filter(|group| *group > 0).and_then(Pid::from_raw)?,
                 session: number(3)?,
             })
         })

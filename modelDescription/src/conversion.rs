@@ -26,7 +26,7 @@ impl Conversion {
     }
 }
 
-/// What is known of the unit of a number.
+/// The known part of the unit of a number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured<'a> {
     /// Name of the unit.
@@ -37,7 +37,7 @@ pub struct Measured<'a> {
     pub relative: bool,
 }
 
-/// How a number gets from one side of a connection to the other.
+/// The path of a number from one side of a connection to the other.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Passage {
     /// Unchanged: the units are equal.
@@ -49,7 +49,7 @@ pub enum Passage {
 }
 
 impl Measured<'_> {
-    /// How a number of this unit becomes one of the other.
+    /// The conversion of a number of this unit to the other.
     ///
     /// # Errors
     /// The units belong to different quantities, or one number is a difference and the other is not.
@@ -141,6 +141,17 @@ mod tests {
         assert!(
             mixed.contains("a difference (relativeQuantity) in K, the target an absolute value in degC"),
             "{mixed}"
+        );
+    }
+
+    #[test]
+    fn two_conversions_are_one_after_the_other() {
+        let [first, second] = [(2.0, 3.0), (5.0, 7.0)].map(|(factor, offset)| Conversion { factor, offset });
+        let both = Conversion::then(Some(first), Some(second)).unwrap();
+        assert!((both.apply(11.0) - second.apply(first.apply(11.0))).abs() < 1e-12);
+        assert_eq!(
+            (Conversion::then(Some(first), None), Conversion::then(None, Some(second))),
+            (Some(first), Some(second))
         );
     }
 

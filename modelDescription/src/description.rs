@@ -134,7 +134,7 @@ impl ModelDescription {
         Some(if v.relative { shown.of_differences() } else { shown.clone() })
     }
 
-    /// What is known of the unit of a variable's values.
+    /// The known part of the unit of a variable's values.
     pub fn measured<'a>(&self, v: &'a ModelVariable) -> Measured<'a> {
         let base = v.unit.as_deref().and_then(|name| self.unit(name)?.base);
         Measured { unit: v.unit.as_deref(), base, relative: v.relative }

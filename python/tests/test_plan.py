@@ -192,7 +192,7 @@ WRONG = {
     "an interface": (lambda p: pair_of(p, fmi_type="ME"), ValueError, "must be CoSimulation or ModelExchange, not 'ME'"),
     "an FMU of an interface": (lambda p: pair_of(p, fmi_type={"q": "ModelExchange"}), ValueError, "q is not the name of an FMU"),
     "a solver": (lambda p: pair_of(p, solver="Rk45"), ValueError, "solver = 'Rk45': there is no such solver"),
-    "a solver of nobody": (lambda p: pair_of(p, solver="RK4"), FmuError, "are for Model Exchange, and no FMU runs so"),
+    "a solver of nobody": (lambda p: pair_of(p, solver="RK4"), FmuError, "is for Model Exchange, and no FMU runs so"),
     "a tolerance": (lambda p: pair_of(p, fmi_type="ModelExchange", relative_tolerance=1.0), FmuError, "between 1e-14 and 0.1"),
     "NaN in a column": (lambda p: raised(p.run_many({"p.motor.R_s": [float("nan")]})), FmuError, "motor.R_s"),
     "no row": (lambda p: p.run_many({"p.motor.R_s": []}), ValueError, "the table has no row"),

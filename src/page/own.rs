@@ -348,7 +348,11 @@ impl Model<'_> {
             Term::Name(name) => {
                 let v = self.variable(name)?;
                 let has_number = is_curve(v) || (v.causality == Causality::Parameter && !v.is_array());
-                if has_number { Ok(json!(name)) } else { Err(format!("{name} has no number that the page can read")) }
+                if has_number {
+                    Ok(json!(name))
+                } else {
+                    Err(format!("the page cannot read {name}: expected a plotted variable or a scalar parameter"))
+                }
             }
             Term::Product(parts) => {
                 if parts.iter().any(|part| matches!(part, Term::Product(_))) {

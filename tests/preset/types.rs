@@ -136,7 +136,7 @@ fn wrong_names_and_values_are_told_and_nothing_is_written() {
         ("in.fan=3", "in.fan = 3 is not allowed: 1 (Off), 2 (On)"),
         ("voltage=NaN", "voltage = NaN is not allowed: any finite number"),
         ("voltage=1A", "voltage = 1A is not a number in V"),
-        ("label=\u{1}", "has a character that XML does not have"),
+        ("label=\u{1}", "has a character that XML does not allow"),
         ("label", "label: is not --set NAME=VALUE"),
     ] {
         let said = preset(of(V3), &new, &["voltage=2", set]).unwrap_err();

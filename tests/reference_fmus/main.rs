@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The archives of a package of `examples/`, of FMI 2.0 and of FMI 3.0: a library as Cargo's tests are built.
+/// The archives of a package of `examples/`, of FMI 2.0 and of FMI 3.0: the library is built with the profile of the tests.
 fn packed(package: &str) -> Vec<PathBuf> {
     type Once = Arc<OnceLock<Vec<PathBuf>>>;
     static ALL: Mutex<BTreeMap<String, Once>> = Mutex::new(BTreeMap::new());

@@ -3,7 +3,7 @@
 use crate::checks;
 use crate::commission::{CommissionFault, CommissionState};
 use crate::commissioning::{CommissionMode, Held, IDENTIFIED, Turn};
-use crate::estimator::{Class, Estimator, Kind, Sample, Setup, options};
+use crate::estimator::{Class, Estimator, Kind, Sample, Setup, options, tracker};
 use crate::gains::Gains;
 use crate::idle;
 use crate::lock::{LOST, Lock};
@@ -237,6 +237,7 @@ impl SensorlessController {
             weakens: par.weakening.used,
             tell: &tell,
         };
+        tracker::validate(&setup)?;
         options::validate(*estimator, &setup)?;
         estimator.validate(&setup)?;
         checks::current(par)?;

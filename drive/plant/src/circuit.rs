@@ -92,7 +92,7 @@ impl Passed {
         self.impulse += step.impulse;
     }
 
-    /// Of a step of `h` (s) with these rates in its four stages, by the weights of the Runge-Kutta method, while the shaft
+    /// The sums for a step of `h` (s) with these rates in its four stages, by the weights of the Runge-Kutta method, while the shaft
     /// turns by `turned` (rad): the load torque is constant, or the speed is imposed.
     #[expect(clippy::inline_always, reason = "as for `Circuit::rates`")]
     #[inline(always)]

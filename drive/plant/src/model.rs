@@ -194,7 +194,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 12;
+    const STATE_VERSION: u16 = 13;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;

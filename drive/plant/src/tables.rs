@@ -9,10 +9,10 @@ use crate::mechanics::{MECHANICS, Mechanics};
 use crate::power::{ENERGY, POWERS};
 use crate::saturation::{SATURATION, Saturation};
 use crate::signals::PlantOutputs;
-use crate::thermal::{HEAT, TEMPERATURES, THERMAL, Thermal};
+use crate::thermal::{THERMAL, Thermal};
 use drive_base::frame::Dq;
 use drive_base::motor::{MOTOR, Motor};
-use fmu_core::unit::{AMPERE, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, WEBER};
+use fmu_core::unit::{AMPERE, KELVIN, NEWTON_METER, ONE, PER_KELVIN, RADIAN, S2_PER_RAD2, SPEED, WATT, WEBER};
 use fmu_core::{Part, Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
@@ -130,8 +130,38 @@ pub const OUTPUTS: &Table<PlantOutputs> = table![
     )
     .mean(),
     O::part("energy_", &Part { table: ENERGY, lens: |o| &mut o.energy }),
-    O::part("", &Part { table: TEMPERATURES, lens: |o| &mut o.temperatures }),
-    O::part("", &Part { table: HEAT, lens: |o| &mut o.heat }),
+    O::part("", &Part { table: THERMAL_OUTPUTS, lens: |o| o }),
+];
+
+/// Temperatures and heat.
+const THERMAL_OUTPUTS: &Table<PlantOutputs> = table![
+    O::output("T_winding", &KELVIN, "Temperature of the winding", |o| &mut o.temperatures.winding).nominal(300.0),
+    O::output("T_stator", &KELVIN, "Temperature of the stator iron", |o| &mut o.temperatures.stator).nominal(300.0),
+    O::output("T_magnet", &KELVIN, "Temperature of the magnets", |o| &mut o.temperatures.magnet).nominal(300.0),
+    O::output("T_inverter", &KELVIN, "Temperature of the inverter", |o| &mut o.temperatures.inverter).nominal(300.0),
+    O::output("Q_winding", &WATT, "Heat out of the winding, p_cu; mean like p_cu", |o| &mut o.heat.winding).mean(),
+    O::output(
+        "Q_iron",
+        &WATT,
+        "Heat out of the stator iron, (1 - iron.rotor_share) p_iron + p_friction; mean like these",
+        |o| &mut o.heat.iron,
+    )
+    .mean(),
+    O::output("Q_magnet", &WATT, "Heat out of rotor and magnets, iron.rotor_share p_iron; mean like p_iron", |o| {
+        &mut o.heat.magnet
+    },)
+    .mean(),
+    O::output("Q_inverter", &WATT, "Heat out of the inverter, p_cond + p_sw; mean like these", |o| {
+        &mut o.heat.inverter
+    })
+    .mean(),
+    O::output(
+        "Q_coolant",
+        &WATT,
+        "Heat to the coolant, out of the FMU: Constant all losses, Network the heat flow from the network, Imposed 0",
+        |o| &mut o.heat.coolant,
+    )
+    .mean(),
 ];
 
 type P = Row<PlantParameters>;

@@ -229,7 +229,7 @@ fn the_description_has_the_start_values_and_the_token() {
     assert_eq!(start("fan"), [Value::Integer(2)]);
     assert_eq!(start("label"), [Value::Text("two\nlines \u{3c8}".into())]);
     let said = described(&[("label", "\u{1}")]).unwrap_err();
-    assert!(said.contains("has a character that XML does not have"), "{said}");
+    assert!(said.contains("has a character that XML does not allow"), "{said}");
 }
 
 /// A state contains all values, and can be restored in every instance of the model; a reset returns to the instance's preset.

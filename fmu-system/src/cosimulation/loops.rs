@@ -16,7 +16,7 @@ const NEARLY: f64 = 1e-11;
 
 /// Solves the loop among the inputs that are not settled.
 pub(super) fn solve(exchange: &mut Exchange, instances: &mut [Instance], t: f64) -> Result<(), Error> {
-    let inputs = exchange.unsettled(instances, t)?;
+    let mut inputs = exchange.unsettled(instances, t)?;
     if inputs.is_empty() {
         return Ok(());
     }
@@ -25,9 +25,24 @@ pub(super) fn solve(exchange: &mut Exchange, instances: &mut [Instance], t: f64)
             "the connections form an algebraic loop of discrete inputs or elements of arrays, which do not settle";
         return Err(Error::usage(&names(&inputs, instances), format!("{cause} at t = {t} s")));
     }
-    let (mut u, mut last) = (exchange.values_of(&inputs), f64::INFINITY);
+    loop {
+        newton(exchange, instances, t, &inputs)?;
+        // An input of the loop that the last pass happened to settle was not among them: without it, a step is one more pass.
+        let known = |new: &Unsettled| inputs.iter().any(|i| (i.index, i.reference) == (new.index, new.reference));
+        let unsettled = exchange.unsettled(instances, t)?.into_iter();
+        let more: Vec<_> = unsettled.filter(|new| new.source.is_some() && !known(new)).collect();
+        if more.is_empty() {
+            return Ok(());
+        }
+        inputs.extend(more);
+    }
+}
+
+/// Iterates these inputs until they are what the outputs pass on.
+fn newton(exchange: &mut Exchange, instances: &mut [Instance], t: f64, inputs: &[Unsettled]) -> Result<(), Error> {
+    let (mut u, mut last) = (exchange.values_of(inputs), f64::INFINITY);
     for _ in 0..ITERATIONS {
-        let g = exchange.try_values(instances, t, &inputs, &u)?;
+        let g = exchange.try_values(instances, t, inputs, &u)?;
         let mut residual: Vec<f64> = g.iter().zip(&u).map(|(g, u)| g - u).collect();
         let scale = u.iter().chain(&g).fold(f64::MIN_POSITIVE, |max, x| max.max(x.abs()));
         let error = residual.iter().fold(0.0_f64, |max, r| max.max(r.abs())) / scale;
@@ -38,14 +53,14 @@ pub(super) fn solve(exchange: &mut Exchange, instances: &mut [Instance], t: f64)
             break;
         }
         last = error;
-        let mut matrix = matrix(exchange, instances, t, &inputs, &u, &g)?;
+        let mut matrix = matrix(exchange, instances, t, inputs, &u, &g)?;
         if !eliminate(&mut matrix, &mut residual) {
             break;
         }
         u.iter_mut().zip(&residual).for_each(|(u, step)| *u += step);
     }
     let cause = format!("the algebraic loop of these inputs does not converge at t = {t} s in {ITERATIONS} iterations");
-    Err(Error::usage(&names(&inputs, instances), cause))
+    Err(Error::usage(&names(inputs, instances), cause))
 }
 
 /// The matrix 1 - dG/du by rows.

@@ -13,7 +13,7 @@ use model_description::{
     BaseType, Causality, Conversion, Interface, Measured, ModelVariable, Passage, Variability, parse_number,
 };
 
-/// What a connection between different units does.
+/// The effect of a connection between different units.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Units {
     /// It converts the number.
@@ -23,7 +23,7 @@ pub enum Units {
     PassOn,
 }
 
-/// How a value gets from an output to an input.
+/// The path of a value from an output to an input.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Crossing<'a> {
     /// Whether units are converted.
@@ -73,7 +73,7 @@ impl System {
         Self { tolerance, ..self }
     }
 
-    /// What connections between different units do.
+    /// The effect of connections between different units.
     pub fn units(&self) -> Units {
         self.units
     }
@@ -140,7 +140,7 @@ impl System {
         self.notes.push(text);
     }
 
-    /// What was noticed since the last call: units that are not known.
+    /// Notes since the last call: unknown units.
     pub fn take_notes(&mut self) -> Vec<String> {
         std::mem::take(&mut self.notes)
     }
@@ -283,7 +283,7 @@ impl System {
         self.feed(target, to, Source::Port(source, Conversion::then(conversion, *transformation)))
     }
 
-    /// What is known of the unit of a variable, written `instance.variable`; what is `stated` elsewhere if its FMU names none.
+    /// The known part of the unit of a variable, written `instance.variable`; `stated` if its FMU names none.
     ///
     /// # Errors
     /// The variable does not exist.

@@ -1,4 +1,4 @@
-//! What is integrated.
+//! The integrated system.
 
 use fmu_import::{CompletedStep, Error, Update};
 

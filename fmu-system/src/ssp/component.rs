@@ -1,4 +1,4 @@
-//! What a system consists of.
+//! The elements of a system.
 
 use super::ssm::MappingEntry;
 use super::ssv::Parameter;
@@ -28,7 +28,7 @@ pub struct Connector {
     pub name: String,
     /// `input`, `output`, `parameter`, `calculatedParameter` or `inout`.
     pub kind: String,
-    /// Unit, where the file tells it.
+    /// Unit, if the file gives one.
     pub unit: Option<String>,
     /// Line of the element.
     pub line: usize,

@@ -191,7 +191,7 @@ fn node(level: &Level, end: &ConnectionEnd) -> Result<(Node, String), String> {
                 let names = level.components.iter().map(|c| c.name.as_str());
                 let inner = level.inner.iter().map(|inner| inner.path.trim_end_matches('.'));
                 format!(
-                    "there is no component {element}; there are {}",
+                    "there is no component {element}; available: {}",
                     names.chain(inner).collect::<Vec<_>>().join(", ")
                 )
             };

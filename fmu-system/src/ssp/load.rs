@@ -2,15 +2,15 @@
 
 use super::DESCRIPTION;
 use super::error::{Error, invalid};
+use super::package::Package;
 use super::ssm;
-use super::ssv::{self, Parameter};
-use super::structure::{Binding, Connection, ConnectionEnd, Connector, Mapping, ParameterValues, Structure};
+use super::ssv::Parameter;
+use super::structure::{Connection, ConnectionEnd, Connector, Structure};
 use super::values::{self, Given};
 use crate::cosimulation::{Crossing, Method, Schedule, Sequence, Settings, System, Units};
-use fmu_import::{Fmu, check_entries, document, limits};
-use model_description::{Element, Experiment, Measured, Passage, decode};
+use fmu_import::{Fmu, check_entries, limits};
+use model_description::{Experiment, Measured, Passage};
 use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -62,37 +62,6 @@ impl Connectors {
             Some((_, source)) => Ok(source.clone()),
             None => Ok(self.ports(name)?.swap_remove(0)),
         }
-    }
-}
-
-/// The archive, with its path for errors.
-struct Package<'a> {
-    path: &'a Path,
-    zip: ZipArchive<File>,
-}
-
-impl Package<'_> {
-    fn bytes(&mut self, name: &str) -> Result<Vec<u8>, Error> {
-        let of = || self.path.display();
-        let mut bytes = Vec::new();
-        // The sizes in the headers are within the limits: see `check_entries`.
-        match self.zip.by_name(name) {
-            Ok(entry) => {
-                let read = entry.take(limits::UNPACKED.most).read_to_end(&mut bytes);
-                read.map_err(|e| Error::Invalid(format!("{}: {e}", of())))?
-            }
-            Err(zip::result::ZipError::FileNotFound) => return invalid(format!("{}: has no {name}", of())),
-            Err(e) => return invalid(format!("{}: {name}: {e}", of())),
-        };
-        Ok(bytes)
-    }
-
-    fn text(&mut self, name: &str) -> Result<String, Error> {
-        let of = |cause: String| Error::Invalid(format!("{}: {cause}", self.path.display()));
-        let bytes = document(&mut self.zip, name).map_err(of)?;
-        let bytes = bytes.ok_or_else(|| of(format!("has no {name}")))?;
-        let text = decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?;
-        Ok(text.to_owned())
     }
 }
 
@@ -180,7 +149,7 @@ impl Loaded {
                 variants[0]
             )));
         }
-        let mut package = Package { path, zip };
+        let mut package = Package { path, description, zip };
         let text = package.text(description)?;
         let in_description = |cause: String| within(format!("{description}: {cause}"));
         let structure = Structure::read(&text).map_err(in_description)?;
@@ -475,34 +444,6 @@ fn find<'a>(structure: &'a Structure, end: &ConnectionEnd) -> Result<&'a Connect
     let names = || connectors.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
     let found = connectors.iter().find(|c| c.name == end.connector);
     found.ok_or_else(|| format!("{of} has no connector {}; it has {}", end.connector, names()))
-}
-
-impl Package<'_> {
-    /// The values of a binding, its prefix before every name, with a name for their file.
-    fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
-        let path = self.path.display().to_string();
-        let (file, parameters) = match &binding.values {
-            ParameterValues::Inline(parameters) => (format!("{path}: {DESCRIPTION}"), parameters.clone()),
-            ParameterValues::File(name) => {
-                let file = format!("{path}: {name}");
-                let read = ssv::read(&self.text(name)?).map_err(|cause| Error::Invalid(format!("{file}: {cause}")))?;
-                (file, read)
-            }
-        };
-        let parameters = match &binding.mapping {
-            None => parameters,
-            Some(Mapping::Inline(entries)) => ssm::apply(entries, &parameters)
-                .map_err(|cause| Error::Invalid(format!("{path}: {DESCRIPTION}: {cause}")))?,
-            Some(Mapping::File(name)) => {
-                let wrong = |cause: String| Error::Invalid(format!("{path}: {name}: {cause}"));
-                let root = Element::parse(&self.text(name)?).map_err(|e| wrong(e.to_string()))?;
-                let entries = ssm::read(&root).map_err(wrong)?;
-                ssm::apply(&entries, &parameters).map_err(wrong)?
-            }
-        };
-        let named = |p: Parameter| Parameter { name: format!("{}{}", binding.prefix, p.name), ..p };
-        Ok((file, parameters.into_iter().map(named).collect()))
-    }
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod element;
 mod error;
 mod flat;
 pub mod load;
+mod package;
 pub mod ssm;
 pub mod ssv;
 pub mod structure;

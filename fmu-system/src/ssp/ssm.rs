@@ -13,7 +13,7 @@ pub struct MappingEntry {
     line: usize,
 }
 
-/// What happens to a value.
+/// The transformation of a value.
 #[derive(Clone, Debug, PartialEq)]
 enum Transformation {
     None,

@@ -73,7 +73,7 @@ impl Structure {
         })
     }
 
-    /// What the file says of the unit of a connector.
+    /// The unit of a connector according to the file.
     pub fn measured<'a>(&self, connector: &'a Connector) -> Option<Measured<'a>> {
         let unit = connector.unit.as_deref()?;
         let base = self.units.iter().find(|(name, _)| name == unit).map(|(_, base)| *base);

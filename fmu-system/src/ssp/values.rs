@@ -89,7 +89,7 @@ fn in_unit_of(
         }
         let model = &description.model_name;
         let unknown = |_| {
-            format!("is given in {unit}, and {model} has it in {own}: define {unit} in the file, or convert the value")
+            format!("is given in {unit}, but {model} has it in {own}: define {unit} in the file, or convert the value")
         };
         return Ok((Some(each(&|x| quantity::convert(x, unit, variable, description).map_err(unknown))?), None));
     }

@@ -187,7 +187,7 @@ int fmi2GetNominalsOfContinuousStates(M *m, double *x, size_t n) { return nomina
 int fmi2GetDirectionalDerivative(M *m, const uint32_t *u, size_t nu, const uint32_t *k, size_t nk, const double *seed, double *to) {
     for (size_t i = 0; i < nu; i++) {
         to[i] = 0;
-        for (size_t j = 0; j < nk; j++) to[i] += seed[j] * (k[j] == U ? 1 : -1);
+        for (size_t j = 0; j < nk; j++) to[i] += seed[j] * (u[i] == Z ? (k[j] == U ? -2 : 0) : k[j] == U ? 1 : -1);
     }
     return OK;
 }

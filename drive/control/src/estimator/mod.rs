@@ -80,9 +80,8 @@ macro_rules! estimators {
             /// Checks that this estimator can work in the controller.
             ///
             /// # Errors
-            /// Those of [`Estimating::validate`]; a tracker that cannot work.
+            /// Those of [`Estimating::validate`], and of the resistance adaptation.
             pub fn validate(self, setup: &Setup) -> Result<(), Fault> {
-                tracker::validate(setup)?;
                 resistance::validate(setup)?;
                 match self {
                     $(Self::$name => <$state as Estimating<EstimatorParameters>>::validate(setup),)*

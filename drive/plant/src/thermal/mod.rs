@@ -29,7 +29,7 @@ use fmu_core::unit::KELVIN;
 use fmu_core::{Field, Part, Row, Scalar, Table, enumeration, table};
 use network::{NETWORK, Network};
 use parts::T_20;
-pub use parts::{HEAT, Heat, TEMPERATURES, THERMAL_INPUTS, Temperatures, ThermalInputs};
+pub use parts::{Heat, THERMAL_INPUTS, Temperatures, ThermalInputs};
 use serde::{Deserialize, Serialize};
 
 enumeration! {

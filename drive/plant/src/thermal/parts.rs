@@ -1,7 +1,7 @@
 //! Temperatures and heat of the parts: winding, stator iron, rotor with the magnets, and inverter. T in K, Q in W, positive out
 //! of the part.
 
-use fmu_core::unit::{KELVIN, WATT};
+use fmu_core::unit::KELVIN;
 use fmu_core::{Row, Scalar, Table, table};
 use serde::{Deserialize, Serialize};
 
@@ -115,41 +115,4 @@ pub const THERMAL_INPUTS: &Table<ThermalInputs> = table![
         .at_least(0.0)
         .nominal(300.0)
         .read_with("thermal.mode", "Imposed"),
-];
-
-type T = Row<Temperatures>;
-
-/// Variables of the temperatures.
-pub const TEMPERATURES: &Table<Temperatures> = table![
-    T::output("T_winding", &KELVIN, "Temperature of the winding", |t| &mut t.winding).nominal(300.0),
-    T::output("T_stator", &KELVIN, "Temperature of the stator iron", |t| &mut t.stator).nominal(300.0),
-    T::output("T_magnet", &KELVIN, "Temperature of the magnets", |t| &mut t.magnet).nominal(300.0),
-    T::output("T_inverter", &KELVIN, "Temperature of the inverter", |t| &mut t.inverter).nominal(300.0),
-];
-
-type Q = Row<Heat>;
-
-/// Variables of the heat.
-pub const HEAT: &Table<Heat> = table![
-    Q::output("Q_winding", &WATT, "Heat out of the winding, p_cu; mean like p_cu", |q| &mut q.winding).mean(),
-    Q::output(
-        "Q_iron",
-        &WATT,
-        "Heat out of the stator iron, (1 - iron.rotor_share) p_iron + p_friction; mean like these",
-        |q| &mut q.iron,
-    )
-    .mean(),
-    Q::output("Q_magnet", &WATT, "Heat out of rotor and magnets, iron.rotor_share p_iron; mean like p_iron", |q| {
-        &mut q.magnet
-    },)
-    .mean(),
-    Q::output("Q_inverter", &WATT, "Heat out of the inverter, p_cond + p_sw; mean like these", |q| { &mut q.inverter })
-        .mean(),
-    Q::output(
-        "Q_coolant",
-        &WATT,
-        "Heat to the coolant, out of the FMU: Constant all losses, Network the heat flow from the network, Imposed 0",
-        |q| &mut q.coolant,
-    )
-    .mean(),
 ];

@@ -76,7 +76,7 @@ def load_and_unload(fmu):
 @case
 def instances_are_freed(fmu):
     """Thousands of instances, with errors and saved states: no memory leak."""
-    for n in range(3000):
+    for n in range(1500):
         it = fmu.instance()
         it.begin()
         run(it, 2)
@@ -87,9 +87,9 @@ def instances_are_freed(fmu):
         assert it.restore(state) == OK
         assert it.forget(state) == OK and it.forget(stored) == OK
         it.free()
-        if n == 1000:
+        if n == 500:
             before = resident()
-    assert resident() - before < 2000 * 256, f"{(resident() - before) / 2000:.0f} bytes per life"
+    assert resident() - before < 1000 * 256, f"{(resident() - before) / 1000:.0f} bytes per life"
 
 
 @case

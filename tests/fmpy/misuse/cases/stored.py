@@ -86,9 +86,9 @@ def stored_state_of_another_size(fmu):
 
 @case
 def flipped_bits(fmu):
-    """Each bit of the first bytes and one of each further byte: refused, and the pointer stays null."""
+    """Each bit of the first bytes and one of every fifth further byte: refused, and the pointer stays null."""
     it, data = stored(fmu)
-    for position in range(len(data)):
+    for position in (*range(64), *range(64, len(data), 5)):
         for bit in range(8) if position < 64 else [position % 8]:
             broken = bytearray(data)
             broken[position] ^= 1 << bit
@@ -120,7 +120,7 @@ def forged_bytes(fmu):
     dice, body = random.Random(2), data[:-4]
     assert zlib.crc32(body).to_bytes(4, "little") == data[-4:], "the layout has changed: adapt this case"
     accepted = 0
-    for _ in range(3000):
+    for _ in range(1000):
         forged = bytearray(body)
         for _ in range(dice.choice((1, 1, 2, 8))):
             forged[dice.randrange(32, len(body))] = dice.choice((0, 1, 0x7F, 0x80, 0xFF, dice.randrange(256)))

@@ -113,7 +113,7 @@ mod tests {
             ("open file:///home/ann/t.mat: no", Some("/home/ann/t.mat")),
             ("\"/root/data\"", Some("/root/data")),
             ("D:\\Users\\ann\\t.txt", Some("D:\\Users\\ann\\t.txt")),
-            ("/home/ann/work/src/lib.rscalled `unwrap`", None),
+            ("/home/ann/model/src/lib.rscalled `unwrap`", None),
             ("/home/ann/.cargo/registry/src/x/table", None),
             ("/home/ann/model.c:12: assertion", None),
             ("C:\\Users\\ann\\x.pdb", None),

@@ -1,0 +1,219 @@
+//! Settings of a run: tolerance, steps, jumps of inputs, results before an error; and a system from an SSP file.
+
+use crate::workshop::Workshop;
+use fmu_import::Fmu;
+use fmu_system::cosimulation::{Crossing, Integration, Method, Schedule, Settings, Solver, System};
+use fmu_system::ssp::load::Loaded;
+use model_description::Conversion;
+use std::ops::ControlFlow;
+
+/// The last value of `variable` of a plant, the last time, and the notes.
+fn ran(system: System, fmu: &Fmu, variable: &str, stop: f64) -> Result<(f64, f64, Vec<String>), fmu_import::Error> {
+    let mut system = system;
+    system.add("p", fmu, false)?;
+    system.record(&format!("p.{variable}"))?;
+    let settings = Settings { start: 0.0, stop, step: 0.1, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(())))?;
+    let (value, time) = (recording.columns[0].values.last().unwrap(), recording.time.last().unwrap());
+    Ok((*value, *time, system.take_notes()))
+}
+
+#[test]
+fn the_tolerance_of_the_description_or_of_the_user_reaches_the_fmu() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let fmu = workshop.plain("plant", version);
+        let received = |system| ran(system, &fmu, "tolerance", 0.2).unwrap().0;
+        let exchange = |solver| System::new(Method::ModelExchange(Integration { solver, ..Integration::default() }));
+        assert_eq!(received(System::default()), 1e-5);
+        assert_eq!(received(System::default().with_tolerance(Some(1e-3))), 1e-3);
+        assert_eq!(received(exchange(Solver::Dopri { rtol: 1e-8 })), 1e-8);
+        assert_eq!(received(exchange(Solver::Rk4)), -1.0);
+    }
+}
+
+#[test]
+fn an_fmu_that_cannot_vary_its_step_gets_no_shorter_one() {
+    let workshop = Workshop::new();
+    let with = |attribute: &str| {
+        let xml = |xml: String| xml.replace("canHandleVariableCommunicationStepSize='true'", attribute);
+        workshop.fmu("plant", 2, &[], xml)
+    };
+    let varies = workshop.plain("plant", 2);
+    assert!(matches!(ran(System::default(), &varies, "x", 0.95).unwrap(), (_, 0.95, notes) if notes.is_empty()));
+    for fmu in [with(""), with("canHandleVariableCommunicationStepSize='false'")] {
+        let (_, end, notes) = ran(System::default(), &fmu, "x", 0.95).unwrap();
+        assert!((end - 0.9).abs() < 1e-12, "{end}");
+        let [note] = &notes[..] else { panic!("{notes:?}") };
+        assert!(
+            note.starts_with("p cannot vary its step") && note.contains("ends with the last whole step, at 0.9"),
+            "{note}"
+        );
+        assert!(ran(System::default(), &fmu, "x", 1.0).unwrap().2.is_empty());
+        let error = ran(System::default(), &fmu, "x", 0.05).unwrap_err().to_string();
+        assert!(error.contains("shorter than one step of 0.1 s"), "{error}");
+    }
+    let internal = workshop.fmu("plant", 3, &[], |xml| {
+        xml.replace(
+            "canHandleVariableCommunicationStepSize='true'",
+            "canHandleVariableCommunicationStepSize='true' fixedInternalStepSize='0.03'",
+        )
+    });
+    let notes = ran(System::default(), &internal, "x", 0.2).unwrap().2;
+    assert!(
+        notes[0].contains("its fixedInternalStepSize is 0.03 s, and the step of 0.1 s is not a multiple"),
+        "{notes:?}"
+    );
+}
+
+#[test]
+fn a_jump_between_two_communication_points_is_noted() {
+    let workshop = Workshop::new();
+    let fmu = workshop.plain("plant", 2);
+    let notes = |points: &str, method| {
+        let mut system = System::new(method);
+        system.add("p", &fmu, false).unwrap();
+        system.input("p.u", Schedule::parse(points).unwrap()).unwrap();
+        let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+        system.feasible(&settings).unwrap();
+        system.take_notes()
+    };
+    let exact = Method::ModelExchange(Integration::default());
+    assert_eq!(notes("0:0,0.3:1,2.05:3", Method::default()), [""; 0]);
+    assert_eq!(notes("0:0~0.25:1", Method::default()), [""; 0]);
+    assert_eq!(notes("0:0,0.25:1", exact), [""; 0]);
+    let found = notes("0:0,0.2:1,0.25:2,0.35:3", Method::default());
+    assert!(
+        found.len() == 1
+            && found[0].starts_with("p.u: the value of 0.25 s, between two communication points, acts from 0.3"),
+        "{found:?}"
+    );
+}
+
+/// An SSP file of these entries.
+fn packed(path: &std::path::Path, entries: &[(&str, &[u8])]) {
+    use std::io::Write;
+    let mut zip = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
+    for (name, bytes) in entries {
+        zip.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+        zip.write_all(bytes).unwrap();
+    }
+    zip.finish().unwrap();
+}
+
+const NESTED: &str = "<s:SystemStructureDescription><s:System name='outer'>
+    <s:Connectors><s:Connector name='T0' kind='parameter'/><s:Connector name='out' kind='output'/></s:Connectors>
+    <s:ParameterBindings>
+      <s:ParameterBinding source='p.ssv'><s:ParameterMapping source='p.ssm'/></s:ParameterBinding>
+      <s:ParameterBinding><s:ParameterValues><v:ParameterSet><v:Parameters>
+        <v:Parameter name='T0'><v:Real value='0.2'/></v:Parameter></v:Parameters></v:ParameterSet></s:ParameterValues></s:ParameterBinding>
+    </s:ParameterBindings>
+    <s:Elements>
+      <s:Component name='a' source='plant.fmu'><s:Connectors><s:Connector name='z' kind='output'/>
+        <s:Connector name='T' kind='parameter'/></s:Connectors></s:Component>
+      <s:System name='in'>
+        <s:Connectors><s:Connector name='w' kind='input'/><s:Connector name='T1' kind='parameter'/>
+          <s:Connector name='r' kind='output'/></s:Connectors>
+        <s:Elements><s:Component name='b' source='plant.fmu'><s:Connectors><s:Connector name='u' kind='input'/>
+          <s:Connector name='z' kind='output'/><s:Connector name='T' kind='parameter'/></s:Connectors></s:Component></s:Elements>
+        <s:Connections><s:Connection startConnector='w' endElement='b' endConnector='u'/>
+          <s:Connection startElement='b' startConnector='z' endConnector='r'/>
+          <s:Connection startConnector='T1' endElement='b' endConnector='T'><c:LinearTransformation factor='3'/></s:Connection></s:Connections>
+      </s:System>
+    </s:Elements>
+    <s:Connections>
+      <s:Connection startElement='a' startConnector='z' endElement='in' endConnector='w'>
+        <c:LinearTransformation factor='0.5' offset='1'/></s:Connection>
+      <s:Connection startElement='in' startConnector='r' endConnector='out'/>
+      <s:Connection startConnector='T0' endElement='a' endConnector='T'/>
+      <s:Connection startConnector='T0' endElement='in' endConnector='T1'/>
+    </s:Connections>
+  </s:System></s:SystemStructureDescription>";
+
+#[test]
+fn an_ssp_with_inner_systems_mappings_and_transformations() {
+    let workshop = Workshop::new();
+    let fmu = std::fs::read(workshop.archive("plant", 2, &[], |xml| xml)).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("nested.ssp");
+    let values = b"<v:ParameterSet><v:Parameters><v:Parameter name='drive'><v:Real value='3'/></v:Parameter>\
+        <v:Parameter name='unused'><v:Real value='3'/></v:Parameter></v:Parameters></v:ParameterSet>";
+    let mapping =
+        b"<m:ParameterMapping><m:MappingEntry source='drive' target='a.u'><c:LinearTransformation factor='2'/>\
+        </m:MappingEntry></m:ParameterMapping>";
+    let entries: [(&str, &[u8]); 4] =
+        [("SystemStructure.ssd", NESTED.as_bytes()), ("plant.fmu", &fmu), ("p.ssv", values), ("p.ssm", mapping)];
+    packed(&path, &entries);
+    let mut loaded = Loaded::open(&path, false).unwrap();
+    assert_eq!(loaded.notes, [""; 0]);
+    for name in ["a.u", "a.z", "in.b.u", "out", "a.T", "in.b.T"] {
+        loaded.record(name).unwrap();
+    }
+    let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
+    let recording = loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let last: Vec<f64> = recording.columns.iter().map(|column| *column.values.last().unwrap()).collect();
+    // z = 1 - 2 u.
+    let expected = [6.0, -11.0, -4.5, 10.0, 0.2, 0.6];
+    assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{last:?}");
+
+    // Another variant, and what is missing.
+    packed(&path, &[("B.ssd", NESTED.as_bytes()), ("A.ssd", NESTED.as_bytes()), entries[1], entries[2], entries[3]]);
+    let open =
+        |name: &str| Loaded::open_files(&[name.to_owned()], folder.path(), false).map(drop).map_err(|e| e.to_string());
+    assert!(open("nested.ssp#A.ssd").is_ok());
+    let error = open("nested.ssp").unwrap_err();
+    assert!(
+        error.contains("has no SystemStructure.ssd; its variants are A.ssd, B.ssd: name one, as in nested.ssp#A.ssd"),
+        "{error}"
+    );
+    let twice = NESTED.replace(
+        "<s:Connection startElement='in' startConnector='r'",
+        "<s:Connection startElement='a' startConnector='z' endElement='in' endConnector='w'/><s:Connection startElement='in' startConnector='r'",
+    );
+    packed(&path, &[("SystemStructure.ssd", twice.as_bytes()), entries[1], entries[2], entries[3]]);
+    let error = open("nested.ssp").unwrap_err();
+    assert!(error.contains("in.w is fed twice"), "{error}");
+}
+
+#[test]
+fn what_was_recorded_before_an_error_is_kept() {
+    let workshop = Workshop::new();
+    let mut system = System::default();
+    system.add("p", &workshop.plain("plant", 2), false).unwrap();
+    system.record("p.x").unwrap();
+    system.record_text_as("p.x", "text").unwrap_err();
+    let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+    let (recording, outcome) = system.run_keeping(&settings, |point| {
+        let error = || fmu_import::Error::usage("p", "stops here");
+        if point.index < 3 { Ok(ControlFlow::Continue(())) } else { Err(error()) }
+    });
+    assert!(outcome.unwrap_err().to_string().contains("stops here"));
+    assert_eq!((recording.time.len(), recording.columns[0].values.len()), (4, 4));
+}
+
+/// z = 1 - 2 u in a loop whose one connection takes 4 z + 3: a = 1 - 2 b, b = 7 - 8 a, so a = 13/15 and b = 1/15. The derivatives of the
+/// FMU count with the factor of the connection.
+#[test]
+fn a_loop_through_a_conversion_is_solved() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let name = if version == 2 { "providesDirectionalDerivative" } else { "providesDirectionalDerivatives" };
+        for flag in [String::new(), format!("{name}='true' ")] {
+            let xml = |xml: String| xml.replace("<ModelExchange ", &format!("<ModelExchange {flag}"));
+            let fmu = workshop.fmu("plant", version, &[], xml);
+            let mut system = System::new(Method::ModelExchange(Integration::default()));
+            for name in ["a", "b"] {
+                system.add(name, &fmu, false).unwrap();
+                system.record(&format!("{name}.u")).unwrap();
+            }
+            let transformation = Some(Conversion { factor: 4.0, offset: 3.0 });
+            system.connect_by("a.z", "b.u", &Crossing { transformation, ..Crossing::default() }).unwrap();
+            system.connect("b.z", "a.u").unwrap();
+            let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
+            let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+            let last: Vec<f64> = recording.columns.iter().map(|column| *column.values.last().unwrap()).collect();
+            let expected = [13.0 / 15.0, 1.0 / 15.0];
+            assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-9), "FMI {version}, {flag}: {last:?}");
+        }
+    }
+}
