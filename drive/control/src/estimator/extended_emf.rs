@@ -136,7 +136,7 @@ mod tests {
         let (motor, par) = (salient(), EstimatorParameters::default());
         for (share, w, i_q, off) in [
             (2.0, 47.0, 5.59, 0.0),
-            (2.0, 30.0, 5.59, PI),
+            (2.0, 20.0, 5.59, PI),
             (2.0, -47.0, -5.59, 0.0),
             (2.0, 30.0, -5.59, 0.0),
             (0.2, 30.0, 5.59, 0.0),
