@@ -274,7 +274,6 @@ const SHARED: &[(&str, &[&str])] = &[
             "Limit",
             "Measured",
             "Motion",
-            "Outcome",
             "Point",
             "Quantity",
             "Schedule",

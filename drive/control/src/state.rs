@@ -2,6 +2,7 @@
 
 use crate::battery::Battery;
 use crate::current::CurrentController;
+use crate::current_limit::Fresh;
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
 use crate::lock::Lock;
@@ -110,6 +111,8 @@ pub(super) struct State {
     pub(super) commands: [Command; 3],
     /// Current of the last sample in A.
     pub(super) i_last: AlphaBeta,
+    /// Whether the measured currents are new.
+    pub(super) fresh: Fresh,
     /// References of the last sample in A.
     pub(super) i_ref: DqHat,
     /// Torque reference of the last sample in N.m.
