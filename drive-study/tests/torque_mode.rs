@@ -205,3 +205,35 @@ fn a_small_torque_that_moves_nothing_is_said() {
     let (exact, said) = moved(1.0, 0.3, |_| ());
     assert!(exact > 0.8 && !said, "R^ = R: {exact} of the speed");
 }
+
+/// With `release`, no torque means no current, and a torque that is asked for again turns the rotor; without it, i_0 flows, and holds a
+/// small load with R^ < R.
+#[test]
+fn no_torque_releases_the_shaft() {
+    for release in [false, true] {
+        let mut pair = Pair::default();
+        let par = &mut pair.controller.model.parameters;
+        par.speed_loop.torque_mode = true;
+        par.zero_speed.release = release;
+        pair.start().unwrap();
+        let mut run = |tau: f64, load: f64, samples: u32| {
+            for _ in 0..samples {
+                pair.controller.model.inputs.tau_ref = tau;
+                pair.set_inputs(0.0, load, 325.0);
+                pair.step(T_S).unwrap();
+            }
+            let i = pair.controller.model.inputs.i.to_stator().magnitude();
+            (i, pair.plant.out.speed, pair.controller.out.tau_max)
+        };
+        let (i, _, most) = run(0.0, 0.0, 3000);
+        assert_eq!(i > 4.9, !release, "release {release}: {i} A");
+        assert!(
+            (most - 0.675 * (7.5_f64 * 7.5 - 25.0).sqrt()).abs() < 1e-6,
+            "the limit is that of a torque: {most} N.m"
+        );
+        let (_, speed, _) = run(0.0, -0.2, 1000);
+        assert_eq!(speed > 5.0, release, "release {release}: {speed} rad/s under a load of 0.2 N.m");
+        let (_, speed, _) = run(1.0, 0.0, 2000);
+        assert!(speed > 60.0, "release {release}: {speed} rad/s after 0.2 s of 1 N.m");
+    }
+}

@@ -77,11 +77,12 @@ impl SensorlessController {
     #[inline(never)]
     fn any_cycle(&mut self) {
         let ControllerInputs { speed_ref, tau_ref, .. } = self.inputs;
+        let release = self.parameters.zero_speed.release;
         if self.measures_resistance() {
-            (self.inputs.speed_ref, self.inputs.tau_ref) = (0.0, 0.0);
+            (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
         }
         self.state.computed = self.cycle(false);
-        (self.inputs.speed_ref, self.inputs.tau_ref) = (speed_ref, tau_ref);
+        (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (speed_ref, tau_ref, release);
     }
 
     /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default

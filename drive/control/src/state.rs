@@ -251,7 +251,10 @@ impl State {
         if par.dc.used {
             i_0 = at_most(i_0, par.dc.i_0(&par.motor, inputs.u_dc));
         }
-        let law = gains.law(par, i_0, speed);
+        let mut law = gains.law(par, i_0, speed);
+        if par.speed_loop.torque_mode && par.zero_speed.releases(inputs.tau_ref) {
+            law = law.released();
+        }
         let limit = law.limit;
         if par.weakening.used || par.dc.used {
             return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
