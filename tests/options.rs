@@ -32,6 +32,8 @@ struct Mode {
 
 const SPEED: &str = "changes the time that the command takes alone";
 const LIMIT: &str = "a limit that this run does not reach";
+const CERTAIN: &str = "the only finding is certain";
+const ACCURATE: &str = "the models have no tolerance";
 const NO_EVENT: &str = "no event falls into this run";
 const EQUAL: &str = "connects no two units, and both ways of a run give the same values";
 const BEST: &str = "the delay that is found without it";
@@ -98,7 +100,13 @@ const COMMANDS: &[Options] = &[
         modes: &[
             Mode {
                 line: "d=in/PmsmDrive.fmu --set plant.initial.speed=10 --stop 0.01 --step 0.002 --csv -",
-                same: &[("memory", LIMIT), ("sandbox", LIMIT), ("in-process", EQUAL), ("no-unit-conversion", EQUAL)],
+                same: &[
+                    ("memory", LIMIT),
+                    ("sandbox", LIMIT),
+                    ("in-process", EQUAL),
+                    ("no-unit-conversion", EQUAL),
+                    ("tolerance", ACCURATE),
+                ],
             },
             Mode {
                 line: "d=in/PmsmDrive.fmu --set plant.initial.speed=10 --stop 0.01 --record speed --plot out.png",
@@ -107,6 +115,7 @@ const COMMANDS: &[Options] = &[
                     ("sandbox", LIMIT),
                     ("in-process", EQUAL),
                     ("no-unit-conversion", EQUAL),
+                    ("tolerance", ACCURATE),
                     ("me", "less than a pixel of the picture"),
                 ],
             },
@@ -117,6 +126,7 @@ const COMMANDS: &[Options] = &[
                     ("sandbox", LIMIT),
                     ("in-process", EQUAL),
                     ("no-unit-conversion", EQUAL),
+                    ("tolerance", ACCURATE),
                     ("event-mode", NO_EVENT),
                     ("early-return", NO_EVENT),
                 ],
@@ -133,7 +143,7 @@ const COMMANDS: &[Options] = &[
             },
             Mode {
                 line: "d=in/PmsmDrive.fmu --in-process --stop 0.01 --html out.html",
-                same: &[("in-process", EQUAL), ("no-unit-conversion", EQUAL)],
+                same: &[("in-process", EQUAL), ("no-unit-conversion", EQUAL), ("tolerance", ACCURATE)],
             },
         ],
     },
@@ -166,11 +176,23 @@ const COMMANDS: &[Options] = &[
         modes: &[
             Mode {
                 line: "in/wrong.fmu --only terminals",
-                same: &[("patience", LIMIT), ("memory", LIMIT), ("sandbox", LIMIT), ("strict", "a must is violated")],
+                same: &[
+                    ("patience", LIMIT),
+                    ("memory", LIMIT),
+                    ("sandbox", LIMIT),
+                    ("strict", "a must is violated"),
+                    ("confidence", CERTAIN),
+                ],
             },
             Mode {
                 line: "in/wrong.fmu --only terminals --format html",
-                same: &[("patience", LIMIT), ("memory", LIMIT), ("sandbox", LIMIT), ("strict", "a must is violated")],
+                same: &[
+                    ("patience", LIMIT),
+                    ("memory", LIMIT),
+                    ("sandbox", LIMIT),
+                    ("strict", "a must is violated"),
+                    ("confidence", CERTAIN),
+                ],
             },
             Mode {
                 line: "in/PmsmPlant.fmu --replay L06",
@@ -202,7 +224,13 @@ const COMMANDS: &[Options] = &[
         ],
         modes: &[Mode {
             line: "--resistance 1 --flux 1 --load 0,1 --speed 0.01 --angle 0 --scenario load --out out",
-            same: &[("jobs", SPEED), ("full", "each of its axes is given"), ("set", "the adaptation is off"), ("angle", START), ("scenario", START)],
+            same: &[
+                ("jobs", SPEED),
+                ("full", "each of its axes is given"),
+                ("set", "the adaptation is off"),
+                ("angle", START),
+                ("scenario", START),
+            ],
         }],
     },
     Options {
@@ -237,7 +265,10 @@ const COMMANDS: &[Options] = &[
         ],
         modes: &[
             Mode { line: "in/bench.csv --n-p 3 --current 15 --delay 0 --every 5 --json", same: &[("delay", BEST)] },
-            Mode { line: "in/bench.csv --n-p 3 --current 15 --delay 0 --every 5 --out out.toml", same: &[("delay", BEST)] },
+            Mode {
+                line: "in/bench.csv --n-p 3 --current 15 --delay 0 --every 5 --out out.toml",
+                same: &[("delay", BEST)],
+            },
         ],
     },
     Options {
@@ -378,7 +409,7 @@ fn inputs(folder: &Path) {
     write("cycle.csv", "t,v\n0,0\n10,20\n20,0\n");
     let vehicle = fs::read_to_string(root.join("examples/vehicle/vehicle.toml")).unwrap();
     write("vehicle.toml", &vehicle.replacen("mass = 1300.0", "mass = 900.0", 1));
-    write("known.toml", "");
+    write("known.toml", "[\"PmsmPlant, FMI 3.0\"]\nmust = [\"I01\"]\n");
     write("stimuli.csv", "time,tau_load\n0,0\n0.1,1\n");
     let ssv = |name: &str| {
         let value = std::iter::once((name, &drive_study::tune::setting::Value::Real(1.0)));

@@ -82,7 +82,8 @@ impl SensorlessController {
             (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
         }
         self.state.computed = self.cycle(false);
-        (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (speed_ref, tau_ref, release);
+        (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) =
+            (speed_ref, tau_ref, release);
     }
 
     /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default

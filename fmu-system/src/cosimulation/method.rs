@@ -72,7 +72,10 @@ impl Method {
                     return refused("event_mode", "no FMU has event mode (hasEventMode, FMI 3.0 Co-Simulation)");
                 }
                 if *early_return && !any(|k| matches!(k, Kind::CoSimulation { early_return: true, .. })) {
-                    return refused("early_return", "no FMU returns early (mightReturnEarlyFromDoStep, FMI 3.0 Co-Simulation)");
+                    return refused(
+                        "early_return",
+                        "no FMU returns early (mightReturnEarlyFromDoStep, FMI 3.0 Co-Simulation)",
+                    );
                 }
             }
             Self::ModelExchange(integration) => {
