@@ -379,7 +379,7 @@ fn copy_all(from: &Path, to: &Path) {
 fn inputs(folder: &Path) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
-    let copy = |from: &str, to: &str| drop(fs::copy(root.join(from), folder.join(to)).unwrap());
+    let copy = |from: &str, to: &str| assert!(fs::copy(root.join(from), folder.join(to)).unwrap() > 0);
     for name in ["PmsmDrive", "PmsmPlant", "SensorlessController"] {
         let file = format!("{name}.fmu");
         fs::copy(common::archives().join("fmi3").join(&file), folder.join(&file)).unwrap();
@@ -487,7 +487,7 @@ fn every_option_changes_something_or_is_refused() {
             let after = run(dir.path(), command, &changed(&words(mode), option, *value));
             let same = mode.same.iter().any(|(id, _)| *id == option.get_id().as_str() || format!("--{id}") == flag);
             let refused = after.status == Some(2) && before.status != Some(2);
-            let parts = value.into_iter().flat_map(|value| value.split('=')).any(|part| after.error.contains(part));
+            let parts = value.iter().flat_map(|value| value.split('=')).any(|part| after.error.contains(part));
             // Of three or more options that exclude each other, the command line names the one that excludes the others.
             let excludes = after.error.contains("cannot be used with one or more of the other specified arguments");
             let setting = flag.trim_start_matches("--").replace('-', "_");

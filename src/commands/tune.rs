@@ -124,7 +124,9 @@ pub fn run(args: &Tune) -> Result<()> {
         if swings.is_empty() {
             println!("without a load, from 0.1 to 1 pu and back, the drive does not swing");
         }
-        swings.iter().for_each(|swing| println!("{swing}"));
+        for swing in &swings {
+            println!("{swing}");
+        }
         for celsius in trial::TEMPERATURES {
             println!("\nwinding and magnet at {celsius:.0} degC since before the start, the rated current:");
             table(&trial::all(&trial::at_temperature(&tuned, celsius), ANGLES / 4), "does not hold");
