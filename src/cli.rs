@@ -59,7 +59,7 @@ enum Command {
 }
 
 /// The command line. `-h` shows the first example of `--help`.
-fn line() -> clap::Command {
+pub fn line() -> clap::Command {
     Cli::command().mut_subcommands(|command| {
         let example = command.get_long_about().and_then(|text| first_example(&text.to_string(), command.get_name()));
         example.into_iter().fold(command, |command, text| command.after_help(text).after_long_help(""))

@@ -193,7 +193,7 @@ pub struct Plane {
     pub base: f64,
     /// Speed in rpm above which there is no motoring torque.
     pub end: f64,
-    /// Greatest motoring and generating torque.
+    /// Maximum motoring and generating torque.
     pub panel: Panel,
 }
 

@@ -113,7 +113,7 @@ fn number(x: f64, decimals: usize) -> String {
     format!("{:.decimals$}", if x.abs() < half { 0.0 } else { x }).replace('-', "−")
 }
 
-/// The pages have the run of every order with every delay, and the right one is told by the current alone.
+/// The pages have the run of every order with every delay, and the current alone shows which is right.
 #[test]
 fn order_and_delay() {
     for order in Order::ALL {
@@ -165,7 +165,7 @@ fn loaded(kind: Kind, speed: f64, late: bool, delay: i32) -> f64 {
     mean.mean()
 }
 
-/// Every estimator is as good with two samples as with one, where the injections work and where the EMF does; told of one in
+/// Every estimator is as good with two samples as with one, where the injections work and where the EMF does; reported of one in
 /// the place of two, those on the EMF are behind by w T_s.
 #[test]
 fn every_estimator_knows_two_samples() {

@@ -145,7 +145,7 @@ fn without_a_link_the_diodes_short_the_machine() {
 #[test]
 fn a_narrow_zone_does_not_take_for_ever() {
     let mut off = off(|par| (par.initial.speed, par.inverter.i_zero) = (600.0, 1e-12));
-    // At most a hundred substeps in a period, whatever i_zero: else this one would be refused.
+    // At most a hundred substeps in a period, for any i_zero: else this one would be refused.
     off.step(5.0);
     assert!(off.block.out.i.a == 0.0 && off.block.out.speed < 420.0, "{:?}", off.block.out);
 }

@@ -18,7 +18,7 @@ struct Method {
     name: &'static str,
     kind: Kind,
     set: fn(&mut ControllerParameters),
-    /// Greatest mean error in deg.
+    /// Maximum mean error in deg.
     mean: f64,
     /// Standard deviation of the error in deg of the list.
     std: f64,

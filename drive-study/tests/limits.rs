@@ -1,4 +1,4 @@
-//! The numbers of `drive/control/docs/limits.html`, the limits that every documentation page tells: each row is that of a run.
+//! The numbers of `drive/control/docs/limits.html`, the limits on every documentation page: each row is that of a run.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "common/rated.rs"]

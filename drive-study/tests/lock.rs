@@ -1,4 +1,4 @@
-//! A lost rotor: every output stays finite, regardless of the estimator, and `lock_lost` tells lost from found.
+//! A lost rotor: every output stays finite, regardless of the estimator, and `lock_lost` separates lost from found.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::estimator::Kind;

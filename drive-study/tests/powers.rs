@@ -258,7 +258,7 @@ fn excite(plant: &mut SteppedPlant, k: u32, h: f64) {
     plant.block.model.inputs.u = Phases::from_stator(Axis::<Rotor>::at(theta).to_stator(u));
 }
 
-/// Greatest deviation of a current (A) and of the speed (rad/s) that `tau_shaft` gives, when the free run is imposed, and
+/// Maximum deviation of a current (A) and of the speed (rad/s) that `tau_shaft` gives, when the free run is imposed, and
 /// the bound of the former: an acceleration turns the true rotor on by half of it times h^2 before the next angle comes.
 fn imposed(h: f64, steps: u32) -> (f64, f64, f64) {
     let run = free(h, steps);

@@ -114,17 +114,18 @@ fn a_real_inverter_near_standstill() {
     assert!(blind >= 3 && uncalibrated >= 10, "{blind} lost without observe, {uncalibrated} without calibrate");
 }
 
-/// R rises by 40 % at 30 rpm without a load and at 60 rpm generating; and a start from 120 deg off that leaves R^ wrong.
+/// R rises by 40 % at 30 rpm without a load and at 60 rpm generating: lost without the tracking. A start from 120 deg off needs none,
+/// since the drive waits until R^ is measured.
 #[test]
 fn tracks_the_resistance_at_creep() {
     let heating = |load| Cell { scenario: Course::Heating, ..cell(1.0, 1.0, load, 60.0) };
     let cells =
         [Cell { speed: 0.01, ..heating(0.0) }, heating(-1.0), Cell { theta: 120.0, ..cell(0.8, 1.0, -1.0, 30.0) }];
-    assert_eq!(lost(&cells, Some(0.02)), cells);
+    assert_eq!(lost(&cells, Some(0.02)), cells[..2]);
     assert_eq!(lost_by(&cells, robust()), []);
 }
 
-/// Off, the estimate is the parameter; in torque mode it adapts while no torque is asked for.
+/// Off, the estimate is the parameter; in torque mode it adapts before a torque acts and while none is asked for, not in a start at speed.
 #[test]
 fn nothing_adapts_unless_asked() {
     let end = |mut pair: Pair| {
@@ -136,8 +137,12 @@ fn nothing_adapts_unless_asked() {
     assert!((end(pair(0.9, None)) - 1.8).abs() < 1e-12);
     let mut asked = torque_mode.clone();
     asked.controller.model.inputs.tau_ref = 0.5;
-    assert!((end(torque_mode) - 2.0).abs() < 0.01);
-    assert!((end(asked) - 1.8).abs() < 0.02);
+    let mut turning = asked.clone();
+    turning.controller.model.parameters.speed_est = 1.0;
+    for at_rest in [torque_mode, asked] {
+        assert!((end(at_rest) - 2.0).abs() < 0.01);
+    }
+    assert!((end(turning) - 1.8).abs() < 0.02);
     assert!((end(pair(0.9, Some(0.0))) - 2.0).abs() < 0.01);
 }
 

@@ -106,11 +106,19 @@ fn the_ramp_leads_the_speed() {
 }
 
 /// A shaft that pulsates at half of its speed, like that of an engine: the observer follows with the angle error dw W / (W^2 +
-/// w_n^2), and `lock_lost` shows one that does not.
+/// w_n^2), and `lock_lost` shows one that does not. In all of them the current stays within its limit wherever the hexagon allows.
 #[test]
 fn a_pulsating_shaft() {
     let (n_p, speed) = (21.0, 150.0);
-    for (share, w_n, found) in [(0.1, 300.0, true), (0.2, 600.0, true), (0.3, 1200.0, true), (0.7, 300.0, false)] {
+    for (share, w_n, tau_ref, found) in [
+        (0.1, 300.0, 0.0, true),
+        (0.2, 600.0, 0.0, true),
+        (0.3, 1200.0, 0.0, true),
+        (0.7, 300.0, 0.0, false),
+        (0.5, 300.0, 0.0, false),
+        (0.5, 300.0, -7.5, false),
+        (0.5, 600.0, -7.5, true),
+    ] {
         let mut pair = Pair::default();
         let plant = &mut pair.plant.model;
         plant.parameters.motor = Motor { n_p: 21, R_s: 0.03, L_d: 60e-6, L_q: 60e-6, psi_M: 0.004 };
@@ -124,12 +132,20 @@ fn a_pulsating_shaft() {
         pair.start().unwrap();
         let at = |t: f64| speed * (1.0 + share * (0.5 * speed * t).sin());
         let (mut angle, mut error, mut lost) = (0.0, 0.0_f64, 0.0_f64);
+        let (mut most, mut cut, mut since) = (0.0_f64, 0, 0);
         for k in 0..15_000_u32 {
             let t = T_S * f64::from(k);
             let inputs = &mut pair.plant.model.inputs;
             (inputs.speed_shaft, inputs.angle_shaft) = (at(t), angle);
             angle += T_S * at(t + 0.5 * T_S);
+            pair.controller.model.inputs.tau_ref = tau_ref;
             pair.step(T_S).unwrap();
+            since = if pair.controller.out.voltage_limited { 0 } else { since + 1 };
+            cut += u32::from(pair.controller.out.current_limited);
+            // Once the hexagon has allowed the correction and it has acted.
+            if since > 5 {
+                most = most.max(pair.controller.model.inputs.i.to_stator().magnitude());
+            }
             if k > 5000 {
                 error = error.max(runner::rotor_ahead(&pair).abs());
                 lost = lost.max(pair.controller.out.lock_lost);
@@ -137,7 +153,12 @@ fn a_pulsating_shaft() {
         }
         let W = 0.5 * speed;
         let expected = (n_p * share * speed * W / (W * W + w_n * w_n)).to_degrees();
-        println!("+-{share}, {w_n} rad/s: {error} deg, expected {expected} deg, lock_lost {lost}");
+        println!("+-{share}, {w_n} rad/s: {error} deg, expected {expected} deg, lock_lost {lost}, {most} A");
+        // The EMF of a lost estimate is turned by up to 0.3 w T_s too little or too much in the first interval, twice that in the second.
+        let w = n_p * speed * (1.0 + share);
+        let off = if found { 0.02 * 60.0 } else { 3.0 * 0.3 * w * T_S * w * 0.004 * T_S / 60e-6 };
+        assert!(most < 60.0 + off, "{most} A beyond the limit of 60 A by more than {off} A");
+        assert!(found && tau_ref == 0.0 || cut > 0, "the limit is seen to act");
         if found {
             assert!((error - expected).abs() < 0.15 * expected + 1.0, "{error} deg, not {expected} deg");
             assert!(lost < 0.8, "{lost}");
@@ -183,4 +204,36 @@ fn a_small_torque_that_moves_nothing_is_said() {
     assert!(above > 0.8 && !said, "R^ = {share} R: {above} of the speed at {threshold} A, said: {said}");
     let (exact, said) = moved(1.0, 0.3, |_| ());
     assert!(exact > 0.8 && !said, "R^ = R: {exact} of the speed");
+}
+
+/// With `release`, no torque means no current, and a torque that is asked for again turns the rotor; without it, i_0 flows, and holds a
+/// small load with R^ < R.
+#[test]
+fn no_torque_releases_the_shaft() {
+    for release in [false, true] {
+        let mut pair = Pair::default();
+        let par = &mut pair.controller.model.parameters;
+        par.speed_loop.torque_mode = true;
+        par.zero_speed.release = release;
+        pair.start().unwrap();
+        let mut run = |tau: f64, load: f64, samples: u32| {
+            for _ in 0..samples {
+                pair.controller.model.inputs.tau_ref = tau;
+                pair.set_inputs(0.0, load, 325.0);
+                pair.step(T_S).unwrap();
+            }
+            let i = pair.controller.model.inputs.i.to_stator().magnitude();
+            (i, pair.plant.out.speed, pair.controller.out.tau_max)
+        };
+        let (i, _, most) = run(0.0, 0.0, 3000);
+        assert_eq!(i > 4.9, !release, "release {release}: {i} A");
+        assert!(
+            (most - 0.675 * (7.5_f64 * 7.5 - 25.0).sqrt()).abs() < 1e-6,
+            "the limit is that of a torque: {most} N.m"
+        );
+        let (_, speed, _) = run(0.0, -0.1, 2000);
+        assert_eq!(speed > 5.0, release, "release {release}: {speed} rad/s under a load of 0.1 N.m");
+        let (_, speed, _) = run(1.0, 0.0, 2000);
+        assert!(speed > 60.0, "release {release}: {speed} rad/s after 0.2 s of 1 N.m");
+    }
 }

@@ -10,7 +10,8 @@ use drive::estimator::Kind::{
 use drive::{Pair, PmsmPlant, SensorlessController};
 use drive_study::runner;
 use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules::{self, Tuned};
+use drive_study::tune::rules;
+use drive_study::tune::setting::Tuned;
 use fmu_core::{Block, Elapsed, Fault, Model, Slot, Step, Variability};
 use std::f64::consts::PI;
 use std::path::Path;

@@ -120,6 +120,7 @@ fn the_current_loop_holds_its_limit_at_the_bound() {
     for active in [false, true] {
         let (bound, beyond) = (greatest(2.4e-4, active), greatest(1e-3, active));
         println!("active resistance {active}: {bound} A at the bound, {beyond} A at 1 ms, limit 7.5 A");
-        assert!(bound < 1.15 * 7.5 && beyond > 3.0 * 7.5, "{bound} {beyond} A");
+        // The limit at modulation knows one sample: it keeps the first, and bounds what the second does.
+        assert!(bound < 1.01 * 7.5 && beyond > 1.5 * 7.5, "{bound} {beyond} A");
     }
 }

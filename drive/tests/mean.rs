@@ -423,6 +423,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
         plant.mechanics.imposed = false;
         (controller.speed_loop.ramp, controller.speed_est) = (300.0, 5.0);
         (controller.zero_speed.i_0, controller.current.mtpa) = (2.0, case == 2);
+        controller.speed_loop.torque_mode = case == 4;
         if case == 2 {
             controller.limit.tau = 1.5;
         }
@@ -461,7 +462,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
         }
     }
     let inputs = &mut block.model.inputs;
-    (inputs.u_dc, inputs.tau_ref, inputs.speed_shaft) = (400.0, 190.0, 430.0);
+    (inputs.u_dc, inputs.tau_ref, inputs.speed_shaft) = (400.0, if case == 4 { 0.0 } else { 190.0 }, 430.0);
     (inputs.speed_ref, inputs.tau_load) = (40.0, 0.7);
     block.initialize();
     block.model.validate().ok()?;
@@ -487,14 +488,14 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
 /// The descriptions state the effect of each parameter correctly.
 #[test]
 fn parameters_have_an_effect_or_say_that_they_have_none() {
-    let plain = [0, 1, 2, 3].map(|case| with_moved(None, case).unwrap());
+    let plain = [0, 1, 2, 3, 4].map(|case| with_moved(None, case).unwrap());
     let mut idle = Vec::new();
     for index in 0..PmsmDriveMean::TABLE.len() {
         let Some((name, meta, element)) = PmsmDriveMean::TABLE.locate(index) else { continue };
         if element > 0 || meta.causality != Causality::Parameter {
             continue;
         }
-        let moved = [0, 1, 2, 3].map(|case| with_moved(Some(index), case));
+        let moved = [0, 1, 2, 3, 4].map(|case| with_moved(Some(index), case));
         let same = moved.iter().zip(&plain).all(|(moved, plain)| moved.as_ref().is_none_or(|bits| bits == plain));
         let tried = moved.iter().any(Option::is_some);
         if !PmsmDriveMean::has_effect(&name) {

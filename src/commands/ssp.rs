@@ -120,7 +120,7 @@ fn is_of(folder: &Path, version: FmiVersion) -> Result<()> {
 fn values(args: &Ssp) -> Result<Vec<ComponentValues>> {
     if let Some(motor) = &args.motor {
         let tuned = tune::tune(motor)?;
-        let of = |component: &str, settings: &[tune::rules::Setting]| ComponentValues {
+        let of = |component: &str, settings: &[tune::setting::Setting]| ComponentValues {
             component: component.into(),
             file: motor.display().to_string(),
             text: ssv::text(&format!("{} {component}", tuned.name), settings),

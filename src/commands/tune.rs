@@ -6,10 +6,10 @@ use crate::{pack, ssv};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules::{self, Setting, Value};
+use drive_study::tune::motor::{MotorFile, torque_constant};
+use drive_study::tune::setting::{Setting, Tuned, Value};
 use drive_study::tune::trial::{self, Trial};
-use drive_study::tune::{self, limits, rules::Tuned};
+use drive_study::tune::{self, limits, remedy, rules};
 use fmu_core::{Description, Model};
 use std::path::{Path, PathBuf};
 
@@ -21,7 +21,9 @@ use std::path::{Path, PathBuf};
 ///
 /// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
 /// a load at rating.speed_max if that is given. A note lists each load and each start at which the drive fails, with remedies
-/// that the command has tried too; the exit status is still 0. --check prints the trial as a table.
+/// that the command has tried too; the exit status is still 0. Another note names the speed at which the drive without a load swings
+/// most, on the way from 0.1 to 1 pu and back. Rasmussen's observer adapts the resistance, unless the trial holds less with it: a note
+/// says so. --check prints the trial as a table, and that of a machine of -30 and of 130 degC.
 ///
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
@@ -101,7 +103,7 @@ pub fn run(args: &Tune) -> Result<()> {
             println!("  {name:26}{:>14}  {rule}", shown(value));
         }
     }
-    let constant = shown(&Value::Real(rules::torque_constant(&motor.data)));
+    let constant = shown(&Value::Real(torque_constant(&motor.data)));
     println!("\nK = 1.5 n_p psi_M = {constant} N.m/A: torque per ampere of i_q; R^: the R_s of the controller");
     let trials = trial::all(&tuned, ANGLES);
     let (limits, narrow) = limits::of(&motor, &tuned, &trials);
@@ -111,8 +113,24 @@ pub fn run(args: &Tune) -> Result<()> {
     for limit in &limits {
         println!("\nnote: {limit}");
     }
+    let swings = trial::swings(&tuned);
+    if let Some(worst) = swings.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)) {
+        let cure = remedy::calm(&motor, &tuned, &trials);
+        let cure = cure.map_or("use a sensor (estimator Sensored)".to_owned(), |cure| cure.to_string());
+        println!("\nnote: {worst}; {cure}");
+    }
     if args.check {
-        table(&trials);
+        table(&trials, "does not hold: see the note");
+        if swings.is_empty() {
+            println!("without a load, from 0.1 to 1 pu and back, the drive does not swing");
+        }
+        for swing in &swings {
+            println!("{swing}");
+        }
+        for celsius in trial::TEMPERATURES {
+            println!("\nwinding and magnet at {celsius:.0} degC since before the start, the rated current:");
+            table(&trial::all(&trial::at_temperature(&tuned, celsius), ANGLES / 4), "does not hold");
+        }
     }
     println!();
     for file in &files {
@@ -122,7 +140,7 @@ pub fn run(args: &Tune) -> Result<()> {
 }
 
 /// Prints the trial.
-fn table(trials: &[Trial]) {
+fn table(trials: &[Trial], lost: &str) {
     println!("\nspeed   started    held load   min. speed  angle error");
     for trial in trials {
         let Trial { task, angles, started, held, least, error, .. } = trial;
@@ -131,7 +149,7 @@ fn table(trials: &[Trial]) {
         let verdict = match (trial.starts() && trial.holds(), trial.slips()) {
             (true, false) => "holds",
             (true, true) => "slipped, recovered",
-            (false, _) => "does not hold: see the note",
+            (false, _) => lost,
         };
         let level = format!("{:.2}", task.level);
         let level = level.trim_end_matches('0').trim_end_matches('.');

@@ -6,7 +6,7 @@ use super::text::{declare, html, identifier};
 use anyhow::{Context, Result, bail, ensure};
 use drive_study::tune::{
     self,
-    rules::{Tuned, Value},
+    setting::{Tuned, Value},
 };
 use std::collections::BTreeSet;
 use std::fmt::Write as _;

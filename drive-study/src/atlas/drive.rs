@@ -45,8 +45,8 @@ impl Drive {
         }
     }
 
-    /// The machine of a file with this estimator, tuned by the rules of `fmu tune`: a flux observer by those for Rasmussen's, any
-    /// other by those for the extended EMF.
+    /// The machine of a file with this estimator and a fixed resistance, tuned by the rules of `fmu tune`: a flux observer by those
+    /// for Rasmussen's, any other by those for the extended EMF.
     ///
     /// # Errors
     /// Those of [`crate::tune::tune`].
@@ -56,7 +56,7 @@ impl Drive {
         let rest = kind.class() == Class::FluxObserver;
         let rules = if rest { "Rasmussen" } else { "ExtendedEmf" };
         file.data.control.estimator = Some(Spanned::new(0..0, rules.into()));
-        let tuned = rules::tune(&file)?;
+        let tuned = rules::fixed(&file)?;
         let mut pair = tuned.pair();
         let par = &mut pair.controller.model.parameters;
         par.estimator = kind;

@@ -1,9 +1,11 @@
 //! The comparison as one self-contained page.
 
 use super::candidate::Entry;
+use super::measure::Outcome;
 use super::plots::Plot;
+use super::run::Run;
+use super::table;
 use super::table::{Block, mark, number};
-use super::{Outcome, Run, table};
 use crate::ink;
 use anyhow::Result;
 use fmu_plot::page::{self, escape};

@@ -189,3 +189,23 @@ mod tests {
         assert_eq!((f.clone().into_trace(true).lost, f.into_trace(false).lost), (None, Some(0.2)));
     }
 }
+
+/// The result of one estimator in one scenario.
+#[derive(Clone, Debug)]
+pub enum Outcome {
+    /// Numbers, and the run over time if it is worth a plot.
+    Measured(Vec<Measure>, Option<Trace>),
+    /// Why the scenario does not apply to this estimator.
+    NotApplicable(&'static str),
+    /// The drive could not be started: the message about inconsistent parameters.
+    Refused(String),
+}
+
+/// Extent of the comparison. The reduced one is for a test that runs in seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Effort {
+    /// 24 starts, all speeds.
+    Full,
+    /// 4 starts, some speeds, no bandwidths.
+    Reduced,
+}

@@ -1,8 +1,7 @@
 //! Scenarios with an imperfect model of the drive in the controller: wrong machine parameters, dead time.
 
-use super::Outcome;
 use super::candidate::{Candidate, Class};
-use super::measure::Measure;
+use super::measure::{Measure, Outcome};
 use super::running::slowed_down;
 use drive::motor::Motor;
 use fmu_core::Fault;

@@ -1,7 +1,7 @@
 //! Plots over time: speed and angle error of all estimators in one plot per scenario and, for each estimator that
 //! injects a voltage, the carrier current and the angle found in it (Fig. 8 and 11 of the review).
 
-use super::Run;
+use super::run::Run;
 use crate::ink;
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, REFERENCE};

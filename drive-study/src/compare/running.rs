@@ -1,9 +1,7 @@
 //! Scenarios of a running drive: start, ramp, reversal, load steps, rated load, lowest speed, bandwidth.
 
-use super::Outcome;
 use super::candidate::{Candidate, Class, opposing};
-use super::measure::{Follow, Measure};
-use super::scenario::Effort;
+use super::measure::{Effort, Follow, Measure, Outcome};
 use crate::runner::{self, Moment, line, step};
 use drive::Pair;
 use drive::estimator::tracker::TrackerKind;

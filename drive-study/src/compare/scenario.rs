@@ -1,17 +1,11 @@
 //! The scenarios. Each one is a row here; its function runs a drive and measures numbers.
 
 use super::candidate::Candidate;
-use super::{Outcome, parameters, running, signal, weakening};
+use super::measure::Outcome;
+use super::{parameters, running, signal, weakening};
 use fmu_core::Fault;
 
-/// Extent of the comparison. The reduced one is for a test that runs in seconds.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
-    /// 24 starts, all speeds.
-    Full,
-    /// 4 starts, some speeds, no bandwidths.
-    Reduced,
-}
+pub use super::measure::Effort;
 
 /// One scenario.
 #[derive(Debug)]

@@ -1,8 +1,7 @@
 //! Cost and effect of an injected voltage: the carrier current and the angle found in it.
 
-use super::Outcome;
 use super::candidate::Candidate;
-use super::measure::{Measure, Trace};
+use super::measure::{Measure, Outcome, Trace};
 use crate::runner::{self, Statistics};
 use fmu_core::Fault;
 

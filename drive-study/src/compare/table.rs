@@ -1,8 +1,8 @@
 //! The comparison as text, Markdown and CSV: estimators as rows, scenarios as columns, one table per group of scenarios.
 
 use super::candidate::Entry;
-use super::measure::Measure;
-use super::{Outcome, Run};
+use super::measure::{Measure, Outcome};
+use super::run::Run;
 use crate::compare::candidate::Class;
 use crate::output::{self, aligned};
 use std::fmt::Write as _;

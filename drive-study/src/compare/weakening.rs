@@ -3,9 +3,8 @@
 //! The base speed n_b is that of the true machine at its greatest current and 0.95 u_dc / sqrt 3; the envelope too is that of the
 //! true machine, under the limits of each estimator.
 
-use super::Outcome;
 use super::candidate::Candidate;
-use super::measure::Measure;
+use super::measure::{Measure, Outcome};
 use crate::runner::{self, RATED_SPEED, Statistics, line};
 use drive::Pair;
 use drive::control::envelope::Envelope;
@@ -50,7 +49,7 @@ impl Truth {
         self.envelope.base_speed(self.U) / self.n_p / RATED_SPEED
     }
 
-    /// Greatest torque (N.m) at `speed` (pu).
+    /// Maximum torque (N.m) at `speed` (pu).
     fn torque(&self, speed: f64) -> f64 {
         self.envelope.settled(speed * RATED_SPEED * self.n_p, 1.0, self.U).tau
     }

@@ -4,8 +4,8 @@
 //! `tau` are found around the linear fit. A second pass adds the terms of the saturation that lower what the fit leaves, and takes
 //! the currents between samples as exponentials.
 
-use super::Complex;
 use super::interval::{self, Sums};
+use super::record::Complex;
 use super::windows::{BENT, CURVE, Form, Problem, SIZE, Window};
 use nalgebra::{DMatrix, DVector};
 
@@ -18,14 +18,14 @@ const ITERATIONS: usize = 12;
 /// Windows of a block of the sandwich estimate.
 const BLOCK: usize = 25;
 
-/// Greatest share of a diagonal that is taken for noise.
+/// Maximum share of a diagonal that is taken for noise.
 const MOST_NOISE: f64 = 0.9;
 
 /// Terms of the saturation that are tried together: a_2, a_3, b_3, a_x.
 const TERMS: [[bool; 4]; 5] =
     [[false; 4], [true, true, false, false], [false, false, true, false], [true, true, true, false], [true; 4]];
 
-/// Greatest R T/L that the second pass takes into account.
+/// Maximum R T/L that the second pass takes into account.
 const MOST_DECAY: f64 = 3.0;
 
 /// Rounds of the second pass.
@@ -204,7 +204,7 @@ impl Problem<'_> {
             power += u.norm_sqr();
         }
         let mut noiseless = sums.matrix.clone();
-        // An inductance whose current hardly changes is seen through noise alone; all others are still told.
+        // An inductance whose current hardly changes is seen through noise alone; all others are still reported.
         let count = windows.len().max(1) as f64;
         let noise = [1, 2].map(|k| self.noise().min(MOST_NOISE * sums.matrix[(k, k)] / count));
         for k in [1, 2] {

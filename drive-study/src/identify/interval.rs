@@ -53,7 +53,7 @@ pub fn half_widths(blocks: &[Sums], gradients: &[DVector<f64>]) -> Option<Vec<f6
     let scores = blocks.iter().fold(DMatrix::zeros(size, size), |sum, b| sum + &b.score * b.score.transpose());
     let sandwich = &inverse * scores * &inverse;
     let mut without = Vec::new();
-    // Parameters that one of the stretches alone tells.
+    // Parameters that a single stretch determines.
     let mut lost = vec![false; size];
     for stretch in blocks.chunks(blocks.len().div_ceil(STRETCHES)) {
         let matrix = stretch.iter().fold(all.clone(), |sum, b| sum - &b.matrix);

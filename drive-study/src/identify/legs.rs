@@ -1,6 +1,6 @@
 //! Voltage that the inverter's legs lose to the dead time.
 
-use super::Complex;
+use super::record::Complex;
 
 /// Loss of a leg for a dead-time voltage of 1 V at the current `i`: it rises linearly up to the current `bend` and then approaches
 /// 1 V with a tail in 1/i, because the ripple of the current crosses zero.

@@ -5,11 +5,10 @@
 //! tau_e = 1.5 n_p (psi_d i_q - psi_q i_d)
 //! ```
 
-use super::Complex;
 use super::electrical::Fit;
 use super::interval::{self, Sums};
 use super::motion::Motion;
-use super::record::{BenchRecord, quantile};
+use super::record::{BenchRecord, Complex, quantile};
 use nalgebra::{DMatrix, DVector};
 
 /// Length of a window in s.
@@ -33,9 +32,9 @@ pub struct MechanicalFit {
 /// What the record shows of speed and torque, in windows of 50 ms.
 #[derive(Clone, Debug)]
 pub struct Shown {
-    /// Greatest mechanical speed in rad/s.
+    /// Maximum mechanical speed in rad/s.
     pub speed: f64,
-    /// Greatest electromagnetic torque in N.m.
+    /// Maximum electromagnetic torque in N.m.
     pub torque: f64,
     /// Speeds that differ by a tenth of the greatest, each for at least 3 % of the time.
     pub levels: usize,

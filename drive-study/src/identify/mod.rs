@@ -29,47 +29,15 @@ pub mod verdict;
 pub mod windows;
 
 use anyhow::{Context, Result, ensure};
-use columns::{Naming, Signals};
+use columns::Signals;
 use electrical::Fit;
 use mechanics::{MechanicalFit, Shown, TorqueWindow};
 use motion::Motion;
 use record::BenchRecord;
-use serde::Deserialize;
 use verdict::{Facts, Quantity};
 use windows::{Problem, Timing, Window};
 
-/// A vector in the plane of the stator.
-pub type Complex = nalgebra::Complex<f64>;
-
-/// What a record does not say of itself.
-#[derive(Clone, Debug, Default, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Options {
-    /// Names and units of columns.
-    pub naming: Naming,
-    /// Pole pairs.
-    pub n_p: Option<i32>,
-    /// Maximum current in A, peak value; the greatest of the record if `None`.
-    pub current: Option<f64>,
-    /// Rated mechanical speed in rad/s; the greatest of the record if `None`.
-    pub speed: Option<f64>,
-    /// Rated torque in N.m; the greatest of the record if `None`.
-    pub torque: Option<f64>,
-    /// DC-link voltage in V; the mean of the column `u_dc` if `None`.
-    pub u_dc: Option<f64>,
-    /// Samples of the controller between a row and the action of its voltage; the best of 0, 0.5, 1, 1.5, 2 if `None`.
-    pub delay: Option<f64>,
-    /// The record keeps one of so many samples of the controller; 1 if `None`.
-    pub every: Option<u32>,
-    /// Rows per second, instead of a column `t`.
-    pub rate: Option<f64>,
-    /// Times in s between which there is no current.
-    pub zero: Option<(f64, f64)>,
-    /// Column of the load torque, `tau_load` or `tau_shaft`; `none` for a free shaft; the column that there is if `None`.
-    pub load: Option<String>,
-    /// Values that a commissioning does not tell, by their names in a motor file.
-    pub given: Vec<(String, f64)>,
-}
+pub use record::{Complex, Options};
 
 /// The result.
 #[derive(Clone, Debug)]
@@ -163,7 +131,7 @@ const SHIFTED: f64 = 1.3;
 pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     options.check()?;
     let Some(n_p) = options.n_p else {
-        anyhow::bail!("--n-p is missing: give the number of pole pairs; no record tells it");
+        anyhow::bail!("--n-p is missing: give the number of pole pairs; a record does not contain it");
     };
     let record = BenchRecord::new(signals, options)?;
     let motion = Motion::of(&record);

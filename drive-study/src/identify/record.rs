@@ -1,19 +1,52 @@
 //! A record of a running drive, checked: voltages and currents as vectors in stator axes, the angle, the load, and the stretches
 //! without gaps.
 
-use super::columns::Signals;
-use super::{Complex, Options};
+use super::columns::{Naming, Signals};
 use anyhow::{Context, Result, bail, ensure};
+use serde::Deserialize;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Fewest rows of a record.
+/// A vector in the plane of the stator.
+pub type Complex = nalgebra::Complex<f64>;
+
+/// What a record does not say of itself.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Options {
+    /// Names and units of columns.
+    pub naming: Naming,
+    /// Pole pairs.
+    pub n_p: Option<i32>,
+    /// Maximum current in A, peak value; the greatest of the record if `None`.
+    pub current: Option<f64>,
+    /// Rated mechanical speed in rad/s; the greatest of the record if `None`.
+    pub speed: Option<f64>,
+    /// Rated torque in N.m; the greatest of the record if `None`.
+    pub torque: Option<f64>,
+    /// DC-link voltage in V; the mean of the column `u_dc` if `None`.
+    pub u_dc: Option<f64>,
+    /// Samples of the controller between a row and the action of its voltage; the best of 0, 0.5, 1, 1.5, 2 if `None`.
+    pub delay: Option<f64>,
+    /// The record keeps one of so many samples of the controller; 1 if `None`.
+    pub every: Option<u32>,
+    /// Rows per second, instead of a column `t`.
+    pub rate: Option<f64>,
+    /// Times in s between which there is no current.
+    pub zero: Option<(f64, f64)>,
+    /// Column of the load torque, `tau_load` or `tau_shaft`; `none` for a free shaft; the column that there is if `None`.
+    pub load: Option<String>,
+    /// Values that a commissioning does not tell, by their names in a motor file.
+    pub given: Vec<(String, f64)>,
+}
+
+/// Minimum number of rows of a record.
 const ROWS: usize = 2000;
 
 /// Rows per second.
 const RATES: std::ops::RangeInclusive<f64> = 200.0..=200e3;
 
-/// Greatest current of a record over the maximum current.
+/// Maximum current of a record over the maximum current.
 const MOST: f64 = 3.0;
 
 /// A record. All vectors have one element per row.
@@ -154,7 +187,7 @@ impl BenchRecord {
         self.runs.iter().flat_map(Clone::clone)
     }
 
-    /// Greatest current in A, without single peaks.
+    /// Maximum current in A, without single peaks.
     pub fn peak(&self) -> f64 {
         quantile(self.rows().map(|k| self.i[k].norm()).collect(), 0.999)
     }
@@ -268,7 +301,7 @@ fn angle(signals: &Signals, options: &Options, runs: &[Range<usize>]) -> Result<
     Ok(theta)
 }
 
-/// The vector of three phases, whatever they have in common.
+/// The vector of three phases, without their common part.
 fn vector(a: f64, b: f64, c: f64) -> Complex {
     Complex::new((2.0 * a - b - c) / 3.0, (b - c) / 3.0_f64.sqrt())
 }

@@ -1,6 +1,6 @@
 //! A machine from a run of the self-commissioning: the outputs `identified_*` in the last row of a recording of `fmu simulate`.
 //!
-//! An output counts whatever the instance is called: `identified_R_s`, `drive.identified_R_s`.
+//! An output counts under any name of the instance: `identified_R_s`, `drive.identified_R_s`.
 
 use super::machine_file::{Content, number};
 use super::verdict::Quantity;
@@ -33,7 +33,7 @@ const MORE: [(&str, &str, Option<f64>, &str); 6] = [
     ("tau_friction", "N.m", None, FRICTION),
 ];
 
-const FRICTION: &str = "commission.mode Spin tells at least the sum of both, tau_friction";
+const FRICTION: &str = "commission.mode Spin measures the sum of both, tau_friction";
 
 const LOOPS: &str = "the loops of current do not fit or do not agree: block the rotor, or commission with less current";
 
@@ -85,7 +85,7 @@ fn about<E: Enumerated>(value: E) -> &'static str {
 pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commissioned> {
     options.check()?;
     let Some(n_p) = options.n_p else {
-        bail!("--n-p is missing: give the number of pole pairs; no commissioning tells it");
+        bail!("--n-p is missing: give the number of pole pairs; a commissioning does not measure it");
     };
     let wanted = |name: &str| {
         let known = |list: &[(&str, &str)]| list.iter().any(|(known, _)| *known == name);

@@ -1,14 +1,13 @@
 //! Which values of a fit are written, and why the others are refused.
 
-use super::Complex;
 use super::electrical::Fit;
 use super::mechanics::{MechanicalFit, Shown};
 use super::motion::Motion;
-use super::record::{BenchRecord, quantile};
+use super::record::{BenchRecord, Complex, quantile};
 use super::windows::{Problem, Timing};
 use serde::Serialize;
 
-/// Greatest R T/L of a step, and of a step that is a sample of the controller: the voltage is held there, and the current's course
+/// Maximum R T/L of a step, and of a step that is a sample of the controller: the voltage is held there, and the current's course
 /// is known.
 const DECAY: (f64, f64) = (0.2, 0.35);
 

@@ -13,9 +13,9 @@
 //! Over a sample of the controller, a current runs exponentially: its mean is `(1 - c) i[k] + c i[k+1]` with
 //! `c = 1/(1 - e^-x) - 1/x`, `x = R T/L`; c = 1/2 is the trapezoid.
 
+use super::legs;
 use super::motion::Motion;
-use super::record::BenchRecord;
-use super::{Complex, legs};
+use super::record::{BenchRecord, Complex};
 use std::ops::Range;
 
 /// Parameters: R, L_d, L_q, psi_M, c_1, c_2, c_3, a_2, a_3, b_3, a_x.

@@ -21,7 +21,8 @@ pub mod table;
 pub mod verify;
 
 use crate::tune::motor::MotorFile;
-use crate::tune::rules::{self, Tuned};
+use crate::tune::rules;
+use crate::tune::setting::Tuned;
 use anyhow::{Result, bail};
 use cycle::{Cycle, Energy};
 use drive::control::start::StartMode;
@@ -90,7 +91,8 @@ pub fn drive(tuned: &Tuned) -> Steady {
 /// A value of the request or of the file is wrong, or the rated point is out of reach.
 pub fn make(motor: &MotorFile, request: &Request) -> Result<Map> {
     request.check()?;
-    let tuned = rules::tune(motor)?;
+    // With a sensor, nothing adapts.
+    let tuned = rules::fixed(motor)?;
     let drive = drive(&tuned);
     let nominal = *motor.data.dc_link.u_dc.get_ref();
     let u_dc = if request.u_dc.is_empty() { vec![nominal] } else { request.u_dc.clone() };

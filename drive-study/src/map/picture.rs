@@ -22,7 +22,7 @@ const STEPS: [f64; 6] = [5.0, 2.0, 1.0, 0.5, 0.2, 0.1];
 const INKS: [Ink; 10] =
     ["#440154", "#482878", "#3e4a89", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6dcd59", "#b4de2c", "#fde725"];
 
-/// Speeds and torques of the picture: its contours are those of the drive, whatever the grid of the map.
+/// Speeds and torques of the picture: its contours are those of the drive and do not depend on the map's grid.
 const GRID: (usize, usize) = (161, 121);
 
 /// The picture of a sheet.
@@ -169,7 +169,7 @@ fn marks(map: &Map, sheet: &Sheet) -> Vec<(f64, String)> {
 mod tests {
     use super::*;
 
-    /// The best color is that of the best points, whatever the machine reaches.
+    /// The best color is that of the best points of this machine.
     #[test]
     fn the_colors_follow_the_machine() {
         for (best, expected) in [

@@ -61,7 +61,7 @@ pub fn of(map: &Map, cycle: &Cycle, asked: bool) -> Report {
             None => notes.push(format!("{title}: the rated point is out of reach")),
         }
         notes.extend(
-            linear::cost(&map.drive, map.rated, sheet.u_dc, sheet.T).map(|cost| told(&title, map.rated[1], &cost)),
+            linear::cost(&map.drive, map.rated, sheet.u_dc, sheet.T).map(|cost| sentence(&title, map.rated[1], &cost)),
         );
         match map.energy(k, cycle) {
             Ok([exact, read]) => {
@@ -105,7 +105,7 @@ pub fn of(map: &Map, cycle: &Cycle, asked: bool) -> Report {
 }
 
 /// A sentence about the controller's constant inductances.
-fn told(title: &str, rated: f64, cost: &Cost) -> String {
+fn sentence(title: &str, rated: f64, cost: &Cost) -> String {
     let Cost { torque, now, best } = cost;
     let [lost, least] = [now, best].map(|point| point.powers.losses.sum());
     format!(

@@ -7,7 +7,7 @@ use crate::queue;
 use drive::plant::thermal::Temperatures;
 use drive::steady::{At, Condition, Point, Region, Steady};
 
-/// Greatest share of u_dc / sqrt 3 of a drive that settles.
+/// Maximum share of u_dc / sqrt 3 of a drive that settles.
 const FULL: f64 = 1.0 + 1e-6;
 
 /// The grid.
@@ -39,7 +39,7 @@ pub struct Sheet {
     pub u_dc: f64,
     /// Temperature of winding and magnet in K.
     pub T: f64,
-    /// Least and greatest torque at the shaft in N.m at each speed; 0 where that sign is out of reach.
+    /// Minimum and maximum torque at the shaft in N.m at each speed; 0 where that sign is out of reach.
     pub limits: Vec<[f64; 2]>,
     /// Where the least and the greatest torque lie.
     pub regions: Vec<[Region; 2]>,

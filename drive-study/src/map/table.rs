@@ -52,7 +52,7 @@ impl<'a> Table<'a> {
         Self { axes, sheet, plant }
     }
 
-    /// Least and greatest torque (N.m) at the shaft at the mechanical `speed` (rad/s, not negative).
+    /// Minimum and maximum torque (N.m) at the shaft at the mechanical `speed` (rad/s, not negative).
     pub fn limits(&self, speed: f64) -> Option<[f64; 2]> {
         let (k, share) = cell(&self.axes.speed, speed)?;
         let between = |s: usize| (1.0 - share) * self.sheet.limits[k][s] + share * self.sheet.limits[k + 1][s];

@@ -25,13 +25,13 @@ pub struct Verified {
     pub points: usize,
     /// Maximum difference of the power from the link, as a share of the size of the powers.
     pub power: f64,
-    /// Greatest relative difference of a loss.
+    /// Maximum relative difference of a loss.
     pub loss: f64,
     /// A sentence for each point that differs by more than allowed.
     pub apart: Vec<String>,
 }
 
-/// Least torque limit of a speed that is compared, as a share of the greatest: where the voltage is used up, nothing is left
+/// Minimum torque limit of a speed that is compared, as a share of the greatest: where the voltage is used up, nothing is left
 /// for the ripple of a sampled drive.
 const LEAST_LIMIT: f64 = 0.05;
 

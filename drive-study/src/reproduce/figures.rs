@@ -78,7 +78,7 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Greatest distance from `target`.
+    /// Maximum distance from `target`.
     fn off(&self, column: Column, target: f64) -> f64 {
         (self.max(column) - target).max(target - self.min(column))
     }

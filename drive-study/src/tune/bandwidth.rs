@@ -11,14 +11,12 @@
 //!   with the extended EMF, less where the gain through the change of i_q would be high ([`limits`](super::limits)).
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
-use super::extended_emf::{EMF_PER_TRACKER, GREATEST_GAIN, GREATEST_TORQUE, gain_per_bandwidth};
-use super::motor::{Data, Number};
-use super::rasmussen::least_observer;
-use super::rules::{Setting, Value};
+use super::motor::{Data, Number, torque_constant};
+use super::setting::{LEVELS, Setting, Value};
 use drive::estimator::Kind;
 use std::f64::consts::{E, TAU};
 
-/// Least number of samples per electrical period at the highest speed.
+/// Minimum number of samples per electrical period at the highest speed.
 const SAMPLES: f64 = 12.0;
 
 /// Sample periods in s to choose from.
@@ -127,4 +125,28 @@ pub const DIP_OF_A_STEP: f64 = 2.0 / E;
 /// Mechanical acceleration in rad/s2 by the rated torque.
 pub fn acceleration(data: &Data) -> f64 {
     data.rating.torque.get_ref() / data.mechanics.J.get_ref()
+}
+
+/// Minimum bandwidth in rad/s of the observer: it follows the greatest acceleration.
+pub fn least_observer(data: &Data) -> f64 {
+    let greatest = torque_constant(data) * 0.8 * data.rating.current.get_ref() / data.mechanics.J.get_ref();
+    (f64::from(*data.machine.n_p.get_ref()) * greatest / 0.35).sqrt()
+}
+
+/// Limit of the torque in units of the rated torque.
+pub const GREATEST_TORQUE: f64 = 1.6;
+
+/// Bandwidth of the EMF observer in units of the tracker's.
+pub const EMF_PER_TRACKER: f64 = 7.5;
+
+/// Maximum loop gain through the EMF of the change of i_q, at 0.1 pu.
+pub const GREATEST_GAIN: f64 = 40.0;
+
+/// Gain of the speed loop through the EMF that a change of i_q makes, per rad/s of w_s, at 0.1 pu and the tracker's `rho`
+/// (rad/s).
+pub fn gain_per_bandwidth(data: &Data, rho: f64) -> f64 {
+    let (machine, n_p) = (&data.machine, f64::from(*data.machine.n_p.get_ref()));
+    let saliency = (machine.L_q.get_ref() - machine.L_d.get_ref()).abs();
+    let emf = n_p * LEVELS[0] * data.rating.speed.get_ref() * machine.psi_M.get_ref();
+    data.mechanics.J.get_ref() * saliency * rho * rho / (torque_constant(data) * n_p * emf)
 }

@@ -1,7 +1,7 @@
 //! Checks that the models have the variables that the rules set, with matching type and range.
 
 use super::motor::MotorFile;
-use super::rules::{Setting, Value};
+use super::setting::{Setting, Value};
 use anyhow::{Result, anyhow, bail};
 use drive::{PmsmPlant, SensorlessController};
 use fmu_core::Description;

@@ -9,29 +9,10 @@
 //!
 //! A load step at low speed takes the rotor through zero: `emf.hold_reversal` holds it there, below 0.08 of the rated speed.
 
-use super::bandwidth::Bandwidths;
-use super::motor::Data;
-use super::rules::{Setting, Value, real, set, swing, torque_constant};
-use super::trial::LEVELS;
+use super::bandwidth::{Bandwidths, EMF_PER_TRACKER, GREATEST_TORQUE};
+use super::motor::{Data, swing, torque_constant};
+use super::setting::{LEVELS, Setting, Value, real, set};
 use std::f64::consts::TAU;
-
-/// Limit of the torque in units of the rated torque.
-pub const GREATEST_TORQUE: f64 = 1.6;
-
-/// Bandwidth of the EMF observer in units of the tracker's.
-pub const EMF_PER_TRACKER: f64 = 7.5;
-
-/// Greatest loop gain through the EMF of the change of i_q, at 0.1 pu.
-pub const GREATEST_GAIN: f64 = 40.0;
-
-/// Gain of the speed loop through the EMF that a change of i_q makes, per rad/s of w_s, at 0.1 pu and the tracker's `rho`
-/// (rad/s).
-pub fn gain_per_bandwidth(data: &Data, rho: f64) -> f64 {
-    let (machine, n_p) = (&data.machine, f64::from(*data.machine.n_p.get_ref()));
-    let saliency = (machine.L_q.get_ref() - machine.L_d.get_ref()).abs();
-    let emf = n_p * LEVELS[0] * data.rating.speed.get_ref() * machine.psi_M.get_ref();
-    data.mechanics.J.get_ref() * saliency * rho * rho / (torque_constant(data) * n_p * emf)
-}
 
 /// Values of the controller.
 pub fn settings(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Vec<Setting> {
@@ -40,6 +21,16 @@ pub fn settings(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
     if rho < TAU * 15.0 * (1.0 - 1e-9) {
         notes.push(format!(
             "bandwidth.observer is {rho} rad/s; below 94 rad/s a load step of half the torque loses the rotor"
+        ));
+    }
+    // Copper of -30 degC has 0.80 R_s, R^ is 0.9 R_s: the bound of the estimator, with the EMF of the magnet.
+    let i = torque / torque_constant(data);
+    let least = 0.1 * data.machine.R_s.get_ref() * i
+        / (f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref() * rating.speed.get_ref());
+    if least > LEVELS[0] {
+        notes.push(format!(
+            "a winding of -30 degC has less than R^ = 0.9 R_s: below (R^ - R) i / (n_p psi_M) = {least:.2} pu, the rated torque turns the \
+             estimate by half a turn"
         ));
     }
     // A d-axis current holds the rotor only while magnet torque exceeds reluctance torque: |L_q - L_d| i

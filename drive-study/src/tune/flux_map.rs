@@ -13,7 +13,7 @@ mod judge;
 mod squares;
 
 use super::motor::{FluxMap as Given, MotorFile};
-use super::rules::{Setting, Value};
+use super::setting::{Setting, Value};
 use crate::csv::Columns;
 use anyhow::{Context, Result, bail, ensure};
 use drive::frame::Dq;
@@ -22,7 +22,7 @@ use judge::{Errors, check, coverage, judge_magnet, reciprocity, torque};
 use squares::solve;
 use std::f64::consts::SQRT_2;
 
-/// Least number of points: two for three coefficients.
+/// Minimum number of points: two for three coefficients.
 const LEAST_POINTS: usize = 72;
 
 /// A point of the table: current (A) and flux linkage (Wb).

@@ -6,7 +6,7 @@
 //! came out negative, it is 0, and the other one is fitted alone.
 
 use super::motor::MotorFile;
-use super::rules::{Setting, Value};
+use super::setting::{Setting, Value};
 use anyhow::{Result, bail};
 use drive::plant::iron::Iron;
 

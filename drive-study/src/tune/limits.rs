@@ -11,34 +11,15 @@
 //!   the speed loop, the gain is J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). Above 40 at 0.1 pu, the speed does not
 //!   settle there after the hand-over.
 
-use super::bandwidth::DIP_OF_A_STEP;
-use super::extended_emf::{GREATEST_GAIN, gain_per_bandwidth};
-use super::motor::{Data, MotorFile, Number};
+use super::bandwidth::{DIP_OF_A_STEP, GREATEST_GAIN, gain_per_bandwidth};
+use super::motor::{Data, MotorFile, Number, torque_constant};
 use super::rasmussen::{LEAST_MARGIN, resistance_margin};
-use super::remedy::{self, Cure};
-use super::rules::{Tuned, torque_constant};
+use super::remedy::{self, Cure, What};
+use super::setting::Tuned;
 use super::trial::Trial;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use std::fmt;
-
-/// What a drive does not hold.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum What {
-    /// The start from any angle.
-    Start,
-    /// The load as a step.
-    Load,
-}
-
-impl fmt::Display for What {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Start => "START",
-            Self::Load => "LOAD",
-        })
-    }
-}
 
 /// A start or a load that the drive will not hold.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,8 +2,9 @@
 //! the dead time, which it compensates.
 
 use super::motor::{Inverter, MotorFile, Number};
-use super::rules::{Setting, Value, given, real};
+use super::setting::{Setting, Value, given, real};
 use anyhow::{Result, bail};
+use drive::estimator::Kind;
 
 /// Current below which the dead-time voltage falls to zero where the file gives none, over the maximum current: about the middle of
 /// the 0.5 % to 4 % that the machines of `tests/population` are drawn from; no source outside the project.
@@ -61,10 +62,19 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
     Ok(all)
 }
 
-/// The settings of the controller's dead-time compensation; none where the file has no dead-time voltage.
-pub fn compensation(motor: &MotorFile) -> Vec<Setting> {
-    let Some(Inverter { u_dead: Some(u_dead), .. }) = &motor.data.inverter else { return Vec::new() };
-    std::iter::once(given("compensation.u_dead", u_dead)).chain(zero("compensation.i_zero", motor)).collect()
+/// The settings of the controller's dead-time compensation; none where the file has no voltage that a leg loses. Near standstill, a leg
+/// conducts for half of the time through a transistor and for half through a diode, and loses the mean of their thresholds in
+/// addition: Rasmussen's observer would take it for R i, swing with it at higher speeds, and adapt R^ to it.
+pub fn compensation(motor: &MotorFile, estimator: Kind) -> Vec<Setting> {
+    let Some(Inverter { u_dead, u_transistor, u_diode, .. }) = &motor.data.inverter else { return Vec::new() };
+    let part = |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref());
+    let threshold = if estimator == Kind::Rasmussen { 0.5 * (part(u_transistor) + part(u_diode)) } else { 0.0 };
+    let lost = match u_dead {
+        Some(u_dead) if threshold == 0.0 => given("compensation.u_dead", u_dead),
+        None if threshold == 0.0 => return Vec::new(),
+        _ => real("compensation.u_dead", part(u_dead) + threshold, "u_dead, and the mean of u_transistor and u_diode"),
+    };
+    std::iter::once(lost).chain(zero("compensation.i_zero", motor)).collect()
 }
 
 /// The setting `name` of the current below which the dead-time voltage falls to zero: as given, or by rule where the file has a
@@ -80,15 +90,30 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    fn of(text: &str) -> Result<Vec<(&'static str, super::super::rules::Value)>> {
+    fn of(text: &str) -> Result<Vec<(&'static str, super::super::setting::Value)>> {
         let motor = include_str!("../../../motors/ipmsm-2.2kw.toml");
         let motor = MotorFile::parse(&format!("{motor}\n{text}\n"), Path::new("m.toml"))?;
         Ok(settings(&motor, 5e-5)?.into_iter().map(|s| (s.name, s.value)).collect())
     }
 
+    /// The mean of the thresholds joins the dead time, for Rasmussen's observer alone.
+    #[test]
+    fn the_thresholds_are_compensated() {
+        let of = |text: &str, kind| {
+            let motor = include_str!("../../../motors/ipmsm-2.2kw.toml");
+            let motor = MotorFile::parse(&format!("{motor}\n[inverter]\n{text}\n"), Path::new("m.toml")).unwrap();
+            compensation(&motor, kind).into_iter().map(|s| (s.name, s.value)).collect::<Vec<_>>()
+        };
+        let u_dead = |x| ("compensation.u_dead", super::super::setting::Value::Real(x));
+        let both = "u_transistor = 0.5\nu_diode = 0.7";
+        assert_eq!(of(both, Kind::Rasmussen), [u_dead(0.6)]);
+        assert_eq!(of(&format!("{both}\nu_dead = 5.4"), Kind::Rasmussen)[0], u_dead(6.0));
+        assert!(of(both, Kind::ExtendedEmf).is_empty() && of("r_diode = 0.1", Kind::Rasmussen).is_empty());
+    }
+
     #[test]
     fn what_the_file_gives_and_no_more() {
-        use super::super::rules::Value::Real;
+        use super::super::setting::Value::Real;
         assert!(of("").unwrap().is_empty());
         assert_eq!(of("[temperature]\nmagnet = -1.1e-3").unwrap(), [("magnet.alpha", Real(-1.1e-3))]);
         let period = ("inverter.T_pwm", Real(5e-5));

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, anyhow, bail};
 use drive::estimator::Kind;
+use drive::motor::Motor;
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
@@ -214,6 +215,28 @@ pub struct Control {
     pub estimator: Option<Spanned<String>>,
     /// Sample period in s.
     pub T_s: Option<Number>,
+}
+
+/// Torque constant K = 1.5 n_p psi_M in N.m/A.
+pub fn torque_constant(data: &Data) -> f64 {
+    1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
+}
+
+/// Natural frequency in rad/s of the rotor on a current vector of `i` (A): w_0 = sqrt(n_p K i / J).
+pub fn swing(data: &Data, i: f64) -> f64 {
+    (f64::from(*data.machine.n_p.get_ref()) * torque_constant(data) * i / data.mechanics.J.get_ref()).sqrt()
+}
+
+/// The machine's electrical data.
+pub fn electrical(data: &Data) -> Motor {
+    let m = &data.machine;
+    Motor {
+        n_p: *m.n_p.get_ref(),
+        R_s: *m.R_s.get_ref(),
+        L_d: *m.L_d.get_ref(),
+        L_q: *m.L_q.get_ref(),
+        psi_M: *m.psi_M.get_ref(),
+    }
 }
 
 impl MotorFile {

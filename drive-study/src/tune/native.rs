@@ -1,6 +1,6 @@
 //! The tuned values in the native models: the closed loop as the packed FMUs run it.
 
-use super::rules::{Setting, Tuned, Value};
+use super::setting::{Setting, Tuned, Value};
 use drive::Pair;
 use fmu_core::{Block, Kind, Model, Slot};
 

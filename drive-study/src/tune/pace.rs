@@ -9,12 +9,12 @@
 //!   for the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
 
 use super::bandwidth::DIP_OF_A_STEP;
-use super::rules::Tuned;
+use super::setting::Tuned;
 use drive::Pair;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
 
-/// Least torque that a load leaves, as a share of the load: an assumption where it leaves less.
+/// Minimum torque that a load leaves, as a share of the load: an assumption where it leaves less.
 const LEAST_SPARE: f64 = 0.02;
 
 /// Time constants in s.
@@ -68,16 +68,29 @@ fn slowest(a: f64, b: f64) -> f64 {
     if half * half > b { (half + (half * half - b).sqrt()) / b } else { 1.0 / half }
 }
 
-/// The instants in s at which the drive gets its speed reference, and at which its estimator has the rotor and a ramp has come
-/// to `level` (pu).
-pub fn begin(tuned: &Tuned, pair: &Pair, level: f64) -> (f64, f64) {
-    let par = &pair.controller.model.parameters;
-    let ramp = if par.speed_loop.ramp > 0.0 { level * tuned.speed / par.speed_loop.ramp } else { 0.0 };
-    let start = &par.start;
-    if start.mode == StartMode::CurrentFrequency {
-        (0.0, 2.0 * start.t_align + start.speed / start.acceleration + start.settle + ramp)
-    } else {
-        (tuned.rest, tuned.rest + ramp)
+/// Times in s of a start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Begin {
+    /// At rest, with 0 as the speed reference.
+    pub rest: f64,
+    /// Maximum for which the controller itself then keeps the rotor at rest, and measures the resistance.
+    pub measures: f64,
+    /// Until the estimator has the rotor after that, and a ramp has come to the speed.
+    pub ready: f64,
+}
+
+impl Begin {
+    /// The start of a drive that goes to `level` (pu).
+    pub fn of(tuned: &Tuned, pair: &Pair, level: f64) -> Self {
+        let par = &pair.controller.model.parameters;
+        let ramp = if par.speed_loop.ramp > 0.0 { level * tuned.speed / par.speed_loop.ramp } else { 0.0 };
+        let (start, adaptation) = (&par.start, &par.estimators.adaptation);
+        if start.mode == StartMode::CurrentFrequency {
+            let ready = 2.0 * start.t_align + start.speed / start.acceleration + start.settle + ramp;
+            return Self { rest: 0.0, measures: 0.0, ready };
+        }
+        let measures = if pair.controller.model.measures_resistance() { adaptation.longest_rest() } else { 0.0 };
+        Self { rest: if measures > 0.0 { 0.0 } else { tuned.rest }, measures, ready: ramp }
     }
 }
 

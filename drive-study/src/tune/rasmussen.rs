@@ -4,8 +4,8 @@
 //! w_0 = 30 rad/s electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest
 //! electrical acceleration alpha = n_p K i_q / J.
 //!
-//! R^ = 0.9 R: the safe side at standstill, where R^ > R runs away. At rest on i_0 the estimate then drifts by (R - R^) i_0 /
-//! psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). The rules choose R^
+//! A resistance that is not adapted ([`adaptation`](super::adaptation)) is R^ = 0.9 R: the safe side at standstill, where R^ > R runs
+//! away. At rest on i_0 the estimate then drifts by (R - R^) i_0 / psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). The rules choose R^
 //!
 //! - closer to R where the drift would exceed w_0: the rotor is too heavy to follow the estimate;
 //! - closer to R where (R - R^) i with the rated torque would exceed 0.15 of the EMF at 0.1 pu: the estimate turns away by c_1
@@ -16,20 +16,19 @@
 //!
 //! The shares 0.15 and 0.025 are found by trial on machines from 5 W to 300 kW.
 
-use super::bandwidth::Bandwidths;
-use super::motor::{Data, MotorFile};
-use super::rules::{Setting, real, swing, torque_constant};
-use super::trial::LEVELS;
+use super::bandwidth::{Bandwidths, least_observer};
+use super::motor::{Data, MotorFile, swing, torque_constant};
+use super::setting::{LEVELS, Setting, real};
 use anyhow::{Result, bail};
 use drive::control::tables::ControllerParameters;
 
-/// Greatest share of the EMF at 0.1 pu for (R - R^) i at the rated torque.
+/// Maximum share of the EMF at 0.1 pu for (R - R^) i at the rated torque.
 const LOST_EMF: f64 = 0.15;
 
-/// Least drift of the estimate at rest as a share of the rotor's swing, and the greatest share of R that the rules give up for it.
+/// Minimum drift of the estimate at rest as a share of the rotor's swing, and the maximum share of R that the rules give up for it.
 const LEAST_DRIFT: (f64, f64) = (0.025, 0.5);
 
-/// Least share by which R^ can be kept below R: less than this is below the uncertainty of R.
+/// Minimum share by which R^ can be kept below R: less than this is below the uncertainty of R.
 pub const LEAST_MARGIN: f64 = 0.02;
 
 /// Share of R by which R^ should be below R.
@@ -39,7 +38,7 @@ pub fn resistance_margin(data: &Data) -> f64 {
     0.1_f64.max((share * followed).min(most)).min(followed).min(held)
 }
 
-/// Greatest shares of R by which R^ may be below R: so that the rotor follows at rest, and so that the EMF at 0.1 pu stays larger.
+/// Maximum shares of R by which R^ may be below R: so that the rotor follows at rest, and so that the EMF at 0.1 pu stays larger.
 fn bounds(data: &Data) -> (f64, f64) {
     let (R_s, psi_M) = (*data.machine.R_s.get_ref(), *data.machine.psi_M.get_ref());
     let (i_0, i) = (zero_speed_current(data), data.rating.torque.get_ref() / torque_constant(data));
@@ -67,12 +66,6 @@ pub fn resistance(data: &Data) -> Setting {
 /// Current in A of the low-speed law: holds 1.35 times the rated torque.
 pub fn zero_speed_current(data: &Data) -> f64 {
     1.35 * data.rating.torque.get_ref() / torque_constant(data)
-}
-
-/// Least bandwidth in rad/s of the observer: it follows the greatest acceleration.
-pub fn least_observer(data: &Data) -> f64 {
-    let greatest = torque_constant(data) * 0.8 * data.rating.current.get_ref() / data.mechanics.J.get_ref();
-    (f64::from(*data.machine.n_p.get_ref()) * greatest / 0.35).sqrt()
 }
 
 /// Values of the controller.

@@ -1,15 +1,33 @@
 //! Remedies for a drive that does not start or does not hold its load. Each is tried before it is named.
 
-use super::limits::What;
 use super::motor::MotorFile;
 use super::pace::Pace;
-use super::rules::{self, Tuned, Value};
+use super::rules;
+use super::setting::{Tuned, Value};
 use super::trial::{self, Task, Trial};
 use std::fmt;
 use toml::Spanned;
 
 /// Number of start angles of the first try, which sorts out most remedies that do not help.
 const FEW: u32 = 4;
+
+/// What a drive does not hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    /// The start from any angle.
+    Start,
+    /// The load as a step.
+    Load,
+}
+
+impl fmt::Display for What {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Start => "START",
+            Self::Load => "LOAD",
+        })
+    }
+}
 
 /// A remedy.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +50,7 @@ pub enum Cure {
         /// Whether it is more than in the file: with the inertia of the load.
         more: bool,
     },
-    /// Greatest change of the speed reference in rad/s2.
+    /// Maximum change of the speed reference in rad/s2.
     Ramp(f64),
     /// A sensor of the rotor's angle.
     Sensor,
@@ -116,6 +134,25 @@ pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, 
         cures.extend(first(&[Cure::Sensor]));
     }
     cures
+}
+
+/// A lower bandwidth of the speed loop with which a drive that swings without a load no longer does, and holds what it held.
+pub fn calm(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> Option<Cure> {
+    let (speed, observer) = (tuned.real("speed_loop.bandwidth")?, tuned.real("rasmussen.w_n"));
+    let observer = observer.or_else(|| tuned.real("tracker.bandwidth"))?;
+    let each = [0.7, 0.5, 0.35, 0.25].map(|x| Cure::Bandwidths { speed: short(x * speed), observer: short(observer) });
+    each.into_iter().find(|cure| {
+        let holds = |(tuned, task): (Tuned, Task), old: &Trial| {
+            let new = trial::at(&tuned, &task, FEW);
+            (new.starts() || !old.starts()) && (new.holds() || !old.holds())
+        };
+        let with = |task: &Task| cure.applied(motor, tuned, task);
+        let quiet = trials
+            .first()
+            .and_then(|trial| with(&trial.task))
+            .is_some_and(|(tuned, _)| trial::swings(&tuned).is_empty());
+        quiet && trials.iter().all(|trial| with(&trial.task).is_some_and(|cured| holds(cured, trial)))
+    })
 }
 
 /// Whether the drive holds `what` with the change, and still holds what it held.

@@ -15,85 +15,36 @@
 use super::bandwidth::Bandwidths;
 use super::check::check;
 use super::iron;
-use super::motor::{Data, MotorFile, Number, RULED};
+use super::motor::{Data, MotorFile, Number, RULED, swing};
+use super::setting::{Setting, Tuned, Value, given, real, set};
 use super::voltage::{self, Voltage};
-use super::{extended_emf, flux_map, losses, plausible, rasmussen, saturation};
+use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, saturation};
 use anyhow::{Result, anyhow, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
-use drive::motor::Motor;
 use std::f64::consts::TAU;
-
-/// A value for a variable.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// Value of a real variable.
-    Real(f64),
-    /// Values of an array of real variables.
-    Reals(Vec<f64>),
-    /// Value of an integer.
-    Integer(i32),
-    /// Value of a Boolean.
-    Boolean(bool),
-    /// Value of an enumeration: the name of an item.
-    Item(String),
-}
-
-/// A variable with its value and the origin of the value.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Setting {
-    /// Variable of the model.
-    pub name: &'static str,
-    /// The value, in the unit of the variable.
-    pub value: Value,
-    /// The rule.
-    pub rule: String,
-    /// Offset of the source value in the machine's file.
-    pub origin: Option<usize>,
-}
-
-/// Values of both FMUs.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Tuned {
-    /// Name of the machine.
-    pub name: String,
-    /// Source of its data.
-    pub source: String,
-    /// Values of `PmsmPlant`.
-    pub plant: Vec<Setting>,
-    /// Values of `SensorlessController`.
-    pub controller: Vec<Setting>,
-    /// Warnings: values outside the ranges that the rules were tested in.
-    pub notes: Vec<String>,
-    /// Rated mechanical speed in rad/s.
-    pub speed: f64,
-    /// Rated torque in N.m.
-    pub torque: f64,
-    /// Highest mechanical speed in rad/s.
-    pub top: f64,
-    /// Load in N.m at the highest speed.
-    pub top_torque: f64,
-    /// Time in s at rest before the first speed reference, in which the rotor aligns itself.
-    pub rest: f64,
-}
-
-pub(super) fn given(name: &'static str, x: &Number) -> Setting {
-    Setting { name, value: Value::Real(*x.get_ref()), rule: "as given".into(), origin: Some(x.span().start) }
-}
-
-pub(super) fn set(name: &'static str, value: Value, rule: &str) -> Setting {
-    Setting { name, value, rule: rule.into(), origin: None }
-}
-
-pub(super) fn real(name: &'static str, x: f64, rule: &str) -> Setting {
-    set(name, Value::Real(x), rule)
-}
 
 /// Derives the values.
 ///
 /// # Errors
 /// Inconsistent values, with their position and a remedy.
 pub fn tune(motor: &MotorFile) -> Result<Tuned> {
+    let mut tuned = adaptation::chosen(&motor.data, fixed(motor)?);
+    let waits = tuned.pair().controller.model.parameters.estimators.adaptation.resistance;
+    if tuned.rest > REST && !waits {
+        tuned.notes.push(format!(
+            "keep speed_ref at 0 for the first {:.2} s: the rotor turns to the current that holds standstill",
+            tuned.rest
+        ));
+    }
+    Ok(tuned)
+}
+
+/// Derives the values of a drive that does not adapt the resistance.
+///
+/// # Errors
+/// Those of [`tune`].
+pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
     let data = &motor.data;
     let mut plant = plant(data);
     let estimator = estimator(motor)?;
@@ -108,7 +59,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     fits(motor, &bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
     plant.extend(losses::settings(motor, bandwidths.T_s.value)?);
-    controller.extend(losses::compensation(motor));
+    controller.extend(losses::compensation(motor, estimator));
     let fitted = flux_map::fit(motor)?;
     if let Some(fitted) = &fitted {
         plant.retain(|setting| setting.name != "motor.psi_M");
@@ -128,11 +79,6 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
     check(&plant, &controller, motor)?;
     // 5 / w_0: five periods of the swing, which the observer damps, over 2 pi.
     let rest = if rasmussen { (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST) } else { 0.0 };
-    if rest > REST {
-        notes.push(format!(
-            "keep speed_ref at 0 for the first {rest:.2} s: the rotor turns to the current that holds standstill"
-        ));
-    }
     let (speed, torque) = (*data.rating.speed.get_ref(), *data.rating.torque.get_ref());
     let tuned = Tuned {
         name: data.name.clone(),
@@ -237,16 +183,6 @@ fn short(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
 
-/// Natural frequency in rad/s of the rotor on a current vector of `i` (A): w_0 = sqrt(n_p K i / J).
-pub fn swing(data: &Data, i: f64) -> f64 {
-    (f64::from(*data.machine.n_p.get_ref()) * torque_constant(data) * i / data.mechanics.J.get_ref()).sqrt()
-}
-
-/// Torque constant K = 1.5 n_p psi_M in N.m/A.
-pub fn torque_constant(data: &Data) -> f64 {
-    1.5 * f64::from(*data.machine.n_p.get_ref()) * data.machine.psi_M.get_ref()
-}
-
 /// Checks that the ratings are positive.
 fn ratings(motor: &MotorFile) -> Result<()> {
     let rating = &motor.data.rating;
@@ -258,7 +194,7 @@ fn ratings(motor: &MotorFile) -> Result<()> {
     Ok(())
 }
 
-/// Least number of samples per electrical period.
+/// Minimum number of samples per electrical period.
 const LEAST_SAMPLES: f64 = 10.0;
 
 /// Checks bandwidths and sample period, for every estimator.
@@ -298,18 +234,6 @@ fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> 
         notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
     }
     Ok(())
-}
-
-/// The machine's electrical data.
-pub(super) fn electrical(data: &Data) -> Motor {
-    let m = &data.machine;
-    Motor {
-        n_p: *m.n_p.get_ref(),
-        R_s: *m.R_s.get_ref(),
-        L_d: *m.L_d.get_ref(),
-        L_q: *m.L_q.get_ref(),
-        psi_M: *m.psi_M.get_ref(),
-    }
 }
 
 /// Maximum product of the current loop's gain and T_s / L: half of the value at which the loop oscillates.

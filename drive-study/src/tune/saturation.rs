@@ -5,8 +5,7 @@
 //! incremental inductances, is positive definite; beyond, more flux takes less current, and the plant runs away.
 
 use super::flux_map::Fitted;
-use super::motor::{Data, MotorFile, Number};
-use super::rules::electrical;
+use super::motor::{Data, MotorFile, Number, electrical};
 use anyhow::{Result, bail};
 use drive::frame::Dq;
 use drive::motor::Motor;

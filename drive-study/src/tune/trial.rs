@@ -3,17 +3,19 @@
 //! Held: in the end the speed is within 0.02 pu of its reference, and the estimate within 30 deg of the rotor. The end is 20
 //! times the slowest time constant ([`pace`](super::pace)) after the reference and again after the load; a run ends earlier
 //! where it has clearly settled, or runs away. Settled: over 4 time constants of the slower loop, the speed stays within 0.005
-//! pu of the reference and the angle error below 25 deg, and they move by less than 0.002 pu and 1 deg.
+//! pu of the reference and the angle error below 25 deg, and they move by less than 0.002 pu and 1 deg. A speed that still moves by
+//! 0.02 pu at the end is not held.
+//!
+//! [`swings`] goes without a load over speeds between the levels, up and down again: a swing that one side begins, the other keeps.
+//! [`at_temperature`] is the drive with a colder or hotter machine than its values say.
 
-use super::pace::{Pace, begin};
-use super::rules::Tuned;
+use super::pace::{Begin, Pace};
+use super::setting::{LEVELS, Setting, Tuned, Value, real};
 use crate::queue;
 use drive::Pair;
 use drive::math::wrap;
 use std::f64::consts::TAU;
-
-/// Speeds in pu at which every drive is tried, in addition to its highest speed.
-pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
+use std::fmt;
 
 /// End of a run in units of the slowest time constant.
 const HORIZON: f64 = 20.0;
@@ -30,7 +32,7 @@ const HELD: (f64, f64) = (0.02, 30.0);
 /// Tolerances of a run that has clearly settled.
 const CALM: (f64, f64) = (0.005, 25.0);
 
-/// Greatest movement in the window of a run that has clearly settled: speed in pu, angle in deg.
+/// Maximum movement in the window of a run that has clearly settled: speed in pu, angle in deg.
 const STILL: (f64, f64) = (0.002, 1.0);
 
 /// Distance from the reference in pu, in addition to its magnitude, from which no drive returns.
@@ -68,11 +70,11 @@ pub struct Trial {
     pub started: u32,
     /// How many of these held the load.
     pub held: u32,
-    /// Least speed after the load step in pu.
+    /// Minimum speed after the load step in pu.
     pub least: f64,
     /// Maximum angle error in deg after the load step where it was held.
     pub error: f64,
-    /// Greatest torque in N.m that the controller allows at this speed.
+    /// Maximum torque in N.m that the controller allows at this speed.
     pub most: f64,
 }
 
@@ -111,9 +113,9 @@ struct Part {
     off: f64,
     /// Angle error in deg, greatest magnitude.
     ahead: f64,
-    /// Least and greatest speed in pu.
+    /// Minimum and maximum speed in pu.
     speed: (f64, f64),
-    /// Least and greatest angle error in deg.
+    /// Minimum and maximum angle error in deg.
     angle: (f64, f64),
 }
 
@@ -142,7 +144,7 @@ impl Part {
     }
 
     fn held(&self) -> bool {
-        self.off <= HELD.0 && self.ahead <= HELD.1
+        self.off <= HELD.0 && self.ahead <= HELD.1 && self.speed.1 - self.speed.0 <= HELD.0
     }
 
     fn settled(&self) -> bool {
@@ -174,6 +176,17 @@ impl Bench<'_> {
         self.k += 1;
         let ahead = wrap(self.pair.plant.out.theta_e - self.pair.controller.out.theta_est);
         Some((self.pair.plant.out.speed / self.tuned.speed, ahead.to_degrees()))
+    }
+
+    /// Starts to `level`: whether it comes to stand there.
+    fn starts(&mut self, level: f64) -> bool {
+        let Begin { rest, ready, .. } = Begin::of(self.tuned, &self.pair, level);
+        while self.now() < rest || self.pair.controller.model.measures_resistance() {
+            if self.step(if self.now() < rest { 0.0 } else { level }, 0.0).is_none() {
+                return false;
+            }
+        }
+        self.until_settled(level, ready, |_| 0.0, |_, _| ())
     }
 
     /// Runs at `level` with `load` (N.m over the time in s since now), which is constant from `from` (s) on, until it has settled
@@ -222,15 +235,9 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
     if pair.start().is_err() {
         return run;
     }
-    let (turn, ready) = begin(tuned, &pair, task.level);
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
     let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0 };
-    while bench.now() < turn {
-        if bench.step(0.0, 0.0).is_none() {
-            return run;
-        }
-    }
-    run.started = bench.until_settled(task.level, ready - turn, |_| 0.0, |_, _| ());
+    run.started = bench.starts(task.level);
     if !run.started {
         return run;
     }
@@ -242,6 +249,115 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
         error = error.max(angle.abs());
     });
     Run { least, error, most, ..run }
+}
+
+/// Number of speeds between 0 and the rated one at which a drive without a load is tried for swings.
+const STAIRS: u32 = 10;
+
+/// Minimum swing: speed in pu, current as a share of the maximum, power as a share of the rated one, all from peak to peak.
+const SWING: [f64; 3] = [0.01, 0.25, 0.25];
+
+/// A drive without a load that swings at a constant reference.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Swing {
+    /// Speed in pu.
+    pub level: f64,
+    /// Whether the drive came from below.
+    pub rising: bool,
+    /// Peak to peak: speed in pu.
+    pub speed: f64,
+    /// Peak to peak: i_q in A.
+    pub current: f64,
+    /// Peak to peak: input power in W.
+    pub power: f64,
+}
+
+impl fmt::Display for Swing {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let side = if self.rising { "below" } else { "above" };
+        write!(
+            f,
+            "without a load, the drive swings at {:.1} pu, reached from {side}: speed +-{:.3} pu, i_q +-{:.3} A, input power +-{:.3} W",
+            self.level,
+            0.5 * self.speed,
+            0.5 * self.current,
+            0.5 * self.power
+        )
+    }
+}
+
+impl Bench<'_> {
+    /// Moves the speed reference from `from` to `to` (pu) in the time (s), without a load; the spans of speed, i_q and input power.
+    fn pass(&mut self, from: f64, to: f64, time: f64) -> Option<[f64; 3]> {
+        let begin = self.now();
+        let mut span = [(f64::INFINITY, f64::NEG_INFINITY); 3];
+        while self.now() < begin + time {
+            let share = (self.now() - begin) / time;
+            let (speed, _) = self.step(from + (to - from) * share, 0.0)?;
+            let seen = [speed, self.pair.controller.out.i.q, self.pair.plant.out.powers.p_in];
+            for ((low, high), x) in span.iter_mut().zip(seen) {
+                (*low, *high) = (low.min(x), high.max(x));
+            }
+        }
+        Some(span.map(|(low, high)| high - low))
+    }
+}
+
+/// The swings of a drive that starts at 0.1 pu and goes without a load to 1 pu and back, by ramps and in steps of 0.1 pu. A drive that
+/// is lost on the way has those so far.
+pub fn swings(tuned: &Tuned) -> Vec<Swing> {
+    let (mut all, mut pair) = (Vec::new(), tuned.pair());
+    if pair.start().is_err() {
+        return all;
+    }
+    let first = 1.0 / f64::from(STAIRS);
+    let par = &pair.controller.model.parameters;
+    let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, par.T_s);
+    let least = [SWING[0], SWING[1] * par.limit.i, SWING[2] * tuned.torque * tuned.speed];
+    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0 };
+    if !bench.starts(first) {
+        return all;
+    }
+    let mut last = first;
+    for (k, rising) in (1..=STAIRS).map(|k| (k, true)).chain((1..STAIRS).rev().map(|k| (k, false))) {
+        let level = f64::from(k) * first;
+        let time = 8.0 * Pace::of(tuned, &bench.pair, level, 0.0).loops();
+        let mut pass = |from| bench.pass(from, level, time);
+        let (Some(_), Some(_), Some(before), Some(after)) = (pass(last), pass(level), pass(level), pass(level)) else {
+            return all;
+        };
+        let stays = |k: usize| before[k] > least[k] && after[k] > least[k].max(0.7 * before[k]);
+        if (0..3).any(stays) {
+            let [speed, current, power] = after;
+            all.push(Swing { level, rising, speed, current, power });
+        }
+        last = level;
+    }
+    all
+}
+
+/// Temperatures in degC of winding and magnet at which a drive with the values of 20 degC is tried.
+pub const TEMPERATURES: [f64; 2] = [-30.0, 130.0];
+
+/// Temperature coefficients in 1/K of copper and NdFeB: those of a machine whose file has none.
+const ALPHA: [(&str, f64); 2] = [("winding.alpha", 3.93e-3), ("magnet.alpha", -1.1e-3)];
+
+/// The drive whose machine has `celsius` degC since before the start, with at most the torque that the rated current gives there.
+pub fn at_temperature(tuned: &Tuned, celsius: f64) -> Tuned {
+    let mut other = tuned.clone();
+    for (name, alpha) in ALPHA {
+        if !other.plant.iter().any(|setting| setting.name == name) {
+            other.plant.push(real(name, alpha, "copper and NdFeB"));
+        }
+    }
+    let alpha = other.plant.iter().find_map(|setting| match setting {
+        Setting { name: "magnet.alpha", value: Value::Real(x), .. } => Some(*x),
+        _ => None,
+    });
+    let share = (1.0 + alpha.unwrap_or_default() * (celsius - 20.0)).min(1.0);
+    (other.torque, other.top_torque) = (share * tuned.torque, share * tuned.top_torque);
+    other.plant.push(real("thermal.T_start", 273.15 + celsius, "of the trial"));
+    other
 }
 
 /// Tries all tasks from `angles` start angles.

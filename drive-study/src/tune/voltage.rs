@@ -3,15 +3,15 @@
 //! The references may use U = k_u u_dc / sqrt 3. The rated torque at the rated speed must fit, with field weakening if need be;
 //! at the highest speed, that of the rated power.
 
-use super::motor::{Data, MotorFile};
-use super::rules::{Setting, Value, electrical, set};
+use super::motor::{Data, MotorFile, electrical};
+use super::setting::{Setting, Value, set};
 use anyhow::{Result, bail};
 use drive::control::envelope::Envelope;
 use drive::control::reference::max_torque_per_ampere;
 use drive::control::weakening::WeakeningParameters;
 use drive::frame::DqHat;
 
-/// Greatest load at the highest speed as a share of the greatest torque: the rest is for the speed loop.
+/// Maximum load at the highest speed as a share of the maximum torque: the rest is for the speed loop.
 const TOP_SHARE: f64 = 0.8;
 
 /// Field weakening and load at the highest speed.

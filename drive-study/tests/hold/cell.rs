@@ -2,8 +2,9 @@
 
 use drive::Pair;
 use drive::math::wrap;
-use drive_study::tune::pace::{Pace, begin};
-use drive_study::tune::rules::{Tuned, Value};
+use drive_study::tune::pace::{Begin, Pace};
+use drive_study::tune::setting::{Tuned, Value};
+use fmu_core::Warns;
 use std::f64::consts::TAU;
 use std::fmt;
 
@@ -180,7 +181,7 @@ fn prepared(tuned: &Tuned, cell: &Cell, sensor: bool) -> Pair {
     pair
 }
 
-/// Least and greatest value and sum over a part of the time.
+/// Minimum and maximum value and sum over a part of the time.
 #[derive(Clone, Copy)]
 struct Part {
     low: [f64; 2],
@@ -223,7 +224,8 @@ fn parts(time: f64) -> usize {
 
 /// Times in s: of the reference, from which the rotor counts, of the load, and of the end.
 fn times(tuned: &Tuned, pair: &Pair, cell: &Cell) -> [f64; 4] {
-    let (turn, ready) = begin(tuned, pair, cell.level);
+    let Begin { rest: turn, measures, ready } = Begin::of(tuned, pair, cell.level);
+    let ready = turn + measures + ready;
     if cell.torque_mode {
         let J = pair.plant.model.parameters.mechanics.J;
         let accelerates = J * cell.level * tuned.speed / (cell.load * tuned.torque);
@@ -236,8 +238,8 @@ fn times(tuned: &Tuned, pair: &Pair, cell: &Cell) -> [f64; 4] {
     [turn, ready, load, load + settles(cell.load) + LAST]
 }
 
-/// The run of a drive: the end, the loss, greatest `lock_lost` at a loss and in the last seconds, whether a limit acts there, and
-/// whether `lock_lost` reached 1 later than 1 s after the start.
+/// The run of a drive: the end, the loss, greatest `lock_lost` at a loss and in the last seconds, whether a limit acts there or a warning names a
+/// torque that moves nothing, and whether `lock_lost` reached 1 later than 1 s after the start.
 fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>, f64, bool, bool) {
     let mut pair = prepared(tuned, cell, sensor);
     let mut end = End::default();
@@ -253,7 +255,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
     let (mut before, mut slip, mut span) = (0.0, 0.0, (0.0_f64, 0.0_f64));
     // lock_lost in each part.
     let mut locks = vec![0.0_f64];
-    let (mut limited, mut judged, mut alarm) = (0.0, 0.0, false);
+    let (mut limited, mut judged, mut alarm, mut warned) = (0.0, 0.0, false, false);
     let (mut k, mut t) = (0_u32, 0.0);
     while t < stop {
         let asked = if t >= turn { 1.0 } else { 0.0 };
@@ -286,6 +288,10 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
             limited += f64::from(u8::from(controller.current_limited || controller.voltage_limited));
             judged += 1.0;
         }
+        if cell.torque_mode && k % 1000 == 0 {
+            let mut hear = |(_, key, _): fmu_core::log::Said<'_>| warned |= key == "stands";
+            pair.controller.model.warn(&mut fmu_core::log::Warnings::to(&mut hear));
+        }
         if t >= PART * f64::from(u32::try_from(history.len()).expect("few")) - 0.5 * T_s {
             let mean = Part::of(&history[history.len().saturating_sub(second)..]);
             let apart = (mean.sum[0] - mean.sum[1]).abs() / mean.n;
@@ -308,7 +314,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
     let from = if matches!(lost, Some((Loss::Apart, _))) { at - 1.0 } else { at };
     let seen = locks[parts(from).min(locks.len() - 1)..].iter().take(parts(until - from) + 1);
     let lock_lost = seen.fold(0.0_f64, |most, lock| most.max(*lock));
-    (end, lost, lock_lost, limited > 0.5 * judged, alarm)
+    (end, lost, lock_lost, warned || limited > 0.5 * judged, alarm)
 }
 
 /// Whether the drive of an `end` stands at the task; in torque mode at the `goal` of the sensor.

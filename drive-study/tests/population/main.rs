@@ -15,7 +15,8 @@ use drive_study::identify::columns::{Naming, Signals};
 use drive_study::identify::verdict::Quantity;
 use drive_study::identify::{Identified, Options, identify, machine_file};
 use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules::{self, Tuned};
+use drive_study::tune::rules;
+use drive_study::tune::setting::Tuned;
 use drive_study::tune::trial::{self, Task};
 use foreign::{Machine, PLAIN, Part, THOROUGH};
 use std::path::Path;
@@ -153,7 +154,7 @@ fn chain() {
     for index in 0..machines {
         let m = Machine::drawn(seed, index);
         let truth = tuned(&true_file(&m));
-        // Three times the same course: no stretch of the record alone tells a value. A heavy rotor needs the time to change its speed.
+        // Three times the same course: no single stretch of the record determines a value. A heavy rotor needs the time to change its speed.
         let time = (24.0 + 8.0 * m.J * m.speed / m.torque).min(600e3 * m.T_s);
         let found = found(&m, seed, index, time, &[THOROUGH; 3].concat(), 1).unwrap_or_else(|e| panic!("{index}: {e}"));
         let missing: Vec<String> = ["R_s", "L_d", "L_q", "psi_M", "J"]

@@ -8,12 +8,14 @@ mod draw;
 
 use draw::{Dice, machine};
 use drive::PmsmDrive;
-use drive::control::start::StartMode;
 use drive::estimator::Kind;
 use drive::math::wrap;
-use drive_study::tune::limits::{self, Limit, What};
+use drive_study::tune::limits::{self, Limit};
 use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules::{self, Tuned, Value};
+use drive_study::tune::pace::Begin;
+use drive_study::tune::remedy::What;
+use drive_study::tune::rules;
+use drive_study::tune::setting::{Tuned, Value};
 use drive_study::tune::trial::{self, Task, Trial};
 use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::{E, TAU};
@@ -99,15 +101,9 @@ fn long(motor: &MotorFile, tuned: &Tuned, task: &Task, theta_e: f64) -> (bool, b
         _ => 1.0 / par.estimators.tracker.bandwidth,
     };
     let slowest = observer.max(2.0 / par.speed_loop.bandwidth).max(J * tuned.speed / tuned.torque);
-    let ramp = if par.speed_loop.ramp > 0.0 { reference / par.speed_loop.ramp } else { 0.0 };
-    let start = &par.start;
-    if start.mode == StartMode::CurrentFrequency {
-        let sequence = 2.0 * start.t_align + start.speed / start.acceleration + start.settle;
-        run.run(sequence, 0.0, reference, tuned.speed, |_| 0.0);
-    } else {
-        run.run(tuned.rest, 0.0, 0.0, tuned.speed, |_| 0.0);
-    }
-    if !run.run(ramp + 20.0 * slowest, 2.0 * slowest, reference, tuned.speed, |_| 0.0) {
+    let Begin { rest, measures, ready } = Begin::of(tuned, &tuned.pair(), task.level);
+    run.run(rest, 0.0, 0.0, tuned.speed, |_| 0.0);
+    if !run.run(measures + ready + 20.0 * slowest, 2.0 * slowest, reference, tuned.speed, |_| 0.0) {
         return (false, false);
     }
     // What the load leaves of the torque makes the dip good.
@@ -156,27 +152,26 @@ fn head(motor: &MotorFile, tuned: &Tuned) -> String {
 
 /// Every verdict on a machine against long runs from `angles` angles; returns the number of cells that were compared and of
 /// remedies.
-fn compare(motor: &MotorFile, angles: u32) -> (u32, u32) {
-    let tuned = rules::tune(motor).unwrap();
-    let trials = trial::all(&tuned, angles);
-    let (limits, _) = limits::of(motor, &tuned, &trials);
-    let (mut cells, mut remedies, mut row) = (0, 0, head(motor, &tuned));
+fn compare(motor: &MotorFile, tuned: &Tuned, angles: u32) -> (u32, u32) {
+    let trials = trial::all(tuned, angles);
+    let (limits, _) = limits::of(motor, tuned, &trials);
+    let (mut cells, mut remedies, mut row) = (0, 0, head(motor, tuned));
     for trial in &trials {
-        let (started, held) = long_from(motor, &tuned, &trial.task, angles);
+        let (started, held) = long_from(motor, tuned, &trial.task, angles);
         let cell = format!(" | {:.2}: {}/{} {started}/{held}", trial.task.level, trial.started, trial.held);
         row.push_str(&cell);
-        let told = |what| limits.iter().any(|l| l.what == what && l.level.total_cmp(&trial.task.level).is_eq());
+        let announced = |what| limits.iter().any(|l| l.what == what && l.level.total_cmp(&trial.task.level).is_eq());
         assert_eq!(trial.starts(), started == angles, "{row}");
         assert_eq!(trial.holds(), held == started, "{row}");
-        assert_eq!(told(What::Start), started < angles, "{row}");
-        assert_eq!(told(What::Load), held < started, "{row}");
+        assert_eq!(announced(What::Start), started < angles, "{row}");
+        assert_eq!(announced(What::Load), held < started, "{row}");
         cells += 2;
     }
     println!("{row}");
     for limit in &limits {
         println!("    {limit}");
         let trial = trials.iter().find(|trial| trial.task.level.total_cmp(&limit.level).is_eq()).unwrap();
-        remedies += helped(motor, &tuned, limit, trial);
+        remedies += helped(motor, tuned, limit, trial);
     }
     (cells, remedies)
 }
@@ -206,7 +201,7 @@ fn a_verdict_waits_for_the_slowest_time_constant() {
         let trials = trial::all(&tuned, 8);
         assert!(trials.iter().all(|trial| trial.started == 8 && trial.held == 8), "{trials:?}");
         assert!(limits::of(&motor, &tuned, &trials).0.is_empty());
-        compare(&motor, 4);
+        compare(&motor, &tuned, 4);
     }
 }
 
@@ -216,25 +211,42 @@ const LIGHT: &str = include_str!("machines/light-24v.toml");
 #[test]
 fn a_small_machine_holds_what_it_lost() {
     let motor = read(SMALL);
-    let tuned = rules::tune(&motor).unwrap();
+    let tuned = rules::fixed(&motor).unwrap();
     assert!(trial::all(&tuned, 8).iter().all(|trial| trial.started == 8 && trial.held == 8));
-    compare(&motor, 4);
+    compare(&motor, &tuned, 4);
     // Known by 10 % only, R loses the load.
     let R_s = *motor.data.machine.R_s.get_ref();
     let known_badly = tuned.with("motor.R_s", Value::Real(0.9 * R_s)).with("rasmussen.c_1", Value::Real(200.0));
     assert_eq!(trial::at(&known_badly, &tuned.tasks()[0], 4).held, 0);
 }
 
-/// What is lost is told, and every remedy helps.
+/// A scooter's hub motor whose diodes drop 0.7 V. Without their compensation it swings without a load on the way down from 0.9 pu,
+/// bistable: +-10 A at 0.5 pu, where the trial from standstill said "24 of 24 holds". With it, or with a slow speed loop, it is quiet.
+#[test]
+fn a_swing_between_the_levels_is_found_from_both_sides() {
+    let motor = read(include_str!("machines/scooter-36v.toml"));
+    let tuned = rules::tune(&motor).unwrap();
+    assert!(trial::swings(&tuned).is_empty());
+    let fixed = rules::fixed(&motor).unwrap().with("compensation.u_dead", Value::Real(0.0));
+    let swings = trial::swings(&fixed);
+    let half: Vec<_> = swings.iter().filter(|swing| (swing.level - 0.5).abs() < 1e-9).collect();
+    assert!(half.len() == 1 && !half[0].rising && half[0].current > 15.0 && swings.len() >= 4, "{swings:?}");
+    assert!(half[0].to_string().contains("swings at 0.5 pu, reached from above"), "{}", half[0]);
+    assert!(trial::swings(&fixed.with("speed_loop.bandwidth", Value::Real(40.0))).is_empty());
+}
+
+/// What is lost is announced, and every remedy helps. With the adaptation, this machine holds its load.
 #[test]
 fn a_light_machine_is_told_what_helps() {
-    let (_, remedies) = compare(&read(LIGHT), 4);
+    let motor = read(LIGHT);
+    assert!(trial::all(&rules::tune(&motor).unwrap(), 4).iter().all(|trial| trial.starts() && trial.holds()));
+    let (_, remedies) = compare(&motor, &rules::fixed(&motor).unwrap(), 4);
     assert!(remedies >= 2, "{remedies}");
 }
 
 #[test]
 fn what_is_told_of_some_machines_is_what_long_runs_show() {
-    let compared: u32 = drawn(8).iter().map(|motor| compare(motor, 4).0).sum();
+    let compared: u32 = drawn(8).iter().map(|motor| compare(motor, &rules::tune(motor).unwrap(), 4).0).sum();
     assert!(compared >= 48, "{compared} cells");
 }
 
@@ -245,7 +257,7 @@ fn what_is_told_of_forty_machines_is_what_long_runs_show() {
     let machines = [TRACTION, SERVO, SMALL].map(read).into_iter().chain(drawn(40));
     let (mut cells, mut remedies) = (0, 0);
     for motor in machines {
-        let (more, helped) = compare(&motor, 24);
+        let (more, helped) = compare(&motor, &rules::tune(&motor).unwrap(), 24);
         (cells, remedies) = (cells + more, remedies + helped);
     }
     println!("{cells} verdicts compared, {remedies} remedies tried");

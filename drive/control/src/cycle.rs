@@ -2,18 +2,21 @@
 
 #![expect(clippy::inline_always, reason = "one sample is one function: its values stay in registers")]
 
-use crate::estimator::{Estimate, Estimating, Estimator, Injection, Sample};
+use crate::current_limit::{Predictor, may_exceed};
+use crate::estimator::{Estimate, Estimating, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::lock::Lock;
 use crate::model::SensorlessController;
-use crate::signals::ControllerOutputs;
+use crate::signals::{ControllerInputs, ControllerOutputs};
+use crate::start::StartMode;
 use crate::state::{Command, Leader, Mode, References, context};
-use crate::tables::Compensation;
+use crate::tables::{Compensation, ControllerParameters};
 use crate::trip::Cause;
 use crate::weakening::share;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use drive_base::hexagon::within_hexagon;
 use drive_base::math::{at_most, wrap};
 use drive_base::modulation::dead_time_loss;
+use fmu_core::Elapsed;
 
 /// The estimated rotor frame at a sample and the quantities controlled in it.
 struct Frame {
@@ -36,6 +39,8 @@ struct Modulated {
     u: Phases,
     /// Whether the hexagon limited them.
     voltage_limited: bool,
+    /// Whether the current limit changed them.
+    cut: bool,
     /// Share of u_dc / sqrt(3) that was requested.
     u_share: f64,
 }
@@ -46,16 +51,39 @@ impl SensorlessController {
     pub(super) fn control(&mut self) {
         let Self { tuned, state, .. } = self;
         let steady = state.k > 0 && !*tuned && matches!(state.leader, Leader::Estimator);
-        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) {
+        if steady && matches!(state.estimator, Estimator::Rasmussen(_)) && !self.measures_resistance() {
             self.state.computed = self.cycle(true);
         } else {
             self.any_cycle();
         }
     }
 
+    /// Whether a drive that starts at rest still measures its resistance: until then, it rests on i_0 and follows no reference.
+    #[inline]
+    pub fn measures_resistance(&self) -> bool {
+        let ControllerParameters { estimators: EstimatorParameters { adaptation, .. }, estimator, start, .. } =
+            &self.parameters;
+        adaptation.resistance
+            && *estimator == Kind::Rasmussen
+            && start.mode == StartMode::Direct
+            && self.parameters.speed_est == 0.0
+            && Elapsed::periods(self.state.k, self.parameters.T_s).seconds() < adaptation.longest_rest()
+            && match &self.state.estimator {
+                Estimator::Rasmussen(observer) => self.state.k == 0 || !observer.knows_resistance(),
+                _ => self.state.k == 0,
+            }
+    }
+
     #[inline(never)]
     fn any_cycle(&mut self) {
+        let ControllerInputs { speed_ref, tau_ref, .. } = self.inputs;
+        let release = self.parameters.zero_speed.release;
+        if self.measures_resistance() {
+            (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
+        }
         self.state.computed = self.cycle(false);
+        (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) =
+            (speed_ref, tau_ref, release);
     }
 
     /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default
@@ -75,7 +103,7 @@ impl SensorlessController {
         if self.parameters.speed_loop.torque_mode {
             self.state.stands.update(&self.parameters, mode == Mode::ClosedLoop, speed, i_ref, at_most(low, high));
         }
-        let Modulated { u, voltage_limited, u_share } = self.modulate(mode, &frame, i_ref, tuned);
+        let Modulated { u, voltage_limited, cut, u_share } = self.modulate(mode, &frame, &sample, i_ref, tuned);
         let R_s_est = self.state.estimator.resistance(&context(
             &self.parameters,
             &self.in_use.estimators,
@@ -96,7 +124,7 @@ impl SensorlessController {
             tripped: Cause::None,
             sensor_lost: self.state.sensor_lost,
             voltage_limited,
-            current_limited,
+            current_limited: current_limited || cut,
             tau_max: high,
             tau_min: -low,
             u_share,
@@ -190,9 +218,9 @@ impl SensorlessController {
         }
     }
 
-    /// Current control, injection, the hexagon and dead-time compensation.
+    /// Current control, the current limit, injection, the hexagon and dead-time compensation.
     #[inline(always)]
-    fn modulate(&mut self, mode: Mode, frame: &Frame, i_ref: DqHat, tuned: bool) -> Modulated {
+    fn modulate(&mut self, mode: Mode, frame: &Frame, sample: &Sample, i_ref: DqHat, tuned: bool) -> Modulated {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
         if tuned && mode != Mode::AfterSearch {
@@ -219,10 +247,22 @@ impl SensorlessController {
             Injection::Estimated(u) => Some(acting.to_stator(u)),
         };
         let without = acting.to_stator(requested);
-        let whole = injected.map_or(without, |injected| without + injected);
+        let mut whole = injected.map_or(without, |injected| without + injected);
+        let mut cut = false;
+        let shown = state.fresh.update(inputs.i, sample.u);
+        if may_exceed(sample, par.limit.i) && shown && injected.is_none() && !matches!(mode, Mode::Voltage(_)) {
+            let [newest, older, _] = &state.commands;
+            let waiting = [older.u, newest.u, whole];
+            let commands = &waiting[usize::from(par.delay < 2) + usize::from(par.delay < 1)..];
+            let predictor = Predictor { motor, T_s, axis: frame.axis, w: frame.w };
+            if let Some(change) = predictor.correction(sample, commands, par.limit.i) {
+                whole += change;
+                cut = true;
+            }
+        }
         let injected = injected.unwrap_or_default();
         let (mut command, limited) = within_hexagon(whole, inputs.u_dc);
-        let limitation = limited.then(|| acting.from_stator(command - injected) - requested);
+        let limitation = (limited || cut).then(|| acting.from_stator(command - injected) - requested);
         state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
         let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
         let (mut output, mut beyond) = (command, false);
@@ -237,7 +277,7 @@ impl SensorlessController {
         state.commands[2] = state.commands[1];
         state.commands[1] = state.commands[0];
         state.commands[0] = Command { u: command, injected };
-        Modulated { u: Phases::from_stator(output), voltage_limited: limited || beyond, u_share }
+        Modulated { u: Phases::from_stator(output), voltage_limited: limited || beyond, cut, u_share }
     }
 
     /// The output `lock_lost`; 0 during a start sequence, because its angle is not an estimate.
@@ -318,6 +358,45 @@ mod tests {
         assert!((controller.measure().u.alpha() - 10.0).abs() < 1e-12);
     }
 
+    /// A drive with the adaptation ignores its references until the resistance is measured, here until the bound, without a current; a
+    /// drive that starts at speed, and one without the adaptation, follow at once.
+    #[test]
+    fn the_references_wait_for_the_resistance() {
+        let samples = |torque_mode: bool, adapts: bool, speed_est: f64| {
+            let [mut asked, mut idle] = [30.0, 0.0].map(|reference| {
+                let mut controller = SensorlessController::default();
+                let par = &mut controller.parameters;
+                (par.speed_loop.torque_mode, par.speed_est) = (torque_mode, speed_est);
+                (par.estimators.adaptation.resistance, par.estimators.adaptation.bandwidth) = (adapts, 200.0);
+                (controller.inputs.speed_ref, controller.inputs.tau_ref) = (reference, 0.1 * reference);
+                controller.inputs.u_dc = 325.0;
+                controller.derive();
+                controller.initialize();
+                controller
+            });
+            let equal = |asked: &SensorlessController, idle: &SensorlessController| asked.state == idle.state;
+            let mut samples = 0;
+            while samples < 2000 {
+                for controller in [&mut asked, &mut idle] {
+                    controller.control();
+                    controller.state.k += 1;
+                }
+                if !equal(&asked, &idle) {
+                    break;
+                }
+                samples += 1;
+            }
+            assert!((asked.inputs.speed_ref - 30.0).abs() < 1e-12, "the input stays");
+            samples
+        };
+        for torque_mode in [false, true] {
+            // 20 / 200 s.
+            assert_eq!(samples(torque_mode, true, 0.0), 1000, "torque mode {torque_mode}");
+            assert_eq!(samples(torque_mode, false, 0.0), 0);
+            assert_eq!(samples(torque_mode, true, 5.0), 0);
+        }
+    }
+
     /// The newest command acted in the last interval; with a delay of 1 or 2, the second or third newest.
     #[test]
     fn the_delay_selects_the_command_that_acted() {
@@ -326,7 +405,7 @@ mod tests {
         let (axis, half) = (Axis::at(0.0), Turn::new(0.0));
         let frame = Frame { axis, theta: 0.0, w: 0.0, half, i: DqHat::ZERO, injection: Injection::None };
         for u in [3.0, 2.0, 1.0] {
-            controller.modulate(Mode::Voltage(DqHat::new(u, 0.0)), &frame, DqHat::ZERO, false);
+            controller.modulate(Mode::Voltage(DqHat::new(u, 0.0)), &frame, &Sample::default(), DqHat::ZERO, false);
         }
         for (delay, u) in [(0, 1.0), (1, 2.0), (2, 3.0)] {
             controller.parameters.delay = delay;
@@ -342,7 +421,8 @@ mod tests {
         let half = Turn::new(0.5 * controller.parameters.T_s * 400.0);
         let frame =
             Frame { axis: Axis::at(0.0), theta: 0.0, w: 400.0, half, i: DqHat::ZERO, injection: Injection::None };
-        let Modulated { u, .. } = controller.modulate(Mode::Voltage(DqHat::new(10.0, 0.0)), &frame, DqHat::ZERO, false);
+        let Modulated { u, .. } =
+            controller.modulate(Mode::Voltage(DqHat::new(10.0, 0.0)), &frame, &Sample::default(), DqHat::ZERO, false);
         let u = u.to_stator();
         assert!((u.beta().atan2(u.alpha()) - 0.06).abs() < 1e-12, "{u:?}");
     }
@@ -362,8 +442,9 @@ mod tests {
     #[test]
     fn what_the_hexagon_cuts_off_drives_the_integrators_back() {
         let (mut controller, frame) = turning(200.0, |c| c.inputs.u_dc = 60.0);
-        let i_ref = DqHat::new(-2.0, 4.0);
-        let mut request = |n: u32| (0..n).map(|_| controller.modulate(Mode::ClosedLoop, &frame, i_ref, false)).last();
+        let (sample, i_ref) = (Sample::default(), DqHat::new(-2.0, 4.0));
+        let mut request =
+            |n: u32| (0..n).map(|_| controller.modulate(Mode::ClosedLoop, &frame, &sample, i_ref, false)).last();
         let Modulated { voltage_limited: limited, u_share: share, .. } = request(20_000).unwrap();
         let Modulated { u_share: later, .. } = request(20_000).unwrap();
         assert!(limited && share < 2.5 && (later - share).abs() < 1e-3, "{share} and later {later} of u_dc / sqrt 3");
@@ -375,7 +456,8 @@ mod tests {
         let (mut controller, frame) = turning(0.0, |c| c.parameters.compensation.u_dead = 6.5);
         let i_ref = DqHat::new(0.0, 4.0);
         let at = |u: Phases| frame.axis.from_stator(u.to_stator());
-        let Modulated { u: with, .. } = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
+        let Modulated { u: with, .. } =
+            controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, &Sample::default(), i_ref, false);
         let command = frame.axis.from_stator(controller.state.commands[0].u);
         assert!((command - DqHat::new(0.0, 20.0)).magnitude() < 1e-9, "the estimators see the command: {command:?}");
         let more = (at(with) - command).q();
@@ -393,7 +475,8 @@ mod tests {
             });
             // Inside +-i_zero the legs are resistances: what they lose has the angle of the current.
             let i_ref = DqHat::new(-1.0, 4.0);
-            let Modulated { u, .. } = controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, i_ref, false);
+            let Modulated { u, .. } =
+                controller.modulate(Mode::Voltage(DqHat::new(0.0, 20.0)), &frame, &Sample::default(), i_ref, false);
             let lost = Axis::<Estimated>::at(0.7 + turned).from_stator(u.to_stator() - controller.state.commands[0].u);
             assert!((lost - i_ref * 0.65).magnitude() < 1e-9, "{lost:?} V at {w} rad/s, delay {delay}");
         }
@@ -404,7 +487,7 @@ mod tests {
     fn the_estimators_see_what_is_left_of_an_injection() {
         let (mut controller, mut frame) = turning(200.0, |c| c.inputs.u_dc = 60.0);
         frame.injection = Injection::Stator(AlphaBeta::new(10.0, -20.0));
-        controller.modulate(Mode::Voltage(DqHat::new(0.0, 90.0)), &frame, DqHat::ZERO, false);
+        controller.modulate(Mode::Voltage(DqHat::new(0.0, 90.0)), &frame, &Sample::default(), DqHat::ZERO, false);
         let Command { u, injected } = controller.state.commands[0];
         let whole = frame.axis.ahead(frame.half).ahead(frame.half).ahead(frame.half).to_stator(DqHat::new(0.0, 90.0))
             + AlphaBeta::new(10.0, -20.0);
@@ -416,7 +499,7 @@ mod tests {
                 c.inputs.u_dc = 325.0;
             });
             let (mode, i_ref) = (Mode::Voltage(DqHat::new(0.0, 20.0)), DqHat::new(0.0, 4.0));
-            let Modulated { u: output, .. } = controller.modulate(mode, &frame, i_ref, false);
+            let Modulated { u: output, .. } = controller.modulate(mode, &frame, &Sample::default(), i_ref, false);
             let beside = (output.to_stator() - controller.state.commands[0].u).magnitude();
             assert_eq!(beside < 1e-9, observe, "{beside} V");
         }

@@ -102,6 +102,13 @@ impl Gains {
     }
 }
 
+impl Law {
+    /// The law without its current; the limit stays that of a torque that is asked for.
+    pub(crate) fn released(self) -> Self {
+        Self { i_d: 0.0, ..self }
+    }
+}
+
 /// The low-speed law at a sample.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Law {

@@ -38,6 +38,8 @@ pub const ACTS: &[Acts<Par>] = &[
     Acts { names: &["limit.i_dc_max", "limit.i_dc_min"], when: |p| p.dc.used, why: "no effect without limit.i_dc_use" },
     Acts { names: &["zero_speed.i_0", "zero_speed.w_0"], when: |p| reads(p, |kind| kind.class() == Class::FluxObserver),
         why: "no effect with this estimator; Rasmussen and FluxObserver have the low-speed law" },
+    Acts { names: &["zero_speed.release"], when: |p| p.speed_loop.torque_mode && reads(p, |kind| kind.class() == Class::FluxObserver),
+        why: "no effect without speed_loop.torque_mode and an estimator with the low-speed law, Rasmussen or FluxObserver" },
     Acts { names: &["weakening.k_u", "weakening.k_t", "weakening.bandwidth"], when: |p| p.weakening.used,
         why: "no effect without weakening.use" },
     Acts { names: &["start.i", "start.t_align", "start.acceleration", "start.speed", "start.settle"],

@@ -14,6 +14,7 @@ pub mod clocked;
 pub mod commission;
 pub mod commissioning;
 pub mod current;
+pub mod current_limit;
 mod cycle;
 pub mod documentation;
 pub mod envelope;

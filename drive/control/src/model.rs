@@ -367,7 +367,8 @@ impl Sampled for SensorlessController {
 }
 
 /// Description of the torque reference.
-pub const TAU_REF: &str = "Torque reference; 0 holds the shaft at standstill with zero_speed.i_0";
+pub const TAU_REF: &str =
+    "Torque reference; at 0, zero_speed.i_0 flows near standstill, or no current with zero_speed.release";
 
 /// The warning of a torque reference (N.m) that was beyond these limits (N.m) for a second.
 pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {

@@ -10,6 +10,9 @@ use crate::weakening::Weakening;
 use drive_base::frame::DqHat;
 use serde::{Deserialize, Serialize};
 
+/// Torque that counts as none with `zero_speed.release`, as a share of that of i_0.
+const RELEASED: f64 = 1e-3;
+
 /// Computed from the parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Settled {
@@ -66,7 +69,11 @@ impl SettledAt<'_> {
     #[inline]
     pub fn currents(&self, tau: f64) -> (DqHat, bool) {
         let &Self { gains, par, ref law, w, ref weakening, .. } = self;
-        let plain = || gains.currents(par, law, tau / gains.k);
+        // A torque that decays to 0 comes to rest here.
+        let asked = if tau.abs() > RELEASED * gains.k * par.zero_speed.i_0 { tau } else { 0.0 };
+        let released = par.speed_loop.torque_mode && par.zero_speed.releases(asked);
+        let law = if released { law.released() } else { *law };
+        let plain = || gains.currents(par, &law, tau / gains.k);
         if !par.weakening.used {
             return (plain(), false);
         }

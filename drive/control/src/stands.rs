@@ -9,7 +9,8 @@
 //! |tau| > 2 % of the limit        psi_M |w^| < 0.3 R^ |i|        w^ smoothed over 0.3 s
 //! ```
 //!
-//! and warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M). A rotor that
+//! or, where `emf.hold_reversal` leads a method with a back EMF through zero, |w^| < w_hold / 4, where little of its gain is left. It
+//! warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M). A rotor that
 //! takes the whole torque is faster than w_s by then.
 //!
 //! Derived here. tau in N.m, w in rad/s (electrical), w_s in rad/s (mechanical).
@@ -21,6 +22,8 @@ use serde::{Deserialize, Serialize};
 
 /// Share of R^ by which the resistance may be wrong: that of `lock_lost`.
 const RESISTANCE: f64 = 0.3;
+/// Speed as a share of `emf.w_hold` below which little of the angle's gain is left.
+const FADED: f64 = 0.25;
 /// Minimum torque as a share of the limit.
 const LITTLE: f64 = 0.02;
 /// Time constant of the speed in s.
@@ -50,7 +53,9 @@ impl Stands {
     pub(crate) fn update(&mut self, par: &ControllerParameters, works: bool, speed: f64, i: DqHat, most: f64) {
         let motor = &par.motor;
         let tau = motor.torque(i.d(), i.q()).abs();
-        let hidden = RESISTANCE * motor.R_s * i.magnitude() / (f64::from(motor.n_p) * motor.psi_M);
+        let emf = &par.estimators.emf;
+        let faded = if par.estimator.class() == Class::BackEmf && emf.hold_reversal { FADED * emf.w_hold } else { 0.0 };
+        let hidden = (RESISTANCE * motor.R_s * i.magnitude() / motor.psi_M).max(faded) / f64::from(motor.n_p);
         let speed = self.speed + (speed - self.speed) * (par.T_s / (par.T_s + SMOOTH));
         let time = if works && tau > LITTLE * most && speed.abs() < hidden { self.time + par.T_s } else { 0.0 };
         *self = Self { time, tau, hidden, speed };

@@ -2,6 +2,7 @@
 
 use crate::battery::Battery;
 use crate::current::CurrentController;
+use crate::current_limit::Fresh;
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
 use crate::lock::Lock;
@@ -110,6 +111,8 @@ pub(super) struct State {
     pub(super) commands: [Command; 3],
     /// Current of the last sample in A.
     pub(super) i_last: AlphaBeta,
+    /// Whether the measured currents are new.
+    pub(super) fresh: Fresh,
     /// References of the last sample in A.
     pub(super) i_ref: DqHat,
     /// Torque reference of the last sample in N.m.
@@ -248,7 +251,10 @@ impl State {
         if par.dc.used {
             i_0 = at_most(i_0, par.dc.i_0(&par.motor, inputs.u_dc));
         }
-        let law = gains.law(par, i_0, speed);
+        let mut law = gains.law(par, i_0, speed);
+        if par.speed_loop.torque_mode && par.zero_speed.releases(inputs.tau_ref) {
+            law = law.released();
+        }
         let limit = law.limit;
         if par.weakening.used || par.dc.used {
             return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);

@@ -300,7 +300,7 @@ pub const STATUS: &Table<ControllerOutputs> = table![
     ),
     O::boolean_output(
         "current_limited",
-        "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited the current references of the last sample",
+        "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited current references or voltage of the last sample",
         |o| &mut o.current_limited,
     ),
     O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),

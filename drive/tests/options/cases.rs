@@ -8,9 +8,9 @@ use drive::control::reference::{max_torque, max_torque_per_ampere};
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters as Par;
 use drive::control::trip::Cause;
-use drive::estimator::Kind;
 use drive::estimator::pulsating::Demodulation;
 use drive::estimator::tracker::TrackerKind;
+use drive::estimator::{Class, Kind};
 use drive::math::wrap;
 use drive::motor::Motor;
 use std::f64::consts::TAU;
@@ -527,5 +527,23 @@ pub(super) const CASES: &[Case] = &[
         ask: |p| p.commission.mode = CommissionMode::Standstill,
         figures: commissioned,
         acts: |_, without, with| are(without, [false, true]) && are(with, [true, false]),
+    },
+    Case {
+        option: "zero_speed.release",
+        on: |kind| {
+            let mut pair = drive(kind);
+            pair.controller.model.parameters.speed_loop.torque_mode = true;
+            pair
+        },
+        ask: |p| p.zero_speed.release = true,
+        figures: |mut pair| {
+            run(&mut pair, 0.05, |_, _| ());
+            let out = &pair.controller.out;
+            [out.i_ref.d.hypot(out.i_ref.q), out.tau_max]
+        },
+        acts: |kind, [held, most], [free, same]| {
+            let i_0 = if kind.class() == Class::FluxObserver { 5.0 } else { 0.0 };
+            (held - i_0).abs() < 0.1 && free < 1e-9 && (most - same).abs() < 1e-12
+        },
     },
 ];

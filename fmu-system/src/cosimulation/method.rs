@@ -62,16 +62,20 @@ impl Method {
 
     /// Refuses a method that none of the instances supports, and invalid settings.
     pub(super) fn check(&self, kinds: &[Kind], sequential: bool) -> Result<(), Error> {
+        let refused = |setting: &str, cause: &str| Err(Error::usage(setting, cause));
         let wrong = |cause: String| Err(Error::usage("settings", cause));
         let any = |used: fn(&Kind) -> bool| kinds.iter().any(used);
         match self {
             Self::CoSimulation { event_mode: false, early_return: false } => return Ok(()),
             Self::CoSimulation { event_mode, early_return } => {
                 if *event_mode && !any(|k| matches!(k, Kind::CoSimulation { event_mode: true, .. })) {
-                    return wrong("no FMU has event mode (hasEventMode, FMI 3.0 Co-Simulation)".into());
+                    return refused("event_mode", "no FMU has event mode (hasEventMode, FMI 3.0 Co-Simulation)");
                 }
                 if *early_return && !any(|k| matches!(k, Kind::CoSimulation { early_return: true, .. })) {
-                    return wrong("no FMU returns early (mightReturnEarlyFromDoStep, FMI 3.0 Co-Simulation)".into());
+                    return refused(
+                        "early_return",
+                        "no FMU returns early (mightReturnEarlyFromDoStep, FMI 3.0 Co-Simulation)",
+                    );
                 }
             }
             Self::ModelExchange(integration) => {

@@ -6,7 +6,7 @@ use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Result, bail};
 use drive_study::tune::{
     joined,
-    rules::{Setting, Tuned, Value},
+    setting::{Setting, Tuned, Value},
 };
 use fmu_core::Description;
 

@@ -7,7 +7,7 @@ use drive::frame::Dq;
 use drive::plant::flux_map::FluxMap;
 use std::f64::consts::SQRT_2;
 
-/// Greatest residue, reciprocity error and torque error as a share of the rms value.
+/// Maximum residue, reciprocity error and torque error as a share of the rms value.
 const ALLOWED: f64 = 0.15;
 
 /// How far the map is from the table, in A.

@@ -6,6 +6,11 @@
 //! Each axis has one observer ([`emf`]). A tracker receives theta~ = atan2(-s e_d, s e_q), where s is the sign of w.
 //! Correction to the paper: (19) and (21) use the measured current in the innovation; (20) is missing.
 //!
+//! **A wrong R^** adds (R - R^) i to the EMF and is integrated nowhere: with E = w (psi_M + (L_d - L_q) i_d), the estimate stands at
+//! tan theta~ = (R - R^) i_d / (E + (R - R^) i_q). It does not swing, and it is at the rotor as long as the sum keeps the sign of w:
+//! |w| > (R^ - R) |i_q| / (psi_M + (L_d - L_q) i_d), motoring with R^ > R or generating with R^ < R. Below, the estimate is half a turn
+//! off.
+//!
 //! Limits: the angle requires an EMF. It holds rated load down to 0.010 of the rated speed, 0.020 with a compensated dead
 //! time. A reversal at light load is ambiguous by half a turn, unless `emf.hold_reversal` holds it. L_q + 20 % at rated
 //! load shifts the angle by 5.8 deg. The speed that `emf.hold_reversal` takes from the EMF is e_q / (psi_M + (L_d - L_q) i_d).
@@ -104,6 +109,9 @@ mod tests {
     use crate::estimator::EstimatorParameters;
     use crate::estimator::testing::{beside, comes_to_the_rotor, salient, with_L_q};
     use drive_base::frame::Dq;
+    use drive_base::math::wrap;
+    use drive_base::motor::Motor;
+    use std::f64::consts::PI;
 
     #[test]
     fn comes_to_the_rotor_without_bias() {
@@ -119,6 +127,31 @@ mod tests {
             let (angle, speed) = beside::<ExtendedEmf>(&par, &salient(), (w, Dq::new(-6.0, 8.0)), 0.1, 10_000);
             assert!(angle.abs().to_degrees() < 0.02, "{w} rad/s: {} deg off", angle.to_degrees());
             assert!(speed.abs() < 0.02, "{w} rad/s: {speed} rad/s off");
+        }
+    }
+
+    /// tan theta~ = (R - R^) i_d / (E + (R - R^) i_q), and half a turn more where the sum has the other sign: with R^ = 2 R below 36 rad/s.
+    #[test]
+    fn a_wrong_resistance_turns_it_and_has_a_bound() {
+        let (motor, par) = (salient(), EstimatorParameters::default());
+        for (share, w, i_q, off) in [
+            (2.0, 47.0, 5.59, 0.0),
+            (2.0, 20.0, 5.59, PI),
+            (2.0, -47.0, -5.59, 0.0),
+            (2.0, 30.0, -5.59, 0.0),
+            (0.2, 30.0, 5.59, 0.0),
+            (0.2, 20.0, -5.59, PI),
+        ] {
+            let hat = Motor { R_s: share * motor.R_s, ..motor.clone() };
+            let i = Dq::new(-0.84, i_q);
+            let (angle, speed) = beside::<ExtendedEmf>(&par, &hat, (w, i), 0.1, 20_000);
+            let (lost, E) = (motor.R_s - hat.R_s, w * (motor.psi_M + (motor.L_d - motor.L_q) * i.d()));
+            let expected = (lost * i.d() / (E + lost * i.q())).atan() + off;
+            let error = wrap(angle - expected).to_degrees();
+            assert!(
+                error.abs() < 0.1 && speed.abs() < 0.05,
+                "R^ = {share} R, {w} rad/s, {i_q} A: {error} deg, {speed} rad/s"
+            );
         }
     }
 

@@ -93,7 +93,8 @@ impl<All: AsRef<FluxObserverParameters> + AsRef<ResistanceParameters> + AsRef<Tr
         let ContextOf { motor, T_s, .. } = *context;
         let axis = Axis::<Estimated>::at(theta);
         let psi = axis.to_stator(flux(motor, motor.psi_M, axis.from_stator(sample.i)));
-        let (R, psi_M) = (context.of::<ResistanceParameters>().first(motor, sample), motor.psi_M);
+        let at_once = sample.speed_ref.is_none();
+        let (R, psi_M) = (context.of::<ResistanceParameters>().first(motor, at_once), motor.psi_M);
         let tracker = Tracker::at(theta, w, T_s);
         (Self { tracker, psi, R, psi_M, w_f: w, ..Self::default() }, Estimate::new(theta, w, sample))
     }
@@ -290,7 +291,7 @@ mod tests {
     fn what_the_resistance_explains_is_not_the_magnet() {
         let (mut par, motor) = (EstimatorParameters::default(), salient());
         (par.adaptation.resistance, par.flux_observer.magnet) = (true, 5.0);
-        let R = par.adaptation.first(&motor, &Sample { speed_ref: Some(300.0), ..Sample::default() });
+        let R = par.adaptation.first(&motor, false);
         let c_0 = 0.5 * R * (1.0 / motor.L_d + 1.0 / motor.L_q);
         let (rho_0, r) = (par.adaptation.i / (c_0 * motor.psi_M), -0.01 / motor.psi_M);
         for share in [0.0, 0.3, 1.0] {

@@ -146,6 +146,12 @@ impl RasmussenParameters {
 }
 
 impl Rasmussen {
+    /// Whether the adaptation has measured the resistance.
+    #[inline]
+    pub fn knows_resistance(&self) -> bool {
+        self.resistance.is_known()
+    }
+
     /// Resistance in Ohm.
     #[inline]
     fn in_use<All: AsRef<ResistanceParameters>>(&self, context: &ContextOf<All>) -> f64 {

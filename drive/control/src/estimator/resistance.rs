@@ -18,12 +18,16 @@
 //! together with the error of psi_M^, and a fast k with i_q / w as regressor lost 3 to 7 of 56 creeping cells with a generating
 //! load. R^ therefore stays constant while the reference is a speed, unless it is tracked.
 //!
+//! A drive with Rasmussen's observer that starts at rest stays there, with i_0 and without a reference, until 0.05 of R~ is left (3.7 / b
+//! with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that leaves with an R^ that is not measured yet loses the
+//! start.
+//!
 //! **At creep**, the steady state is sin theta~ = -(c_1 d + R~ i_d) / (w psi_M) + c_1 R~ i_q / (w^2 psi_M). A constant
 //! c_1 lets both terms grow without limit towards w = 0: at 30 rpm, psi_M^ = 1.2 psi_M has no equilibrium. With
 //! c_1 = k_c |w|, an error of psi_M^ costs the same angle at every speed, and the poles of s^2 + k_c |w| s + w^2 are
 //! damped by k_c / 2. An equilibrium exists for psi_M^ / psi_M <= sqrt(1 + 1 / k_c^2): up to 1.41 with k_c = 1.
 //! A small c_1 needs a known R^: the remaining share r of R~ obeys dr/dt = -b g i_d^2 / (i_d^2 + i_q^2 + i^2) r from
-//! r = 1, and c_1 = c_1' + r^2 (c_1 - c_1'), c_1' = min(c_1, k_c |w|).
+//! r = 1, as long as |w_f| psi_M < 0.05 R^ |i_d|, and c_1 = c_1' + r^2 (c_1 - c_1'), c_1' = min(c_1, k_c |w|).
 //!
 //! **Tracking at creep** (`adaptation.tracking` = k_t, off at the start): with the regressor i_q / w and only as far as x
 //! exceeds the uncertainty delta psi_M^ (`adaptation.flux`) of the magnet flux,
@@ -44,8 +48,8 @@
 //!
 //! **In torque mode**, no torque asked for stands for rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
 //! vanish, so R^ may adapt while the rotor coasts below 2 rad/s, too. There it goes to the R^ that explains the error of psi_M^,
-//! x = -d, and returns within 1 / b once the rotor rests. R^ begins with `motor.R_s` and stays constant as long as a torque is
-//! asked for; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will turn.
+//! x = -d, and returns within 1 / b once the rotor rests. R^ stays constant as long as a torque is asked for, and a start at speed
+//! begins with `motor.R_s`; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will turn.
 //!
 //! Not observable: R^ without current, while the reference is a speed, or while it is a torque; theta~ and psi_M^ at rest.
 
@@ -71,6 +75,13 @@ const NO_TORQUE: f64 = 5e-3;
 
 /// Minimum c_1 in torque mode, as a share of c_1.
 const LEAST_C_1: f64 = 0.2;
+
+/// Share of R~ that may remain when a drive leaves its rest, and the longest rest in units of 1 / `bandwidth`.
+const KNOWN: f64 = 0.05;
+const LONGEST_REST: f64 = 20.0;
+
+/// Voltage of a swinging rotor, as a share of R^ i_d, beyond which R~ does not count as measured.
+const SWING: f64 = 0.05;
 
 /// Parameters of the adaptation; shares are relative to `motor.R_s`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -115,10 +126,15 @@ impl Default for ResistanceParameters {
 }
 
 impl ResistanceParameters {
-    /// First estimate in Ohm: `motor.R_s` in torque mode, where a torque that is asked for at once leaves no time to adapt.
-    pub(super) fn first(&self, motor: &Motor, sample: &Sample) -> f64 {
-        let share = if sample.speed_ref.is_some() { self.start } else { 1.0 };
+    /// First estimate in Ohm: `motor.R_s` where a torque that is asked for `at_once` leaves no time to adapt.
+    pub(super) fn first(&self, motor: &Motor, at_once: bool) -> f64 {
+        let share = if at_once { 1.0 } else { self.start };
         share * motor.R_s
+    }
+
+    /// Longest time in s for which a drive that starts at rest stays there to measure its resistance.
+    pub fn longest_rest(&self) -> f64 {
+        LONGEST_REST / self.bandwidth
     }
 
     /// The estimate `R` (Ohm) within the clamps.
@@ -151,7 +167,8 @@ pub struct Adapted {
 impl Resistance {
     /// The adaptation at the first sample, at the electrical speed `w` (rad/s).
     pub fn start<All: AsRef<ResistanceParameters>>(context: &ContextOf<All>, sample: &Sample, w: f64) -> Self {
-        Self { R: context.of::<ResistanceParameters>().first(context.motor, sample), remaining: 1.0, w_f: w }
+        let at_once = sample.speed_ref.is_none() && w != 0.0;
+        Self { R: context.of::<ResistanceParameters>().first(context.motor, at_once), remaining: 1.0, w_f: w }
     }
 
     /// One sample with the observer's gain `c_1` (1/s), the flux error `x` (Wb), the current `i` (A) in the estimated frame, and the electrical speed
@@ -182,7 +199,10 @@ impl Resistance {
             let rate = T_s * par.bandwidth * g / (i.d() * i.d() + i.q() * i.q() + par.i * par.i);
             let R = self.R + rate * c_1 * x * i.d();
             self.R = par.within(motor, R);
-            self.remaining -= self.remaining * rate * i.d() * i.d();
+            // A rotor that swings by w adds up to w psi_M to the R~ i_d that x shows.
+            if self.w_f.abs() * motor.psi_M < SWING * self.R * i.d().abs() {
+                self.remaining -= self.remaining * rate * i.d() * i.d();
+            }
             return Adapted { c_1, v_q };
         }
         if par.tracking > 0.0 {
@@ -194,6 +214,12 @@ impl Resistance {
 }
 
 impl Resistance {
+    /// Whether little of the initial error remains.
+    #[inline]
+    pub fn is_known(&self) -> bool {
+        self.remaining <= KNOWN
+    }
+
     /// A creeping sample with the observer's gain `c_1` (1/s), the flux error `x` (Wb) and the current `i_q` (A).
     #[inline]
     fn track<All: AsRef<ResistanceParameters>>(&mut self, context: &ContextOf<All>, c_1: f64, x: f64, i_q: f64) {
@@ -239,8 +265,9 @@ type P = Row<ResistanceParameters>;
 pub const ADAPTATION: &Table<ResistanceParameters> = table![
             P::boolean_parameter(
                 "resistance",
-                "Rasmussen (while the reference is standstill) and FluxObserver adapt the resistance, Sensored ignores it, \
-                 the others refuse it; false: motor.R_s",
+                "Rasmussen (while the reference is standstill, and after a start at rest, before any reference acts, for at \
+                 most 20 / adaptation.bandwidth) and FluxObserver adapt the resistance, Sensored ignores it, the others refuse it; false: \
+                 motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(
