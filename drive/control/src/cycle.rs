@@ -368,6 +368,7 @@ mod tests {
                 let par = &mut controller.parameters;
                 (par.speed_loop.torque_mode, par.speed_est) = (torque_mode, speed_est);
                 (par.estimators.adaptation.resistance, par.estimators.adaptation.bandwidth) = (adapts, 200.0);
+                par.zero_speed.release = torque_mode;
                 (controller.inputs.speed_ref, controller.inputs.tau_ref) = (reference, 0.1 * reference);
                 controller.inputs.u_dc = 325.0;
                 controller.derive();
@@ -384,6 +385,7 @@ mod tests {
                 if !equal(&asked, &idle) {
                     break;
                 }
+                assert!((asked.state.i_ref.d() - 5.0).abs() < 1e-12, "i_0 flows while the resistance is measured");
                 samples += 1;
             }
             assert!((asked.inputs.speed_ref - 30.0).abs() < 1e-12, "the input stays");

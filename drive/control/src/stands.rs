@@ -77,3 +77,30 @@ pub(crate) fn hidden(par: &ControllerParameters, tau_ref: f64, speed_est: f64, t
         par.motor.R_s
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::estimator::Kind;
+
+    /// Time counts below 0.3 R^ |i| / (n_p psi_M), or below w_hold / 4 where `emf.hold_reversal` leads the extended EMF through zero.
+    #[test]
+    fn a_faded_emf_counts_as_no_speed() {
+        let counts = |estimator: Kind, hold: bool, speed: f64| {
+            let mut par = ControllerParameters { estimator, ..ControllerParameters::default() };
+            (par.estimators.emf.hold_reversal, par.estimators.emf.w_hold) = (hold, 240.0);
+            let mut stands = Stands::default();
+            for _ in 0..20_000 {
+                stands.update(&par, true, speed, DqHat::new(0.0, 2.0), 4.0);
+            }
+            stands.time > 1.0
+        };
+        // 0.3 * 1.8 Ohm * 2 A / (3 * 0.15 Wb) = 2.4 rad/s; 240 / 4 / 3 = 20 rad/s.
+        for (estimator, hold, last) in
+            [(Kind::ExtendedEmf, true, 20.0), (Kind::ExtendedEmf, false, 2.4), (Kind::Rasmussen, true, 2.4)]
+        {
+            assert!(counts(estimator, hold, 0.95 * last), "{estimator:?}, {hold}");
+            assert!(!counts(estimator, hold, 1.05 * last), "{estimator:?}, {hold}");
+        }
+    }
+}
