@@ -1,4 +1,4 @@
-//! The most torque under a current and a voltage limit, and the currents for less: the algebra of field weakening.
+//! The maximum torque under a current and a voltage limit, and the currents for a smaller torque: the algebra of field weakening.
 //!
 //! In steady state, with R exact, |u|^2 = R^2 |i|^2 + w^2 |psi|^2 + 2 R w t, t = tau / (1.5 n_p) = l i_q, l = psi_M - dL i_d,
 //! dL = L_q - L_d. Largest torque of one sign s (motoring +1, generating -1; w > 0) under |u| <= U and |i| <= I:
@@ -14,7 +14,7 @@
 //! ampere, so that the root on the other side of the MTPA end is never the limit. Without R, MTPV needs psi_M < L_d I; with R
 //! it does not: a machine whose R i is above w L i has it at any speed at which R I + w psi_M > U.
 //!
-//! For a torque below the limit, the least current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
+//! For a torque below the limit, the minimum current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
 //! = t / l. The cross term is constant and f is convex, so Newton's method from the right does not overshoot, and from
 //! the inside it lands right of the root.
 //!

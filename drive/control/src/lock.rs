@@ -13,17 +13,17 @@
 //! min over dR of sqrt(mean |epsilon - dR i|^2) / (lock.u + 2 sin(lock.angle / 2) psi_M mean |w^|),  |dR| <= 0.3 R^
 //! ```
 //!
-//! dR is the part that a resistance explains which stays wrong in the same way. The smoothing, 50 Hz or 4 lock.u / psi_M,
-//! takes away no slip that matters: beyond it, the EMF of a rotor that turns with the slip still passes with
-//! 4 lock.u. A frame that turns by more than pi / 2 in a sample follows no rotor: the quotient is 10.
+//! dR represents the part that a constant error of the resistance explains. The smoothing, 50 Hz or 4 lock.u / psi_M,
+//! hides no relevant slip: above that frequency, the EMF of a rotor that turns with the slip still reaches 4 lock.u. A frame that
+//! turns by more than pi / 2 in a sample follows no rotor: the quotient is 10.
 //!
-//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There the speed shows it:
+//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There, the speed is used instead:
 //!
 //! # Speed
 //! A rotor that turns with the estimated frame but not at the reference is lost: the estimate itself shows it. The
 //! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of it, whichever is
-//! nearer. The model lags by (1 - b) t_is / w_s, what the set-point weight leaves to the integral part, and changes no faster than
-//! half of the torque that the limits leave can:
+//! nearer. The model lags by (1 - b) t_is / w_s, the share that the set-point weight leaves to the integral part, and changes no
+//! faster than with half of the available torque:
 //!
 //! ```text
 //! S = (1 / S_0) int |x| dt     while |x| > w_0 + 5 % of the reference + f; otherwise S decays with 8 lock.time
@@ -44,9 +44,9 @@
 //! half-wave as far as the one before reached, which had the other sign; W decays with 20 lock.time and is at most 2. A load step and
 //! its overshoot are one half-wave and a small one.
 //!
-//! There is no x in torque mode: a rotor may swing with its load there, and the voltage shows an estimate that does not follow.
+//! There is no x in torque mode, where a rotor may swing with its load; the voltage detects an estimate that does not follow.
 //!
-//! The greatest of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
+//! The maximum of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
 //! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
 //!
 //! `lock.u` covers the errors that remain with a good estimate: what (R - R^) i leaves, and for the dead time 4/3 of a

@@ -1,4 +1,4 @@
-//! Dc current along an angle phi, which the rotor follows, and its rest.
+//! Direct current along an angle phi, which aligns the rotor, and the test that the rotor is at rest.
 //!
 //! ```text
 //! along phi        PI on the current

@@ -1,4 +1,4 @@
-//! How much current aligns the rotor of a machine with saliency.
+//! The current that aligns the rotor of a machine with saliency.
 //!
 //! ```text
 //! torque of a current i at beta from the magnet       1.5 n_p i sin(beta) (psi_M - (L_q - L_d) i cos(beta))
@@ -7,7 +7,8 @@
 //! ```
 //!
 //! A current far beyond i_1 therefore rests on the q-axis, as the magnet of a machine with L_d > L_q rests on its greater
-//! inductance. Less current separates the two: where the smaller inductance comes to the current, the magnet lies along it. The
+//! inductance. A smaller current separates the two: if the axis of smaller inductance turns to the current, the magnet lies along
+//! it. The
 //! angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change is that of a blocked
 //! rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the swing must
 //! also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.

@@ -1,4 +1,4 @@
-//! Inductances by output error: the record of an axis is simulated, and the current's error is least.
+//! Inductances by the output-error method: simulates the record of an axis and minimizes the error of the current.
 //!
 //! ```text
 //! dpsi/dt = u + u_0 - R i - loss(i)                 Heun, 12 steps a row at least

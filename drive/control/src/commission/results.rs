@@ -1,4 +1,4 @@
-//! Results with the half-widths of their intervals, and what refuses them.
+//! Results with the half-widths of their intervals, and the conditions under which they are refused.
 
 use super::axes::Axes;
 use super::bench::Bench;

@@ -1,4 +1,4 @@
-//! What the commissioning is given, and what it gives to the inverter.
+//! Inputs of the commissioning, and its commands to the inverter.
 
 use super::status::CommissionMode;
 use drive_base::frame::AlphaBeta;

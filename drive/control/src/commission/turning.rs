@@ -16,7 +16,7 @@
 //! Between samples the current is not straight: u stays while the EMF turns, and the d-axis current bows by
 //! psi_M (w T)^2 / (8 L_d), which may exceed the friction's current, and each leg is steep where its current crosses zero.
 //! So loss is the mean along the model's current, from the measured one to the next, where a constant voltage `missing`
-//! takes what else the model lacks:
+//! represents the remaining errors of the model:
 //!
 //! ```text
 //! L di/dt = u e^(-j theta) - R i - loss - j w (L i + psi_M) + missing          8 steps, linearly implicit

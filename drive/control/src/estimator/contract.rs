@@ -1,5 +1,5 @@
-//! What the controller gives to an estimator and what it gets back: the interface that every method implements, and what a method may
-//! know of the controller around it.
+//! The interface that every estimator implements: its inputs from the controller, its results, and the controller data that it
+//! may read.
 
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use drive_base::motor::Motor;

@@ -19,8 +19,8 @@
 //! load. R^ therefore stays constant while the reference is a speed, unless it is tracked.
 //!
 //! A drive with Rasmussen's observer that starts at rest stays there, with i_0 and without a reference, until 0.05 of R~ is left (3.7 / b
-//! with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that leaves with an R^ that is not measured yet loses the
-//! start.
+//! with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that starts before R^ has been measured loses
+//! the start.
 //!
 //! **At creep**, the steady state is sin theta~ = -(c_1 d + R~ i_d) / (w psi_M) + c_1 R~ i_q / (w^2 psi_M). A constant
 //! c_1 lets both terms grow without limit towards w = 0: at 30 rpm, psi_M^ = 1.2 psi_M has no equilibrium. With
@@ -46,12 +46,13 @@
 //! an offset of current or voltage makes it drift. It also acts where the speed reference and i_q have the same sign:
 //! a start under load then leaves the false lock at the limit of i_q. For a generating load it would be unstable.
 //!
-//! **In torque mode**, no torque asked for stands for rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
+//! **In torque mode**, a zero torque reference counts as rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
 //! vanish, so R^ may adapt while the rotor coasts below 2 rad/s, too. There it goes to the R^ that explains the error of psi_M^,
-//! x = -d, and returns within 1 / b once the rotor rests. R^ stays constant as long as a torque is asked for, and a start at speed
+//! x = -d, and returns within 1 / b once the rotor rests. R^ stays constant while the torque reference is not zero, and a start
+//! at speed
 //! begins with `motor.R_s`; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will turn.
 //!
-//! Not observable: R^ without current, while the reference is a speed, or while it is a torque; theta~ and psi_M^ at rest.
+//! Not observable: R^ without current or while the speed or torque reference is not zero; theta~ and psi_M^ at rest.
 
 use crate::estimator::contract::{ContextOf, Sample, SetupOf};
 use drive_base::frame::DqHat;

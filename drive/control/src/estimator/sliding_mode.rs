@@ -1,4 +1,5 @@
-//! Sliding-mode observer of the back EMF, as manufacturers of controllers publish it (Microchip, AN1078 "Sensorless field oriented
+//! Sliding-mode observer of the back EMF, as published by manufacturers of controllers (Microchip, AN1078 "Sensorless field
+//! oriented
 //! control of a PMSM", 2010; Texas Instruments, SPRABQ3, 2013), for salient machines by the extended EMF (Chen, Tomita,
 //! Doki, Okuma, IEEE Trans. Ind. Electron. 50 (2), 2003).
 //!
