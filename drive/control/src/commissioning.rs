@@ -59,7 +59,7 @@ pub const COMMISSION: &Table<CommissionParameters> = table![
     P::parameter("t_max", &SECOND, "Longest time of the self-commissioning", |p| &mut p.t_max).above(0.0),
 ];
 
-/// What the controller is to do at a sample.
+/// Task of the controller at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Turn {
     /// It works.
@@ -123,7 +123,7 @@ impl Commissioning {
         true
     }
 
-    /// What it does, and why it has stopped.
+    /// Its current stage, and the reason why it stopped.
     pub(crate) fn status(&self) -> (CommissionState, CommissionFault) {
         self.sequence.as_ref().map_or_else(Default::default, |sequence| (sequence.state(), sequence.fault()))
     }

@@ -19,7 +19,7 @@
 //! L i exceeds 1.5 psi_M, an error of L^ would hide the speed, so w is always w^. In steady state the
 //! prediction is exact with any L^, R^ and psi_M^, because all of it turns at w^, so a current at its limit is left alone.
 //!
-//! The commands that wait and the new one give the current at the end of the interval in which the new one acts. Beyond the
+//! The pending commands and the new one determine the current at the end of the interval in which the new one acts. Beyond the
 //! limit, the voltage changes by L di / T_s, which brings the current back to the limit along its own direction, as far as the
 //! hexagon allows; the integrators are corrected as at the hexagon. Otherwise nothing changes.
 //!
@@ -164,7 +164,7 @@ mod tests {
         (end(commands), end(&corrected))
     }
 
-    /// A sample with 6 A, after the voltage that has brought it there from 5 A.
+    /// A sample with 6 A, after the voltage that has raised the current from 5 A.
     fn sample() -> Sample {
         let (i, i_last) = (AlphaBeta::new(6.0, 0.0), AlphaBeta::new(4.9, -1.0));
         let u = ((i - i_last) * machine().L_d + magnet(0.0) - magnet(-1.0)) * (1.0 / T_S);

@@ -45,7 +45,7 @@ pub struct Envelope {
 const MOST: u32 = 60;
 const SMALL: f64 = 1e-8;
 
-/// Halvings that find the least voltage on the circle.
+/// Bisections that find the minimum voltage on the circle.
 const HALVINGS: u32 = 30;
 
 /// The limit of one sign: its currents (A) and the magnitude of its torque (N.m).
@@ -98,7 +98,7 @@ impl Envelope {
         DqHat::new(-r * (1.0 - x * x), s * 2.0 * r * x)
     }
 
-    /// The base speed (electrical, rad/s) under the voltage `U` (V): up to it, the machine gives its greatest torque.
+    /// The base speed (electrical, rad/s) under the voltage `U` (V): up to it, the machine delivers its maximum torque.
     pub fn base_speed(&self, U: f64) -> f64 {
         let i = self.on_circle(self.x_mtpa, 1.0);
         let (psi_d, psi_q) = (self.psi_M + self.L_d * i.d(), self.L_q * i.q());
@@ -151,14 +151,14 @@ impl Envelope {
         Limit { i: DqHat::new(self.least_i_d(w), 0.0), tau: 0.0 }
     }
 
-    /// i_d (A) of the least voltage without torque, within I.
+    /// i_d (A) of the minimum voltage without torque, within I.
     #[inline]
     pub fn least_i_d(&self, w: f64) -> f64 {
         let x = w * w * self.L_d;
         -self.I.min(x * self.psi_M / (self.R * self.R + x * self.L_d))
     }
 
-    /// The place x on the circle with the least voltage, up to maximum torque per ampere.
+    /// The position x on the circle with the minimum voltage, up to maximum torque per ampere.
     #[cold]
     fn least_voltage(&self, w: f64, s: f64) -> f64 {
         let (mut left, mut right) = (0.0, self.x_mtpa);
@@ -204,7 +204,7 @@ impl Envelope {
         ]
     }
 
-    /// Currents (A) of the most torque per volt; `warm` is the direction of u, from the last sample on.
+    /// Currents (A) of maximum torque per volt; `warm` is the direction of u, kept from the last sample.
     fn max_torque_per_volt<const TO_THE_END: bool>(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
         let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
         let inverse = 1.0 / (R * R + w * w * L_d * L_q);
@@ -252,7 +252,7 @@ impl Envelope {
         [-s * (f * f - psi_d * psi_d).max(0.0).sqrt() / f, psi_d / f]
     }
 
-    /// i_d (A) of the least current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by at most `steps`
+    /// i_d (A) of the minimum current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by at most `steps`
     /// of Newton's method from `i_d`; none where the slope is not positive.
     #[inline]
     pub fn i_d(&self, tau: f64, w: f64, U: f64, mut i_d: f64, steps: u32) -> Option<f64> {

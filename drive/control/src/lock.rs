@@ -33,7 +33,7 @@
 //! f is the distance of w^ from the frame's speed, at most 20 % of the reference: an estimator that takes the speed from the EMF is
 //! off by the error of psi_M, and the speed loop with it.
 //!
-//! n_p i_max / K_i is the error integral for which the speed loop goes from no torque to its limit. No load that the
+//! n_p i_max / K_i is the error integral that takes the speed loop from zero torque to its limit. No load that the
 //! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. S is at most 2,
 //! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5; then a speed that is not reached is
 //! that of a drive at its limit.
@@ -108,14 +108,14 @@ impl Default for LockParameters {
     }
 }
 
-/// What the speed loop can do.
+/// Limits of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
-    /// Integral of the electrical speed error in rad for which it goes from no torque to its limit.
+    /// Integral of the electrical speed error in rad that takes it from zero torque to its limit.
     pub integral: f64,
     /// Electrical acceleration in rad/s2 that a torque of 1 N.m gives.
     pub acceleration: f64,
-    /// Time in s by which the speed lags behind a reference that moves, by the weight of the set point.
+    /// Lag of the speed behind a moving reference in s, due to the set-point weight.
     pub lag: f64,
 }
 
@@ -452,7 +452,7 @@ mod tests {
         }
     }
 
-    /// A frame that turns by a quarter and more in a sample would be divided away by its own speed.
+    /// A frame that turns by a quarter turn or more in a sample would otherwise vanish in the division by its speed.
     #[test]
     fn a_frame_that_runs_away_is_lost() {
         let level = beside(0.0, 300.0, 0.6 * PI / T_S);
@@ -490,8 +490,8 @@ mod tests {
         assert!(swung(&gains, step) < 0.4);
     }
 
-    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad; both count pole pairs. The set-point weight 0.5
-    /// leaves half of a change to the integral part, with 4 / (80 rad/s).
+    /// The speed loop rises from zero torque to i_q = 6 A over 6 A / K_i = 1.6875 rad; both count pole pairs. The set-point
+    /// weight 0.5 leaves half of a change to the integral part, with 4 / (80 rad/s).
     #[test]
     fn the_gains_know_the_reach_of_the_speed_loop() {
         let mut controller = crate::SensorlessController::default();

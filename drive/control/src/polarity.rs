@@ -62,7 +62,7 @@ pub struct PolaritySearch {
     peaks: [f64; 2],
 }
 
-/// What the search requests at a sample.
+/// Requests of the search at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SearchStep {
     /// The estimator injects; the current reference is zero.

@@ -38,11 +38,11 @@ const SAID: f64 = 0.5;
 pub(crate) struct Stands {
     /// Time in s.
     time: f64,
-    /// Magnitude of the torque asked for in N.m.
+    /// Magnitude of the torque reference in N.m.
     tau: f64,
     /// Mechanical speed in rad/s that the resistance may hide.
     hidden: f64,
-    /// Estimated mechanical speed in rad/s, smoothed: a rotor beside the frame swings.
+    /// Estimated mechanical speed in rad/s, smoothed, because a rotor out of step with the frame swings.
     speed: f64,
 }
 

@@ -70,7 +70,7 @@ impl Default for WeakeningParameters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WeakeningGains {
     envelope: Envelope,
-    /// Currents (A) of the greatest positive torque of the plain reference.
+    /// Currents (A) of the maximum positive torque of the plain reference.
     end: DqHat,
     /// Inverse of the torque constant in A/(N.m).
     per_torque: f64,
@@ -108,8 +108,7 @@ impl WeakeningGains {
         self.tracker.at(self.envelope.slope(i))
     }
 
-    /// The limit of the sign `s` where the greatest plain reference fits the voltage `U` (V) at the electrical speed `w` (rad/s):
-    /// none.
+    /// No limit of the sign `s`: the maximum plain reference fits the voltage `U` (V) at the electrical speed `w` (rad/s).
     #[inline]
     fn beyond(&self, s: f64, w: f64, U: f64) -> Option<Limit> {
         let end = DqHat::new(self.end.d(), s * self.end.q());

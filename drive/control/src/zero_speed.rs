@@ -40,7 +40,7 @@ impl ZeroSpeed {
         exp(-speed_hat.abs() * (1.0 / self.w_0))
     }
 
-    /// Whether a reference of `tau` (N.m) asks for no current.
+    /// Whether a reference of `tau` (N.m) requests no current.
     #[inline]
     pub fn releases(&self, tau: f64) -> bool {
         tau == 0.0 && self.release

@@ -16,7 +16,7 @@
 use drive_base::math::{sin_cos, wrap};
 use serde::{Deserialize, Serialize};
 
-/// Angles in rad up to which the smaller inductance is at the current, and from which on it is across.
+/// Maximum angle in rad at which the smaller inductance lies along the current, and minimum angle at which it lies across it.
 const ALONG: f64 = 0.26;
 const ACROSS: f64 = 1.31;
 /// Change of the angle in rad that shows a rotor that follows.
@@ -27,7 +27,7 @@ const NEXT: f64 = 0.25;
 /// Share of i_1.
 const STIFF: f64 = 0.6;
 
-/// What the angles at rest have shown.
+/// Result of the angles at rest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Alignment {
     /// Current in A of an alignment where 0.4 I is too much, and about the flux linkage of the magnet in Wb; 0: it is not.

@@ -43,7 +43,7 @@ pub(super) struct Points {
     i: AlphaBeta,
 }
 
-/// What a part says; angles are electrical, means weighted with (1 - tau^2)^2.
+/// Results of a part; angles are electrical, means weighted with (1 - tau^2)^2.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Part {
     /// Acceleration in rad/s2 and its standard error, speed in rad/s.
@@ -104,7 +104,7 @@ impl Points {
         })
     }
 
-    /// The part that ends now, of samples of `T` (s); `None`: too few points, or no circle.
+    /// The part that ends now, with the sample period `T` (s); `None` if it has too few points or no circle.
     pub(super) fn end(&self, T: f64) -> Option<Part> {
         if self.rows.len() < FEWEST {
             return None;

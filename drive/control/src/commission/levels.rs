@@ -103,7 +103,7 @@ pub(super) struct Levels {
     radii: [Radii; 3],
 }
 
-/// What a sample of the levels gives.
+/// Result of a sample of the levels.
 pub(super) enum Level {
     /// The voltage of this sample in V.
     Voltage(AlphaBeta),

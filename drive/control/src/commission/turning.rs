@@ -34,7 +34,7 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
-/// Rate of the observer over the speed, and the least one in 1/s.
+/// Rate of the observer divided by the speed, and the minimum rate in 1/s.
 const RATE: (f64, f64) = (0.7, 10.0);
 /// Steps of the model's current in a period.
 const STEPS: f64 = 8.0;
@@ -203,7 +203,7 @@ mod tests {
         Bench { T: 1e-4, delay: 1.0, I: 10.0, U: 100.0, psi_r: 0.2, psi_0: 0.12, R: 0.5, curve, ..Bench::default() }
     }
 
-    /// The observer comes to the rotor of an exact EMF, with a psi_M that is 20 % off and from an angle that is 0.3 rad off.
+    /// With an exact EMF, the observer converges to the rotor even if psi_M is 20 % off and the initial angle 0.3 rad off.
     #[test]
     fn the_observer_follows_an_exact_emf() {
         let bench = bench(0.0);

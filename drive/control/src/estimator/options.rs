@@ -18,7 +18,7 @@ struct Choice {
     asked: fn(&Setup, Kind) -> bool,
     /// Whether an estimator has it.
     has: fn(Kind) -> bool,
-    /// What the others do not do.
+    /// The function that other estimators lack.
     why: &'static str,
     /// How to turn it off.
     off: &'static str,

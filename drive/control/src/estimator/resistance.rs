@@ -127,7 +127,7 @@ impl Default for ResistanceParameters {
 }
 
 impl ResistanceParameters {
-    /// First estimate in Ohm: `motor.R_s` where a torque that is asked for `at_once` leaves no time to adapt.
+    /// First estimate in Ohm: `motor.R_s` if a torque requested `at_once` leaves no time to adapt.
     pub(super) fn first(&self, motor: &Motor, at_once: bool) -> f64 {
         let share = if at_once { 1.0 } else { self.start };
         share * motor.R_s
@@ -156,7 +156,7 @@ pub struct Resistance {
     w_f: f64,
 }
 
-/// What the adaptation gives the observer.
+/// Output of the adaptation to the observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
     /// Feedback gain of the d-axis flux error in 1/s.
@@ -332,7 +332,7 @@ mod tests {
     const T_S: f64 = 1e-4;
 
     /// The adaptation after `seconds` next to a machine of 2 Ohm, from an estimate of `R_hat` (Ohm), with the currents `i` (A) at
-    /// the speed `w` (rad/s) asked for; the flux error is the steady one of the observer, `x` (R~ in Ohm, c_1 in 1/s) in Wb.
+    /// the speed reference `w` (rad/s); the flux error is the steady one of the observer, `x` (R~ in Ohm, c_1 in 1/s) in Wb.
     fn adapted(
         set: impl FnOnce(&mut EstimatorParameters),
         (R_hat, i, w): (f64, DqHat, f64),
@@ -355,7 +355,7 @@ mod tests {
         (resistance, adapted)
     }
 
-    /// At rest, x = R~ i_d / c_1: the estimate comes to the resistance from both sides, at the rate
+    /// At rest, x = R~ i_d / c_1: the estimate converges to the resistance from both sides, at the rate
     /// b i_d^2 / (i_d^2 + i_q^2 + i^2).
     #[test]
     fn at_rest_the_estimate_comes_to_the_resistance() {
@@ -368,7 +368,7 @@ mod tests {
         }
     }
 
-    /// At creep, x = R~ i_q / w beyond the uncertainty of the magnet: tracking comes to the resistance in both directions of
+    /// At creep, x = R~ i_q / w beyond the uncertainty of the magnet: tracking converges to the resistance in both directions of
     /// rotation, motoring and generating.
     #[test]
     fn tracking_comes_to_the_resistance() {

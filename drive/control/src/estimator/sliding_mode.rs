@@ -28,7 +28,7 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SlidingModeParameters {
-    /// Gain K in V, > 0: above the greatest EMF.
+    /// Gain K in V, > 0: above the maximum EMF.
     pub gain: f64,
     /// Bandwidth w_z in rad/s within the boundary layer, > 0.
     pub bandwidth: f64,
