@@ -1,5 +1,5 @@
 //! Embeds the sources of the two crates that an FMU links, for `fmu new`: a new project carries them until they are published.
-//! A package from a registry has no such folders beside it; then nothing is embedded, and a new project names the versions.
+//! A package from a registry lacks these folders; then nothing is embedded, and a new project depends on published versions.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

@@ -4,7 +4,7 @@ use anyhow::{Context, Result};
 use std::collections::{BTreeMap, BTreeSet};
 use toml::{Table, Value};
 
-/// Files of the workspace by name; empty if this program comes from a registry, which then also has the crates.
+/// Files of the workspace by name; empty if this program was installed from a registry, which then also provides the crates.
 const FILES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/vendored.rs"));
 
 /// The crates, each after those that it needs.

@@ -42,7 +42,7 @@ impl Columns {
     /// number may have a decimal comma.
     ///
     /// # Errors
-    /// Those of [`parse`](Self::parse), but for semicolons and the cells of other columns.
+    /// Those of [`parse`](Self::parse), except that semicolons and the cells of other columns are allowed.
     pub fn parse_some(text: &str, file: &str, wanted: impl Fn(&str) -> bool) -> Result<Self> {
         let mut lines = lines(text);
         let Some((first, header)) = lines.next() else {
@@ -131,7 +131,7 @@ fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
     lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
 }
 
-/// What stands between the columns of a header.
+/// The separator between the columns of a header.
 fn separator(header: &str) -> char {
     ['\t', ';'].into_iter().find(|c| header.contains(*c)).unwrap_or(',')
 }

@@ -1,4 +1,4 @@
-//! A small part of the atlas: what the reference drive loses, what `lock_lost` says, and the files.
+//! A small part of the atlas: the cells that the reference drive loses, `lock_lost` in them, and the files.
 #![allow(missing_docs)]
 
 use drive::estimator::Kind;
@@ -29,7 +29,8 @@ fn the_reference_drive_loses_two_cells_of_five_and_lock_lost_tells() {
     assert!(alarms.is_empty(), "{alarms:?}");
 }
 
-/// Injection holds what the back EMF loses, except with sensors of the wrong sign; every scenario runs, and any number of threads gives the same bytes.
+/// Injection holds the cells that back-EMF methods lose, except with sensors of the wrong sign; every scenario runs, and any
+/// number of threads gives the same bytes.
 #[test]
 fn every_scenario_and_any_number_of_threads() {
     let grid = Grid {

@@ -42,7 +42,7 @@ fn machine(name: &str, rotor: Rotor, real: bool) -> Pair {
     pair
 }
 
-/// Runs until the commissioning is over; the results, and the greatest current over `commission.i`.
+/// Runs until the commissioning is over; returns the results, and the maximum current over `commission.i`.
 fn run(pair: &mut Pair) -> (Results, f64) {
     pair.controller.model.inputs.commission_start = true;
     pair.start().unwrap();
@@ -56,7 +56,7 @@ fn run(pair: &mut Pair) -> (Results, f64) {
     (results, most / pair.controller.model.parameters.commission.i)
 }
 
-/// The quantities, what has been found, the truth, and the greatest error. In a leg, transistor and diode conduct in turn.
+/// The quantities with the result, the true value, and the maximum error. In a leg, transistor and diode conduct in turn.
 fn compared(pair: &Pair, r: &Results) -> [(&'static str, Identified, f64, f64); 7] {
     let par = &pair.plant.model.parameters;
     let (motor, devices) = (&par.motor, &par.inverter.devices);
@@ -109,7 +109,7 @@ fn loses(name: &str, real: bool) -> bool {
     name == "pmsyrm-5.5kw" || (name == "traction-63kw" && !real)
 }
 
-/// What is refused of a machine, and why: a reluctance machine with a weak magnet does not rest on a direct current along the
+/// Results that are refused, and why: a reluctance machine with a weak magnet does not rest on a direct current along the
 /// d-axis, and the currents of iron loss do not fit the loops: 14 to 35 % of their amplitude are left. Without dead time there is no
 /// u_dead. Without L_d there is neither psi_M nor friction, and a friction of less than 1 % of the rated torque may be refused.
 fn expected(name: &str, rotor: Rotor, real: bool) -> Vec<&'static str> {

@@ -33,7 +33,7 @@ enum Order {
     LateVoltages,
     /// Jacobi, with a unit delay in the currents.
     LateCurrents,
-    /// Jacobi, with a unit delay in both: one sample more than the controller knows.
+    /// Jacobi, with a unit delay in both: one sample more than the controller assumes.
     BothLate,
 }
 
@@ -41,7 +41,7 @@ impl Order {
     const ALL: [Self; 6] =
         [Self::Jacobi, Self::ControllerFirst, Self::PlantFirst, Self::LateVoltages, Self::LateCurrents, Self::BothLate];
 
-    /// What the pages call it.
+    /// Its name on the pages.
     fn name(self) -> &'static str {
         match self {
             Self::Jacobi => "all read, all set, both step (Jacobi)",

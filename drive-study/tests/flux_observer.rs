@@ -106,7 +106,7 @@ fn reversal(mut pair: Pair, load: f64) -> (f64, f64) {
     (peak, end)
 }
 
-/// Within 1 deg with the exact resistance; with a wrong one, the error at zero speed is what the time there adds up.
+/// Within 1 deg with the exact resistance; with a wrong one, the error at zero speed grows with the time spent there.
 #[test]
 fn a_reversal_is_held() {
     for (R_hat, adapts, most) in [

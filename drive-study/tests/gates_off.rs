@@ -189,7 +189,7 @@ fn an_enabled_controller_starts_like_at_t_0() {
     }
 }
 
-/// Bits of what the controller commands and estimates over 400 samples of prescribed inputs.
+/// Bits of the controller's commands and estimates over 400 samples of prescribed inputs.
 fn commands(controller: &mut Block<SensorlessController>, now: &mut Elapsed) -> Vec<[u64; 5]> {
     let sample = |k: u32| {
         let (sin, cos) = (0.02 * f64::from(k)).sin_cos();

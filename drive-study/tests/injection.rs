@@ -253,7 +253,7 @@ fn hybrid_both_ways(mut pair: Pair, ramp: f64, load: f64) -> f64 {
     peak
 }
 
-/// 7.6 deg ideal, below 13 deg with dead time. The list does not say how steep its ramps were, and the peak follows them:
+/// 7.6 deg ideal, below 13 deg with dead time. The list does not state the slope of its ramps, and the peak depends on it:
 /// 10.2, 8.2, 6.8, 5.4 and 4.8 deg with 0.3, 0.35, 0.4, 0.5 and 1 s. Where nothing compensates the dead time, 1 s.
 #[test]
 fn hybrid_from_standstill_to_speed_both_ways() {

@@ -117,7 +117,7 @@ fn the_kalman_filter_makes_little_bias_of_noise() {
     assert!(once.abs() < 0.03 && twice.abs() < 0.1, "{once} {twice} deg");
 }
 
-/// The magnitude of the EMF says nothing of the angle: a magnet 20 % off turns the angle by 0.15 deg at most.
+/// The magnitude of the EMF does not affect the angle: an error of 20 % in the magnet flux turns the angle by at most 0.15 deg.
 #[test]
 fn the_kalman_filter_looks_for_the_angle_along_the_magnet() {
     for factor in [0.8, 1.2] {

@@ -58,7 +58,7 @@ fn from(from: f64, t: f64, value: f64) -> f64 {
     if t >= from - 1e-9 { value } else { 0.0 }
 }
 
-/// Lowest and highest speed in rpm, greatest angle error in deg.
+/// Minimum and maximum speed in rpm, maximum angle error in deg.
 #[derive(Debug)]
 struct Seen(f64, f64, f64);
 

@@ -10,7 +10,7 @@ use std::f64::consts::PI;
 const RPM: f64 = PI / 30.0;
 const T_S: f64 = 1e-4;
 
-/// A run in which every output must be finite: greatest `lock_lost` from `from` (s) on. Where the angle error stayed above
+/// A run in which every output must be finite: the maximum of `lock_lost` from `from` (s) on. Where the angle error stayed above
 /// 60 deg for 0.2 s with an EMF beyond any doubt, `lock_lost` must be above 1; where it stayed below 20 deg, below 1.
 fn watch(what: &str, pair: &mut Pair, (duration, from): (f64, f64), mut each: impl FnMut(f64, &mut Pair)) -> f64 {
     let (mut peak, mut right, mut wrong, mut end) = (0.0_f64, 0.0, 0.0, 0.0);

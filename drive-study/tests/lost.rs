@@ -1,4 +1,4 @@
-//! What `lock_lost` says over a population of machines and estimators, from 0.1 to 1 of the rated speed: cold, hot, with wrong
+//! `lock_lost` over a population of machines and estimators, from 0.1 to 1 of the rated speed: cold, hot, with wrong
 //! estimates, in torque control, with current sensors of the wrong sign. A machine is of low voltage up to 60 V.
 //!
 //! ```sh
@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// What was seen in a class of cells.
+/// Observations in a class of cells.
 #[derive(Default)]
 struct Tally {
     held: u32,

@@ -1,4 +1,4 @@
-//! The machines of `motors/`: each starts from many angles and takes rated torque; a note names what a machine does not.
+//! The machines of `motors/`: each starts from many angles and takes rated torque; notes name the exceptions.
 #![allow(missing_docs, non_snake_case)]
 
 use drive_study::tune::limits::{self, Limit};
@@ -47,7 +47,7 @@ fn tried(tuned: &Tuned, level: f64, angles: u32) -> Trial {
     trial::at(tuned, &Task { level, torque: tuned.torque, rise: 0.0 }, angles)
 }
 
-/// What is announced of a machine that was tried from `angles` angles.
+/// The notes on a machine that was tried from `angles` angles.
 fn announced(motor: &MotorFile, angles: u32) -> Vec<Limit> {
     let tuned = rules::tune(motor).unwrap();
     limits::of(motor, &tuned, &trial::all(&tuned, angles)).0

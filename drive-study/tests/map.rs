@@ -163,7 +163,7 @@ fn small(name: &str, request: Request) -> Map {
     map::make(&motor(name), &Request { grid: (9, 7), ..request }).unwrap()
 }
 
-/// Every point has the torque of its place and balanced powers; the sheets stand in the order of voltage and temperature.
+/// Every point has the torque of its grid position and balanced powers; the sheets stand in the order of voltage and temperature.
 #[test]
 fn the_points_of_a_map() {
     let request = Request { u_dc: vec![300.0, 400.0], T: vec![20.0, 120.0], verify: 1, ..Request::default() };
@@ -209,7 +209,7 @@ fn maps_agree_with_the_running_drive() {
     }
 }
 
-/// Where a map differs from the drive that runs, it says so with the place and both numbers, and how to leave the comparison out.
+/// If a map differs from the running drive, a message names the point and both numbers, and how to skip the comparison.
 #[test]
 fn a_map_that_is_wrong_says_so() {
     let map = small("traction-63kw", Request { verify: 0, ..Request::default() });
@@ -323,7 +323,7 @@ fn the_page() {
     assert!(text.contains("350 V, 20 °C: the rated point is out of reach"), "{text}");
 }
 
-/// A table of a machine that saturates: the map agrees with the running drive, and says what constant inductances cost.
+/// A table of a machine that saturates: the map agrees with the running drive, and reports the cost of constant inductances.
 #[test]
 fn a_machine_with_a_flux_map() {
     let dir = std::env::temp_dir().join(format!("fmu-map-{}", std::process::id()));

@@ -42,7 +42,7 @@ impl SteppedPlant {
         if mechanics.imposed { 0.0 } else { 0.5 * mechanics.J * self.block.out.speed * self.block.out.speed }
     }
 
-    /// Energy in J that is stored or has left: what `energy_in` must be, but for a constant.
+    /// Energy in J that is stored or has left the drive: `energy_in` must equal it up to a constant.
     fn accounted(&self) -> f64 {
         let energy = &self.block.out.energy;
         energy.mech + energy.loss + self.magnetic() + self.kinetic()
@@ -79,11 +79,11 @@ fn whole(x: f64) -> u32 {
     x.round() as u32
 }
 
-/// Steps in s: below, at and above the sample period, none of which divides another.
+/// Steps in s below, at and above the sample period; none divides another.
 const STEPS: [f64; 4] = [7e-6, 3.7e-5, T_S, 1e-3];
 
-/// Nothing is missing beyond the error of the integration. The dead time has a kink where a current crosses zero, which a
-/// substep of 50 us does not see: twice the error.
+/// Nothing is missing beyond the error of the integration. The dead time has a kink where a current crosses zero, which a substep
+/// of 50 us misses: twice the error.
 fn balanced(case @ (.., dead_time): (f64, Dq, f64), passed: f64, lost: f64) {
     let allowed = if dead_time > 0.0 { 2e-6 } else { 1e-6 };
     assert!(passed > 1.0 && lost.abs() < allowed * passed, "(h, i, dead time) = {case:?}: {lost} J of {passed} J");

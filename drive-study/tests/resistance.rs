@@ -92,8 +92,8 @@ fn lost_by(cells: &[Cell], drive: Drive) -> Vec<Cell> {
     atlas::run(&[drive], cells, 2, || ()).unwrap()[0].that_are(true).map(|(cell, _)| *cell).collect()
 }
 
-/// Noise, offsets and a compensated dead time: standstill, 15 and 30 rpm under every load. Beside it, what offsets alone cost
-/// and what the dead time costs at a zero crossing.
+/// Noise, offsets and a compensated dead time: standstill, 15 and 30 rpm under every load. For comparison, the error due to
+/// offsets alone and due to the dead time at a zero crossing.
 #[test]
 fn a_real_inverter_near_standstill() {
     let grid = Grid {
@@ -125,7 +125,8 @@ fn tracks_the_resistance_at_creep() {
     assert_eq!(lost_by(&cells, robust()), []);
 }
 
-/// Off, the estimate is the parameter; in torque mode it adapts before a torque acts and while none is asked for, not in a start at speed.
+/// With the adaptation off, the estimate is the parameter; in torque mode it adapts before a torque acts and while the torque
+/// reference is zero, but not in a start at speed.
 #[test]
 fn nothing_adapts_unless_asked() {
     let end = |mut pair: Pair| {
@@ -185,7 +186,7 @@ fn the_atlas() {
     }
 }
 
-/// The speed is asked for under load, at creeping speeds.
+/// The speed reference is set under load, at creeping speeds.
 #[test]
 #[ignore = "168 runs of 6 s"]
 fn creeping_speed_asked_for_under_load() {

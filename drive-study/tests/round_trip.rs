@@ -42,7 +42,7 @@ fn value<'a>(found: &'a Identified, name: &str) -> &'a Quantity {
     value
 }
 
-/// What a record should give of the parameters of this plant.
+/// The results expected from a record of this plant.
 fn truth(pair: &Pair) -> [(&'static str, f64); 8] {
     let par = &pair.plant.model.parameters;
     let (motor, mechanics) = (&par.motor, &par.mechanics);

@@ -206,7 +206,8 @@ fn a_small_torque_that_moves_nothing_is_said() {
     assert!(exact > 0.8 && !said, "R^ = R: {exact} of the speed");
 }
 
-/// With `release`, no torque means no current, and a torque that is asked for again turns the rotor; without it, i_0 flows, and holds a
+/// With `release`, a zero torque reference means no current, and a new torque reference turns the rotor; without it, i_0 flows,
+/// and holds a
 /// small load with R^ < R.
 #[test]
 fn no_torque_releases_the_shaft() {

@@ -51,7 +51,7 @@ fn run(pair: &mut Pair, inputs: (f64, f64, f64), samples: u32) {
     }
 }
 
-/// The greatest difference of what a sample commands and estimates, in V, A and rad.
+/// The maximum differences between the commands and estimates of a sample, in V, A and rad.
 fn apart(a: &ControllerOutputs, b: &ControllerOutputs) -> f64 {
     let all = |o: &ControllerOutputs| [o.u.a, o.u.b, o.u.c, o.i_ref.d, o.i_ref.q, o.theta_est, o.speed_est];
     all(a).iter().zip(all(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
@@ -98,7 +98,7 @@ fn without_a_bump(kind: Kind, name: &str, change: impl Fn(f64) -> f64, set: impl
     assert!(later > 1e-5, "{name}, {}: no effect, {later}", kind.name());
 }
 
-/// The ratings of the reference motor stand in its file; the constants that the studies use are the same.
+/// The file of the reference motor has the same ratings as the constants of the studies.
 #[test]
 fn the_reference_motor_has_one_rating() {
     let motor = MotorFile::read("../motors/reference.toml".as_ref()).unwrap();

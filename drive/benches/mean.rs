@@ -1,7 +1,8 @@
-//! PmsmDriveMean beside PmsmDrive, natively: ns per step of 1 and 10 ms, and their ratio; and the driving cycle of
+//! Compares PmsmDriveMean with PmsmDrive, natively: ns per step of 1 and 10 ms, and their ratio; and the driving cycle of
 //! `examples/vehicle` in steps of 10 ms.
 //!
-//! The two take turns of less than a millisecond, and the figures are the least of many turns: what the computer can do.
+//! The two models run alternately, for less than a millisecond each; the figures are the minimum over many runs, free of other
+//! load.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../plant/tests/lossy/mod.rs"]

@@ -1,4 +1,4 @@
-//! The documentation pages of the models. Each is complete: that of the drive contains the fragments of its parts.
+//! The documentation pages of the models. Each is complete: the page of the drive contains the fragments of its parts.
 
 use drive_base::joined;
 pub use drive_control::documentation::CONTROLLER;

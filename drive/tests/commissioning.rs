@@ -338,7 +338,7 @@ fn model_exchange_finds_the_same_resistance() {
     assert!((here / there - 1.0).abs() < 1e-5, "{here} {there}");
 }
 
-/// A drive that is stored in the middle of each state and restored has the same bits.
+/// A drive that is stored in the middle of each state and then restored continues with the same bits.
 #[test]
 fn a_restored_drive_is_the_same_drive() {
     let (mut whole, mut restored) = (started_in(CommissionMode::Spin), started_in(CommissionMode::Spin));

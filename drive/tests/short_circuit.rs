@@ -1,8 +1,8 @@
 //! Active short circuit: currents and torque against their closed forms, the first swing, losses and energy, in
 //! Co-Simulation and in Model Exchange.
 //!
-//! i_d = -w^2 L_q psi_M / (R^2 + w^2 L_d L_q), i_q = -w R psi_M / (R^2 + w^2 L_d L_q), and from a flux linkage psi_0 the
-//! first swing goes to -(psi_M + |psi_0|) / L_d at most.
+//! i_d = -w^2 L_q psi_M / (R^2 + w^2 L_d L_q), i_q = -w R psi_M / (R^2 + w^2 L_d L_q), and from a flux linkage psi_0 the first
+//! swing reaches at most -(psi_M + |psi_0|) / L_d.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../control/tests/machines/mod.rs"]

@@ -1,4 +1,4 @@
-//! The baseline: findings that a project knows, so that its CI fails on new ones alone.
+//! The baseline: known findings of a project, so that its CI fails only on new ones.
 //!
 //! ```toml
 //! ["Pump, FMI 2.0"]
@@ -71,7 +71,7 @@ impl Baseline {
         ids.filter(|id| ran(id) && !found.contains(&id.as_str())).cloned().collect()
     }
 
-    /// The text of a baseline that knows all findings of these reports.
+    /// The text of a baseline with all findings of these reports.
     pub fn text(reports: &[Report]) -> String {
         let mut out = String::from(
             "# What `fmu check --baseline` knows: it fails on other findings. --write-baseline writes it.\n",

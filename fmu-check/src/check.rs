@@ -36,13 +36,13 @@ impl Levels {
 pub struct Check {
     /// Short name, for example `V04`.
     pub id: &'static str,
-    /// What is required, in one sentence.
+    /// The requirement, in one sentence.
     pub requirement: &'static str,
     /// Where the standards say so.
     pub clause: &'static str,
     /// How binding it is.
     pub levels: Levels,
-    /// What the check reads or which calls it makes, in one sentence.
+    /// The files that the check reads or the calls that it makes, in one sentence.
     pub tried: &'static str,
     /// The usual fix, in one sentence.
     pub fix: &'static str,
@@ -99,7 +99,7 @@ pub enum Verdict {
     NotDetermined(String),
 }
 
-/// A verdict with what only a probe knows about it.
+/// A verdict with details that only a probe can supply.
 #[derive(Clone, Debug)]
 pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
@@ -165,11 +165,11 @@ pub struct Options {
     pub only: Vec<String>,
     /// Time limit for one call of the binary; `None` for 10 s.
     pub patience: Option<Duration>,
-    /// Time limit for everything; what has not run by then is not determined.
+    /// Time limit for everything; checks that have not run by then are not determined.
     pub timeout: Option<Duration>,
     /// Program with the hidden command `probe` that plays the guard ([`fmu_import::guard::serve`]); `None` for the running one.
     pub program: Option<PathBuf>,
-    /// What a probe may use.
+    /// Resource limits of a probe.
     pub allowance: Allowance,
 }
 

@@ -1,4 +1,4 @@
-//! What a probe has left: its findings, its calls, its console, and the verdict from them.
+//! The evidence of a probe: its findings, its calls, its console, and the resulting verdict.
 
 use crate::check::{Conclusion, Verdict};
 use crate::confidence::Confidence;
@@ -15,7 +15,7 @@ pub(super) fn read(out: &Path) -> Vec<Line> {
     text.lines().filter_map(|line| serde_json::from_str(line).ok()).collect()
 }
 
-/// What a panic of this program says, if one has ended a probe; the panic of an FMU in Rust does not come as far as here.
+/// The message of a panic of this program, if one has ended a probe; the panic of an FMU in Rust does not reach this point.
 pub(super) fn panic(end: &End, out: &Path) -> Option<String> {
     let End::Ended(status) = end else { return None };
     let console = fs::read(out.with_file_name("console")).ok().filter(|_| status.code() == Some(101))?;

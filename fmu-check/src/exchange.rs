@@ -12,7 +12,7 @@ use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown}
 
 /// Why a run of the integrator cannot go on.
 pub(super) const UNSTABLE: &str = "Euler's method is not stable for this FMU";
-/// What vectors are filled with before a call.
+/// Value that fills vectors before a call.
 pub(super) const UNTOUCHED: f64 = f64::from_bits(0xc5c5_c5c5_c5c5_c5c5);
 /// Largest number of updates of one event; an FMU that needs more never ends the event.
 const UPDATES: usize = 100;
@@ -84,7 +84,7 @@ impl Event {
         self.updates.last().filter(|(u, _)| u.next_event_time_defined != 0).map(|(u, _)| u.next_event_time)
     }
 
-    /// The FMU asks for the end of the simulation.
+    /// The FMU requests the end of the simulation.
     pub(super) fn terminates(&self) -> bool {
         self.updates.iter().any(|(u, _)| u.terminate != 0)
     }
@@ -239,7 +239,7 @@ pub(super) struct Importer<'a, 'b> {
     pub(super) next: Option<f64>,
     /// The event indicators after the last step or event.
     pub(super) z: Vec<f64>,
-    /// The FMU asked for the end.
+    /// The FMU requested the end.
     pub(super) over: bool,
     /// Variables to read before the next event, while the FMU is still in Continuous-Time Mode.
     pub(super) watched: Vec<&'b ModelVariable>,

@@ -11,7 +11,7 @@ use std::{env, fs, io};
 const NOT_MAPPED: &str = "failed to map segment";
 
 impl Runner {
-    /// What a first run has found, or why the FMU is not at fault.
+    /// The findings of a first run, or the reason why the FMU is not at fault.
     pub(super) fn excused(&self, check: &Check, conditions: &Conditions, found: Conclusion) -> Conclusion {
         let why = match &found.verdict {
             Verdict::Violated(evidence) => evidence.first().cloned().unwrap_or_default(),

@@ -62,7 +62,7 @@ pub struct FmuFile {
     /// The description as an importer reads it, or why it cannot.
     pub(super) description: Result<ModelDescription, String>,
     pub(super) binaries: Vec<Binary>,
-    /// Where the element of a variable stands, by its line and name.
+    /// Location of the element of a variable, by its line and name.
     places: OnceLock<HashMap<(usize, String), usize>>,
     /// Entries that could not be unpacked.
     pub(super) unpack_errors: Vec<String>,
@@ -208,7 +208,7 @@ impl FmuFile {
     }
 }
 
-/// Where an entry goes: to a file, or nowhere if none is wanted or this computer cannot store it.
+/// Target of an entry: a file, or none if it is not needed or this computer cannot store it.
 struct Target(Option<io::Result<File>>);
 
 impl io::Write for Target {

@@ -21,7 +21,8 @@ fn xml(text: &str) -> String {
     escape(&text.chars().filter(allowed).collect::<String>())
 }
 
-/// JUnit: a suite for each file, a case for each check. What is known, does not apply or is not determined is skipped.
+/// JUnit: a suite for each file, a case for each check. Checks that are in the baseline, do not apply or are not determined are
+/// skipped.
 pub(super) fn junit(reports: &[Report]) -> String {
     let mut out = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n");
     for report in reports {

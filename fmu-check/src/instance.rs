@@ -19,7 +19,7 @@ pub(super) struct Instance<'b> {
     stop: Cell<Option<f64>>,
     /// Start time of the next step in s.
     pub(super) time: Cell<f64>,
-    /// A step has asked for the end of the simulation, as an FMU may.
+    /// A step has requested the end of the simulation, as an FMU may.
     pub(super) over: Cell<bool>,
 }
 

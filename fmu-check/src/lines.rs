@@ -1,4 +1,4 @@
-//! What the parent passes to a probe, and what the probe writes for it.
+//! Lines that the parent passes to a probe, and lines that the probe writes for the parent.
 
 use crate::confidence::Confidence;
 use crate::level::Level;

@@ -69,8 +69,8 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
     Found { conclusions, varying }
 }
 
-/// The runs before all other probes: a minimal one of each interface, L00 of co-simulation and E00 of Model Exchange, on which the
-/// other probes depend, and two plain ones, which show what cannot be compared.
+/// The runs before all other probes: a minimal one of each interface, L00 of co-simulation and E00 of Model Exchange, on which
+/// the other probes depend, and two plain ones, which show the variables that cannot be compared.
 struct FirstRuns {
     found: Vec<(&'static str, Conclusion)>,
     /// The FMU has no co-simulation: checks that make no steps are for Model Exchange.
@@ -124,7 +124,7 @@ impl FirstRuns {
         }
     }
 
-    /// What one of these runs found.
+    /// The result of one of these runs.
     fn found(&self, check: &Check) -> Option<Conclusion> {
         self.found.iter().find(|(id, _)| *id == check.id).map(|(_, found)| found.clone())
     }

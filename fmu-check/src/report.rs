@@ -78,7 +78,7 @@ impl Report {
         self.findings.iter().filter(|f| matches!(f.verdict, Verdict::Violated(_)))
     }
 
-    /// Whether a finding counts: neither `--allow` nor the baseline knows it, and it is sure enough.
+    /// Whether a finding counts: it is neither in `--allow` nor in the baseline, and it is certain enough.
     pub(super) fn counts_for(&self, finding: &Finding) -> bool {
         !finding.known && finding.confidence <= self.confidence
     }
@@ -380,7 +380,7 @@ pub(super) fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
-/// What a check is about, for `--explain`.
+/// The subject of a check, for `--explain`.
 pub(super) fn explain(id: &str) -> Option<String> {
     let mut all = GROUPS.iter().flat_map(|g| g.checks.iter().map(move |c| (g, c)));
     let (group, c) = all.find(|(_, c)| c.id.eq_ignore_ascii_case(id))?;

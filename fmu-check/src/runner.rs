@@ -1,8 +1,8 @@
 //! Runs the probes: each check of the binary in a separate process, with a time limit, on all cores.
 //!
 //! The parent starts the same program with the hidden command `probe`. The child appends its findings to a file, line by line,
-//! and writes the call that it is about to make to another file. When the child dies, the parent knows what was found and which
-//! call ended it. A probe with several cases is restarted after the case that ended it.
+//! and writes the call that it is about to make to another file. If the child dies, the parent has its findings and the call that
+//! ended it. A probe with several cases is restarted after the case that ended it.
 
 use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
@@ -54,7 +54,7 @@ pub(super) struct Runner {
     integrator: OnceLock<f64>,
     /// Names of the variables in which the two runs of T10 differ.
     pub(super) varying: OnceLock<Vec<String>>,
-    /// What the first process of a check found that compares two, and when it began.
+    /// For a check that compares two processes: the findings of the first one, and when it began.
     first: Mutex<Option<(Instant, Vec<String>)>>,
     /// End of the whole run.
     deadline: Option<Instant>,
@@ -70,7 +70,7 @@ const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
 /// Checks whose subject is a second instance; in all others, a second instance that hangs is not a finding.
 const SEVERAL: [&str; 8] = ["L04a", "L04b", "L04c", "B05d", "G07a", "F03a", "F04a", "E14"];
 
-/// Where a probe runs, and what it may use.
+/// The folder of a probe, and its resource limits.
 #[derive(Clone)]
 pub(super) struct Conditions {
     /// Folder that the FMU was unpacked to.

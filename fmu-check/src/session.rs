@@ -204,7 +204,7 @@ impl Session {
         self.report(Some(level), Confidence::Certain, text);
     }
 
-    /// Reports a call that should have succeeded, as a violation; an end that the FMU asked for is not a violation.
+    /// Reports a call that should have succeeded, as a violation; an end requested by the FMU is not a violation.
     pub(super) fn failed(&self, what: &str, NotDetermined(why): NotDetermined) {
         if why.starts_with(ENDED) {
             self.write(&Line::NotDetermined(why));
@@ -296,7 +296,7 @@ impl Session {
         }
     }
 
-    /// Adds what the last call returned.
+    /// Adds the result of the last call.
     pub(super) fn record_result(&self, result: &dyn std::fmt::Display) {
         self.note_call(&format!(" -> {result}"));
     }

@@ -17,7 +17,7 @@ pub(super) enum State {
     Error,
 }
 
-/// What an instance is made for.
+/// Purpose of an instance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Life {
     CoSimulation,

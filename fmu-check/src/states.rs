@@ -73,7 +73,7 @@ impl Instance<'_> {
         self.perform(Simple::Terminate)
     }
 
-    /// Makes the FMU return Error with one of two wrong calls; returns the call that succeeded in doing so.
+    /// Makes the FMU return Error by one of two wrong calls; returns the call that produced the Error.
     pub(super) fn provoke(&self) -> Result<String, NotDetermined> {
         let (t, h) = (self.time.get(), self.session.h());
         if self.step_at(t, -h)? == Status::ERROR {

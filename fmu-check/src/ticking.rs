@@ -126,7 +126,7 @@ pub(super) struct Served<'b> {
     over: bool,
 }
 
-/// What an importer looks at in Event Mode: once its clocks are active, and after the last update.
+/// Points at which an importer reads values in Event Mode: once its clocks are active, and after the last update.
 pub(super) enum Moment {
     Active,
     Updated,

@@ -49,7 +49,7 @@ impl Difference {
 /// Multiple of the tolerance by which a run may differ if an integrator with variable steps restarts.
 const INTEGRATOR: f64 = 5.0;
 
-/// A relative deviation from which on no integrator with variable steps is the cause.
+/// Relative deviation above which a variable-step integrator cannot be the cause.
 const LARGE: f64 = 1e-3;
 
 /// Minimum scale of a deviation, for a variable without a nominal: anything far below it is noise around 0.

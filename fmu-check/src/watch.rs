@@ -1,5 +1,5 @@
 //! Distinguishes a call that hangs from a slow probe: by its progress and by the processor time it uses, not by the clock alone,
-//! so that a busy machine makes no finding.
+//! so a busy machine causes no finding.
 
 use std::fs;
 use std::path::PathBuf;
@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 /// A probe that makes progress is given up after this many time limits.
 const PATIENCE: u32 = 6;
 
-/// What the parent knows about a probe that has not ended.
+/// The parent's data about a probe that has not ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pace {
     /// Go on waiting.
@@ -29,7 +29,7 @@ pub(super) struct Watch {
     /// The file with the call that it is in.
     journal: PathBuf,
     limit: Duration,
-    /// How long it has been watched. What this process slept itself, because it was stopped or got no processor, does not count.
+    /// How long it has been watched. Time in which this process itself was stopped or got no processor does not count.
     watched: Duration,
     /// The call, since when, and the processor time then.
     call: (Vec<u8>, Duration, Option<Duration>),
@@ -99,7 +99,7 @@ mod tests {
     use super::*;
     use std::process::{Child, Command};
 
-    /// What the watch says in the end about a shell command, with its limit.
+    /// The final verdict of the watch on a shell command, with its limit.
     fn end(script: &str, limit: u64, journal: &std::path::Path) -> Pace {
         let mut child: Child = Command::new("sh").args(["-c", script]).env("JOURNAL", journal).spawn().unwrap();
         let mut watch = Watch::new(child.id(), journal.into(), Duration::from_millis(limit));

@@ -59,7 +59,7 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
 /// step belongs to the next one.
 ///
 /// # Errors
-/// Those of [`smooth`] and of [`Events::event`], [`Fault::end`] among them; events without end.
+/// Those of [`smooth`] and of [`Events::event`], including [`Fault::end`]; an unlimited sequence of events.
 pub fn hybrid<M: ContinuousTime + Events, const N: usize>(
     model: &mut M,
     step: &Step,

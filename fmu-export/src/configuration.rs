@@ -59,7 +59,7 @@ impl<E: Exported> Instance<E> {
     /// Mode.
     ///
     /// # Errors
-    /// As [`set`](Self::set) and [`exit_configuration`](Self::exit_configuration): nothing has changed.
+    /// Those of [`set`](Self::set) and [`exit_configuration`](Self::exit_configuration); an error leaves everything unchanged.
     #[cold]
     pub(crate) fn set_and_configure<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
         let structural = |reference: &u32| {

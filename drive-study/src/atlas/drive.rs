@@ -24,7 +24,7 @@ pub struct Drive {
     pub machine: String,
     /// The drive at rest, with its rated speed and torque.
     pub bench: Bench,
-    /// How it comes to its speed.
+    /// How it reaches its speed.
     pub approach: Approach,
 }
 

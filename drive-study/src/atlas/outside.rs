@@ -1,12 +1,13 @@
-//! What a lost rotor looks like from outside, at any reference: in the last 2 s of a run, cut into quarters of
+//! Signs of a lost rotor in the plant's quantities, at any reference: in the last 2 s of a run, cut into quarters of
 //! 0.5 s,
 //!
 //! - the rotor turns against the estimated frame by a turn or more,
 //! - or over two quarters, `speed_est` is off the rotor's speed by more than 5 % of the rated speed on the average,
-//! - or in two quarters, the speeds of rotor and estimate both swing by more than 10 % of the rated speed from peak to peak. A
-//!   drive that accelerates does not swing: from quarter to quarter, its mean moves by as much as its peaks are apart.
+//! - or in two quarters, the speeds of rotor and estimate both swing by more than 10 % of the rated speed from peak to peak. An
+//! accelerating drive does not count as swinging: from quarter to quarter, its mean moves by as much as its peaks differ.
 //!
-//! A drive that its limits keep off its reference is not lost: the outputs `current_limited` and `voltage_limited` say so.
+//! A drive that misses its reference because of its limits is not lost: the outputs `current_limited` and `voltage_limited` say
+//! so.
 
 use std::f64::consts::TAU;
 
@@ -16,7 +17,7 @@ const QUARTER: f64 = 0.5;
 const MEAN: f64 = 0.05;
 const SWING: f64 = 0.1;
 
-/// Sum, least and greatest value.
+/// Sum, minimum and maximum.
 #[derive(Clone, Copy, Debug)]
 struct Signal {
     sum: f64,
@@ -32,7 +33,7 @@ impl Signal {
     }
 }
 
-/// What was seen in a quarter.
+/// Observations in a quarter.
 #[derive(Clone, Copy, Debug)]
 struct Quarter {
     n: f64,

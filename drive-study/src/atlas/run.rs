@@ -25,7 +25,7 @@ use drive::frame::Phases;
 use drive::math::wrap;
 use fmu_core::{Fault, Model};
 
-/// How the drive comes to its speed; it also decides what counts as lost.
+/// How the drive reaches its speed; this also determines when it counts as lost.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Approach {
     /// From rest, in steps.

@@ -112,7 +112,7 @@ fn grid(block: &Block<'_>) -> String {
     html + "</tbody></table></div>\n"
 }
 
-/// The name of an estimator beside its color; a narrow page may break it before a capital.
+/// The name of an estimator next to its color; a narrow page may break it before a capital letter.
 fn name(entry: &Entry) -> String {
     let mut name = page::swatch(ink::of(entry.kind));
     let mut last = ' ';

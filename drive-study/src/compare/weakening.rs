@@ -1,6 +1,6 @@
 //! Field weakening: to a multiple of the base speed, and there more load than the machine can carry.
 //!
-//! The base speed n_b is that of the true machine at its greatest current and 0.95 u_dc / sqrt 3; the envelope too is that of the
+//! The base speed n_b is that of the true machine at its maximum current and 0.95 u_dc / sqrt 3; the envelope is also that of the
 //! true machine, under the limits of each estimator.
 
 use super::candidate::Candidate;

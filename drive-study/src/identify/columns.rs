@@ -1,4 +1,4 @@
-//! Columns of a record: their names, their units, and what a header says of them.
+//! Columns of a record: their names, their units, and their headers.
 
 use crate::csv::Columns;
 use anyhow::{Context, Result, bail, ensure};
@@ -66,7 +66,7 @@ impl Kind {
         }
     }
 
-    /// The size of a unit, perhaps with a prefix, in SI.
+    /// The size of a unit, with or without a prefix, in SI.
     fn size(self, unit: &str) -> Option<f64> {
         let plain = |unit: &str| self.units().iter().find(|(name, _)| *name == unit).map(|(_, size)| *size);
         plain(unit).or_else(|| {
@@ -78,7 +78,7 @@ impl Kind {
 
 const PREFIXES: &[(&str, f64)] = &[("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("m", 1e-3), ("k", 1e3), ("M", 1e6)];
 
-/// Which header holds a column, and in which unit a column is: what the options say.
+/// The options that assign headers to columns and units to columns.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Naming {

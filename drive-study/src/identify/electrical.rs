@@ -1,8 +1,9 @@
 //! Linear fit of the voltage equations over the [`windows`](super::windows) of a record.
 //!
-//! Noise of the current widens `[i]`, so that its square is taken off the normal matrix. The angle's offset `theta_0` and delay
-//! `tau` are found around the linear fit. A second pass adds the terms of the saturation that lower what the fit leaves, and takes
-//! the currents between samples as exponentials.
+//! Noise of the current increases `[i]`, so its square is subtracted from the normal matrix. The angle's offset `theta_0` and
+//! delay
+//! `tau` are found around the linear fit. A second pass adds the terms of the saturation that reduce the residual, and models the
+//! currents between samples as exponentials.
 
 use super::interval::{self, Sums};
 use super::record::Complex;
@@ -46,9 +47,9 @@ pub struct Fit {
     pub half: [f64; 6],
     /// Condition number of the scaled normal matrix.
     pub condition: f64,
-    /// What the fit leaves, as a voltage in V (rms of the vector), and what noise would leave.
+    /// Residual of the fit as a voltage in V (rms of the vector), and the residual that noise alone would cause.
     pub rest: f64,
-    /// What the noise of the current would leave.
+    /// The residual that the noise of the current alone would cause.
     pub noise: f64,
     bends: [f64; 3],
 }
@@ -296,7 +297,7 @@ struct Solved {
     sums: Sums,
     condition: f64,
     windows: Vec<Window>,
-    /// Square of the noise that was taken off both inductances' diagonals, per window.
+    /// Square of the noise subtracted from the diagonal entries of both inductances, per window.
     noise: [f64; 2],
 }
 

@@ -1,5 +1,5 @@
 //! How far a least-squares result may be off: the greater of a sandwich estimate over blocks of rows and a jackknife over stretches
-//! of time. The first sees noise, the second what the model leaves out: without it, errors reached 8 half-widths.
+//! of time. The first covers noise, the second the errors of the model: without it, errors reached 8 half-widths.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -33,7 +33,7 @@ impl Sums {
         }
     }
 
-    /// Adds a row of regressors with what the fit leaves of its value.
+    /// Adds a row of regressors with its residual.
     pub fn add(&mut self, row: &[f64], rest: f64) {
         for (a, x) in row.iter().enumerate() {
             self.score[a] += x * rest;
@@ -80,8 +80,8 @@ fn scaled_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     Some(&scale * scaled.try_inverse()? * &scale)
 }
 
-/// A normal matrix with a diagonal of ones, and the scale. A parameter that no row shows has a row and a column of zeros beside
-/// its one: it stays 0.
+/// A normal matrix with a diagonal of ones, and the scale. A parameter without information in any row has only zeros in its row
+/// and column, except a 1 on the diagonal: it stays 0.
 fn scaled(matrix: &DMatrix<f64>) -> (DMatrix<f64>, DMatrix<f64>) {
     let scale = matrix.diagonal().map(|x| if x > 0.0 { 1.0 / x.sqrt() } else { 0.0 });
     let scale = DMatrix::from_diagonal(&scale);

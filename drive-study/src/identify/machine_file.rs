@@ -4,10 +4,10 @@ use super::verdict::Quantity;
 use super::{Identified, Ratings};
 use std::fmt::{Arguments, Write};
 
-/// What a machine file says.
+/// Contents of a machine file.
 #[derive(Clone, Debug)]
 pub struct Content<'a> {
-    /// What the values come from.
+    /// Origin of the values.
     pub from: &'static str,
     /// What the reader should know.
     pub notes: &'a [String],

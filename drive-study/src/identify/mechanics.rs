@@ -29,14 +29,14 @@ pub struct MechanicalFit {
     pub half: [f64; SIZE],
 }
 
-/// What the record shows of speed and torque, in windows of 50 ms.
+/// Speed and torque in the record, in windows of 50 ms.
 #[derive(Clone, Debug)]
 pub struct Shown {
     /// Maximum mechanical speed in rad/s.
     pub speed: f64,
     /// Maximum electromagnetic torque in N.m.
     pub torque: f64,
-    /// Speeds that differ by a tenth of the greatest, each for at least 3 % of the time.
+    /// Speeds that differ by a tenth of the maximum, each for at least 3 % of the time.
     pub levels: usize,
     /// The windows.
     pub rows: Vec<TorqueWindow>,

@@ -4,7 +4,7 @@
 //! - [`columns`]: headers, units, forms of columns. [`record`]: the checked record. [`motion`]: angle and speed.
 //! - [`windows`]: the voltage equations in integral form; [`electrical`]: their linear fit; [`legs`]: the inverter's curve in it.
 //! - [`mechanics`]: inertia and friction. [`interval`]: half-widths. [`verdict`]: what is written and what is refused.
-//! - [`machine_file`]: the file for `fmu tune`. [`page`]: the fits beside the record.
+//! - [`machine_file`]: the file for `fmu tune`. [`page`]: the fits together with the record.
 //! - [`run`]: the machine of a run of the self-commissioning instead.
 
 #![allow(
@@ -50,7 +50,7 @@ pub struct Identified {
     pub seen: Seen,
     /// When the voltage of a row acts.
     pub timing: Timing,
-    /// Ratings, and whether they are given or the greatest of the record.
+    /// Ratings, and whether they are given or are the maxima of the record.
     pub ratings: Ratings,
     /// Pole pairs.
     pub n_p: i32,

@@ -6,7 +6,7 @@ use std::ops::Range;
 /// Time in s to each side of a row that its parabola covers, at most: a change of the torque within it bends the parabola.
 const REACH: f64 = 4e-3;
 
-/// Noise of the angle in rad from which on it covers that. Noise falls with the root of the time, the error of a bend grows with its
+/// Noise of the angle in rad above which it hides that. Noise falls with the root of the time, the error of a bend grows with its
 /// square, so that less noise is best met with a time that falls with the power 0.4.
 const NOISE: f64 = 1e-3;
 

@@ -1,4 +1,5 @@
-//! A page with the values, and each fit beside the record: voltages over time, flux linkages over currents, torque over time, and
+//! A page with the values, and each fit together with the record: voltages over time, flux linkages over currents, torque over
+//! time, and
 //! friction over speed.
 
 use super::run::Commissioned;
@@ -17,7 +18,7 @@ use std::rc::Rc;
 /// Places along a current or a speed at which the record is averaged.
 const PLACES: usize = 60;
 
-/// Change of a current within a window, as a share of the greatest current, up to which its flux linkage is shown.
+/// Maximum change of a current within a window, as a share of the maximum current, for which its flux linkage is shown.
 const STEADY: f64 = 0.03;
 
 /// The page; `file` is the name of the record.
@@ -106,7 +107,7 @@ fn table(values: &[Quantity]) -> String {
     html + "</tbody></table></div>\n"
 }
 
-/// The figures, each with what it shows.
+/// The figures with their captions.
 fn figures(found: &Identified) -> [(Figure, &'static str); 4] {
     [
         (

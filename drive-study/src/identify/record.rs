@@ -10,7 +10,7 @@ use std::ops::Range;
 /// A vector in the plane of the stator.
 pub type Complex = nalgebra::Complex<f64>;
 
-/// What a record does not say of itself.
+/// Information that a record does not contain.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Options {
@@ -18,11 +18,11 @@ pub struct Options {
     pub naming: Naming,
     /// Pole pairs.
     pub n_p: Option<i32>,
-    /// Maximum current in A, peak value; the greatest of the record if `None`.
+    /// Maximum current in A, peak value; the maximum of the record if `None`.
     pub current: Option<f64>,
-    /// Rated mechanical speed in rad/s; the greatest of the record if `None`.
+    /// Rated mechanical speed in rad/s; the maximum of the record if `None`.
     pub speed: Option<f64>,
-    /// Rated torque in N.m; the greatest of the record if `None`.
+    /// Rated torque in N.m; the maximum of the record if `None`.
     pub torque: Option<f64>,
     /// DC-link voltage in V; the mean of the column `u_dc` if `None`.
     pub u_dc: Option<f64>,
@@ -193,7 +193,8 @@ impl BenchRecord {
     }
 }
 
-/// Noise of a current vector: its third differences, which a smooth signal does not have. A current that turns with the rotor is
+/// Noise of a current vector, from its third differences, which vanish for a smooth signal. A current that turns with the rotor
+/// is
 /// turned back before.
 fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> f64 {
     /// Rows to each side of the slope that gives the turn of a row.

@@ -10,7 +10,7 @@ use anyhow::{Context, Result, bail, ensure};
 use drive::control::commission::{CommissionFault, CommissionState, LIMIT_DEAD, LIMIT_L, LIMIT_R, LIMIT_SATURATION};
 use fmu_core::Enumerated;
 
-/// The quantities of a machine file with their units, greatest half-widths, and what helps where one is refused.
+/// The quantities of a machine file with their units, maximum half-widths, and advice for a refused one.
 const FILE: [(&str, &str, Option<f64>, &str); 9] = [
     ("R_s", "Ohm", Some(LIMIT_R), "commission with more current"),
     ("L_d", "H", Some(LIMIT_L), LOOPS),
@@ -56,7 +56,7 @@ const SHOWN: [(&str, &str); 8] = [
 pub struct Commissioned {
     /// The quantities, in the order of a motor file.
     pub values: Vec<Quantity>,
-    /// Quantities that a motor file does not have.
+    /// Quantities that a motor file does not contain.
     pub more: Vec<Quantity>,
     /// Why it has stopped.
     pub fault: CommissionFault,

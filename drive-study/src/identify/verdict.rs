@@ -38,14 +38,14 @@ impl Quantity {
     }
 }
 
-/// What the record shows, beside the fit.
+/// Properties of the record, in addition to the fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// Angle that the rotor turns in a step, rad.
     turn: f64,
     /// R T over the smaller inductance.
     decay: f64,
-    /// The greatest that is accepted.
+    /// The maximum accepted value.
     most_decay: f64,
     /// Current that 99 % of the rows stay below, over the maximum current.
     current: f64,
@@ -100,7 +100,7 @@ impl Facts {
     }
 }
 
-/// What would fit better: other phases, another direction, another delay.
+/// Better fits: other phases, another direction, another delay.
 pub(super) fn better(record: &BenchRecord, motion: &Motion, timing: Timing, i_max: f64, fit: &Fit) -> String {
     /// A third of a turn.
     const THIRD: f64 = 2.0 * std::f64::consts::PI / 3.0;

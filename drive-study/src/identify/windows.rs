@@ -7,8 +7,8 @@
 //! ```
 //!
 //! Both fluxes come from one energy. The voltage is held in stator axes for a sample; its mean in rotor axes is
-//! `u e^(-j theta) sin(w T/2)/(w T/2)` at the middle. `s_j` is what the three legs lose for `u_dead` = 1 V and the current `i_xj` at
-//! which the dead time's curve bends: the sum of three approximates its tail.
+//! `u e^(-j theta) sin(w T/2)/(w T/2)` at the middle. `s_j` is the voltage loss of the three legs for `u_dead` = 1 V and the
+//! current `i_xj` at which the dead-time curve bends: the sum of three approximates its tail.
 //!
 //! Over a sample of the controller, a current runs exponentially: its mean is `(1 - c) i[k] + c i[k+1]` with
 //! `c = 1/(1 - e^-x) - 1/x`, `x = R T/L`; c = 1/2 is the trapezoid.

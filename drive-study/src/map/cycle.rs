@@ -101,7 +101,7 @@ impl Cycle {
     /// The energy with the power from the link (W) and the losses of `read` at each speed and torque.
     ///
     /// # Errors
-    /// The first speed and torque at which `read` has none.
+    /// The first speed and torque at which `read` returns no losses.
     pub fn energy(&self, mut read: impl FnMut(f64, f64) -> Option<(f64, Losses)>) -> Result<Energy, [f64; 2]> {
         let mut energy = Energy::default();
         for [speed, tau] in self.points() {

@@ -12,7 +12,7 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 /// A column of `map.csv` and an array of `map.npz`: the name and the value at a point.
 type Column = (&'static str, fn(&Point) -> f64);
 
-/// What a point has besides its place on the grid, but the region.
+/// Columns of a point other than its grid coordinates and its region.
 const COLUMNS: [Column; 11] = [
     ("i_d", |p| p.i.d()),
     ("i_q", |p| p.i.q()),
@@ -51,7 +51,7 @@ pub fn map_csv(map: &Map) -> String {
     csv
 }
 
-/// `envelope.csv`: least and greatest torque at the shaft over the speed; 0 where that sign is out of reach.
+/// `envelope.csv`: minimum and maximum torque at the shaft over the speed; 0 where that sign is out of reach.
 pub fn envelope_csv(map: &Map) -> String {
     let mut csv = String::from("speed,u_dc,T_winding,T_magnet,tau_min,tau_max,region_min,region_max\n");
     for sheet in &map.sheets {

@@ -1,5 +1,4 @@
-//! What it costs that the controller computes its currents with constant inductances, where the machine saturates: torque and loss
-//! at the rated point.
+//! Cost of the controller's constant inductances if the machine saturates: torque and loss at the rated point.
 
 use super::sheet;
 use drive::frame::Dq;
@@ -13,7 +12,7 @@ pub struct Cost {
     pub torque: f64,
     /// The point with the rated torque at the shaft, with the controller's currents.
     pub now: Point,
-    /// The point with the least losses for that torque, within the same current and voltage.
+    /// The point with minimum losses for that torque, within the same current and voltage.
     pub best: Point,
 }
 

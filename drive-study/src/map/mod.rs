@@ -1,13 +1,13 @@
 //! `fmu map`: the efficiency map of a machine with the values that [`tune`](crate::tune) gives it, and its envelope.
 //!
-//! - [`request`]: what is asked for. [`sheet`]: the points at one voltage and temperature, from [`drive::steady`].
+//! - [`request`]: the request of the user. [`sheet`]: the points at one voltage and temperature, from [`drive::steady`].
 //! - [`verify`](mod@verify): some of them against the running drive.
 //! - [`table`]: reading between the points. [`cycle`]: a vehicle on a driving cycle.
-//! - [`linear`]: what the controller's constant inductances cost a machine that saturates.
+//! - [`linear`]: the cost of the controller's constant inductances if the machine saturates.
 //! - [`files`](mod@files): CSV and npz. [`picture`]: the map as a figure. [`page`]: the map as a page. [`report`]: tables of text.
 //!
-//! The drive is that of torque control with a sensor, whose controller has the estimates that the rules give it; the current is
-//! the only limit, and the voltage is held over the sample period, as `PmsmDrive` does.
+//! The drive runs in torque control with a sensor, and its controller uses the estimates from the tuning rules; the current is
+//! the only limit, and the voltage is constant over the sample period, as in `PmsmDrive`.
 
 pub mod cycle;
 pub mod files;
@@ -65,7 +65,7 @@ pub struct Map {
     pub notes: Vec<String>,
 }
 
-/// Samples per electrical period that the greatest speed of a map leaves, where the file names no greatest speed.
+/// Samples per electrical period at the maximum speed of a map if the file does not specify that speed.
 const LEAST_SAMPLES: f64 = 10.0;
 /// Share of the rated torque that is left there.
 const LEAST_TORQUE: f64 = 0.01;
@@ -151,8 +151,8 @@ fn rated(motor: &MotorFile, drive: &Steady, u_dc: f64) -> Result<()> {
     Ok(())
 }
 
-/// The greatest speed (rad/s) of the map: that of the file; else twice the rated one, as far as there is a torque and the
-/// controller has its samples.
+/// The maximum speed (rad/s) of the map: that of the file, or twice the rated speed, limited to speeds with a torque and with
+/// enough samples per period.
 fn top(motor: &MotorFile, drive: &Steady, u_dc: &[f64], T: &[f64]) -> f64 {
     let rating = &motor.data.rating;
     if let Some(top) = &rating.speed_max {

@@ -114,7 +114,7 @@ fn bands(best: f64) -> Vec<Band> {
     std::iter::once(first).chain(levels.iter().enumerate().map(level)).collect()
 }
 
-/// Lines of constant power at the shaft, up to the edge of the picture; up to five of each sign, within the greatest `power`.
+/// Lines of constant power at the shaft, up to the edge of the picture; up to five of each sign, within the maximum `power`.
 fn isopower(top: f64, [low, high]: [f64; 2], power: f64) -> Vec<Line> {
     let decade = 10_f64.powf((power / 5.0).log10().floor());
     let step =

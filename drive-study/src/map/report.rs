@@ -1,4 +1,4 @@
-//! What `fmu map` prints: the best point, the losses at the rated point, the energy of the driving cycle.
+//! Output of `fmu map`: the best point, the losses at the rated point, the energy of the driving cycle.
 
 use super::cycle::{Cycle, Energy};
 use super::linear::{self, Cost};
@@ -17,7 +17,7 @@ const RPM: f64 = 30.0 / PI;
 pub struct Report {
     /// Title, headings and rows of each.
     pub tables: Vec<(&'static str, Vec<Vec<String>>)>,
-    /// What does not fit into a table.
+    /// Results that do not fit into a table.
     pub notes: Vec<String>,
 }
 

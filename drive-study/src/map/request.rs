@@ -1,4 +1,4 @@
-//! What a map is asked for: the grid, the voltages, the temperatures, and how many points are verified.
+//! The request for a map: the grid, the voltages, the temperatures, and how many points are verified.
 
 use anyhow::{Context, Result, bail};
 
@@ -31,7 +31,7 @@ const MOST: usize = 1001;
 /// The grid of a text like `47x41`.
 ///
 /// # Errors
-/// It is something else, or has too few or too many points.
+/// The text is not a grid, or the grid has too few or too many points.
 pub fn grid(text: &str) -> Result<(usize, usize)> {
     let allowed = || {
         format!(

@@ -1,6 +1,7 @@
 //! The points of a map at one voltage and one temperature, on a grid of speed and relative torque.
 //!
-//! The torque at the shaft is a share x of the greatest one of its sign at that speed, x = tau / tau_max or tau / |tau_min|, in
+//! The torque at the shaft is given as a share x of the maximum of its sign at that speed, x = tau / tau_max or tau / |tau_min|,
+//! in
 //! -1..1: the grid has no holes, and no cell lies across the envelope.
 
 use crate::queue;
@@ -15,7 +16,7 @@ const FULL: f64 = 1.0 + 1e-6;
 pub struct Axes {
     /// Mechanical speeds in rad/s, ascending from 0.
     pub speed: Vec<f64>,
-    /// Torque at the shaft as a share of the greatest one of its sign, from -1 to 1.
+    /// Torque at the shaft as a share of the maximum of its sign, from -1 to 1.
     pub x: Vec<f64>,
 }
 
@@ -41,7 +42,7 @@ pub struct Sheet {
     pub T: f64,
     /// Minimum and maximum torque at the shaft in N.m at each speed; 0 where that sign is out of reach.
     pub limits: Vec<[f64; 2]>,
-    /// Where the least and the greatest torque lie.
+    /// Positions of the minimum and the maximum torque.
     pub regions: Vec<[Region; 2]>,
     /// The points, torque by torque for each speed; `None` out of reach.
     pub points: Vec<Option<Point>>,
@@ -57,7 +58,7 @@ pub fn is_reached(point: &Point) -> bool {
     point.u_share <= FULL
 }
 
-/// The points of least and greatest torque at the shaft, where the voltage is enough for a torque of that sign.
+/// The points of minimum and maximum torque at the shaft, if the voltage allows a torque of that sign.
 pub fn ends(at: &At<'_>) -> [Option<Point>; 2] {
     let [low, high] = at.ends();
     let reached = |point: &Point, sign: f64| is_reached(point) && sign * point.powers.tau_shaft > 0.0;

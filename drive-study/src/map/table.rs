@@ -7,8 +7,9 @@
 //! tau_lim is linear in the speed between those of the grid. The efficiency is computed from the losses and never interpolated:
 //! it is 0/0 without load.
 //!
-//! At another voltage the map is read at the speed n u_ref / u_dc, where field weakening is as deep, with the torque that leaves the
-//! same to the rotor after friction. p_sw grows with (u_dc / u_ref)^k_sw; p_iron is that of the speed with this flux linkage, and
+//! At another voltage the map is read at the speed n u_ref / u_dc, where field weakening is equally deep, with the shaft torque
+//! that corresponds to the same torque of the rotor before friction. p_sw grows with (u_dc / u_ref)^k_sw; p_iron is that of the
+//! speed with this flux linkage, and
 //! p_friction that of the speed. At another temperature of the winding, p_cu is in proportion to R_s(T). `tests/map.rs` has the
 //! errors.
 
@@ -59,7 +60,7 @@ impl<'a> Table<'a> {
         Some([between(0), between(1)])
     }
 
-    /// The losses at a speed and a share of the greatest torque; `None` where a point of the cell is out of reach.
+    /// The losses at a speed and a share of the maximum torque; `None` where a point of the cell is out of reach.
     pub fn losses(&self, speed: f64, x: f64) -> Option<Losses> {
         let (k, b) = cell(&self.axes.speed, speed)?;
         let (j, a) = cell(&self.axes.x, x)?;

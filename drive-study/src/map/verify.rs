@@ -11,7 +11,7 @@ use fmu_core::{Block, Elapsed, Model, Step};
 /// Maximum difference of the power from the link, as a share of the size of the powers ([`size`]), and of each loss.
 const OF_POWER: f64 = 1e-3;
 const OF_LOSS: f64 = 1e-2;
-/// A loss below this share of all is not compared on its own.
+/// A loss below this share of the total is not compared separately.
 const NEGLIGIBLE: f64 = 1e-3;
 
 /// Times in s that the drive settles, and over which the means are taken.
@@ -31,12 +31,11 @@ pub struct Verified {
     pub apart: Vec<String>,
 }
 
-/// Minimum torque limit of a speed that is compared, as a share of the greatest: where the voltage is used up, nothing is left
+/// Minimum torque limit of a speed that is compared, as a share of the maximum: where the voltage is used up, there is no margin
 /// for the ripple of a sampled drive.
 const LEAST_LIMIT: f64 = 0.05;
 
-/// Places on the grid, spread evenly over speed and torque: speeds from a tenth of the greatest on, no torque near 0 and none
-/// on the limit.
+/// Grid points spread evenly over speed and torque: speeds from a tenth of the maximum, no torque near 0 or on the limit.
 fn places(axes: &Axes, sheet: &Sheet, count: usize) -> Vec<(f64, Point)> {
     let (speeds, torques) = (axes.speed.len(), axes.x.len());
     let greatest = sheet.limits.iter().flatten().fold(0.0_f64, |most, limit| most.max(limit.abs()));
@@ -87,17 +86,17 @@ pub fn verify(drive: &Steady, axes: &Axes, sheets: &[Sheet], count: usize) -> Re
     Ok(all)
 }
 
-/// What one point differs by.
+/// Differences at one point.
 #[derive(Clone, Debug, PartialEq)]
 struct Difference {
     power: f64,
     loss: f64,
-    /// What is more than allowed.
+    /// Differences above the limit.
     apart: Option<String>,
 }
 
-/// What a power is compared with (W): the apparent power of the machine, or that of link or losses if it is greater. p_in itself
-/// passes through 0, where the shaft alone feeds the losses.
+/// Reference for the difference of a power (W): the apparent power of the machine, or the power of the link or the losses if
+/// greater. p_in itself passes through 0, where the shaft alone covers the losses.
 fn size(point: &Point) -> f64 {
     let apparent = 1.5 * point.u.magnitude() * point.i.magnitude();
     apparent.max(point.powers.p_in.abs()).max(point.powers.losses.sum())

@@ -5,8 +5,8 @@
 //!   c_1 (R - R^) i / (w^2 psi_M), to first order.
 //! - **Start, flux observer.** At rest, R^ below R drives the estimate away at (R - R^) i_0 / psi_M, and the rotor follows with
 //!   w_0 = sqrt(n_p K i_0 / J): the drift must be slower. The rules choose R^ for that; a margin below 2 % is less than the
-//!   uncertainty of R. From the opposite angle, the speed loop turns i_q to its limit before the rotor has come round: at atan(i_q / i_d)
-//!   beside the rotor, the currents give no torque, and where R - R^ is small the estimate stays.
+//!   uncertainty of R. From the opposite angle, the speed loop drives i_q to its limit before the rotor has turned around: at an
+//! angle of atan(i_q / i_d) from the rotor, the currents produce no torque, and if R - R^ is small, the estimate stays there.
 //! - **Start, extended EMF.** A change of i_q acts on the estimated speed through (L_q - L_d) p i_q against the EMF; closed by
 //!   the speed loop, the gain is J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). Above 40 at 0.1 pu, the speed does not
 //!   settle there after the hand-over.
@@ -24,7 +24,7 @@ use std::fmt;
 /// A start or a load that the drive will not hold.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Limit {
-    /// What the drive will not hold.
+    /// Operating conditions that the drive cannot hold.
     pub what: What,
     /// At which speed in pu.
     pub level: f64,
@@ -52,7 +52,7 @@ fn short(x: f64) -> f64 {
     format!("{x:.2e}").parse().unwrap_or(x)
 }
 
-/// What the drive does not hold in its `trials`, and notes on what it holds by a narrow margin.
+/// Failures of the drive in its `trials`, and notes on conditions that it holds by a narrow margin.
 pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Vec<String>) {
     let (mut limits, mut notes) = (Vec::new(), Vec::new());
     let pair = tuned.pair();

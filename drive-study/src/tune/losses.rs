@@ -1,5 +1,5 @@
-//! Losses of the inverter and temperature coefficients: values of the file for the plant, which the controller does not know, and
-//! the dead time, which it compensates.
+//! Losses of the inverter and temperature coefficients: values from the file for the plant alone, and the dead time, which the
+//! controller compensates.
 
 use super::motor::{Inverter, MotorFile, Number};
 use super::setting::{Setting, Value, given, real};

@@ -5,8 +5,8 @@
 //!   the estimators, [`adaptation`] for the resistance, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag
 //!   test, [`flux_map`] for a map from a table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
 //!   compares them with the variables of the models; [`Tuned::pair`] is the native drive with these values.
-//! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: what it will not
-//!   hold, and why. [`remedy`]: what helps.
+//! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: the conditions
+//! that it cannot hold, and why. [`remedy`]: what helps.
 
 pub mod adaptation;
 pub mod bandwidth;

@@ -147,7 +147,7 @@ pub struct Saturation {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FluxMap {
-    /// CSV file with the columns i_d,i_q,psi_d,psi_q and perhaps torque, beside the machine's file.
+    /// CSV file with the columns i_d,i_q,psi_d,psi_q and optionally torque, in the folder of the machine's file.
     pub file: Spanned<String>,
     /// Axes of the table: "pm" (the d-axis on the magnet) or "syr" (the magnet on the negative q-axis); "pm" if omitted.
     pub convention: Option<Spanned<String>>,

@@ -2,7 +2,8 @@
 //!
 //! - **Speed loop.** s^2 + w_s s + w_s^2 / t_is = 0; with t_is = 4, a double pole at w_s / 2.
 //! - **Observer.** Rasmussen's flux poles at the electrical speed w: s^2 + c_1 s + w^2 = 0, so 2 / c_1 above w = c_1 / 2 and about
-//!   c_1 / w^2 below, where the back EMF says little; its speed adaptation: a double pole at w_n. The tracker of the extended
+//!   c_1 / w^2 below, where the back EMF carries little information; its speed adaptation: a double pole at w_n. The tracker of
+//! the extended
 //!   EMF: a double pole at rho.
 //! - **Mechanics.** J w / T, the time in which the rated torque brings the rotor to its speed. A load tau_L moves the rotor of
 //!   a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque that the load leaves makes up
@@ -75,12 +76,12 @@ pub struct Begin {
     pub rest: f64,
     /// Maximum for which the controller itself then keeps the rotor at rest, and measures the resistance.
     pub measures: f64,
-    /// Until the estimator has the rotor after that, and a ramp has come to the speed.
+    /// Until the estimator has found the rotor after that, and a ramp has reached the speed.
     pub ready: f64,
 }
 
 impl Begin {
-    /// The start of a drive that goes to `level` (pu).
+    /// The start of a drive that runs up to `level` (pu).
     pub fn of(tuned: &Tuned, pair: &Pair, level: f64) -> Self {
         let par = &pair.controller.model.parameters;
         let ramp = if par.speed_loop.ramp > 0.0 { level * tuned.speed / par.speed_loop.ramp } else { 0.0 };

@@ -9,7 +9,7 @@
 use super::motor::{Data, MotorFile, Number};
 use anyhow::{Result, bail};
 
-/// A value, what it is judged by, and other units in which it may have been written, with their size in the expected unit.
+/// A value, its plausible range, and other units in which it may have been written, with their size in the expected unit.
 struct Check<'a> {
     name: &'static str,
     value: &'a Number,

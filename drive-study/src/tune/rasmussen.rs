@@ -11,8 +11,8 @@
 //! - closer to R where (R - R^) i with the rated torque would exceed 0.15 of the EMF at 0.1 pu: the estimate turns away by c_1
 //!   (R - R^) i / (w^2 psi_M), less torque remains, the current rises, and the estimate turns further;
 //! - farther from R where the drift would be less than 0.025 w_0: from the opposite angle, the speed loop brings i_q to its limit
-//!   before the rotor has come round. Near atan(i_q / i_0) beside the rotor the currents give no torque, and only the drift
-//!   leads away from there.
+//!   before the rotor has come round. At an angle near atan(i_q / i_0) from the rotor, the currents produce no torque, and only
+//! the drift leads away from there.
 //!
 //! The shares 0.15 and 0.025 are found by trial on machines from 5 W to 300 kW.
 
@@ -25,10 +25,11 @@ use drive::control::tables::ControllerParameters;
 /// Maximum share of the EMF at 0.1 pu for (R - R^) i at the rated torque.
 const LOST_EMF: f64 = 0.15;
 
-/// Minimum drift of the estimate at rest as a share of the rotor's swing, and the maximum share of R that the rules give up for it.
+/// Minimum drift of the estimate at rest as a share of the rotor's swing, and the maximum share of R that the rules sacrifice for
+/// it.
 const LEAST_DRIFT: (f64, f64) = (0.025, 0.5);
 
-/// Minimum share by which R^ can be kept below R: less than this is below the uncertainty of R.
+/// Minimum share by which R^ can be kept below R: a smaller share is within the uncertainty of R.
 pub const LEAST_MARGIN: f64 = 0.02;
 
 /// Share of R by which R^ should be below R.

@@ -11,7 +11,7 @@ use toml::Spanned;
 /// Number of start angles of the first try, which sorts out most remedies that do not help.
 const FEW: u32 = 4;
 
-/// What a drive does not hold.
+/// A condition that a drive does not hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// The start from any angle.
@@ -102,8 +102,8 @@ impl Cure {
     }
 }
 
-/// The remedies that help where `trial` showed that the drive does not start or does not hold: the shortest rise, the least change
-/// of each kind. With them, the drive still holds everything that it held in `trials`.
+/// The remedies if `trial` showed that the drive does not start or does not hold: the shortest rise, the smallest change of each
+/// kind. With them, the drive still holds everything that it held in `trials`.
 pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, what: What) -> Vec<Cure> {
     let speed = tuned.real("speed_loop.bandwidth").unwrap_or_default();
     let observer = tuned.real("rasmussen.w_n").or_else(|| tuned.real("tracker.bandwidth")).unwrap_or_default();
@@ -136,7 +136,7 @@ pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, 
     cures
 }
 
-/// A lower bandwidth of the speed loop with which a drive that swings without a load no longer does, and holds what it held.
+/// A lower bandwidth of the speed loop that ends the swings of a drive without a load, with no loss of what it held before.
 pub fn calm(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> Option<Cure> {
     let (speed, observer) = (tuned.real("speed_loop.bandwidth")?, tuned.real("rasmussen.w_n"));
     let observer = observer.or_else(|| tuned.real("tracker.bandwidth"))?;

@@ -1,5 +1,5 @@
-//! The saturation of a machine's file over the currents in use: the least incremental inductance, and whether the polynomial
-//! still is a machine there.
+//! The saturation of a machine's file over the currents in use: the minimum incremental inductance, and whether the polynomial is
+//! still physical there.
 //!
 //! The current is a polynomial of the flux linkage. It belongs to a machine as long as its derivative, the inverse of the
 //! incremental inductances, is positive definite; beyond, more flux takes less current, and the plant runs away.
@@ -57,7 +57,7 @@ pub fn least_inductance(data: &Data, fitted: Option<&Fitted>, i: f64) -> f64 {
     (0..DIRECTIONS).map(|k| at(f64::from(k) * TAU / f64::from(DIRECTIONS))).fold(f64::INFINITY, f64::min)
 }
 
-/// Checks that the saturation is that of a machine up to the greatest current.
+/// Checks that the saturation is physical up to the maximum current.
 ///
 /// # Errors
 /// The coefficients, the current at which they fail, and the remedy.

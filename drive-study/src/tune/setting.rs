@@ -1,4 +1,4 @@
-//! The values of both FMUs, each with its rule, and what a trial needs to know of the machine.
+//! The values of both FMUs, each with its rule, and the machine data for a trial.
 
 use super::motor::Number;
 

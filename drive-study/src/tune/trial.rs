@@ -6,8 +6,9 @@
 //! pu of the reference and the angle error below 25 deg, and they move by less than 0.002 pu and 1 deg. A speed that still moves by
 //! 0.02 pu at the end is not held.
 //!
-//! [`swings`] goes without a load over speeds between the levels, up and down again: a swing that one side begins, the other keeps.
-//! [`at_temperature`] is the drive with a colder or hotter machine than its values say.
+//! [`swings`] runs without a load through speeds between the levels, up and down again, because a swing that begins on the way up
+//! may persist on the way down.
+//! [`at_temperature`] runs the drive with a colder or hotter machine than its values assume.
 
 use super::pace::{Begin, Pace};
 use super::setting::{LEVELS, Setting, Tuned, Value, real};
@@ -95,8 +96,8 @@ impl Trial {
     }
 }
 
-/// The result of a run: whether the drive started, whether it held the load, least speed in pu and greatest angle error in deg
-/// after the load, and the greatest torque in N.m.
+/// The result of a run: whether the drive started, whether it held the load, minimum speed in pu and maximum angle error in deg
+/// after the load, and the maximum torque in N.m.
 #[derive(Clone, Copy)]
 struct Run {
     started: bool,
@@ -109,9 +110,9 @@ struct Run {
 /// Speed and angle error in a part of the window.
 #[derive(Clone, Copy)]
 struct Part {
-    /// Distance of the speed from the reference in pu, greatest magnitude.
+    /// Maximum distance of the speed from the reference in pu.
     off: f64,
-    /// Angle error in deg, greatest magnitude.
+    /// Maximum magnitude of the angle error in deg.
     ahead: f64,
     /// Minimum and maximum speed in pu.
     speed: (f64, f64),
@@ -178,7 +179,7 @@ impl Bench<'_> {
         Some((self.pair.plant.out.speed / self.tuned.speed, ahead.to_degrees()))
     }
 
-    /// Starts to `level`: whether it comes to stand there.
+    /// Starts up to `level`; returns whether the speed settles there.
     fn starts(&mut self, level: f64) -> bool {
         let Begin { rest, ready, .. } = Begin::of(self.tuned, &self.pair, level);
         while self.now() < rest || self.pair.controller.model.measures_resistance() {
@@ -303,7 +304,8 @@ impl Bench<'_> {
     }
 }
 
-/// The swings of a drive that starts at 0.1 pu and goes without a load to 1 pu and back, by ramps and in steps of 0.1 pu. A drive that
+/// The swings of a drive that starts at 0.1 pu and runs without a load to 1 pu and back, by ramps and in steps of 0.1 pu. A drive
+/// that
 /// is lost on the way has those so far.
 pub fn swings(tuned: &Tuned) -> Vec<Swing> {
     let (mut all, mut pair) = (Vec::new(), tuned.pair());
@@ -339,7 +341,7 @@ pub fn swings(tuned: &Tuned) -> Vec<Swing> {
 /// Temperatures in degC of winding and magnet at which a drive with the values of 20 degC is tried.
 pub const TEMPERATURES: [f64; 2] = [-30.0, 130.0];
 
-/// Temperature coefficients in 1/K of copper and NdFeB: those of a machine whose file has none.
+/// Temperature coefficients in 1/K of copper and NdFeB, for a machine whose file specifies none.
 const ALPHA: [(&str, f64); 2] = [("winding.alpha", 3.93e-3), ("magnet.alpha", -1.1e-3)];
 
 /// The drive whose machine has `celsius` degC since before the start, with at most the torque that the rated current gives there.

@@ -18,7 +18,7 @@ const TOP_SHARE: f64 = 0.8;
 pub struct Voltage {
     /// The setting of field weakening, where it is needed.
     pub settings: Vec<Setting>,
-    /// Load in N.m at the highest speed: that of the rated power, at most 0.8 of the greatest torque, less friction.
+    /// Load in N.m at the highest speed: that of the rated power, at most 0.8 of the maximum torque, less friction.
     pub top_torque: f64,
 }
 

@@ -1,4 +1,4 @@
-//! A page of the documentation shows what a run gives.
+//! Checks that a page of the documentation shows the result of a run.
 #![allow(dead_code)]
 
 /// The file at `path` with the text `page` contains `text`; otherwise the message has both texts and says what to do.
@@ -6,7 +6,7 @@ pub(crate) fn shows(path: &str, page: &str, text: &str) {
     assert!(page.contains(text), "{}", differs(path, page, text));
 }
 
-/// Why a test fails whose page does not contain `text`.
+/// The message of a test if the page does not contain `text`.
 pub(crate) fn differs(path: &str, page: &str, text: &str) -> String {
     // The line that begins like the text, or with the greatest part of it.
     let common = |line: &str| line.chars().zip(text.chars()).take_while(|(a, b)| a == b).count();

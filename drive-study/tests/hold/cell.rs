@@ -1,4 +1,4 @@
-//! A cell of the table: what is wrong with the drive, what it is asked for, and what a run of it shows.
+//! A cell of the table: the error of the drive, its task, and the results of a run.
 
 use drive::Pair;
 use drive::math::wrap;
@@ -22,7 +22,7 @@ const TORQUES: [f64; 2] = [0.2, 0.7];
 const ALPHA: (f64, f64) = (3.93e-3, -1.1e-3);
 /// Time in s at the end that is judged.
 const LAST: f64 = 2.0;
-/// Parts in s of which the mean over 1 s and the swing over the last time consist.
+/// Lengths in s of the parts that form the mean over 1 s and the swing at the end.
 const PART: f64 = 0.1;
 
 /// One run.
@@ -68,7 +68,7 @@ impl fmt::Display for Cell {
     }
 }
 
-/// What the last seconds show.
+/// Results of the last seconds.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct End {
     /// Mean speed of the rotor and of the estimate in pu.
@@ -81,7 +81,7 @@ pub(crate) struct End {
     pub(crate) error: f64,
 }
 
-/// What a sensor shows in the same task.
+/// Results with a sensor in the same task.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Goal {
     end: End,
@@ -106,11 +106,11 @@ pub(crate) enum Loss {
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "answers")]
 pub(crate) struct Outcome {
-    /// Whether the drive does what the sensor does.
+    /// Whether the drive behaves as with a sensor.
     pub(crate) held: bool,
     /// How and when (s) the rotor was lost.
     pub(crate) lost: Option<(Loss, f64)>,
-    /// Whether an output says that the drive is lost, or why it is off.
+    /// Whether an output reports that the drive is lost, or why it is off.
     pub(crate) said: bool,
     /// Whether `lock_lost` reached 1 later than 1 s after the start.
     pub(crate) alarm: bool,
@@ -238,8 +238,8 @@ fn times(tuned: &Tuned, pair: &Pair, cell: &Cell) -> [f64; 4] {
     [turn, ready, load, load + settles(cell.load) + LAST]
 }
 
-/// The run of a drive: the end, the loss, greatest `lock_lost` at a loss and in the last seconds, whether a limit acts there or a warning names a
-/// torque that moves nothing, and whether `lock_lost` reached 1 later than 1 s after the start.
+/// The run of a drive: its end, the loss, the maximum of `lock_lost` at a loss and in the last seconds, whether a limit is active
+/// there or a warning names a torque without motion, and whether `lock_lost` reached 1 later than 1 s after the start.
 fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>, f64, bool, bool) {
     let mut pair = prepared(tuned, cell, sensor);
     let mut end = End::default();
@@ -317,7 +317,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
     (end, lost, lock_lost, warned || limited > 0.5 * judged, alarm)
 }
 
-/// Whether the drive of an `end` stands at the task; in torque mode at the `goal` of the sensor.
+/// Whether the drive has fulfilled the task at the `end`; in torque mode, whether it has reached the `goal` of the sensor.
 fn stands(cell: &Cell, end: &End, goal: &End) -> bool {
     let calm = end.swing.0 <= 0.1 && end.swing.1 <= 0.1 && end.error <= 60.0;
     if cell.torque_mode {

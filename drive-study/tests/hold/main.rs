@@ -1,5 +1,6 @@
-//! What a tuned drive holds, from outside: every machine of `motors/` with wrong resistances and at wrong temperatures, in speed
-//! and torque mode, at 0.1 to 1 pu, beside the same drive on a sensor.
+//! Conditions that a tuned drive holds, seen from the plant: every machine of `motors/` with wrong resistances and at wrong
+//! temperatures, in speed
+//! and torque mode, at 0.1 to 1 pu, compared with the same drive on a sensor.
 //!
 //! ```sh
 //! cargo test --release -p drive-study --test hold -- --ignored --nocapture                 # all machines, a table a machine
@@ -154,7 +155,7 @@ fn run(tuned: &Tuned, cells: &[Cell]) -> Vec<(Cell, Outcome)> {
     cells.iter().copied().zip(outcomes).collect()
 }
 
-/// What the notes of `fmu tune` name.
+/// Conditions named by the notes of `fmu tune`.
 struct Named {
     /// Speeds in pu at which the drive will not hold a start or a load.
     levels: Vec<f64>,

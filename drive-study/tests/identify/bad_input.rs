@@ -1,4 +1,4 @@
-//! Wrong files, units, signs and phases, and what the command says of them.
+//! Wrong files, units, signs and phases, and the messages of the command.
 
 use crate::bench::{Bench, IDEAL, REAL, Row, T_S, file};
 use crate::{given, of, refused, value};
@@ -36,7 +36,7 @@ fn wrong_columns_are_named() {
     }
 }
 
-/// More current: resistance and inductances shrink by as much, the magnet's flux stays.
+/// More current: resistance and inductances shrink in proportion, the magnet flux stays.
 #[test]
 fn values_scale_with_the_sensors() {
     let rows = REAL.run();

@@ -159,7 +159,7 @@ impl Machine {
         x
     }
 
-    /// What the sensors show of a current vector: the phases.
+    /// The sensor readings of a current vector: the phases.
     fn measured(&self, i: Complex, dice: &mut Dice) -> [f64; 3] {
         let step = 2.0 * self.range / 4096.0;
         let i = phases(i);
@@ -198,8 +198,8 @@ pub(crate) const PLAIN: [Part; 8] = [
     (0.45, -0.15, 0.1),
 ];
 
-/// What docs/identify.md asks for: speeds of both signs, and currents of all sizes at a low speed, which tell the resistance from
-/// the inverter's loss.
+/// The record that docs/identify.md requires: speeds of both signs, and currents of all sizes at a low speed, which separate the
+/// resistance from the inverter's loss.
 pub(crate) const THOROUGH: [Part; 16] = [
     (0.1, 0.85, 0.0),
     (0.1, 0.7, 0.0),
@@ -219,7 +219,7 @@ pub(crate) const THOROUGH: [Part; 16] = [
     (0.45, -0.15, 0.1),
 ];
 
-/// What a run shows: columns with their names, every so many samples.
+/// The record of a run: columns with their names, every so many samples.
 pub(crate) fn record(
     m: &Machine,
     seed: u64,

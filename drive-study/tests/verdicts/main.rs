@@ -1,4 +1,4 @@
-//! What `fmu tune` says of a drive against what a long run of `PmsmDrive` shows: every start, every load, every note.
+//! Compares the verdicts of `fmu tune` with long runs of `PmsmDrive`: every start, every load, every note.
 //!
 //! The run takes 20 times the slowest time constant of mechanics, observer and speed loop after the reference and again after
 //! the load, and is judged by its last two.
@@ -205,7 +205,7 @@ fn a_verdict_waits_for_the_slowest_time_constant() {
     }
 }
 
-/// A motor of 150 W at 22,700 rpm, whose rated torque takes twice its speed at 0.1 pu.
+/// A motor of 150 W at 22,700 rpm; a step of rated torque at 0.1 pu changes its speed by twice that value.
 const LIGHT: &str = include_str!("machines/light-24v.toml");
 
 #[test]
@@ -235,7 +235,7 @@ fn a_swing_between_the_levels_is_found_from_both_sides() {
     assert!(trial::swings(&fixed.with("speed_loop.bandwidth", Value::Real(40.0))).is_empty());
 }
 
-/// What is lost is announced, and every remedy helps. With the adaptation, this machine holds its load.
+/// Every failure is announced, and every remedy helps. With the adaptation, this machine holds its load.
 #[test]
 fn a_light_machine_is_told_what_helps() {
     let motor = read(LIGHT);

@@ -1,4 +1,4 @@
-//! Connections between plant and controller: what the sensors measure, and the terminals that exist on both.
+//! Connections between plant and controller: the measured quantities, and the terminals that exist on both.
 //!
 //! `phases` and `sensor` exist on the plant and, mirrored, on the controller; members with the same name connect. The
 //! inverter is inside the plant, so the phases carry references and measured values: signals, which a connection makes equal.
@@ -7,7 +7,7 @@ use crate::frame::Phases;
 use fmu_core::{Icon, Member};
 use serde::{Deserialize, Serialize};
 
-/// What the sensors of a controller measure.
+/// Quantities measured by the sensors of a controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// Stator currents in A.

@@ -1,6 +1,6 @@
 //! Joins the fragments of HTML and SVG that make the page of a model, at compile time.
 //!
-//! Each page is complete: that of a whole contains the fragments of its parts, which are stored in the crates of the parts.
+//! Each page is complete: the page of a composite model contains the fragments of its parts, which are stored in their crates.
 
 /// Joins texts at compile time.
 ///

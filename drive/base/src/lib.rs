@@ -1,4 +1,4 @@
-//! What the plant and the controller of a drive share: frames and space vectors, elementary functions, the data of a machine,
+//! Code shared by the plant and the controller of a drive: frames and space vectors, elementary functions, the data of a machine,
 //! the average inverter, and the connections between the two.
 //!
 //! Conventions throughout the drive: SI units; motor sign (currents flow into the machine, torque is positive with positive

@@ -11,8 +11,8 @@
 //! i_d follows the references through a low-pass: with maximum torque per ampere i_d depends on the torque, and the limits
 //! would otherwise alternate between two samples. The controller does not know the losses of iron and inverter.
 //!
-//! At standstill i_0 of the low-speed law takes 1.5 R i_0^2 without a torque. It is lowered to the current that takes half of
-//! the limit, which leaves i_q the other half, so that the drive starts:
+//! At standstill, i_0 of the low-speed law consumes 1.5 R i_0^2 without producing torque. It is lowered to the current that uses
+//! half of the limit; the other half remains for i_q, so that the drive can start:
 //!
 //! ```text
 //! i_0 <= sqrt(i_dc_max u_dc / (3 R))

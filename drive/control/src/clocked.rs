@@ -1,7 +1,7 @@
-//! The model `SensorlessControllerClocked`: [`SensorlessController`] as the periodic task that it is, on a clock of FMI 3.0. The
-//! importer ticks it, so the sample period is the interval of the clock.
+//! The model `SensorlessControllerClocked`: [`SensorlessController`] as a periodic task on a clock of FMI 3.0. The importer ticks
+//! the clock, and its interval is the sample period.
 //!
-//! At an instant t_k the importer activates the clock `sample`, reads the command of the sample before, sets the currents, and
+//! At an instant t_k the importer activates the clock `sample`, reads the command of the previous sample, sets the currents, and
 //! lets the clock tick: the delay of one sample of `SensorlessController`, in any importer.
 
 use crate::model::{ROWS, SensorlessController};

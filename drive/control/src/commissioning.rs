@@ -1,5 +1,5 @@
-//! Self-commissioning in the controller: its parameters, its variables, and when it runs. [`commission`](crate::commission) has
-//! the sequence.
+//! Self-commissioning in the controller: its parameters, its variables, and when it runs. The sequence is in
+//! [`commission`](crate::commission).
 //!
 //! ```text
 //! commission_start rises, enabled      gates off for 20 ms, then a new sequence; the controller does nothing else
@@ -8,7 +8,7 @@
 //! enable false, asc, a trip            the sequence is aborted
 //! ```
 //!
-//! With `commission.mode` Off nothing of this exists: the sequence is on the heap, and made when the simulation starts.
+//! With `commission.mode` Off none of this exists: the sequence is allocated on the heap when the simulation starts.
 
 pub use crate::commission::CommissionMode;
 use crate::commission::{Commission, CommissionFault, CommissionSetup, CommissionState, Results, Voltage};
@@ -59,7 +59,7 @@ pub const COMMISSION: &Table<CommissionParameters> = table![
     P::parameter("t_max", &SECOND, "Longest time of the self-commissioning", |p| &mut p.t_max).above(0.0),
 ];
 
-/// What the controller is to do at a sample.
+/// Task of the controller at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Turn {
     /// It works.
@@ -123,7 +123,7 @@ impl Commissioning {
         true
     }
 
-    /// What it does, and why it has stopped.
+    /// Its current stage, and the reason why it stopped.
     pub(crate) fn status(&self) -> (CommissionState, CommissionFault) {
         self.sequence.as_ref().map_or_else(Default::default, |sequence| (sequence.state(), sequence.fault()))
     }

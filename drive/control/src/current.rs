@@ -233,7 +233,7 @@ mod tests {
     }
 
     /// On the currents of its references, the command is the voltage of the turning machine, u = R i + j w psi, once the
-    /// integrators hold what the decoupling leaves.
+    /// integrators have taken over the remainder of the decoupling.
     #[test]
     fn the_command_is_the_voltage_of_the_turning_machine() {
         let motor = Motor::IPMSM_2_2_KW;
@@ -254,7 +254,7 @@ mod tests {
         }
     }
 
-    /// An error adds K_p of its axis to the command beside everything else in it, and `output` shows the same.
+    /// An error adds K_p of its axis to the command, and `output` shows the same.
     #[test]
     fn an_error_acts_with_the_proportional_gain_of_its_axis() {
         let motor = Motor::IPMSM_2_2_KW;

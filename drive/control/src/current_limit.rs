@@ -16,16 +16,17 @@
 //! ```
 //!
 //! w is w^, or |e| / psi_M where w^ is not within 0.7 and 1.3 of it: the EMF shows the speed of a rotor that the estimate has lost. Where
-//! L i exceeds 1.5 psi_M, an error of L^ would hide that, and w is always w^. In steady state the
+//! L i exceeds 1.5 psi_M, an error of L^ would hide the speed, so w is always w^. In steady state the
 //! prediction is exact with any L^, R^ and psi_M^, because all of it turns at w^, so a current at its limit is left alone.
 //!
-//! The commands that wait and the new one give the current at the end of the interval in which the new one acts. Beyond the
-//! limit, the voltage changes by what brings the current back to it along its own direction, L di / T_s, as far as the hexagon
-//! allows; the integrators follow as they follow the hexagon. Nothing is changed otherwise.
+//! The pending commands and the new one determine the current at the end of the interval in which the new one acts. Beyond the
+//! limit, the voltage changes by L di / T_s, which brings the current back to the limit along its own direction, as far as the
+//! hexagon allows; the integrators are corrected as at the hexagon. Otherwise nothing changes.
 //!
 //! Limits: L^ and R^ are estimates, and the EMF of the next interval is that of the last one, turned: an error of 20 % in L^
-//! leaves 20 % of what is to be removed in a sample. A sample that injects is not corrected: its carrier is larger than what
-//! the limit would remove. With a communication step above T_s, several samples see the same currents, which show no EMF: only a sample
+//! leaves 20 % of the excess in a sample. A sample that injects is not corrected: its carrier is larger than the excess that the
+//! limit would remove. With a communication step above T_s, several samples see the same currents, which show no EMF: only a
+//! sample
 //! whose currents are new, after one whose currents were new, is corrected. Derived here. u and e in V, i in A, psi in Wb, L in H, w in rad/s (electrical).
 
 use crate::estimator::Sample;
@@ -163,7 +164,7 @@ mod tests {
         (end(commands), end(&corrected))
     }
 
-    /// A sample with 6 A, after the voltage that has brought it there from 5 A.
+    /// A sample with 6 A, after the voltage that has raised the current from 5 A.
     fn sample() -> Sample {
         let (i, i_last) = (AlphaBeta::new(6.0, 0.0), AlphaBeta::new(4.9, -1.0));
         let u = ((i - i_last) * machine().L_d + magnet(0.0) - magnet(-1.0)) * (1.0 / T_S);
@@ -195,7 +196,7 @@ mod tests {
         }
     }
 
-    /// An estimate that stands beside a turning rotor: the EMF shows the speed within 30 %.
+    /// An estimate at standstill while the rotor turns: the EMF shows the speed within 30 %.
     #[test]
     fn a_lost_estimate_does_not_hide_the_speed() {
         let commands = [AlphaBeta::new(40.0, 110.0), AlphaBeta::new(200.0, 100.0)];

@@ -297,7 +297,7 @@ impl SensorlessController {
         }
     }
 
-    /// Stores what the next sample needs: the references and the current `i` (A) of this sample.
+    /// Stores the values for the next sample: the references and the current `i` (A) of this sample.
     #[inline(always)]
     fn keep(&mut self, sample: &Sample, i_ref: DqHat, i: DqHat) {
         let Self { parameters: par, gains, state, .. } = self;
@@ -452,7 +452,7 @@ mod tests {
         assert!(limited && share < 2.5 && (later - share).abs() < 1e-3, "{share} and later {later} of u_dc / sqrt 3");
     }
 
-    /// What the dead time takes from the legs is added, in the direction of the current that is asked for.
+    /// The voltage lost to the dead time is added, in the direction of the current reference.
     #[test]
     fn the_compensation_adds_the_loss_of_the_legs() {
         let (mut controller, frame) = turning(0.0, |c| c.parameters.compensation.u_dead = 6.5);
@@ -507,7 +507,7 @@ mod tests {
         }
     }
 
-    /// The next sample reads what the PI gave, and the torque of the references.
+    /// The next sample reads the output of the PI, and the torque of the references.
     #[test]
     fn the_next_sample_reads_references_and_output() {
         let (mut controller, frame) = turning(0.0, |_| ());
@@ -522,7 +522,7 @@ mod tests {
         assert_eq!(frame.theta.to_bits(), 0.7_f64.to_bits());
     }
 
-    /// The angle that is shown is that of the next sample, and the least torque is below 0.
+    /// The angle output is that of the next sample, and the minimum torque is below 0.
     #[test]
     fn the_outputs_are_for_the_next_sample() {
         let (mut controller, _) = turning(0.0, |c| c.parameters.estimator = crate::estimator::Kind::Sensored);

@@ -1,4 +1,4 @@
-//! The documentation page of the controller, and its fragments, which the page of a whole drive contains too.
+//! The documentation page of the controller, and its fragments, which the page of the drive also contains.
 //!
 //! `fmu reproduce` draws the reference plots, and the numbers and the other plots come from runs; tests check both.
 

@@ -1,4 +1,4 @@
-//! The most torque under a current and a voltage limit, and the currents for less: the algebra of field weakening.
+//! The maximum torque under a current and a voltage limit, and the currents for a smaller torque: the algebra of field weakening.
 //!
 //! In steady state, with R exact, |u|^2 = R^2 |i|^2 + w^2 |psi|^2 + 2 R w t, t = tau / (1.5 n_p) = l i_q, l = psi_M - dL i_d,
 //! dL = L_q - L_d. Largest torque of one sign s (motoring +1, generating -1; w > 0) under |u| <= U and |i| <= I:
@@ -14,7 +14,7 @@
 //! ampere, so that the root on the other side of the MTPA end is never the limit. Without R, MTPV needs psi_M < L_d I; with R
 //! it does not: a machine whose R i is above w L i has it at any speed at which R I + w psi_M > U.
 //!
-//! For a torque below the limit, the least current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
+//! For a torque below the limit, the minimum current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
 //! = t / l. The cross term is constant and f is convex, so Newton's method from the right does not overshoot, and from
 //! the inside it lands right of the root.
 //!
@@ -45,7 +45,7 @@ pub struct Envelope {
 const MOST: u32 = 60;
 const SMALL: f64 = 1e-8;
 
-/// Halvings that find the least voltage on the circle.
+/// Bisections that find the minimum voltage on the circle.
 const HALVINGS: u32 = 30;
 
 /// The limit of one sign: its currents (A) and the magnitude of its torque (N.m).
@@ -98,7 +98,7 @@ impl Envelope {
         DqHat::new(-r * (1.0 - x * x), s * 2.0 * r * x)
     }
 
-    /// The base speed (electrical, rad/s) under the voltage `U` (V): up to it, the machine gives its greatest torque.
+    /// The base speed (electrical, rad/s) under the voltage `U` (V): up to it, the machine delivers its maximum torque.
     pub fn base_speed(&self, U: f64) -> f64 {
         let i = self.on_circle(self.x_mtpa, 1.0);
         let (psi_d, psi_q) = (self.psi_M + self.L_d * i.d(), self.L_q * i.q());
@@ -151,14 +151,14 @@ impl Envelope {
         Limit { i: DqHat::new(self.least_i_d(w), 0.0), tau: 0.0 }
     }
 
-    /// i_d (A) of the least voltage without torque, within I.
+    /// i_d (A) of the minimum voltage without torque, within I.
     #[inline]
     pub fn least_i_d(&self, w: f64) -> f64 {
         let x = w * w * self.L_d;
         -self.I.min(x * self.psi_M / (self.R * self.R + x * self.L_d))
     }
 
-    /// The place x on the circle with the least voltage, up to maximum torque per ampere.
+    /// The position x on the circle with the minimum voltage, up to maximum torque per ampere.
     #[cold]
     fn least_voltage(&self, w: f64, s: f64) -> f64 {
         let (mut left, mut right) = (0.0, self.x_mtpa);
@@ -204,7 +204,7 @@ impl Envelope {
         ]
     }
 
-    /// Currents (A) of the most torque per volt; `warm` is the direction of u, from the last sample on.
+    /// Currents (A) of maximum torque per volt; `warm` is the direction of u, kept from the last sample.
     fn max_torque_per_volt<const TO_THE_END: bool>(&self, w: f64, s: f64, U: f64, warm: &mut [f64; 2]) -> DqHat {
         let &Self { R, L_d, L_q, dL, psi_M, .. } = self;
         let inverse = 1.0 / (R * R + w * w * L_d * L_q);
@@ -252,7 +252,7 @@ impl Envelope {
         [-s * (f * f - psi_d * psi_d).max(0.0).sqrt() / f, psi_d / f]
     }
 
-    /// i_d (A) of the least current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by at most `steps`
+    /// i_d (A) of the minimum current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by at most `steps`
     /// of Newton's method from `i_d`; none where the slope is not positive.
     #[inline]
     pub fn i_d(&self, tau: f64, w: f64, U: f64, mut i_d: f64, steps: u32) -> Option<f64> {

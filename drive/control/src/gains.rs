@@ -103,7 +103,7 @@ impl Gains {
 }
 
 impl Law {
-    /// The law without its current; the limit stays that of a torque that is asked for.
+    /// The law without its current; the limit stays that of a nonzero torque reference.
     pub(crate) fn released(self) -> Self {
         Self { i_d: 0.0, ..self }
     }

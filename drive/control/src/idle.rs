@@ -1,7 +1,7 @@
 //! When the controller's parameters and inputs act: a value that is set without effect is reported by name.
 //!
-//! Every parameter and every input is here once; `no_variable_is_forgotten` looks. Options that an estimator does not have are refused
-//! ([`options`](crate::estimator)), and count as acting.
+//! Every parameter and every input is here once; `no_variable_is_forgotten` looks. Options that an estimator does not support are
+//! refused ([`options`](crate::estimator)), and count as acting.
 
 use crate::commissioning::CommissionMode;
 use crate::estimator::{Class, Kind};

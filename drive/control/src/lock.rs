@@ -13,17 +13,17 @@
 //! min over dR of sqrt(mean |epsilon - dR i|^2) / (lock.u + 2 sin(lock.angle / 2) psi_M mean |w^|),  |dR| <= 0.3 R^
 //! ```
 //!
-//! dR is the part that a resistance explains which stays wrong in the same way. The smoothing, 50 Hz or 4 lock.u / psi_M,
-//! takes away no slip that matters: beyond it, the EMF of a rotor that turns with the slip still passes with
-//! 4 lock.u. A frame that turns by more than pi / 2 in a sample follows no rotor: the quotient is 10.
+//! dR represents the part that a constant error of the resistance explains. The smoothing, 50 Hz or 4 lock.u / psi_M,
+//! hides no relevant slip: above that frequency, the EMF of a rotor that turns with the slip still reaches 4 lock.u. A frame that
+//! turns by more than pi / 2 in a sample follows no rotor: the quotient is 10.
 //!
-//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There the speed shows it:
+//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There, the speed is used instead:
 //!
 //! # Speed
 //! A rotor that turns with the estimated frame but not at the reference is lost: the estimate itself shows it. The
 //! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of it, whichever is
-//! nearer. The model lags by (1 - b) t_is / w_s, what the set-point weight leaves to the integral part, and changes no faster than
-//! half of the torque that the limits leave can:
+//! nearer. The model lags by (1 - b) t_is / w_s, the share that the set-point weight leaves to the integral part, and changes no
+//! faster than with half of the available torque:
 //!
 //! ```text
 //! S = (1 / S_0) int |x| dt     while |x| > w_0 + 5 % of the reference + f; otherwise S decays with 8 lock.time
@@ -33,7 +33,7 @@
 //! f is the distance of w^ from the frame's speed, at most 20 % of the reference: an estimator that takes the speed from the EMF is
 //! off by the error of psi_M, and the speed loop with it.
 //!
-//! n_p i_max / K_i is the error integral for which the speed loop goes from no torque to its limit. No load that the
+//! n_p i_max / K_i is the error integral that takes the speed loop from zero torque to its limit. No load that the
 //! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. S is at most 2,
 //! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5; then a speed that is not reached is
 //! that of a drive at its limit.
@@ -44,9 +44,9 @@
 //! half-wave as far as the one before reached, which had the other sign; W decays with 20 lock.time and is at most 2. A load step and
 //! its overshoot are one half-wave and a small one.
 //!
-//! There is no x in torque mode: a rotor may swing with its load there, and the voltage shows an estimate that does not follow.
+//! There is no x in torque mode, where a rotor may swing with its load; the voltage detects an estimate that does not follow.
 //!
-//! The greatest of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
+//! The maximum of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
 //! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
 //!
 //! `lock.u` covers the errors that remain with a good estimate: what (R - R^) i leaves, and for the dead time 4/3 of a
@@ -108,14 +108,14 @@ impl Default for LockParameters {
     }
 }
 
-/// What the speed loop can do.
+/// Limits of the speed loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reach {
-    /// Integral of the electrical speed error in rad for which it goes from no torque to its limit.
+    /// Integral of the electrical speed error in rad that takes it from zero torque to its limit.
     pub integral: f64,
     /// Electrical acceleration in rad/s2 that a torque of 1 N.m gives.
     pub acceleration: f64,
-    /// Time in s by which the speed lags behind a reference that moves, by the weight of the set point.
+    /// Lag of the speed behind a moving reference in s, due to the set-point weight.
     pub lag: f64,
 }
 
@@ -452,7 +452,7 @@ mod tests {
         }
     }
 
-    /// A frame that turns by a quarter and more in a sample would be divided away by its own speed.
+    /// A frame that turns by a quarter turn or more in a sample would otherwise vanish in the division by its speed.
     #[test]
     fn a_frame_that_runs_away_is_lost() {
         let level = beside(0.0, 300.0, 0.6 * PI / T_S);
@@ -490,8 +490,8 @@ mod tests {
         assert!(swung(&gains, step) < 0.4);
     }
 
-    /// The speed loop goes from no torque to i_q = 6 A over 6 A / K_i = 1.6875 rad; both count pole pairs. The set-point weight 0.5
-    /// leaves half of a change to the integral part, with 4 / (80 rad/s).
+    /// The speed loop rises from zero torque to i_q = 6 A over 6 A / K_i = 1.6875 rad; both count pole pairs. The set-point
+    /// weight 0.5 leaves half of a change to the integral part, with 4 / (80 rad/s).
     #[test]
     fn the_gains_know_the_reach_of_the_speed_loop() {
         let mut controller = crate::SensorlessController::default();

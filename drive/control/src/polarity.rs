@@ -3,7 +3,7 @@
 //! 1. The estimator injects for `t_find` and finds the magnet axis, but not its polarity; the current reference is
 //!    zero.
 //! 2. No voltage for 4 L/R: the injection currents decay.
-//! 3. +V along the estimated d-axis for `samples`, then -V for as many; the peak of i_d is stored; then no voltage for
+//! 3. +V along the estimated d-axis for `samples`, then -V for as many samples; the peak of i_d is stored; then no voltage for
 //!    4 L/R. This sequence follows with the opposite sign.
 //! 4. Along the magnet flux, the iron saturates and the current is larger, so the larger peak marks the north pole. The
 //!    estimate stays or turns by half a turn. Then speed and current control begin.
@@ -62,7 +62,7 @@ pub struct PolaritySearch {
     peaks: [f64; 2],
 }
 
-/// What the search requests at a sample.
+/// Requests of the search at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SearchStep {
     /// The estimator injects; the current reference is zero.

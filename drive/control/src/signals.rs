@@ -34,7 +34,7 @@ pub struct ControllerInputs {
 }
 
 impl ControllerInputs {
-    /// Takes what the sensors at the plant measure.
+    /// Adopts the measurements of the sensors at the plant.
     #[inline]
     pub fn measure(&mut self, plant: Measured) {
         (self.i, self.theta_meas, self.speed_meas) = (plant.i, plant.theta_e, plant.speed);

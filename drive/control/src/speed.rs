@@ -38,8 +38,8 @@ impl Default for SpeedLoop {
 }
 
 impl SpeedLoop {
-    /// Time in s by which the speed lags behind a reference that moves: the proportional part sees the share b of it, the integral
-    /// part gives the rest.
+    /// Lag of the speed behind a moving reference in s: the proportional part acts on the share b of it, the integral part
+    /// supplies the rest.
     pub fn lag(&self) -> f64 {
         (1.0 - self.b) * self.t_is / self.bandwidth
     }
@@ -83,7 +83,7 @@ impl SpeedGains {
         [self.k_p, self.k_i]
     }
 
-    /// Integral of the speed error in rad, mechanical, for which the integral part goes from 0 to `i` (A).
+    /// Integral of the mechanical speed error in rad that takes the integral part from 0 to `i` (A).
     pub fn error_integral(&self, i: f64) -> f64 {
         i / self.k_i
     }
@@ -230,7 +230,7 @@ mod tests {
         assert!((begins - 2.5).abs() < 1e-12, "{begins}");
     }
 
-    /// While a limit falls, the integral follows it: what is wanted comes to the limit at the given rate.
+    /// While a limit falls, the integral follows it: the unlimited output approaches the limit at the given rate.
     #[test]
     fn the_integral_follows_a_limit() {
         let mut c = SpeedController { integral: 5.0 };

@@ -1,7 +1,7 @@
-//! Torque mode: whether a torque that is asked for moves anything that the estimate can show.
+//! Torque mode: detects a requested torque without a motion that the estimate can show.
 //!
-//! A resistance that is off by dR hides a rotor whose back EMF is below |dR| i: the estimated frame stands or creeps beside it, the
-//! current acts on the wrong axis, and the torque is not that of the references (the heads of
+//! A resistance that is off by dR hides a rotor whose back EMF is below |dR| i: the estimated frame stands still or creeps while
+//! the rotor moves, the current acts on the wrong axis, and the torque is not that of the references (the heads of
 //! [`rasmussen`](crate::estimator::rasmussen) and [`flux_observer`](crate::estimator::flux_observer) have the threshold). The
 //! controller cannot tell such a rotor from a blocked one. It counts the time t in which
 //!
@@ -10,8 +10,8 @@
 //! ```
 //!
 //! or, where `emf.hold_reversal` leads a method with a back EMF through zero, |w^| < w_hold / 4, where little of its gain is left. It
-//! warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M). A rotor that
-//! takes the whole torque is faster than w_s by then.
+//! warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M). A rotor
+//! that receives the whole torque exceeds w_s within this time.
 //!
 //! Derived here. tau in N.m, w in rad/s (electrical), w_s in rad/s (mechanical).
 
@@ -38,11 +38,11 @@ const SAID: f64 = 0.5;
 pub(crate) struct Stands {
     /// Time in s.
     time: f64,
-    /// Magnitude of the torque asked for in N.m.
+    /// Magnitude of the torque reference in N.m.
     tau: f64,
     /// Mechanical speed in rad/s that the resistance may hide.
     hidden: f64,
-    /// Estimated mechanical speed in rad/s, smoothed: a rotor beside the frame swings.
+    /// Estimated mechanical speed in rad/s, smoothed, because a rotor out of step with the frame swings.
     speed: f64,
 }
 

@@ -94,7 +94,7 @@ pub struct CurrentFrequencyStart {
     e: DqHat,
 }
 
-/// What the start requests at a sample; angles in rad and speeds in rad/s, electrical.
+/// Requests of the start at a sample; angles in rad and speeds in rad/s, electrical.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StartStep {
     /// Control the current `i_ref` (A) in the frame at `theta`, which turns at `w`.
@@ -221,8 +221,8 @@ mod tests {
 
     const T_S: f64 = 1e-4;
 
-    /// Runs the start next to a rotor at `rotor(frame, t)` (rad, for the frame's angle and the time in s) that has the currents
-    /// asked for, until it hands over or `seconds` are over; returns the last step and the rotor's angle.
+    /// Runs the start next to a rotor at `rotor(frame, t)` (rad, for the frame's angle and the time in s) that carries the
+    /// requested currents, until it hands over or `seconds` have passed; returns the last step and the rotor's angle.
     fn beside(reference: f64, seconds: f64, rotor: impl Fn(f64, f64) -> f64) -> (StartStep, f64) {
         let (motor, par, estimators) = (Motor::default(), StartParameters::default(), EstimatorParameters::default());
         let context = Context { par: &estimators, motor: &motor, J: 1.5e-3, T_s: T_S };

@@ -130,7 +130,7 @@ pub(super) struct State {
     pub(super) battery: Battery,
     /// Time in s for which a limit has reduced the references, while field weakening or limits of the DC link are in use.
     pub(super) limited_for: f64,
-    /// Time in s for which a torque has been asked for and the estimate has shown no speed; [`Stands`](crate::stands).
+    /// Time in s for which a torque has been requested and the estimate has shown no speed; [`Stands`](crate::stands).
     pub(super) stands: Stands,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
@@ -368,7 +368,7 @@ mod tests {
         assert!((i.q() - 2.0).abs() < 1e-9, "the torque stays: {i:?}");
     }
 
-    /// Beyond the base speed, the references give the limit's torque in the direction that is asked for, and the integral of the
+    /// Beyond the base speed, the references give the torque of the limit in the requested direction, and the integral of the
     /// speed loop follows the limit.
     #[test]
     fn the_limits_of_field_weakening_act_in_both_directions() {

@@ -175,7 +175,7 @@ impl ControllerParameters {
         LeastTracker::new(*estimator, estimators, speed_loop, motor.n_p, (*J, *T_s))
     }
 
-    /// What the sequence of the self-commissioning is given.
+    /// Inputs of the self-commissioning sequence.
     pub(crate) fn commission_setup(&self) -> CommissionSetup {
         CommissionSetup {
             mode: self.commission.mode,

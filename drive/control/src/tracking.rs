@@ -8,10 +8,10 @@
 //! s^4 + 2 rho s^3 + (rho^2 - A) s^2 + rho^2 w_s s + rho^2 w_s^2 / t_is = 0,   stable for w_s (1/2 + 2 / t_is) < rho - A / rho
 //! ```
 //!
-//! and for the mechanical observer, which knows its own torque, (s + rho)^3 = A s, stable for A < 8/3 rho^2. A filter of the EMF
-//! with three times rho or more changes the bounds by 2 %. While i_d is lowered, the tracker is at least as fast as these bounds
-//! require, with the margin m: rho / m >= w_s (1/2 + 2 / t_is) + A / rho. m is 1.5, or less where the set bandwidth leaves less at A = 0; rho is at
-//! most a third of the EMF's bandwidth, and 0.05 / T_s.
+//! and for the mechanical observer, which accounts for the torque, (s + rho)^3 = A s, stable for A < 8/3 rho^2. A filter of the
+//! EMF with three times rho or more changes the bounds by 2 %. While i_d is lowered, the tracker is at least as fast as these
+//! bounds require, with the margin m: rho / m >= w_s (1/2 + 2 / t_is) + A / rho. m is 1.5, or less where the set bandwidth leaves
+//! less at A = 0; rho is at most a third of the EMF's bandwidth, and 0.05 / T_s.
 
 use crate::estimator::tracker::TrackerKind;
 use crate::estimator::{EstimatorParameters, Kind};

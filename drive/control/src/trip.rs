@@ -18,7 +18,7 @@ use fmu_core::{Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
-    /// What has tripped; values never change.
+    /// The cause of a trip; values never change.
     #[derive(Serialize, Deserialize)]
     pub enum Cause("Trip", "What has tripped") {
         1 None "Nothing";
@@ -57,7 +57,7 @@ impl Default for TripParameters {
 }
 
 impl TripParameters {
-    /// What the measured currents `i` (A) and the DC-link voltage `u_dc` (V) trip.
+    /// The trip caused by the measured currents `i` (A) and the DC-link voltage `u_dc` (V), if any.
     #[inline]
     pub fn cause(&self, Phases { a, b, c }: Phases, u_dc: f64) -> Cause {
         if a.abs().max(b.abs()).max(c.abs()) > self.i {
@@ -81,7 +81,7 @@ impl Cause {
     }
 }
 
-/// What has tripped, and what the inverter does since.
+/// The cause of the trip, and the state of the inverter since then.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trip {
     /// What has tripped.

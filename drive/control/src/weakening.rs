@@ -1,17 +1,19 @@
 //! Field weakening: the torque and the current references that the DC link allows, by feed-forward with a bounded trim.
 //!
 //! The voltage that the references may use is U = k_u u_dc / sqrt 3 - y. From U, the estimated speed and the machine
-//! estimates, [`Envelope`] gives the limits of the torque and, for the torque within them, the least current. Where
+//! estimates, [`Envelope`] gives the limits of the torque and, for the torque within them, the minimum current. Where
 //! the plain reference (maximum torque per ampere, i_d = 0 or the low-speed law) fits the voltage, nothing is changed.
 //!
 //! The trim y corrects wrong estimates: dy/dt = w_t (|u| - k_t u_dc / sqrt 3), 0 <= y <= 0.3 u_dc / sqrt 3, with the voltage
 //! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit
-//! stay right; it also moves while the current error is large, where wrong estimates would saturate the loop for good.
+//! stay right; it also moves while the current error is large, where wrong estimates would otherwise saturate the loop
+//! permanently.
 //!
 //! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
 //! follows: dI/dt = w_s (limited - wanted), in addition to the hold of [`speed`](crate::speed).
 //!
-//! A limit is computed at every sample while it acts, else at every eighth one and when the voltage has changed by 1 %.
+//! A limit is computed at every sample while it acts; otherwise at every eighth sample and whenever the voltage has changed by 1
+//! %.
 //!
 //! The tracker's bandwidth while weakening: [`tracking`](crate::tracking).
 
@@ -68,7 +70,7 @@ impl Default for WeakeningParameters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WeakeningGains {
     envelope: Envelope,
-    /// Currents (A) of the greatest positive torque of the plain reference.
+    /// Currents (A) of the maximum positive torque of the plain reference.
     end: DqHat,
     /// Inverse of the torque constant in A/(N.m).
     per_torque: f64,
@@ -106,8 +108,7 @@ impl WeakeningGains {
         self.tracker.at(self.envelope.slope(i))
     }
 
-    /// The limit of the sign `s` where the greatest plain reference fits the voltage `U` (V) at the electrical speed `w` (rad/s):
-    /// none.
+    /// No limit of the sign `s`: the maximum plain reference fits the voltage `U` (V) at the electrical speed `w` (rad/s).
     #[inline]
     fn beyond(&self, s: f64, w: f64, U: f64) -> Option<Limit> {
         let end = DqHat::new(self.end.d(), s * self.end.q());

@@ -2,13 +2,14 @@
 //!
 //! Rasmussen (25): i_sd,ref = i_0 exp(-|w_r^| / w_0), with the MECHANICAL speed.
 //!
-//! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q gives the rest of the
-//! torque; the greatest torque is that of the current limit.
+//! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q supplies the rest of the torque;
+//! the current limit sets the maximum torque.
 //!
-//! In torque mode, i_0 also flows while no torque is asked for, and heats the winding with 1.5 R_s i_0^2. It holds a small load where
+//! In torque mode, i_0 also flows while the torque reference is zero, and heats the winding with 1.5 R_s i_0^2. It holds a small
+//! load where
 //! R^ < R, as on the reference motor 0.2 N.m with R^ = 0.9 R; with R^ = R the frame follows the rotor, and the shaft is free. With
-//! `release`, tau_ref = 0 asks for no current: the shaft is free. A flux observer without current knows no angle at standstill; it takes the
-//! rotor along with i_0 as soon as a torque is asked for, as at a start.
+//! `release`, tau_ref = 0 requests no current: the shaft is free. Without current, a flux observer cannot determine the angle at
+//! standstill; as soon as a torque is requested, i_0 pulls the rotor along, as at a start.
 
 use drive_base::math::exp;
 use fmu_core::unit::{AMPERE, SPEED};
@@ -39,7 +40,7 @@ impl ZeroSpeed {
         exp(-speed_hat.abs() * (1.0 / self.w_0))
     }
 
-    /// Whether a reference of `tau` (N.m) asks for no current.
+    /// Whether a reference of `tau` (N.m) requests no current.
     #[inline]
     pub fn releases(&self, tau: f64) -> bool {
         tau == 0.0 && self.release

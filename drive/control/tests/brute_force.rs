@@ -12,14 +12,14 @@ use drive_control::weakening::{Weakening, WeakeningGains};
 use machines::Machine;
 use random_machines::{Brute, all};
 
-/// Share of the greatest torque, and of the current limit, to which both agree.
+/// Share of the maximum torque, and of the current limit, to which both agree.
 const SMALL: f64 = 1e-6;
 
 fn brute(machine: &Machine, w: f64) -> Brute<'_> {
     Brute { motor: &machine.motor, I: machine.i, w, U: machine.U(0.95) }
 }
 
-/// The greatest torque of each sign: run to the end, and sample by sample from a cold start.
+/// The maximum torque of each sign: run to the end, and sample by sample from a cold start.
 #[test]
 fn the_limits() {
     let (mut count, mut inside, mut none) = (0, 0, 0);

@@ -1,4 +1,4 @@
-//! The command leads the angle by what the rotor turns until the middle of the interval in which it acts: half a
+//! The command leads the angle by the rotation of the rotor until the middle of the interval in which it acts: half a
 //! sample and the delay (Rasmussen 2006, Fig. 2, sampled). In the closed loop the integrators hide a
 //! wrong lead, so the first command is looked at.
 #![allow(missing_docs)]

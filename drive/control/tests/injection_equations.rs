@@ -1,4 +1,5 @@
-//! Equations of Kim & Sul from (33) on, as corrected, against the machine: residuals below 1e-10, and the print's where it errs.
+//! Equations of Kim & Sul from (33) on, as corrected, against the machine: residuals below 1e-10; where the printed equation is
+//! wrong, its residual is shown.
 #![allow(missing_docs, non_snake_case)]
 
 use nalgebra::{Matrix2, Rotation2, Vector2};

@@ -9,7 +9,7 @@
 //! In stator axes, the flux linkage is the integral of a voltage that is constant over a step, minus the small resistive
 //! part, the only one that follows the rotor. A step of Co-Simulation ([`integration`](crate::integration)), Model
 //! Exchange ([`exchange`](crate::exchange)) with its energies, and the derivatives with respect to inputs and states
-//! (as [`Dual`](fmu_core::Dual) numbers) all evaluate these equations. What stays the same over a step is a type, so that
+//! (as [`Dual`](fmu_core::Dual) numbers) all evaluate these equations. Properties that stay constant over a step are types, so
 //! the compiler omits absent effects.
 
 use crate::losses::Losses;
@@ -20,7 +20,7 @@ use crate::power::Energy;
 use drive_base::frame::{Axis, Rotor, Stator, Vector};
 use fmu_core::Scalar;
 
-/// What stays constant over an integration step.
+/// Data that stay constant over an integration step.
 pub(super) struct Circuit<'a, D, C, S = f64, const LINEAR: bool = false> {
     pub(super) machine: Machine<'a, S, LINEAR>,
     pub(super) path: Path<D, S>,

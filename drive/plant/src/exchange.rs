@@ -138,7 +138,7 @@ impl PmsmPlant {
         self.outputs(inputs, &self.present(inputs))
     }
 
-    /// What the sensors of a controller measure under these `inputs`: the same as in the outputs, to the last bit.
+    /// The measurements of a controller's sensors under these `inputs`: the same as in the outputs, to the last bit.
     pub fn measured_under(&self, inputs: &PlantInputs) -> Measured {
         let at = self.present(inputs);
         let theta_e = wrap(at.angle * f64::from(self.parameters.motor.n_p));

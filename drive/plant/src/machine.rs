@@ -164,8 +164,8 @@ impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
 }
 
 impl<S: Scalar, const LINEAR: bool> Machine<'_, S, LINEAR> {
-    /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The part of the magnet is transformed separately, both
-    /// ways, so that a machine without current has none after a transformation either.
+    /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The magnet's part is transformed separately, both ways, so
+    /// that zero current stays zero under a transformation.
     #[inline]
     pub fn to_stator(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>) -> Vector<Stator, S> {
         axis.to_stator(psi - Vector::new(self.psi_M, 0.0.into())) + axis.along(self.psi_M)

@@ -40,7 +40,7 @@ impl Default for PlantInputs {
 }
 
 impl<S: Scalar> PlantInputs<S> {
-    /// What the transistors do under these inputs.
+    /// State of the transistors under these inputs.
     #[inline]
     pub fn gates(&self) -> Gates {
         if self.asc {

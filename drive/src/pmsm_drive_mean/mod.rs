@@ -44,7 +44,7 @@ use fmu_core::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A drive of which only the torque and the shaft take time.
+/// A drive in which only the torque and the shaft have dynamics.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PmsmDriveMean {
     /// Inputs, constant over a communication step.

@@ -22,7 +22,7 @@ pub(super) type Figures = [f64; 2];
 pub(super) struct Case {
     /// Name in the table.
     pub(super) option: &'static str,
-    /// A drive on which it has an effect.
+    /// A drive in which it has an effect.
     pub(super) on: fn(Kind) -> Pair,
     /// Turns it on.
     pub(super) ask: fn(&mut Par),

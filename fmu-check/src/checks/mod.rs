@@ -1,5 +1,5 @@
-//! The checks, in folders by subject: one file for each group, with a table of its checks at the top; below it, in `shared`, what has
-//! no check.
+//! The checks, in folders by subject: one file for each group, with a table of its checks at the top; code without checks is in
+//! the folder `shared` below it.
 
 #![allow(clippy::unnecessary_wraps, reason = "all probes have one signature")]
 

@@ -1,4 +1,4 @@
-//! What is legal, or no fault of the FMU, violates no must; and what a lesser violation is reported at its lower level.
+//! Legal behavior, and behavior that is not the FMU's fault, violates no must; a lesser violation is reported at its lower level.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use crate::binary::{compile, pack};
@@ -137,7 +137,7 @@ fn a_missing_library() {
     assert_eq!(at(&report, Level::Must), ["B00"], "{}", listed(&report));
 }
 
-/// What this computer cannot do is no fault of the FMU: long names, few open files, another working directory.
+/// Limits of this computer are no fault of the FMU: long names, few open files, another working directory.
 #[test]
 fn our_own_errors() {
     let dir = tempfile::tempdir().unwrap();
@@ -196,7 +196,7 @@ fn rounding_is_no_must() {
     assert_eq!(at(&report, Level::Should), ["T05"], "{}", listed(&report));
 }
 
-/// What cannot be read between steps cannot be read after Terminate: a finding of G15, and none of L10.
+/// A variable that cannot be read between steps cannot be read after Terminate either: a finding of G15, and none of L10.
 #[test]
 fn a_value_that_could_not_be_read_before_is_not_lost() {
     let dir = tempfile::tempdir().unwrap();
@@ -255,7 +255,7 @@ fn events_that_the_text_leaves_open() {
     }
 }
 
-/// An FMU that takes the importer down with it stands out.
+/// An FMU that crashes the importer is reported.
 #[test]
 fn a_crash_stands_out() {
     let dir = tempfile::tempdir().unwrap();
@@ -293,7 +293,8 @@ fn what_fmi_2_requires() {
     assert!(listed(&report).contains("variable n: is a continuous Int32 by default"), "{}", listed(&report));
 }
 
-/// What exceeds a limit of the checker is not tried, and is no fault of the FMU: here more files than it copies.
+/// An FMU that exceeds a limit of the checker is not tried, and this is no fault of the FMU: here it has more files than the
+/// checker copies.
 #[test]
 fn our_own_limits() {
     let dir = tempfile::tempdir().unwrap();

@@ -115,7 +115,7 @@ const RUNNING: &[(&str, &[&str])] = &[
 ];
 const RUNNING_GROUPS: [&str; 9] = ["access", "time", "L06", "L13", "F01l", "F02b", "G-L3c", "B07a", "S04"];
 
-/// Faults that somebody invented who did not know the checks, of both standards.
+/// Faults of both standards, invented by someone who did not know the checks.
 const INVENTED: &[(&str, &[&str])] = &[
     ("NONE", &[]),
     // What cannot be read, is not written, or set alone only.
@@ -157,7 +157,7 @@ const INVENTED_CHECKS: [&str; 24] = [
     "G-L4", "B07a", "B08", "G-L2a", "G-L3a", "V12", "L10", "T01c", "L04a",
 ];
 
-/// What stays altered or is left: each is found by this check.
+/// State that stays altered or is left behind: each case is found by this check.
 const AROUND: &[(&str, &[&str])] = &[
     ("LOCALE", &["B08g"]),
     ("TIMER", &["B08g"]),
@@ -205,7 +205,7 @@ const FAULTS3: &[(&str, &[&str])] = &[
     ("G_L4", &["G-L4"]),
 ];
 
-/// Faults of the symbols, which a library of their own has.
+/// Faults of the symbols, in a separate library.
 const OF_SYMBOLS: [&str; 4] = ["B01", "B02a", "B02b", "UNDEFINED"];
 
 /// The small FMU with these faults; `None` without a compiler.

@@ -1,4 +1,4 @@
-//! What the CI of another exporter uses: known findings, formats, explanations, several files, time limits, calls.
+//! Features for the CI of another exporter: known findings, formats, explanations, several files, time limits, calls.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use crate::binary::{compile, pack};
@@ -26,7 +26,7 @@ fn archive(dir: &Path, name: &str, change: fn(&str) -> String) -> PathBuf {
     path
 }
 
-/// A rule of thumb does not count for a CI that asks for certain findings.
+/// A rule of thumb does not count for a CI that requests only certain findings.
 #[test]
 fn findings_below_a_confidence_do_not_count() {
     let dir = tempfile::tempdir().unwrap();
@@ -160,7 +160,7 @@ fn the_summary_says_how_much_was_checked() {
     assert!(help.contains("Model Exchange"), "{help}");
 }
 
-/// What FMI 3.0 requires and FMI 2.0 does not.
+/// Requirements of FMI 3.0 that FMI 2.0 does not have.
 #[test]
 fn levels_differ_between_the_standards() {
     for id in ["B08f", "B08g", "B08r", "G-L3a", "G-L3c", "L01b"] {

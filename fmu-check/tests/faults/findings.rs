@@ -1,4 +1,4 @@
-//! What the checker finds in a file, for the test programs that ask it; each names its `PROGRAM`.
+//! The checker's findings in a file, for the test programs that use it; each names its `PROGRAM`.
 
 use fmu_check::{Options, report::Report};
 use std::path::Path;
@@ -26,7 +26,7 @@ pub fn violated(report: &Report) -> Vec<&'static str> {
     report.violated().map(|f| f.id).collect()
 }
 
-/// What a check that should have failed said.
+/// The result of a check that should have failed.
 pub fn listed(report: &Report) -> String {
     report.violated().map(|f| format!("{}: {:?}", f.id, f.verdict)).collect::<Vec<_>>().join("\n")
 }

@@ -26,7 +26,8 @@ fn the_limit_on_memory_is_ours() {
     assert!(matches!(verdict(&report, "L00"), Verdict::Pass(_)), "{:?}", verdict(&report, "L00"));
 }
 
-/// What of this computer is limited, and a shell script that runs `"$0" "$@"` under it; `$TMP_HERE` is a folder for a mount.
+/// The limited resource of this computer, and a shell script that runs `"$0" "$@"` under that limit; `$TMP_HERE` is a folder for
+/// a mount.
 const LIMITS: &[(&str, &str)] = &[
     ("RLIMIT_AS", "ulimit -v 200000; exec \"$0\" \"$@\""),
     ("RLIMIT_NOFILE", "ulimit -n 14; exec \"$0\" \"$@\""),

@@ -27,7 +27,7 @@ use std::ffi::CString;
 use std::ptr::{null, null_mut};
 use std::sync::Once;
 
-/// A map of any size, in a part: more elements than a table has indices.
+/// A map of any size, inside a part: it has more elements than a table has indices.
 #[derive(Clone, Serialize, Deserialize)]
 struct Map {
     rows: u64,

@@ -243,7 +243,7 @@ impl Live {
         self.calls.simple(name, self.given()).outcome()
     }
 
-    /// `noSetFMUStatePriorToCurrentPoint`: no earlier point was saved, so none can be returned to.
+    /// `noSetFMUStatePriorToCurrentPoint`: no earlier point was saved, so the importer cannot return to one.
     fn no_prior(&self) -> bool {
         self.saved == 0
     }

@@ -458,7 +458,7 @@ impl System {
         self.set.iter().rev().find(of).map(|(_, values)| values)
     }
 
-    /// Whether a variable was set to this value, or else starts at it.
+    /// Whether a variable was set to this value or, if it was not set, starts at it.
     fn has_value(&self, instance: usize, name: &str, value: &str) -> bool {
         let description = self.instances[instance].description();
         let Some(variable) = description.variable(name) else { return false };

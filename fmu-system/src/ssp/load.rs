@@ -364,7 +364,8 @@ impl Loaded {
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
-    /// The values of a binding; names begin with `prefix`; those of a system's connectors mean the variables behind them.
+    /// The values of a binding; names begin with `prefix`; the name of a system's connector refers to the variable connected to
+    /// it.
     fn bound(
         &mut self,
         file: &str,

@@ -153,7 +153,7 @@ pub(crate) fn sample() -> Description {
     }
 }
 
-/// The sample with two states, whose order is not that of the variables, and an event indicator.
+/// The sample with two states, in another order than the variables, and an event indicator.
 pub(crate) fn exchange_sample() -> Description {
     let local = (Causality::Local, Variability::Continuous);
     let acceleration = Quantity::new("Acceleration", Unit::si("rad/s2", RAD_PER_S.unit.exponents));

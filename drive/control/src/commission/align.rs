@@ -1,4 +1,4 @@
-//! Dc current along an angle phi, which the rotor follows, and its rest.
+//! Direct current along an angle phi, which aligns the rotor, and the test that the rotor is at rest.
 //!
 //! ```text
 //! along phi        PI on the current
@@ -56,7 +56,7 @@ impl Dc {
     }
 }
 
-/// Whether the mean of `samples` whose sum is `sum` (A) is that of a rotor at rest.
+/// Whether the rotor is at rest, from the mean of `samples` with the sum `sum` (A).
 pub(super) fn is_still(bench: &Bench, sum: f64, samples: f64) -> bool {
     (sum / samples).abs() < 0.002 * bench.I + 4.0 * bench.sigma / samples.sqrt()
 }

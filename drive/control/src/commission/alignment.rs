@@ -1,4 +1,4 @@
-//! How much current aligns the rotor of a machine with saliency.
+//! The current that aligns the rotor of a machine with saliency.
 //!
 //! ```text
 //! torque of a current i at beta from the magnet       1.5 n_p i sin(beta) (psi_M - (L_q - L_d) i cos(beta))
@@ -7,7 +7,8 @@
 //! ```
 //!
 //! A current far beyond i_1 therefore rests on the q-axis, as the magnet of a machine with L_d > L_q rests on its greater
-//! inductance. Less current separates the two: where the smaller inductance comes to the current, the magnet lies along it. The
+//! inductance. A smaller current separates the two: if the axis of smaller inductance turns to the current, the magnet lies along
+//! it. The
 //! angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change is that of a blocked
 //! rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the swing must
 //! also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
@@ -15,7 +16,7 @@
 use drive_base::math::{sin_cos, wrap};
 use serde::{Deserialize, Serialize};
 
-/// Angles in rad up to which the smaller inductance is at the current, and from which on it is across.
+/// Maximum angle in rad at which the smaller inductance lies along the current, and minimum angle at which it lies across it.
 const ALONG: f64 = 0.26;
 const ACROSS: f64 = 1.31;
 /// Change of the angle in rad that shows a rotor that follows.
@@ -26,7 +27,7 @@ const NEXT: f64 = 0.25;
 /// Share of i_1.
 const STIFF: f64 = 0.6;
 
-/// What the angles at rest have shown.
+/// Result of the angles at rest.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Alignment {
     /// Current in A of an alignment where 0.4 I is too much, and about the flux linkage of the magnet in Wb; 0: it is not.

@@ -1,4 +1,4 @@
-//! What the parts of the commissioning share: the test conditions, and what earlier parts have found.
+//! Data shared by the parts of the commissioning: the test conditions and the results of earlier parts.
 
 use super::curve::Curve;
 use super::tensor::Tensor;

@@ -11,7 +11,8 @@
 //! J w' + B w + tau_coulomb = tau holds for the means exactly, in spite of cogging and control in the part, and what has
 //! a period much shorter than the part vanishes. The torque 1.5 n_p (p - c - d tau) x i needs neither L_q nor psi_M.
 //!
-//! At most 256 points; when they are full, every second one goes. The circle is Kasa's (1976, IEEE Trans. Instrum. Meas.
+//! At most 256 points; when the buffer is full, every second point is dropped. The circle is Kasa's (1976, IEEE Trans. Instrum.
+//! Meas.
 //! 25), extended by the drift here; noise s of p makes the radius (s/psi)^2 too large. A part of less than two turns
 //! separates center and radius poorly.
 
@@ -42,7 +43,7 @@ pub(super) struct Points {
     i: AlphaBeta,
 }
 
-/// What a part says; angles are electrical, means weighted with (1 - tau^2)^2.
+/// Results of a part; angles are electrical, means weighted with (1 - tau^2)^2.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Part {
     /// Acceleration in rad/s2 and its standard error, speed in rad/s.
@@ -103,7 +104,7 @@ impl Points {
         })
     }
 
-    /// The part that ends now, of samples of `T` (s); `None`: too few points, or no circle.
+    /// The part that ends now, with the sample period `T` (s); `None` if it has too few points or no circle.
     pub(super) fn end(&self, T: f64) -> Option<Part> {
         if self.rows.len() < FEWEST {
             return None;

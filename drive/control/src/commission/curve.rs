@@ -149,7 +149,7 @@ mod tests {
         assert!((curve.leg(40.0).0 - 10.0_f64.sqrt()).abs() < 1e-12 && curve.leg(0.0).0.abs() < 1e-15);
     }
 
-    /// Over an exponential from 0 to 1, the mean is what the integral says.
+    /// Over an exponential from 0 to 1, the mean equals the integral.
     #[test]
     fn the_mean_current_is_that_of_the_exponential() {
         for x in [0.019_f64, 0.021, 0.5, 1.3] {

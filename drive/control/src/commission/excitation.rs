@@ -69,7 +69,7 @@ impl<const C: usize, const N: usize> Rows<C, N> {
         }
     }
 
-    /// Two rows become one, as `pair` says.
+    /// Combines two rows into one by `pair`.
     pub(super) fn halve(&mut self, pair: impl Fn([f64; C], [f64; C]) -> [f64; C]) {
         let half = self.len() / 2;
         for n in 0..half {
@@ -83,7 +83,7 @@ impl<const C: usize, const N: usize> Rows<C, N> {
     }
 }
 
-/// What an excitation shall do.
+/// Settings of an excitation.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Plan {
     /// Amplitude in A, and samples of a half-wave.

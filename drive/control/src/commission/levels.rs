@@ -10,12 +10,13 @@
 //! flux        then max(0.2 s, 3 turns) with i_d = -0.06 I; i_d = 0 elsewhere
 //! ```
 //!
-//! A machine without load needs so little current that noise and the dead zone of the legs would decide about u. With i_d,
+//! A machine without load needs so little current that noise and the dead zone of the legs would dominate u. With i_d,
 //! all legs carry current, and the error of what they lose points along d, where it turns the angle instead of changing the
 //! radius; the radius is psi_M + (L_d - L_q) i_d, where the saturation changes L_d: by 5 % at 0.06 I, or psi_M by 0.3 %. An
 //! error of 1 % of L_d changes psi_M by less than 0.1 %. The torque, however, is free of an error of the angle where i_d = 0.
 //!
-//! J / (n_p K) of the speed control and of i_a follows the last sweep, i_f the last two levels. psi_M is the mean radius
+//! J / (n_p K) of the speed control and of i_a is updated after each sweep, and i_f from the last two levels. psi_M is the mean
+//! radius
 //! at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is the
 //! error at 0.45 w_r and so part of the half-width, as is that of L_d. If time runs out after each level has been measured once, the rest is
 //! left out. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
@@ -102,7 +103,7 @@ pub(super) struct Levels {
     radii: [Radii; 3],
 }
 
-/// What a sample of the levels gives.
+/// Result of a sample of the levels.
 pub(super) enum Level {
     /// The voltage of this sample in V.
     Voltage(AlphaBeta),

@@ -19,15 +19,17 @@
 //! Done         the gates are off; a spun rotor coasts from 0.1 of the rated speed
 //! ```
 //!
-//! Each result has the relative half-width of its 95 % interval; 1 means refused. Faults end with the gates off, and what is
-//! known by then stays shown: a blocked rotor in mode Spin ends in Refused with NotFollowing, because psi_M and J are what
-//! its user has asked for, and shows what was found at standstill.
+//! Each result has the relative half-width of its 95 % interval; 1 means refused. Faults end with the gates off, and the results
+//! obtained so far remain visible: a blocked rotor in mode Spin ends in Refused with NotFollowing, because psi_M and J were
+//! requested, and the results at standstill are shown.
 //!
-//! A free rotor shows which inductance is the magnet's (`alignment`); of a blocked one, the smaller inductance is taken as L_d.
+//! A free rotor shows which inductance belongs to the magnet axis (`alignment`); if the rotor is blocked, the smaller inductance
+//! is taken as L_d.
 //!
-//! Limits: a load that is there from the first level to the last counts as friction; friction and inertia are those of the
-//! whole shaft. B and tau_coulomb are separated by the range from 0.15 to 0.45 of the rated speed only, so that often just their sum is
-//! accepted. J needs two turns in a sweep: a rotor that reaches its rated speed within some 10 ms gets none if it is slow.
+//! Limits: a load present from the first level to the last counts as friction; friction and inertia are those of the
+//! whole shaft. Only the range from 0.15 to 0.45 of the rated speed separates B from tau_coulomb, so often only their sum is
+//! accepted. J needs two turns in a sweep: a rotor with few turns per second that reaches its rated speed within some 10 ms
+//! yields no J.
 //! Values scale with the gains of the sensors: currents that read 1 % high give R and L 1 % low, J and friction 1 % high; a
 //! voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
 

@@ -3,7 +3,7 @@
 use drive_base::frame::Phases;
 use serde::{Deserialize, Serialize};
 
-/// Shortest time in s and fewest samples.
+/// Minimum time in s and minimum number of samples.
 const SHORTEST: (f64, f64) = (0.1, 1000.0);
 
 /// Sums over the samples with the gates off.

@@ -1,4 +1,4 @@
-//! Inductances by output error: the record of an axis is simulated, and the current's error is least.
+//! Inductances by the output-error method: simulates the record of an axis and minimizes the error of the current.
 //!
 //! ```text
 //! dpsi/dt = u + u_0 - R i - loss(i)                 Heun, 12 steps a row at least
@@ -35,7 +35,7 @@ pub(super) enum Along {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct OutputError {
     along: Along,
-    /// Unknowns of the least cost, and those of the next evaluation.
+    /// Unknowns with the minimum cost so far, and those of the next evaluation.
     best: [f64; UNKNOWNS],
     trial: [f64; UNKNOWNS],
     normal: Normal<UNKNOWNS>,
@@ -231,8 +231,8 @@ impl Magnetization {
     }
 
     /// s_2 in A/Wb2 and s_3 in A/Wb3 of i = x/L + s_2 x^2 + s_3 x^3 along d, each with its half-width, by least squares over
-    /// +-psi(A) with `L` (H) given, whose relative half-width is `u`. An error of L bends the line as s_3 does; what the fit
-    /// leaves may have any form.
+    /// +-psi(A) with `L` (H) given, whose relative half-width is `u`. An error of L bends the line as s_3 does; the residual of
+    /// the fit may have any form.
     pub(super) fn saturation(&self, L: f64, u: f64) -> [[f64; 2]; 2] {
         let ([a, b, c, d], half) = (self.g, self.half);
         // Over z in +-1: means of z^4 and z^6 are 1/5 and 1/7.

@@ -50,7 +50,7 @@ pub(super) struct Probe {
     L_c: f64,
 }
 
-/// What a sample of the probe gives.
+/// Result of a sample of the probe.
 pub(super) enum Probed {
     /// The voltage of this sample in V.
     Voltage(AlphaBeta),

@@ -9,8 +9,8 @@
 //! gives R, u_dead and i_x by least squares over nine currents that the PI holds. Nine smaller ones follow at constant
 //! voltages; f(i) = u - R i of all eighteen, and l(i) = 1.5 f(i) - l(i/2) from the smallest current upward. An error of f
 //! returns in each higher octave with the other sign, undiminished, and the bend of f about i_x makes one of some percent of
-//! u_dead. So the same equation also leads downward, from u_dead (1 - i_x / (2 i)) at the greatest currents, and the curve
-//! changes from the one to the other about i_x.
+//! u_dead. So the same equation also leads downward, from u_dead (1 - i_x / (2 i)) at the largest currents, and the curve passes
+//! from one to the other near i_x.
 
 use super::align::{Dc, is_still};
 use super::bench::{Bench, Sample};
@@ -40,7 +40,7 @@ pub(super) struct Line {
 /// One staircase.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Staircase {
-    /// Mean voltage (V) and current (A) of the steps, from the greatest current down.
+    /// Mean voltage (V) and current (A) of the steps, from the largest current down.
     points: [[f64; 2]; STEPS],
     #[serde(with = "crate::commission::fixed_size")]
     step: u64,
@@ -108,7 +108,7 @@ impl Staircase {
     }
 
     /// The line through the controlled currents, and half-widths: those of white residuals, or 2.36 standard errors of the
-    /// jackknife that leaves out one current after the other, which sees a tail that is not 1/i.
+    /// jackknife that leaves out one current at a time, which reveals a tail other than 1/i.
     fn fit(&self) -> Option<Line> {
         let whole = self.without(HIGH.len())?;
         let (mut half, mut squares) = (whole.half_width, [0.0; 3]);
@@ -162,7 +162,7 @@ impl Staircase {
 }
 
 impl Line {
-    /// What the legs take from the voltage along a phase at the current `i` (A), in V.
+    /// Voltage (V) that the legs lose along a phase at the current `i` (A).
     fn loss(&self, i: f64) -> f64 {
         let [u_dead, i_x] = [self.u_dead[0], self.i_x[0]];
         let leg = |i: f64| if i < i_x { 0.5 * u_dead * i / i_x } else { u_dead * (1.0 - 0.5 * i_x / i) };
@@ -170,7 +170,7 @@ impl Line {
     }
 }
 
-/// Adopts what the `staircases` (at 120 degrees, and at 0) say: R, u_dead, i_x and the curve.
+/// Adopts the results of the `staircases` (at 120 degrees, and at 0): R, u_dead, i_x and the curve.
 pub(super) fn adopt(bench: &mut Bench, staircases: &[Staircase]) -> Result<(), Fault> {
     let each = if staircases.len() == 2 { 0.5 } else { 1.0 };
     let mean = |get: &dyn Fn(&Line) -> f64| staircases.iter().map(|s| get(&s.line)).sum::<f64>() * each;

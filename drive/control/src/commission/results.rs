@@ -1,4 +1,4 @@
-//! Results with the half-widths of their intervals, and what refuses them.
+//! Results with the half-widths of their intervals, and the conditions under which they are refused.
 
 use super::axes::Axes;
 use super::bench::Bench;
@@ -25,7 +25,7 @@ const LIMIT_J: f64 = 0.05;
 /// Maximum relative half-width of the friction's values.
 const LIMIT_FRICTION: f64 = 0.15;
 
-/// What the commissioning has found.
+/// Results of the commissioning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Results {
     /// Stator resistance with one transistor in Ohm.

@@ -1,10 +1,10 @@
-//! What the commissioning is given, and what it gives to the inverter.
+//! Inputs of the commissioning, and its commands to the inverter.
 
 use super::status::CommissionMode;
 use drive_base::frame::AlphaBeta;
 use serde::{Deserialize, Serialize};
 
-/// What the commissioning is given.
+/// Inputs of the commissioning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CommissionSetup {
     /// What is commissioned; with `Off`, nothing happens.
@@ -23,7 +23,7 @@ pub struct CommissionSetup {
     pub t_max: f64,
 }
 
-/// What the inverter shall do until the next sample.
+/// Command to the inverter until the next sample.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Voltage {
     /// Command in V.

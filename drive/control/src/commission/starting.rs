@@ -62,7 +62,7 @@ pub(super) struct Starting {
     sums: [f64; 4],
 }
 
-/// What a sample of the start gives.
+/// Result of a sample of the start.
 pub(super) enum Started {
     /// The voltage of this sample in V.
     Voltage(AlphaBeta),

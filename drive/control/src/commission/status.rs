@@ -1,4 +1,4 @@
-//! What is commissioned, what the commissioning does, and why it has stopped: the enumerations of the interface.
+//! Enumerations of the interface: the mode of the commissioning, its stage, and the reason why it stopped.
 
 use fmu_core::enumeration;
 use serde::{Deserialize, Serialize};

@@ -16,8 +16,8 @@ use super::least_squares::Normal;
 use drive_base::frame::{AlphaBeta, SQRT_3};
 use serde::{Deserialize, Serialize};
 
-/// Residual over psi_r below which the current explains the flux linkage: between 0.013, the greatest of 100 blocked machines,
-/// and 0.19, the smallest of 299 free ones.
+/// Residual over psi_r below which the current explains the flux linkage: between 0.013, the maximum of 100 blocked machines, and
+/// 0.19, the minimum of 299 free ones.
 const BLOCKED: f64 = 0.05;
 /// Time in s at the end that gives the slope.
 const LAST: f64 = 0.1;

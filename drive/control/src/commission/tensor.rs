@@ -49,7 +49,7 @@ impl Tensor {
         1.0 / (self.mean - self.size()) - 1.0 / (self.mean + self.size())
     }
 
-    /// This machine with its smallest inductance at 0 rad, or where it is `inverse` its greatest one.
+    /// This machine with its smallest inductance at 0 rad, or its largest one if the tensor is an `inverse`.
     pub(super) fn aligned(&self, inverse: bool) -> Self {
         Self { mean: self.mean, cos: if inverse { -self.size() } else { self.size() }, sin: 0.0 }
     }

@@ -16,7 +16,7 @@
 //! Between samples the current is not straight: u stays while the EMF turns, and the d-axis current bows by
 //! psi_M (w T)^2 / (8 L_d), which may exceed the friction's current, and each leg is steep where its current crosses zero.
 //! So loss is the mean along the model's current, from the measured one to the next, where a constant voltage `missing`
-//! takes what else the model lacks:
+//! represents the remaining errors of the model:
 //!
 //! ```text
 //! L di/dt = u e^(-j theta) - R i - loss - j w (L i + psi_M) + missing          8 steps, linearly implicit
@@ -34,7 +34,7 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
-/// Rate of the observer over the speed, and the least one in 1/s.
+/// Rate of the observer divided by the speed, and the minimum rate in 1/s.
 const RATE: (f64, f64) = (0.7, 10.0);
 /// Steps of the model's current in a period.
 const STEPS: f64 = 8.0;
@@ -203,7 +203,7 @@ mod tests {
         Bench { T: 1e-4, delay: 1.0, I: 10.0, U: 100.0, psi_r: 0.2, psi_0: 0.12, R: 0.5, curve, ..Bench::default() }
     }
 
-    /// The observer comes to the rotor of an exact EMF, with a psi_M that is 20 % off and from an angle that is 0.3 rad off.
+    /// With an exact EMF, the observer converges to the rotor even if psi_M is 20 % off and the initial angle 0.3 rad off.
     #[test]
     fn the_observer_follows_an_exact_emf() {
         let bench = bench(0.0);

@@ -1,5 +1,5 @@
-//! What the controller gives to an estimator and what it gets back: the interface that every method implements, and what a method may
-//! know of the controller around it.
+//! The interface that every estimator implements: its inputs from the controller, its results, and the controller data that it
+//! may read.
 
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Turn};
 use drive_base::motor::Motor;
@@ -129,7 +129,7 @@ impl Estimate {
 }
 
 /// The interface of an estimator: it starts at the first sample and updates at each later one. A step does not
-/// allocate. `All` are the parameters of all estimators, of which an implementation names those that it reads.
+/// allocate. `All` contains the parameters of all estimators; an implementation names those that it reads.
 pub trait Estimating<All>: Sized {
     /// The estimator at the first sample, at the electrical angle `theta` (rad) and speed `w` (rad/s).
     fn start(context: &ContextOf<All>, sample: &Sample, theta: f64, w: f64) -> (Self, Estimate);

@@ -23,7 +23,8 @@
 //! ```
 //!
 //! The angle's gain fades with the EMF, and the speed goes on through zero with e_q, so that theta^ is its integral: the
-//! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is for passing zero, not for staying.
+//! error grows with the time spent there, by (R - R^) i / psi_M in rad/s. It is meant for passing through zero, not for staying
+//! there.
 
 use crate::estimator::contract::{ContextOf, Estimate, Sample, SetupOf};
 use crate::estimator::interval::Interval;

@@ -16,8 +16,9 @@
 //!
 //! independently of the tracker, and r = Re z shows it.
 //!
-//! **Resistance.** What one ohm does to psi~ is known: h with dh/dt = -i - c rho psi_a, rho = Re(h / psi_a), integrated
-//! along with psi^. It gives r = (R - R^) rho, at rest (rho = -i_d / (c psi_M)), at speed (rho = -i_q / (w psi_M)) and in all
+//! **Resistance.** The sensitivity of psi~ to the resistance is known: h with dh/dt = -i - c rho psi_a, rho = Re(h / psi_a),
+//! integrated along with psi^. It gives r = (R - R^) rho, at rest (rho = -i_d / (c psi_M)), at speed (rho = -i_q / (w psi_M)) and
+//! in all
 //! transients between, with the right sign, also where rho passes zero. Hence the adaptive observer (Zhang, IEEE Trans.
 //! Autom. Control 47 (3), 2002), with rho_0 = `adaptation.i` / (c_0 psi_M), c_0 = c at rest:
 //!

@@ -36,7 +36,7 @@ const LEAST: f64 = 0.1;
 /// Parameters of the observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GradientParameters {
-    /// Rate gamma psi_M^2 in 1/s at which eta comes to the circle, > 0.
+    /// Rate gamma psi_M^2 in 1/s at which eta converges to the circle, > 0.
     pub bandwidth: f64,
     /// Clamp in the place of the gradient.
     pub clamped: bool,

@@ -1,5 +1,5 @@
-//! Options that only some estimators have. With any other estimator the controller refuses them by name, so that none is
-//! ignored silently.
+//! Options that only some estimators have. With any other estimator, the controller rejects them by name, so none is ignored
+//! silently.
 //!
 //! An option is a variable that is off at its start value. Values of a method (bandwidths, voltages, noise densities) are not
 //! options: each estimator reads its own, and a set of values may hold those of several.
@@ -18,7 +18,7 @@ struct Choice {
     asked: fn(&Setup, Kind) -> bool,
     /// Whether an estimator has it.
     has: fn(Kind) -> bool,
-    /// What the others do not do.
+    /// The function that other estimators lack.
     why: &'static str,
     /// How to turn it off.
     off: &'static str,

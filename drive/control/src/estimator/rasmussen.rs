@@ -7,8 +7,8 @@
 //!
 //! The poles of the speed adaptation set the gains: g_2 = w_n^2 / psi_M, g_1 = 2 zeta w_n / psi_M.
 //!
-//! A ripple of the speed of the electrical amplitude dw and the frequency W passes to the angle with W^2 / (W + w_n)^2 for zeta
-//! = 1: |theta~| = dw W / (W^2 + w_n^2), at most dw / (2 w_n).
+//! A speed ripple with electrical amplitude dw and frequency W appears in the angle with the factor W^2 / (W + w_n)^2 for zeta =
+//! 1: |theta~| = dw W / (W^2 + w_n^2), at most dw / (2 w_n).
 //!
 //! To sample without bias, psi_s^ is kept in stator axes, which do not turn:
 //!

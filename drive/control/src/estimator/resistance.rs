@@ -19,8 +19,8 @@
 //! load. R^ therefore stays constant while the reference is a speed, unless it is tracked.
 //!
 //! A drive with Rasmussen's observer that starts at rest stays there, with i_0 and without a reference, until 0.05 of R~ is left (3.7 / b
-//! with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that leaves with an R^ that is not measured yet loses the
-//! start.
+//! with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that starts before R^ has been measured loses
+//! the start.
 //!
 //! **At creep**, the steady state is sin theta~ = -(c_1 d + R~ i_d) / (w psi_M) + c_1 R~ i_q / (w^2 psi_M). A constant
 //! c_1 lets both terms grow without limit towards w = 0: at 30 rpm, psi_M^ = 1.2 psi_M has no equilibrium. With
@@ -46,12 +46,13 @@
 //! an offset of current or voltage makes it drift. It also acts where the speed reference and i_q have the same sign:
 //! a start under load then leaves the false lock at the limit of i_q. For a generating load it would be unstable.
 //!
-//! **In torque mode**, no torque asked for stands for rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
+//! **In torque mode**, a zero torque reference counts as rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
 //! vanish, so R^ may adapt while the rotor coasts below 2 rad/s, too. There it goes to the R^ that explains the error of psi_M^,
-//! x = -d, and returns within 1 / b once the rotor rests. R^ stays constant as long as a torque is asked for, and a start at speed
+//! x = -d, and returns within 1 / b once the rotor rests. R^ stays constant while the torque reference is not zero, and a start
+//! at speed
 //! begins with `motor.R_s`; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will turn.
 //!
-//! Not observable: R^ without current, while the reference is a speed, or while it is a torque; theta~ and psi_M^ at rest.
+//! Not observable: R^ without current or while the speed or torque reference is not zero; theta~ and psi_M^ at rest.
 
 use crate::estimator::contract::{ContextOf, Sample, SetupOf};
 use drive_base::frame::DqHat;
@@ -126,7 +127,7 @@ impl Default for ResistanceParameters {
 }
 
 impl ResistanceParameters {
-    /// First estimate in Ohm: `motor.R_s` where a torque that is asked for `at_once` leaves no time to adapt.
+    /// First estimate in Ohm: `motor.R_s` if a torque requested `at_once` leaves no time to adapt.
     pub(super) fn first(&self, motor: &Motor, at_once: bool) -> f64 {
         let share = if at_once { 1.0 } else { self.start };
         share * motor.R_s
@@ -155,7 +156,7 @@ pub struct Resistance {
     w_f: f64,
 }
 
-/// What the adaptation gives the observer.
+/// Output of the adaptation to the observer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Adapted {
     /// Feedback gain of the d-axis flux error in 1/s.
@@ -331,7 +332,7 @@ mod tests {
     const T_S: f64 = 1e-4;
 
     /// The adaptation after `seconds` next to a machine of 2 Ohm, from an estimate of `R_hat` (Ohm), with the currents `i` (A) at
-    /// the speed `w` (rad/s) asked for; the flux error is the steady one of the observer, `x` (R~ in Ohm, c_1 in 1/s) in Wb.
+    /// the speed reference `w` (rad/s); the flux error is the steady one of the observer, `x` (R~ in Ohm, c_1 in 1/s) in Wb.
     fn adapted(
         set: impl FnOnce(&mut EstimatorParameters),
         (R_hat, i, w): (f64, DqHat, f64),
@@ -354,7 +355,7 @@ mod tests {
         (resistance, adapted)
     }
 
-    /// At rest, x = R~ i_d / c_1: the estimate comes to the resistance from both sides, at the rate
+    /// At rest, x = R~ i_d / c_1: the estimate converges to the resistance from both sides, at the rate
     /// b i_d^2 / (i_d^2 + i_q^2 + i^2).
     #[test]
     fn at_rest_the_estimate_comes_to_the_resistance() {
@@ -367,7 +368,7 @@ mod tests {
         }
     }
 
-    /// At creep, x = R~ i_q / w beyond the uncertainty of the magnet: tracking comes to the resistance in both directions of
+    /// At creep, x = R~ i_q / w beyond the uncertainty of the magnet: tracking converges to the resistance in both directions of
     /// rotation, motoring and generating.
     #[test]
     fn tracking_comes_to_the_resistance() {

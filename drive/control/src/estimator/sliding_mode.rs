@@ -1,4 +1,5 @@
-//! Sliding-mode observer of the back EMF, as manufacturers of controllers publish it (Microchip, AN1078 "Sensorless field oriented
+//! Sliding-mode observer of the back EMF, as published by manufacturers of controllers (Microchip, AN1078 "Sensorless field
+//! oriented
 //! control of a PMSM", 2010; Texas Instruments, SPRABQ3, 2013), for salient machines by the extended EMF (Chen, Tomita,
 //! Doki, Okuma, IEEE Trans. Ind. Electron. 50 (2), 2003).
 //!
@@ -27,7 +28,7 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the observer.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SlidingModeParameters {
-    /// Gain K in V, > 0: above the greatest EMF.
+    /// Gain K in V, > 0: above the maximum EMF.
     pub gain: f64,
     /// Bandwidth w_z in rad/s within the boundary layer, > 0.
     pub bandwidth: f64,

@@ -34,7 +34,7 @@ fn period(commission: &mut Commission, bench: &mut Bench, gain: f64, u_dc: f64) 
     bench.tick(out.u, out.gates);
 }
 
-/// Runs to the end; and the greatest speed over the rated one, of the swings at standstill and of the turning machine.
+/// Runs to the end; returns the maximum speed relative to the rated one, in the swings at standstill and of the turning machine.
 fn run_fast(motor: &Motor, seed: u64) -> (Commission, Bench, [f64; 2]) {
     let mut fastest = [0.0_f64; 2];
     let (commission, bench) = run_with(motor, seed, |commission, bench| {
@@ -58,7 +58,7 @@ fn run(motor: &Motor, seed: u64) -> (Commission, Bench) {
     run_with(motor, seed, |_, _| ())
 }
 
-/// The quantities, with what the commissioning has found and the truth.
+/// The quantities, with the results of the commissioning and the true values.
 fn compared(r: &Results, m: &Motor) -> [(&'static str, Identified, f64); 15] {
     let at = |chord: &dyn Fn(f64) -> f64, i: f64| if i == 0.0 { 1.0 } else { chord(i) };
     let d = |i: f64| m.chord_d(i);
@@ -123,7 +123,7 @@ fn machines_commission_themselves() {
     assert!(drive_base::math::wrap(r.axis - bench.angle()).abs() < 0.05, "the north pole");
 }
 
-/// At standstill, mode Standstill has the axis, and what mode Spin found by then.
+/// At standstill, mode Standstill gives the axis and the same results as mode Spin up to that stage.
 #[test]
 fn standstill_is_the_first_part_of_spin() {
     let motor = Motor::draw(1, 7);
@@ -348,7 +348,8 @@ fn a_rotor_that_is_held_or_loaded_gives_no_wrong_value() {
     }
 }
 
-/// Beyond psi_M / (L_q - L_d) = 12.5 A the rotor rests with its magnet beside the current, far beyond with its q-axis at it.
+/// Beyond psi_M / (L_q - L_d) = 12.5 A the rotor rests with its magnet at an angle to the current, far beyond with its q-axis
+/// along it.
 #[test]
 fn a_magnet_beside_the_current_swaps_no_inductance() {
     let motor = Motor::reluctance(50.0);
@@ -402,7 +403,7 @@ impl Errors {
 }
 
 /// Prints errors and half-widths in % (-100 and 100: refused), and compares those of 300 free machines of seed 1 with the
-/// limits: errors in % at 95 and 99 %, greatest share refused, share inside the intervals. `MACHINES`, `SEED` and `BLOCKED=1`
+/// limits: errors in % at 95 and 99 %, maximum share refused, share inside the intervals. `MACHINES`, `SEED` and `BLOCKED=1`
 /// select others, `FROM` skips the first ones.
 #[test]
 #[ignore = "ten minutes: cargo test --release -p drive-control --test commission population -- --ignored --nocapture"]

@@ -163,7 +163,8 @@ impl Motor {
         }
     }
 
-    /// A PM-assisted reluctance machine of 10/30 mH and 0.25 Wb: with more than 12.5 A, its magnet rests beside the current.
+    /// A PM-assisted reluctance machine of 10/30 mH and 0.25 Wb: with more than 12.5 A, its magnet rests at an angle to the
+    /// current.
     pub(crate) fn reluctance(I: f64) -> Self {
         let mut m = Self { n_p: 2.0, R: 0.42, L_d: 10e-3, L_q: 30e-3, psi: 0.25, J: 0.055, ..Self::default() };
         (m.B, m.tau_coulomb, m.w_coulomb) = (1e-3, 0.3, 0.16);
@@ -345,7 +346,7 @@ impl Bench {
         Phases { a, b, c }
     }
 
-    /// A command acts for a period, and this one waits.
+    /// A command acts for a period; this is the pending one.
     pub(crate) fn tick(&mut self, u: AlphaBeta, gates: bool) {
         let m = &self.motor;
         self.commands = [u, self.commands[0], self.commands[1]];

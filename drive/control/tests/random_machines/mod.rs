@@ -1,4 +1,4 @@
-//! Random machines of every kind, and a search through all currents that knows no algebra of field weakening.
+//! Random machines of every kind, and a search through all currents without the algebra of field weakening.
 
 #![allow(dead_code, reason = "each test program uses a part")]
 

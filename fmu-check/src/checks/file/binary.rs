@@ -1,4 +1,4 @@
-//! The binary as a file: its format, what it exports and what it needs (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
+//! The binary as a file: its format, its exports and its requirements (FMI 2.0.5, 2.3; FMI 3.0.2, 2.5).
 
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::checks::file::shared::libraries::{ALL3, COMMON2, COSIMULATION2, EXCHANGE2, libraries};
@@ -70,7 +70,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Send messages to the log callback, and write files only to a path given by a parameter." },
 ];
 
-/// The verdict from the findings about each of these libraries; what a rule cannot read is not determined.
+/// The verdict from the findings about each of these libraries; a library that a rule cannot read is not determined.
 fn of_each<'f>(
     libraries: impl IntoIterator<Item = &'f Binary>,
     rule: impl Fn(&Binary, &[u8]) -> Result<Vec<String>, String>,

@@ -1,4 +1,4 @@
-//! The FMU as a file: archive, description, terminals, libraries. Nothing of it runs.
+//! The FMU as a file: archive, description, terminals, libraries. None of its code runs.
 
 pub(crate) mod archive;
 pub(crate) mod binary;

@@ -211,8 +211,8 @@ fn independent(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// Whether the file omits the variability. The default of FMI 2.0 is continuous for every type; except for Real this
-/// is illegal, which V05 says, and the other checks read it as discrete.
+/// Whether the file omits the variability. The default of FMI 2.0 is continuous for every type; except for Real this is illegal,
+/// which V05 reports; the other checks read it as discrete.
 fn by_default(fmu: &FmuFile, v: &ModelVariable) -> bool {
     let element = fmu.element_of(v);
     element.is_some_and(|e| e.get("variability").is_none())

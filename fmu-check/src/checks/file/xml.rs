@@ -90,7 +90,7 @@ fn well_formed(fmu: &FmuFile) -> Verdict {
     Verdict::of(findings)
 }
 
-/// An attribute with a character that XML does not have, not even as a reference (XML 1.0, 2.2).
+/// An attribute with a character that XML does not allow, not even as a reference (XML 1.0, 2.2).
 fn forbidden(element: &Element) -> Option<String> {
     let is_bad = |c: char| (c < ' ' && !"\t\n\r".contains(c)) || matches!(c, '\u{fffe}' | '\u{ffff}');
     let bad = element.attributes.iter().find_map(|(name, value)| Some((name, value.chars().find(|c| is_bad(*c))?)));

@@ -202,7 +202,7 @@ fn plain_types(version: FmiVersion) -> Vec<BaseType> {
 
 const WAYS: [&str; 2] = ["Get", "Set"];
 
-/// Gets or sets, as `way` says, with arrays that may be NULL, each with its count.
+/// Gets or sets, depending on `way`, with arrays that may be NULL, each with its count.
 fn pass(
     instance: &Instance<'_>,
     way: &str,

@@ -40,7 +40,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Let Reset set structural parameters to their start values, and allocate arrays anew." },
 ];
 
-/// A structural parameter, and what it is changed to.
+/// A structural parameter, and its new value.
 #[derive(Clone, Copy)]
 struct Size<'a> {
     session: &'a Session,
@@ -103,7 +103,7 @@ impl<'a> Size<'a> {
     }
 }
 
-/// Reads so many values; also says whether nothing was written past them.
+/// Reads this number of values; also returns whether nothing was written past them.
 fn get(instance: &Instance<'_>, v: &ModelVariable, count: usize) -> Result<(Status, bool), NotDetermined> {
     let mut buffer = Buffer::room(v.base, instance.session.description.version, count);
     let status = instance.call(&format!("Get({}, nValues={count})", v.name), |raw| {
@@ -112,7 +112,7 @@ fn get(instance: &Instance<'_>, v: &ModelVariable, count: usize) -> Result<(Stat
     Ok((status, buffer.intact()))
 }
 
-/// The result of what the standard requires to succeed; a failure is a violation.
+/// The result of a call that the standard requires to succeed; a failure is a violation.
 fn succeeds<T>(session: &Session, what: &str, outcome: Result<T, NotDetermined>) -> Option<T> {
     outcome.map_err(|why| session.failed(what, why)).ok()
 }

@@ -1,4 +1,4 @@
-//! The life of an instance: which calls it allows, what it takes and keeps, saves and says.
+//! The life of an instance: the calls that it allows, the values that it accepts and keeps, its saved states and its messages.
 
 pub(crate) mod access;
 pub(crate) mod configuration;

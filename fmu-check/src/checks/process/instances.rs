@@ -98,7 +98,7 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
     free_others(session, all.into_iter().map(|(instance, _)| instance).collect())
 }
 
-/// Frees all instances but two, whose values must stay and which must run on.
+/// Frees all instances except two, which must keep their values and continue to run.
 fn free_others(session: &Session, mut all: Vec<Instance<'_>>) -> Result<(), NotDetermined> {
     let own = session.watched();
     let left = all.split_off(all.len().saturating_sub(2));

@@ -1,4 +1,4 @@
-//! What the FMU does to the process that runs it, and several of its instances.
+//! Effects of the FMU on the process that runs it, and several instances of the FMU.
 
 pub(crate) mod host;
 pub(crate) mod instances;

@@ -106,7 +106,7 @@ impl<'b> Stepper<'b> {
         self.leave_event_mode()
     }
 
-    /// A step of `h`, at most to the next event, and the event that it ends in: what it returned, and what was asked for.
+    /// A step of `h`, at most to the next event, and the event that it ends in: its result, and the request.
     fn step(&mut self, whole: f64) -> Result<(Status, StepResults, f64), NotDetermined> {
         let t = self.instance.time.get();
         let variable = self.instance.session.flag("canHandleVariableCommunicationStepSize");
@@ -131,7 +131,7 @@ impl<'b> Stepper<'b> {
     }
 }
 
-/// What is wrong with a step, from its status, its results, and its two ends as the importer asked for them.
+/// The fault of a step, from its status, its results, and its requested start and end.
 type Rule<'a> = &'a dyn Fn(&Stepper<'_>, Status, StepResults, [f64; 2]) -> Option<String>;
 
 /// Steps of one and of five communication steps, within the default experiment, for each combination of the two flags.

@@ -1,4 +1,4 @@
-//! Intermediate updates: what an FMU calls inside a step (FMI 3.0.2, 4.2.2).
+//! Intermediate updates: callbacks of an FMU inside a step (FMI 3.0.2, 4.2.2).
 
 use crate::check::{Check, Levels, Run};
 use crate::exchange::deviation;
@@ -72,7 +72,8 @@ fn updated(session: &Session, early_return: bool) -> Result<Instance<'_>, NotDet
 }
 
 impl Instance<'_> {
-    /// A communication step in whose callbacks the importer does this; what was called meanwhile, and the ends of the step.
+    /// A communication step with these actions of the importer in its callbacks; returns the calls made meanwhile, and the ends
+    /// of the step.
     fn step_updated(&self, acts: &[Inside]) -> Result<(Status, StepResults, Meanwhile, [f64; 2]), NotDetermined> {
         let (t, h) = (self.time.get(), self.session.h());
         let call = format!("DoStep(t={t:?}, h={h:?}), with {acts:?} in intermediateUpdate");

@@ -45,7 +45,7 @@ const INSTANTS: usize = 12;
 struct Schedule<'b> {
     instance: Instance<'b>,
     clocks: Vec<Ticking<'b>>,
-    /// What is done in each `clockUpdate`.
+    /// The actions in each `clockUpdate`.
     acts: Vec<Inside>,
 }
 
@@ -64,7 +64,7 @@ fn scheduled(session: &Session, locks: bool) -> Result<Instance<'_>, NotDetermin
 }
 
 impl<'b> Schedule<'b> {
-    /// A new instance in Clock Activation Mode. In a callback, each output clock is asked for so many times.
+    /// A new instance in Clock Activation Mode. In a callback, each output clock is queried this many times.
     fn start(session: &'b Session, locks: bool, times: usize) -> Result<Self, NotDetermined> {
         let instance = scheduled(session, locks)?;
         instance.enter()?;
@@ -189,7 +189,7 @@ fn too_early(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
-/// What is wrong with the locks of one call.
+/// The fault in the locks of one call.
 fn unpaired(heard: &[Heard]) -> Option<&'static str> {
     let mut locked = false;
     for heard in heard {

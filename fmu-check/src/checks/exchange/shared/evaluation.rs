@@ -1,4 +1,4 @@
-//! What an evaluation, the end of a step and a change of the mode must leave as it was (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
+//! State that an evaluation, the end of a step and a change of the mode must leave unchanged (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
 
 use crate::checks::life::shared::values::is_rounded;
 use crate::checks::process::instances::only_once;

@@ -1,4 +1,4 @@
-//! What the groups of this subject share.
+//! Code shared by the groups of this subject.
 
 pub(crate) mod clock_rules;
 pub(crate) mod clocked;

@@ -17,13 +17,13 @@ const SOURCES: [&str; 28] = [
     "mos", "py", "pyx", "go", "java", "pas", "adb", "o", "obj", "pdb",
 ];
 
-/// Folders of packages and compilers, whose sources stand in messages too.
+/// Folders of packages and compilers; messages also contain paths of their sources.
 const TOOLS: [&str; 4] = ["/.cargo/", "/.rustup/", "\\.cargo\\", "\\.rustup\\"];
 
 /// Further findings in one library are alike.
 const MOST: usize = 5;
 
-/// Reads what a program reads from its library, without the information for a debugger, and the start values of strings.
+/// Reads the parts of a library that are loaded at run time, without debug information, and the start values of strings.
 pub(crate) fn paths(fmu: &FmuFile) -> Verdict {
     let mut found = Vec::new();
     for binary in libraries(fmu) {

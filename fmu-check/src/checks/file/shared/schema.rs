@@ -52,7 +52,7 @@ fn walk(element: &Element, parent: &str, rules: &'static [Rule], findings: &mut 
     }
 }
 
-/// The attributes of the interfaces of FMI 3.0 that the standard does not have, although its schema allows any.
+/// Attributes of the interfaces of FMI 3.0 that the standard does not define, although its schema allows any.
 pub(crate) fn unknown_capabilities(root: &Element) -> Vec<String> {
     let mut findings = Vec::new();
     for element in

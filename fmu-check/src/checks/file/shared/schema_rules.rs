@@ -1,4 +1,5 @@
-//! What the standards allow in modelDescription.xml and terminalsAndIcons.xml: elements, attributes, and the order of children.
+//! Content that the standards allow in modelDescription.xml and terminalsAndIcons.xml: elements, attributes, and the order of
+//! children.
 //!
 //! One line per element: its path from the root, its attributes with their forms (`!` required), its children in order.
 //! Forms: `s` text, `b` boolean, `i` integer, `u` unsigned integer, `d` number, `t` date and time, `l` list of unsigned

@@ -8,7 +8,7 @@ use fmu_import::Status;
 use fmu_import::raw::{Buffer, Handle, Optional, Raw, SavedState, Simple, StepStatus, type_name};
 use model_description::{BaseType, Causality, CoSimulation, FmiVersion};
 
-/// Functions whose capability the FMU does not have.
+/// Functions of capabilities that the FMU does not have.
 fn unsupported_functions(session: &Session) -> Vec<&'static str> {
     let flag = |name| session.flag(name);
     let i = session.description.co_simulation.as_ref();

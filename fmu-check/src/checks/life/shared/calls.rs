@@ -104,7 +104,7 @@ pub(crate) fn attempt(session: &Session, life: Life, sign: char) {
     }
 }
 
-/// The calls that a check of this table makes, with the states: what the standard's tables of states say, for `--explain`.
+/// The calls that a check of this table makes, with the states from the standard's state tables, for `--explain`.
 pub(crate) fn explained(id: &str) -> Vec<String> {
     let (signs, life, columns): (_, _, &[(usize, &str)]) = match id {
         "L07" => ("+s", Life::CoSimulation, &[(0, "FMI 2.0"), (1, "FMI 3.0")]),
@@ -200,7 +200,7 @@ fn directional_derivative(instance: &Instance<'_>, _: State) -> Result<Status, N
     Ok(instance.sensitivity(Sensitivity::GetDirectionalDerivative, [&[unknown], &[known]], &seed)?.0)
 }
 
-/// Variables that a row needs were looked for before.
+/// The row's filter has already checked that such a variable exists.
 fn nothing() -> NotDetermined {
     NotDetermined("there is no such variable".into())
 }

@@ -18,7 +18,7 @@ fn exact(session: &Session) -> Vec<&ModelVariable> {
     session.numeric().filter(of_model).filter(|v| settable(v) && session.is_steady(v)).collect()
 }
 
-/// What was set when the FMU was instantiated is the value in the initialization, and the start value is back after a reset.
+/// A value set in state Instantiated persists in the initialization, and a reset restores the start value.
 pub(crate) fn stand(session: &Session) -> Result<(), NotDetermined> {
     let all = exact(session);
     if all.is_empty() {

@@ -73,7 +73,7 @@ pub(crate) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     }
 }
 
-/// What is set before Initialization Mode is still there in it: parameters, and in FMI 3.0 inputs.
+/// Values set before Initialization Mode persist in it: parameters, and in FMI 3.0 inputs.
 fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64>)]) -> Result<(), NotDetermined> {
     let fits = |v: &ModelVariable| {
         v.causality == Causality::Parameter || (v.causality == Causality::Input && !session.is_v2())
@@ -104,7 +104,7 @@ fn set_before_initialization(session: &Session, kept: &[(&ModelVariable, Vec<u64
     Ok(())
 }
 
-/// Whether a real variable has the values in single precision, which FMI 2.0 cannot say: it has one type of real numbers.
+/// Whether a real variable is stored in single precision; FMI 2.0 cannot express this, because it has one type of real numbers.
 pub(crate) fn is_rounded(v: &ModelVariable, version: FmiVersion, set: &[u64], got: &[u64]) -> bool {
     #[expect(clippy::cast_possible_truncation, reason = "rounds")]
     let rounded = |bits: &u64| f64::from(f64::from_bits(*bits) as f32).to_bits();

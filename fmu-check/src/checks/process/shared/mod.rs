@@ -1,4 +1,4 @@
-//! What the groups of this subject share.
+//! Code shared by the groups of this subject.
 
 pub(crate) mod copies;
 pub(crate) mod surroundings;

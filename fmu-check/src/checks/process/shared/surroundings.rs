@@ -1,4 +1,4 @@
-//! What an FMU must leave as it was: settings of the process, the folder of the FMU, and everything that outlives a run.
+//! State that an FMU must leave unchanged: settings of the process, the folder of the FMU, and everything that outlives a run.
 
 use crate::checks::process::shared::copies::{Files, MANY, failed, list, second_binary};
 use crate::session::{NotDetermined, Session};
@@ -91,7 +91,7 @@ pub(crate) fn written(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// What outlives a run: how many threads, and what is there.
+/// Remains after a run: the number of threads, and other resources.
 fn remaining() -> (usize, Vec<String>) {
     let links = fs::read_dir("/proc/self/fd").into_iter().flatten().flatten();
     // Reading the folder opens it, under a name that changes.

@@ -1,4 +1,4 @@
-//! What the groups of this subject share.
+//! Code shared by the groups of this subject.
 
 pub(crate) mod derivatives;
 pub(crate) mod plain_runs;

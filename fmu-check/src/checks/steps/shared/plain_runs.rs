@@ -126,7 +126,7 @@ impl<'b> Varying<'b> {
         Ok(())
     }
 
-    /// Adds a variable; whether it is new and deserves its own finding.
+    /// Adds a variable; returns whether it is new and needs a separate finding.
     fn is_new(&mut self, name: &str) -> bool {
         let new = self.names.insert(name.to_owned());
         if new {
