@@ -486,7 +486,7 @@ class Plane {
     element(box, "figcaption").append(element(document.createElement("span"), "b", {}, title));
     this.canvas = element(box, "canvas", { role: "img", "aria-label": `${title}: ${arrows.map((arrow) => arrow.name).join(", ")}` });
     const list = element(box, "p", { class: "legend" });
-    // The first one also tells the differences, as large figures.
+    // The first one also shows the differences, as large figures.
     this.readings = i ? [] : [...differences.values()].map((d) => {
       const item = element(list, "span", { class: "reading" }, `${d.name} `), value = element(item, "b");
       return (row) => { value.textContent = `${shown(seen(d.like, rec.columns.get(d.name)[row]))} ${scale(d.like)[0]}`; };
@@ -546,7 +546,7 @@ function address() {
   parts.push(`stop=${plan.stop ?? "none"}`, `rate=${$("rate").value}`, `step=${plan.step}`);
   return `#${parts.join("&")}`;
 }
-// The plan of an address; what is wrong in it is told once, the rest is used.
+// The plan of an address; errors in it are shown once, and the rest is used.
 function read(hash) {
   const given = new Map(hash.replace(/^#/, "").split("&").map((part) => [part.split("=")[0], part.slice(part.indexOf("=") + 1)])), wrong = [];
   const list = (key) => (given.get(key) ?? "").split(",").filter(Boolean);

@@ -309,7 +309,7 @@ function told(error) {
   post({ does: "fault", text, k });
 }
 
-// Every way into the code above: a fault is told, not thrown.
+// Every way into the code above: a fault is reported, not thrown.
 const guarded = (work) => (...given) => {
   try {
     const result = work(...given);
