@@ -28,8 +28,8 @@ struct ArtifactTarget {
     crate_types: Vec<String>,
 }
 
-/// Compiles the cdylibs of these packages, optimized, in a separate target folder (a `cargo` that waits for this program locks
-/// the usual one). Local paths are removed from the binaries, so that builds in two folders agree byte for byte.
+/// Compiles the cdylibs of these packages, optimized, in a separate target folder (if `cargo` runs this program, it locks the
+/// usual one). Local paths are removed from the binaries, so that builds in two folders agree byte for byte.
 ///
 /// # Errors
 /// Cargo fails; it has then printed the reason.

@@ -60,7 +60,7 @@ pub fn page(d: &Description, version: FmiVersion) -> String {
     document(d.model_name(), "", STYLE, &format!("{header}{contents}<main>\n{body}</main>\n"))
 }
 
-/// The icon of the FMU as part of the page: an SVG document without its declaration, described by the name beside it.
+/// The icon of the FMU as part of the page: an SVG document without its declaration, described by the adjacent name.
 fn icon(svg: &str) -> String {
     let svg = svg.find("<svg").map_or(svg, |at| &svg[at..]);
     format!("<div class=\"icon\" aria-hidden=\"true\">{}</div>\n", svg.trim())

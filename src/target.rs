@@ -64,8 +64,8 @@ impl Tools {
     /// A target by its name, with the tools for its build.
     ///
     /// # Errors
-    /// rustc does not know it, FMI has no platform for it, or its standard library or a linker is missing; the error says how
-    /// to get it.
+    /// rustc does not support the target, FMI has no platform for it, or its standard library or a linker is missing; the error
+    /// explains how to install it.
     pub fn target(&self, triple: &str) -> Result<Target> {
         let wrong = |cause: String| anyhow!("--target {triple}: {cause}");
         let mut rustc = rustc();

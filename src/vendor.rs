@@ -15,7 +15,7 @@ pub fn are_carried() -> bool {
     !FILES.is_empty()
 }
 
-/// The files below `vendor/` by name. Their manifests stand alone, without the workspace's settings, tests and benchmarks.
+/// The files below `vendor/` by name. Their manifests are self-contained, without the workspace's settings, tests and benchmarks.
 ///
 /// # Errors
 /// A manifest cannot be read.

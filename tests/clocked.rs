@@ -19,7 +19,7 @@ use fmi::*;
 const ERROR: c_int = 3;
 const SAMPLE: u32 = 1;
 
-/// What the importer sets at sample k: a start, a reversal, load steps.
+/// Inputs set by the importer at sample k: a start, a reversal, load steps.
 fn inputs(k: u32) -> (f64, f64) {
     let speed = [0.0, 50.0, 150.0, -100.0, 30.0][(k as usize / 20_000).min(4)];
     (speed, if k % 30_000 > 15_000 { 1.5 } else { 0.0 })

@@ -138,7 +138,7 @@ fn the_limits_of_the_estimators_are_those_of_the_grid() {
     shows("drive/control/docs/limits.html", &page, &format!("under 0.8 of the load: error {both_ways}"));
 }
 
-/// The results page shows what the command prints; `UPDATE_GOLDEN=1` writes it.
+/// The results page shows the output of the command; `UPDATE_GOLDEN=1` writes it.
 #[test]
 fn the_results_page_shows_what_is_printed() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/results.md");
@@ -197,7 +197,7 @@ fn what_is_outside_is_marked() {
     assert!(html.contains(" out\" title=\"expected 0.093") && html.contains(">0.200 ✗</td>"), "{html}");
 }
 
-/// Rasmussen's row is for another machine, and every table says so.
+/// Rasmussen's row is for another machine, and every table states this.
 #[test]
 fn another_machine_is_told_in_its_row() {
     let cells = of(grid(), &["Rasmussen", "ExtendedEmf"], &["generating-0.1"]);

@@ -1,5 +1,5 @@
 //! The packed FMUs in a drive train, in both standards: the integrated torque equals the counted energies, Model Exchange
-//! agrees with Co-Simulation, and a diverging coupling ends with an error that says so.
+//! agrees with Co-Simulation, and a diverging coupling ends with an error that names the cause.
 #![allow(missing_docs)]
 
 mod common;

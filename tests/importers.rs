@@ -122,7 +122,7 @@ fn cargo_with_libclang(arguments: &[&str]) -> Command {
     command
 }
 
-/// rust-fmi's crate `fmi` runs the pair of the FMI 2.0 archives. (Its reader of FMI 3.0 does not know units on variables.)
+/// rust-fmi's crate `fmi` runs the pair of the FMI 2.0 archives. (Its FMI 3.0 reader does not support units on variables.)
 #[test]
 #[ignore = "needs crates.io and PyPI, and builds 160 packages: some minutes"]
 fn rust_fmi() {
@@ -165,7 +165,7 @@ fn fmi_sim() {
     }
 }
 
-/// fmi-sim 0.7 does not know `A` and `K` of a unit, `unit`, `displayUnit`, `unbounded` and `nominal` of a variable in FMI 3.0.
+/// fmi-sim 0.7 does not support `A` and `K` of a unit, `unit`, `displayUnit`, `unbounded` and `nominal` of a variable in FMI 3.0.
 fn without_units(xml: &str) -> Vec<u8> {
     let (before, rest) = xml.split_once("<UnitDefinitions>").unwrap();
     let (_, after) = rest.split_once("</UnitDefinitions>").unwrap();

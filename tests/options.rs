@@ -1,4 +1,5 @@
-//! Every option of every command, in every mode of it, changes what the command does, or is refused with a message that names it.
+//! Every option of every command, in each of its modes, changes the behavior of the command or is refused with a message that
+//! names it.
 //!
 //! The options come from the command line itself: one without a value here fails the test. A row of [`COMMANDS`] has the values
 //! and the modes of a command. Each option is added to each mode; exit status, text and files are compared with those without it.
@@ -324,7 +325,7 @@ const COMMANDS: &[Options] = &[
     Options { command: "reproduce", values: &[], modes: &[] },
 ];
 
-/// What a run leaves: exit status, standard output, standard error, files.
+/// Results of a run: exit status, standard output, standard error, files.
 #[derive(PartialEq)]
 struct Left {
     status: Option<i32>,

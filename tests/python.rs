@@ -13,7 +13,7 @@ const TESTS: &str = "../python/tests";
 /// One environment with the tests of FMPy: it is created once.
 const REQUIREMENTS: &str = "../../tests/fmpy/requirements.txt";
 
-/// Installs the package into its own folder.
+/// Installs the package into a separate folder.
 fn installed() -> PathBuf {
     let python = environment(&package().join("tests").join(REQUIREMENTS));
     let folder = scratch().join(format!("fmurun-{}", process::id()));

@@ -314,7 +314,8 @@ fn changed(from: &str, name: &str, old: &str, new: &str) -> (tempfile::TempDir, 
     (dir, path.to_str().unwrap().to_owned())
 }
 
-/// SSPs of other tools: a connection has no direction, a prefix goes before names, the system's times before its parts'.
+/// SSPs of other tools: a connection has no direction, a prefix is added to names, and the times of the system override those of
+/// its parts.
 #[test]
 fn what_other_tools_write_runs_too() {
     let run = |path: &str, stop: &[&str]| {

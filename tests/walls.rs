@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Each crate with the crates of this workspace on which it may depend.
+/// Each crate, with the crates of this workspace that it may depend on.
 const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-core", &[]),
     ("fmu-export", &["fmu-core"]),
@@ -166,7 +166,7 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
     }
 }
 
-/// An estimator checks a small view of the controller, so the controller knows the estimators and they do not know it.
+/// An estimator checks a small view of the controller, so the controller depends on the estimators, and they do not depend on it.
 #[test]
 fn an_estimator_does_not_know_the_controller() {
     let mut files = Vec::new();

@@ -1,5 +1,5 @@
-//! The colors of the estimators, in every figure and on every page: the class of an estimator chooses the tones, its place
-//! among the estimators of these tones chooses the color. A new estimator takes the first color that is not in use.
+//! The colors of the estimators, in every figure and on every page: the class of an estimator determines the tones, and its
+//! position among the estimators of these tones determines the color. A new estimator takes the first color that is not in use.
 
 use drive::estimator::{Class, Kind};
 use fmu_plot::ink::Ink;

@@ -2,7 +2,7 @@
 //!
 //! - [`reproduce`]: the paper's experiments with packed FMUs.
 //! - [`compare`]: the estimators side by side.
-//! - [`atlas`]: what wrong estimates of resistance and magnet flux lose at low speed.
+//! - [`atlas`]: the effect of wrong estimates of resistance and magnet flux at low speed.
 //! - [`tune`]: parameter values for a machine.
 //! - [`map`]: efficiency over speed and torque.
 //! - [`identify`]: a machine's data from a record.

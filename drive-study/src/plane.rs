@@ -1,11 +1,11 @@
 //! The torque-speed plane, the losses and the efficiency map of the reference drive, drawn for the documentation page: curves from the
 //! equations of the steady state, dots from the running drive.
 //!
-//! To stack quantities, a [`Panel`] fills their sums down to zero, the greatest first.
+//! To stack quantities, a [`Panel`] fills their sums down to zero, the largest first.
 //!
-//! Steady state of a drive whose controller gets the torque `tau` and knows the machine but not the losses: at the samples, i is
-//! the current for `tau` under the voltage of field weakening. The voltage is held over T_s while the rotor turns; the mean
-//! current is i_s. With g = G w
+//! Steady state of a drive whose controller receives the torque `tau` and has exact machine values but no model of the losses: at
+//! the samples, i is the current for `tau` under the voltage of field weakening. The voltage is held over T_s while the rotor
+//! turns; the mean current is i_s. With g = G w
 //!
 //! ```text
 //! i_s = i + j w u T_s^2 / (12 L)

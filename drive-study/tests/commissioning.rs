@@ -1,4 +1,4 @@
-//! Self-commissioning of the machines in `motors/` on the project's plant: all that is accepted is true.
+//! Self-commissioning of the machines in `motors/` on the project's plant: every accepted result is true.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;

@@ -1,11 +1,11 @@
-//! In which order an importer exchanges the values of the pair, and how `timing.delay` shows: the numbers of
+//! The order in which an importer exchanges the values of the pair, and the effect of `timing.delay`: the numbers of
 //! `drive/control/docs/limits.html` and `docs/import.md`.
 //!
 //! The controller takes the currents at its sample k and shows the command of that sample, and theta^ for the instant one
 //! period later, at the end of the step. Jacobi: the currents are those of t_k, the command acts in [t_k + T_s, t_k + 2 T_s],
-//! theta^ is recorded at the instant that it is for. Controller first: the plant gets the command in the very step, delay 0.
-//! Plant first: the currents are those of t_k + T_s already and the command acts right from there, delay 0, but theta^ is the
-//! one for t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
+//! theta^ is recorded at the instant to which it applies. Controller first: the plant receives the command in the same step,
+//! delay 0. Plant first: the currents are already those of t_k + T_s and the command acts from that instant, delay 0, but theta^
+//! applies to t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "common/shows.rs"]

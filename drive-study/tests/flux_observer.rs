@@ -1,5 +1,5 @@
-//! The flux observer on the 2.2 kW machine: which cells of wrong resistance and magnet flux, load and low speed it holds,
-//! and the reversal under load.
+//! The flux observer on the 2.2 kW machine: the cells of wrong resistance and magnet flux, load and low speed that it holds, and
+//! the reversal under load.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;

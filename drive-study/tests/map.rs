@@ -1,5 +1,5 @@
-//! The efficiency map of `fmu map`: its points, reading between them, the energy of a driving cycle, the files, and what is
-//! refused.
+//! The efficiency map of `fmu map`: its points, reading between them, the energy of a driving cycle, the files, and refused
+//! requests.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::plant::losses::Losses;

@@ -1,4 +1,5 @@
-//! Energy between DC link, machine and shaft is balanced, and a shaft that a drive train turns is the free one's.
+//! Energy between DC link, machine and shaft is balanced, and a shaft turned by a drive train gives the same results as a free
+//! one.
 #![allow(missing_docs)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 

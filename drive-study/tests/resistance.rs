@@ -1,5 +1,5 @@
-//! Resistance adaptation of Rasmussen's observer: which cells of wrong resistance, wrong magnet flux, load and speed
-//! the reference drive holds with it, and without.
+//! Resistance adaptation of Rasmussen's observer: the cells of wrong resistance, wrong magnet flux, load and speed that the
+//! reference drive holds with and without it.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::Pair;

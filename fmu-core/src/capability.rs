@@ -1,4 +1,4 @@
-//! What a model can do beyond co-simulation: a table of its functions, built at compile time.
+//! Capabilities of a model beyond co-simulation: a table of its functions, built at compile time.
 //!
 //! A capability is a separate trait, named in the line that exports the model. A capability that is not named costs nothing:
 //! its entry is `None` at compile time.

@@ -121,7 +121,7 @@ pub trait ContinuousTime: Model {
 /// quantity between two points.
 ///
 /// A solver also tries states that it later rejects, and a model without this trait cannot distinguish them from accepted ones.
-/// In Co-Simulation, [`Model::advance`] knows the solution, and nothing here is called.
+/// In Co-Simulation, [`Model::advance`] computes the solution, and nothing here is called.
 pub trait CompletedSteps: ContinuousTime {
     /// The solution passes through the present states, inputs and time: a step of the importer's solver is complete, or Event
     /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time does not decrease from call to call, unless

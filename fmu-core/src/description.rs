@@ -55,7 +55,7 @@ pub struct Description {
     pub terminals: Vec<TerminalDescription>,
     /// Icon: an SVG document.
     pub icon: Option<String>,
-    /// What the model can do beyond co-simulation without events, if anything.
+    /// Capabilities of the model beyond co-simulation without events, if any.
     pub model_exchange: Option<ModelExchange>,
 }
 

@@ -66,7 +66,7 @@ impl<W, E: Enumerated> Place<W> for Field<W, E> {
 /// assert_eq!((Fan::of(2), Fan::of(3), Fan::On.value(), Fan::On.name()), (Some(Fan::On), None, 2, "On"));
 /// ```
 ///
-/// With `#[derive(Default)]`, one item is marked as the default. A model whose own `Default` names an item needs none.
+/// With `#[derive(Default)]`, one item is marked as the default. A model whose `Default` names an item does not need this.
 ///
 /// ```
 /// fmu_core::enumeration! {

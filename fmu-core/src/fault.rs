@@ -29,7 +29,7 @@ impl Fault {
         Self::new(format!("{name} = {value} is not allowed: {allowed}"))
     }
 
-    /// No error: the model has come to its end, and the simulation ends at `at`. [`Model::advance`](crate::Model::advance)
+    /// Not an error: the model has reached its end, and the simulation ends at `at`. [`Model::advance`](crate::Model::advance)
     /// returns it with the state of that instant; the importer is informed as its standard prescribes, and steps no further.
     pub fn end(at: Elapsed) -> Self {
         let message = format!("the model ends the simulation {} s after the start", at.seconds());

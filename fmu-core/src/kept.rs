@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Number of points after the last event that are kept. Stages of one step of a solver, and its retries, take fewer.
 const NEWEST: u8 = 8;
 
-/// What happens to the counts of a model with [`CompletedSteps`](crate::CompletedSteps).
+/// Events in the life of the counts of a model with [`CompletedSteps`](crate::CompletedSteps).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Account {
     /// Counts at an event: the importer goes back no further.

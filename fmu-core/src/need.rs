@@ -1,7 +1,7 @@
 //! Whether an importer must feed an input, expressed in its description: neither standard has an attribute for it.
 //!
 //! A row states it by [`Row::optional`](crate::Row::optional) or [`Row::read_with`](crate::Row::read_with). The sentence is
-//! written and parsed only here, so that an importer knows as much as the table.
+//! written and parsed only here, so an importer has the same information as the table.
 
 use std::fmt;
 

@@ -162,7 +162,7 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(TABLE.len(), 3 + 3 + 3 + 6 + 3 + 2 + 4 + 4);
 /// ```
 ///
-/// Other names of a variable, of which FMI 2.0 has none:
+/// Aliases of a variable, which FMI 2.0 does not have:
 ///
 /// ```
 /// # use fmu_core::unit::{DisplayUnit, METER};
@@ -199,7 +199,7 @@ pub(crate) enum Access<W: 'static> {
 /// # impl Clone for Model { fn clone(&self) -> Self { Self { ..*self } } }
 /// ```
 ///
-/// A part has its own table, which the whole sees under a prefix:
+/// A part has its own table, which the whole includes under a prefix:
 ///
 /// ```
 /// # use fmu_core::unit::OHM;

@@ -1,6 +1,6 @@
 //! Terminals: which variables belong together where models are connected, and pictures (FMI 3.0.2, 2.4.9).
 //!
-//! A terminal names variables of the table and adds nothing to them: an importer that knows no terminals loses nothing, and
+//! A terminal names variables of the table and adds nothing to them: an importer without support for terminals loses nothing, and
 //! the instantiation token does not change.
 
 use crate::rules::{demand, same_text};

@@ -1,8 +1,8 @@
 //! Quantities, units and display units: the constants that every variable table names.
 //!
-//! A [`Quantity`] is what a variable measures: it has a name (the type definition in the XML), a [`Unit`] with its SI base
-//! exponents, and at most one display unit that importers show by default. Each exists once: here or, for a quantity of the
-//! author, beside the author's model.
+//! A [`Quantity`] is the physical quantity of a variable: it has a name (the type definition in the XML), a [`Unit`] with its SI
+//! base exponents, and at most one display unit that importers show by default. Each exists once: here or, for a quantity defined
+//! by the author, next to the author's model.
 
 use serde::{Deserialize, Serialize};
 
@@ -78,7 +78,7 @@ impl Unit {
     }
 }
 
-/// What a variable measures: the type definition that it refers to.
+/// The physical quantity of a variable: the type definition that it refers to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantity {
     /// Name of the type definition, for example `Voltage`; no variable may have this name.

@@ -219,7 +219,7 @@ pub fn position(shape: &[usize], element: usize) -> String {
     format!("[{}]", indices.join(","))
 }
 
-/// The element that [`position`] writes in this way; `None` if the array has none.
+/// The element that [`position`] writes in this way; `None` if the array has no such element.
 pub fn element(shape: &[usize], position: &str) -> Option<usize> {
     let mut indices = position.strip_prefix('[')?.strip_suffix(']')?.split(',');
     let mut element = 0_usize;

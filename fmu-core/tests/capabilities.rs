@@ -5,7 +5,7 @@ use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::*;
 use serde::{Deserialize, Serialize};
 
-/// A state beside a sampled part.
+/// A state in addition to a sampled part.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Both {
     x: f64,

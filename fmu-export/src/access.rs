@@ -17,7 +17,7 @@ pub(crate) fn index<E: Exported>(reference: u32) -> usize {
     E::CAN.index(reference)
 }
 
-/// Whether the reference is that of `time`, which archives of FMI 2.0 do not have.
+/// Whether the reference is that of `time`, which exists only in FMI 3.0 archives.
 pub(crate) fn is_time(reference: u32, standard: Standard) -> bool {
     reference == TIME && standard == Standard::Fmi3
 }

@@ -17,7 +17,7 @@ use std::mem::MaybeUninit;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[repr(i32)]
 pub enum Qualifier {
-    /// The model does not know the interval yet.
+    /// The model has not determined the interval yet.
     NotYetKnown = 0,
     /// Unchanged since it was last reported.
     Unchanged = 1,

@@ -71,7 +71,7 @@ impl<E: Exported> Instance<E> {
     /// Updates the discrete states with the inputs as they are set. Tunable parameters take effect here, all together.
     ///
     /// # Errors
-    /// Tunable parameters that do not fit together, or what the model reports.
+    /// Tunable parameters that do not fit together, or an error of the model.
     pub fn update_discrete(&mut self) -> Result<Updated, Fault> {
         self.stale |= self.exchanges();
         let current = &mut self.current;

@@ -45,7 +45,7 @@ pub type Reply = Option<f64>;
 
 /// The action after a part of a step.
 pub(crate) enum Then {
-    /// The importer is called, and the step goes on.
+    /// The importer is called, and the step continues.
     Call(Pause),
     /// The step is done.
     Done(StepResult),

@@ -20,7 +20,7 @@ use std::ffi::CString;
 /// Why a call failed.
 #[derive(Debug)]
 pub enum Refusal {
-    /// Status Error: the instance goes to the Error state.
+    /// Status Error: the instance enters the Error state.
     Error(Fault),
     /// Status Discard: nothing changes.
     Discard(Fault),
@@ -76,7 +76,7 @@ pub struct Instance<E: Exported> {
     pub(crate) made: Option<Box<Block<E::Model>>>,
     /// The properties of the clocks, for a model with clocks.
     pub(crate) clocks: Option<Box<Clocks>>,
-    /// What the importer does inside communication steps.
+    /// Requests of the importer inside communication steps.
     pub(crate) inside: Option<Box<IntermediateUpdates<E::Model>>>,
     /// Keys of the warnings of the last second, and the times of their messages.
     warned: Vec<(&'static str, f64)>,
@@ -271,7 +271,7 @@ impl<E: Exported> Instance<E> {
     }
 
     /// A step of a sampled model for an importer that handles its events, or takes steps that end early. Every sample reads the
-    /// inputs set at its instant, or else those set last.
+    /// inputs set at its instant or, if none were set, the last ones.
     fn step_to_event(&mut self, t: f64, h: f64) -> Result<StepResult, Fault> {
         let Some(samples) = &E::CAN.samples else { return Ok(StepResult::default()) };
         let event_mode = self.current.life.handles_events();

@@ -74,8 +74,8 @@
 //!
 //! Layers, from the bottom: [`lifecycle`] (which call is allowed in which state), [`value`] (C types and base types),
 //! [`snapshot`] (everything that changes), [`blob`] and [`registry`] (states as bytes and as handles), [`log`], [`instance`],
-//! [`exchange`], [`clocks`], [`inside`] and [`sensitivity`] (the calls without C), and [`abi`] (pointers). The crate knows
-//! neither motors nor XML; only [`abi`] contains `unsafe`.
+//! [`exchange`], [`clocks`], [`inside`] and [`sensitivity`] (the calls without C), and [`abi`] (pointers). The crate contains
+//! nothing about motors or XML; only [`abi`] contains `unsafe`.
 
 #![deny(unsafe_code)]
 

@@ -223,7 +223,7 @@ pub enum Call {
     Shift,
     /// `fmi3ActivateModelPartition`.
     Activate,
-    /// A capability that this FMU does not have: refused in every state, with that reason.
+    /// A capability that this FMU lacks: refused in every state, for this reason.
     Unsupported,
 }
 

@@ -16,7 +16,7 @@ pub(crate) fn name<M: Model>(index: usize) -> String {
     }
 }
 
-/// [`name`] with the present sizes of arrays, by which a description counts the elements of a matrix.
+/// [`name`] with the present sizes of arrays, which determine the indices of a matrix in a description.
 pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String {
     if const { !M::TABLE.has_sizes() } {
         return name::<M>(index);

@@ -17,7 +17,7 @@ const READS_FILES: bool = !cfg!(target_family = "wasm");
 /// A model before it loads its resources.
 pub(crate) struct Made<M: Model> {
     pub(crate) block: Block<M>,
-    /// What stands after the model's token; empty without a preset.
+    /// Suffix of the model's token; empty without a preset.
     pub(crate) suffix: String,
 }
 

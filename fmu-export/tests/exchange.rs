@@ -328,7 +328,7 @@ fn instances_that_this_fmu_cannot_be() {
     assert_eq!(fmu.step(0.0, 1.0), (OK, Stepped { end: 1.0, ..Stepped::default() }));
 }
 
-/// FMI 3.0.2, 3.2.1: time goes back as far as the last completed step; here as far as the last event, and no further.
+/// FMI 3.0.2, 3.2.1: time goes back as far as the last completed step; here at most to the last event.
 #[test]
 fn time_goes_back_to_the_last_event() {
     for kind in ME {

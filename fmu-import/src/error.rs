@@ -11,10 +11,10 @@ pub enum Error {
     File {
         /// Path of the file that cannot be used.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         cause: String,
     },
-    /// A name, a type or a value that the FMU does not have or accept.
+    /// A name, a type or a value that does not exist in the FMU or that it does not accept.
     #[error("{instance}: {cause}")]
     Usage {
         /// Name of the instance.

@@ -1,7 +1,7 @@
 //! Every limit on files and on processes that run FMUs, each with a message.
 //!
-//! They apply to all commands, and keep the static checks of a file below 512 MB and 20 s. The limits of descriptions are
-//! beside their reader.
+//! They apply to all commands, and keep the static checks of a file below 512 MB and 20 s. The limits of descriptions are defined
+//! with their reader, in `model-description`.
 
 use model_description::limits;
 pub use model_description::limits::{DEPENDENCIES, LEVELS, Limit, NODES, VALUES, VARIABLES, XML};

@@ -67,7 +67,8 @@ impl Platform {
     }
 
     /// The folders under `binaries/` to look in, the one to write to first. FMI 2.0.5, 2.3 names three of 64 bits, which do not
-    /// depend on the processor, and lets others use the tuples of FMI 3.0. Many importers know only those three, even on ARM.
+    /// depend on the processor, and lets others use the tuples of FMI 3.0. Many importers recognize only those three, even on
+    /// ARM.
     pub fn folders(self, version: FmiVersion) -> Vec<&'static str> {
         match (version, self) {
             (FmiVersion::V2, Self::X64Linux) => vec!["linux64", self.tuple()],

@@ -110,7 +110,7 @@ impl Values {
     /// The start value of a variable, all elements of an array.
     ///
     /// # Errors
-    /// It has none, or one of another type.
+    /// It has no value, or one of another type.
     pub fn start(variable: &ModelVariable, description: &ModelDescription) -> Result<Self, String> {
         match variable.base {
             BaseType::String if !variable.start_texts.is_empty() => Ok(Self::Strings(variable.start_texts.clone())),

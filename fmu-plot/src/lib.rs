@@ -1,4 +1,4 @@
-//! Figures, and pages that need no network. The crate knows neither motors nor FMUs.
+//! Figures, and pages that need no network. The crate contains nothing about motors or FMUs.
 //!
 //! - [`figure`]: the content of a figure; its author chooses the colors of the curves.
 //! - [`svg`]: draws a figure as SVG.

@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 
 /// Width and height of a panel in pixels: of one column, of several.
 const SIZE: [(f64, f64); 2] = [(1060.0, 240.0), (520.0, 270.0)];
-/// Space for the legend: beside the panels of one column, above those of several.
+/// Space for the legend: next to the panels of one column, above those of several.
 const BESIDE: f64 = 240.0;
 const ABOVE: f64 = 22.0;
 /// Vertical distance of two names.

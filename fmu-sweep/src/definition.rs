@@ -143,7 +143,7 @@ pub struct MeasureDefinition {
     pub is: MeasureFunction,
     /// Period to which the sum is wrapped (±period/2): a number or a multiple of pi such as `2pi`.
     pub wrap: Option<SetValue>,
-    /// Time in s from which on values count; by default the start.
+    /// Time in s from which values count; by default the start.
     pub after: Option<f64>,
     /// Time in s, of `at`.
     pub time: Option<f64>,

@@ -451,7 +451,7 @@ impl Runner {
         self.reuse = reuse;
     }
 
-    /// Runs with a value for each variable. `trace` sees the time and the traced variables of every communication point.
+    /// Runs with a value for each variable. `trace` receives the time and the traced variables at every communication point.
     pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> RunResult {
         let Self { plan, worker, variables, states, .. } = self;
         let Shared { measures, trace: traced, .. } = &*plan.0;

@@ -270,7 +270,7 @@ fn push_value(text: &mut String, items: &[(i64, String)], x: f64) {
     }
 }
 
-/// A number that reads back to the same double, in few characters.
+/// A number in few characters that reads back as the same double.
 fn push_number(text: &mut String, x: f64) {
     let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite();
     // Writing to a String cannot fail.

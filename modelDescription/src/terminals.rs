@@ -5,7 +5,7 @@
 pub struct TerminalsAndIcons {
     /// The standard that defines the file: 3.0, in an FMU of FMI 2.0 as well.
     pub fmi_version: String,
-    /// The coordinate system; the standard's default if the file has none.
+    /// The coordinate system; the standard's default if the file does not specify one.
     pub coordinates: CoordinateSystem,
     /// Position of the FMU's icon.
     pub icon: Option<Area>,

@@ -67,7 +67,7 @@ impl Plan {
         })
     }
 
-    /// What was noticed while the files were opened and connected.
+    /// Notes from opening and connecting the files.
     fn notes(&self) -> Vec<String> {
         self.plan.notes().to_vec()
     }

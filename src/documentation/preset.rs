@@ -6,8 +6,8 @@ use fmu_core::description::Variable;
 use fmu_core::preset::FILE;
 use std::fmt::Write;
 
-/// The documentation of `preset`, whose model starts with the values of `own`: a line before that of the model, and a table
-/// after it.
+/// The documentation of `preset`, a model that starts with the values of `own`: a line before the documentation of the model, and
+/// a table after it.
 pub fn preset(preset: &Description, own: &Description) -> String {
     let pairs: Vec<(&Variable, &Variable)> =
         preset.variables.iter().zip(&own.variables).filter(|(new, old)| new.start != old.start).collect();

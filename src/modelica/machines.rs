@@ -22,7 +22,7 @@ pub(super) struct Machine {
 /// Reads machines, with the names that their values have in the FMU.
 ///
 /// # Errors
-/// A file is wrong; the FMU does not have the variables of a machine; two files have one name.
+/// A file is invalid; the FMU lacks the variables of a machine; two files have the same name.
 pub(super) fn read(files: &[PathBuf], interface: &Interface) -> Result<Vec<Machine>> {
     let mut all: Vec<Machine> = Vec::new();
     for file in files {

@@ -1,4 +1,4 @@
-//! The author's configuration of a page: `page.toml`, beside the package's `Cargo.toml`.
+//! The author's configuration of a page: `page.toml`, next to the package's `Cargo.toml`.
 
 use fmu_core::Description;
 use fmu_core::description::{Variable, VariableKind};

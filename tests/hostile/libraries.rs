@@ -138,7 +138,7 @@ fn a_library_that_stops_itself_is_found() {
     });
 }
 
-/// A signal to the process group of an FMU ends no other process: here the shell that has started the command in its own group.
+/// A signal to the process group of an FMU ends no other process: here the shell that started the command in its own group.
 #[test]
 fn the_group_of_the_caller_survives() {
     if library().is_none() {
@@ -159,7 +159,7 @@ fn the_group_of_the_caller_survives() {
     }
 }
 
-/// The FMU connects to this test; with `--sandbox` it cannot, or the command says that there is no sandbox.
+/// The FMU connects to this test; with `--sandbox` it cannot, or the command reports that no sandbox is available.
 #[test]
 fn a_sandbox_has_no_network() {
     if library().is_none() {

@@ -5,7 +5,7 @@ use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, Solver, 
 use std::ops::ControlFlow;
 use std::path::Path;
 
-/// An input over time: values that hold from their times on, or straight lines between them.
+/// An input over time: values that apply from their times on, or straight lines between them.
 pub struct Input {
     pub name: &'static str,
     pub points: &'static [(f64, f64)],

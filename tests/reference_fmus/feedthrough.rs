@@ -27,7 +27,7 @@ fn run(name: &str, inputs: &str) -> Recording {
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap()
 }
 
-/// 34 variables beside time, with the value references of the original's ValueReference.
+/// 34 variables in addition to time, with the value references of the original's ValueReference.
 #[test]
 fn its_variables_are_those_of_the_original() {
     let fmu = open("feedthrough");

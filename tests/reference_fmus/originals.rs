@@ -1,4 +1,4 @@
-//! The originals in C beside the rewrites, in one importer.
+//! The originals in C and the rewrites, in one importer.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! One run: the course of speed and load, what counts as lost, and whether `lock_lost` reports it.
+//! One run: the course of speed and load, the criteria of a lost rotor, and whether `lock_lost` reports it.
 //!
 //! Every run has an approach, then a load, and it is judged at its end. Shares are of rated speed and torque:
 //!

@@ -1,6 +1,6 @@
-//! An estimator with the drive that it is compared on.
+//! An estimator, with the drive used for its comparison.
 //!
-//! All estimators but one run on the 2.2 kW machine with interior magnets, with the gains of the review's figures
+//! All estimators except one run on the 2.2 kW machine with interior magnets, with the gains of the review's figures
 //! ([`crate::runner`]). Rasmussen's observer is for machines without saliency. It runs on its own reference motor with
 //! its own gains (the start values of the FMUs, R^ = 0.9 R), where 1 pu of torque is the 2 N.m of the paper's load
 //! steps. 1 pu of speed is 1500 rpm on both machines.

@@ -1,4 +1,4 @@
-//! Field weakening: to a multiple of the base speed, and there more load than the machine can carry.
+//! Field weakening: acceleration to a multiple of the base speed, and there a load above the capability of the machine.
 //!
 //! The base speed n_b is that of the true machine at its maximum current and 0.95 u_dc / sqrt 3; the envelope is also that of the
 //! true machine, under the limits of each estimator.

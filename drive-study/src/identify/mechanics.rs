@@ -1,4 +1,4 @@
-//! Fit of inertia and friction to the torque that the currents make:
+//! Fit of inertia and friction to the torque produced by the currents:
 //!
 //! ```text
 //! J [w_m] + B int(w_m) + tau_coulomb int(tanh(w_m / (0.003 w_max))) = int(tau_e - tau_load)

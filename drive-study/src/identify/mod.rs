@@ -1,9 +1,9 @@
 //! A machine's data from a record of a running drive with an angle: resistance with the inverter's dead time, inductances, magnet
-//! flux, inertia and friction, each with an interval, or with the reason why the record does not tell it.
+//! flux, inertia and friction, each with an interval, or with the reason why the record does not determine it.
 //!
 //! - [`columns`]: headers, units, forms of columns. [`record`]: the checked record. [`motion`]: angle and speed.
 //! - [`windows`]: the voltage equations in integral form; [`electrical`]: their linear fit; [`legs`]: the inverter's curve in it.
-//! - [`mechanics`]: inertia and friction. [`interval`]: half-widths. [`verdict`]: what is written and what is refused.
+//! - [`mechanics`]: inertia and friction. [`interval`]: half-widths. [`verdict`]: accepted and refused values.
 //! - [`machine_file`]: the file for `fmu tune`. [`page`]: the fits together with the record.
 //! - [`run`]: the machine of a run of the self-commissioning instead.
 

@@ -3,11 +3,11 @@
 //! The table has the columns `i_d,i_q,psi_d,psi_q` and may have `torque`; peak values, in any order, scattered or on a grid. The
 //! current of [`FluxMap`] is linear in its coefficients, so the fit is linear least squares of the currents at the flux
 //! linkages of the table; no inversion of the table is needed. Where the table has no point, a penalty on third differences
-//! continues the energy with constant curvature. The axis of the map is moved so that there is no current at the flux linkage
-//! of the magnet, which becomes `motor.psi_M` of the plant.
+//! continues the energy with constant curvature. The map is shifted so that the current is zero at the flux linkage of the
+//! magnet, which becomes `motor.psi_M` of the plant.
 //!
-//! A table that is not reciprocal (d psi_d/d i_q = d psi_q/d i_d) has no energy: the fit leaves a residue. Swapped axes, the sign
-//! of i_d and rms values for peak values show so, or in the torque, or in psi_M.
+//! A table that is not reciprocal (d psi_d/d i_q = d psi_q/d i_d) has no energy: the fit leaves a residue. Swapped axes, a wrong
+//! sign of i_d, and rms values instead of peak values show in this residue, in the torque or in psi_M.
 
 mod judge;
 mod squares;

@@ -1,7 +1,7 @@
-//! Refuses values that no machine has, which are mostly those in another unit: 36 H for 36 mH, rpm for rad/s, g.cm2 for
+//! Refuses implausible values, which are mostly values in another unit: 36 H for 36 mH, rpm for rad/s, g.cm2 for
 //! kg.m2.
 //!
-//! Each check forms a ratio of the value to the others of the file, and says in which range that is for machines: L i / psi_M
+//! Each check forms a ratio of the value to others in the file, and states the range of this ratio for real machines: L i / psi_M
 //! at the maximum current; R_s i against u_dc; the EMF at rated speed against u_dc / sqrt(3); the time in which the rated
 //! torque reaches the rated speed; the rated torque against that of the maximum current; the
 //! highest speed against the rated speed.

@@ -1,8 +1,8 @@
 //! The rules for Rasmussen's observer.
 //!
 //! w_n = observer, zeta = 1; c_1 = 4 |R - R^| i_0 / psi_M within 50..200 1/s, c_2 = c_1 / 50; K i_0 = 1.35 times the rated torque;
-//! w_0 = 30 rad/s electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the greatest
-//! electrical acceleration alpha = n_p K i_q / J.
+//! w_0 = 30 rad/s electrical within 5..40 rad/s mechanical; w_s <= w_n / 3; w_n >= sqrt(alpha / 0.35) with the maximum electrical
+//! acceleration alpha = n_p K i_q / J.
 //!
 //! A resistance that is not adapted ([`adaptation`](super::adaptation)) is R^ = 0.9 R: the safe side at standstill, where R^ > R runs
 //! away. At rest on i_0 the estimate then drifts by (R - R^) i_0 / psi_M, and the rotor swings about it with w_0 = sqrt(n_p K i_0 / J). The rules choose R^
@@ -10,8 +10,8 @@
 //! - closer to R where the drift would exceed w_0: the rotor is too heavy to follow the estimate;
 //! - closer to R where (R - R^) i with the rated torque would exceed 0.15 of the EMF at 0.1 pu: the estimate turns away by c_1
 //!   (R - R^) i / (w^2 psi_M), less torque remains, the current rises, and the estimate turns further;
-//! - farther from R where the drift would be less than 0.025 w_0: from the opposite angle, the speed loop brings i_q to its limit
-//!   before the rotor has come round. At an angle near atan(i_q / i_0) from the rotor, the currents produce no torque, and only
+//! - farther from R where the drift would be less than 0.025 w_0: from the opposite angle, the speed loop drives i_q to its limit
+//! before the rotor has turned around. At an angle near atan(i_q / i_0) from the rotor, the currents produce no torque, and only
 //! the drift leads away from there.
 //!
 //! The shares 0.15 and 0.025 are found by trial on machines from 5 W to 300 kW.

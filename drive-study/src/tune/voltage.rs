@@ -1,4 +1,4 @@
-//! The limits of the DC link: field weakening where the rated point or the highest speed needs it, and the torque there.
+//! The limits of the DC link: field weakening if the rated point or the highest speed needs it, and the torque there.
 //!
 //! The references may use U = k_u u_dc / sqrt 3. The rated torque at the rated speed must fit, with field weakening if need be;
 //! at the highest speed, that of the rated power.

@@ -1,5 +1,5 @@
-//! A drive on a test bench, as a record for `fmu identify`: the pair of plant and controller runs without a sensor of its angle; beside
-//! it, the bench logs an encoder of 4096 steps, a torque sensor, and what the controller sees of the currents.
+//! A drive on a test bench, as a record for `fmu identify`: the pair of plant and controller runs without an angle sensor; the
+//! bench also logs an encoder of 4096 steps, a torque sensor, and the currents measured by the controller.
 
 use drive::Pair;
 use drive::estimator::Kind;

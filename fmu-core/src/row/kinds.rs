@@ -80,7 +80,7 @@ constructors! {
     [] (name: &'static str, quantity: &'static Quantity, description: &'static str, get: fn(&mut W) -> &mut f32)
         => Self::new(name, description, Kind::Float32(quantity), Access::Float32(get));
     /// A real input in single precision, which changes at sample instants unless it is [`continuous`](Row::continuous). FMI 2.0
-    /// has double precision only: what the importer sets is rounded.
+    /// has double precision only: values from the importer are rounded.
     float32_input Input Discrete;
     /// A real output in single precision, which changes at sample instants.
     float32_output Output Discrete;

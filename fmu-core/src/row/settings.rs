@@ -34,7 +34,7 @@ impl<W: 'static> Row<W> {
 
     /// The importer may set the start value of this output or local variable, before the initialization and in it. The start
     /// value is that of the model's `Default`; [`initialize`](crate::Model::initialize) leaves it alone. The row of a state sets
-    /// the state itself; the closure of another row leads to a field of the model, which its outputs do not have.
+    /// the state itself; the closure of any other row must refer to a field of the model, not to one of its outputs.
     ///
     /// # Panics
     /// At compile time, if the variable is not an output or a local variable, or is a text, bytes, a mean or a constant. Describing the
@@ -80,7 +80,7 @@ impl<W: 'static> Row<W> {
         self
     }
 
-    /// Makes an array a matrix, or an array of more dimensions: its extents, of which the product is the number of elements.
+    /// Makes an array a matrix or an array of more dimensions; the product of the extents is the number of elements.
     /// The elements are row by row, as `as_flattened_mut` of `[[f64; COLUMNS]; ROWS]` gives them.
     ///
     /// # Panics

@@ -11,7 +11,7 @@ use fmu_core::{Exported, Fault, Model};
 use std::ffi::c_char;
 
 /// # Errors
-/// A pointer that is NULL or not aligned, a count that does not fit, or what the instance refuses.
+/// A pointer that is NULL or not aligned, a count that does not fit, or a refusal by the instance.
 ///
 /// # Safety
 /// For every function here, the importer follows the standard: a pointer to an array is NULL or points to as many elements
@@ -285,7 +285,7 @@ impl<E: Exported> Abi<'_, E> {
         Ok(self.0.input_derivatives(vr, orders, values)?)
     }
 
-    /// A function of a capability that this FMU does not have.
+    /// A function of a capability that this FMU lacks.
     pub fn unsupported(&mut self, why: &str) -> Answer {
         Err(Fault::new(format!("not supported: {why}")).into())
     }

@@ -1,5 +1,5 @@
 //! The text of a panic where panics do not unwind: in a module of WebAssembly, a panic ends the call in the host, which then
-//! asks for the text.
+//! reads the text.
 
 use super::gate::panicked;
 use super::types::Text;

@@ -69,7 +69,7 @@ impl<E: Exported> Abi<'_, E> {
         open::<E>(entry, Log::new(Box::new(sink), logging_on.0 != 0), judged, resources, interface, steps)
     }
 
-    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information. If the importer has asked for
+    /// FMI 3.0.2, 4.2.1. Without Event Mode and early return, only the time carries information. If the importer has requested
     /// intermediate updates, the step is taken in parts.
     ///
     /// # Safety
@@ -303,7 +303,7 @@ const fn announces<E: Exported>() -> bool {
     E::Model::TABLE.announces()
 }
 
-/// Scheduled Execution knows no Discard (FMI 3.0.2, 5.2).
+/// Scheduled Execution has no status Discard (FMI 3.0.2, 5.2).
 fn as_error(refusal: Refusal) -> Refusal {
     match refusal {
         Refusal::Discard(fault) | Refusal::Error(fault) => Refusal::Error(fault),

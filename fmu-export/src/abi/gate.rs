@@ -84,7 +84,7 @@ impl<E: Exported> Handle<E> {
 }
 
 thread_local! {
-    /// The handle whose callback this thread runs: its calls have the lock already, and those of other threads wait for it.
+    /// The handle whose callback this thread runs: its calls already have the lock, and those of other threads wait for it.
     static CALLING: Cell<*const ()> = const { Cell::new(std::ptr::null()) };
 }
 

@@ -99,7 +99,7 @@ impl Shared {
         self.draw.borrow_mut().below(n)
     }
 
-    /// A call that `may` succeed has come to its end.
+    /// A call that `may` succeed has ended.
     fn done(&self, status: c_int, may: bool) -> bool {
         assert_eq!(status, if may { OK } else { ERROR }, "{}", self.trace.borrow());
         let count = &self.calls[usize::from(!may)];

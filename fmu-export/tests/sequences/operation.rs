@@ -39,7 +39,7 @@ pub(crate) enum Kind {
     Foreign(u8),
 }
 
-/// What is wrong with the arrays of a getter or setter.
+/// Fault in the arrays of a getter or setter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Arrays {
     Good,

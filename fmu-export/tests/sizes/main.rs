@@ -1,4 +1,4 @@
-//! Structural parameters, arrays whose sizes they are, and arrays of states.
+//! Structural parameters, arrays whose sizes they determine, and arrays of states.
 #![allow(missing_docs)]
 #![allow(
     clippy::float_cmp,

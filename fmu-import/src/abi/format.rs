@@ -166,7 +166,7 @@ impl Conversion<'_> {
         }
     }
 
-    /// An integer of this length as a `long long`; `None` for a length that C does not have.
+    /// An integer of this length as a `long long`; `None` for a length that does not exist in C.
     #[expect(clippy::cast_possible_truncation, reason = "the low bits are the value")]
     fn integer(&self, word: u64) -> Option<i64> {
         let signed = matches!(self.letter, b'd' | b'i');

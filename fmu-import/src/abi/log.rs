@@ -37,7 +37,7 @@ impl Status {
     /// No instance of this FMU can be used any more.
     pub const FATAL: Self = Self(4);
 
-    /// The step goes on (FMI 2.0).
+    /// The step continues (FMI 2.0).
     pub const PENDING: Self = Self(5);
 
     /// Whether the call succeeded: OK or Warning.

@@ -1,6 +1,6 @@
 //! Clocks of an instance (FMI 3.0.2, 2.2.8): the facade generates their ticks, so that the user of an instance sees time
-//! events. Clocked variables are read and set while the clock is active; at other times, a read returns the last value, and a
-//! set value waits.
+//! events. Clocked variables are read and set while the clock is active; at other times, a read returns the last value, and a set
+//! value is stored until the next tick.
 
 use super::Instance;
 use crate::abi::journal::Call;

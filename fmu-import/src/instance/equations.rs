@@ -138,7 +138,7 @@ impl Instance {
     /// Partial derivatives of the unknowns in the direction of the seed of the knowns, both by value reference.
     ///
     /// # Errors
-    /// The FMU refuses or has none, or an array does not have the length of its list.
+    /// The FMU refuses or has no such values, or an array differs in length from its list.
     pub fn directional_derivative(
         &mut self,
         unknowns: &[u32],
@@ -170,7 +170,7 @@ impl Instance {
     /// Derivatives of outputs with respect to time at the end of the last step (Co-Simulation).
     ///
     /// # Errors
-    /// The FMU refuses or has none, or the arrays have different lengths.
+    /// The FMU refuses or has no such derivatives, or the arrays have different lengths.
     pub fn output_derivatives(&mut self, references: &[u32], orders: &[i32], values: &mut [f64]) -> Result<(), Error> {
         self.call(Call::Evaluation, |s| s.output_derivatives(references, orders, values))
     }

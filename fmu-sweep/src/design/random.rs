@@ -24,7 +24,7 @@ pub(super) fn unit(bits: u64) -> f64 {
     middle / 4_503_599_627_370_496.0
 }
 
-/// Where `row` goes in a permutation of `0..count` that `key` selects: a Feistel network over an even number of bits, walked
+/// The position of `row` in a permutation of `0..count` that `key` selects: a Feistel network over an even number of bits, walked
 /// until it lands in the range.
 pub(super) fn permuted(key: u64, row: u64, count: u64) -> u64 {
     let bits_of_count = u64::BITS - count.saturating_sub(1).leading_zeros();

@@ -38,7 +38,7 @@ pub(super) fn solve(exchange: &mut Exchange, instances: &mut [Instance], t: f64)
     }
 }
 
-/// Iterates these inputs until they are what the outputs pass on.
+/// Iterates these inputs until they equal the outputs passed on to them.
 fn newton(exchange: &mut Exchange, instances: &mut [Instance], t: f64, inputs: &[Unsettled]) -> Result<(), Error> {
     let (mut u, mut last) = (exchange.values_of(inputs), f64::INFINITY);
     for _ in 0..ITERATIONS {

@@ -128,7 +128,7 @@ impl Parts {
         Ok(port)
     }
 
-    /// The variable of this name, or the array of which it names an element.
+    /// The variable of this name, or the array that contains the named element.
     pub(super) fn variable(&self, instance: usize, name: &str) -> Result<&ModelVariable, Error> {
         let part = &self.0[instance];
         let names = || part.description().variables.iter().map(|v| v.name.as_str());

@@ -252,8 +252,8 @@ impl Worker {
         &self.plan
     }
 
-    /// Runs from start to stop with these values in addition to those set in the system. `hook` sees the time and the recorded
-    /// values of every communication point, and may end the run. A run does not depend on those before it.
+    /// Runs from start to stop with these values in addition to those set in the system. `hook` receives the time and the
+    /// recorded values at every communication point, and may end the run. A run does not depend on those before it.
     ///
     /// # Errors
     /// An FMU refuses a value or a call. The next run has new instances.

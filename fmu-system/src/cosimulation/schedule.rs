@@ -113,8 +113,8 @@ impl Schedule {
 }
 
 impl Schedule {
-    /// Value at time `t` (s) of a run whose last event was at `since`: every point is an event, so steps hold until the next
-    /// one, and do not change before it.
+    /// Value at time `t` (s) of a run whose last event was at `since`: every point is an event, so a step keeps its value until
+    /// the next one.
     pub(super) fn held(&self, since: f64, t: f64) -> f64 {
         self.at(if self.linear { t } else { since })
     }

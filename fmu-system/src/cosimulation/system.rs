@@ -84,8 +84,8 @@ impl System {
     }
 
     /// The settings that the FMUs can follow: where one cannot vary its step (`canHandleVariableCommunicationStepSize` is false), no
-    /// shorter last step. What that changes is a [note](Self::take_notes), and so is a step that an FMU's `fixedInternalStepSize`
-    /// does not divide, and an input that jumps between two communication points.
+    /// shorter last step. A resulting change is reported as a [note](Self::take_notes), as are a step that an FMU's
+    /// `fixedInternalStepSize` does not divide, and an input that jumps between two communication points.
     ///
     /// # Errors
     /// The settings make no sense, or leave no step.
@@ -250,7 +250,7 @@ impl System {
         self.connect_by(from, to, &Crossing { units: self.units, ..Crossing::default() })
     }
 
-    /// [`connect`](Self::connect), as a crossing says.
+    /// [`connect`](Self::connect) for a crossing.
     ///
     /// # Errors
     /// As [`connect`](Self::connect).

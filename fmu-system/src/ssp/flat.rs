@@ -1,4 +1,4 @@
-//! Inner systems of an SSP, resolved: what is left are components, connections between them and the connectors of the outer system.
+//! Inner systems of an SSP, resolved: only components, connections between them and the connectors of the outer system remain.
 //!
 //! A component `b` of the inner system `in` becomes the component `in.b`. A connector of an inner system, and a parameter of any
 //! system, is a name for the connectors of components that it reaches.
@@ -32,7 +32,7 @@ pub(super) struct Flat {
     pub reach: Reach,
 }
 
-/// A connector with the full name of what it belongs to.
+/// A connector with the full name of its owner.
 #[derive(Clone, PartialEq)]
 struct Node {
     /// Full name of a component, or path of a system, which ends with a dot.
@@ -140,7 +140,8 @@ fn reached(reach: &mut Reach, name: String, target: (String, Option<Conversion>)
     }
 }
 
-/// The connection with its direction: what comes out of an element or into the system sends; start and end say nothing of it.
+/// The connection with its direction: an output of an element or an input of the system is the source, regardless of start and
+/// end.
 fn edge<'a>(level: &Level, c: &'a Connection) -> Result<Edge<'a>, String> {
     let ((start, one), (end, other)) = (node(level, &c.start)?, node(level, &c.end)?);
     let inside = |end: &ConnectionEnd| end.element.is_some();

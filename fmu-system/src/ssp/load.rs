@@ -77,7 +77,7 @@ impl Loaded {
     /// Like [`open_files`](Self::open_files), in a system that suits the FMUs.
     ///
     /// # Errors
-    /// As [`open_files`](Self::open_files), or an FMU does not have the interface that the method needs.
+    /// As [`open_files`](Self::open_files), or an FMU lacks the interface that the method needs.
     pub fn open_files_with(
         files: &[String],
         folder: &Path,
@@ -338,7 +338,7 @@ impl Loaded {
         }
     }
 
-    /// A connector of the system has the unit of the variable that it stands for. `stated` are the units of the connector of the
+    /// A connector of the system has the unit of the variable that it represents. `stated` are the units of the connector of the
     /// system and of that of the component.
     fn check_unit(&mut self, port: &str, units: Units, stated: [Option<Measured<'_>>; 2]) -> Result<(), String> {
         let [Some(of_system), _] = stated else { return Ok(()) };

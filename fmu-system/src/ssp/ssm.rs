@@ -68,7 +68,7 @@ pub(super) fn linear(e: &Element) -> Result<Conversion, String> {
 /// The values under the names of the mapping; those that it does not name are left out.
 ///
 /// # Errors
-/// The entry whose value cannot be transformed, or whose source the file does not have.
+/// The entry whose value cannot be transformed, or whose source is missing from the file.
 pub fn apply(entries: &[MappingEntry], parameters: &[Parameter]) -> Result<Vec<Parameter>, String> {
     let one = |entry: &MappingEntry| {
         let at = |cause: String| format!("line {}: {} to {}: {cause}", entry.line, entry.source, entry.target);
@@ -90,7 +90,7 @@ pub fn apply(entries: &[MappingEntry], parameters: &[Parameter]) -> Result<Vec<P
     entries.iter().map(one).collect()
 }
 
-/// Numbers with spaces between them, each converted.
+/// Numbers separated by spaces, each converted.
 pub(super) fn transformed(text: &str, conversion: &Conversion) -> Result<String, String> {
     let number = |word: &str| {
         let x = parse_number(word).ok_or_else(|| format!("{word:?} is not a number"))?;

@@ -17,7 +17,7 @@ pub struct Structure {
     pub start: Option<f64>,
     /// Stop time in s.
     pub stop: Option<f64>,
-    /// Its FMUs; those of inner systems have their names before their own, as in `in.b`.
+    /// Its FMUs; an FMU of an inner system has the system's name as a prefix, as in `in.b`.
     pub components: Vec<Component>,
     /// Connectors of the system itself.
     pub connectors: Vec<Connector>,

@@ -209,7 +209,7 @@ fn a_loop_with_events_has_its_solution_at_any_step() {
     }
 }
 
-/// Of two FMUs that return early, the one that went further goes back.
+/// If two FMUs return early, the one that went further goes back.
 #[test]
 fn who_stepped_too_far_goes_back() {
     let workshop = Workshop::new();

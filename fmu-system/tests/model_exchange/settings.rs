@@ -191,8 +191,8 @@ fn what_was_recorded_before_an_error_is_kept() {
     assert_eq!((recording.time.len(), recording.columns[0].values.len()), (4, 4));
 }
 
-/// z = 1 - 2 u in a loop whose one connection takes 4 z + 3: a = 1 - 2 b, b = 7 - 8 a, so a = 13/15 and b = 1/15. The derivatives of the
-/// FMU count with the factor of the connection.
+/// z = 1 - 2 u in a loop with a connection that transmits 4 z + 3: a = 1 - 2 b, b = 7 - 8 a, so a = 13/15 and b = 1/15. The
+/// derivatives of the FMU count with the factor of the connection.
 #[test]
 fn a_loop_through_a_conversion_is_solved() {
     let workshop = Workshop::new();

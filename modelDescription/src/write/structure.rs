@@ -118,7 +118,7 @@ impl<'a> Numbering<'a> {
         references.iter().any(wide)
     }
 
-    /// Numbers of the variables that the value depends on between events. FMI 2.0 knows no parameters there.
+    /// Numbers of the variables that the value depends on between events. FMI 2.0 allows no parameters there.
     fn between(&self, v: &Variable) -> Option<Vec<u32>> {
         if self.steps_only {
             return Some(Vec::new());

@@ -1,9 +1,9 @@
 //! `ModelVariables`: the variables in the order of their value references, and in FMI 3.0 time behind them.
 //!
-//! FMI 3.0 requires the independent variable, FMI 2.0 allows it. Our archives of FMI 2.0 have none: OpenModelica's importer
-//! makes a component of every variable, and Modelica reserves the name `time`. OMSimulator treats value references of FMI 3.0
-//! as positions in the list, counted from 1 (ComponentFMU3CS.cpp, `initializeDependencyGraph_outputs`). With time, whose value
-//! reference is 0, at the end, the two agree.
+//! FMI 3.0 requires the independent variable, FMI 2.0 allows it. Our FMI 2.0 archives omit it: OpenModelica's importer creates a
+//! component for every variable, and Modelica reserves the name `time`. OMSimulator treats value references of FMI 3.0
+//! as positions in the list, counted from 1 (ComponentFMU3CS.cpp, `initializeDependencyGraph_outputs`). Time has value reference
+//! 0; with time at the end, the two agree.
 //!
 //! FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7. Unit and display unit are written on the variable as well as in its type
 //! definition: both standards allow it, and importers that ignore type definitions need it.

@@ -1,4 +1,5 @@
-//! Whether a table is that of a machine, and of this one: the residue of its map, reciprocity, torque, the magnet, the currents.
+//! Checks that a table describes a machine, and this machine: the residue of its map, reciprocity, torque, the magnet, the
+//! currents.
 
 use super::super::motor::MotorFile;
 use super::Point;

@@ -199,7 +199,7 @@ impl<M: Twin> Turn<'_, M> {
     }
 }
 
-/// Whether `reference` is that of an element of an array but the first; FMI 3.0 has none.
+/// Whether `reference` is that of an array element other than the first; FMI 3.0 has no such references.
 pub fn is_element<M: Twin>(reference: u32) -> bool {
     let index = usize::try_from(reference).unwrap().checked_sub(1);
     index.and_then(|i| M::TABLE.element(i)).is_some_and(|element| element > 0)

@@ -245,8 +245,8 @@ impl<M: Twin> Snapshot<M> {
         Ok(stepped)
     }
 
-    /// The step of a model with states: the first event inside it ends it if it may, and otherwise the step goes on from there.
-    /// Without Event Mode, those at the end are left to the model.
+    /// The step of a model with states: the first event inside it ends it if early return is allowed; otherwise the step
+    /// continues from there. Without Event Mode, those at the end are left to the model.
     fn stop(&mut self, to_event: ToEvent<M>, (event, early): (bool, bool), t: f64, h: f64) -> Result<Stepped, c_int> {
         let (events, end) = (M::CAN.events.as_ref().unwrap(), self.elapsed.plus(h));
         let model = &mut self.block.model;
