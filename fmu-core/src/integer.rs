@@ -36,7 +36,7 @@ macro_rules! integers {
             }
         }
 
-        /// Where a `W` holds an integer.
+        /// Location of an integer in a `W`.
         pub(crate) enum Getter<W: 'static> {
             $($name(fn(&mut W) -> &mut $type)),*
         }

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use zip::{Entry, write};
 
-/// Time limit of a command: much longer than any takes on a busy machine.
+/// Time limit of a command, much longer than any command needs on a busy machine.
 const HANG: Duration = Duration::from_secs(100);
 
 /// The checks that do not run the binary.

@@ -197,7 +197,7 @@ impl BenchRecord {
 /// is
 /// turned back before.
 fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> f64 {
-    /// Rows to each side of the slope that gives the turn of a row.
+    /// Rows on each side that determine the slope, and thus the turn, at a row.
     const REACH: usize = 20;
     let (mut squares, mut count) = (0.0, 0.0_f64);
     for run in runs {

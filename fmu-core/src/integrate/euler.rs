@@ -28,7 +28,7 @@ pub fn euler<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, fixe
 /// of the step. Every step begins with an event, because inputs may have changed; an event due then is handled then.
 ///
 /// # Errors
-/// Those of [`euler`] and of [`Events::event`], [`Fault::end`] among them.
+/// Those of [`euler`] and of [`Events::event`], including [`Fault::end`].
 pub fn euler_hybrid<M: ContinuousTime + Events, const N: usize>(
     model: &mut M,
     step: &Step,

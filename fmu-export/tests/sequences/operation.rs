@@ -107,7 +107,7 @@ pub(crate) enum Damage {
 pub(crate) enum Call {
     /// The next call of a plain simulation.
     Onward,
-    /// The instance is freed, and another one made; first a try that is wrong in this way, 0 for none.
+    /// Frees the instance and creates another one, after a first attempt with this error (0: no such attempt).
     New {
         version: u8,
         wrong: u8,

@@ -154,8 +154,8 @@ impl Calls {
     /// Gets or sets values.
     ///
     /// # Safety
-    /// `values` is NULL or points to values of the type, as many as both counts state, to which a getter may write; texts that
-    /// are set are NULL or C strings.
+    /// `values` is NULL or points to as many values of the type as both counts state; a getter may write to them. Texts to be set
+    /// are NULL or C strings.
     #[inline]
     pub(super) unsafe fn transfer(
         &self,

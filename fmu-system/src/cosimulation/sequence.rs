@@ -110,7 +110,7 @@ impl Sequence {
         Schedule::jumping(points, &self.unit)
     }
 
-    /// The text at time `t` (s); before the first, the first.
+    /// The text at time `t` (s); before the first time, the first text.
     pub fn at(&self, t: f64) -> &str {
         let until = self.points.partition_point(|(time, ..)| *time <= t + SAME);
         &self.points[until.saturating_sub(1)].1

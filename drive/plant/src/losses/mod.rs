@@ -65,7 +65,7 @@ impl Losses {
         *self = self.with(step, |a, b| a + b);
     }
 
-    /// Applies `f` to each and that of `other`.
+    /// Applies `f` to each loss and its counterpart in `other`.
     #[inline]
     pub fn with(&self, other: &Self, f: impl Fn(f64, f64) -> f64) -> Self {
         Self {

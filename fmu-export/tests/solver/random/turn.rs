@@ -23,7 +23,7 @@ impl<M: Twin> Turn<'_, M> {
         states.contains(self.now.state)
     }
 
-    /// Whether it is Model Exchange in one of these states, of the `two` or the `three` of a standard.
+    /// Whether it is Model Exchange in one of these states: `two` for FMI 2.0, `three` for FMI 3.0.
     pub fn in_exchange(&self, two: &str, three: &str) -> bool {
         self.now.kind.exchanges() && self.is(if self.now.kind.version() == 2 { two } else { three })
     }
