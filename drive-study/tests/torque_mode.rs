@@ -207,8 +207,7 @@ fn a_small_torque_that_moves_nothing_is_said() {
 }
 
 /// With `release`, a zero torque reference means no current, and a new torque reference turns the rotor; without it, i_0 flows,
-/// and holds a
-/// small load with R^ < R.
+/// and holds a small load with R^ < R.
 #[test]
 fn no_torque_releases_the_shaft() {
     for release in [false, true] {

@@ -105,7 +105,7 @@ pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
     /// The level of the finding, if it is lower than that of the check.
     pub(super) lower: Option<Level>,
-    /// How sure the finding is.
+    /// Confidence of the finding.
     pub(super) confidence: Confidence,
     /// A call crashed the process or did not return: an importer would have crashed or hung.
     pub(super) fatal: bool,
@@ -174,7 +174,7 @@ pub struct Options {
 }
 
 impl Options {
-    /// When the time for everything is over, if it begins now.
+    /// Deadline of the whole run if it begins now.
     pub(super) fn deadline(&self) -> Option<Instant> {
         Instant::now().checked_add(self.timeout?)
     }

@@ -10,7 +10,7 @@ use fmu_import::Status;
 use fmu_import::raw::{Sensitivity, SensitivityArguments, Simple, UpdateResults, Vector};
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown};
 
-/// Why a run of the integrator cannot go on.
+/// The reason why a run of the integrator cannot continue.
 pub(super) const UNSTABLE: &str = "Euler's method is not stable for this FMU";
 /// Value that fills vectors before a call.
 pub(super) const UNTOUCHED: f64 = f64::from_bits(0xc5c5_c5c5_c5c5_c5c5);

@@ -26,7 +26,7 @@ pub(super) struct Binary {
     pub(super) name: String,
     /// Folder below `binaries/`.
     pub(super) folder: String,
-    /// Where it was unpacked to.
+    /// The folder with the unpacked files.
     path: PathBuf,
 }
 
@@ -125,7 +125,7 @@ impl FmuFile {
         self.dir.path()
     }
 
-    /// Removes what was unpacked, although a check that takes too long still has this.
+    /// Removes the unpacked files, even if a check that exceeds its time limit still uses them.
     pub(super) fn discard(&self) {
         let _ = fs::remove_dir_all(self.dir());
     }

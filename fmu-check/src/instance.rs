@@ -13,7 +13,7 @@ pub(super) struct Instance<'b> {
     pub(super) session: &'b Session,
     pub(super) handle: Handle,
     event_mode: bool,
-    /// Which instance of the case it is, from 1.
+    /// Number of the instance within the case, from 1.
     number: usize,
     start: Cell<f64>,
     stop: Cell<Option<f64>>,
@@ -231,7 +231,7 @@ impl Instance<'_> {
         Ok(())
     }
 
-    /// A variable's values; none if the getter returned OK and wrote nothing.
+    /// A variable's values; `None` if the getter returned OK and wrote nothing.
     pub(super) fn get(&self, v: &ModelVariable) -> Result<(Status, Vec<u64>), NotDetermined> {
         let n = self.session.elements(v);
         let version = self.session.description.version;

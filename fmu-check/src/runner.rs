@@ -30,7 +30,7 @@ const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
 pub(super) const OUT_OF_TIME: &str = "the run reached its time limit (see --timeout)";
-/// After this time a clock that counts seconds shows another one.
+/// After this time, a clock that counts seconds shows a different value.
 const ANOTHER_SECOND: Duration = Duration::from_millis(1050);
 /// Maximum number of restarts of a probe whose cases crash it.
 const MAX_RESTARTS: usize = 12;
@@ -82,11 +82,11 @@ pub(super) struct Conditions {
 /// The checks on which others depend: a failure that is due to this computer or to a limit is not a finding.
 const FIRST: [&str; 3] = ["B00", "L00", "E00"];
 
-/// How the process of a probe ended.
+/// End of the process of a probe.
 enum Outcome {
     /// By itself.
     End(End),
-    /// In a call that hangs, in this way.
+    /// In a call that hangs, for this reason.
     Hang(&'static str),
     /// Too slow, although no call hangs.
     Slow,
@@ -157,8 +157,8 @@ impl Runner {
         if FIRST.contains(&check.id) { self.excused(check, &conditions, found) } else { found }
     }
 
-    /// The first process of a check that compares two: nothing yet, if it passes. The second, after another second of the clock:
-    /// the verdict.
+    /// The first of two processes that a check compares: no result yet if it passes. The second process, one second of the clock
+    /// later: the verdict.
     pub(super) fn once_more(&self, check: &Check) -> Option<Conclusion> {
         let first = self.first.lock().unwrap_or_else(PoisonError::into_inner).take();
         let Some((began, first)) = first else {

@@ -312,7 +312,7 @@ impl Session {
         self.of_case.get()
     }
 
-    /// How many instances this case has made.
+    /// Number of instances that this case has created.
     pub(super) fn made_in_case(&self) -> usize {
         self.of_case.get()
     }

@@ -1,4 +1,4 @@
-//! Which variables of an FMU a probe looks at, and values to set them to.
+//! The variables of an FMU that a probe examines, and values for setting them.
 
 use crate::encoding::bits;
 use crate::session::Session;

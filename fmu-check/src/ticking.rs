@@ -210,7 +210,7 @@ impl<'b> Served<'b> {
         self.instance.perform(Simple::EnterEventMode)
     }
 
-    /// Runs for so many events.
+    /// Runs for this number of events.
     pub(super) fn run(&mut self, events: usize, look: Look<'_, 'b>) -> Result<(), NotDetermined> {
         self.event(look)?;
         for _ in 1..events {

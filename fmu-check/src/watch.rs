@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-/// A probe that makes progress is given up after this many time limits.
+/// A probe that makes progress is abandoned after this many time limits.
 const PATIENCE: u32 = 6;
 
 /// The parent's data about a probe that has not ended.
@@ -15,11 +15,11 @@ pub(super) enum Pace {
     Runs,
     /// One call has used the processor for the time limit, or has slept for it.
     Hangs,
-    /// One call has stopped the process (`SIGSTOP`) for the time limit: nothing here stops a probe, and it is in a session of its
-    /// own, which no terminal stops.
+    /// One call has stopped the process (`SIGSTOP`) for the time limit: the checker never stops a probe, and a terminal cannot
+    /// stop it either, because it has its own session.
     #[cfg_attr(not(target_os = "linux"), allow(dead_code, reason = "read on Linux only"))]
     Stopped,
-    /// It makes progress, or gets no processor: neither shows a fault.
+    /// It makes progress, or gets no processor time: neither indicates a fault.
     Slow,
 }
 
@@ -29,7 +29,7 @@ pub(super) struct Watch {
     /// The file with the call that it is in.
     journal: PathBuf,
     limit: Duration,
-    /// How long it has been watched. Time in which this process itself was stopped or got no processor does not count.
+    /// Time since the watch began. Time in which this process itself was stopped or got no processor does not count.
     watched: Duration,
     /// The call, since when, and the processor time then.
     call: (Vec<u8>, Duration, Option<Duration>),
@@ -71,8 +71,7 @@ impl Watch {
     }
 }
 
-/// The processor time that a process has used, and how all its threads rest: they wait for something, or a signal has stopped
-/// them.
+/// The processor time that a process has used, and the state of all its threads at rest: waiting, or stopped by a signal.
 #[cfg(target_os = "linux")]
 fn processor(pid: u32) -> Option<(Duration, Option<Pace>)> {
     // The name of the program stands in parentheses and may contain anything.

@@ -101,7 +101,7 @@ impl Archive {
         self.entries.iter().find(|e| e.central.name == name.as_bytes())
     }
 
-    /// Names of files that are folders of other entries, too: no system can store both.
+    /// Names of files that are also folders of other entries: no system can store both.
     pub(super) fn files_and_folders(&self) -> Vec<String> {
         let mut names: Vec<&[u8]> = self.entries.iter().map(|e| &*e.central.name).collect();
         names.sort_unstable();
@@ -225,7 +225,7 @@ pub(super) fn copy(file: &File, entry: &Entry, limit: u64, out: &mut impl Write)
     Ok(written)
 }
 
-/// Whether a name stays below the folder that it is joined to. A colon after the first letter makes a drive of it.
+/// Whether a name stays below the folder that it is joined to. A colon after the first letter makes it a drive.
 pub(super) fn is_inside(name: &str) -> bool {
     !name.contains(['\\', '\0'])
         && name.as_bytes().get(1) != Some(&b':')

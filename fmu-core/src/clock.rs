@@ -7,7 +7,7 @@ use crate::variable::{Causality, Kind, Variability};
 use crate::{Elapsed, Fault, Model};
 use serde::{Deserialize, Serialize};
 
-/// Who knows when a clock ticks (`intervalVariability`; FMI 3.0.2, 2.2.8.2).
+/// The source of the ticks of a clock (`intervalVariability`; FMI 3.0.2, 2.2.8.2).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Ticks {
@@ -15,7 +15,7 @@ pub enum Ticks {
     Constant,
     /// With an interval that the importer chooses in Initialization Mode.
     Fixed,
-    /// With an interval that the importer may change at events too.
+    /// With an interval that the importer may also change at events.
     Tunable,
     /// With an interval that the model gives at each tick for the next one.
     Changing,
@@ -40,7 +40,7 @@ impl Ticks {
 /// Properties of a clock.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Timing {
-    /// Who knows when it ticks.
+    /// The source of its ticks.
     pub ticks: Ticks,
     /// Interval (s) of a constant clock; for other clocks the start value is the interval.
     pub interval: Option<f64>,
@@ -271,13 +271,13 @@ pub trait Clocked: Model {
     /// they are the outputs that [`activate`](Self::activate) computes.
     const FEEDTHROUGH: bool = false;
 
-    /// The clock becomes active: computes the outputs that hold from now on, regardless of the inputs.
+    /// The clock becomes active: computes the outputs that apply from now on, regardless of the inputs.
     fn activate(&mut self, _clock: usize, _now: Elapsed) {}
 
     /// The clock ticks: acts on the inputs of this instant. Called once at each.
     ///
     /// # Errors
-    /// Gives the reason why the model cannot go on.
+    /// Returns the reason why the model cannot continue.
     fn tick(&mut self, clock: usize, now: Elapsed) -> Result<(), Fault>;
 
     /// Time in s from `now` to the next tick of a changing clock, or of a countdown clock if it is known.

@@ -3,7 +3,7 @@
 use crate::{Account, Elapsed, Fault, Model, unit::Quantity};
 use std::slice;
 
-/// Where the model `M` keeps a state.
+/// Location of a state in the model `M`.
 enum Place<M: 'static> {
     One(fn(&mut M) -> &mut f64),
     /// Maximum number of elements, and their location.
@@ -28,8 +28,8 @@ impl<M: 'static> State<M> {
         Self { name, rate, reinit: false, place: Place::One(at) }
     }
 
-    /// An array of states that no event changes: `name` is a row of an array with `dimension` elements. The elements follow one
-    /// another in all calls, as many as the model holds: see [`Resizable`](crate::Resizable).
+    /// An array of states that no event changes: `name` is a row of an array with `dimension` elements. The elements are
+    /// consecutive in all calls, and their number is that in the model: see [`Resizable`](crate::Resizable).
     pub const fn array(
         name: &'static str,
         rate: &'static Quantity,
@@ -97,8 +97,8 @@ pub trait ContinuousTime: Model {
     /// The states, in the order of all calls.
     const STATES: &'static [State<Self>];
 
-    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an
-    /// array has as many as the model holds. It does not allocate, and its result does not depend on earlier steps.
+    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an array
+    /// has as many as it has elements in the model. It does not allocate, and its result does not depend on earlier steps.
     ///
     /// # Errors
     /// The derivatives do not exist here: the solver tries a shorter step.
@@ -129,7 +129,7 @@ pub trait CompletedSteps: ContinuousTime {
     /// only.
     ///
     /// # Errors
-    /// Gives the reason why the model cannot go on.
+    /// Returns the reason why the model cannot continue.
     fn complete(&mut self, now: Elapsed) -> Result<(), Fault>;
 
     /// Copies the counts after [`complete`](Self::complete), or restores those of an earlier time: some importers complete
@@ -137,8 +137,8 @@ pub trait CompletedSteps: ContinuousTime {
     fn account(&mut self, account: Account);
 }
 
-/// A continuous model that knows its own tangent, for example with [`Dual`](crate::Dual) numbers. For a model that
-/// does not, the exporter takes a central difference.
+/// A continuous model with its own tangent, for example by [`Dual`](crate::Dual) numbers. For a model without one, the exporter
+/// uses central differences.
 pub trait Differentiable: ContinuousTime {
     /// The directional derivative of the derivatives (to `dx`) and of the continuous outputs (to `outputs`) along `along`,
     /// which has a component for each state and continuous input.

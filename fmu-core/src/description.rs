@@ -446,7 +446,7 @@ fn fresh<M: Model>() -> Result<Block<M>, Fault> {
     Ok(block)
 }
 
-/// The dependencies of an array are those of its elements together.
+/// An array has the dependencies of all its elements.
 fn join(all: &mut Option<Vec<u32>>, more: Option<Vec<u32>>) {
     if let (Some(all), Some(more)) = (all, more) {
         all.extend(more);
@@ -563,7 +563,7 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// Checks a start value by the rules of a set call. A text must be one that XML can hold (XML 1.0, 2.2).
+/// Checks a start value by the rules of a set call. A text must be valid in XML (XML 1.0, 2.2).
 fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
     let text = match slot {
         Slot::Text(text) => text.as_str(),

@@ -1,4 +1,4 @@
-//! Dual numbers: a value and its change, so that an equation written once gives its exact derivative too.
+//! Dual numbers: a value and its change, so an equation written once also yields its exact derivative.
 //!
 //! (a + b e)(c + d e) = ac + (ad + bc) e with e^2 = 0. An equation that is generic over [`Scalar`] runs with `f64`, to
 //! the last bit as if it were written for it, and with [`Dual`].

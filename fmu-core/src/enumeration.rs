@@ -38,7 +38,7 @@ impl<E: Enumerated> Choice for E {
     }
 }
 
-/// Where a `W` holds an enum `E`.
+/// Location of an enum `E` in a `W`.
 pub struct Field<W: 'static, E: 'static>(pub fn(&mut W) -> &mut E);
 
 /// The interface of a [`Field`] for a table that does not know its type.

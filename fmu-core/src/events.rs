@@ -178,21 +178,21 @@ pub trait Events: Model {
     /// Writes the indicators to `z`. After an event none is 0, and the sign shows on which side the model is.
     fn indicators(&self, _now: Elapsed, _z: &mut [f64]) {}
 
-    /// Event Mode begins, before the importer exchanges values: discrete outputs take the values that they have from
-    /// this instant on, as far as the inputs of this instant do not matter.
+    /// Event Mode begins, before the importer exchanges values: discrete outputs take their values from this instant on, as far
+    /// as these do not depend on the inputs of this instant.
     fn begin(&mut self, _now: Elapsed) {}
 
     /// Acts on the inputs of this instant. If nothing is due, it changes nothing.
     ///
     /// # Errors
-    /// Gives the reason why the model cannot go on.
+    /// Returns the reason why the model cannot continue.
     fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault>;
 
-    /// When the next event is due, after everything that is due at `now` was done.
+    /// When the next event is due, after all events due at `now` have been handled.
     fn next(&self, now: Elapsed) -> Next;
 }
 
-/// Where a step towards an event ended.
+/// End of a step towards an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
     /// The instant, not after the end of the step: the model's state is of this instant.
@@ -204,7 +204,7 @@ pub struct Stop {
 }
 
 /// A model with states and events whose importer may handle the events in Co-Simulation: Event Mode and early return of FMI 3.0
-/// (3.0.2, 2.3.5, 4.1.3 and 4.2.1). With any use of the two, the results are those of [`Model::advance`].
+/// (3.0.2, 2.3.5, 4.1.3 and 4.2.1). However the importer uses them, the results are those of [`Model::advance`].
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not stop at its events: it lacks the capability `EventMode`",
     note = "write `impl EventMode for {Self}`, or remove `EventMode` from the line that exports the model"

@@ -3,7 +3,7 @@
 use crate::Elapsed;
 use serde::{Deserialize, Serialize};
 
-/// Number of points after the last event that are kept. Stages of one step of a solver, and its retries, take fewer.
+/// Number of points after the last event that are kept. The stages and retries of one solver step need fewer.
 const NEWEST: u8 = 8;
 
 /// Events in the life of the counts of a model with [`CompletedSteps`](crate::CompletedSteps).

@@ -51,7 +51,7 @@ impl<E: Enumerated> Element for E {
     }
 }
 
-/// Where a `W` holds a list of elements of the type `T`.
+/// Location of a list of elements of the type `T` in a `W`.
 pub struct Items<W: 'static, T: 'static>(pub fn(&mut W) -> &mut [T]);
 
 /// The interface of [`Items`] for a table that does not know their type.

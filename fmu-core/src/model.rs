@@ -65,7 +65,7 @@ impl Experiment {
     pub const DEFAULT: Self = Self { start: 0.0, stop: 1.0, step: 1e-3, tolerance: None, fixed_step: None };
 }
 
-/// How an importer uses a model.
+/// The interface through which an importer uses a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Interface {
     /// Co-simulation without events: communication points only.
@@ -111,8 +111,8 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// Hash of name, version and table.
     const HASH: Hash = Hash::START.text(Self::INFO.name).text(Self::INFO.version).join(&Self::TABLE.hash());
 
-    /// Reads data from the files of the FMU's folder `resources/`, once, at instantiation. `resources` is that folder; `None`
-    /// if the importer names none. Store what is read in a [`Resource`](crate::Resource): it is not part of a saved state, and
+    /// Reads data from the files of the FMU's folder `resources/`, once, at instantiation. `resources` is that folder; `None` if
+    /// the importer passes none. Store what is read in a [`Resource`](crate::Resource): it is not part of a saved state, and
     /// remains after a reset and when a state is restored.
     ///
     /// ```
@@ -151,7 +151,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     const CONTINUOUS: bool = false;
 
     /// Whether the parameter of this name has an effect. A model that shares the parameters of another model, so that it can
-    /// replace it, need not read them all; the descriptions of those without effect say so.
+    /// replace it, need not read them all; the descriptions of those without effect state this.
     fn has_effect(_parameter: &str) -> bool {
         true
     }

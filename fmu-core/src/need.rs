@@ -39,7 +39,7 @@ impl fmt::Display for Need<'_> {
 }
 
 impl<'a> Need<'a> {
-    /// Reads the end of a description. A description by another tool counts too if it calls the input optional.
+    /// Reads the end of a description. A description by another tool also counts if it calls the input optional.
     pub fn of(description: &'a str) -> Self {
         let condition = description.rsplit_once(OPTIONAL).and_then(|(_, end)| end.strip_prefix(ONLY_WITH));
         if let Some(condition) = condition {

@@ -7,8 +7,8 @@ use crate::row::Slot;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault};
 
-/// Number of operating points, the start values included. A dependency behind three switches and a threshold shows in about 1
-/// of 40.
+/// Number of operating points, the start values included. A dependency behind three switches and a threshold appears in about 1
+/// of 40 samples.
 const POINTS: u32 = 192;
 
 /// The index used for `time`.
@@ -176,7 +176,7 @@ impl Found {
         }
     }
 
-    /// A known that everything may depend on.
+    /// A known on which every unknown may depend.
     fn suspect(&mut self, known: usize) {
         self.0.iter_mut().for_each(|list| list.push(known));
     }

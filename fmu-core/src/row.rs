@@ -212,7 +212,7 @@ pub(crate) enum Access<W: 'static> {
 /// assert_eq!(DRIVE.locate(0).map(|(name, ..)| name), Some("motor.R".into()));
 /// ```
 ///
-/// A row that contradicts itself does not compile; the compiler shows it, with its name and the reason:
+/// An inconsistent row does not compile; the compiler shows it, with its name and the reason:
 ///
 /// ```compile_fail,E0080
 /// # use fmu_core::{Row, Table, table};

@@ -197,7 +197,7 @@ impl Member {
         Self { name, variable: name, kind: MemberKind::CodomainOutput }
     }
 
-    /// Names another variable for the member.
+    /// Selects a different variable for the member.
     pub const fn of(mut self, variable: &'static str) -> Self {
         self.variable = variable;
         self

@@ -190,7 +190,8 @@ mod tests {
         assert!((late.since(early) - 1e-9).abs() < 1e-24, "a nanosecond after 1e6 s");
     }
 
-    /// The quick subtraction decides as the exact one, at every distance from +-`width`, wherever the low part of the time is.
+    /// The fast subtraction gives the same decision as the exact one, at every distance from +-`width` and for any low part of
+    /// the time.
     #[test]
     fn the_quick_comparison_decides_as_the_exact_one() {
         let (mut seed, mut exactly) = (1_u64, 0);

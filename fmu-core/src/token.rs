@@ -1,8 +1,8 @@
 //! The instantiation token: a hash of the interface, computed while compiling.
 //!
 //! Binaries of one model built separately, for several platforms, have the same token; a changed name, unit, range or
-//! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID. Every number enters it with a fixed width, so that
-//! 32-bit and 64-bit compilers compute one token.
+//! version changes it. The token is a 128-bit FNV-1a hash, written as a GUID. Every number enters it with a fixed width, so
+//! 32-bit and 64-bit compilers compute the same token.
 
 use crate::clock::Timing;
 use crate::integer::IntegerType;

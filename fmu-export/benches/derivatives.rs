@@ -1,5 +1,5 @@
 //! Cost of a solver's call: states, inputs, derivatives through the C functions, for four states with almost no equations.
-//! `cargo bench -p fmu-export`. The goal is 40 ns, which leaves 80 of 120 ns for the equations of a machine.
+//! `cargo bench -p fmu-export`. The goal is 40 ns; of 120 ns, 80 remain for the equations of a machine.
 #![allow(missing_docs)]
 
 mod timing;

@@ -70,8 +70,8 @@ pub(crate) const fn has<E: Exported, T: CValue>() -> bool {
 }
 
 impl<E: Exported> Instance<E> {
-    /// The variables' values in sequence. In initialization they match the values set so far; later they are those of the last
-    /// step, with inputs and tunable parameters as set.
+    /// The variables' values in sequence. During initialization they match the values set so far; later they are those of the
+    /// last step, and inputs and tunable parameters are those last set.
     ///
     /// # Errors
     /// Unknown reference, another type, or a number of values that does not match `out`.
@@ -338,7 +338,7 @@ impl<E: Exported> Instance<E> {
         if tried { Refusal::Discard(fault) } else { Refusal::Error(fault) }
     }
 
-    /// The reason why a reference past the table cannot be set, or read as another type.
+    /// The reason why a reference beyond the table cannot be set, or read as another type.
     #[cold]
     pub(crate) fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
         match self.after_table(index::<E>(reference)) {

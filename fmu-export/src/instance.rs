@@ -152,8 +152,8 @@ impl<E: Exported> Instance<E> {
         self.current.experiment.map(|_| ()).ok_or_else(|| Fault::new("fmi2SetupExperiment must be called before it"))
     }
 
-    /// Ends initialization: checks the parameters together, and computes state and outputs. Where the importer handles events,
-    /// the first one begins.
+    /// Ends initialization: checks the parameters together, and computes state and outputs. If the importer handles events, the
+    /// first event begins.
     ///
     /// # Errors
     /// As [`Snapshot::check`] and [`Model::validate`].

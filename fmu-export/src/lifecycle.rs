@@ -205,7 +205,7 @@ pub enum Call {
     InputDerivatives,
     /// `GetFMUState`.
     SaveState,
-    /// `SetFMUState`: the restored snapshot brings the next state.
+    /// `SetFMUState`: the restored snapshot determines the next state.
     RestoreState,
     /// Free, size, serialize and deserialize a saved state.
     UseState,
@@ -445,8 +445,8 @@ impl Allowed {
     }
 }
 
-/// The state of one instance and its interface. It changes in [`Life::after`] and [`Life::end`] and nowhere else; a restored
-/// FMU state brings its own.
+/// The state of one instance and its interface. It changes only in [`Life::after`] and [`Life::end`]; a restored FMU state
+/// includes its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Life {
     state: State,

@@ -102,7 +102,7 @@ impl Log {
     /// in FMI 3.0 they are switched and the others stay (3.0.2, 2.3.1).
     ///
     /// # Errors
-    /// Names a category that does not exist; then nothing changes.
+    /// A category does not exist; nothing changes.
     pub fn switch(&mut self, standard: Standard, on: bool, categories: &[&str], own: Categories) -> Result<(), Fault> {
         let mut listed = if categories.is_empty() { !0 } else { 0 };
         for &category in categories {

@@ -156,8 +156,8 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
     Fault::value("nValues", given, format_args!("{needed} for these value references"))
 }
 
-/// The start of an instance: the values that differ from the start values, which are those of the model's `Default` unless it
-/// was `made` with others.
+/// The start of an instance: the values that differ from the start values, which come from the model's `Default` unless it was
+/// `made` with others.
 pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
     let mut fresh = made.cloned().unwrap_or_default();
     fresh.initialize();

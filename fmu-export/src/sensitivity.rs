@@ -235,7 +235,7 @@ impl<E: Exported> Instance<E> {
         (current, scratch)
     }
 
-    /// Divides the knowns into states and others, and takes the derivative.
+    /// Divides the knowns into states and others, and computes the derivative.
     fn column(&mut self, unknowns: &[u32], knowns: &[u32], seed: &[f64], out: &mut [f64]) -> Result<(), Refusal> {
         let (_, scratch) = self.scratch();
         let mut rates = zeros(&mut scratch.rates, E::CAN.scalars());

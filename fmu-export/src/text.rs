@@ -18,7 +18,7 @@ impl<E: Exported> Instance<E> {
     /// The texts of variables, `given` of them.
     ///
     /// # Errors
-    /// Unknown reference, another type, another number of values, a text that C cannot have.
+    /// Unknown reference, another type, another number of values, a text that a C string cannot contain.
     pub fn get_texts(&mut self, references: &[u32], given: usize) -> Result<&[CString], Refusal> {
         self.check_count(references, given)?;
         self.refresh();

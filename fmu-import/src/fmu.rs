@@ -103,7 +103,7 @@ impl Fmu {
         Self::load(&Arc::new(Mutex::new(Archive::from_bytes(path.as_ref(), bytes)?)))
     }
 
-    /// Opens the FMU again with another copy of its binary, from the same archive, even if its path now leads to another file.
+    /// Opens the FMU again with another copy of its binary, from the same archive, even if its path now refers to another file.
     /// After the status Fatal no instance of a binary can be used (FMI 2.0.5, 2.1.3; FMI 3.0.2, 2.2.4).
     ///
     /// # Errors

@@ -7,7 +7,7 @@ use std::process;
 
 const PREFIX: &str = "fmu-";
 /// Locked as long as a process uses the folder. The system unlocks it whenever the process ends, so no process has to guess
-/// from the number in the name whether its owner is alive, perhaps in another container or on another machine.
+/// from the number in the name whether its owner is alive, possibly in another container or on another machine.
 const LOCK: &str = ".lock";
 
 /// A folder `fmu-PID-XXXXXX` for temporary files. Dropping it removes it.

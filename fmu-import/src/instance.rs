@@ -21,7 +21,7 @@ use std::sync::Arc;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FmuState(usize);
 
-/// An instance of an FMU, which may go from thread to thread. Dropping it frees it.
+/// An instance of an FMU, which may move between threads. Dropping it frees it.
 pub struct Instance {
     name: String,
     /// Its number in the journal.

@@ -7,7 +7,7 @@ use model_description::BaseType;
 
 /// A call that did not succeed.
 pub(super) enum Refusal {
-    /// The FMU returned neither OK nor a warning.
+    /// The FMU returned a status other than OK or Warning.
     Status(&'static str, Status),
     /// The FMU returned no instance.
     Null(&'static str),

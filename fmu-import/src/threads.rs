@@ -8,7 +8,7 @@ pub fn available() -> usize {
     thread::available_parallelism().map_or(1, NonZero::get)
 }
 
-/// Calls `work` with 0, 1, 2, ... on up to as many threads; number 0 is the calling thread, because a busy system may be unable
+/// Calls `work` with 0, 1, 2, ... on up to that many threads; number 0 is the calling thread, because a busy system may be unable
 /// to start another. No thread outlives the call, so a process may fork before and after.
 pub fn share(threads: usize, work: impl Fn(usize) + Sync) {
     thread::scope(|scope| {

@@ -50,7 +50,7 @@ pub struct Curve {
     pub x: Rc<[f64]>,
     /// Vertical coordinates, at most as many as `x`: a curve may end early. A value that is not finite is a gap.
     pub y: Vec<f64>,
-    /// Whether the run that the curve shows was lost: a cross marks the end of the curve, and the legend says so.
+    /// Whether the run that the curve shows was lost: a cross marks the end of the curve, and the legend explains it.
     pub lost: bool,
 }
 

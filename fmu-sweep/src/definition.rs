@@ -24,7 +24,7 @@ pub struct Definition {
     pub no_unit_conversion: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
-    /// How to run all FMUs; by default each steps itself if it can.
+    /// The method for all FMUs; by default, each FMU with Co-Simulation steps itself.
     pub interface: Option<Interface>,
     /// Names of FMUs that still step themselves in a system for Model Exchange.
     pub stepping: Vec<String>,
@@ -56,7 +56,7 @@ pub struct Definition {
     pub trace: Option<Traces>,
 }
 
-/// Who integrates the states of an FMU.
+/// The integrator of an FMU's states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub enum Interface {
     /// The FMU itself.
@@ -83,7 +83,7 @@ pub struct Design {
     pub kind: Kind,
     /// Number of rows, of a random, LHS or Sobol design.
     pub runs: Option<u64>,
-    /// Seed of a random, LHS or Sobol design; another seed gives other rows.
+    /// Seed of a random, LHS or Sobol design; a different seed gives different rows.
     pub seed: Option<u64>,
     /// CSV file of a list; its header names the variables.
     pub file: Option<String>,
@@ -107,7 +107,7 @@ pub enum Kind {
     List,
 }
 
-/// How a variable varies: one of `uniform`, `log`, `normal`, `values`, `from` with `to` and `count`, `same`.
+/// The variation of a variable: one of `uniform`, `log`, `normal`, `values`, `from` with `to` and `count`, `same`.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Vary {

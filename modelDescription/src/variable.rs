@@ -128,7 +128,7 @@ impl BaseType {
 }
 
 words! {
-    /// Who knows when a clock ticks (FMI 3.0 only).
+    /// The source of the ticks of a clock (FMI 3.0 only).
     IntervalVariability {
         /// Always with one interval.
         Constant = "constant",
@@ -148,7 +148,7 @@ words! {
 /// When a clock ticks, as in the file (FMI 3.0 only).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClockTiming {
-    /// Who knows when it ticks.
+    /// The source of its ticks.
     pub ticks: IntervalVariability,
     /// Interval between two ticks in the unit of the independent variable, usually s.
     pub interval: Option<f64>,

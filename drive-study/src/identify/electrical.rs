@@ -1,9 +1,8 @@
 //! Linear fit of the voltage equations over the [`windows`](super::windows) of a record.
 //!
 //! Noise of the current increases `[i]`, so its square is subtracted from the normal matrix. The angle's offset `theta_0` and
-//! delay
-//! `tau` are found around the linear fit. A second pass adds the terms of the saturation that reduce the residual, and models the
-//! currents between samples as exponentials.
+//! delay `tau` are found around the linear fit. A second pass adds the terms of the saturation that reduce the residual, and
+//! models the currents between samples as exponentials.
 
 use super::interval::{self, Sums};
 use super::record::Complex;

@@ -1,6 +1,5 @@
 //! A page with the values, and each fit together with the record: voltages over time, flux linkages over currents, torque over
-//! time, and
-//! friction over speed.
+//! time, and friction over speed.
 
 use super::run::Commissioned;
 use super::verdict::Quantity;

@@ -194,8 +194,7 @@ impl BenchRecord {
 }
 
 /// Noise of a current vector, from its third differences, which vanish for a smooth signal. A current that turns with the rotor
-/// is
-/// turned back before.
+/// is turned back before.
 fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> f64 {
     /// Rows on each side that determine the slope, and thus the turn, at a row.
     const REACH: usize = 20;

@@ -9,9 +9,8 @@
 //!
 //! At another voltage the map is read at the speed n u_ref / u_dc, where field weakening is equally deep, with the shaft torque
 //! that corresponds to the same torque of the rotor before friction. p_sw grows with (u_dc / u_ref)^k_sw; p_iron is that of the
-//! speed with this flux linkage, and
-//! p_friction that of the speed. At another temperature of the winding, p_cu is in proportion to R_s(T). `tests/map.rs` has the
-//! errors.
+//! speed with this flux linkage, and p_friction that of the speed. At another temperature of the winding, p_cu is in proportion
+//! to R_s(T). `tests/map.rs` has the errors.
 
 use super::sheet::{Axes, Sheet};
 use drive::plant::losses::{Losses, efficiency};

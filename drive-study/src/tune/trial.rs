@@ -7,8 +7,7 @@
 //! 0.02 pu at the end is not held.
 //!
 //! [`swings`] runs without a load through speeds between the levels, up and down again, because a swing that begins on the way up
-//! may persist on the way down.
-//! [`at_temperature`] runs the drive with a colder or hotter machine than its values assume.
+//! may persist on the way down. [`at_temperature`] runs the drive with a colder or hotter machine than its values assume.
 
 use super::pace::{Begin, Pace};
 use super::setting::{LEVELS, Setting, Tuned, Value, real};
@@ -305,8 +304,7 @@ impl Bench<'_> {
 }
 
 /// The swings of a drive that starts at 0.1 pu and runs without a load to 1 pu and back, by ramps and in steps of 0.1 pu. A drive
-/// that
-/// is lost on the way has those so far.
+/// that is lost on the way has those so far.
 pub fn swings(tuned: &Tuned) -> Vec<Swing> {
     let (mut all, mut pair) = (Vec::new(), tuned.pair());
     if pair.start().is_err() {

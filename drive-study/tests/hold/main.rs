@@ -1,6 +1,5 @@
 //! Conditions that a tuned drive holds, seen from the plant: every machine of `motors/` with wrong resistances and at wrong
-//! temperatures, in speed
-//! and torque mode, at 0.1 to 1 pu, compared with the same drive on a sensor.
+//! temperatures, in speed and torque mode, at 0.1 to 1 pu, compared with the same drive on a sensor.
 //!
 //! ```sh
 //! cargo test --release -p drive-study --test hold -- --ignored --nocapture                 # all machines, a table a machine

@@ -25,7 +25,7 @@ pub mod math;
 pub mod modulation;
 pub mod motor;
 
-/// Information common to all models of a drive; each adds its own name, description and documentation.
+/// Information common to all models of a drive; each adds its name, description and documentation.
 pub const PROJECT: fmu_core::Info = fmu_core::Info {
     version: env!("CARGO_PKG_VERSION"),
     author: "The sensorless-drive developers",

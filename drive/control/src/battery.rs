@@ -1,6 +1,6 @@
 //! Limits of the current of the DC link, which the controller keeps by limiting the torque.
 //!
-//! With the estimates of the machine, the torque tau at the mechanical speed w takes the power
+//! With the estimates of the machine, the torque tau at the mechanical speed w requires the power
 //!
 //! ```text
 //! p(tau) = w tau + 1.5 R (i_d^2 + i_q^2),  i_q = tau / (1.5 n_p (psi_M - dL i_d)),  dL = L_q - L_d

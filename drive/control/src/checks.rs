@@ -1,4 +1,4 @@
-//! Checks of parameters that belong to several parts of the controller: each part knows its own values only.
+//! Checks of parameters that belong to several parts of the controller: each part checks only its own values.
 
 use crate::battery::DcLimits;
 use crate::commission::CommissionMode;
@@ -175,7 +175,7 @@ pub(crate) fn dc_limits(par: &ControllerParameters) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Checks that i_q gives torque in spite of the law's i_d, where the references depend on it.
+/// Checks that i_q produces torque despite the law's i_d, where the references depend on it.
 ///
 /// # Errors
 /// The reluctance torque cancels most of the magnet's torque.

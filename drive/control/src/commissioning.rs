@@ -18,7 +18,7 @@ use fmu_core::unit::{AMPERE, HENRY, KG_M2, NEWTON_METER, NM_S_PER_RAD, OHM, ONE,
 use fmu_core::{Field, Row, Table, table};
 use serde::{Deserialize, Serialize};
 
-/// Time in s with the gates off before the sequence: the currents of the control before it are gone.
+/// Time in s with the gates off before the sequence: by then, the currents of the preceding control have decayed.
 const QUIET: f64 = 0.02;
 
 /// Parameters of the self-commissioning.
@@ -146,7 +146,7 @@ pub type Held = Option<Box<Commissioning>>;
 
 type R = Row<Held>;
 
-/// A visible result; without a commissioning nothing is known.
+/// A result as shown by the outputs; without a commissioning, every value is unknown.
 fn shown(held: &Held, get: impl FnOnce(&Results) -> f64) -> f64 {
     match held {
         Some(commissioning) => get(&commissioning.shown),

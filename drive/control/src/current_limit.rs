@@ -1,4 +1,4 @@
-//! The current limit at modulation: a command that would take the current beyond `limit.i` is corrected before it acts.
+//! The current limit at modulation: a command that would drive the current beyond `limit.i` is corrected before it acts.
 //!
 //! The references stay within `limit.i`. The current leaves them where the estimated angle is off by theta~: the current loop
 //! then feeds forward an EMF that differs from the machine's by 2 sin(theta~ / 2) w psi_M, and
@@ -8,7 +8,8 @@
 //! |di| = |de| W / (L sqrt(W^2 + w_c^2) sqrt(W^2 + (R / L)^2))
 //! ```
 //!
-//! The voltage shows the EMF of the machine also where the estimate is wrong. From the last interval, with psi = L i in the estimated frame,
+//! The voltage reveals the EMF of the machine even if the estimate is wrong. From the last interval, with psi = L i in the
+//! estimated frame,
 //!
 //! ```text
 //! e = u - R (i[k-1] + i[k]) / 2 - (psi[k] - psi[k-1]) / T_s
@@ -17,7 +18,7 @@
 //!
 //! w is w^, or |e| / psi_M where w^ is not within 0.7 and 1.3 of it: the EMF shows the speed of a rotor that the estimate has lost. Where
 //! L i exceeds 1.5 psi_M, an error of L^ would hide the speed, so w is always w^. In steady state the
-//! prediction is exact with any L^, R^ and psi_M^, because all of it turns at w^, so a current at its limit is left alone.
+//! prediction is exact with any L^, R^ and psi_M^, because all vectors turn at w^, so a current at its limit is not corrected.
 //!
 //! The pending commands and the new one determine the current at the end of the interval in which the new one acts. Beyond the
 //! limit, the voltage changes by L di / T_s, which brings the current back to the limit along its own direction, as far as the
@@ -26,8 +27,8 @@
 //! Limits: L^ and R^ are estimates, and the EMF of the next interval is that of the last one, turned: an error of 20 % in L^
 //! leaves 20 % of the excess in a sample. A sample that injects is not corrected: its carrier is larger than the excess that the
 //! limit would remove. With a communication step above T_s, several samples see the same currents, which show no EMF: only a
-//! sample
-//! whose currents are new, after one whose currents were new, is corrected. Derived here. u and e in V, i in A, psi in Wb, L in H, w in rad/s (electrical).
+//! sample whose currents are new, after one whose currents were new, is corrected. Derived here. u and e in V, i in A, psi in Wb,
+//! L in H, w in rad/s (electrical).
 
 use crate::estimator::Sample;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
@@ -40,7 +41,7 @@ const NEAR: f64 = 0.25;
 const SLOW: f64 = 1.0 / 36.0;
 /// Maximum turn of the EMF in a sample in rad.
 const FASTEST: f64 = 1.0;
-/// Bounds of the speed as shares of |e| / psi_M, and the flux linkage L i as a share of psi_M below which they hold.
+/// Bounds of the speed as shares of |e| / psi_M, and the flux linkage L i as a share of psi_M below which they apply.
 const SPEED: (f64, f64) = (0.7, 1.3);
 const MAGNETIC: f64 = 1.5;
 /// Current that is corrected, as a share of the limit: a reference at the limit has ripple.
@@ -91,8 +92,8 @@ pub struct Predictor<'a> {
 }
 
 impl Predictor<'_> {
-    /// The change (V) of the newest of the `commands` (V, in the order in which they act from `sample` on) that keeps the current at
-    /// its end within `i_max` (A); none if it is within.
+    /// The change (V) of the newest of the `commands` (V, in the order in which they act from `sample` on) that keeps the current
+    /// at its end within `i_max` (A); `None` if it is within this limit anyway.
     #[cold]
     #[inline(never)]
     pub fn correction(&self, sample: &Sample, commands: &[AlphaBeta], i_max: f64) -> Option<AlphaBeta> {
@@ -171,8 +172,8 @@ mod tests {
         Sample { i, i_last, u, ..Sample::default() }
     }
 
-    /// At any estimated angle and with every delay, the current of a command that would exceed the limit ends at it, and another
-    /// command stays.
+    /// At any estimated angle and with every delay, a command that would exceed the limit is corrected to end at it, and any
+    /// other command stays unchanged.
     #[test]
     fn the_current_ends_at_the_limit() {
         for off in [0.0, 1.0, -2.0, 3.1] {

@@ -41,7 +41,7 @@ pub struct Envelope {
     x_mtpa: f64,
 }
 
-/// Iterations run to their end, at most so many and until a step is as small as this: the next one would be below the rounding.
+/// Iterations run until a step is this small, so that the next one would be below rounding, and at most this many times.
 const MOST: u32 = 60;
 const SMALL: f64 = 1e-8;
 
@@ -57,7 +57,7 @@ pub struct Limit {
     pub tau: f64,
 }
 
-/// Where the iterations for one sign ended at the last sample and the next ones begin; zeros: they begin anew.
+/// Result of the iterations for one sign at the last sample, from which the next ones begin; zeros for a fresh start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WarmStart {
     x: f64,
@@ -301,7 +301,7 @@ fn value(p: &[f64; 5], x: f64) -> f64 {
     (((p[4] * x + p[3]) * x + p[2]) * x + p[1]) * x + p[0]
 }
 
-/// The root of `p` between `left`, where it is not positive, and `right`, where it is; starts at `x` if that is inside.
+/// The root of `p` between `left`, where it is not positive, and `right`, where it is positive; starts at `x` if that is inside.
 /// A Newton step that leaves the bracket is replaced by bisection; one that hits its end stays.
 fn root<const TO_THE_END: bool>(p: &[f64; 5], mut left: f64, mut right: f64, x: f64) -> f64 {
     let (mut x, steps) = if x > left && x < right { (x, 2) } else { (0.5 * (left + right), 6) };

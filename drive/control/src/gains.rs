@@ -36,7 +36,7 @@ impl Gains {
         Self::with(par, par.estimator)
     }
 
-    /// From the parameters, with another `estimator` in use.
+    /// From the parameters, with a different `estimator` in use.
     pub(crate) fn with(par: &ControllerParameters, estimator: Kind) -> Self {
         let ControllerParameters { current, speed_loop, motor, J, limit, lock, T_s, .. } = par;
         // Finite, so that no current is no torque with any psi_M.

@@ -15,7 +15,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Maximum |i_q| in A that `i_d` (A), which has priority, leaves.
+    /// Maximum |i_q| in A beside `i_d` (A), which has priority.
     #[inline]
     pub fn i_q_beside(&self, i_d: f64) -> f64 {
         at_most(at_least(self.i * self.i - i_d * i_d, 0.0).sqrt(), self.i_q)

@@ -1,4 +1,4 @@
-//! The currents of a machine with saturation, read from a map over its flux linkages that the importer may replace by one of
+//! The currents of a machine with saturation, read from a map over its flux linkages; the importer may replace it by a map of
 //! another size: arrays with structural parameters, and a terminal that groups them (FMI-LS-STRUCT).
 
 use fmu_core::unit::{AMPERE, WEBER};

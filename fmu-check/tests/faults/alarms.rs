@@ -111,7 +111,7 @@ fn a_byte_order_mark_is_no_must() {
     assert_eq!((violated(&report), at(&report, Level::Hard)), (vec!["X01m"], vec!["X01m"]), "{}", listed(&report));
 }
 
-/// That a library of this computer is missing is a should (FMI 2.0.5, 2.3); that a symbol of the FMU's own is missing is not.
+/// A library missing on this computer is a should (FMI 2.0.5, 2.3); a missing symbol of the FMU itself is not.
 #[test]
 fn a_missing_library() {
     let dir = tempfile::tempdir().unwrap();
@@ -155,7 +155,7 @@ fn our_own_errors() {
     assert!(at(&report, Level::Must).is_empty() && at(&report, Level::Should).is_empty(), "{}", listed(&report));
 }
 
-/// A file with the name of a folder hides nothing in that folder, whichever comes first.
+/// A file with the name of a folder does not hide the contents of that folder, whichever comes first.
 #[test]
 fn a_file_beside_a_folder_of_its_name() {
     let dir = tempfile::tempdir().unwrap();
@@ -354,7 +354,7 @@ fn what_can_be_disputed_is_a_should() {
     }
 }
 
-/// Explicit steps of a stiff model must be short: that the checker's own integrator runs away is no fault of the FMU.
+/// Explicit steps of a stiff model must be short: if the checker's own integrator diverges, this is no fault of the FMU.
 #[test]
 fn a_stiff_model_is_integrated_in_short_steps() {
     let dir = tempfile::tempdir().unwrap();

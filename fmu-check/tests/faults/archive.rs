@@ -69,7 +69,7 @@ fn each_fault_is_found_by_its_check() {
     assert_eq!(violated(&check(&other, &["archive"])), ["Z01a"]);
 }
 
-/// Faults of sources/buildDescription.xml, in both standards, and a folder in the place of a library.
+/// Faults of sources/buildDescription.xml, in both standards, and a folder instead of a library.
 #[test]
 fn faults_of_the_build_description() {
     let dir = tempfile::tempdir().unwrap();
@@ -110,7 +110,7 @@ fn faults_of_the_build_description() {
     assert_eq!(violated(&check(&path, &["X03"])), ["X03"]);
 }
 
-/// Many variables: the checks of the file take seconds, and none is given up.
+/// Many variables: the checks of the file take seconds, and all of them finish.
 #[test]
 fn a_hundred_thousand_variables() {
     let dir = tempfile::tempdir().unwrap();

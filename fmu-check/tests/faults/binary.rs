@@ -234,7 +234,7 @@ fn all(version: u8, faults: &[(&str, &[&str])]) {
     all_of(version, faults, &[]);
 }
 
-/// Each fault is found by its check, and nothing else by these.
+/// Each fault is found by its check, and these checks find nothing else.
 fn all_of(version: u8, faults: &[(&str, &[&str])], only: &[&str]) {
     let dir = tempfile::tempdir().unwrap();
     if compile(version, "NONE").is_none() {
@@ -276,7 +276,7 @@ fn each_fault_at_run_time_is_found_by_its_check() {
     }
 }
 
-/// A second instance that hangs is a matter of the check that is about it, not of all that make two.
+/// A second instance that hangs is reported by the check for it, not by every check that creates two.
 #[test]
 fn a_second_instance_that_hangs() {
     let dir = tempfile::tempdir().unwrap();
@@ -310,7 +310,7 @@ fn derivatives_of_outputs() {
     }
 }
 
-/// Of FMI 2.0, linux64 says nothing about the processor; importers expect x86-64 there.
+/// In FMI 2.0, linux64 does not specify the processor; importers expect x86-64 there.
 #[test]
 fn a_library_for_another_processor() {
     let dir = tempfile::tempdir().unwrap();

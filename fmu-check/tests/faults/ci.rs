@@ -125,7 +125,7 @@ fn every_check_is_explained() {
     }
 }
 
-/// The checks of the tables of states tell which calls they make where.
+/// The checks of the state tables list their calls for each state.
 #[test]
 fn tables_of_states_are_explained() {
     for (id, line) in [

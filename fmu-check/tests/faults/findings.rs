@@ -4,7 +4,7 @@ use fmu_check::{Options, report::Report};
 use std::path::Path;
 use std::time::Duration;
 
-/// All findings about a file. Time decides nothing here, however busy the machine is.
+/// All findings about a file. Timing has no influence here, however busy the machine is.
 pub fn check(path: &Path, only: &[&str]) -> Report {
     check_within(path, only, 120)
 }

@@ -60,7 +60,7 @@ fn under(name: &str, script: &str, path: &Path) -> Option<(Option<i32>, String, 
     Some((output.status.code(), out, errors))
 }
 
-/// A good FMU violates nothing where the computer is short of something: there is a reason, or one line and status 2.
+/// A good FMU violates nothing if the computer runs short of a resource: the report gives a reason, or one line and status 2.
 #[test]
 fn a_computer_that_is_short_of_something_is_no_fault() {
     let dir = tempfile::tempdir().unwrap();

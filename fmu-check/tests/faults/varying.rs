@@ -36,7 +36,7 @@ fn noise_in_model_exchange_is_one_finding() {
     }
 }
 
-/// A fault in another variable is found beside the noise.
+/// A fault in another variable is found despite the noise.
 #[test]
 fn noise_hides_no_fault_of_another_variable() {
     let dir = tempfile::tempdir().unwrap();

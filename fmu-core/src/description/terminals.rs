@@ -29,7 +29,7 @@ pub struct MemberDescription {
     pub name: String,
     /// Name of the variable.
     pub variable: String,
-    /// How a connection combines the values.
+    /// The rule by which a connection combines the values.
     pub kind: MemberKind,
 }
 

@@ -33,8 +33,8 @@ impl<W: 'static> Row<W> {
     }
 
     /// The importer may set the start value of this output or local variable, before the initialization and in it. The start
-    /// value is that of the model's `Default`; [`initialize`](crate::Model::initialize) leaves it alone. The row of a state sets
-    /// the state itself; the closure of any other row must refer to a field of the model, not to one of its outputs.
+    /// value is that of the model's `Default`; [`initialize`](crate::Model::initialize) must not change it. The row of a state
+    /// sets the state itself; the closure of any other row must refer to a field of the model, not to one of its outputs.
     ///
     /// # Panics
     /// At compile time, if the variable is not an output or a local variable, or is a text, bytes, a mean or a constant. Describing the
@@ -122,7 +122,7 @@ impl<W: 'static> Row<W> {
     /// Values greater than `bound` only.
     ///
     /// # Panics
-    /// At compile time, like every bound: if the variable is not a number, or if no value is left.
+    /// At compile time, like every bound: if the variable is not a number, or if no value remains.
     #[track_caller]
     pub const fn above(mut self, bound: f64) -> Self {
         self.meta.range.min = bound;

@@ -22,7 +22,7 @@ use std::sync::atomic::{
     Ordering::{Acquire, Relaxed, Release},
 };
 
-/// Which function was called: its name in C and its row of the lifecycle table.
+/// The called function: its name in C and its row of the lifecycle table.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     name: &'static str,
@@ -129,7 +129,7 @@ const fn calls_back<E: Exported>() -> bool {
     E::CAN.intermediate.is_some() || E::CAN.scheduled
 }
 
-/// Passes a call to the instance in parts. After a part that requests it, the importer is called, while nothing of the instance
+/// Passes a call to the instance in parts. After a part that requests it, the importer is called, while no part of the instance
 /// is borrowed and it is not busy; the lifecycle table lists the calls that the callback may make. If one of them fails, this
 /// call fails.
 ///
@@ -237,7 +237,7 @@ pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
     Fault::new(format!("a fault in the model's code (panic): {}", text.unwrap_or("no message")))
 }
 
-/// How the importer takes communication steps.
+/// The way in which the importer makes communication steps.
 #[derive(Clone, Copy)]
 pub(crate) struct Steps<'a> {
     /// They may end early.

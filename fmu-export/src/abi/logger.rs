@@ -60,7 +60,7 @@ impl Sink for Fmi3Sink {
     }
 }
 
-/// A text for C, without null bytes, which a C string cannot hold.
+/// A text for C, without null bytes, which a C string cannot contain.
 fn c_text(text: &str) -> CString {
     CString::new(text.replace('\0', "")).unwrap_or_default()
 }

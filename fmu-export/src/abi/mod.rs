@@ -50,7 +50,7 @@ impl<E: Exported> Abi<'_, E> {
     /// Passes a call through the gate.
     ///
     /// # Safety
-    /// The instance is NULL, or one that this binary made and has not freed, used by one thread at a time.
+    /// The instance is NULL, or was created by this binary and not freed, and is used by one thread at a time.
     #[inline]
     pub unsafe fn enter<F: types::Function>(
         instance: InstancePointer,
@@ -116,8 +116,8 @@ pub fn quiet() {
     ONCE.call_once(|| set_hook(Box::new(fault::keep)));
 }
 
-/// The text of the panic that ended the last call, NULL if none did: for a host whose calls end without an answer, where panics
-/// do not unwind.
+/// The text of the panic that ended the last call, or NULL: for a host in which panics do not unwind and calls end without a
+/// result.
 pub fn fault() -> types::Text {
     fault::text()
 }

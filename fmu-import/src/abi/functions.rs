@@ -93,7 +93,7 @@ macro_rules! functions {
 
         impl Calls {
             /// # Safety
-            /// Where the library has a function of the standard, it has the standard's type.
+            /// Every function of the standard in the library has the standard's type.
             pub(super) unsafe fn new(library: Library, version: FmiVersion, folder: Option<Arc<Folder>>) -> Self {
                 /// # Safety
                 /// As for `new`, and that is type `T`.

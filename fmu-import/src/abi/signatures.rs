@@ -80,7 +80,7 @@ pub(super) mod v2 {
         pub(in crate::abi) allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
         pub(in crate::abi) free: Option<unsafe extern "C" fn(*mut c_void)>,
         pub(in crate::abi) step_finished: Option<unsafe extern "C" fn(*mut c_void, Status)>,
-        /// A C pointer, atomic because instances with these callbacks go from thread to thread.
+        /// A C pointer, atomic because instances with these callbacks may move between threads.
         pub(in crate::abi) environment: AtomicPtr<c_void>,
     }
 

@@ -178,7 +178,7 @@ impl Instance {
     /// Derivatives of inputs with respect to time at the beginning of the next step (Co-Simulation of FMI 2.0 only).
     ///
     /// # Errors
-    /// The FMU refuses or takes none, or the arrays have different lengths.
+    /// The FMU refuses or does not support this, or the arrays have different lengths.
     pub fn set_input_derivatives(&mut self, references: &[u32], orders: &[i32], values: &[f64]) -> Result<(), Error> {
         self.call(Call::Evaluation, |s| s.set_input_derivatives(references, orders, values))
     }

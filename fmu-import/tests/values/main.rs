@@ -184,7 +184,7 @@ fn real(it: &mut Instance, reference: u32) -> f64 {
     one[0]
 }
 
-/// An FMU that never has to return may forget: one of the public FMUs computes something else where it must not.
+/// An FMU that never has to go back in time may discard data: one of the public FMUs then computes a different result.
 #[test]
 fn only_a_saved_state_can_bring_back_an_earlier_time() {
     both(|it, version| {

@@ -12,7 +12,7 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::within;
 use serde::{Deserialize, Serialize};
 
-/// Share of I of the current across that is left alone.
+/// Share of I below which the current across is not corrected.
 const ACROSS: f64 = 0.35;
 /// Longest time in s of an alignment, of a swing and of coasting.
 pub(super) const LONGEST: f64 = 12.0;

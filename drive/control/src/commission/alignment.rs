@@ -8,10 +8,9 @@
 //!
 //! A current far beyond i_1 therefore rests on the q-axis, as the magnet of a machine with L_d > L_q rests on its greater
 //! inductance. A smaller current separates the two: if the axis of smaller inductance turns to the current, the magnet lies along
-//! it. The
-//! angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change is that of a blocked
-//! rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the swing must
-//! also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
+//! it. The angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change is that of a
+//! blocked rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the
+//! swing must also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
 
 use drive_base::math::{sin_cos, wrap};
 use serde::{Deserialize, Serialize};
@@ -19,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Maximum angle in rad at which the smaller inductance lies along the current, and minimum angle at which it lies across it.
 const ALONG: f64 = 0.26;
 const ACROSS: f64 = 1.31;
-/// Change of the angle in rad that shows a rotor that follows.
+/// Change of the angle in rad that indicates that the rotor follows.
 const FOLLOWS: f64 = 0.05;
 /// Smallest current over I, and the next one over the present one where the angle does not show i_1.
 const FEWEST: f64 = 0.03;
@@ -40,7 +39,7 @@ pub(super) struct Alignment {
     pub(super) over: bool,
     /// The magnet seems to lie along the greater inductance.
     pub(super) inverse: bool,
-    /// The rotor rests between the two: it is blocked, or nothing is known.
+    /// The rotor rests between the two: it is blocked, or the case is undecided.
     pub(super) stuck: bool,
 }
 

@@ -13,7 +13,8 @@ use super::status::CommissionFault as Fault;
 use drive_base::math::atan2;
 use serde::{Deserialize, Serialize};
 
-/// Minimum ratio of the inductances that shows the axis of a free rotor, whose alignment shows it too, and of a blocked one.
+/// Minimum ratio of the inductances that determines the axis of a free rotor, which is also known from its alignment, and of a
+/// blocked one.
 const SALIENT: [f64; 2] = [1.15, 1.03];
 
 /// Ratio of the inductances above which the angle of the rest has shown which of them is the magnet's.
@@ -72,7 +73,7 @@ impl Loops {
     /// The axes, of an `inverse` machine with L_d > L_q.
     ///
     /// # Errors
-    /// They are not separable, an inductance is negative, or the magnet lies along the other one than it did.
+    /// They are not separable, an inductance is negative, or the magnet lies along the other axis than before.
     pub(super) fn axes(&self, blocked: bool, inverse: bool) -> Result<Axes, Fault> {
         let [aa, ab, bb] = self.normal.solve(0.0).ok_or(Fault::Inductance)?.x;
         let (g_0, g_c, g_s) = (0.5 * (aa + bb), 0.5 * (aa - bb), ab);

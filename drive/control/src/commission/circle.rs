@@ -12,8 +12,7 @@
 //! a period much shorter than the part vanishes. The torque 1.5 n_p (p - c - d tau) x i needs neither L_q nor psi_M.
 //!
 //! At most 256 points; when the buffer is full, every second point is dropped. The circle is Kasa's (1976, IEEE Trans. Instrum.
-//! Meas.
-//! 25), extended by the drift here; noise s of p makes the radius (s/psi)^2 too large. A part of less than two turns
+//! Meas. 25), extended by the drift here; noise s of p makes the radius (s/psi)^2 too large. A part of less than two turns
 //! separates center and radius poorly.
 
 use super::excitation::Rows;

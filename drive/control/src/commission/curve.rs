@@ -72,7 +72,7 @@ impl Curve {
         (if i < 0.0 { -l } else { l }, slope)
     }
 
-    /// Voltage in V that the legs take from the command at the currents `i` (A).
+    /// Voltage in V lost in the legs at the currents `i` (A).
     #[inline]
     pub(super) fn loss(&self, i: AlphaBeta) -> AlphaBeta {
         self.loss_and_slope(i).0
@@ -122,7 +122,7 @@ impl Between {
         Self { mean: 1.0 / whole - 1.0 / x, at: mid.map(|s| (1.0 - exp(-x * s)) / whole) }
     }
 
-    /// Voltage in V that the resistance `R` (Ohm) and the legs take on the average between the currents `from` and `to` (A).
+    /// Mean voltage drop in V of the resistance `R` (Ohm) and the legs between the currents `from` and `to` (A).
     pub(super) fn lost(&self, R: f64, curve: &Curve, from: AlphaBeta, to: AlphaBeta) -> AlphaBeta {
         let step = to - from;
         let legs = self.at.iter().fold(AlphaBeta::ZERO, |sum, &s| sum + curve.loss(from + step * s));

@@ -1,7 +1,7 @@
 //! Excitation of an axis at standstill: a triangle of current with falling peaks, and the record of voltage and current.
 //!
 //! The current follows r of constant slope through (-0.707, 1, -1, 1, -0.9, 0.8, -0.7, 0.6, -0.5, 0.4, -0.3, 0) A. The first
-//! half-wave has half of the area of the others, so the torque gives the rotor no mean speed.
+//! half-wave has half of the area of the others, so the torque causes no mean speed of the rotor.
 //!
 //! ```text
 //! u = L^/T (r[k+1] - r[k] + 0.3 (r[k-1] - i[k-1])) + R r_mean + loss(r_mean)      0 V across the axis
@@ -229,7 +229,7 @@ impl Excitation {
 mod tests {
     use super::*;
 
-    /// Twice the integral of the first half-waves gives the rotor no mean speed.
+    /// The double integral of the first half-waves causes no mean speed of the rotor.
     #[test]
     fn the_triangle_passes_its_peaks_and_ends_at_zero() {
         let plan = Plan { A: 2.0, n: 10.0, L: 1.0, block: 1.0 };

@@ -16,10 +16,9 @@
 //! error of 1 % of L_d changes psi_M by less than 0.1 %. The torque, however, is free of an error of the angle where i_d = 0.
 //!
 //! J / (n_p K) of the speed control and of i_a is updated after each sweep, and i_f from the last two levels. psi_M is the mean
-//! radius
-//! at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is the
-//! error at 0.45 w_r and so part of the half-width, as is that of L_d. If time runs out after each level has been measured once, the rest is
-//! left out. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
+//! radius at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is the
+//! error at 0.45 w_r and so part of the half-width, as is that of L_d. If time runs out after each level has been measured once,
+//! the rest is omitted. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
 
 use super::bench::{Bench, Sample};
 use super::circle::{Part, Points};
@@ -134,7 +133,7 @@ pub(super) fn rho(bench: &Bench) -> f64 {
 }
 
 impl Levels {
-    /// The start is over; the friction takes `i_f` (A).
+    /// The start is over; friction requires `i_f` (A).
     pub(super) fn new(bench: &Bench, turning: &Turning, sample: &Sample, i_f: f64, results: &Results) -> Self {
         // A heavy rotor still swings: its friction is at most a tenth of I.
         let i_f = i_f.clamp(0.0, 0.1 * bench.I);
@@ -196,7 +195,7 @@ impl Levels {
         self.points.begin();
     }
 
-    /// One sample, `left` (s) before the end of the time.
+    /// One sample, with `left` (s) of the time remaining.
     pub(super) fn update(
         &mut self,
         bench: &Bench,
@@ -298,7 +297,7 @@ impl Levels {
         Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(self.i_d, i_q))))
     }
 
-    /// Bandwidth of the speed control in rad/s: noise of w makes little current.
+    /// Bandwidth of the speed control in rad/s: noise of w causes little current.
     fn bandwidth(&self, bench: &Bench, turning: &Turning) -> f64 {
         (turning.rho / 6.0).min(30.0).min(10.0 * bench.I / (self.inertia * bench.w_r()))
     }

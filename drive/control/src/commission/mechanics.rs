@@ -42,7 +42,7 @@ pub(super) struct Found {
 }
 
 impl Mechanics {
-    /// Takes a part; one more than the store holds is lost.
+    /// Stores a part; if the store is full, the part is discarded.
     pub(super) fn add(&mut self, acceleration: f64, sigma: f64, w: f64, tau: f64) {
         self.rows.push([acceleration, sigma, w, tau]);
     }

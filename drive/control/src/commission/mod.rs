@@ -2,8 +2,8 @@
 //! with the loss of the inverter, L_d, L_q and their saturation; the rotor may be free or blocked. Then, in mode Spin, psi_M,
 //! J, B and tau_coulomb of the turning machine, at up to half of its rated speed.
 //!
-//! [`Commission`] is called once a sample with the currents and the link's voltage, and commands voltage and gates. It keeps
-//! no references and allocates nothing; a sample takes bounded time, at most one simulation of a record of 512 rows.
+//! [`Commission`] is called once a sample with the currents and the link's voltage, and commands voltage and gates. It keeps no
+//! references and allocates nothing; the work per sample is bounded, at most one simulation of a record of 512 rows.
 //!
 //! ```text
 //! Offsets      gates off: means of the phases                                        offsets
@@ -29,9 +29,8 @@
 //! Limits: a load present from the first level to the last counts as friction; friction and inertia are those of the
 //! whole shaft. Only the range from 0.15 to 0.45 of the rated speed separates B from tau_coulomb, so often only their sum is
 //! accepted. J needs two turns in a sweep: a rotor with few turns per second that reaches its rated speed within some 10 ms
-//! yields no J.
-//! Values scale with the gains of the sensors: currents that read 1 % high give R and L 1 % low, J and friction 1 % high; a
-//! voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
+//! yields no J. Values scale with the gains of the sensors: currents that read 1 % high give R and L 1 % low, J and friction 1 %
+//! high; a voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
 
 mod align;
 mod alignment;

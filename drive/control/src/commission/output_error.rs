@@ -21,7 +21,7 @@ const LEFT: f64 = 3.0;
 /// Evaluations at most.
 const MOST: f64 = 25.0;
 
-/// Which axis a loop has excited.
+/// The axis excited by a loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) enum Along {
     /// The magnet's: even powers.
@@ -48,7 +48,7 @@ pub(super) struct OutputError {
     L: f64,
 }
 
-/// How far the fit is.
+/// Progress of the fit.
 pub(super) enum Progress {
     /// It goes on.
     Continues,

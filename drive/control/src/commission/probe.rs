@@ -22,7 +22,7 @@ const REACHED: f64 = 0.15;
 const LONGEST: f64 = 64.0;
 /// Repetitions of each direction and level.
 const REPEATED: f64 = 4.0;
-/// Longest time in s that a current may take to end.
+/// Maximum decay time (s) of a current.
 const DECAY: f64 = 5.0;
 
 /// The pulses.
@@ -56,7 +56,7 @@ pub(super) enum Probed {
     Voltage(AlphaBeta),
     /// The smallest inductance in H, and all.
     Done(f64, Tensor),
-    /// The machine gives no such current.
+    /// The machine cannot reach this current.
     Refused(Fault),
 }
 

@@ -1,6 +1,6 @@
 //! Stator resistance and the loss of an inverter leg, from a staircase of direct currents of one sign.
 //!
-//! Along phase a the legs take (2/3)(l(i) + l(i/2)) from the command. Where all legs carry current,
+//! Along phase a, the legs reduce the commanded voltage by (2/3)(l(i) + l(i/2)). Where all legs carry current,
 //!
 //! ```text
 //! u = R i + (4/3) u_dead - u_dead i_x / i
@@ -155,7 +155,7 @@ impl Staircase {
         f(n) + (f(n - 1) - f(n)) * ln(i / below) / ln(above / below)
     }
 
-    /// Whether the points are in order, so that a curve goes through them.
+    /// Whether the points are in ascending order, as a curve requires.
     fn is_ordered(&self) -> bool {
         self.points[STEPS - 1][1] > 0.0 && self.points.windows(2).all(|p| p[0][1] > p[1][1])
     }

@@ -103,7 +103,7 @@ impl Results {
         self.psi_M = Identified::within(psi_M.value, psi_M.u, self.with_l_d(LIMIT_PSI));
     }
 
-    /// The limit, which nothing keeps where L_d is refused.
+    /// The limit, which has no effect if L_d is refused.
     fn with_l_d(&self, limit: f64) -> f64 {
         if self.L_d.u < 1.0 { limit } else { 0.0 }
     }
@@ -175,7 +175,7 @@ mod tests {
         assert!((Results::default().chord_d(36e-3, -0.9) - 36e-3).abs() < 1e-12);
     }
 
-    /// Iron loss, which the loops of the d-axis show, brakes as friction does.
+    /// Iron loss, which appears in the loops of the d-axis, brakes like friction.
     #[test]
     fn without_l_d_no_flux_and_no_friction() {
         let found = Found {

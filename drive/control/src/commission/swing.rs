@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 /// Residual over psi_r below which the current explains the flux linkage: between 0.013, the maximum of 100 blocked machines, and
 /// 0.19, the minimum of 299 free ones.
 const BLOCKED: f64 = 0.05;
-/// Time in s at the end that gives the slope.
+/// Time in s at the end over which the slope is fitted.
 const LAST: f64 = 0.1;
 
 /// The flux linkage on its way.
@@ -97,7 +97,7 @@ fn after(k: f64) -> f64 {
     (1.025 * k).ceil().max(k + 1.0)
 }
 
-/// Root mean square in Wb of what neither the current nor a drift explains of the flux linkage in the `record`.
+/// Root mean square in Wb of the part of the flux linkage in the `record` that neither the current nor a drift explains.
 fn unexplained(T: f64, record: &Record) -> f64 {
     let mut normal = [Normal::<4>::default(), Normal::default()];
     let mut k = 1.0;

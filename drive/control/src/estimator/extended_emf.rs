@@ -24,7 +24,7 @@ use drive_base::math::at_least;
 use fmu_core::Fault;
 use serde::{Deserialize, Serialize};
 
-/// The observer for both axes: it gives one angle error per interval; the caller turns the frame.
+/// The observer for both axes: it returns one angle error per interval; the caller turns the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ExtendedEmfObserver {
     d: AxisObserver,
@@ -65,7 +65,7 @@ impl ExtendedEmfObserver {
     }
 }
 
-/// Minimum flux linkage that makes the extended EMF, as a share of psi_M.
+/// Minimum flux linkage of the extended EMF, as a share of psi_M.
 const LEAST_FLUX: f64 = 0.2;
 
 /// State kept from one sample to the next.

@@ -18,17 +18,16 @@
 //!
 //! **Resistance.** The sensitivity of psi~ to the resistance is known: h with dh/dt = -i - c rho psi_a, rho = Re(h / psi_a),
 //! integrated along with psi^. It gives r = (R - R^) rho, at rest (rho = -i_d / (c psi_M)), at speed (rho = -i_q / (w psi_M)) and
-//! in all
-//! transients between, with the right sign, also where rho passes zero. Hence the adaptive observer (Zhang, IEEE Trans.
+//! in all transients between, with the right sign, also where rho passes zero. Hence the adaptive observer (Zhang, IEEE Trans.
 //! Autom. Control 47 (3), 2002), with rho_0 = `adaptation.i` / (c_0 psi_M), c_0 = c at rest:
 //!
 //! ```text
 //! dR^/dt = b r rho / (rho^2 + rho_0^2)        psi^ += h dR^        b = adaptation.bandwidth
 //! ```
 //!
-//! The second equation removes what the old R^ left in psi^. Neither the gate by standstill nor the freezing of R^ that
-//! Rasmussen's observer needs ([`resistance`](crate::estimator::resistance)) is left: both replaced the missing dynamics
-//! of r. A small c makes the angle insensitive and rho large: while the reference is a speed, c <= k_c |w|, as there.
+//! The second equation removes what the old R^ left in psi^. The standstill gate and the freezing of R^ that Rasmussen's observer
+//! needs ([`resistance`](crate::estimator::resistance)) are not necessary here: both substitute for the missing dynamics of r. A
+//! small c makes the angle insensitive and rho large: while the reference is a speed, c <= k_c |w|, as there.
 //! `adaptation.k_a` is not read: at creep it fought R^ and lost cells.
 //!
 //! **Magnet.** r also contains (psi_M^ - psi_M) / psi_a: psi_M^ follows -r where R^ has no part in it,

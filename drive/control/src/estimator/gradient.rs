@@ -16,7 +16,7 @@
 //! where the slow pole is w^2 / b.
 //!
 //! `clamped` is the form that open motor controllers use: no gradient, but both components of eta^ are limited to
-//! +-psi_a. It costs less and corrects only what has left the square.
+//! +-psi_a. It costs less and corrects only components that have left the square.
 //!
 //! Limits: a constant error of R i or of the current adds up at low speed. It holds rated load down to 0.010 of the rated
 //! speed, 0.010 with a compensated dead time. With the clamp, an angle error remains where eta^ leaves the circle but not
@@ -38,7 +38,7 @@ const LEAST: f64 = 0.1;
 pub struct GradientParameters {
     /// Rate gamma psi_M^2 in 1/s at which eta converges to the circle, > 0.
     pub bandwidth: f64,
-    /// Clamp in the place of the gradient.
+    /// Clamp instead of the gradient.
     pub clamped: bool,
 }
 

@@ -233,7 +233,7 @@ mod tests {
         errors
     }
 
-    /// The frame in half a sample and in a whole one is that of its angle then, at a speed in either direction.
+    /// The frame after half a sample and after a whole sample has the angle of that instant, for speeds in both directions.
     #[test]
     fn the_frame_goes_on_at_the_estimated_speed() {
         let (par, motor) = (EstimatorParameters::default(), Motor::default());
@@ -329,7 +329,7 @@ mod tests {
         assert!(most < 1e-4, "{most} rad");
     }
 
-    /// Tuning the speed adaptation leaves the estimated speed: w^ = 2 zeta w_n / psi_M psi_rq^ + w_I.
+    /// Tuning the speed adaptation keeps the estimated speed: w^ = 2 zeta w_n / psi_M psi_rq^ + w_I.
     #[test]
     fn tuning_does_not_change_the_speed() {
         let motor = Motor::default();

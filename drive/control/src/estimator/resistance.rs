@@ -38,8 +38,8 @@
 //!
 //! With c_1' = |w|, its poles are those of s^3 + |w| s^2 + (w^2 + k i_d) s + k w i_q, k = k_t |w| w i_q / (i_q^2 + ...):
 //! stable for k_t (1 + i_d / |i_q|) < 1 with a generating load, where the zero at -w i_q / i_d lies in the right
-//! half-plane. So k_t = 0.15 is the useful value; it lags a ramp of R by dR/dt / (k_t |w|). A psi_M^ that is wrong by more
-//! than delta drives R^ off; without i_q, nothing is observable and R^ stays.
+//! half-plane. So k_t = 0.15 is the useful value; it lags a ramp of R by dR/dt / (k_t |w|). A psi_M^ that is wrong by more than
+//! delta drives R^ away; without i_q, nothing is observable and R^ stays.
 //!
 //! **k_a** adds the voltage k_a R_nom g i_q on the q-axis, which acts like a lower R^ there: dy/dt = k_a R_nom i_q
 //! turns the frame until i_d carries the load, the safe side at rest, where theta~ is not observable: with an exact R^
@@ -49,8 +49,8 @@
 //! **In torque mode**, a zero torque reference counts as rest: i_q = 0 makes the last coefficient k w i_q of the polynomial above
 //! vanish, so R^ may adapt while the rotor coasts below 2 rad/s, too. There it goes to the R^ that explains the error of psi_M^,
 //! x = -d, and returns within 1 / b once the rotor rests. R^ stays constant while the torque reference is not zero, and a start
-//! at speed
-//! begins with `motor.R_s`; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will turn.
+//! at speed begins with `motor.R_s`; c_1 does not fall below c_1 / 5, because no reference says in which direction the rotor will
+//! turn.
 //!
 //! Not observable: R^ without current or while the speed or torque reference is not zero; theta~ and psi_M^ at rest.
 
@@ -63,7 +63,7 @@ use serde::{Deserialize, Serialize};
 
 /// Mechanical speed in rad/s below which a speed reference counts as standstill.
 pub(super) const STANDSTILL: f64 = 0.05;
-/// Mechanical speed in rad/s above which nothing adapts.
+/// Mechanical speed in rad/s above which the adaptation stops.
 const GATE: f64 = 2.0;
 /// Corner frequency in rad/s of the low-pass filter of the speed.
 pub(super) const FILTER: f64 = 100.0;
@@ -77,7 +77,7 @@ const NO_TORQUE: f64 = 5e-3;
 /// Minimum c_1 in torque mode, as a share of c_1.
 const LEAST_C_1: f64 = 0.2;
 
-/// Share of R~ that may remain when a drive leaves its rest, and the longest rest in units of 1 / `bandwidth`.
+/// Share of R~ that may remain when a drive starts from rest, and the maximum time at rest in units of 1 / `bandwidth`.
 const KNOWN: f64 = 0.05;
 const LONGEST_REST: f64 = 20.0;
 
@@ -105,7 +105,7 @@ pub struct ResistanceParameters {
     pub k_c: f64,
     /// Rate at which R^ follows R at creep divided by the electrical speed, >= 0; 0: R^ stays constant there.
     pub tracking: f64,
-    /// Error of psi_M^ that the tracking does not take for one of R, as a share of psi_M^, >= 0.
+    /// Error of psi_M^ that the tracking does not attribute to R, as a share of psi_M^, >= 0.
     pub flux: f64,
 }
 

@@ -1,6 +1,5 @@
 //! Sliding-mode observer of the back EMF, as published by manufacturers of controllers (Microchip, AN1078 "Sensorless field
-//! oriented
-//! control of a PMSM", 2010; Texas Instruments, SPRABQ3, 2013), for salient machines by the extended EMF (Chen, Tomita,
+//! oriented control of a PMSM", 2010; Texas Instruments, SPRABQ3, 2013), for salient machines by the extended EMF (Chen, Tomita,
 //! Doki, Okuma, IEEE Trans. Ind. Electron. 50 (2), 2003).
 //!
 //! In stator axes, with e = E (-sin theta, cos theta), E as in [`extended_emf`](crate::estimator::extended_emf):
@@ -125,7 +124,7 @@ mod tests {
         assert!((more - 5.78).abs() < 0.3 && (less + 5.91).abs() < 0.3, "{more} {less} deg");
     }
 
-    /// A gain below the EMF loses the angle; one above it holds it.
+    /// A gain below the EMF loses the angle; a gain above it does not.
     #[test]
     fn the_gain_must_exceed_the_emf() {
         let mut par = EstimatorParameters::default();

@@ -78,7 +78,7 @@ impl Differentiable for Roberts {
     }
 }
 
-/// The indicators only show where a share becomes small.
+/// The indicators only mark the points where a share becomes small.
 impl Events for Roberts {
     const INDICATORS: &'static [Indicator] =
         &[Indicator { name: "g1", description: "y1 - 1e-4" }, Indicator { name: "g2", description: "y3 - 0.01" }];

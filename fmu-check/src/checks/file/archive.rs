@@ -122,7 +122,7 @@ fn names(fmu: &FmuFile) -> Verdict {
     })
 }
 
-/// Windows stores no colons, and a folder named `.` is none anywhere; ZIP and FMI forbid neither.
+/// Windows cannot store colons in names, and `.` is not a folder name on any system; ZIP and FMI forbid neither.
 fn portable(fmu: &FmuFile) -> Verdict {
     each_entry(fmu, |entry| {
         let name = entry.name();

@@ -174,7 +174,7 @@ fn format(fmu: &FmuFile) -> Verdict {
     Verdict::of(findings)
 }
 
-/// FMI 2.0 names no processor, but importers take linux64 and win64 for x86-64; universal libraries of macOS are common.
+/// FMI 2.0 names no processor, but importers assume x86-64 for linux64 and win64; universal libraries of macOS are common.
 fn expected_processor(fmu: &FmuFile) -> Verdict {
     each(fmu, |binary, file| {
         let other = file.architecture() != Architecture::X86_64;

@@ -309,7 +309,7 @@ fn text_must_be_refused(session: &Session, way: &str, reference: u32, what: &str
     Ok(())
 }
 
-/// Requires an Error; one that gives up all instances is a lesser matter.
+/// Requires an Error; a Fatal status, which ends all instances, is a lesser violation.
 fn refused(session: &Session, status: Status, text: &str) {
     if status == Status::FATAL {
         session.lesser(Level::Should, text);

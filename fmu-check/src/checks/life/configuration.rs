@@ -1,4 +1,4 @@
-//! Structural parameters, and the sizes of arrays that they give (FMI 3.0.2, 2.3.6, 2.3.7 and 2.4.7.2).
+//! Structural parameters, and the array sizes that they determine (FMI 3.0.2, 2.3.6, 2.3.7 and 2.4.7.2).
 
 use crate::check::{Check, Levels, Run};
 use crate::encoding::{bits, show};
@@ -85,7 +85,7 @@ impl<'a> Size<'a> {
         Ok(left.is_ok())
     }
 
-    /// Requires that it has this value, and its arrays as many elements as that means.
+    /// Requires that it has this value and that its arrays have the corresponding number of elements.
     fn require(&self, instance: &Instance<'_>, n: u64, when: &str) -> Result<(), NotDetermined> {
         let (status, found) = instance.get(self.v)?;
         self.session.require(status.is_ok() && found == [n], || {

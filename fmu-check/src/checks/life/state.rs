@@ -232,7 +232,7 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     in_initialization(session, &|| session.initializing(), &all)
 }
 
-/// Restores a state in Initialization Mode, where more can be set, texts too.
+/// Restores a state in Initialization Mode, where more variables can be set, including texts.
 pub(crate) fn in_initialization<'b>(
     session: &'b Session,
     begin: &dyn Fn() -> Result<Instance<'b>, NotDetermined>,
@@ -351,7 +351,7 @@ fn serialized(session: &Session) -> Result<(), NotDetermined> {
     serialized_variables(session)
 }
 
-/// Bytes of an instance in Initialization Mode bring everything with them, to one that has the start values.
+/// The bytes of an instance in Initialization Mode transfer its complete state to an instance with the start values.
 fn serialized_variables(session: &Session) -> Result<(), NotDetermined> {
     let all: Vec<&ModelVariable> =
         session.numeric().filter(|v| v.clocks.is_empty() && v.causality != Causality::Independent).collect();

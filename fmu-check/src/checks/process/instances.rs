@@ -214,7 +214,7 @@ fn memory() -> Option<[u64; 2]> {
 
 /// Bytes per repetition that are not a leak: the struct of callbacks kept for FMI 2.0, and the checker's tables.
 const LEFT: u64 = 300;
-/// Bytes per saved state that are not a leak: the checker keeps nothing for it.
+/// Bytes per saved state below which growth is not a leak; the checker itself stores nothing per state.
 pub(crate) const LEFT_BY_STATE: u64 = 50;
 /// Total bytes that are not a leak: pages that the allocator keeps.
 const MINIMUM: u64 = 300_000;

@@ -18,7 +18,7 @@ pub(crate) fn moved(session: &Session, x: &[f64], k: usize) -> Vec<f64> {
     x.iter().enumerate().map(|(i, x)| if i == k || k >= nominal.len() { x + 1e-3 * size(i) } else { *x }).collect()
 }
 
-/// Values at one point, each evaluated after something else has happened: what, the derivatives, and the event indicators.
+/// Values at one point, each evaluated after a different action: the action, the derivatives, and the event indicators.
 type Evaluations = Vec<(&'static str, Vec<f64>, Vec<f64>)>;
 
 /// Values at a point, or the reason why time cannot be set back to it.
@@ -160,7 +160,7 @@ impl<'a, 'b> Snapshot<'a, 'b> {
         Ok(Self { instance, variables, values, vectors: vectors(instance)? })
     }
 
-    /// Requires that a call has changed nothing of it.
+    /// Requires that a call has left them unchanged.
     fn require(&self, call: &str) -> Result<(), NotDetermined> {
         let session = self.instance.session;
         let now = vectors(self.instance)?;

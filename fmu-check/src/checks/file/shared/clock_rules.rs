@@ -262,7 +262,7 @@ pub(crate) fn source_files(fmu: &FmuFile) -> Verdict {
     Verdict::of(missing.collect())
 }
 
-/// Intervals that no default experiment reaches, as milliseconds give them.
+/// Intervals longer than any default experiment, as result from values in milliseconds.
 pub(crate) fn long_intervals(fmu: &FmuFile) -> Verdict {
     let experiment = fmu.description.as_ref().ok().map(|d| d.default_experiment);
     let Some(span) = experiment.and_then(|x| Some(x.stop? - x.start.unwrap_or(0.0))) else {

@@ -10,7 +10,7 @@ use object::{Object, ObjectSection, SectionKind};
 /// Where home folders are, on Linux, macOS and Windows; on Unix a user name follows, except for root.
 const HOMES: [&str; 4] = ["/home/", "/Users/", "/root/", ":\\Users\\"];
 
-/// Endings of sources and of what compilers make of them. Messages of a panic or an assertion name a source, and a library may name
+/// Extensions of source files and of compiler outputs. Messages of a panic or an assertion name a source, and a library may name
 /// the file of its symbols: no program opens them.
 const SOURCES: [&str; 28] = [
     "rs", "c", "h", "cc", "cpp", "cxx", "c++", "hh", "hpp", "hxx", "inc", "inl", "s", "asm", "f", "f90", "for", "mo",

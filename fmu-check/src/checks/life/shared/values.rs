@@ -146,7 +146,7 @@ pub(crate) fn strings(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// How a string that was set reads back.
+/// The result of reading back a string that was set.
 fn read_back(set: &str, got: Option<&str>) -> String {
     match got {
         None => "reads back as NULL".into(),

@@ -105,8 +105,7 @@ fn remaining() -> (usize, Vec<String>) {
     (fs::read_dir("/proc/self/task").map_or(0, Iterator::count), all)
 }
 
-/// The contents of shared and user folders, with the time of its last change. The number of this process
-/// is left out of names.
+/// The contents of shared and user folders, with the time of its last change. The number of this process is removed from names.
 fn stray_files() -> Vec<(String, Option<SystemTime>)> {
     let folders = [Some(PathBuf::from("/dev/shm")), Some(std::env::temp_dir()), std::env::home_dir()];
     let own = std::process::id().to_string();
