@@ -147,7 +147,7 @@ impl Reference {
         OperatingPoint { rpm, tau, tau_e, tau_shaft, losses, efficiency: efficiency(p_mech + losses.sum(), p_mech) }
     }
 
-    /// The steady state with the torque `wanted` (N.m) at the shaft, or else with the greatest one of this sign.
+    /// The steady state with the torque `wanted` (N.m) at the shaft or, if this is out of reach, with the maximum of this sign.
     fn at_shaft(&self, rpm: f64, wanted: f64) -> OperatingPoint {
         let end = |s: f64| s * self.limit(rpm, s).tau;
         self.steady(rpm, bisect(end(-1.0), end(1.0), |tau| self.steady(rpm, tau).tau_shaft < wanted))
@@ -177,7 +177,7 @@ impl Reference {
     }
 }
 
-/// The greatest value between `low` and `high` up to which `holds` is true.
+/// The maximum value between `low` and `high` up to which `holds` is true.
 fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..60 {
         let mid = 0.5 * (low + high);

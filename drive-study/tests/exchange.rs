@@ -165,8 +165,8 @@ fn loaded(kind: Kind, speed: f64, late: bool, delay: i32) -> f64 {
     mean.mean()
 }
 
-/// Every estimator is as good with two samples as with one, where the injections work and where the EMF does; reported of one in
-/// the place of two, those on the EMF are behind by w T_s.
+/// Every estimator is as accurate with two samples as with one, at speeds suited to injection and to the EMF; if one is set
+/// instead of two, those based on the EMF lag by w T_s.
 #[test]
 fn every_estimator_knows_two_samples() {
     for &kind in Kind::ALL {

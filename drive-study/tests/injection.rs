@@ -224,7 +224,7 @@ fn start_at_standstill_from_every_angle() {
     }
 }
 
-/// Without saturation the noise decides: chance level. It proves that the pulses measure saturation and nothing else.
+/// Without saturation the noise decides: chance level. It proves that the pulses measure only saturation.
 #[test]
 fn without_saturation_the_pulses_decide_by_chance() {
     let right = |method: &Method| {
@@ -254,7 +254,7 @@ fn hybrid_both_ways(mut pair: Pair, ramp: f64, load: f64) -> f64 {
 }
 
 /// 7.6 deg ideal, below 13 deg with dead time. The list does not state the slope of its ramps, and the peak depends on it:
-/// 10.2, 8.2, 6.8, 5.4 and 4.8 deg with 0.3, 0.35, 0.4, 0.5 and 1 s. Where nothing compensates the dead time, 1 s.
+/// 10.2, 8.2, 6.8, 5.4 and 4.8 deg with 0.3, 0.35, 0.4, 0.5 and 1 s. 1 s if the dead time is not compensated.
 #[test]
 fn hybrid_from_standstill_to_speed_both_ways() {
     for load in [0.8, -0.8] {
@@ -303,7 +303,7 @@ fn hybrid_holds_rated_load_at_every_speed() {
     }
 }
 
-/// A rotor that is torn away, voltages that are not there: nothing but finite numbers.
+/// With a rotor torn away or missing voltages, all numbers stay finite.
 #[test]
 fn a_lost_rotor_yields_numbers() {
     for method in &METHODS {

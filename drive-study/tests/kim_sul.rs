@@ -108,7 +108,7 @@ fn speed_bandwidths() {
     near("with the mechanical observer", Kind::ExtendedEmf, speed_bandwidth(&observed, 0.5), 67.0, 6.7);
 }
 
-/// The bias that a Kalman filter makes of noise grows with its square; in the rotor frame it stays small. The mean over
+/// The bias of a Kalman filter due to noise grows with the square of the noise; in the rotor frame it stays small. The mean over
 /// 0.5 s is itself uncertain by about std / sqrt(0.5 s w_0 / 2) = 0.015 deg.
 #[test]
 fn the_kalman_filter_makes_little_bias_of_noise() {

@@ -164,7 +164,7 @@ fn torque_at_zero_speed() {
     }
 }
 
-/// How far up each injection holds rated load, in tenths of the rated speed.
+/// Speed up to which each injection holds rated load, in tenths of the rated speed.
 #[test]
 fn injection_at_speed() {
     let up_to = |kind: Kind| {

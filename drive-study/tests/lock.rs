@@ -10,8 +10,8 @@ use std::f64::consts::PI;
 const RPM: f64 = PI / 30.0;
 const T_S: f64 = 1e-4;
 
-/// A run in which every output must be finite: the maximum of `lock_lost` from `from` (s) on. Where the angle error stayed above
-/// 60 deg for 0.2 s with an EMF beyond any doubt, `lock_lost` must be above 1; where it stayed below 20 deg, below 1.
+/// A run in which every output must be finite: the maximum of `lock_lost` from `from` (s) on. If the angle error stayed above 60
+/// deg for 0.2 s with a sufficient EMF, `lock_lost` must be above 1; if it stayed below 20 deg, below 1.
 fn watch(what: &str, pair: &mut Pair, (duration, from): (f64, f64), mut each: impl FnMut(f64, &mut Pair)) -> f64 {
     let (mut peak, mut right, mut wrong, mut end) = (0.0_f64, 0.0, 0.0, 0.0);
     let motor = pair.plant.model.parameters.motor.clone();
@@ -111,7 +111,7 @@ fn healthy_drives_are_not_lost() {
     }
 }
 
-/// The figures of Rasmussen's paper: starts, the one from 180 deg among them, speed steps, loads, reversals.
+/// The figures of Rasmussen's paper: starts (including the one from 180 deg), speed steps, loads, reversals.
 #[test]
 fn the_figures_of_the_paper_are_not_lost() {
     let figure = |what: &str, theta: f64, speed: f64, load: f64, reversal: f64| {

@@ -108,7 +108,8 @@ fn a_heavy_rotor_gets_the_time_it_needs() {
     assert!(tried(&heavy.with("motor.R_s", Value::Real(0.9 * 0.05)), 0.1, 4).started < 4);
 }
 
-/// A fixed R^ is closer to R where (R - R^) i takes much of the EMF at 0.1 pu, and farther where the estimate would hardly drift.
+/// A fixed R^ is closer to R if (R - R^) i is a large share of the EMF at 0.1 pu, and farther from R if the estimate would hardly
+/// drift.
 #[test]
 fn the_resistance_fits_the_machine() {
     let machine = |R_s: f64| {
@@ -126,7 +127,7 @@ fn the_resistance_fits_the_machine() {
 }
 
 /// The adaptation measures the resistance of a cold and of a hot winding, where the drive with a fixed one loses starts and loads; the
-/// bandwidth follows the swing of the rotor on i_0. It is left off, with a note, where it does harm: at a rotor that swings on.
+/// bandwidth follows the swing of the rotor on i_0. It is left off, with a note, if it does harm: here the rotor keeps swinging.
 #[test]
 fn the_adaptation_is_on_where_it_does_no_harm() {
     let both = |motor: &MotorFile| (rules::fixed(motor).unwrap(), rules::tune(motor).unwrap());

@@ -95,7 +95,7 @@ fn the_energy_of_the_cycle_exactly_and_from_tables() {
 }
 
 /// Without load the table has the losses of the points, where an interpolated efficiency would be 0/0; on the grid it is exact,
-/// and beyond the envelope there is nothing.
+/// and beyond the envelope it has no value.
 #[test]
 fn a_table_reads_losses() {
     let (drive, axes) = (traction(), Axes::new((47, 41), 11_500.0 * RPM));
@@ -121,7 +121,7 @@ fn a_table_reads_losses() {
     assert!(table.read(100.0, f64::NAN).is_none());
 }
 
-/// At other voltages and temperatures than those of the table: the losses on the cycle's points beside the exact ones.
+/// At other voltages and temperatures than those of the table: the losses at the cycle's points, compared with the exact ones.
 #[test]
 fn a_table_is_read_at_another_voltage_and_temperature() {
     let (drive, axes) = (traction(), Axes::new((47, 41), 16_000.0 * RPM));
@@ -302,7 +302,7 @@ fn the_files() {
     assert_eq!(files::npz(&map).unwrap(), files::npz(&map).unwrap());
 }
 
-/// The page and the picture need nothing from outside, and have a picture and a choice for each condition.
+/// The page and the picture are self-contained, and have a picture and a choice for each condition.
 #[test]
 fn the_page() {
     let request = Request { u_dc: vec![350.0, 400.0], verify: 0, ..Request::default() };

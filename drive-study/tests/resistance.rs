@@ -40,7 +40,7 @@ fn cell(R: f64, psi: f64, load: f64, rpm: f64) -> Cell {
     Cell { scenario: Course::Load, R, psi, load, speed: rpm / 3000.0, theta: 0.0 }
 }
 
-/// A few cells of the atlas: lost and held without adaptation, all held with it; `lock_lost` is true of each.
+/// A few cells of the atlas: lost and held without adaptation, all held with it; `lock_lost` is right in each.
 #[test]
 fn adaptation_holds_what_the_wrong_resistance_loses() {
     let without = [
@@ -62,7 +62,7 @@ fn adaptation_holds_what_the_wrong_resistance_loses() {
     }
 }
 
-/// A loaded rest that `k_a` has turned to 36 deg is left at a creeping speed, and R^ is right.
+/// A loaded drive at rest, turned to 36 deg by `k_a`, starts to a creeping speed, and R^ is right.
 #[test]
 fn leaves_a_loaded_rest() {
     for (R_hat, load, rpm) in [(0.8, -1.0, 10.0), (1.2, 1.0, 20.0)] {
@@ -114,8 +114,8 @@ fn a_real_inverter_near_standstill() {
     assert!(blind >= 3 && uncalibrated >= 10, "{blind} lost without observe, {uncalibrated} without calibrate");
 }
 
-/// R rises by 40 % at 30 rpm without a load and at 60 rpm generating: lost without the tracking. A start from 120 deg off needs none,
-/// since the drive waits until R^ is measured.
+/// R rises by 40 % at 30 rpm without a load and at 60 rpm generating: lost without the tracking. A start from an angle error of
+/// 120 deg needs none, because the drive waits until R^ is measured.
 #[test]
 fn tracks_the_resistance_at_creep() {
     let heating = |load| Cell { scenario: Course::Heating, ..cell(1.0, 1.0, load, 60.0) };

@@ -96,7 +96,7 @@ fn chord(pair: &Pair, i: f64) -> f64 {
     low / i
 }
 
-/// A machine with the written values gives them again.
+/// A machine with the written values yields them again.
 #[test]
 fn the_machine_file_gives_itself_again() {
     let found = of(EXAMPLE);

@@ -106,7 +106,8 @@ fn the_ramp_leads_the_speed() {
 }
 
 /// A shaft that pulsates at half of its speed, like that of an engine: the observer follows with the angle error dw W / (W^2 +
-/// w_n^2), and `lock_lost` shows one that does not. In all of them the current stays within its limit wherever the hexagon allows.
+/// w_n^2), and `lock_lost` reports an observer that does not follow. In all of them the current stays within its limit wherever
+/// the hexagon allows.
 #[test]
 fn a_pulsating_shaft() {
     let (n_p, speed) = (21.0, 150.0);

@@ -133,7 +133,7 @@ pub(crate) enum Happened {
 }
 
 impl Happened {
-    /// The next value, after a step in which the condition `is` met or not.
+    /// The next value after a step; `is`: whether the condition was met in it.
     pub(crate) fn followed_by(self, is: bool) -> Self {
         match self {
             Self::Never if is => Self::Now,
@@ -380,8 +380,8 @@ impl Warns for PmsmDrive {
     }
 }
 
-/// Time in s from `now` to the next sample instant: exactly one period if `now` is a sample instant, because the pair
-/// at T_s takes only steps of T_s.
+/// Time in s from `now` to the next sample instant: exactly one period if `now` is a sample instant, because the pair at T_s
+/// makes only steps of T_s.
 fn to_next_sample(grid: SampleGrid, now: Elapsed) -> f64 {
     let k = grid.first_after(now);
     if k > 0 && !grid.passed(k - 1, now) { grid.period } else { -now.minus_periods(k, grid.period) }

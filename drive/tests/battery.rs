@@ -162,7 +162,7 @@ fn limits_of_the_wrong_sign_are_refused() {
     drive.validate().unwrap();
 }
 
-/// i_0 = 5 A alone takes 1.5 * 2 Ohm * 25 A2 / 325 V = 0.231 A.
+/// i_0 = 5 A alone requires 1.5 * 2 Ohm * 25 A2 / 325 V = 0.231 A.
 #[test]
 fn the_current_of_standstill_is_within_the_limit_and_the_drive_starts() {
     for (max, i_0) in [(0.1, (0.1_f64 * 325.0 / 6.0).sqrt()), (0.2, (0.2_f64 * 325.0 / 6.0).sqrt()), (1.0, 5.0)] {

@@ -19,7 +19,7 @@ use fmu_core::log::Warnings;
 use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Model, Slot, Step, Warns};
 use vehicle::{ENERGY, KWH, LOSSES, Vehicle};
 
-/// A drive that takes the same inputs and gives the same outputs.
+/// A drive with the same inputs and the same outputs.
 trait Drive: Model + Send {
     fn new(plant: &PlantParameters, controller: &ControllerParameters) -> Block<Self>;
     fn inputs(&mut self) -> &mut DriveInputs;
@@ -66,7 +66,8 @@ fn traction() -> (PlantParameters, ControllerParameters) {
     (lossy::c().par, controller)
 }
 
-/// Runs a drive for `seconds` in steps of `h` (s); `set` gets the inputs and the time before each, `each` the outputs after.
+/// Runs a drive for `seconds` in steps of `h` (s); `set` receives the inputs and the time before each step, `each` the outputs
+/// after it.
 fn run<D: Drive>(
     block: &mut Block<D>,
     seconds: f64,
@@ -338,7 +339,7 @@ fn the_temperatures_are_those_of_the_drive() {
     assert!((ours.plant.heat.coolant / theirs.plant.heat.coolant - 1.0).abs() < 1e-3);
 }
 
-/// Model Exchange: the classical Runge-Kutta method on the derivatives gives the results of Co-Simulation.
+/// Model Exchange: the classical Runge-Kutta method on the derivatives yields the results of Co-Simulation.
 #[test]
 fn both_interfaces_agree() {
     let (mut plant, mut controller) = (lossy::b().par, machines::b().parameters());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 /// One line that names the thing, its value and what was expected.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// An FMU, or something that it lacks.
+    /// An FMU, or a feature that it lacks.
     #[error(transparent)]
     Fmu(#[from] fmu_import::Error),
     /// An invalid definition or table.

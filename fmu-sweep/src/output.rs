@@ -1,6 +1,6 @@
 //! The folder of a sweep: its identity (`sweep.json`), its parts, and all results (`results.csv`).
 //!
-//! A part gets its name when it is complete and on the disk. So a sweep killed at any time resumes with the missing parts,
+//! A part receives its name once it is complete and on the disk. So a sweep killed at any time resumes with the missing parts,
 //! several processes may work on one folder, and a part that two of them write has the same bytes.
 
 use crate::sweep::hash;

@@ -402,7 +402,7 @@ impl RunResults {
     }
 }
 
-/// How to run the FMUs: as in the definition; by default those that can step themselves do.
+/// The method for the FMUs, as in the definition; by default, each FMU that can step itself does.
 fn method(definition: &Definition, fmus: &[(String, Fmu)]) -> Method {
     let steps = |fmu: &Fmu| fmu.description().co_simulation.is_some();
     let stepping = match definition.interface {

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Rows that a thread takes at once.
+/// Rows that a thread claims at a time.
 pub(crate) const BLOCK: u64 = 8;
 
 /// Calls `work` for each of `blocks` on up to `threads` threads, each with its own state that `begin` makes. With one

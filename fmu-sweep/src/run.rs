@@ -22,7 +22,7 @@ pub struct Options {
     pub jobs: Option<usize>,
     /// Only the parts k with k = I mod N.
     pub part: Option<(u64, u64)>,
-    /// Stop after so many rows, rounded up to whole parts.
+    /// Stop after this many rows, rounded up to whole parts.
     pub limit: Option<u64>,
     /// Remove earlier results first.
     pub restart: bool,
@@ -54,7 +54,7 @@ pub struct Report {
 /// Runs the missing parts of the folder.
 ///
 /// # Errors
-/// The folder is of another sweep, a file cannot be written, or an FMU cannot be instantiated. Complete parts remain.
+/// The folder belongs to another sweep, a file cannot be written, or an FMU cannot be instantiated. Complete parts remain.
 pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress) -> Result<Report, Error> {
     // An FMU may change the working directory.
     let folder = &std::path::absolute(folder).map_err(|e| Error::file(folder, e))?;
@@ -134,7 +134,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress
 /// Numbers of the missing parts and of all parts, and rows of a part; nothing runs and nothing is written.
 ///
 /// # Errors
-/// The folder is of another sweep.
+/// The folder belongs to another sweep.
 pub fn missing(sweep: &Sweep, folder: &Path) -> Result<Option<(Vec<u64>, u64, u64)>, Error> {
     if !folder.join("sweep.json").exists() {
         return Ok(None);

@@ -27,7 +27,7 @@ impl Sweep {
     /// Opens a sweep from its TOML file.
     ///
     /// # Errors
-    /// The file, one that it names, or something in it is wrong; nothing has run.
+    /// The file, its content, or a file that it names is invalid; nothing has run.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let definition = Definition::read(path)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();

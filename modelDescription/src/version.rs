@@ -22,7 +22,7 @@ impl fmt::Display for FmiVersion {
     }
 }
 
-/// A version that is neither 2.0 nor 3.0.
+/// A version other than 2.0 and 3.0.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("\"{0}\" is not a version of FMI that is known here: expected 2 or 3")]
 pub struct UnknownVersion(String);

@@ -29,7 +29,7 @@ fn a_minimal_file_of_each_standard() {
     }
 }
 
-/// FMI 2.0.5, 2.2.3: a type definition gives the defaults, a variable may overrule them.
+/// FMI 2.0.5, 2.2.3: a type definition contains the defaults, and a variable may override them.
 #[test]
 fn the_declared_type_gives_what_the_variable_does_not_say() {
     let text = two("<TypeDefinitions><SimpleType name='Speed'>

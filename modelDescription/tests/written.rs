@@ -13,7 +13,7 @@ fn sample_read(version: FmiVersion) -> ModelDescription {
     read(xml(version)).unwrap()
 }
 
-/// The whole text, so that a change of it is seen. `UPDATE_GOLDEN=1 cargo test -p model-description` accepts a change.
+/// The whole text, so that any change is noticed. `UPDATE_GOLDEN=1 cargo test -p model-description` accepts a change.
 #[test]
 fn golden_files() {
     for (name, of) in [("sample", sample()), ("exchange", exchange_sample()), ("sampled", sampled_sample())] {

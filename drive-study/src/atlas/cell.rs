@@ -19,7 +19,7 @@ pub enum Course {
     Cold,
     /// `Load` with a winding and a magnet that are hot from the start.
     Hot,
-    /// Torque control on a shaft that something else turns.
+    /// Torque control on an externally driven shaft.
     Torque,
     /// `Load` with current sensors of the wrong sign.
     Sign,

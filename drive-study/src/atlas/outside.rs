@@ -102,7 +102,7 @@ impl Outside {
         self.quarters.windows(2).any(both)
     }
 
-    /// Maximum `lock_lost`: a loss shows in every second.
+    /// Maximum `lock_lost`: a loss is visible in every second.
     pub fn lock_lost(&self) -> f64 {
         let second = |pair: &[Quarter]| pair[0].lock_lost.max(pair[1].lock_lost);
         self.quarters.windows(2).map(second).fold(f64::INFINITY, f64::min)

@@ -97,7 +97,7 @@ impl Loss {
 /// The result of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// How and when (s) the drive was lost: the first time out of its tolerance while it is judged.
+    /// Kind and time (s) of the loss: the first time out of tolerance within the evaluated span.
     pub lost: Option<(Loss, f64)>,
     /// Maximum `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
     pub lock_lost: f64,

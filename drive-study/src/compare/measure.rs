@@ -42,7 +42,7 @@ pub struct Trace {
     pub lost: Option<f64>,
 }
 
-/// Angle error in deg beyond which the rotor counts as lost: no torque is left.
+/// Angle error in deg beyond which the rotor counts as lost: the torque vanishes.
 const LOST: f64 = 90.0;
 /// Band in pu within which a speed has settled.
 const BAND: f64 = 0.02;

@@ -18,7 +18,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// The numbers; none where the scenario does not apply.
+    /// The numbers; empty if the scenario does not apply.
     pub fn measures(&self) -> &[Measure] {
         match &self.outcome {
             Outcome::Measured(measures, _) => measures,
@@ -45,7 +45,7 @@ impl Run {
     }
 }
 
-/// Which estimators run through which scenarios, and how thoroughly.
+/// The estimators, the scenarios, and the effort of a comparison.
 #[derive(Clone, Debug)]
 pub struct Selection {
     /// The estimators, the rows.

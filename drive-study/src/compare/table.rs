@@ -35,7 +35,7 @@ impl Block<'_> {
     }
 }
 
-/// A number with as many digits as its unit deserves.
+/// A number with the digits appropriate to its unit.
 pub fn number(m: &Measure) -> String {
     if m.value.is_infinite() {
         return if m.name == "settling time" { "never" } else { "lost" }.into();
@@ -65,7 +65,7 @@ fn cell_text(cell: &Run) -> String {
     }
 }
 
-/// Inside or outside of the expected tolerance; nothing where nothing is expected.
+/// Inside or outside the expected tolerance; empty without an expected value.
 pub(super) fn mark(m: &Measure, expected: bool) -> &'static str {
     match (expected, m.expected.is_none_or(|e| e.holds(m.value)) && m.value.is_finite()) {
         (false, _) => "",

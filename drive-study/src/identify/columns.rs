@@ -107,7 +107,7 @@ impl Naming {
         Ok(())
     }
 
-    /// The column that a header holds.
+    /// The column named by a header.
     fn column(&self, header: &str) -> Option<(&'static str, Kind)> {
         let name = split(header).0;
         let mapped = self.map.iter().find(|(_, from)| from == header || from == name).map(|(to, _)| to.as_str());

@@ -78,7 +78,7 @@ impl Fit {
         Complex::new(psi_d, (L_q + b_3 * q * q + a_x * d) * q)
     }
 
-    /// Saturation as the plant has it: s_2 in A/Wb2, s_3 in A/Wb3, s_dq in A/Wb2; `None` where the record shows none.
+    /// Saturation as the plant has it: s_2 in A/Wb2, s_3 in A/Wb3, s_dq in A/Wb2; `None` if the record shows no saturation.
     pub fn saturation(&self) -> Option<[f64; 3]> {
         let [_, L_d, L_q, _, _, _, _, a_2, a_3, _, a_x] = self.p;
         let s_2 = -a_2 / L_d.powi(3);
@@ -98,7 +98,7 @@ impl Problem<'_> {
         self.record.sigma * self.record.sigma
     }
 
-    /// Where the magnet's flux points, as seen from the sensor's axes: the start of `theta_0`.
+    /// Direction of the magnet's flux in the sensor's axes: the start value of `theta_0`.
     fn direction(&self) -> Option<f64> {
         let mut theta_0 = 0.0;
         for _ in 0..4 {
@@ -141,8 +141,8 @@ impl Problem<'_> {
         Some(fit)
     }
 
-    /// The terms of the saturation with which the values are known best: what a term explains makes the results without one
-    /// stretch of time alike, what it does not explain makes them differ.
+    /// The terms of the saturation with which the values are known best: a term that explains the record makes the results
+    /// without one stretch of time agree, an unexplained effect makes them differ.
     fn worth(&self, fit: &Fit) -> Option<[bool; 4]> {
         let whole = self.with(Form { bent: [true; 4], ..fit.form }, 0.0);
         let solved = whole.linear(fit.theta_0, fit.tau)?;

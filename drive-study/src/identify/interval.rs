@@ -1,9 +1,9 @@
-//! How far a least-squares result may be off: the greater of a sandwich estimate over blocks of rows and a jackknife over stretches
+//! Uncertainty of a least-squares result: the greater of a sandwich estimate over blocks of rows and a jackknife over stretches
 //! of time. The first covers noise, the second the errors of the model: without it, errors reached 8 half-widths.
 
 use nalgebra::{DMatrix, DVector};
 
-/// Stretches of time that the jackknife leaves out, one after the other.
+/// Stretches of time that the jackknife omits, one at a time.
 const STRETCHES: usize = 8;
 
 /// The jackknife's spread is a little too narrow with 8 stretches: the factor of Student's distribution.

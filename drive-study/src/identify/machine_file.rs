@@ -36,7 +36,7 @@ pub fn text(found: &Identified, name: &str, source: &str) -> String {
 }
 
 impl Content<'_> {
-    /// Text of the file: a value with its half-width behind it, or a comment with the reason where there is none.
+    /// Text of the file: a value followed by its half-width, or a comment with the reason if there is no value.
     pub fn text(&self, name: &str, source: &str) -> String {
         let Ratings { current, speed, torque, u_dc } = self.ratings;
         let mut out = String::new();

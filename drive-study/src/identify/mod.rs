@@ -121,7 +121,7 @@ const SCALE: &str = "values scale with the sensors: 1 % more current makes R_s, 
 /// Delays that are tried.
 const DELAYS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
-/// How much more the fit leaves with the voltages of a wrong row, at least.
+/// Minimum factor by which voltages of a wrong row increase the residual of the fit.
 const SHIFTED: f64 = 1.3;
 
 /// Identifies the machine of a record.

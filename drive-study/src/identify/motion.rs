@@ -7,10 +7,10 @@ use std::ops::Range;
 const REACH: f64 = 4e-3;
 
 /// Noise of the angle in rad above which it hides that. Noise falls with the root of the time, the error of a bend grows with its
-/// square, so that less noise is best met with a time that falls with the power 0.4.
+/// square, so the best time decreases with the noise to the power 0.4.
 const NOISE: f64 = 1e-3;
 
-/// Angle and speed. Rows near the end of a stretch have none and belong to no stretch here.
+/// Angle and speed. Rows near the end of a stretch have no parabola and belong to no stretch here.
 #[derive(Clone, Debug)]
 pub struct Motion {
     /// Electrical angle in rad.

@@ -56,7 +56,7 @@ pub fn commissioning(found: &Commissioned, file: &str) -> Result<String> {
     drawn(file, &values, &found.notes, &[(figure, &text)])
 }
 
-/// A page of values, notes, and figures with what they show.
+/// A page of values, notes, and figures with captions.
 fn drawn(file: &str, values: &[Quantity], notes: &[String], figures: &[(Figure, &str)]) -> Result<String> {
     let refused = values.iter().filter(|v| v.refused.is_some()).count();
     let (class, verdict) = match refused {

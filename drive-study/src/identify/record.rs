@@ -28,13 +28,13 @@ pub struct Options {
     pub u_dc: Option<f64>,
     /// Samples of the controller between a row and the action of its voltage; the best of 0, 0.5, 1, 1.5, 2 if `None`.
     pub delay: Option<f64>,
-    /// The record keeps one of so many samples of the controller; 1 if `None`.
+    /// Samples of the controller per row of the record; 1 if `None`.
     pub every: Option<u32>,
     /// Rows per second, instead of a column `t`.
     pub rate: Option<f64>,
     /// Times in s between which there is no current.
     pub zero: Option<(f64, f64)>,
-    /// Column of the load torque, `tau_load` or `tau_shaft`; `none` for a free shaft; the column that there is if `None`.
+    /// Column of the load torque, `tau_load` or `tau_shaft`; `none` for a free shaft; the existing column if `None`.
     pub load: Option<String>,
     /// Values that a commissioning does not tell, by their names in a motor file.
     pub given: Vec<(String, f64)>,
@@ -212,7 +212,7 @@ fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> 
     (squares / (20.0 * count.max(1.0))).sqrt()
 }
 
-/// Mean of some values; 0 if there is none.
+/// Mean of some values; 0 for none.
 pub fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }

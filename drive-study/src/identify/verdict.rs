@@ -57,7 +57,7 @@ pub struct Facts {
     levels: usize,
     /// The load is unknown.
     unloaded: bool,
-    /// Rest of the fit over what noise leaves, and over the voltage.
+    /// Residual of the fit, relative to that of noise and to the voltage.
     rest: (f64, f64),
     condition: f64,
 }
@@ -94,7 +94,7 @@ impl Facts {
         }
     }
 
-    /// Whether the model leaves more than noise explains.
+    /// Whether the residual of the model exceeds that of noise.
     pub(super) fn misfit(&self) -> bool {
         self.rest.0 > 3.0 && self.rest.1 > 0.02
     }

@@ -21,7 +21,7 @@ use std::ops::Range;
 /// Parameters: R, L_d, L_q, psi_M, c_1, c_2, c_3, a_2, a_3, b_3, a_x.
 pub const SIZE: usize = 11;
 
-/// Places of the inverter's curve among them.
+/// Positions of the inverter's curve among them.
 pub const CURVE: Range<usize> = 4..7;
 
 /// Places of the saturation.
@@ -51,7 +51,7 @@ pub struct Window {
 pub struct Timing {
     /// Samples of the controller between a row and the action of its voltage.
     pub delay: f64,
-    /// The record keeps one of so many samples.
+    /// Samples of the controller per row of the record.
     pub every: u32,
 }
 

@@ -20,7 +20,7 @@ pub struct Vehicle {
 /// Acceleration of gravity in m/s2.
 const GRAVITY: f64 = 9.81;
 
-/// Copies of the files in `examples/vehicle`: a package holds no file of another one.
+/// Copies of the files in `examples/vehicle`, because a Cargo package cannot include files outside its folder.
 pub const VEHICLE: &str = include_str!("vehicle.toml");
 /// The cycle beside it.
 pub const CYCLE: &str = include_str!("cycle.csv");

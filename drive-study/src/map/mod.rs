@@ -67,7 +67,7 @@ pub struct Map {
 
 /// Samples per electrical period at the maximum speed of a map if the file does not specify that speed.
 const LEAST_SAMPLES: f64 = 10.0;
-/// Share of the rated torque that is left there.
+/// Share of the rated torque available there.
 const LEAST_TORQUE: f64 = 0.01;
 
 /// The drive of a map: torque control with a sensor on an imposed shaft, limited by the current alone.
@@ -248,8 +248,8 @@ impl Map {
         at.by_shaft(torque)
     }
 
-    /// The energy of a cycle under the condition of a sheet: of the drive itself, and read from the map. Where the drive cannot
-    /// brake as hard, the wheels' brakes do the rest.
+    /// The energy of a cycle under the condition of a sheet: of the drive itself, and read from the map. If the drive cannot
+    /// brake hard enough, the wheel brakes supply the rest.
     ///
     /// # Errors
     /// The first speed (rad/s) and torque (N.m) that are out of reach.

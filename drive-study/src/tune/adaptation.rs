@@ -25,10 +25,11 @@ const ANGLES: u32 = 6;
 const START: f64 = 0.75;
 const BANDWIDTH: (f64, f64) = (20.0, 0.25);
 
-/// Usual time at rest in which R^ comes to R, over 1 / bandwidth: 0.05 of the error is left, since `adaptation.i` is i_0 / 2.
+/// Usual time at rest in which R^ converges to R, relative to 1 / bandwidth: 0.05 of the error remains, because `adaptation.i` is
+/// i_0 / 2.
 const REST: f64 = 4.0;
 
-/// The drive with the adaptation where it does no harm, and a note where it is left off; `fixed` is the drive without it.
+/// The drive with the adaptation unless it does harm, in which case a note is added; `fixed` is the drive without it.
 pub fn chosen(data: &Data, fixed: Tuned) -> Tuned {
     let par = fixed.pair().controller.model.parameters;
     if par.estimator != Kind::Rasmussen {
@@ -76,7 +77,7 @@ fn adapting(data: &Data, fixed: &Tuned, start: f64) -> Tuned {
     with
 }
 
-/// What the drive holds less `with` the adaptation than with a `fixed` resistance, if anything.
+/// The conditions that the drive holds with a `fixed` resistance but not `with` the adaptation, if any.
 fn harm(fixed: &Tuned, with: &Tuned) -> Option<String> {
     let fewer = |own: bool, of: &dyn Fn(&Tuned) -> Tuned| {
         let new = trial::all(&of(with), ANGLES);

@@ -1,7 +1,7 @@
 //! The sample period and the bandwidths of the loops: as given in the machine's file, or by these rules.
 //!
 //! - T_s: the longest of 100, 50, 25 and 12.5 us that gives at least 12 samples per electrical period at the highest speed. A
-//!   voltage that is held for a sample turns by 30 deg there against the rotor, which loses 1.1 % of it, and the command,
+//!   voltage that is held for a sample turns by 30 deg there against the rotor, a loss of 1.1 %, and the command,
 //!   which acts 1.5 samples later on average, is turned ahead by 45 deg. The poles of the EMF observer get as many samples.
 //! - Observer: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2 = 0.35 rad at
 //!   most. Rasmussen's observer: that of the maximum current, and 300 rad/s at least; the tracker of the extended EMF: that
@@ -26,7 +26,7 @@ const PERIODS: [f64; 4] = [1e-4, 5e-5, 2.5e-5, 1.25e-5];
 /// Target of the rules: dip of the speed in pu under a step of the rated torque.
 const DIP: f64 = 0.05;
 
-/// Gain of the speed loop through the EMF that a change of i_q makes, see [`limits`](super::limits): the limit of the rules.
+/// Gain of the speed loop through the EMF caused by a change of i_q, see [`limits`](super::limits): the limit of the rules.
 const CALM: f64 = 0.6 * GREATEST_GAIN;
 
 /// A value and its origin.
@@ -143,7 +143,7 @@ pub const EMF_PER_TRACKER: f64 = 7.5;
 /// Maximum loop gain through the EMF of the change of i_q, at 0.1 pu.
 pub const GREATEST_GAIN: f64 = 40.0;
 
-/// Gain of the speed loop through the EMF that a change of i_q makes, per rad/s of w_s, at 0.1 pu and the tracker's `rho`
+/// Gain of the speed loop through the EMF caused by a change of i_q, per rad/s of w_s, at 0.1 pu and the tracker's `rho`
 /// (rad/s).
 pub fn gain_per_bandwidth(data: &Data, rho: f64) -> f64 {
     let (machine, n_p) = (&data.machine, f64::from(*data.machine.n_p.get_ref()));

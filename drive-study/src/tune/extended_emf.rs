@@ -1,13 +1,13 @@
 //! The rules for the extended EMF with an I-f start.
 //!
-//! The start: the rotor swings on the current vector with w_0 = sqrt(n_p K I / J), damped by 0.5, and the reluctance takes the
-//! share (L_q - L_d) I / psi_M of stiffness and damping away. The alignments take 3 of its time constants each, the speed before
+//! The start: the rotor swings on the current vector with w_0 = sqrt(n_p K I / J), damped by 0.5, and the reluctance reduces
+//! stiffness and damping by the share (L_q - L_d) I / psi_M. The alignments take 3 of its time constants each, the speed before
 //! the hand-over 4.
 //!
 //! A change of i_q acts on the estimated speed through (L_q - L_d) p i_q against the EMF; closed by the speed loop, the gain is
 //! J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). It is to be less than 40 at 0.1 pu.
 //!
-//! A load step at low speed takes the rotor through zero: `emf.hold_reversal` holds it there, below 0.08 of the rated speed.
+//! A load step at low speed drives the rotor through zero: `emf.hold_reversal` holds it there, below 0.08 of the rated speed.
 
 use super::bandwidth::{Bandwidths, EMF_PER_TRACKER, GREATEST_TORQUE};
 use super::motor::{Data, swing, torque_constant};

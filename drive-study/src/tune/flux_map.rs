@@ -41,7 +41,7 @@ pub struct Fitted {
     pub psi_M: f64,
     /// Settings of the plant.
     pub settings: Vec<Setting>,
-    /// How close the map comes to the table, and what it does not cover.
+    /// Deviation of the map from the table, and the range that it does not cover.
     pub notes: Vec<String>,
 }
 

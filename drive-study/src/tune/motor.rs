@@ -28,7 +28,7 @@ pub struct MotorFile {
 pub struct Data {
     /// Short name, used for files.
     pub name: String,
-    /// Where the values come from.
+    /// Source of the values.
     pub source: String,
     /// The machine.
     pub machine: Machine,

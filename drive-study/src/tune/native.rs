@@ -24,7 +24,7 @@ impl Tuned {
         })
     }
 
-    /// These values with another value of the controller.
+    /// These values, with one value of the controller replaced.
     pub fn with(&self, name: &'static str, value: Value) -> Self {
         let mut other = self.clone();
         other.controller.retain(|setting| setting.name != name);

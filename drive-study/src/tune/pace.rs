@@ -5,9 +5,10 @@
 //!   c_1 / w^2 below, where the back EMF carries little information; its speed adaptation: a double pole at w_n. The tracker of
 //! the extended
 //!   EMF: a double pole at rho.
-//! - **Mechanics.** J w / T, the time in which the rated torque brings the rotor to its speed. A load tau_L moves the rotor of
-//!   a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque that the load leaves makes up
-//!   for the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
+//! - **Mechanics.** J w / T, the time in which the rated torque accelerates the rotor to its speed. A load tau_L moves the rotor
+//! of
+//!   a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque in excess of the load recovers
+//! the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
 
 use super::bandwidth::DIP_OF_A_STEP;
 use super::setting::Tuned;
@@ -15,7 +16,7 @@ use drive::Pair;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
 
-/// Minimum torque that a load leaves, as a share of the load: an assumption where it leaves less.
+/// Minimum torque available in excess of a load, as a share of the load: an assumption if less is available.
 const LEAST_SPARE: f64 = 0.02;
 
 /// Time constants in s.

@@ -18,7 +18,7 @@ struct Check<'a> {
     per_unit: f64,
     what: &'static str,
     range: (f64, f64),
-    /// The range of usual machines, which another unit must reach.
+    /// The range of usual machines; a value in another unit must lie in it.
     usual: (f64, f64),
     /// What to write instead where no other unit fits.
     remedy: String,
@@ -148,7 +148,7 @@ mod tests {
         check(&motor).unwrap_err().to_string()
     }
 
-    /// Data of public reports: the flux from another rule than that of KV, and a current that the voltage cannot drive.
+    /// Data of public reports: the flux by a rule other than that of KV, and a current that the voltage cannot drive.
     #[test]
     fn a_unit_that_is_far_off_is_not_named() {
         let flux = refused("psi_M = 0.545", "psi_M = 12000.0");

@@ -168,7 +168,7 @@ fn common(data: &Data, bandwidths: &Bandwidths, estimator: Kind) -> Vec<Setting>
 }
 
 /// The voltage error that `lock_lost` tolerates, scaled to the machine: a share of the EMF at rated speed, 5 V for the
-/// reference motor, and at least twice what R^ = 0.9 R leaves at the maximum current.
+/// reference motor, and at least twice the error of R^ = 0.9 R at the maximum current.
 fn lock(data: &Data) -> Setting {
     const SHARE: f64 = 5.0 / 141.4;
     let Data { machine, rating, .. } = data;

@@ -2,7 +2,7 @@
 //! still physical there.
 //!
 //! The current is a polynomial of the flux linkage. It belongs to a machine as long as its derivative, the inverse of the
-//! incremental inductances, is positive definite; beyond, more flux takes less current, and the plant runs away.
+//! incremental inductances, is positive definite; beyond that, more flux requires less current, and the plant runs away.
 
 use super::flux_map::Fitted;
 use super::motor::{Data, MotorFile, Number, electrical};

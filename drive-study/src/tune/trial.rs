@@ -66,9 +66,9 @@ pub struct Trial {
     pub task: Task,
     /// Start angles.
     pub angles: u32,
-    /// How many of them started.
+    /// Number of those that started.
     pub started: u32,
-    /// How many of these held the load.
+    /// Number of these that held the load.
     pub held: u32,
     /// Minimum speed after the load step in pu.
     pub least: f64,
@@ -303,8 +303,8 @@ impl Bench<'_> {
     }
 }
 
-/// The swings of a drive that starts at 0.1 pu and runs without a load to 1 pu and back, by ramps and in steps of 0.1 pu. A drive
-/// that is lost on the way has those so far.
+/// The swings of a drive that starts at 0.1 pu and runs without a load to 1 pu and back, by ramps and in steps of 0.1 pu. If the
+/// drive is lost on the way, the swings so far.
 pub fn swings(tuned: &Tuned) -> Vec<Swing> {
     let (mut all, mut pair) = (Vec::new(), tuned.pair());
     if pair.start().is_err() {

@@ -11,7 +11,7 @@ use std::fmt::Write;
 /// Length of the record in s.
 pub(crate) const TIME: f64 = 3.2;
 
-/// The bench logs one of so many samples.
+/// Samples per logged row of the bench.
 pub(crate) const EVERY: u64 = 5;
 
 /// Time in s without voltage, for the offset of the sensors.
@@ -100,7 +100,7 @@ pub(crate) fn record(mut pair: Pair, time: f64, every: u64) -> String {
     text
 }
 
-/// A number with so many decimals at most.
+/// A number with at most this many decimals.
 fn short(x: f64, decimals: usize) -> String {
     let text = format!("{x:.decimals$}");
     let text = text.trim_end_matches('0').trim_end_matches('.');

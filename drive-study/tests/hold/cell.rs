@@ -18,7 +18,7 @@ const LEVELS: [f64; 4] = [0.1, 0.3, 0.5, 1.0];
 const LOADS: [f64; 3] = [0.0, 0.7, -0.7];
 /// Torque references in rated torques; the load takes as much at the speed of the cell and is proportional to the speed.
 const TORQUES: [f64; 2] = [0.2, 0.7];
-/// Temperature coefficients in 1/K of copper and NdFeB, where the machine's file has none.
+/// Temperature coefficients in 1/K of copper and NdFeB, if the machine's file has none.
 const ALPHA: (f64, f64) = (3.93e-3, -1.1e-3);
 /// Time in s at the end that is judged.
 const LAST: f64 = 2.0;
@@ -108,7 +108,7 @@ pub(crate) enum Loss {
 pub(crate) struct Outcome {
     /// Whether the drive behaves as with a sensor.
     pub(crate) held: bool,
-    /// How and when (s) the rotor was lost.
+    /// Kind and time (s) of the loss of the rotor.
     pub(crate) lost: Option<(Loss, f64)>,
     /// Whether an output reports that the drive is lost, or why it is off.
     pub(crate) said: bool,

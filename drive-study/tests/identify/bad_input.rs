@@ -136,7 +136,7 @@ fn bad_options_are_named() {
     }
 }
 
-/// Clipped currents, a gap, and open gates are left out: the other rows tell the same machine.
+/// Clipped currents, a gap, and open gates are omitted: the other rows yield the same machine.
 #[test]
 fn what_a_record_lacks_is_left_out() {
     let rows = REAL.run();

@@ -49,12 +49,12 @@
 //! The maximum of the quotient, S and W, smoothed with lock.time, is the output `lock_lost`: 0 means that the estimate
 //! fits, 1 and above that it is lost; the maximum is 10. It does not depend on the estimator.
 //!
-//! `lock.u` covers the errors that remain with a good estimate: what (R - R^) i leaves, and for the dead time 4/3 of a
-//! leg's voltage. A smaller value detects more if the machine values are accurate.
+//! `lock.u` covers the errors that remain with a good estimate: the residue of (R - R^) i, and for the dead time 4/3 of a leg's
+//! voltage. A smaller value detects more if the machine values are accurate.
 //!
 //! Limits: a rotor that is blocked, or loaded beyond the torque, near standstill is reported as lost: the current is at
 //! its limit and the speed is not reached in both cases. At |w| psi_M < lock.u / 2, a rotor at a wrong angle that
-//! still turns at the reference is not seen; at standstill without a change of current, nothing shows it.
+//! still turns at the reference is not detected; at standstill without a change of current, it cannot be.
 //!
 //! The voltage is derived here from Kim & Sul 2011, eq (1), the speed from the PI speed loop; for every estimator.
 //! u in V, psi in Wb, theta in rad, w in rad/s (electrical).
@@ -113,7 +113,7 @@ impl Default for LockParameters {
 pub struct Reach {
     /// Integral of the electrical speed error in rad that takes it from zero torque to its limit.
     pub integral: f64,
-    /// Electrical acceleration in rad/s2 that a torque of 1 N.m gives.
+    /// Electrical acceleration in rad/s2 caused by a torque of 1 N.m.
     pub acceleration: f64,
     /// Lag of the speed behind a moving reference in s, due to the set-point weight.
     pub lag: f64,
@@ -139,7 +139,7 @@ pub struct LockGains {
     integrates: f64,
     /// Decay of S in a sample.
     decays: f64,
-    /// Change of the reference's model in a sample in rad/s, for each N.m that the limits leave.
+    /// Change of the reference model per sample in rad/s, for each N.m of available torque.
     follows: f64,
     /// The model's approach to the reference in a sample.
     lags: f64,
@@ -206,7 +206,7 @@ struct Following {
     off_m: f64,
     /// Integral of the speed error as a share of S_0.
     S: f64,
-    /// Half-waves of a swing: the present one and the last one as shares of S_0, the first signed, and what they give together.
+    /// Half-waves of a swing: the present one (signed) and the last one as shares of S_0, and their combined result.
     half: f64,
     last: f64,
     W: f64,
@@ -410,8 +410,8 @@ mod tests {
         watch.S
     }
 
-    /// An error of 10 rad/s takes S_0 / 10 = 0.8 s; a reference that moves is given the time that half of the torque needs;
-    /// the EMF clears it.
+    /// An error of 10 rad/s is reported after S_0 / 10 = 0.8 s; a moving reference is allowed the time that half of the torque
+    /// needs; the EMF resets S.
     #[test]
     fn a_speed_that_is_not_reached_is_seen() {
         // Less the lag 1 / SMOOTH = 23 ms.
@@ -443,7 +443,7 @@ mod tests {
         }
     }
 
-    /// A rotor that slips turns its EMF in the estimated frame; w psi_M of both, at right angles, is left of 60 V at 100 Hz.
+    /// A slipping rotor turns its EMF in the estimated frame; at 100 Hz, w psi_M of both, at right angles, remains of 60 V.
     #[test]
     fn a_rotor_that_is_driven_against_the_frame_is_seen() {
         for (w, w_hat) in [(-600.0, 20.0), (300.0, -300.0), (-900.0, 300.0)] {
@@ -504,7 +504,7 @@ mod tests {
         }
     }
 
-    /// Where the speed is right again, S decays with 8 lock.time = 0.4 s.
+    /// Once the speed is right again, S decays with 8 lock.time = 0.4 s.
     #[test]
     fn what_has_been_seen_is_forgotten_in_eight_times_the_time() {
         let mut watch = Following { S: 1.0, ..Following::default() };

@@ -500,8 +500,8 @@ pub(crate) const ROWS: &[V] = const {
 mod tests {
     use super::*;
 
-    /// The mean that the sensors show without current is subtracted from what they show later, as long as no short circuit
-    /// carries a current.
+    /// The mean reading of the sensors without current is subtracted from later readings, provided that no current flows in a
+    /// short circuit.
     #[test]
     fn a_calibrated_sensor_has_no_offset() {
         for asc in [false, true] {

@@ -10,7 +10,7 @@ use crate::weakening::Weakening;
 use drive_base::frame::DqHat;
 use serde::{Deserialize, Serialize};
 
-/// Torque that counts as none with `zero_speed.release`, as a share of that of i_0.
+/// Torque that counts as zero with `zero_speed.release`, as a share of that of i_0.
 const RELEASED: f64 = 1e-3;
 
 /// Computed from the parameters.

@@ -82,7 +82,7 @@ pub struct ControllerOutputs {
     pub lock_lost: f64,
     /// Whether the controller operates.
     pub enabled: bool,
-    /// Whether the inverter shall short-circuit the machine.
+    /// Whether the inverter is to short-circuit the machine.
     pub short_circuit: bool,
     /// What has tripped.
     pub tripped: Cause,

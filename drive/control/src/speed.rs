@@ -111,7 +111,7 @@ impl SpeedController {
     }
 }
 
-/// A branch out of line, so that the current loop begins before the limits are known.
+/// Kept out of line, so that the current loop can begin before the limits are known.
 #[cold]
 #[inline(never)]
 fn limited(wanted: f64, low: f64, high: f64) -> f64 {
@@ -119,7 +119,7 @@ fn limited(wanted: f64, low: f64, high: f64) -> f64 {
 }
 
 impl SpeedController {
-    /// Moves the integral part with the `cut` (A) that a limit makes, at the rate `bandwidth` (rad/s).
+    /// Moves the integral part by the `cut` (A) of a limit, at the rate `bandwidth` (rad/s).
     #[inline]
     pub fn follow(&mut self, bandwidth: f64, cut: f64, T_s: f64) {
         self.integral += T_s * bandwidth * cut;

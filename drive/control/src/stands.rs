@@ -9,9 +9,9 @@
 //! |tau| > 2 % of the limit        psi_M |w^| < 0.3 R^ |i|        w^ smoothed over 0.3 s
 //! ```
 //!
-//! or, where `emf.hold_reversal` leads a method with a back EMF through zero, |w^| < w_hold / 4, where little of its gain is left. It
-//! warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M). A rotor
-//! that receives the whole torque exceeds w_s within this time.
+//! or, where `emf.hold_reversal` leads a method with a back EMF through zero, |w^| < w_hold / 4, where little of its gain
+//! remains. It warns once after 1 s, and after as long as the inertia needs: t |tau| / J = 2 w_s, w_s = 0.3 R^ |i| / (n_p psi_M).
+//! A rotor that receives the whole torque exceeds w_s within this time.
 //!
 //! Derived here. tau in N.m, w in rad/s (electrical), w_s in rad/s (mechanical).
 
@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 
 /// Share of R^ by which the resistance may be wrong: that of `lock_lost`.
 const RESISTANCE: f64 = 0.3;
-/// Speed as a share of `emf.w_hold` below which little of the angle's gain is left.
+/// Speed as a share of `emf.w_hold` below which little of the angle's gain remains.
 const FADED: f64 = 0.25;
 /// Minimum torque as a share of the limit.
 const LITTLE: f64 = 0.02;
@@ -47,8 +47,8 @@ pub(crate) struct Stands {
 }
 
 impl Stands {
-    /// After a sample with the references `i` (A) at the estimated mechanical `speed` (rad/s), where the limits leave `most` (N.m);
-    /// `works`: no start sequence is under way.
+    /// After a sample with the references `i` (A) at the estimated mechanical `speed` (rad/s), with `most` (N.m) available within
+    /// the limits; `works`: no start sequence is running.
     #[inline(never)]
     pub(crate) fn update(&mut self, par: &ControllerParameters, works: bool, speed: f64, i: DqHat, most: f64) {
         let motor = &par.motor;
@@ -61,7 +61,7 @@ impl Stands {
         *self = Self { time, tau, hidden, speed };
     }
 
-    /// The time in s for which nothing has moved, when it is long enough for the warning.
+    /// The time in s without motion, once it is long enough for the warning.
     pub(crate) fn reached(&self, par: &ControllerParameters) -> Option<f64> {
         let knows = matches!(par.estimator.class(), Class::FluxObserver | Class::BackEmf);
         let after = SHORTEST.max(2.0 * self.hidden * par.J / self.tau);
@@ -69,7 +69,7 @@ impl Stands {
     }
 }
 
-/// The warning of a torque reference (N.m) that has moved nothing for a `time` (s); `speed_est` in rad/s.
+/// The warning of a torque reference (N.m) without motion for a `time` (s); `speed_est` in rad/s.
 pub(crate) fn hidden(par: &ControllerParameters, tau_ref: f64, speed_est: f64, time: f64) -> String {
     format!(
         "tau_ref = {tau_ref} N.m has moved nothing for {time:.1} s that the estimate can show: speed_est = {speed_est:.3} rad/s; the shaft is \

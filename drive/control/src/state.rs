@@ -124,7 +124,7 @@ pub(super) struct State {
     pub(super) offset: Offset,
     pub(super) lock: Lock,
     pub(super) trip: Trip,
-    /// The sensor is lost: `sensor.fallback` has taken its place until enable falls.
+    /// The sensor is lost: `sensor.fallback` replaces it until enable falls.
     pub(super) sensor_lost: bool,
     pub(super) weakening: Weakening,
     pub(super) battery: Battery,

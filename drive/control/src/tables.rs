@@ -40,7 +40,7 @@ pub struct Compensation {
     pub u_dead: f64,
     /// Current in A below which the compensation is reduced, > 0.
     pub i_zero: f64,
-    /// The estimators take the voltage that the inverter loses at the measured currents.
+    /// The estimators use the voltage loss of the inverter at the measured currents.
     pub observe: bool,
     /// The offsets of the current sensors are measured while the controller is not enabled.
     pub calibrate: bool,
@@ -120,7 +120,7 @@ pub struct ControllerParameters {
     pub trip: TripParameters,
     /// Current sensors.
     pub sensor: Sensor,
-    /// Estimator that takes the place of a lost sensor; `Sensored`: none.
+    /// Estimator that replaces a lost sensor; `Sensored`: none.
     pub fallback: Kind,
     /// Dead-time compensation.
     pub compensation: Compensation,

@@ -1,8 +1,8 @@
-//! The tracker's bandwidth in field weakening, where an angle error makes torque.
+//! The tracker's bandwidth in field weakening, where an angle error produces torque.
 //!
 //! Beyond maximum torque per ampere, the torque of given currents grows with the angle theta~ of the rotor ahead of their frame,
 //! by c = -1.5 n_p (i_d (psi_M - dL i_d) + dL i_q^2) > 0, dL = L_q - L_d. A tracker with the poles rho lags behind an
-//! acceleration, theta~ = n_p s w / (s + rho)^2, so that acceleration makes torque. With A = n_p c / J and the speed loop on w^,
+//! acceleration, theta~ = n_p s w / (s + rho)^2, so acceleration produces torque. With A = n_p c / J and the speed loop on w^,
 //!
 //! ```text
 //! s^4 + 2 rho s^3 + (rho^2 - A) s^2 + rho^2 w_s s + rho^2 w_s^2 / t_is = 0,   stable for w_s (1/2 + 2 / t_is) < rho - A / rho
@@ -92,7 +92,7 @@ mod tests {
         assert!(par.least_tracker().at(-5.0).abs() < 1e-12, "no torque by angle, no bound");
     }
 
-    /// Where the set bandwidth leaves less than the margin of 1.5, weakening does not raise it at A = 0.
+    /// If the set bandwidth has a margin below 1.5, weakening does not raise it at A = 0.
     #[test]
     fn a_tracker_with_little_margin_stays() {
         let mut par = ControllerParameters { estimator: Kind::ExtendedEmf, ..ControllerParameters::default() };

@@ -8,7 +8,7 @@
 //! sqrt 3 psi_M |w| > u_dc         and until sqrt 3 psi_M |w| < 0.9 u_dc
 //! ```
 //!
-//! w is the speed of the sensor if the estimator reads it, else the estimate at the trip. An active short circuit from
+//! w is the speed of the sensor if the estimator reads it, otherwise the estimate at the trip. An active short circuit from
 //! full torque swings to currents beyond most limits, so a current does not trip a second time.
 
 use drive_base::frame::Phases;

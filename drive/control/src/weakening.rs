@@ -298,7 +298,7 @@ impl Weakening {
     }
 }
 
-/// Share of u_dc / sqrt 3 that the voltage `u` (V) takes; 0 without a link.
+/// The voltage `u` (V) as a share of u_dc / sqrt 3; 0 without a link.
 #[inline]
 pub fn share(u: f64, u_dc: f64) -> f64 {
     if u_dc > 1e-3 { u * SQRT_3 / u_dc } else { 0.0 }

@@ -6,9 +6,9 @@
 //! the current limit sets the maximum torque.
 //!
 //! In torque mode, i_0 also flows while the torque reference is zero, and heats the winding with 1.5 R_s i_0^2. It holds a small
-//! load where R^ < R, as on the reference motor 0.2 N.m with R^ = 0.9 R; with R^ = R the frame follows the rotor, and the shaft
-//! is free. With `release`, tau_ref = 0 requests no current: the shaft is free. Without current, a flux observer cannot determine
-//! the angle at standstill; as soon as a torque is requested, i_0 pulls the rotor along, as at a start.
+//! load if R^ < R, for example 0.2 N.m on the reference motor with R^ = 0.9 R; with R^ = R the frame follows the rotor, and the
+//! shaft is free. With `release`, tau_ref = 0 requests no current: the shaft is free. Without current, a flux observer cannot
+//! determine the angle at standstill; as soon as a torque is requested, i_0 pulls the rotor along, as at a start.
 
 use drive_base::math::exp;
 use fmu_core::unit::{AMPERE, SPEED};

@@ -63,7 +63,7 @@ fn eq_36_is_exact_and_its_second_term_is_the_saliency() {
     assert!((at_rest - turned).norm() > 1e-3, "the second term has the angle at standstill");
 }
 
-/// (37) drops dL/dt i: nothing at standstill, w / w_h of the whole when turning.
+/// (37) omits dL/dt i: zero at standstill, a share w / w_h of the whole when turning.
 #[test]
 fn eq_37_lacks_the_turning_inductance() {
     for (theta, w, i, di) in points() {

@@ -89,7 +89,7 @@ fn eq_10_gain_of_the_angle() {
     }
 }
 
-/// (11) with the frame term: what is left in a right frame is w_r psi on q, at any speed of the frame.
+/// (11) with the frame term: in a correct frame, only w_r psi on q remains, at any speed of the frame.
 #[test]
 fn eq_11_and_14_with_the_frame_term() {
     for p in points() {

@@ -19,7 +19,7 @@
 use drive_base::frame::{AlphaBeta, Axis, Rotor};
 use drive_base::math::exp;
 
-/// How a Runge-Kutta step combines the derivatives of its stages.
+/// Weights by which a Runge-Kutta step combines the derivatives of its stages.
 pub(super) trait Stages {
     /// The flux linkage (Wb) at a stage with the d-axis on `axis`, at a distance of `away` (Wb) from the `start`.
     fn at(&self, start: AlphaBeta, away: AlphaBeta, axis: Axis<Rotor>) -> AlphaBeta;

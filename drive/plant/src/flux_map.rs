@@ -32,7 +32,7 @@ const INTERVALS: [usize; 2] = [D - 3, Q - 2];
 /// Parameters; not used at the start.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FluxMap {
-    /// The map gives the current, instead of inductances and saturation.
+    /// The map determines the current, instead of inductances and saturation.
     pub used: bool,
     /// Minimum d-axis flux linkage of the grid in Wb, relative to that of the magnet, < 0.
     pub d_min: f64,

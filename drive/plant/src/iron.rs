@@ -43,7 +43,7 @@ impl Default for Iron {
 }
 
 impl Iron {
-    /// Whether the iron loses nothing.
+    /// Whether the iron loss is zero.
     #[inline]
     pub fn is_none(&self) -> bool {
         let &Self { G_e, G_h, w_0: _ } = self;

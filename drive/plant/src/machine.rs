@@ -19,7 +19,7 @@ pub fn flux<S: Scalar>(motor: &Motor<S>, i: Vector<Rotor, S>) -> Vector<Rotor, S
     Vector::new(i.d() * motor.L_d + motor.psi_M, i.q() * motor.L_q)
 }
 
-/// How the current follows from the flux linkage.
+/// The relation between current and flux linkage.
 #[derive(Clone, Copy, Debug)]
 pub enum Magnetics<'a> {
     /// By the inductances.

@@ -199,14 +199,14 @@ impl<'a, C: Coulomb<S>, S: Scalar> Shaft<'a, C, S> {
         Self { mechanics, by_J, tau_load, coulomb }
     }
 
-    /// This shaft with another form of its Coulomb torque.
+    /// This shaft with a different form of its Coulomb torque.
     #[inline]
     pub fn with<D>(&self, coulomb: D) -> Shaft<'a, D, S> {
         let &Self { mechanics, by_J, tau_load, .. } = self;
         Shaft { mechanics, by_J, tau_load, coulomb }
     }
 
-    /// Torque on the load in N.m where the machine gives `tau_given` (N.m) beyond friction.
+    /// Torque on the load in N.m if the machine delivers `tau_given` (N.m) in excess of friction.
     #[inline]
     pub fn tau_shaft(&self, tau_given: S) -> S {
         self.mechanics.tau_shaft(tau_given, self.tau_load)

@@ -27,8 +27,8 @@ const MAX_SUBSTEPS: f64 = 1e7;
 const FASTEST: f64 = 1e6;
 
 impl PmsmPlant {
-    /// The state at the beginning of a step, and the energy transferred on the way there: an imposed shaft takes the angle of
-    /// the drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
+    /// The state at the beginning of a step, and the energy transferred in reaching it: an imposed shaft adopts the angle of the
+    /// drive train. A difference from the angle at the end of the last step turns the rotor under the stator flux
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]

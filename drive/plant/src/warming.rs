@@ -14,7 +14,7 @@ use crate::thermal::{Heat, Temperatures, ThermalMode};
 use drive_base::motor::Motor;
 use fmu_core::{Fault, Interface, Scalar};
 
-/// Remedy when the network leaves the possible temperatures.
+/// Remedy if the temperatures of the network leave their valid range.
 const RUNAWAY: &str = "the network became too hot; reduce the current, or raise thermal.G_ws and thermal.G_sc: at constant \
                        current, the winding runs away where winding.alpha p_cu(T_ref) (1/G_ws + 1/G_sc) reaches 1";
 

@@ -1,5 +1,5 @@
-//! Every parameter of the plant has an effect, and the same one in Co-Simulation and in Model Exchange: each is changed from its
-//! start value, alone and together with another one. An effect that one of the two omits fails here.
+//! Every parameter of the plant has the same effect in Co-Simulation and in Model Exchange: each is changed from its start value,
+//! alone and in pairs. An effect that one of the two omits fails here.
 
 use drive_base::frame::{AlphaBeta, Phases};
 use drive_plant::PmsmPlant;

@@ -97,7 +97,7 @@ impl Circuit {
         i.abs() * t * phi_1 / self.C
     }
 
-    /// Starts at the voltage `u` (V) and covers `t` (s), in which the inverter takes `energy` (J).
+    /// Starts at the voltage `u` (V) and covers `t` (s), in which the inverter draws `energy` (J).
     pub(super) fn over(&self, u: f64, t: f64, energy: f64) -> Piece {
         let &Self { C, source, chopper, U } = self;
         let [phi_1, phi_2, phi_3] = phi(t * (source + chopper) / C);

@@ -143,7 +143,7 @@ impl Link {
         (h / parts.max(1.0)).max(T_s / MAX_PARTS).min(h)
     }
 
-    /// Advances by `h` (s) on a source of `U` (V), while the inverter takes `energy` (J).
+    /// Advances by `h` (s) on a source of `U` (V), while the inverter draws `energy` (J).
     pub fn advance(&mut self, par: &LinkParameters, U: f64, h: f64, energy: f64) {
         let power = (energy + std::mem::take(&mut self.owed)) / h;
         let mut left = h;
@@ -194,7 +194,7 @@ impl Link {
         self.point = Counted { time: now, u: self.u, source: U, taken };
     }
 
-    /// Model Exchange: keeps the counts at the points of the solution, or takes them back.
+    /// Model Exchange: keeps the counts at the points of the solution, or restores earlier ones.
     pub fn account(&mut self, account: Account) {
         let mut counts = (self.energy, self.point);
         self.kept.follow(account, &mut counts);

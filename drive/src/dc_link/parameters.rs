@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Capacitor and source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DcLink {
-    /// The link is modeled; false: the inverter takes its voltage from the input.
+    /// The link is modeled; if false, the input sets the inverter's voltage.
     pub used: bool,
     /// Capacitance in F.
     pub C: f64,

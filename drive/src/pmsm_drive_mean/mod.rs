@@ -1,7 +1,7 @@
 //! The model `PmsmDriveMean`: the drive for system models, a drop-in replacement for `PmsmDrive`.
 //!
 //! It has the variables of [`PmsmDrive`](crate::PmsmDrive) and, at every instant, the [steady state](crate::steady) of that
-//! drive; only the torque takes time. With the torque reference t of torque mode or speed loop:
+//! drive; only the torque has dynamics. With the torque reference t of torque mode or speed loop:
 //!
 //! ```text
 //! t_lag dx/dt = min(max(t, tau_min), tau_max) - x,  t_lag = 1 / current.bandwidth       currents, voltage, powers: those of x

@@ -67,7 +67,7 @@ impl Steady {
         Temperatures::all(self.plant.thermal.T_start)
     }
 
-    /// Maximum speed (mechanical, rad/s) at which the controller's estimates give its full torque, on a link of `u_dc` (V);
+    /// Maximum speed (mechanical, rad/s) at which the controller's estimates allow full torque, on a link of `u_dc` (V);
     /// without field weakening, with the full voltage of the link.
     pub fn base_speed(&self, u_dc: f64) -> f64 {
         let par = &self.controller;

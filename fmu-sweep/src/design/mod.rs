@@ -272,7 +272,7 @@ mod tests {
         }
     }
 
-    /// With 100 rows of LHS, or 128 of Sobol, each of as many strata of each variable has one point.
+    /// With 100 rows of LHS, or 128 of Sobol, each variable has exactly one point in each of 100 or 128 strata.
     #[test]
     fn every_stratum_has_one_point() {
         for (kind, count) in [("lhs", 100_u64), ("lhs", 1), ("lhs", 997), ("sobol", 128)] {

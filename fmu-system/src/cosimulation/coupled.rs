@@ -1,8 +1,8 @@
 //! FMUs for Model Exchange as one system of differential equations with events.
 //!
-//! At every evaluation all FMUs get time and states, and a [`Feed`] sets their continuous inputs. Discrete inputs are set in
+//! At every evaluation, all FMUs receive time and states, and a [`Feed`] sets their continuous inputs. Discrete inputs are set in
 //! event mode alone. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of
-//! discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are left alone.
+//! discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are skipped.
 
 use super::exchange::Inputs;
 use super::iteration::{Iterated, iterate};

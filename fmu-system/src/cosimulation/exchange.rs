@@ -197,7 +197,7 @@ impl Exchange {
         Self { traffic, row, fed: wiring.feeds.len(), since: None }
     }
 
-    /// A run begins: nothing is held, and nothing was written.
+    /// A run begins: no value is held or has been written.
     pub(super) fn begin(&mut self) {
         self.since = None;
         self.traffic.iter_mut().flat_map(|t| &mut t.held).for_each(|(_, _, last)| *last = None);
@@ -248,7 +248,7 @@ impl Exchange {
     }
 
     /// Passes outputs on to inputs until nothing changes: an output may depend on an input, through several FMUs. A loop of
-    /// continuous inputs is solved. FMUs for Co-Simulation are left out: they read and set at communication points. Returns
+    /// continuous inputs is solved. FMUs for Co-Simulation are excluded: they exchange values at communication points. Returns
     /// whether a discrete input changed.
     pub(super) fn settle(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<bool, Error> {
         if inputs == Inputs::Continuous && self.traffic.iter().all(|traffic| traffic.continuous == [0, 0]) {
@@ -266,7 +266,7 @@ impl Exchange {
         loops::solve(self, instances, t).map(|()| discrete)
     }
 
-    /// Reads the sources of inputs, and sets the inputs that have changed; returns whether none has changed, and whether a
+    /// Reads the sources of inputs, and sets the inputs that have changed; returns whether no input has changed, and whether a
     /// discrete one has.
     fn pass(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<(bool, bool), Error> {
         let (mut settled, mut discrete) = (true, false);

@@ -60,7 +60,7 @@ impl Method {
         }
     }
 
-    /// Refuses a method that none of the instances supports, and invalid settings.
+    /// Refuses a method that no instance supports, and invalid settings.
     pub(super) fn check(&self, kinds: &[Kind], sequential: bool) -> Result<(), Error> {
         let refused = |setting: &str, cause: &str| Err(Error::usage(setting, cause));
         let wrong = |cause: String| Err(Error::usage("settings", cause));

@@ -84,7 +84,7 @@ impl System {
     /// Prepares the system for many runs from start to stop.
     ///
     /// # Errors
-    /// The settings make no sense.
+    /// The settings are invalid.
     pub fn into_plan(mut self, settings: &Settings) -> Result<SystemPlan, Error> {
         let grid = self.grid(settings)?;
         let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
@@ -165,9 +165,9 @@ impl SystemPlan {
         })
     }
 
-    /// The system together with a copy of it: neither feeds the other, the columns are those of the system, then those of the
-    /// copy. FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then differ by
-    /// these values alone and not by the solver's choice of steps.
+    /// The system together with a copy of it, without connections between the two; the columns are those of the system, then
+    /// those of the copy. FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then
+    /// differ by these values alone and not by the solver's choice of steps.
     #[must_use]
     pub fn with_copy(&self) -> Self {
         let count = self.parts.0.len();

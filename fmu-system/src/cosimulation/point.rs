@@ -39,7 +39,7 @@ pub struct Ended {
     pub by: Option<String>,
 }
 
-/// The last point of a run that an instance has ended: outputs are read, nothing is set.
+/// The last point of a run that an instance has ended: outputs are read, but no inputs are set.
 pub(super) fn end(
     instances: &mut [Instance],
     exchange: &mut Exchange,

@@ -17,7 +17,7 @@ pub struct Schedule {
 pub(super) const SAME: f64 = 1e-9;
 
 impl Schedule {
-    /// Steps: each value holds from its time (s) on; before the first, the first value holds.
+    /// Steps: each value applies from its time (s) on; before the first time, the first value.
     ///
     /// # Errors
     /// There is no point, a number is not finite, or times do not increase.
@@ -25,7 +25,7 @@ impl Schedule {
         Self::new(points, false)
     }
 
-    /// Straight lines between the points; before the first and after the last, their values hold.
+    /// Straight lines between the points; before the first and after the last point, their values apply.
     ///
     /// # Errors
     /// As [`steps`](Self::steps).

@@ -169,7 +169,7 @@ impl Schedule {
 pub(super) struct Held(Arc<[(f64, Values)]>);
 
 impl Held {
-    /// Number of the value at time `t` (s); before the first, the first holds.
+    /// Number of the value at time `t` (s); before the first time, that of the first value.
     pub(super) fn index(&self, t: f64) -> usize {
         last_before(&self.0, t).saturating_sub(1)
     }

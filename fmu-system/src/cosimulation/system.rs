@@ -78,7 +78,7 @@ impl System {
         self.units
     }
 
-    /// How the system is run.
+    /// The method of running the system.
     pub fn method(&self) -> &Method {
         &self.method
     }
@@ -88,7 +88,7 @@ impl System {
     /// `fixedInternalStepSize` does not divide, and an input that jumps between two communication points.
     ///
     /// # Errors
-    /// The settings make no sense, or leave no step.
+    /// The settings are invalid, or allow no step.
     pub fn feasible(&mut self, settings: &Settings) -> Result<Settings, Error> {
         let wrong = |cause| Error::usage("settings", cause);
         let grid = settings.grid().map_err(wrong)?;

@@ -5,7 +5,7 @@ use std::fmt::Display;
 /// One line that names the file, the location in it, and the cause.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
-    /// An FMU, or something that it lacks.
+    /// An FMU, or a feature that it lacks.
     #[error(transparent)]
     Fmu(#[from] fmu_import::Error),
     /// An FMU that refuses the content of a file.

@@ -61,7 +61,7 @@ impl Node {
     }
 }
 
-/// A connection from what sends to what takes.
+/// A connection from its source to its target.
 struct Edge<'a> {
     from: Node,
     to: Node,

@@ -203,7 +203,7 @@ impl Loaded {
     /// Feeds an input over time: one of the system's, or `component.variable`.
     ///
     /// # Errors
-    /// There is none of this name, or it is already fed.
+    /// No input has this name, or it is already fed.
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.input(&port, schedule.clone())?;
@@ -214,7 +214,7 @@ impl Loaded {
     /// Feeds an input of any type over time, as [`input`](Self::input), from texts of a user or a file.
     ///
     /// # Errors
-    /// There is none of this name, it is already fed, or a text is not a value of its type.
+    /// No input has this name, it is already fed, or a text is not a value of its type.
     pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.sequence(&port, texts)?;
@@ -242,7 +242,7 @@ impl Loaded {
     /// Sets a value: of an input of the system, or of `component.variable`.
     ///
     /// # Errors
-    /// There is none of this name, or the FMU refuses the value.
+    /// No variable has this name, or the FMU refuses the value.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             self.system.set(&port, value)?;

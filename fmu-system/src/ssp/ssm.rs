@@ -65,7 +65,7 @@ pub(super) fn linear(e: &Element) -> Result<Conversion, String> {
     Ok(Conversion { factor: number("factor", 1.0)?, offset: number("offset", 0.0)? })
 }
 
-/// The values under the names of the mapping; those that it does not name are left out.
+/// The values under the names of the mapping; values that it does not name are omitted.
 ///
 /// # Errors
 /// The entry whose value cannot be transformed, or whose source is missing from the file.

@@ -69,7 +69,7 @@ fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<(), Error> 
     Ok(system.set(&format!("{instance}.{name}"), &value)?)
 }
 
-/// The value in the unit of the variable, if that is another one, and a note if one of them is not known.
+/// The value in the unit of the variable, if that is another one, and a note if one of the units is unknown.
 fn in_unit_of(
     p: &Parameter,
     variable: &ModelVariable,

@@ -11,7 +11,7 @@ use std::f64::consts::SQRT_2;
 /// Maximum residue, reciprocity error and torque error as a share of the rms value.
 const ALLOWED: f64 = 0.15;
 
-/// How far the map is from the table, in A.
+/// Deviation of the map from the table, in A.
 pub(super) struct Errors {
     /// Root mean square of both currents.
     rms: Dq,
@@ -133,7 +133,7 @@ pub(super) fn reciprocity(points: &[Point], file: &str) -> Result<Option<String>
     )))
 }
 
-/// How the torques of the table compare with those of its flux linkages and currents.
+/// Comparison of the torques in the table with those of its flux linkages and currents.
 ///
 /// # Errors
 /// They are too far off.

@@ -82,7 +82,7 @@ fn compared(r: &Results, m: &Motor) -> [(&'static str, Identified, f64); 15] {
     ]
 }
 
-/// Relative errors are within limits; nothing but what `refused` names is refused. i_zero, B and tau_coulomb do not count.
+/// Relative errors are within limits; only the values named in `refused` are refused. i_zero, B and tau_coulomb do not count.
 fn check(r: &Results, motor: &Motor, refused: &[&str]) {
     for (name, found, truth) in compared(r, motor) {
         let limit = match name {
@@ -138,7 +138,7 @@ fn standstill_is_the_first_part_of_spin() {
     assert_eq!((whole.results().R_s, whole.results().L_q), (commission.results().R_s, commission.results().L_q));
 }
 
-/// Off does nothing; a blocked rotor cannot spin, and keeps what is known at standstill.
+/// Off does nothing; a blocked rotor cannot spin, and the results at standstill are kept.
 #[test]
 fn nothing_spins_that_must_not() {
     let motor = Motor::draw(2, 51).held();
@@ -304,7 +304,7 @@ fn faults_are_named_and_safe() {
     is_safe(&mut commission, Fault::Inductance);
 }
 
-/// A blocked rotor that gives way gives no wrong value.
+/// A blocked rotor that comes loose yields no wrong value.
 #[test]
 fn a_rotor_that_comes_loose_gives_no_wrong_value() {
     for state in [State::Align, State::Resistance, State::Axes, State::Saturation] {
@@ -322,7 +322,7 @@ fn a_rotor_that_comes_loose_gives_no_wrong_value() {
     }
 }
 
-/// A rotor that is blocked, or that gets a load between two levels, gives no wrong value; the gates go off.
+/// A rotor that is blocked or loaded between two levels yields no wrong value; the gates go off.
 #[test]
 fn a_rotor_that_is_held_or_loaded_gives_no_wrong_value() {
     let motor = Motor::draw(1, 7);

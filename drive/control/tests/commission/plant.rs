@@ -222,7 +222,7 @@ impl Motor {
         bisect(&at, i, 3.0 * self.L_d * i.abs()) / i
     }
 
-    /// s_2 and s_3 of i = x/L_d + s_2 x^2 + s_3 x^3, by least squares over the flux linkages that +-`i` (A) give on L_d.
+    /// s_2 and s_3 of i = x/L_d + s_2 x^2 + s_3 x^3, by least squares over the flux linkages for +-`i` (A) on L_d.
     pub(crate) fn saturation(&self, i: f64) -> [f64; 2] {
         let psi = self.L_d * i;
         let (mut even, mut odd) = ([0.0; 2], [0.0; 2]);
@@ -241,7 +241,7 @@ impl Motor {
         bisect(&at, i, 3.0 * self.L_q * i.abs()) / i
     }
 
-    /// Twice the current in A where the line of a leg ends whose tail 1/i is that of dead time and threshold together.
+    /// Twice the current in A at which the line of a leg ends, if its tail 1/i combines dead time and threshold.
     pub(crate) fn i_zero(&self) -> f64 {
         2.0 * (self.u_dead * self.i_x + 2.0 * self.u_th * self.i_y) / (self.u_dead + self.u_th)
     }

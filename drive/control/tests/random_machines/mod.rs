@@ -75,8 +75,8 @@ impl Brute<'_> {
         [(u_d * R_s + self.w * L_q * u_q) / by, (R_s * u_q - self.w * L_d * u_d) / by]
     }
 
-    /// The best value of `worth` on a curve over 0..2 pi among the currents that fit, with its currents: the best place, and then the
-    /// best one around it, nearer and nearer.
+    /// The best value of `worth` on a curve over 0..2 pi among the currents that fit, with its currents: a coarse search, refined
+    /// step by step around the best point.
     fn best(&self, curve: impl Fn(f64) -> [f64; 2], worth: impl Fn([f64; 2]) -> f64) -> Option<(f64, [f64; 2])> {
         let (mut middle, mut width, mut places, mut best) = (std::f64::consts::PI, std::f64::consts::TAU, PLACES, None);
         for _ in 0..ZOOMS {

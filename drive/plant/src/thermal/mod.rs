@@ -33,7 +33,7 @@ pub use parts::{Heat, THERMAL_INPUTS, Temperatures, ThermalInputs};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
-    /// Where the temperatures come from; values never change.
+    /// Source of the temperatures; values never change.
     #[derive(Serialize, Deserialize)]
     pub enum ThermalMode("ThermalMode", "Where the temperatures come from") {
         1 Constant "thermal.T_start, regardless of the losses";
@@ -45,7 +45,7 @@ enumeration! {
 /// Parameters of temperatures and heat.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Thermal {
-    /// Where the temperatures come from.
+    /// Source of the temperatures.
     pub mode: ThermalMode,
     /// Temperature coefficient of the resistance in 1/K, >= 0.
     pub alpha_R: f64,
