@@ -29,7 +29,7 @@ struct ArtifactTarget {
 }
 
 /// Compiles the cdylibs of these packages, optimized, in a separate target folder (if `cargo` runs this program, it locks the
-/// usual one). Local paths are removed from the binaries, so that builds in two folders agree byte for byte.
+/// usual one). Local paths are removed from the binaries, so builds in two folders agree byte for byte.
 ///
 /// # Errors
 /// Cargo fails; it has then printed the reason.

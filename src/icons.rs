@@ -22,7 +22,7 @@ const MANIFEST: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
  fmi-ls:fmi-ls-description=\"Layered standard for structuring of variables\"/>
 ";
 
-/// The files; none for a model without terminals and icon.
+/// The files; empty for a model without terminals and icon.
 ///
 /// # Errors
 /// A picture is not an SVG document, or contains text.

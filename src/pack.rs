@@ -1,4 +1,4 @@
-//! The archive of an FMU: its contents, and a writer that gives the same bytes for the same contents.
+//! The archive of an FMU: its contents, and a writer that produces the same bytes for the same contents.
 
 use crate::TOOL;
 use crate::documentation;
@@ -84,7 +84,7 @@ impl GenerationTime {
 /// All files of an FMU.
 ///
 /// # Errors
-/// A library for macOS is not a Mach-O file, so that no universal library can be made.
+/// A library for macOS is not a Mach-O file, so no universal library can be created.
 pub fn contents(
     description: &Description,
     binaries: &[(Platform, Vec<u8>)],

@@ -516,7 +516,7 @@ fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, 
     Ok(Need::With { parameter: &found.name, value }.to_string())
 }
 
-/// Rows of variables that no model holds: derivatives and indicators.
+/// Rows of variables that are not fields of a model: derivatives and indicators.
 type V = Row<f64>;
 
 fn value(slot: &Slot<'_>) -> Value {

@@ -220,7 +220,7 @@ pub trait EventMode: ContinuousTime + Events {
     fn to_event(&mut self, step: &Step) -> Result<Stop, Fault>;
 }
 
-/// A model that acts at the instants k T only, like a digital controller: it reads its inputs at one instant, and the results
+/// A model that acts only at the instants k T, like a digital controller: it reads its inputs at one instant, and the results
 /// become visible at the next one. An importer that handles events gives it the inputs of every instant, regardless of its
 /// communication step.
 pub trait Sampled: Model {

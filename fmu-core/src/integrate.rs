@@ -135,7 +135,7 @@ const fn check_indicators<M: Events>() {
     assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for");
 }
 
-/// Advances a model that acts at its sample instants only, with the inputs held.
+/// Advances a model that acts only at its sample instants, with the inputs held.
 ///
 /// # Errors
 /// Those of [`Sampled::sample`]; more than 1e7 samples in the step.

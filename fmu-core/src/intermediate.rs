@@ -1,4 +1,4 @@
-//! The capability of a model whose communication steps the importer follows from inside.
+//! Intermediate updates: the importer exchanges values with a model within a communication step.
 
 use crate::Model;
 

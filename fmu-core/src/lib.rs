@@ -76,7 +76,7 @@
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
 //! [`CompletedSteps`], [`Intermediate`], [`Clocked`], [`Resizable`] and [`Warns`] are further capabilities of a model;
-//! [`Model::load`] reads files that the FMU brings along, and a [`preset`] is one of them.
+//! [`Model::load`] reads files that the FMU contains, and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`sizes`], [`terminal`], [`model`],
 //! [`continuous`], [`events`], [`capability`], [`rules`], [`description`]. No motor, no XML, no C, no `unsafe`.

@@ -1,4 +1,4 @@
-//! Whether an importer must feed an input, expressed in its description: neither standard has an attribute for it.
+//! States in the description of an input whether an importer must feed it; neither standard has an attribute for this.
 //!
 //! A row states it by [`Row::optional`](crate::Row::optional) or [`Row::read_with`](crate::Row::read_with). The sentence is
 //! written and parsed only here, so an importer has the same information as the table.

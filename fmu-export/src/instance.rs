@@ -89,7 +89,7 @@ pub struct Instance<E: Exported> {
     starts: Starts,
 }
 
-/// Knowledge about the start values of a run.
+/// Information about the start values of a run.
 #[derive(Default)]
 struct Starts {
     /// Whether the values after a reset pass [`Snapshot::check`]: determined at the first reset.

@@ -1,7 +1,7 @@
 //! The saved FMU states, and the handles that represent them in C.
 //!
 //! A handle is a unique number, not an address: it is looked up and never dereferenced. A foreign, freed or garbage `FMUState`
-//! therefore gives an error with a message and never a crash. This is the only global of a binary; a step does not touch it.
+//! therefore causes an error with a message, never a crash. This is the only global of a binary; a step does not touch it.
 
 use crate::snapshot::Snapshot;
 use fmu_core::{Fault, Model};

@@ -310,7 +310,7 @@ mod unix {
 
     /// Prefix of the line with the number of the child, which the guard writes first, before its report.
     const STARTED: &str = "started ";
-    /// Time that helpers of a process may take to end after it.
+    /// Grace period for the helpers of a process after its end.
     const FAREWELL: Duration = Duration::from_millis(100);
 
     /// Arguments: memory, file, sandbox or open, then those of the child, which runs the same program.

@@ -118,7 +118,7 @@ impl ModelDescription {
     }
 
     /// The continuous states in the order of `x` in every call, which is the order of the derivatives in the model structure
-    /// (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). Entries that do not refer to the derivative of a variable are left out.
+    /// (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8). Entries that do not refer to the derivative of a variable are omitted.
     pub fn states(&self) -> Vec<&ModelVariable> {
         self.derivatives.iter().filter_map(|unknown| self.state_of(self.referenced(unknown.reference)?)).collect()
     }

@@ -98,7 +98,7 @@ impl Place {
         Ended { status: status.unwrap_or(-1), out, errors }
     }
 
-    /// The same; an error is one line and has status 2.
+    /// The same; an error is one line with status 2.
     pub fn runs(&self, command: &str, more: &[&str]) -> Ended {
         let ended = self.run(command, more, "");
         let statuses: &[i32] = &[0, 1, 2];

@@ -86,7 +86,7 @@ fn outputs_that_fmpy_does_not_record_are_left_out_there() {
     assert!(readme.contains("FMPy 0.3.32: 0.0e0\n"), "{readme}");
 }
 
-/// Texts and bytes in this program; FMPy cannot feed them.
+/// Feeds texts and bytes in this program, because FMPy cannot feed them.
 #[test]
 fn texts_and_bytes_are_replayed() {
     let folder = tempfile::tempdir().unwrap();

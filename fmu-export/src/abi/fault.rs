@@ -10,7 +10,7 @@ use std::sync::Mutex;
 
 static TEXT: Mutex<Option<CString>> = Mutex::new(None);
 
-/// Keeps the message and location of a panic. Where a panic unwinds, the gate reports it, and nothing is kept.
+/// Keeps the message and location of a panic. If panics unwind, the gate reports them, and no text is stored.
 pub(super) fn keep(info: &PanicHookInfo<'_>) {
     if cfg!(panic = "unwind") {
         return;

@@ -4,8 +4,8 @@
 //! FMU returns early. There, outputs are passed on to inputs as at a communication point, and FMUs with event mode handle their
 //! events with these inputs (FMI 3.0.2, 4.2.1). An FMU without event mode and early return is stepped to the same instants.
 //!
-//! FMUs that may return early step first; the others follow to the time reached. If one of several returns before the others,
-//! those go back to the saved state before the step: they need `canGetAndSetFMUState`.
+//! FMUs that may return early step first; the others follow to the time reached. If one of several returns before the others, the
+//! others return to the state saved before the step: they need `canGetAndSetFMUState`.
 
 use super::exchange::Exchange;
 use super::grid::Grid;

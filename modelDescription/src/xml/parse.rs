@@ -1,4 +1,4 @@
-//! Parses an element tree. Any input gives a tree or an error: no panic, no unbounded recursion, no entity expansion, no
+//! Parses an element tree. Any input yields a tree or an error: no panic, no unbounded recursion, no entity expansion, no
 //! external file.
 
 use super::element::Element;

@@ -54,7 +54,7 @@ impl<const C: usize, const N: usize> Rows<C, N> {
         std::array::from_fn(|k| self.rows[(k, n)])
     }
 
-    /// Adds a row; one more than `N` is lost.
+    /// Adds a row; rows beyond `N` are discarded.
     pub(super) fn push(&mut self, row: [f64; C]) {
         let n = self.len();
         if n < N {

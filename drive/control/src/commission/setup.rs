@@ -15,7 +15,7 @@ pub struct CommissionSetup {
     pub T_s: f64,
     /// Samples from taking the currents to the voltage acting: 0, 1 or 2.
     pub delay: i32,
-    /// Maximum current of the commissioning in A, > 0: about the rated one to twice of it.
+    /// Maximum current of the commissioning in A, > 0: about one to two times the rated current.
     pub i: f64,
     /// Rated electrical speed in rad/s, > 0.
     pub speed: f64,

@@ -6,7 +6,7 @@ use fmu_core::{
     capability::ToEvent,
 };
 
-/// Facts about a model for the driver, besides its capabilities.
+/// Facts about a model for the driver, in addition to its capabilities.
 pub trait Twin: Model + PartialEq {
     const CAN: Capabilities<Self>;
     /// Interfaces that the FMU has.
