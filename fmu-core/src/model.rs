@@ -83,8 +83,8 @@ pub enum Interface {
 /// The life of an instance:
 /// 1. `Default` creates it: inputs and parameters at their start values. [`load`](Model::load) reads resources.
 /// 2. The importer sets parameters and inputs; each set is checked against its range in the table.
-/// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer reads
-/// a value after it has set one, so that initialization can be iterated.
+/// 3. [`derive`](Model::derive), [`initialize`](Model::initialize) and [`output`](Model::output) run whenever the importer
+///    reads a value after it has set one, so that initialization can be iterated.
 /// 4. [`validate`](Model::validate) checks the parameters together; then the simulation starts.
 /// 5. [`advance`](Model::advance) and [`output`](Model::output) run in turn. An `advance` does not allocate, lock, read a
 ///    clock or print, and never writes a parameter.

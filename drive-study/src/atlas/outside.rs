@@ -4,7 +4,7 @@
 //! - the rotor turns against the estimated frame by a turn or more,
 //! - or over two quarters, `speed_est` is off the rotor's speed by more than 5 % of the rated speed on the average,
 //! - or in two quarters, the speeds of rotor and estimate both swing by more than 10 % of the rated speed from peak to peak. An
-//! accelerating drive does not count as swinging: from quarter to quarter, its mean moves by as much as its peaks differ.
+//!   accelerating drive does not count as swinging: from quarter to quarter, its mean moves by as much as its peaks differ.
 //!
 //! A drive that misses its reference because of its limits is not lost: the outputs `current_limited` and `voltage_limited` say
 //! so.

@@ -4,9 +4,9 @@
 //! hotter loses torque and load. The adaptation measures R^ at rest, within 4 / b, before the controller follows a reference:
 //!
 //! - it begins with 0.75 R or less, below the 0.80 R of copper at -30 degC: R^ > R runs away at standstill before it is measured;
-//! - b = 20 1/s, at most a quarter of w_0 = sqrt(n_p K i_0 / J), with which the rotor swings on i_0: a faster adaptation mistakes
-//! the swing for an error of R^. With half of w_0, R^ of wind-5kw came to 1.36 R from 120 deg beside the rotor, which then crept
-//! away.
+//! - b = 20 1/s, at most a quarter of w_0 = sqrt(n_p K i_0 / J), with which the rotor swings on i_0: a faster adaptation
+//!   mistakes the swing for an error of R^. With half of w_0, R^ of wind-5kw came to 1.36 R from 120 deg beside the rotor,
+//!   which then crept away.
 //!
 //! The rules switch it on, except where the [`trial`] with it holds less than without it, at the temperature of the data, at -30 or
 //! at 130 degC, or swings at more speeds. The loss of a leg due to dead time and thresholds is compensated

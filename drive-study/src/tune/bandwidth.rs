@@ -7,9 +7,9 @@
 //!   most. Rasmussen's observer: that of the maximum current, and 300 rad/s at least; the tracker of the extended EMF: that
 //!   of 1.6 times the rated torque, the limit, and 2 pi 20 rad/s at least.
 //! - Speed: a step of the torque T makes the speed dip by 2/e T / (J w_s), with a double pole at w_s / 2. The dip should be at
-//! most
-//!   0.05 pu; w_s is at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up to a limit;
-//!   with the extended EMF, less where the gain through the change of i_q would be high ([`limits`](super::limits)).
+//!   most 0.05 pu; w_s is at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up
+//!   to a limit; with the extended EMF, less where the gain through the change of i_q would be high
+//!   ([`limits`](super::limits)).
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
 use super::motor::{Data, Number, torque_constant};

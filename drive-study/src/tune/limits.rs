@@ -5,8 +5,9 @@
 //!   c_1 (R - R^) i / (w^2 psi_M), to first order.
 //! - **Start, flux observer.** At rest, R^ below R drives the estimate away at (R - R^) i_0 / psi_M, and the rotor follows with
 //!   w_0 = sqrt(n_p K i_0 / J): the drift must be slower. The rules choose R^ for that; a margin below 2 % is less than the
-//!   uncertainty of R. From the opposite angle, the speed loop drives i_q to its limit before the rotor has turned around: at an
-//! angle of atan(i_q / i_d) from the rotor, the currents produce no torque, and if R - R^ is small, the estimate stays there.
+//!   uncertainty of R. From the opposite angle, the speed loop drives i_q to its limit before the rotor has turned around: at
+//!   an angle of atan(i_q / i_d) from the rotor, the currents produce no torque, and if R - R^ is small, the estimate stays
+//!   there.
 //! - **Start, extended EMF.** A change of i_q acts on the estimated speed through (L_q - L_d) p i_q against the EMF; closed by
 //!   the speed loop, the gain is J w_s (L_q - L_d) rho^2 / (K n_p w psi_M). Above 40 at 0.1 pu, the speed does not
 //!   settle there after the hand-over.

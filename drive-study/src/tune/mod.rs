@@ -6,7 +6,7 @@
 //!   test, [`flux_map`] for a map from a table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
 //!   compares them with the variables of the models; [`Tuned::pair`] is the native drive with these values.
 //! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: the conditions
-//! that it cannot hold, and why. [`remedy`]: what helps.
+//!   that it cannot hold, and why. [`remedy`]: what helps.
 
 pub mod adaptation;
 pub mod bandwidth;

@@ -1,14 +1,12 @@
 //! The time constants of the tuned drive at a speed. They time a trial.
 //!
 //! - **Speed loop.** s^2 + w_s s + w_s^2 / t_is = 0; with t_is = 4, a double pole at w_s / 2.
-//! - **Observer.** Rasmussen's flux poles at the electrical speed w: s^2 + c_1 s + w^2 = 0, so 2 / c_1 above w = c_1 / 2 and about
-//!   c_1 / w^2 below, where the back EMF carries little information; its speed adaptation: a double pole at w_n. The tracker of
-//! the extended
-//!   EMF: a double pole at rho.
-//! - **Mechanics.** J w / T, the time in which the rated torque accelerates the rotor to its speed. A load tau_L moves the rotor
-//! of
-//!   a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque in excess of the load recovers
-//! the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
+//! - **Observer.** Rasmussen's flux poles at the electrical speed w: s^2 + c_1 s + w^2 = 0, so 2 / c_1 above w = c_1 / 2 and
+//!   about c_1 / w^2 below, where the back EMF carries little information; its speed adaptation: a double pole at w_n. The
+//!   tracker of the extended EMF: a double pole at rho.
+//! - **Mechanics.** J w / T, the time in which the rated torque accelerates the rotor to its speed. A load tau_L moves the
+//!   rotor of a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque in excess of the
+//!   load recovers the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
 
 use super::bandwidth::DIP_OF_A_STEP;
 use super::setting::Tuned;

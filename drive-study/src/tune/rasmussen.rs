@@ -10,9 +10,9 @@
 //! - closer to R where the drift would exceed w_0: the rotor is too heavy to follow the estimate;
 //! - closer to R where (R - R^) i with the rated torque would exceed 0.15 of the EMF at 0.1 pu: the estimate turns away by c_1
 //!   (R - R^) i / (w^2 psi_M), less torque remains, the current rises, and the estimate turns further;
-//! - farther from R where the drift would be less than 0.025 w_0: from the opposite angle, the speed loop drives i_q to its limit
-//! before the rotor has turned around. At an angle near atan(i_q / i_0) from the rotor, the currents produce no torque, and only
-//! the drift leads away from there.
+//! - farther from R where the drift would be less than 0.025 w_0: from the opposite angle, the speed loop drives i_q to its
+//!   limit before the rotor has turned around. At an angle near atan(i_q / i_0) from the rotor, the currents produce no torque,
+//!   and only the drift leads away from there.
 //!
 //! The shares 0.15 and 0.025 are found by trial on machines from 5 W to 300 kW.
 
