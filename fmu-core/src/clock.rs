@@ -31,7 +31,7 @@ impl Ticks {
         matches!(self, Self::Constant | Self::Fixed | Self::Tunable)
     }
 
-    /// Whether the model gives the interval: [`Clocked::interval`].
+    /// Whether the model determines the interval: [`Clocked::interval`].
     pub const fn is_aperiodic(self) -> bool {
         matches!(self, Self::Changing | Self::Countdown)
     }

@@ -15,7 +15,7 @@ use drive_study::runner::run_in_steps;
 use fmu_core::{Block, Model, Slot};
 use std::path::{Path, PathBuf};
 
-/// Sets the variable `name` of a block; integers and Booleans from their number.
+/// Sets the variable `name` of a block; integers and Booleans are converted from a number.
 pub fn set<M: Model>(block: &mut Block<M>, name: &str, value: f64) {
     let index = (0..M::TABLE.len())
         .find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name))

@@ -62,7 +62,7 @@ fn course(index: u64) -> (Vec<Part>, usize) {
 
 const NAMES: [&str; 9] = ["R_s", "L_d", "L_q", "psi_M", "J", "B", "tau_coulomb", "u_dead", "i_zero"];
 
-/// The true values; thresholds of the devices add to the dead time in a way that has no single value.
+/// The true values; thresholds of the devices add to the dead time, and no single value represents the sum.
 fn truth(m: &Machine) -> [f64; 9] {
     let (u_dead, i_zero) = if m.threshold > 0.0 { (f64::NAN, f64::NAN) } else { (m.u_dead, 2.0 * m.bend) };
     [m.R, m.L[0], m.L[1], m.psi_M, m.J, m.B, m.tau_coulomb, u_dead, i_zero]

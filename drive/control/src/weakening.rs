@@ -134,7 +134,7 @@ pub struct Weakening {
     U: f64,
     /// Voltage in V at the last sample that had to compute both limits.
     U_then: f64,
-    /// Some plain reference does not fit the voltage.
+    /// The voltage is not sufficient for every plain reference.
     near: bool,
     /// Limits for motoring and for generating.
     limits: [Limit; 2],

@@ -1,4 +1,4 @@
-//! Runs start-up and load step of the pair with rust-fmi's crate `fmi`, exchange Jacobi, and compares with the native run.
+//! Runs start-up and load step of the pair with rust-fmi's crate `fmi` (Jacobi exchange), and compares them with the native run.
 //!
 //! Arguments: the folder with PmsmPlant.fmu and SensorlessController.fmu for FMI 2.0, and the file of references.
 

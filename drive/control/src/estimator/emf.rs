@@ -115,7 +115,7 @@ pub fn follow<All: AsRef<EmfParameters> + AsRef<TrackerParameters>>(
     tracker.follow(context, (1.0 - g) * angle_error(s, e.d(), e.q()), sample)
 }
 
-/// Leads the speed through zero with the EMF `e` (V); returns the share g of standstill.
+/// Guides the speed through zero with the EMF `e` (V); returns the share g of standstill.
 #[inline]
 pub fn hold<All: AsRef<EmfParameters>>(tracker: &mut Tracker, context: &ContextOf<All>, e: DqHat) -> f64 {
     let ContextOf { motor, T_s, .. } = *context;
