@@ -221,7 +221,7 @@ fn thinned(recording: &Recording, every: usize) -> String {
         // Writing to a String does not fail.
         let _ = write!(csv, "{t}");
         recording.columns.iter().for_each(|c| {
-            let _ = write!(csv, ",{}", c.values[k]);
+            let _ = write!(csv, ",{}", c.at(k));
         });
         for column in &texts {
             let _ = write!(csv, ",{}", cell(&column.values[k]));

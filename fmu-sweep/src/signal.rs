@@ -1,6 +1,7 @@
 //! The signal of a measure: a sum of variables.
 
 use crate::definition::SetValue;
+use fmu_import::Number;
 use std::f64::consts::PI;
 
 /// A sum as it is written.
@@ -69,10 +70,29 @@ impl Signal {
         self.wrap.is_some()
     }
 
-    /// The value at a communication point.
-    pub(crate) fn at(&self, values: &[f64]) -> f64 {
-        let sum = self.terms.iter().fold(0.0, |sum, (factor, column)| sum + factor * values[*column]);
-        self.wrap.map_or(sum, |period| sum - period * (sum / period).round())
+    /// The value at a communication point: an integer where all terms are integers with whole factors, else a double.
+    pub(crate) fn at(&self, values: &[Number]) -> Number {
+        if self.terms.iter().any(|(_, column)| values[*column] == Number::Missing) {
+            return Number::Missing;
+        }
+        if self.wrap.is_none()
+            && let Some(sum) = self.whole(values)
+        {
+            return sum;
+        }
+        let sum = self.terms.iter().fold(0.0, |sum, (factor, column)| sum + factor * values[*column].real());
+        Number::Real(self.wrap.map_or(sum, |period| sum - period * (sum / period).round()))
+    }
+
+    /// The sum of integers with all digits.
+    fn whole(&self, values: &[Number]) -> Option<Number> {
+        let term = |(factor, column): &(f64, usize)| match values[*column] {
+            #[expect(clippy::cast_possible_truncation, reason = "whole, and checked")]
+            Number::Integer(i) if factor.fract() == 0.0 && factor.abs() < 1e15 => i.checked_mul(*factor as i128),
+            _ => None,
+        };
+        let sum = self.terms.iter().try_fold(0_i128, |sum, of| sum.checked_add(term(of)?));
+        sum.map(Number::Integer)
     }
 }
 
@@ -111,9 +131,21 @@ mod tests {
         let sum = Sum::parse("a - 2 * b").unwrap();
         let signal = Signal::new(&sum, Some(360.0), |name| usize::from(name == "b"));
         assert_eq!(
-            [[10.0, 0.0], [350.0, 0.0], [0.0, 90.5], [730.0, 0.0]].map(|v| signal.at(&v)),
+            [[10.0, 0.0], [350.0, 0.0], [0.0, 90.5], [730.0, 0.0]].map(|v| signal.at(&v.map(Number::Real)).real()),
             [10.0, -10.0, 179.0, 10.0]
         );
+    }
+
+    #[test]
+    fn integers_keep_their_digits() {
+        let of = |text: &str, a: i128, b: i128| {
+            let signal = Signal::new(&Sum::parse(text).unwrap(), None, |name| usize::from(name == "b"));
+            signal.at(&[Number::Integer(a), Number::Integer(b)])
+        };
+        let large = 9_007_199_254_740_993;
+        assert_eq!(of("a", large, 0), Number::Integer(large));
+        assert_eq!(of("a - 2 * b", large, 1), Number::Integer(large - 2));
+        assert_eq!(of("a - 0.5 * b", 3, 1), Number::Real(2.5));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::definition::{Runs, Traces, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
 use crate::{Definition, DesignRows, Error, Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner};
+use fmu_import::Number;
 use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -118,7 +119,7 @@ impl Sweep {
             let all = self.rows.count();
             return invalid(format!("rows from {first}, {count} of them, of a design with {all} rows"));
         }
-        let row = |k: u64, values: &mut Vec<f64>| self.rows.row(first + k, values);
+        let row = |k: u64, values: &mut Vec<Number>| self.rows.row(first + k, values);
         self.plan.run_rows(&self.variables, count, &row, threads, progress)
     }
 
@@ -168,9 +169,9 @@ impl Sweep {
     }
 
     /// The line of a row, with its line break.
-    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &RunResult) -> String {
+    pub(crate) fn line(&self, row: u64, values: &[Number], outcome: &RunResult) -> String {
         let mut line = row.to_string();
-        let mut put = |(column, x): (&ResultColumn, &f64)| {
+        let mut put = |(column, x): (&ResultColumn, &Number)| {
             line.push(',');
             push_value(&mut line, &column.items, *x);
         };
@@ -181,7 +182,7 @@ impl Sweep {
         }
         line.push(',');
         if !outcome.end.is_nan() {
-            push_number(&mut line, outcome.end);
+            push_number(&mut line, Number::Real(outcome.end));
         }
         line.push(',');
         if let Err(error) = &outcome.result {
@@ -222,7 +223,7 @@ impl Sweep {
 pub(crate) struct Writer<'a> {
     sweep: &'a Sweep,
     runner: Runner,
-    values: Vec<f64>,
+    values: Vec<Number>,
     /// Folder for traces.
     traces: Option<PathBuf>,
     trace: String,
@@ -242,7 +243,7 @@ impl Writer<'_> {
         trace.clear();
         let outcome = runner.run(values, &mut |t, traced| {
             if wanted.is_some() && point % every == 0 {
-                push_number(trace, t);
+                push_number(trace, Number::Real(t));
                 sweep.plan.traced().zip(traced).for_each(|(column, x)| {
                     trace.push(',');
                     push_value(trace, &column.items, x);
@@ -263,15 +264,19 @@ impl Writer<'_> {
 }
 
 /// The name of an enumeration's value, or a number. A name that CSV would have to quote stays a number: cells are split at commas.
-fn push_value(text: &mut String, items: &[(i64, String)], x: f64) {
-    match item(items, x).filter(|name| !name.contains([',', '"', '\n'])) {
+fn push_value(text: &mut String, items: &[(i64, String)], x: Number) {
+    match item(items, x.real()).filter(|name| !name.contains([',', '"', '\n'])) {
         Some(name) => text.push_str(name),
         None => push_number(text, x),
     }
 }
 
-/// A number in few characters that reads back as the same double.
-fn push_number(text: &mut String, x: f64) {
+/// A number that reads back to the same one, in few characters; nothing for a missing one.
+fn push_number(text: &mut String, number: Number) {
+    let Number::Real(x) = number else {
+        let _ = write!(text, "{number}");
+        return;
+    };
     let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite();
     // Writing to a String cannot fail.
     let _ = if plain { write!(text, "{x}") } else { write!(text, "{x:e}") };

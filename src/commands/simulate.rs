@@ -10,7 +10,7 @@ use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
-use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
+use fmu_import::{Fmu, Instance, Kind, Message, Number, journal, printable, printable_lines};
 use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
@@ -275,7 +275,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     };
     journal::writes();
     std::env::set_current_dir(&home)?;
-    let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
+    let bad = recording.columns.iter().find(|c| matches!(c.last(), Number::Real(x) if !x.is_finite()));
     let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
     let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
     let written = output::write(recording, for_plot, alone, args, &mut out);

@@ -11,7 +11,7 @@ use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
 use super::point::{CommunicationPoint, Ended, end};
-use fmu_import::{Error, FmuState, Instance, Kind, Stepped};
+use fmu_import::{Error, FmuState, Instance, Kind, Number, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
 
@@ -161,7 +161,7 @@ pub(super) fn run(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let (start, near) = (grid.settings().start, 1e-9 * grid.settings().step);

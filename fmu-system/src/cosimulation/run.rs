@@ -7,7 +7,7 @@ use super::point::{CommunicationPoint, Ended, end};
 use super::recording::{Recording, TextColumn};
 use super::system::System;
 use super::{continuous, events};
-use fmu_import::{Error, Instance, Kind};
+use fmu_import::{Error, Instance, Kind, Number};
 use std::ops::ControlFlow;
 
 /// Simulates instances whose values are set, from start to stop. `hook` sees every communication point, the last one included,
@@ -17,7 +17,7 @@ pub(super) fn simulate(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
@@ -61,7 +61,7 @@ fn step(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
@@ -126,14 +126,15 @@ impl System {
             Ok(grid) => grid,
             Err(error) => return (recording, Err(error)),
         };
-        let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
+        let mut exchange =
+            Exchange::new(self.instances.len(), &self.wiring, &self.records, self.texts.iter().map(|(port, _)| port));
         let texts = &self.texts;
         let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
             // Texts first: where one cannot be read, no column is longer than another.
             let mut cells = Vec::with_capacity(texts.len());
             for (port, _) in texts {
-                let (_, count) = port.element.unwrap_or((0, 1));
-                cells.push(point.instances[port.instance].get_at(port.base, port.reference, count)?.cell());
+                let values = port.read(&mut point.instances[port.instance])?;
+                cells.push(values.map(|values| values.cell()).unwrap_or_default());
             }
             recording.push(point.time, point.values);
             recording.texts.iter_mut().zip(cells).for_each(|(column, cell)| column.values.push(cell));

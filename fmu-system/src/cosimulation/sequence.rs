@@ -119,7 +119,7 @@ impl Sequence {
     /// The texts as values of this variable.
     pub(super) fn values(&self, variable: &ModelVariable, description: &ModelDescription) -> Result<Held, String> {
         let value = |(t, text, at): &(f64, String, String)| {
-            let number = |_: &String| Values::from_number(text.trim().parse().ok()?, variable.base).ok();
+            let number = |_: &String| Values::from_number(text.trim().parse::<f64>().ok()?, variable.base).ok();
             let read = Values::read(text, variable, description);
             // Tools also write integers and truth values as 1.0.
             let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));

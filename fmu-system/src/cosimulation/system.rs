@@ -3,11 +3,12 @@
 use super::exchange::{Source, Wiring};
 use super::grid::{Grid, Settings};
 use super::method::Method;
-use super::parts::{Part, Parts, Port, kind};
+use super::parts::{Part, Parts, Port, family, kind};
 use super::point::take_messages;
 use super::schedule::Schedule;
 use super::sequence::Sequence;
 use fmu_core::Need;
+use fmu_core::variable::position;
 use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
 use model_description::{
     BaseType, Causality, Conversion, Interface, Measured, ModelVariable, Passage, Variability, parse_number,
@@ -226,7 +227,8 @@ impl System {
         let read = |text: &str| Values::read(text, variable, description).map_err(wrong);
         let mut values = read(text)?;
         let mut whole = port;
-        if let Some((element, count)) = whole.element.take() {
+        if let Some(element) = whole.element.take() {
+            let count = whole.count;
             let one = values;
             let name = std::mem::replace(&mut whole.name, variable.name.clone());
             let before = self.value_set(index, &whole.name).cloned().or(present);
@@ -256,14 +258,16 @@ impl System {
     /// As [`connect`](Self::connect).
     pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing<'_>) -> Result<(), Error> {
         let Crossing { units, stated, transformation } = crossing;
-        let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
-        if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
+        let (source, target) = (self.parts.port(from)?, self.parts.port(to)?);
+        let sends = matches!(self.parts.causality(&source), Causality::Output | Causality::Local);
+        if !sends && !self.parts.is_timed_clock(&source) {
             return Err(Error::usage(from, "is not an output"));
         }
-        let widens = matches!((kind(source.base), kind(target.base)), (Some('i'), Some('r')));
-        if kind(source.base) != kind(target.base) && !widens {
+        let widens = matches!((family(source.base), family(target.base)), ('i', 'r'));
+        if family(source.base) != family(target.base) && !widens {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
+        self.check_extents([(from, &source), (to, &target)])?;
         self.check_fed(&target, to, false)?;
         let conversion = match units {
             Units::PassOn => None,
@@ -281,6 +285,25 @@ impl System {
             },
         };
         self.feed(target, to, Source::Port(source, Conversion::then(conversion, *transformation)))
+    }
+
+    /// Both ends of a connection are single values, or arrays of the same extents.
+    fn check_extents(&self, [(from, source), (to, target)]: [(&str, &Port); 2]) -> Result<(), Error> {
+        let extents = |port: &Port| if port.is_whole() { self.parts.shape(port) } else { Vec::new() };
+        let (sent, taken) = (extents(source), extents(target));
+        if sent == taken {
+            return Ok(());
+        }
+        let said = |extents: &[usize]| match extents {
+            [] => "one value".to_owned(),
+            _ => format!("{} elements", extents.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")),
+        };
+        let (whole, shape) = if source.is_whole() { (from, &sent) } else { (to, &taken) };
+        let remedy = match (sent.is_empty(), taken.is_empty()) {
+            (false, false) => String::new(),
+            _ => format!(": name an element of the array, as in {whole}{}", position(shape, 0)),
+        };
+        Err(Error::usage(to, format!("takes {}, and {from} has {}{remedy}", said(&taken), said(&sent))))
     }
 
     /// The known part of the unit of a variable, written `instance.variable`; `stated` if its FMU names none.
@@ -388,13 +411,9 @@ impl System {
     /// # Errors
     /// The variable does not exist, is one number, or is a clock.
     pub fn record_text_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
-        let mut found = self.parts.port(port)?;
-        let variable = self.parts.variable(found.instance, &found.name)?;
+        let found = self.parts.port(port)?;
         if !self.is_text(port)? || found.base == BaseType::Clock {
             return Err(Error::usage(port, "is one number, or a clock"));
-        }
-        if variable.is_array() {
-            found.element = Some((0, self.instances[found.instance].elements(variable)?));
         }
         self.texts.push((found, name.into()));
         Ok(())
@@ -406,8 +425,7 @@ impl System {
     /// The variable does not exist.
     pub fn is_text(&self, port: &str) -> Result<bool, Error> {
         let port = self.parts.port(port)?;
-        let whole = self.parts.variable(port.instance, &port.name)?.is_array() && port.element.is_none();
-        Ok(whole || matches!(port.base, BaseType::String | BaseType::Binary))
+        Ok(port.is_whole() || matches!(port.base, BaseType::String | BaseType::Binary))
     }
 
     /// Whether a variable, written `instance.variable`, is one real number.
