@@ -42,6 +42,9 @@ impl Values {
             && !text.contains(',')
             && (!variable.base.is_float() || text.split_whitespace().all(is_number));
         let separator = |c: char| if spaced { c.is_whitespace() } else { c == ',' };
+        // One name or truth value may have commas.
+        let whole = !variable.is_array() && matches!(variable.base, BaseType::Boolean | BaseType::Enumeration);
+        let separator = |c: char| !whole && separator(c);
         let elements = || text.split(separator).map(str::trim).filter(|e| !(spaced && e.is_empty()));
         let wrong = |element: &str, expected: &str| format!("{} = {element} is not {expected}", variable.name);
         match variable.base {
@@ -50,7 +53,7 @@ impl Values {
                 .collect::<Result<_, _>>()
                 .map(Self::Reals),
             BaseType::Boolean | BaseType::Clock => elements()
-                .map(|e| match e {
+                .map(|e| match e.to_ascii_lowercase().as_str() {
                     "true" | "1" => Ok(true),
                     "false" | "0" => Ok(false),
                     _ => Err(wrong(e, "true or false")),

@@ -59,7 +59,7 @@ impl Failures {
             self.count += 1;
             if self.first.len() < 3 {
                 let row = line.split(',').next().and_then(|row| row.parse().ok()).unwrap_or_default();
-                self.first.push((row, unquoted(error)));
+                self.first.push((row, error));
             }
         }
     }
@@ -216,13 +216,6 @@ fn difference(place: &str, there: &Value, here: &Value) -> Option<String> {
             a.iter().zip(b).enumerate().find_map(|(k, (x, y))| difference(&at(k, y), x, y))
         }
         _ => Some(format!("{place} is {there} there and {here} here")),
-    }
-}
-
-fn unquoted(cell: &str) -> String {
-    match cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')) {
-        Some(inner) => inner.replace("\"\"", "\""),
-        None => cell.to_owned(),
     }
 }
 

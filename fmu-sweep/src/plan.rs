@@ -8,7 +8,7 @@ use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
 use fmu_import::{Fmu, Kind, Number};
 use fmu_system::cosimulation::{
-    self, Integration, Method, PlanTarget, Recording, Schedule, Settings, Solver, System, Units, Worker, item,
+    self, Integration, Method, PlanTarget, Recording, Settings, Solver, System, Units, Worker, item,
 };
 use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
@@ -142,9 +142,7 @@ impl Plan {
             loaded.system.connect_terminals(one, other)?;
         }
         for (name, points) in &definition.input.0 {
-            let schedule =
-                Schedule::parse(points).map_err(|cause| Error::Invalid(format!("input: {name}: {cause}")))?;
-            loaded.input(name, &schedule)?;
+            loaded.points(name, points).map_err(|error| Error::Invalid(format!("input: {name}: {error}")))?;
         }
         if definition.auto_connect {
             loaded.system.connect_by_name()?;
@@ -164,7 +162,7 @@ impl Plan {
                 return invalid(format!("measure: {name} is the column with the number of each run: rename it"));
             }
             let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
-            measures.push(of(measure, &settings, &mut recorded).map_err(wrong)?);
+            measures.push(of(measure, &settings, &mut recorded, &|name| loaded.has(name)).map_err(wrong)?);
         }
         let traced = definition.trace.iter().flat_map(|trace| &trace.of);
         let trace = traced.map(|name| place(&mut recorded, name)).collect();
@@ -431,8 +429,13 @@ fn place(names: &mut Vec<String>, name: &str) -> usize {
     })
 }
 
-fn of(measure: &MeasureDefinition, settings: &Settings, recorded: &mut Vec<String>) -> Result<(Measure, Sum), String> {
-    let sum = Sum::parse(&measure.of).map_err(|cause| format!("of = {cause}"))?;
+fn of(
+    measure: &MeasureDefinition,
+    settings: &Settings,
+    recorded: &mut Vec<String>,
+    known: &dyn Fn(&str) -> bool,
+) -> Result<(Measure, Sum), String> {
+    let sum = Sum::parse(&measure.of, known).map_err(|cause| format!("of = {cause}"))?;
     let wrap = measure.wrap.as_ref().map(period).transpose()?;
     let signal = Signal::new(&sum, wrap, |name| place(recorded, name));
     Ok((Measure::new(measure, signal, settings)?, sum))

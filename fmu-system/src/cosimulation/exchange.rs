@@ -1,24 +1,48 @@
 //! Moving values between FMUs: the variables read from each FMU, and the sources of those set.
 
+use super::grid::EARLY;
 use super::parts::Port;
+use super::schedule::SAME;
 use super::sequence::Held;
 use super::{Schedule, loops};
 use fmu_import::{Error, Instance, Kind, Number, Values};
 use model_description::{BaseType, Conversion};
+use std::sync::Arc;
+
+/// What becomes of a value on its way.
+#[derive(Clone)]
+pub(super) enum Change {
+    Linear(Conversion),
+    /// Values and what becomes of each.
+    Table(Arc<[(Number, Number)]>),
+}
+
+impl Change {
+    /// The number that arrives; missing if a table does not have it.
+    fn apply(&self, number: Number) -> Number {
+        match self {
+            _ if number == Number::Missing => number,
+            Self::Linear(conversion) => Number::Real(conversion.apply(number.real())),
+            Self::Table(table) => {
+                table.iter().find(|(sent, _)| *sent == number).map_or(Number::Missing, |(_, taken)| *taken)
+            }
+        }
+    }
+}
 
 /// Source of an input.
 #[derive(Clone)]
 pub(super) enum Source {
     /// A variable of another instance, converted to the unit of the target.
-    Port(Port, Option<Conversion>),
+    Port(Port, Option<Change>),
     /// A schedule.
     Schedule(Schedule),
 }
 
 impl Source {
-    /// Whether it has no value until a clock ticks.
-    fn is_clocked(&self) -> bool {
-        matches!(self, Self::Port(port, _) if !port.clocks.is_empty())
+    /// Whether it may have no value: before a clock ticks, or beyond a table.
+    fn may_lack(&self) -> bool {
+        matches!(self, Self::Port(port, change) if !port.clocks.is_empty() || matches!(change, Some(Change::Table(_))))
     }
 }
 
@@ -54,7 +78,7 @@ impl Wiring {
         both.feeds.extend(self.feeds.iter().map(|feed| Feed {
             target: feed.target.shifted(instances),
             source: match &feed.source {
-                Source::Port(port, conversion) => Source::Port(port.shifted(instances), *conversion),
+                Source::Port(port, conversion) => Source::Port(port.shifted(instances), conversion.clone()),
                 schedule @ Source::Schedule(_) => schedule.clone(),
             },
             continuous: feed.continuous,
@@ -99,7 +123,7 @@ enum Place {
     Single {
         instance: usize,
         slot: usize,
-        conversion: Option<Conversion>,
+        change: Option<Change>,
     },
     Schedule(Schedule),
 }
@@ -135,6 +159,8 @@ pub(super) struct Exchange {
     traffic: Vec<Traffic>,
     /// Recorded values and their types.
     row: Vec<(Place, BaseType)>,
+    /// Times (s) at which inputs over time jump, in ascending order.
+    jumps: Vec<f64>,
     /// Number of inputs that are fed.
     fed: usize,
     /// Time (s) since which step schedules are held; `None` if they are read at every exchange.
@@ -175,7 +201,7 @@ impl Exchange {
         let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
         // A fed input need not be read: its value is known here, unless what feeds it may have none yet.
         let origin = |port: &Port| match fed(port) {
-            Some(source) if !source.is_clocked() => source.clone(),
+            Some(source) if !source.may_lack() => source.clone(),
             _ => Source::Port(port.clone(), None),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
@@ -199,13 +225,16 @@ impl Exchange {
         }
         let place = |traffic: &[Traffic], source: &Source| match source {
             Source::Port(port, conversion) => {
-                let (instance, conversion, of) = (port.instance, *conversion, &traffic[port.instance]);
+                let (instance, of) = (port.instance, &traffic[port.instance]);
                 let fast = || of.read.iter().position(|reference| *reference == port.reference);
                 let single = || of.read_singly.iter().position(|p| p == port);
                 if port.is_fast() {
+                    // A table is not for real numbers.
+                    let linear = |change: &Change| if let Change::Linear(x) = change { Some(*x) } else { None };
+                    let conversion = conversion.as_ref().and_then(linear);
                     Place::Fast { instance, slot: fast().unwrap_or_default(), conversion }
                 } else {
-                    Place::Single { instance, slot: single().unwrap_or_default(), conversion }
+                    Place::Single { instance, slot: single().unwrap_or_default(), change: conversion.clone() }
                 }
             }
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
@@ -216,7 +245,7 @@ impl Exchange {
         for Feed { target, source, continuous } in continuous.into_iter().chain(discrete) {
             let place = place(&traffic, source);
             let traffic = &mut traffic[target.instance];
-            let fast = target.is_fast() && !source.is_clocked();
+            let fast = target.is_fast() && !source.may_lack();
             if fast {
                 traffic.references.push(target.reference);
                 traffic.write.push((target.reference, place));
@@ -234,7 +263,10 @@ impl Exchange {
         for (port, values) in &wiring.held {
             traffic[port.instance].held.push((port.clone(), values.clone(), None));
         }
-        Self { traffic, row, fed: wiring.feeds.len(), since: None }
+        let mut jumps: Vec<f64> = wiring.jumps().flat_map(|(_, times)| times).collect();
+        jumps.sort_unstable_by(f64::total_cmp);
+        jumps.dedup_by(|b, a| *b - *a <= SAME);
+        Self { traffic, row, jumps, fed: wiring.feeds.len(), since: None }
     }
 
     /// A run begins: no value is held or has been written.
@@ -488,6 +520,11 @@ impl Exchange {
         fast.chain(singly).filter_map(next).chain(held).reduce(f64::min)
     }
 
+    /// Times (s) between two communication points at which the value of an input jumps, in ascending order.
+    pub(super) fn jumps_between(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        self.jumps.iter().copied().filter(move |t| *t > from + SAME && *t < to - SAME.max(EARLY * (to - from)))
+    }
+
     /// The recorded values at time `t`.
     pub(super) fn row(&self, t: f64, row: &mut Vec<Number>) {
         row.clear();
@@ -506,12 +543,9 @@ impl Exchange {
                 let value = self.traffic[*instance].values[*slot];
                 Number::Real(conversion.map_or(value, |conversion| conversion.apply(value)))
             }
-            Place::Single { instance, slot, conversion } => {
+            Place::Single { instance, slot, change } => {
                 let number = self.traffic[*instance].others[*slot].as_ref().map_or(Number::Missing, |v| v.one(0));
-                match conversion {
-                    Some(conversion) if number != Number::Missing => Number::Real(conversion.apply(number.real())),
-                    _ => number,
-                }
+                change.as_ref().map_or(number, |change| change.apply(number))
             }
             Place::Schedule(schedule) => Number::Real(match self.since {
                 None => schedule.at(t),
@@ -523,11 +557,18 @@ impl Exchange {
     /// The values at a place, as those of a target; `None` if there are none yet.
     fn values(&self, place: &Place, target: &Port, t: f64) -> Result<Option<Values>, Error> {
         let found = match place {
-            Place::Single { instance, slot, conversion: None } => self.traffic[*instance].others[*slot].clone(),
-            Place::Single { instance, slot, conversion: Some(conversion) } => {
+            Place::Single { instance, slot, change: None } => self.traffic[*instance].others[*slot].clone(),
+            Place::Single { instance, slot, change: Some(Change::Linear(conversion)) } => {
                 let found = self.traffic[*instance].others[*slot].as_ref();
                 let numbers = found.map(|v| (0..v.len()).map(|k| conversion.apply(v.one(k).real())).collect());
                 numbers.map(Values::Reals)
+            }
+            Place::Single { instance, slot, change: Some(table) } => {
+                let Some(found) = &self.traffic[*instance].others[*slot] else { return Ok(None) };
+                let taken = Values::from_number(table.apply(found.one(0)), target.base);
+                let none =
+                    |_| Error::usage(&target.name, format!("the table of its connection has no entry for {found}"));
+                Some(taken.map_err(none)?)
             }
             Place::Fast { .. } | Place::Schedule(_) => Some(Values::Reals(vec![self.number(place, t).real()])),
         };

@@ -1,5 +1,6 @@
 //! Recordings: sampled variables.
 
+use fmu_import::csv::Writer;
 use fmu_import::{Number, printable};
 use model_description::DisplayUnit;
 use std::io::{self, Write};
@@ -98,15 +99,13 @@ impl Recording {
     /// As the writer's.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         let columns = self.columns.iter().map(|c| c.name.as_str()).chain(self.texts.iter().map(|c| c.name.as_str()));
-        let names: Vec<_> = std::iter::once("time").chain(columns).map(|name| cell(&printable(name))).collect();
-        writeln!(out, "{}", names.join(","))?;
+        let mut out = Writer::new(out);
+        out.row(std::iter::once("time").chain(columns).map(|name| printable(name).into_owned()))?;
         for (k, t) in self.time.iter().enumerate() {
-            write!(out, "{t}")?;
-            self.columns.iter().try_for_each(|c| write!(out, ",{}", c.at(k)))?;
-            self.texts.iter().try_for_each(|c| write!(out, ",{}", cell(&c.values[k])))?;
-            writeln!(out)?;
+            let numbers = self.columns.iter().map(|c| c.at(k).to_string());
+            out.row([t.to_string()].into_iter().chain(numbers).chain(self.texts.iter().map(|c| c.values[k].clone())))?;
         }
-        out.flush()
+        out.finish()
     }
 
     /// The last values as a table, with the display unit where there is one.
@@ -130,11 +129,6 @@ impl Recording {
         let time = self.time.last().copied().unwrap_or(f64::NAN);
         format!("{:width$}  {:>12} s\n{}", "time", six(time), rows.join("\n"))
     }
-}
-
-/// A text in CSV form, in quotation marks where needed (RFC 4180).
-pub fn cell(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// The name of the value `x` among those of an enumeration.
