@@ -13,6 +13,7 @@ use fmu_import::csv;
 use fmu_system::cosimulation::{Recording, Schedule, Sequence, Settings, System};
 use model_description::{BaseType, Causality};
 use std::collections::BTreeMap;
+use std::fmt::Write;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;

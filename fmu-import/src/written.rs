@@ -8,15 +8,11 @@ pub fn assignment(text: &str, known: impl Fn(&str) -> bool) -> Option<(&str, &st
 }
 
 /// `NAME=OTHER`, where both sides are known.
-pub fn pair<'a>(
-    text: &'a str,
-    known: impl Fn(&str) -> bool,
-    other: impl Fn(&str) -> bool,
-) -> Option<(&'a str, &'a str)> {
+pub fn pair(text: &str, known: impl Fn(&str) -> bool, other: impl Fn(&str) -> bool) -> Option<(&str, &str)> {
     let signs = || text.match_indices('=').map(move |(at, _)| (text[..at].trim(), &text[at + 1..]));
     let both = signs().find(|(name, value)| known(name) && other(value.trim()));
     let one = || signs().find(|(name, _)| known(name));
-    let outside = || signs().find(|(name, _)| name.matches('\'').count() % 2 == 0);
+    let outside = || signs().find(|(name, _)| name.matches('\'').count().is_multiple_of(2));
     both.or_else(one).or_else(outside).or_else(|| signs().next())
 }
 
@@ -28,8 +24,8 @@ pub fn names(text: &str, known: impl Fn(&str) -> bool) -> Vec<String> {
         let ends = || rest.match_indices(',').map(|(at, _)| at).chain([rest.len()]);
         let whole = |name: &str| {
             name.matches('[').count() == name.matches(']').count()
-                && name.matches('\'').count() % 2 == 0
-                && name.matches('"').count() % 2 == 0
+                && name.matches('\'').count().is_multiple_of(2)
+                && name.matches('"').count().is_multiple_of(2)
         };
         let found = ends().find(|&at| known(rest[..at].trim()));
         let end = found.or_else(|| ends().find(|&at| whole(&rest[..at]))).unwrap_or(rest.len());

@@ -183,7 +183,7 @@ impl Sweep {
     }
 
     /// The error of a line, if it has one.
-    pub(crate) fn error_of(&self, line: &str) -> Option<String> {
+    pub(crate) fn error_of(line: &str) -> Option<String> {
         // Most rows end with the comma before an empty error.
         if line.trim_end().ends_with(',') { None } else { csv::cells(line).pop() }
     }

@@ -159,7 +159,7 @@ impl Held {
         for (t, values) in &*self.0 {
             let x = values.number().filter(|x| values.len() == 1 && x.abs() <= EXACT)?;
             // Of several values at one time, the last holds.
-            points.pop_if(|(last, _)| last == t);
+            points.pop_if(|(last, _)| last.to_bits() == t.to_bits());
             points.push((*t, x));
         }
         Schedule::steps(points).ok()
