@@ -310,7 +310,7 @@ fn the_command_line_reads_names_values_and_tables() {
         let (done, said) = run(file, &["--record", "weights[1,2],x,sums[2]"]);
         assert!(done && said.contains("time,\"weights[1,2]\",x,sums[2]\n0,"), "{said}");
         let (done, said) = run(file, &["--record", "out.?int8,*.int16"]);
-        let names = "out.uint8,EveryType.in.int16,EveryType.local.int16";
+        let names = "out.uint8,EveryType.in.int16,EveryType.out.int16,EveryType.local.int16";
         assert!(done && said.contains(&format!("time,EveryType.{names}")), "{said}");
         let (done, said) = run(file, &["--record", "*"]);
         let [header] = said.lines().filter(|line| line.starts_with("time,")).collect::<Vec<_>>()[..] else {
