@@ -458,7 +458,7 @@ impl Runner {
         self.reuse = reuse;
     }
 
-    /// Runs with a value for each variable. `trace` sees the time and the traced variables of every communication point.
+    /// Runs with a value for each variable. `trace` receives the time and the traced variables at every communication point.
     pub fn run(
         &mut self,
         values: &[Number],

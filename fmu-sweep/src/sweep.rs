@@ -253,7 +253,7 @@ fn value(items: &[(i64, String)], x: Number) -> String {
     item(items, x.real()).map_or_else(|| number(x), str::to_owned)
 }
 
-/// A number that reads back to the same one, in few characters; nothing for a missing one.
+/// A number in few characters that reads back as the same one; nothing for a missing one.
 fn number(number: Number) -> String {
     match number {
         Number::Real(x) if x != 0.0 && x.is_finite() && !(1e-5..1e16).contains(&x.abs()) => format!("{x:e}"),

@@ -13,8 +13,8 @@ use fmu_core::terminal::{MatchingRule, MemberKind};
 /// The names of the parts in FMI-LS-STRUCT 1.0.0-rc.1.
 const STRUCT: &str = "org.fmi-standard.fmi-ls-struct.map";
 
-/// terminalsAndIcons.xml for an FMU of this standard; `None` for a model without terminals and icon. FMI 2.0 has no maps, whose
-/// members are arrays, and no networks, whose members are clocks and bytes.
+/// terminalsAndIcons.xml for an FMU of this standard; `None` for a model without terminals and icon. FMI 2.0 has no maps, because
+/// their members are arrays, and no networks, whose members are clocks and bytes.
 pub fn write_terminals(description: &Description, version: FmiVersion) -> Option<String> {
     let Description { terminals, icon, .. } = description;
     let terminals: Vec<_> = terminals.iter().filter(|t| version == FmiVersion::V3 || !t.rule.is_layered()).collect();
