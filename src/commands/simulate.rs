@@ -242,7 +242,9 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     let Loaded { mut system, .. } = loaded;
     let settings = system.feasible(&settings)?;
     let before = system.take_notes();
-    before.iter().for_each(|note| message::note(&printable(note)));
+    for note in &before {
+        message::note(&printable(note));
+    }
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut CommunicationPoint<'_>| {
