@@ -34,13 +34,16 @@ fn script(page: &str, id: &str) -> String {
     found.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"").replace("&amp;", "&")
 }
 
-const SMALL2: (&str, &str, u8) = ("fmu.c", "fmu.xml", 2);
-const SMALL3: (&str, &str, u8) = ("fmu3.c", "fmu3.xml", 3);
-const BOTH2: (&str, &str, u8) = ("exchange.c", "exchange2.xml", 2);
-const BOTH3: (&str, &str, u8) = ("exchange.c", "exchange3.xml", 3);
+/// An FMU: source, description, major version of the standard.
+type Source = (&'static str, &'static str, u8);
+
+const SMALL2: Source = ("fmu.c", "fmu.xml", 2);
+const SMALL3: Source = ("fmu3.c", "fmu3.xml", 3);
+const BOTH2: Source = ("exchange.c", "exchange2.xml", 2);
+const BOTH3: Source = ("exchange.c", "exchange3.xml", 3);
 
 /// Of each: the FMU, the fault, the check, and a line that the script prints.
-const REPEATED: &[((&str, &str, u8), &str, &str, &str)] = &[
+const REPEATED: &[(Source, &str, &str, &str)] = &[
     (SMALL2, "L06", "L06", "fmi2Reset -> OK"),
     (SMALL2, "F02", "F02a", "fmi2SetFMUState -> OK"),
     (SMALL2, "G13", "G13", "the parameter gain was"),
