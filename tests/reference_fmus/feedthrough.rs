@@ -95,7 +95,9 @@ fn the_ends_of_every_integer_arrive_exactly() {
 fn connected_values_keep_their_type() {
     let large = 9_007_199_254_740_993_i128;
     let mut system = System::default();
-    ["a", "b"].iter().for_each(|name| system.add(name, &open("feedthrough"), false).unwrap());
+    for name in ["a", "b"] {
+        system.add(name, &open("feedthrough"), false).unwrap();
+    }
     for name in ["Int64", "UInt64", "String", "Binary", "Boolean", "Enumeration"] {
         system.connect(&format!("a.{name}_output"), &format!("b.{name}_input")).unwrap();
     }
@@ -124,7 +126,9 @@ fn connected_values_keep_their_type() {
     assert_eq!(csv.lines().last().unwrap().matches("-9007199254740993,18446744073709551615").count(), 2, "{csv}");
     let wrong = |from: &str, to: &str| {
         let mut system = System::default();
-        ["a", "b"].iter().for_each(|name| system.add(name, &open("feedthrough"), false).unwrap());
+        for name in ["a", "b"] {
+            system.add(name, &open("feedthrough"), false).unwrap();
+        }
         system.connect(from, to).unwrap_err().to_string()
     };
     let said = wrong("a.String_output", "b.Binary_input");
@@ -201,7 +205,9 @@ fn connections_of_an_ssp_have_tables() {
         let mut loaded = Loaded::open(&path, false).unwrap();
         loaded.set("a.Enumeration_input", "Option2").unwrap();
         loaded.set("a.Int32_input", number).unwrap();
-        ["b.Int32_input", "b.Int32_output", "b.Boolean_output"].iter().for_each(|name| loaded.record(name).unwrap());
+        for name in ["b.Int32_input", "b.Int32_output", "b.Boolean_output"] {
+            loaded.record(name).unwrap();
+        }
         let settings = Settings { start: 0.0, stop: 0.4, step: 0.1, sequential: false };
         loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(())))
     };

@@ -200,7 +200,9 @@ fn arrays_are_connected_whole() {
     for version in BOTH {
         let fmu = fmu_import::Fmu::open(archive("state-space", version)).unwrap();
         let mut system = System::default();
-        ["a", "b"].iter().for_each(|name| system.add(name, &fmu, false).unwrap());
+        for name in ["a", "b"] {
+            system.add(name, &fmu, false).unwrap();
+        }
         if version == V2 {
             // FMI 2.0 has no arrays.
             system.connect("a.y[2]", "b.u[2]").unwrap();
@@ -219,7 +221,9 @@ fn arrays_are_connected_whole() {
         assert_eq!(recording.columns[0].values[0], 5.0, "{version}");
     }
     let mut system = System::default();
-    ["a", "b"].iter().for_each(|name| system.add(name, &open("state-space"), false).unwrap());
+    for name in ["a", "b"] {
+        system.add(name, &open("state-space"), false).unwrap();
+    }
     system.configure([("b.m", "2")]).unwrap();
     let said = system.connect("a.y", "b.u").unwrap_err().to_string();
     assert_eq!(said, "b.u: takes 2 elements, and a.y has 3 elements");

@@ -116,7 +116,9 @@ fn a_discarded_step_is_taken_in_halves() {
             let mut system = System::default();
             system.add("p", &fmu, false).unwrap();
             system.set("p.u", "2").unwrap();
-            ["p.x", "p.y"].iter().for_each(|name| system.record(name).unwrap());
+            for name in ["p.x", "p.y"] {
+                system.record(name).unwrap();
+            }
             let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
             let mut points = 0;
             let (recording, outcome) = system.run_keeping(&settings, |_| {
