@@ -1,6 +1,6 @@
 //! The folder `terminalsAndIcons/` of an FMU: its XML, and every picture as SVG and as PNG (FMI 3.0.2, 2.4.9).
 //!
-//! A terminal that is a map comes with the manifest of FMI-LS-STRUCT. A picture is written once, as SVG; its PNG is drawn here,
+//! A terminal of a layered standard, a map or a network, comes with the manifest of that standard. A picture is written once, as SVG; its PNG is drawn here,
 //! in the size stated by the SVG.
 
 use crate::pack::PackedFile;
@@ -13,14 +13,31 @@ use std::collections::BTreeMap;
 
 const FOLDER: &str = "terminalsAndIcons";
 
-/// Folder of the layered standard that defines terminals with maps.
-const STRUCT: &str = "extra/org.fmi-standard.fmi-ls-struct/";
+/// The layered standards of terminals: rule, name, version, description, further attributes of the manifest.
+const LAYERED: [(MatchingRule, &str, &str, &str, &str); 2] = [
+    (
+        MatchingRule::Map,
+        "org.fmi-standard.fmi-ls-struct",
+        "1.0.0-rc.1",
+        "Layered standard for structuring of variables",
+        "",
+    ),
+    (
+        MatchingRule::Transceiver,
+        "org.fmi-standard.fmi-ls-bus",
+        "1.0.0",
+        "Layered standard for network communication",
+        " isBusSimulationFMU=\"false\"",
+    ),
+];
 
-const MANIFEST: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>
-<fmiLayeredStandardManifest xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls-manifest\" \
- fmi-ls:fmi-ls-name=\"org.fmi-standard.fmi-ls-struct\" fmi-ls:fmi-ls-version=\"1.0.0-rc.1\" \
- fmi-ls:fmi-ls-description=\"Layered standard for structuring of variables\"/>
-";
+fn manifest(name: &str, version: &str, description: &str, more: &str) -> String {
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
+         <fmiLayeredStandardManifest xmlns:fmi-ls=\"http://fmi-standard.org/fmi-ls-manifest\" fmi-ls:fmi-ls-name=\"{name}\" \
+         fmi-ls:fmi-ls-version=\"{version}\" fmi-ls:fmi-ls-description=\"{description}\"{more}/>\n"
+    )
+}
 
 /// The files; empty for a model without terminals and icon.
 ///
@@ -32,9 +49,10 @@ pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<
     if let Some(xml) = write_terminals(description, version) {
         files.insert(format!("{FOLDER}/terminalsAndIcons.xml"), file(xml.into_bytes()));
     }
-    let has_map = description.terminals.iter().any(|t| t.rule == MatchingRule::Map);
-    if has_map && version == FmiVersion::V3 {
-        files.insert(format!("{STRUCT}fmi-ls-manifest.xml"), file(MANIFEST.into()));
+    for (rule, name, of, about, more) in LAYERED {
+        if version == FmiVersion::V3 && description.terminals.iter().any(|t| t.rule == rule) {
+            files.insert(format!("extra/{name}/fmi-ls-manifest.xml"), file(manifest(name, of, about, more).into()));
+        }
     }
     let of_terminals = description.terminals.iter().filter_map(|t| t.picture.as_ref());
     let mut pictures: BTreeMap<&str, &str> = of_terminals.map(|p| (p.icon.as_str(), p.svg.as_str())).collect();

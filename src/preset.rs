@@ -87,6 +87,11 @@ impl PresetFmu {
         Ok(Self { file: file.into(), md, files, unpacked, own, reader, values, earlier })
     }
 
+    /// Whether there is a variable of this name, or an element of an array.
+    pub fn has(&self, name: &str) -> bool {
+        find(&self.own, &self.reader, name).is_some()
+    }
+
     /// The model without a preset.
     pub fn own(&self) -> &Description {
         &self.own

@@ -9,7 +9,8 @@ use crate::pack::PackedFile;
 use anyhow::{Context, Result, bail};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
-use fmu_system::cosimulation::{Recording, Schedule, Sequence, Settings, System, cell};
+use fmu_import::csv;
+use fmu_system::cosimulation::{Recording, Schedule, Sequence, Settings, System};
 use model_description::{BaseType, Causality};
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -158,7 +159,7 @@ impl Feed {
     fn at(&self, t: f64) -> String {
         match self {
             Self::Lines(schedule) => schedule.at(t).to_string(),
-            Self::Held(texts) => cell(texts.at(t)),
+            Self::Held(texts) => texts.at(t).to_owned(),
         }
     }
 }
@@ -178,12 +179,7 @@ fn held(fed: &[Feed], experiment: &Experiment) -> String {
     let mut row = |t: f64, values: &[String]| {
         let time = format!("{t:.digits$}");
         let time = if digits > 0 { time.trim_end_matches('0').trim_end_matches('.') } else { &time };
-        csv.push_str(time);
-        for x in values {
-            // Writing to a String does not fail.
-            let _ = write!(csv, ",{x}");
-        }
-        csv.push('\n');
+        csv.push_str(&csv::line([time].into_iter().chain(values.iter().map(String::as_str))));
     };
     let mut last = at(start);
     row(start, &last);
@@ -218,15 +214,10 @@ fn thinned(recording: &Recording, every: usize) -> String {
     let mut csv = names.map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(",") + "\n";
     let last = recording.time.len().saturating_sub(1);
     for (k, t) in recording.time.iter().enumerate().filter(|(k, _)| k % every == 0 || *k == last) {
-        // Writing to a String does not fail.
-        let _ = write!(csv, "{t}");
-        recording.columns.iter().for_each(|c| {
-            let _ = write!(csv, ",{}", c.values[k]);
-        });
-        for column in &texts {
-            let _ = write!(csv, ",{}", cell(&column.values[k]));
-        }
-        csv.push('\n');
+        let numbers = recording.columns.iter().map(|c| c.at(k).to_string());
+        csv.push_str(&csv::line(
+            [t.to_string()].into_iter().chain(numbers).chain(texts.iter().map(|c| c.values[k].clone())),
+        ));
     }
     csv
 }

@@ -291,6 +291,55 @@ fn a_parameter_file_sets_texts() {
     }
 }
 
+/// Names with commas, patterns, truth values and items over time and in files; what is wrong with a file is named.
+#[test]
+fn the_command_line_reads_names_values_and_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |file: &str, arguments: &[&str]| {
+        let all = [&["simulate", file, "--stop", "0.2", "--step", "0.1", "--csv", "-"][..], arguments].concat();
+        let output = Command::new(env!("CARGO_BIN_EXE_fmu")).args(all).output().unwrap();
+        (output.status.success(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
+    };
+    let table = |text: &str| {
+        let path = folder.path().join("in.csv");
+        std::fs::write(&path, text).unwrap();
+        path.display().to_string()
+    };
+    for file in archives() {
+        let file = file.to_str().unwrap();
+        let (done, said) = run(file, &["--record", "weights[1,2],x,sums[2]"]);
+        assert!(done && said.contains("time,\"weights[1,2]\",x,sums[2]\n0,"), "{said}");
+        let (done, said) = run(file, &["--record", "out.?int8,*.int16"]);
+        let names = "out.uint8,EveryType.in.int16,EveryType.out.int16,EveryType.local.int16";
+        assert!(done && said.contains(&format!("time,EveryType.{names}")), "{said}");
+        let (done, said) = run(file, &["--record", "*"]);
+        let [header] = said.lines().filter(|line| line.starts_with("time,")).collect::<Vec<_>>()[..] else {
+            panic!("{said}")
+        };
+        assert!(done && header.contains(",EveryType.label") && header.contains(",EveryType.in.real,"), "{header}");
+        let (done, said) = run(file, &["--record", "none.*"]);
+        assert!(!done && said.contains("none.*: no variable has a name of this form"), "{said}");
+        let over_time =
+            ["--input", "in.truth=0:false,0.1:True", "--input", "in.fan=0:Off,0.2:On", "--record", "in.truth,in.fan"];
+        let (done, said) = run(file, &over_time);
+        assert!(done && said.contains("time,in.truth,in.fan\n0,0,1\n0.1,1,1\n0.2,1,2\n"), "{said}");
+        let csv = table("time [ms],in.truth,in.fan,\"vector[2]\"\n0,false,Off,1\n100,true,Off,1\n200,TRUE,On,1\n");
+        let (done, said) = run(file, &["--input", &csv, "--record", "in.truth,in.fan"]);
+        assert!(done && said.contains("time,in.truth,in.fan\n0,0,1\n0.1,1,1\n0.2,1,2\n"), "{said}");
+        for (text, why) in [
+            (",time,voltage\n0,0,1\n", "the first column has no name: it numbers the rows (an index)"),
+            ("time\tvoltage\n0\t1\n", "line 1: has tabs"),
+            ("# made by a tool\ntime,voltage\n0,1\n", "line 1: begins with #"),
+            ("time,voltage,\n0,1,\n", "line 1: ends with a comma"),
+            ("time,voltage\n0,1\n0.1,\n", "line 3: a cell is empty"),
+            ("time,in.fan\n0,On\n0.1,Of\n", "line 3: in.fan = Of is not one of Off, On"),
+        ] {
+            let (done, said) = run(file, &["--input", &table(text)]);
+            assert!(!done && said.contains(why), "{text:?}: {said}");
+        }
+    }
+}
+
 /// `fmu simulate` feeds and records variables of every type, and names its limits.
 #[test]
 fn the_command_line_takes_texts_and_names_what_it_cannot_do() {

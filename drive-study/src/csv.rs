@@ -1,6 +1,7 @@
 //! A table of numbers from a CSV file: a header with names, `#` before comments.
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
+use fmu_import::csv::Table;
 use std::path::Path;
 
 /// The columns of a file.
@@ -29,12 +30,8 @@ impl Columns {
     /// File and line, and what was expected: no header, semicolons, another number of cells than names, a cell that is not a
     /// finite number, no row.
     pub fn parse(text: &str, file: &str) -> Result<Self> {
-        if let Some((line, header)) = lines(text).next() {
-            ensure!(
-                separator(header) == ',',
-                "{file}:{line}: has semicolons or tabs; write commas between columns and a decimal point"
-            );
-        }
+        let (_, separator) = Table::of_instrument(text).map_err(|cause| anyhow!(placed(file, &cause)))?;
+        ensure!(separator == ',', "{file}:1: has semicolons or tabs; write commas between columns and a decimal point");
         Self::parse_some(text, file, |_| true)
     }
 
@@ -44,32 +41,22 @@ impl Columns {
     /// # Errors
     /// Those of [`parse`](Self::parse), except that semicolons and the cells of other columns are allowed.
     pub fn parse_some(text: &str, file: &str, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        let mut lines = lines(text);
-        let Some((first, header)) = lines.next() else {
-            bail!("{file}: is empty; expected a header and rows of numbers")
-        };
-        let separator = separator(header);
-        let cells = |line| str::split(line, separator).map(|c: &str| c.trim().trim_matches('"'));
-        let all: Vec<String> = cells(header.trim_start_matches('\u{feff}')).map(str::to_owned).collect();
-        if let Some(number) = all.iter().find(|name| name.parse::<f64>().is_ok()) {
-            bail!("{file}:{first}: {number} is a number; the first line names the columns");
-        }
-        let chosen: Vec<bool> = all.iter().map(|name| wanted(name)).collect();
-        let names: Vec<String> =
-            all.iter().zip(&chosen).filter(|(_, chosen)| **chosen).map(|(n, _)| n.clone()).collect();
+        let (table, separator) = Table::of_instrument(text).map_err(|cause| anyhow!(placed(file, &cause)))?;
+        let all: Vec<&str> = table.headings.iter().map(|heading| heading.text.as_str()).collect();
+        let chosen: Vec<usize> = (0..all.len()).filter(|&k| wanted(all[k])).collect();
+        let names: Vec<String> = chosen.iter().map(|&k| all[k].to_owned()).collect();
         let mut rows = Vec::new();
-        for (line, text) in lines {
-            let (found, expected) = (cells(text).count(), all.len());
-            ensure!(found == expected, "{file}:{line}: expected {expected} numbers, found {found}");
+        for (line, cells) in &table.rows {
             let mut row = Vec::with_capacity(names.len());
-            for ((cell, name), _) in cells(text).zip(&all).zip(&chosen).filter(|(_, chosen)| **chosen) {
+            for &k in &chosen {
+                let (cell, name) = (&cells[k], all[k]);
                 let number = if separator == ',' { cell.parse() } else { cell.replace(',', ".").parse() };
                 match number {
                     Ok(x) if f64::is_finite(x) => row.push(x),
                     _ => bail!("{file}:{line}:{name}: {cell:?} is not a finite number"),
                 }
             }
-            rows.push((line, row));
+            rows.push((usize::try_from(*line)?, row));
         }
         ensure!(!rows.is_empty(), "{file}: has no row of numbers below {}", all.join(","));
         Ok(Self { file: file.into(), names, rows })
@@ -125,15 +112,10 @@ impl Columns {
     }
 }
 
-/// Lines with content and their numbers; `#` starts a comment.
-fn lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    let lines = text.lines().enumerate().map(|(index, line)| (index + 1, line.trim_matches([' ', '\r'])));
-    lines.filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))
-}
-
-/// The separator between the columns of a header.
-fn separator(header: &str) -> char {
-    ['\t', ';'].into_iter().find(|c| header.contains(*c)).unwrap_or(',')
+/// `file:3: what is wrong`, from `line 3: what is wrong`.
+fn placed(file: &str, cause: &str) -> String {
+    let line = cause.strip_prefix("line ").and_then(|rest| rest.split_once(": "));
+    line.map_or_else(|| format!("{file}: {cause}"), |(line, what)| format!("{file}:{line}: {what}"))
 }
 
 #[cfg(test)]

@@ -111,11 +111,20 @@ pub(super) struct Conclusion {
     pub(super) fatal: bool,
     /// The calls that led to the finding, with what they returned.
     pub(super) calls: Vec<String>,
+    /// All of them, one by one, if scripts are asked for.
+    pub(super) script: Vec<String>,
 }
 
 impl From<Verdict> for Conclusion {
     fn from(verdict: Verdict) -> Self {
-        Self { verdict, lower: None, confidence: Confidence::Certain, fatal: false, calls: Vec::new() }
+        Self {
+            verdict,
+            lower: None,
+            confidence: Confidence::Certain,
+            fatal: false,
+            calls: Vec::new(),
+            script: Vec::new(),
+        }
     }
 }
 
@@ -153,6 +162,9 @@ pub struct Finding {
     /// The calls of a probe that led to the finding, with what they returned; `--replay` repeats them.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub calls: Vec<String>,
+    /// All calls up to the finding, for the script of the HTML page.
+    #[serde(skip)]
+    pub(super) script: Vec<String>,
     /// Result.
     #[serde(flatten)]
     pub verdict: Verdict,
@@ -171,6 +183,8 @@ pub struct Options {
     pub program: Option<PathBuf>,
     /// Resource limits of a probe.
     pub allowance: Allowance,
+    /// Whether each finding of the binary comes with all its calls, for [`report::Report::html`](crate::report::Report::html).
+    pub scripts: bool,
 }
 
 impl Options {

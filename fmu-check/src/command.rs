@@ -64,7 +64,7 @@ pub struct CheckArguments {
     /// Time limit for one call of the binary, in seconds [default: 10]
     #[arg(long, value_name = "S")]
     pub patience: Option<f64>,
-    /// Address space of one probe, in GiB; 0 for no limit
+    /// Address space of one probe, in GiB; 0 for no limit on it and on open files
     #[arg(long, value_name = "GIB", default_value_t = guard::Allowance::default().memory >> 30, value_parser = clap::value_parser!(u64).range(..=1 << 20))]
     pub memory: u64,
     /// Run the probes without network (Linux with user namespaces; refused elsewhere)
@@ -148,6 +148,7 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
         timeout: seconds("--timeout", args.timeout)?,
         program: None,
         allowance: guard::Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Default::default() },
+        scripts: args.format == Format::Html,
     };
     if let Some(what) = &args.replay {
         let [file] = args.files.as_slice() else { return Err(Error("--replay takes one file".into())) };

@@ -38,6 +38,15 @@ pub(super) fn same(v: &ModelVariable, version: FmiVersion, a: &[u64], b: &[u64])
     a.len() == b.len() && a.iter().zip(b).all(|(x, y)| x << shift == y << shift || (zero(*x) && zero(*y)))
 }
 
+/// A text in quotes; a long one that repeats a letter as `"x" * 1000`.
+pub(super) fn quoted(text: &str) -> String {
+    let first = text.chars().next().unwrap_or_default();
+    if text.len() > 60 && text.chars().all(|c| c == first) {
+        return format!("\"{first}\" * {}", text.chars().count());
+    }
+    format!("{text:?}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,7 +4,7 @@ use crate::check::{Conclusion, Verdict};
 use crate::confidence::Confidence;
 use crate::level::Level;
 use crate::lines::Line;
-use crate::session::FOUND;
+use crate::session::{BEGUN, FOUND};
 use fmu_import::guard::End;
 use std::fs::{self, File};
 use std::io::Read;
@@ -35,12 +35,20 @@ pub(super) fn is_of_second(call: &str, out: &Path) -> bool {
     case.lines().any(|line| line.strip_prefix(function).is_some_and(|rest| rest.contains(" -> ")))
 }
 
+/// Whether a call makes an instance after this process has freed one.
+pub(super) fn is_after_free(call: &str, out: &Path) -> bool {
+    let log = fs::read_to_string(out.with_extension("log")).unwrap_or_default();
+    let freed = || log.rsplit(BEGUN).next().is_some_and(|log| log.lines().any(|line| line.contains("FreeInstance")));
+    call.contains("Instantiate") && (call.contains("after FreeInstance") || freed())
+}
+
 /// The calls of the first case with a finding: that with the mark, or the last one.
 pub(super) fn calls(log: &str) -> Vec<String> {
     const MOST: usize = 60;
     let cases: Vec<&str> = log.split("# case ").collect();
     let found = cases.iter().find(|case| case.contains(FOUND)).or(cases.last());
-    let lines: Vec<_> = found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND).collect();
+    let lines: Vec<_> =
+        found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND && *l != BEGUN).collect();
     // The number of the case is the first line of all but the first part.
     let first = usize::from(cases.len() > 1 && found.is_some_and(|f| !std::ptr::eq(*f, cases[0])));
     let calls: Vec<String> = lines.iter().skip(first).map(|l| (*l).to_owned()).collect();
@@ -51,13 +59,38 @@ pub(super) fn calls(log: &str) -> Vec<String> {
     [&calls[..MOST / 2], &[left_out], &calls[calls.len() - MOST / 2..]].concat()
 }
 
-/// Unwanted console output and files of the process.
-pub(super) fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
+/// All calls before the first finding: those of its case, and those before the first case. `log` is that of a probe that records every
+/// call, and ends with the finding.
+pub(super) fn script(log: &str) -> Vec<String> {
+    let cases: Vec<&str> = log.split("# case ").collect();
+    let found = cases.iter().position(|case| case.contains(FOUND)).unwrap_or(cases.len() - 1);
+    let before = cases.first().filter(|_| found > 0).map_or(Vec::new(), |first| first.lines().collect());
+    let lines = before.into_iter().chain(cases[found].lines().skip(usize::from(found > 0)));
+    lines
+        .take_while(|line| *line != FOUND)
+        .filter(|line| !line.is_empty() && *line != BEGUN)
+        .map(str::to_owned)
+        .collect()
+}
+
+/// What a process has written to the console.
+fn console(folder: &Path) -> String {
     let mut console = Vec::new();
     if let Ok(file) = File::open(folder.join("console")) {
         let _ = file.take(64 << 10).read_to_end(&mut console);
     }
-    let console = String::from_utf8_lossy(&console);
+    String::from_utf8_lossy(&console).into_owned()
+}
+
+/// The first lines on the console of a process that failed, which may name the cause.
+pub(super) fn printed(folder: &Path) -> Vec<String> {
+    let console = console(folder);
+    console.lines().filter(|l| !l.trim().is_empty()).take(3).map(|l| format!("on the console: {l}")).collect()
+}
+
+/// Unwanted console output and files of the process.
+pub(super) fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
+    let console = console(folder);
     let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
     let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);
     findings
@@ -104,5 +137,5 @@ pub(super) fn conclude(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)
         (_, _, Some(why)) => Verdict::NotApplicable(why),
         _ => Verdict::Pass(notes),
     };
-    Conclusion { verdict, lower, confidence, fatal, calls: Vec::new() }
+    Conclusion { verdict, lower, confidence, fatal, calls: Vec::new(), script: Vec::new() }
 }

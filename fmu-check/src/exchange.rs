@@ -12,6 +12,8 @@ use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Unknown}
 
 /// The reason why a run of the integrator cannot continue.
 pub(super) const UNSTABLE: &str = "Euler's method is not stable for this FMU";
+/// Maximum number of steps to a communication point, those before events included.
+const REACH: usize = 500;
 /// Value that fills vectors before a call.
 pub(super) const UNTOUCHED: f64 = f64::from_bits(0xc5c5_c5c5_c5c5_c5c5);
 /// Largest number of updates of one event; an FMU that needs more never ends the event.
@@ -132,6 +134,9 @@ impl Instance<'_> {
         let status = self.call(name.as_str(), |raw| raw.vector(name, self.handle, Some(&mut values), n))?;
         let intact = values[n..].iter().all(|v| v.to_bits() == untouched.to_bits());
         values.truncate(n);
+        if status.is_ok() {
+            self.session.record_value(&format!("{values:?}"));
+        }
         Ok((status, values, intact))
     }
 
@@ -349,6 +354,18 @@ impl<'a, 'b> Importer<'a, 'b> {
             self.event(see)?;
         }
         Ok(event)
+    }
+
+    /// Steps up to this time, with the events on the way.
+    pub(super) fn reach(&mut self, end: f64, dt: f64) -> Result<(), NotDetermined> {
+        for _ in 0..REACH {
+            let left = end - self.instance.time.get();
+            if self.over || left <= 1e-6 * dt {
+                return Ok(());
+            }
+            self.step(dt.min(left), &mut |_, _| ())?;
+        }
+        Err(NotDetermined(format!("too many events before t = {end}")))
     }
 
     /// Several steps; `look` runs after each.

@@ -1,11 +1,18 @@
 //! A first run that fails may fail because of a limit of the checker or because of this computer. It is tried again without the
-//! limit on memory, and from another folder if the binary does not load: where it then succeeds, the FMU is not at fault.
+//! limits on memory and open files, and from another folder if the binary does not load: where it then succeeds, the FMU is not at
+//! fault. Nor is it where it asks for a license.
 
 use crate::check::{Check, Conclusion, Verdict};
 use crate::checks::GROUPS;
+use crate::lines::SAID;
 use crate::runner::{Conditions, OUT_OF_TIME, Runner};
+use fmu_import::limits;
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
+
+/// Parts of generationTool of tools whose FMUs look for a license where they run, unless they were exported with a special option.
+const LICENSED: [&str; 8] =
+    ["dymola", "simulationx", "amesim", "gt-suite", "maplesim", "simpack", "carmaker", "wolfram systemmodeler"];
 
 /// Part of the message of the dynamic linker if a file cannot be mapped as executable.
 const NOT_MAPPED: &str = "failed to map segment";
@@ -14,7 +21,7 @@ impl Runner {
     /// The findings of a first run, or the reason why the FMU is not at fault.
     pub(super) fn excused(&self, check: &Check, conditions: &Conditions, found: Conclusion) -> Conclusion {
         let why = match &found.verdict {
-            Verdict::Violated(evidence) => evidence.first().cloned().unwrap_or_default(),
+            Verdict::Violated(evidence) => evidence.join("; "),
             Verdict::NotDetermined(why) => why.clone(),
             Verdict::Pass(_) | Verdict::NotApplicable(_) => return found,
         };
@@ -22,28 +29,49 @@ impl Runner {
         if why == OUT_OF_TIME || why.contains("did not return") || why.contains("too slow") {
             return found;
         }
-        let excuse = self.limited(check, conditions, &why);
+        let excuse = self.unlicensed(&why).or_else(|| self.limited(check, conditions, &why));
         let excuse = excuse.or_else(|| why.contains(NOT_MAPPED).then(|| self.elsewhere(conditions, &why)).flatten());
         excuse.map_or(found, |why| Verdict::NotDetermined(why).into())
     }
 
-    /// The limit on memory is the cause if the run succeeds without it.
+    /// A limit is the cause if the run succeeds without it.
     fn limited(&self, check: &Check, conditions: &Conditions, why: &str) -> Option<String> {
         let limit = conditions.allowance.memory;
         if limit == 0 {
             return None;
         }
-        let mut unlimited = conditions.clone();
-        unlimited.allowance.memory = 0;
-        let found = self.attempt(check, &unlimited);
-        let gib = limit >> 30;
-        matches!(found.verdict, Verdict::Pass(_)).then(|| {
+        let succeeds = |memory: u64| {
+            let mut other = conditions.clone();
+            other.allowance.memory = memory;
+            matches!(self.attempt(check, &other).verdict, Verdict::Pass(_))
+        };
+        if !succeeds(0) {
+            return None;
+        }
+        let (gib, files) = ((limit >> 30).max(1), limits::PROCESS_FILES);
+        Some(if succeeds(4 * limit) {
             format!(
-                "with the limit of {gib} GiB of address space, {why}; without it, this run succeeds: use --memory {}, or \
-                 --memory 0 for no limit",
-                4 * gib.max(1)
+                "with the limit of {gib} GiB of address space, {why}; with more, this run succeeds: use --memory {}",
+                4 * gib
+            )
+        } else {
+            format!(
+                "with the limits of {gib} GiB of address space and {files} open files, {why}; without them, this run succeeds: use \
+                 --memory 0"
             )
         })
+    }
+
+    /// A license is missing: the FMU says so, or it is one of a tool whose FMUs need a license and is refused without a reason.
+    fn unlicensed(&self, why: &str) -> Option<String> {
+        let text = why.to_lowercase();
+        if ["license", "licence", "licensing", "dongle"].iter().any(|word| text.contains(word)) {
+            return Some(format!("a license of this FMU is missing on this computer: {why}"));
+        }
+        let tool = self.tool.as_deref()?;
+        let needs = LICENSED.iter().any(|name| tool.to_lowercase().contains(name));
+        (needs && why.contains("returned NULL") && !why.contains(SAID))
+            .then(|| format!("{why} without a message; FMUs of {tool} may need a license on this computer"))
     }
 
     /// The temporary folder is the cause if the binary loads from another one.

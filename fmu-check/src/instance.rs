@@ -33,7 +33,18 @@ impl Session {
     pub(super) fn instantiate(&self, arguments: &Arguments) -> Result<Option<Instance<'_>>, NotDetermined> {
         let function = self.function_for(arguments.interface);
         let mark = mark(self.made_in_case() + 1);
-        self.record_call(&format!("{mark}{function}({:?})", arguments.name.as_deref().unwrap_or_default()));
+        let mut text = format!("{:?}", arguments.name.as_deref().unwrap_or_default());
+        if self.is_v2() && arguments.interface == Interface::ModelExchange {
+            text += ", fmi2ModelExchange";
+        }
+        let token = arguments.token.as_ref().map(|token| token.to_string_lossy());
+        if token.as_deref() != Some(self.description.token.as_str()) {
+            text += &token.map_or_else(|| ", guid=NULL".into(), |token| format!(", guid={token:?}"));
+        }
+        for (given, name) in [(arguments.logging, ", loggingOn"), (arguments.event_mode, ", eventModeUsed")] {
+            text += if given { name } else { "" };
+        }
+        self.record_call(&format!("{mark}{function}({text})"));
         let handle = self.raw.instantiate(arguments).map_err(NotDetermined)?;
         let made = handle.map(|handle| Instance::new(self, handle, arguments.event_mode));
         self.record_result(if made.is_some() { &"an instance" } else { &"NULL" });

@@ -26,6 +26,7 @@ mod queue;
 mod replay;
 pub mod report;
 mod runner;
+mod scripts;
 mod session;
 mod state;
 mod states;
@@ -73,6 +74,7 @@ pub fn run(path: &Path, options: &Options) -> Result<report::Report, Unusable> {
         known: false,
         verdict: found.verdict,
         calls: found.calls,
+        script: found.script,
     });
     let report = report::Report::new(&fmu, findings.collect(), found.varying);
     if Arc::strong_count(&fmu) > 1 {

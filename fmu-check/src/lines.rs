@@ -28,6 +28,9 @@ pub(super) enum Line {
     Done,
 }
 
+/// Comes before the last message of an FMU that does not run.
+pub(super) const SAID: &str = "; its last message: ";
+
 /// Runs one probe. Only the checker calls it.
 #[derive(Debug, Args)]
 pub struct ProbeArguments {
@@ -52,6 +55,9 @@ pub struct ProbeArguments {
     /// Print every call with what it returned.
     #[arg(long)]
     pub trace: bool,
+    /// Record every call one by one, up to the first finding.
+    #[arg(long)]
+    pub full: bool,
     /// Step of the integrator in s, where that of a twentieth of the communication step is too long.
     #[arg(long)]
     pub integrator: Option<f64>,

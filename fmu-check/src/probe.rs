@@ -5,10 +5,11 @@ use crate::checks::GROUPS;
 use crate::confidence::Confidence;
 use crate::error::Error;
 use crate::level::Level;
-use crate::lines::Line;
 pub use crate::lines::ProbeArguments;
+use crate::lines::{Line, SAID};
 use crate::session::{NotDetermined, NotOpened, Session};
 use fmu_import::guard;
+use fmu_import::raw::{Arguments, take_events};
 use std::fs;
 use std::path::Path;
 
@@ -36,7 +37,7 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
         Ok(session) => {
             if let Err(NotDetermined(why)) = probe(&session) {
                 session.write(&if VIOLATED_WHEN_BLOCKED.contains(&check.map_or("", |c| c.id)) {
-                    Line::Violated(None, Confidence::Certain, why)
+                    Line::Violated(None, Confidence::Certain, format!("{why}{}", said(&session, &why)))
                 } else {
                     Line::NotDetermined(why)
                 });
@@ -76,6 +77,15 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
         }
     }
     Ok(())
+}
+
+/// The last message of an FMU that does not run; one that makes no instance may give the reason only with logging on.
+fn said(session: &Session, why: &str) -> String {
+    if why.contains("returned NULL") {
+        let _ = session.instantiate(&Arguments { logging: true, ..session.arguments("probe") });
+    }
+    let text = take_events().into_iter().rev().find_map(|event| event.text.filter(|text| !text.trim().is_empty()));
+    text.map_or_else(String::new, |text| format!("{SAID}{:?}", text.trim()))
 }
 
 /// Whether the FMU needs a tool that may not be here.

@@ -6,6 +6,7 @@ use crate::checks::life::shared::calls;
 use crate::confidence::Confidence;
 use crate::fmu_file::FmuFile;
 use crate::level::Level;
+use crate::scripts::script;
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -241,7 +242,12 @@ impl Report {
                     Verdict::Pass(_) => "pass".into(),
                     _ => "not".into(),
                 };
-                let evidence: Vec<_> = evidence.iter().map(|e| format!("<code>{}</code>", escape(e))).collect();
+                let mut evidence: Vec<_> = evidence.iter().map(|e| format!("<code>{}</code>", escape(e))).collect();
+                if let Some(script) = script(&self.file, f) {
+                    let script = escape(&script);
+                    evidence
+                        .push(format!("<details><summary>Repeat it in FMPy</summary><pre>{script}</pre></details>"));
+                }
                 let _ = writeln!(
                     out,
                     "<tr class=\"{class}\" id=\"{0}\"><td>{0}</td><td>{1}{6}</td><td>{2}</td><td>{3} <small>({4})</small><br>{5}</td></tr>",
@@ -268,7 +274,7 @@ pub fn html(reports: &[Report]) -> String {
          body{{font:16px/1.4 sans-serif;max-width:70em;margin:2em auto;padding:0 1em}}table{{border-collapse:collapse;width:100%}}\
          td,th{{border-top:1px solid #ccc;padding:.3em .6em;text-align:left;vertical-align:top}}td:first-child{{white-space:nowrap}}\
          .violated{{background:#fdd}}.violated.hard,.violated.should{{background:#fec}}.not{{color:#666}}small{{color:#555}}\
-         code{{overflow-wrap:anywhere}}</style></head><body>\n",
+         code{{overflow-wrap:anywhere}}pre{{overflow:auto;max-height:30em}}</style></head><body>\n",
         escape(&title.join("; "))
     );
     reports.iter().map(Report::section).fold(head, |page, section| page + &section) + "</body></html>\n"

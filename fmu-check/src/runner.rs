@@ -6,7 +6,7 @@
 
 use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
-use crate::evidence::{calls, conclude, is_of_second, panic, read, side_effects};
+use crate::evidence::{calls, conclude, is_after_free, is_of_second, panic, printed, read, script, side_effects};
 use crate::fmu_file::FmuFile;
 use crate::lines::Line;
 use crate::probe::NOT_WRITTEN;
@@ -39,6 +39,10 @@ const MAX_RESTARTS: usize = 12;
 pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
+    /// Findings come with all their calls.
+    scripts: bool,
+    /// The attribute generationTool.
+    pub(super) tool: Option<String>,
     /// The binaries for co-simulation, Model Exchange and Scheduled Execution; mostly the same one.
     pub(super) simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
@@ -69,6 +73,9 @@ pub(super) fn is_exchange(check: &Check) -> bool {
 const WILD: [&str; 4] = ["T02b", "G07a", "E09", "F04c"];
 /// Checks whose subject is a second instance; in all others, a second instance that hangs is not a finding.
 const SEVERAL: [&str; 8] = ["L04a", "L04b", "L04c", "B05d", "G07a", "F03a", "F04a", "E14"];
+
+/// The check that makes instances after others were freed; in all others, a crash of an instantiation then is not a finding.
+const REMADE: &str = "B07a";
 
 /// The folder of a probe, and its resource limits.
 #[derive(Clone)]
@@ -109,6 +116,8 @@ impl Runner {
         Ok(Self {
             program,
             dir: fmu.dir().to_owned(),
+            scripts: options.scripts,
+            tool: description.generation_tool.clone(),
             simulation,
             exchange,
             scheduled,
@@ -153,8 +162,16 @@ impl Runner {
             return Verdict::NotApplicable(format!("the FMU has no interface for {interface}")).into();
         };
         let conditions = Conditions { dir: self.dir.clone(), binary: binary.clone(), allowance: self.allowance };
-        let found = self.attempt(check, &conditions);
-        if FIRST.contains(&check.id) { self.excused(check, &conditions, found) } else { found }
+        let mut found = self.attempt(check, &conditions);
+        if FIRST.contains(&check.id) {
+            found = self.excused(check, &conditions, found);
+        }
+        if self.scripts && matches!(found.verdict, Verdict::Violated(_)) {
+            // What a second run would end or hang in is known from the first.
+            let full = if found.fatal { None } else { self.full(check, &conditions).ok() };
+            found.script = full.unwrap_or_else(|| found.calls.clone());
+        }
+        found
     }
 
     /// The first of two processes that a check compares: no result yet if it passes. The second process, one second of the clock
@@ -226,8 +243,11 @@ impl Runner {
             let _ = self.varying.set(varying);
         }
         let mut found = conclude(check.id, lines, crashes, slow);
-        if matches!(found.verdict, Verdict::Violated(_)) {
+        if let Verdict::Violated(evidence) = &mut found.verdict {
             found.calls = calls(&fs::read_to_string(out.with_extension("log")).unwrap_or_default());
+            if FIRST.contains(&check.id) {
+                evidence.extend(printed(folder.path()));
+            }
         }
         if matches!(check.run, Run::Silent(_)) && matches!(found.verdict, Verdict::Pass(_)) {
             let side_effects = side_effects(folder.path(), &working_directory);
@@ -367,11 +387,28 @@ impl Runner {
                 limits::PROBE_FILE,
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
+            Outcome::End(end) if check.id != REMADE && is_after_free(call, out) => Err(format!(
+                "{} {}, after another instance was freed: see {REMADE}",
+                call.trim_start_matches(['C', 'P', 'S', 'H']).trim(),
+                end.describe()
+            )),
             Outcome::End(end) => match panic(end, out) {
                 Some(why) => Err(format!("the checker failed: {why}")),
                 None => Ok((end.describe(), call.into())),
             },
         }
+    }
+
+    /// All calls of a check up to its first finding, one by one, from one more run of it.
+    fn full(&self, check: &Check, conditions: &Conditions) -> io::Result<Vec<String>> {
+        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        fs::create_dir(folder.path().join("home"))?;
+        let console = File::create(folder.path().join("console"))?;
+        let mut command = self.command(check, conditions, folder.path(), 0)?;
+        command.arg("--full").stdout(console.try_clone()?).stderr(console);
+        let out = folder.path().join("out");
+        self.guarded(check, command, &out)?;
+        Ok(script(&fs::read_to_string(out.with_extension("log"))?))
     }
 
     /// Adds the processes that outlived any probe to the check that reports them.

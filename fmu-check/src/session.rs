@@ -6,14 +6,15 @@
 use crate::confidence::Confidence;
 use crate::level::Level;
 use crate::lines::{Line, ProbeArguments};
+use fmu_import::platform::Platform;
 use fmu_import::raw::{Arguments, Interface, Raw};
-use fmu_import::{file_uri, printable_lines};
+use fmu_import::{file_uri, machine, printable_lines};
 use model_description::{BaseType, FmiVersion, ModelDescription};
 use std::cell::{Cell, RefCell};
 use std::collections::HashSet;
 use std::ffi::CString;
 use std::fs::File;
-use std::io::{ErrorKind, Seek, SeekFrom, Write};
+use std::io::{ErrorKind, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -53,6 +54,8 @@ pub(super) struct Session {
     pub(super) varying: HashSet<String>,
     log: RefCell<File>,
     trace: bool,
+    /// Every call is recorded, up to the first finding or so many lines: those left.
+    full: Cell<Option<usize>>,
     from: usize,
     one: bool,
     next: Cell<usize>,
@@ -72,12 +75,25 @@ pub(super) struct Session {
 
 /// Below the environments of the instances.
 const ENVIRONMENT: usize = 0x5000;
+/// Marks the start of a process in the log of calls.
+pub(super) const BEGUN: &str = "# begun";
 /// Marks a finding in the log of calls.
 pub(super) const FOUND: &str = "# found";
 /// Start of the reason if the FMU ended the simulation, as it may at any time.
 pub(super) const ENDED: &str = "the FMU ended the simulation";
+/// Lines of calls in a script.
+const FULL: usize = 6000;
 /// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
+
+/// A library for another processor or system than this one: the dynamic linker says that there is no such file.
+fn of_other(binary: &Path) -> Option<String> {
+    let mut head = Vec::new();
+    File::open(binary).ok()?.take(machine::HEAD).read_to_end(&mut head).ok()?;
+    let (platforms, host) = (machine::platforms(&head), Platform::host());
+    let first = platforms.first().filter(|_| !platforms.contains(&host))?;
+    Some(format!("it is for {}, and this computer is {}", first.tuple(), host.tuple()))
+}
 
 impl Session {
     /// Loads the FMU.
@@ -92,8 +108,10 @@ impl Session {
         let mut journal = File::create(&calls).map_err(|e| lost(&e))?;
         let log = create(&args.out.with_extension("log"))?;
         let _ = journal.write_all(b"P loading the binary");
-        let raw = Raw::open(&args.binary, description.version)
-            .map_err(|e| NotOpened::Load(format!("the binary does not load: {e}")))?;
+        let _ = (&log).write_all(format!("{BEGUN}\n").as_bytes());
+        let raw = Raw::open(&args.binary, description.version).map_err(|e| {
+            NotOpened::Load(format!("the binary does not load: {}", of_other(&args.binary).unwrap_or(e)))
+        })?;
         let paths = [args.binary.clone(), args.dir.clone(), home, calls];
         let timeout = Duration::from_secs_f64(args.seconds);
         let session = Self::new(raw, description, paths, [lines, journal, log], timeout);
@@ -101,7 +119,8 @@ impl Session {
         let names = args.varying.as_deref().map(std::fs::read).transpose().map_err(|e| lost(&e))?;
         let varying = names.map(|json| serde_json::from_slice(&json)).transpose().map_err(|e| lost(&e))?;
         let varying = varying.unwrap_or_default();
-        Ok(Self { integrator, varying, trace: args.trace, from: args.from, one: args.one, ..session })
+        let full = Cell::new(args.full.then_some(FULL));
+        Ok(Self { integrator, varying, full, trace: args.trace, from: args.from, one: args.one, ..session })
     }
 
     /// A session at its start that runs every case and prints nothing; the paths are those of the binary, of the unpacked folder, of
@@ -129,6 +148,7 @@ impl Session {
             varying: HashSet::new(),
             log: RefCell::new(log),
             trace: false,
+            full: Cell::new(None),
             from: 0,
             one: false,
             next: Cell::new(0),
@@ -278,16 +298,22 @@ impl Session {
             (_, Some(Level::Hard)) => "H",
             _ => "C",
         };
+        // The call is the first line; what follows it is left from other calls.
         let _ = journal.seek(SeekFrom::Start(0));
         let _ = journal.write_all(format!("{mark} {call}\n").as_bytes());
-        let end = journal.stream_position().unwrap_or(0);
-        let _ = journal.set_len(end);
     }
 
     /// Adds to the log of calls.
     fn note_call(&self, text: &str) {
-        if self.silent.get() {
-            return;
+        match self.full.get() {
+            _ if self.silent.get() => return,
+            Some(0) => return,
+            Some(left) => self.full.set(Some(if text.contains(FOUND) {
+                0
+            } else {
+                left - text.matches('\n').count().min(left - 1)
+            })),
+            None => {}
         }
         let _ = self.log.borrow_mut().write_all(text.as_bytes());
         if self.trace {
@@ -337,6 +363,10 @@ impl Session {
 
     /// Makes many calls with one journal entry.
     pub(super) fn record_calls<T>(&self, what: &str, work: impl FnOnce() -> T) -> T {
+        if self.full.get().is_some() {
+            self.note_call(&format!("\n# {what}"));
+            return work();
+        }
         self.record_call(what);
         let before = self.silent.replace(true);
         let result = work();

@@ -29,8 +29,17 @@ pub enum MatchingRule {
     Plug,
     /// By name; only the members that both terminals have.
     Bus,
+    /// A node of a network: what one side sends, the other receives (FMI-LS-BUS 1.0.0, FMI 3.0).
+    Transceiver,
     /// A map on a rectilinear grid, with tables over the same points: FMI-LS-STRUCT 1.0.0-rc.1 (FMI 3.0).
     Map,
+}
+
+impl MatchingRule {
+    /// Whether it is of a layered standard on top of FMI 3.0.
+    pub const fn is_layered(self) -> bool {
+        matches!(self, Self::Transceiver | Self::Map)
+    }
 }
 
 /// A variable of a terminal.
@@ -106,6 +115,22 @@ impl Terminal {
     /// Same as [`plug`](Self::plug).
     pub const fn bus(name: &'static str, description: &'static str, members: &'static [Member]) -> Self {
         Self::new(name, description, MatchingRule::Bus, members)
+    }
+
+    /// A node of a network, such as CAN: `Tx_Data` on the clock `Tx_Clock`, `Rx_Data` on the clock `Rx_Clock`, in this
+    /// order.
+    ///
+    /// # Panics
+    /// At compile time, unless the members are these four.
+    pub const fn transceiver(name: &'static str, description: &'static str, members: &'static [Member; 4]) -> Self {
+        let roles = ["Tx_Data", "Tx_Clock", "Rx_Data", "Rx_Clock"];
+        let mut i = 0;
+        while i < 4 {
+            let is = same_text(members[i].name, roles[i]);
+            demand(is, members[i].name, "a transceiver has Tx_Data, Tx_Clock, Rx_Data and Rx_Clock");
+            i += 1;
+        }
+        Self::new(name, description, MatchingRule::Transceiver, members)
     }
 
     /// A map: arrays with the grid points of its axes, an array for each of its tables, and the coordinates at which it is

@@ -75,7 +75,7 @@ impl Archive {
         let mut zip = ZipArchive::new(source).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
         let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
         let xml = document(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
-        let xml = xml.ok_or_else(|| wrong(&"has no modelDescription.xml"))?;
+        let xml = xml.ok_or_else(|| wrong(&no_description(&names)))?;
         let description = model_description::read(&xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?;
         Ok(Self { path: path.into(), zip, names, description: Arc::new(description) })
     }
@@ -211,12 +211,30 @@ impl Archive {
     }
 }
 
+/// Why there is no description: it may lie in a folder that was packed as a whole.
+fn no_description(names: &[String]) -> String {
+    let folders = names.iter().filter_map(|name| name.strip_suffix("/modelDescription.xml"));
+    match folders.min_by_key(|folder| folder.len()) {
+        Some(folder) => format!(
+            "has no modelDescription.xml at its top but one in the folder {folder}: pack the contents of the folder, not the folder"
+        ),
+        None => "has no modelDescription.xml".into(),
+    }
+}
+
 /// The contents of an entry with an XML document; `None` if no entry has this name.
 ///
 /// # Errors
 /// The entry cannot be read, or is larger than [`limits::XML`].
 pub fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<Option<Vec<u8>>, String> {
     let mut bytes = Vec::new();
+    // Some tools write ./ before each name.
+    let written = format!("./{name}");
+    let name = if zip.index_for_name(name).is_none() && zip.index_for_name(&written).is_some() {
+        written.as_str()
+    } else {
+        name
+    };
     match zip.by_name(name) {
         Ok(entry) => entry.take(XML.most + 1).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
         Err(zip::result::ZipError::FileNotFound) => return Ok(None),
@@ -238,22 +256,34 @@ pub fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<Stri
     for index in 0..zip.len() {
         let entry = zip.by_index_raw(index).map_err(|e| format!("entry {index}: {e}"))?;
         let name = entry.name().map_err(|e| format!("entry {index}: {e}"))?.into_owned();
-        if entry.enclosed_name().is_none() || !inside(&name) {
+        if leads_outside(&name) {
             return Err(format!("entry {name:?} leads outside of the archive"));
+        }
+        if name.contains('\\') {
+            let remedy = "a ZIP archive has slashes; pack it with another tool";
+            return Err(format!("entry {name:?} has backslashes between its folders: {remedy}"));
+        }
+        if cfg!(windows) && name.contains(':') {
+            return Err(format!("entry {name:?} has a colon, which no file name of Windows has"));
+        }
+        if name.contains('\0') || (cfg!(windows) && entry.enclosed_name().is_none()) {
+            return Err(format!("entry {name:?} has no valid name"));
         }
         if entry.is_symlink() {
             return Err(format!("entry {name:?} is a link"));
         }
         size = size.saturating_add(entry.size());
-        names.push(name);
+        names.push(name.trim_start_matches("./").to_owned());
     }
     UNPACKED.check(size)?;
     Ok(names)
 }
 
-/// Whether a name stays below the folder to which it is joined, on every system.
-fn inside(name: &str) -> bool {
-    !name.contains(['\\', ':', '\0']) && !name.starts_with('/') && name.split('/').all(|part| part != "..")
+/// Whether a name may lead out of the folder to which it is joined, on any system.
+fn leads_outside(name: &str) -> bool {
+    let mut parts = name.split(['/', '\\']);
+    let first = parts.clone().next().unwrap_or_default();
+    first.is_empty() || (first.len() == 2 && first.ends_with(':')) || parts.any(|part| part == "..")
 }
 
 #[cfg(test)]
@@ -278,6 +308,18 @@ mod tests {
         for name in ["../evil", "/etc/evil", "resources/../../evil", "..\\evil", "C:/evil"] {
             let error = refused(&["modelDescription.xml", name]);
             assert!(error.contains("leads outside"), "{name}: {error}");
+        }
+    }
+
+    #[test]
+    fn what_is_wrong_with_an_archive_is_named() {
+        let error = refused(&["modelDescription.xml", "binaries\\linux64\\M.so"]);
+        assert!(error.contains("has backslashes between its folders"), "{error}");
+        let error = refused(&["M/modelDescription.xml", "M/binaries/linux64/M.so"]);
+        assert!(error.ends_with("but one in the folder M: pack the contents of the folder, not the folder"), "{error}");
+        // The description is found, and is no XML.
+        for names in [&["./modelDescription.xml"][..], &["modelDescription.xml", "resources/a:b.txt"]] {
+            assert!(cfg!(windows) || refused(names).contains("modelDescription.xml: line 1"), "{names:?}");
         }
     }
 

@@ -27,7 +27,7 @@ const GRACE: Duration = Duration::from_secs(5);
 /// Limits of a guarded process.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Allowance {
-    /// Address space in bytes; 0 for no limit. Unix only.
+    /// Address space in bytes; 0 for no limit on it and on open files. Unix only.
     pub memory: u64,
     /// Largest file in bytes that it may write; 0 for no limit. Unix only.
     pub file: u64,
@@ -393,7 +393,9 @@ mod unix {
             let _ = setrlimit(resource, Rlimit { current: most, maximum: most });
         };
         at_most(Resource::Core, 0);
-        at_most(Resource::Nofile, limits::PROCESS_FILES);
+        if allowance.memory > 0 {
+            at_most(Resource::Nofile, limits::PROCESS_FILES);
+        }
         // The system counts all threads of this user, and none of root's.
         if let Some(threads) = threads() {
             at_most(Resource::Nproc, limits::PROCESS_THREADS + threads);

@@ -132,7 +132,7 @@ impl Instance {
     pub fn get_reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Error> {
         if self.clocks.is_some() {
             for (&reference, value) in references.iter().zip(values) {
-                *value = self.get_clocked(BaseType::Float64, reference, 1)?.number().unwrap_or(f64::NAN);
+                *value = self.get_at(BaseType::Float64, reference, 1)?.number().unwrap_or(f64::NAN);
             }
             return Ok(());
         }
@@ -159,10 +159,22 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn get_at(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
+        let known = self.get_known(base, reference, count)?;
+        known.ok_or_else(|| {
+            let name = self.description.referenced(reference).map_or("a variable", |v| &v.name);
+            Error::usage(&self.name, format!("{name} is on a clock that has not ticked"))
+        })
+    }
+
+    /// Like [`get_at`](Self::get_at); `None` for a variable whose clock has not ticked.
+    ///
+    /// # Errors
+    /// The FMU refuses.
+    pub fn get_known(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Option<Values>, Error> {
         if self.clocks.is_some() {
             return self.get_clocked(base, reference, count);
         }
-        self.call(Call::Get, |s| s.get(base, reference, count))
+        self.call(Call::Get, |s| s.get(base, reference, count)).map(Some)
     }
 
     /// Writes the variable with this base type and value reference.

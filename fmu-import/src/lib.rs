@@ -2,7 +2,7 @@
 //! both standards.
 //!
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
-//! - [`quantity`]: numbers with units, as a user writes them; [`threads`]: work for several threads.
+//! - [`quantity`], [`written`], [`csv`](mod@csv): numbers with units, names and tables, as a user writes them; [`threads`]: work for several threads.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
 //! - [`guard`]: separate processes for FMUs of unknown origin; [`limits`]: limits of these processes and of files.
 //!
@@ -28,6 +28,7 @@
 #[allow(unsafe_code)]
 mod abi;
 mod archive;
+pub mod csv;
 pub mod elf;
 mod error;
 mod fmu;
@@ -36,6 +37,7 @@ pub mod guard;
 mod instance;
 pub mod limits;
 pub mod machine;
+mod number;
 pub mod platform;
 pub mod quantity;
 mod standard;
@@ -43,6 +45,7 @@ mod text;
 pub mod threads;
 pub mod trace;
 mod value;
+pub mod written;
 
 pub use abi::journal;
 pub use abi::library::describe;
@@ -53,6 +56,7 @@ pub use error::Error;
 pub use fmu::{Fmu, Outline, Unpacked, contents, outline};
 pub use folder::Folder;
 pub use instance::{FmuState, Instance};
+pub use number::Number;
 pub use quantity::suggest;
 pub use standard::{CompletedStep, Kind, Stepped, Update};
 pub use text::{file_uri, printable, printable_lines};

@@ -46,7 +46,7 @@ pub fn list() -> String {
     let processes = [
         row("Time for the checks of a file that do not run it", STATIC_SECONDS, "s"),
         row("Address space of a process that runs FMUs (`--memory`)", PROCESS_MEMORY >> 30, "GiB"),
-        row("Open files of a process that runs FMUs", PROCESS_FILES, "files"),
+        row("Open files of a process that runs FMUs (no limit with `--memory 0`)", PROCESS_FILES, "files"),
         row(
             "Threads and processes that a process that runs FMUs may add to those of the system",
             PROCESS_THREADS,

@@ -1,5 +1,6 @@
 //! Values that cross the interface, independent of the names of types in the standards.
 
+use crate::number::Number;
 use crate::quantity;
 use fmu_core::{Bytes, IntegerType};
 use model_description::{BaseType, ModelDescription, ModelVariable};
@@ -41,6 +42,9 @@ impl Values {
             && !text.contains(',')
             && (!variable.base.is_float() || text.split_whitespace().all(is_number));
         let separator = |c: char| if spaced { c.is_whitespace() } else { c == ',' };
+        // One name or truth value may have commas.
+        let whole = !variable.is_array() && matches!(variable.base, BaseType::Boolean | BaseType::Enumeration);
+        let separator = |c: char| !whole && separator(c);
         let elements = || text.split(separator).map(str::trim).filter(|e| !(spaced && e.is_empty()));
         let wrong = |element: &str, expected: &str| format!("{} = {element} is not {expected}", variable.name);
         match variable.base {
@@ -49,7 +53,7 @@ impl Values {
                 .collect::<Result<_, _>>()
                 .map(Self::Reals),
             BaseType::Boolean | BaseType::Clock => elements()
-                .map(|e| match e {
+                .map(|e| match e.to_ascii_lowercase().as_str() {
                     "true" | "1" => Ok(true),
                     "false" | "0" => Ok(false),
                     _ => Err(wrong(e, "true or false")),
@@ -122,12 +126,18 @@ impl Values {
         }
     }
 
-    /// A number as a value of this base type: rounded for an integer, not 0 for true.
+    /// A number as a value of this base type: an integer keeps its digits, a real number is rounded for an integer; what is not 0
+    /// is true.
     ///
     /// # Errors
-    /// A text is not a number.
-    pub fn from_number(x: f64, base: BaseType) -> Result<Self, String> {
-        Self::from_numbers(&[x], base)
+    /// A text or bytes are not a number, or the number is missing.
+    pub fn from_number(x: impl Into<Number>, base: BaseType) -> Result<Self, String> {
+        match (x.into(), base) {
+            (Number::Missing, _) => Err("there is no number".into()),
+            (Number::Integer(i), _) => Self::Integers(vec![i]).into_base(base),
+            (Number::Boolean(b), _) => Self::Booleans(vec![b]).into_base(base),
+            (Number::Real(x), base) => Self::from_numbers(&[x], base),
+        }
     }
 
     /// Numbers as the elements of an array, each as in [`from_number`](Self::from_number).
@@ -148,20 +158,66 @@ impl Values {
         }
     }
 
-    /// The first element as a number, for columns and plots; `None` for a text.
-    pub fn number(&self) -> Option<f64> {
-        self.number_at(0)
+    /// These values for a variable of another type; integers stay integers, whatever their width.
+    ///
+    /// # Errors
+    /// A text is not a number, and no number is a text.
+    pub fn into_base(self, base: BaseType) -> Result<Self, String> {
+        let reals = |numbers: Vec<f64>| Self::from_numbers(&numbers, base);
+        match (self, base) {
+            (all @ Self::Reals(_), BaseType::Float32 | BaseType::Float64)
+            | (all @ Self::Booleans(_), BaseType::Boolean | BaseType::Clock)
+            | (all @ Self::Strings(_), BaseType::String)
+            | (all @ Self::Binaries(_), BaseType::Binary) => Ok(all),
+            (_, BaseType::String | BaseType::Binary) => Err(format!("a {base} takes no number")),
+            (Self::Reals(x), _) => reals(x),
+            (Self::Integers(x), BaseType::Float32 | BaseType::Float64) => {
+                reals(x.into_iter().map(|i| Number::Integer(i).real()).collect())
+            }
+            (Self::Integers(x), BaseType::Boolean | BaseType::Clock) => {
+                Ok(Self::Booleans(x.into_iter().map(|i| i != 0).collect()))
+            }
+            (all @ Self::Integers(_), _) => Ok(all),
+            (Self::Booleans(x), BaseType::Float32 | BaseType::Float64) => {
+                reals(x.into_iter().map(|b| f64::from(u8::from(b))).collect())
+            }
+            (Self::Booleans(x), _) => Ok(Self::Integers(x.into_iter().map(i128::from).collect())),
+            (Self::Strings(_) | Self::Binaries(_), _) => Err(format!("a text is no {base}")),
+        }
     }
 
-    /// An element as a number; `None` for a text, or without this element.
-    pub fn number_at(&self, element: usize) -> Option<f64> {
-        match self {
-            Self::Reals(x) => x.get(element).copied(),
-            #[expect(clippy::cast_precision_loss, reason = "columns are of doubles; exact below 2^53")]
-            Self::Integers(x) => x.get(element).map(|&i| i as f64),
-            Self::Booleans(x) => x.get(element).map(|&b| f64::from(u8::from(b))),
-            Self::Strings(_) | Self::Binaries(_) => None,
+    /// The first element as a double; `None` for a text.
+    pub fn number(&self) -> Option<f64> {
+        match self.one(0) {
+            Number::Missing => None,
+            number => Some(number.real()),
         }
+    }
+
+    /// An element as a number; missing for a text, or without this element.
+    pub fn one(&self, element: usize) -> Number {
+        let number = match self {
+            Self::Reals(x) => x.get(element).map(|&x| Number::Real(x)),
+            Self::Integers(x) => x.get(element).map(|&i| Number::Integer(i)),
+            Self::Booleans(x) => x.get(element).map(|&b| Number::Boolean(b)),
+            Self::Strings(_) | Self::Binaries(_) => None,
+        };
+        number.unwrap_or_default()
+    }
+
+    /// An element alone.
+    #[must_use]
+    pub fn element(self, element: usize) -> Option<Self> {
+        fn at<T>(all: Vec<T>, element: usize) -> Option<Vec<T>> {
+            all.into_iter().nth(element).map(|x| vec![x])
+        }
+        Some(match self {
+            Self::Reals(x) => Self::Reals(at(x, element)?),
+            Self::Integers(x) => Self::Integers(at(x, element)?),
+            Self::Booleans(x) => Self::Booleans(at(x, element)?),
+            Self::Strings(x) => Self::Strings(at(x, element)?),
+            Self::Binaries(x) => Self::Binaries(at(x, element)?),
+        })
     }
 
     /// Replaces an element by the one of `value`; returns whether both exist and have the same type.

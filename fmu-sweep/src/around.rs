@@ -11,6 +11,7 @@
 
 use crate::plan::{Plan, RunResult, RunResults, RunVariable};
 use crate::{Error, measure::Measure, pool};
+use fmu_import::Number;
 use fmu_system::cosimulation::{PlanTarget, Worker};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,12 +31,13 @@ impl Plan {
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
     ) -> Result<RunResults, Error> {
         let n = point.len().min(steps.len());
-        let row = |row: usize, values: &mut Vec<f64>| {
+        let row = |row: usize, values: &mut Vec<Number>| {
+            let moved = |k: usize| match row.checked_sub(1) {
+                Some(j) if j % n == k => point[k] + if j < n { steps[j] } else { -steps[j - n] },
+                _ => point[k],
+            };
             values.clear();
-            values.extend_from_slice(point);
-            if let Some(k) = row.checked_sub(1) {
-                values[k % n] += if k < n { steps[k] } else { -steps[k - n] };
-            }
+            values.extend((0..point.len()).map(|k| Number::Real(moved(k))));
         };
         let count = |n: usize| u64::try_from(n).unwrap_or(u64::MAX);
         let index = |row: u64| usize::try_from(row).unwrap_or(usize::MAX);
@@ -77,7 +79,7 @@ impl Plan {
     }
 
     /// Runs the system and its copy with these values.
-    fn pair<'a>(&self, worker: &mut Worker, set: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> [RunResult; 2] {
+    fn pair<'a>(&self, worker: &mut Worker, set: impl IntoIterator<Item = (&'a PlanTarget, Number)>) -> [RunResult; 2] {
         let renewed = if self.reuses() { Ok(()) } else { worker.renew() };
         let (mut end, columns) = (f64::NAN, self.system().columns().len());
         let begin = || self.readers().iter().map(|_| Measure::begin()).collect::<Vec<_>>();

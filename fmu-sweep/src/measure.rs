@@ -4,6 +4,7 @@
 
 use crate::definition::{MeasureDefinition, MeasureFunction};
 use crate::signal::Signal;
+use fmu_import::Number;
 use fmu_system::cosimulation::Settings;
 
 /// Instants closer than this (s) are the same: communication points are `start + k h`, rounded.
@@ -40,6 +41,8 @@ pub(crate) struct Reading {
     count: f64,
     /// Extremum, sum, or last value.
     x: f64,
+    /// The integer that is the last value or the extremum.
+    whole: Option<i128>,
     /// Previous time and value.
     before: (f64, f64),
     /// Time of an event: a crossing of `from`, or the return into the band.
@@ -122,18 +125,37 @@ impl Measure {
     }
 
     pub(crate) fn begin() -> Reading {
-        Reading { count: 0.0, x: f64::NAN, before: (0.0, 0.0), since: None, until: None, begun: 0.0, bad: None }
+        Reading {
+            count: 0.0,
+            x: f64::NAN,
+            whole: None,
+            before: (0.0, 0.0),
+            since: None,
+            until: None,
+            begun: 0.0,
+            bad: None,
+        }
     }
 
     /// Processes the values of a communication point.
-    pub(crate) fn take(&self, s: &mut Reading, t: f64, values: &[f64]) {
+    pub(crate) fn take(&self, s: &mut Reading, t: f64, values: &[Number]) {
         if t < self.after - SAME || s.bad.is_some() {
             return;
         }
-        let x = self.signal.at(values);
+        let value = self.signal.at(values);
+        let x = value.real();
         let first = s.count == 0.0;
-        if matches!(self.kind, Kind::At(_)) && !first {
+        // A variable whose clock has not ticked has no value yet.
+        if (matches!(self.kind, Kind::At(_)) && !first) || value == Number::Missing {
             return;
+        }
+        if let Number::Integer(i) = value {
+            s.whole = Some(match (self.kind, s.whole) {
+                (Kind::Min, Some(other)) => other.min(i),
+                (Kind::Max, Some(other)) => other.max(i),
+                (Kind::MaxAbs, other) => other.unwrap_or(0).max(i.abs()),
+                _ => i,
+            });
         }
         if !x.is_finite() {
             s.bad = Some((t, x));
@@ -180,18 +202,21 @@ impl Measure {
     }
 
     /// The number; NaN if no communication point counted.
-    pub(crate) fn end(&self, s: &Reading) -> Result<f64, String> {
+    pub(crate) fn end(&self, s: &Reading) -> Result<Number, String> {
         if let Some((t, x)) = s.bad {
             return Err(format!("{} is {x} at {t} s", self.of));
         }
-        Ok(match self.kind {
+        if let (Kind::Final | Kind::At(_) | Kind::Min | Kind::Max | Kind::MaxAbs, Some(i)) = (self.kind, s.whole) {
+            return Ok(Number::Integer(i));
+        }
+        Ok(Number::Real(match self.kind {
             _ if s.count == 0.0 => f64::NAN,
             Kind::Mean => s.x / s.count,
             Kind::Rms => libm::sqrt(s.x / s.count),
             Kind::Rise { .. } => s.since.zip(s.until).map_or(f64::INFINITY, |(since, until)| until - since),
             Kind::Settling { .. } => s.since.map_or(f64::INFINITY, |since| since - s.begun),
             _ => s.x,
-        })
+        }))
     }
 }
 
@@ -204,16 +229,16 @@ mod tests {
     fn measure(text: &str) -> Result<Measure, String> {
         let definition = crate::Definition::parse(&format!("[measure]\nm = {{ of = 'x', {text} }}"))?;
         let settings = Settings { start: 0.0, stop: 4.0, step: 1.0, sequential: false };
-        let signal = Signal::new(&Sum::parse("x").unwrap(), None, |_| 0);
+        let signal = Signal::new(&Sum::parse("x", &|_| false).unwrap(), None, |_| 0);
         Measure::new(&definition.measure.0[0].1, signal, &settings)
     }
 
     fn of(text: &str, values: &[f64]) -> Result<f64, String> {
         let (measure, mut state) = (measure(text).unwrap(), Measure::begin());
         for (t, x) in [0.0, 1.0, 2.0, 3.0, 4.0].into_iter().zip(values) {
-            measure.take(&mut state, t, &[*x]);
+            measure.take(&mut state, t, &[Number::Real(*x)]);
         }
-        measure.end(&state)
+        measure.end(&state).map(Number::real)
     }
 
     #[test]
@@ -243,6 +268,21 @@ mod tests {
             let found = of(text, &x).unwrap();
             assert!(found == expected || (found - expected).abs() < 1e-15, "{text}: {found}, expected {expected}");
         }
+    }
+
+    #[test]
+    fn integers_keep_their_digits_and_missing_values_do_not_count() {
+        let large = 9_007_199_254_740_993;
+        let of = |text: &str| {
+            let (measure, mut state) = (measure(text).unwrap(), Measure::begin());
+            let values =
+                [Number::Missing, Number::Integer(large), Number::Integer(-large - 1), Number::Integer(large - 1)];
+            (0..4_u8).zip(values).for_each(|(t, x)| measure.take(&mut state, f64::from(t), &[x]));
+            measure.end(&state).unwrap()
+        };
+        let texts = ["final", "max", "min", "max_abs"].map(|is| of(&format!("is = '{is}'")));
+        assert_eq!(texts, [large - 1, large, -large - 1, large + 1].map(Number::Integer));
+        assert_eq!(of("is = 'mean'"), Number::Real(3_002_399_751_580_330.0));
     }
 
     #[test]

@@ -54,12 +54,12 @@ pub struct Failures {
 }
 
 impl Failures {
-    pub(crate) fn add(&mut self, sweep: &Sweep, line: &str) {
-        if let Some(error) = sweep.error_of(line) {
+    pub(crate) fn add(&mut self, line: &str) {
+        if let Some(error) = Sweep::error_of(line) {
             self.count += 1;
             if self.first.len() < 3 {
                 let row = line.split(',').next().and_then(|row| row.parse().ok()).unwrap_or_default();
-                self.first.push((row, unquoted(error)));
+                self.first.push((row, error));
             }
         }
     }
@@ -163,7 +163,7 @@ impl Output {
             if expected.as_deref() != line.split(',').next() {
                 return Err(io::Error::other("has other rows than the part of this number: remove this part"));
             }
-            failures.add(sweep, &line);
+            failures.add(&line);
             writeln!(out, "{line}")?;
         }
         if rows.is_empty() { Ok(()) } else { Err(io::Error::other("has too few rows: remove this part")) }
@@ -216,13 +216,6 @@ fn difference(place: &str, there: &Value, here: &Value) -> Option<String> {
             a.iter().zip(b).enumerate().find_map(|(k, (x, y))| difference(&at(k, y), x, y))
         }
         _ => Some(format!("{place} is {there} there and {here} here")),
-    }
-}
-
-fn unquoted(cell: &str) -> String {
-    match cell.strip_prefix('"').and_then(|cell| cell.strip_suffix('"')) {
-        Some(inner) => inner.replace("\"\"", "\""),
-        None => cell.to_owned(),
     }
 }
 

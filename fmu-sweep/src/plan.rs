@@ -6,9 +6,9 @@ use crate::error::invalid;
 use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
-use fmu_import::{Fmu, Kind};
+use fmu_import::{Fmu, Kind, Number};
 use fmu_system::cosimulation::{
-    self, Integration, Method, PlanTarget, Recording, Schedule, Settings, Solver, System, Units, Worker, item,
+    self, Integration, Method, PlanTarget, Recording, Settings, Solver, System, Units, Worker, item,
 };
 use fmu_system::ssp::load::{Connectors, Loaded};
 use std::ops::ControlFlow;
@@ -61,8 +61,8 @@ pub struct ResultColumn {
 
 impl ResultColumn {
     /// The name of the enumeration's value `x`.
-    pub fn item(&self, x: f64) -> Option<&str> {
-        item(&self.items, x)
+    pub fn item(&self, x: Number) -> Option<&str> {
+        item(&self.items, x.real())
     }
 }
 
@@ -85,7 +85,7 @@ impl RunVariable {
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunResult {
     /// The measures, or the error in one line.
-    pub result: Result<Vec<f64>, String>,
+    pub result: Result<Vec<Number>, String>,
     /// Time reached, in s; NaN if the run never began.
     pub end: f64,
 }
@@ -93,8 +93,8 @@ pub struct RunResult {
 /// The results of many runs: columns with one value per run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunResults {
-    /// A column for each measure; NaN where the run failed.
-    pub measures: Vec<Vec<f64>>,
+    /// A column for each measure; missing where the run failed.
+    pub measures: Vec<Vec<Number>>,
     /// Time reached, in s; NaN if the run never began.
     pub end: Vec<f64>,
     /// The error.
@@ -142,9 +142,7 @@ impl Plan {
             loaded.system.connect_terminals(one, other)?;
         }
         for (name, points) in &definition.input.0 {
-            let schedule =
-                Schedule::parse(points).map_err(|cause| Error::Invalid(format!("input: {name}: {cause}")))?;
-            loaded.input(name, &schedule)?;
+            loaded.points(name, points).map_err(|error| Error::Invalid(format!("input: {name}: {error}")))?;
         }
         if definition.auto_connect {
             loaded.system.connect_by_name()?;
@@ -164,7 +162,7 @@ impl Plan {
                 return invalid(format!("measure: {name} is the column with the number of each run: rename it"));
             }
             let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
-            measures.push(of(measure, &settings, &mut recorded).map_err(wrong)?);
+            measures.push(of(measure, &settings, &mut recorded, &|name| loaded.has(name)).map_err(wrong)?);
         }
         let traced = definition.trace.iter().flat_map(|trace| &trace.of);
         let trace = traced.map(|name| place(&mut recorded, name)).collect();
@@ -273,16 +271,16 @@ impl Plan {
     ///
     /// # Errors
     /// The text is not a value of the variable's type.
-    pub fn number(&self, variable: &RunVariable, text: &str) -> Result<f64, Error> {
+    pub fn number(&self, variable: &RunVariable, text: &str) -> Result<Number, Error> {
         let number = |target: &PlanTarget| self.0.system.number(target, text);
-        Ok(variable.targets.first().map_or(Ok(f64::NAN), number)?)
+        Ok(variable.targets.first().map_or(Ok(Number::Missing), number)?)
     }
 
     /// Simulates once and records variables: `outputs`, or all outputs.
     ///
     /// # Errors
     /// The variable does not exist, or an FMU refuses.
-    pub fn simulate(&self, values: &[(RunVariable, f64)], outputs: Option<&[String]>) -> Result<Recording, Error> {
+    pub fn simulate(&self, values: &[(RunVariable, Number)], outputs: Option<&[String]>) -> Result<Recording, Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
         let source = |name: &String| Ok((self.0.connectors.source(name)?, name.clone()));
         let variables = outputs.iter().map(source).collect::<Result<Vec<_>, Error>>()?;
@@ -311,10 +309,10 @@ impl Plan {
     /// # Errors
     /// The columns are not of one length, an FMU refuses to make an instance, or `progress` stops it. An error of a run is in
     /// its row.
-    pub fn run_many(
+    pub fn run_many<N: Copy + Into<Number> + Sync>(
         &self,
         variables: &[RunVariable],
-        columns: &[&[f64]],
+        columns: &[&[N]],
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
     ) -> Result<RunResults, Error> {
@@ -329,16 +327,16 @@ impl Plan {
                 columns[k].len()
             ));
         }
-        let row = |index: u64, values: &mut Vec<f64>| {
+        let row = |index: u64, values: &mut Vec<Number>| {
             values.clear();
             let index = usize::try_from(index).unwrap_or(usize::MAX);
-            values.extend(columns.iter().map(|column| column[index]));
+            values.extend(columns.iter().map(|column| column[index].into()));
         };
         self.run_rows(variables, u64::try_from(length).unwrap_or(u64::MAX), &row, threads, progress)
     }
 
     /// The measures from the readings of a run.
-    pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<f64>, String> {
+    pub(crate) fn measured(&self, readings: &[Reading]) -> Result<Vec<Number>, String> {
         let of = |((measure, reading), column): ((&Measure, &Reading), &ResultColumn)| {
             measure.end(reading).map_err(|cause| format!("{}: {cause}", column.name))
         };
@@ -353,7 +351,7 @@ impl Plan {
         &self,
         variables: &[RunVariable],
         count: u64,
-        row: &(dyn Fn(u64, &mut Vec<f64>) + Sync),
+        row: &(dyn Fn(u64, &mut Vec<Number>) + Sync),
         threads: usize,
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
     ) -> Result<RunResults, Error> {
@@ -390,7 +388,11 @@ impl Plan {
 
 impl RunResults {
     pub(crate) fn empty(measures: usize, rows: usize) -> Self {
-        Self { measures: vec![vec![f64::NAN; rows]; measures], end: vec![f64::NAN; rows], errors: vec![None; rows] }
+        Self {
+            measures: vec![vec![Number::Missing; rows]; measures],
+            end: vec![f64::NAN; rows],
+            errors: vec![None; rows],
+        }
     }
 
     pub(crate) fn put(&mut self, row: usize, outcome: RunResult) {
@@ -427,8 +429,13 @@ fn place(names: &mut Vec<String>, name: &str) -> usize {
     })
 }
 
-fn of(measure: &MeasureDefinition, settings: &Settings, recorded: &mut Vec<String>) -> Result<(Measure, Sum), String> {
-    let sum = Sum::parse(&measure.of).map_err(|cause| format!("of = {cause}"))?;
+fn of(
+    measure: &MeasureDefinition,
+    settings: &Settings,
+    recorded: &mut Vec<String>,
+    known: &dyn Fn(&str) -> bool,
+) -> Result<(Measure, Sum), String> {
+    let sum = Sum::parse(&measure.of, known).map_err(|cause| format!("of = {cause}"))?;
     let wrap = measure.wrap.as_ref().map(period).transpose()?;
     let signal = Signal::new(&sum, wrap, |name| place(recorded, name));
     Ok((Measure::new(measure, signal, settings)?, sum))
@@ -452,7 +459,11 @@ impl Runner {
     }
 
     /// Runs with a value for each variable. `trace` receives the time and the traced variables at every communication point.
-    pub fn run(&mut self, values: &[f64], trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = f64>)) -> RunResult {
+    pub fn run(
+        &mut self,
+        values: &[Number],
+        trace: &mut dyn FnMut(f64, &mut dyn Iterator<Item = Number>),
+    ) -> RunResult {
         let Self { plan, worker, variables, states, .. } = self;
         let Shared { measures, trace: traced, .. } = &*plan.0;
         let mut end = f64::NAN;

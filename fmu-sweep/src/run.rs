@@ -199,7 +199,7 @@ impl Work<'_> {
             Executor::Process(process) => process.run(range.clone(), &mut lines)?,
         }
         let mut state = self.state();
-        lines.lines().for_each(|line| state.failures.add(self.sweep, line));
+        lines.lines().for_each(|line| state.failures.add(line));
         state.done += range.end - range.start;
         let (done, failed) = (state.done, state.failures.count);
         let blocks = state.parts.entry(*part).or_default();

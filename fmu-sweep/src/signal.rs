@@ -1,6 +1,7 @@
 //! The signal of a measure: a sum of variables.
 
 use crate::definition::SetValue;
+use fmu_import::Number;
 use std::f64::consts::PI;
 
 /// A sum as it is written.
@@ -11,13 +12,20 @@ pub(crate) struct Sum {
 }
 
 impl Sum {
-    /// Reads `[number *] variable` terms joined by ` + ` or ` - `; the spaces are required because names may contain signs.
-    pub(crate) fn parse(text: &str) -> Result<Self, String> {
+    /// Reads `[number *] variable` terms joined by ` + ` or ` - `; the spaces are required because names may contain signs. A name
+    /// with spaces is the longest known one.
+    pub(crate) fn parse(text: &str, known: &dyn Fn(&str) -> bool) -> Result<Self, String> {
         let mut terms = Vec::new();
         let mut sign = Some(1.0);
         let mut factor = None;
-        let mut words = text.split_whitespace().peekable();
-        while let Some(word) = words.next() {
+        let mut rest = text.trim();
+        while let Some(word) = rest.split_whitespace().next() {
+            let ends = rest.match_indices(char::is_whitespace).map(|(at, _)| at).chain([rest.len()]);
+            // A name stands where a term begins, and not before its factor.
+            let name = ends.filter(|&at| sign.is_some() && known(rest[..at].trim_end())).last();
+            let word = name.map_or(word, |at| rest[..at].trim_end());
+            rest = rest[word.len()..].trim_start();
+            let next = rest.split_whitespace().next();
             let wrong = || format!("{text:?}: {word:?} is not expected; write [number *] variable + ..., with spaces");
             let Some(of_term) = sign else {
                 sign = Some(match word {
@@ -29,13 +37,13 @@ impl Sum {
             };
             if factor.is_none() && terms.is_empty() && word == "-" {
                 sign = Some(-of_term);
-            } else if words.peek() == Some(&"*") {
+            } else if next == Some("*") && name.is_none() {
                 if factor.is_some() {
                     return Err(wrong());
                 }
                 factor = Some(word.parse::<f64>().ok().filter(|x| x.is_finite()).ok_or_else(wrong)?);
-                words.next();
-            } else if ["+", "-", "*"].contains(&word) {
+                rest = rest[1..].trim_start();
+            } else if name.is_none() && ["+", "-", "*"].contains(&word) {
                 return Err(wrong());
             } else {
                 terms.push((of_term * factor.take().unwrap_or(1.0), word.to_owned()));
@@ -69,10 +77,29 @@ impl Signal {
         self.wrap.is_some()
     }
 
-    /// The value at a communication point.
-    pub(crate) fn at(&self, values: &[f64]) -> f64 {
-        let sum = self.terms.iter().fold(0.0, |sum, (factor, column)| sum + factor * values[*column]);
-        self.wrap.map_or(sum, |period| sum - period * (sum / period).round())
+    /// The value at a communication point: an integer where all terms are integers with whole factors, else a double.
+    pub(crate) fn at(&self, values: &[Number]) -> Number {
+        if self.terms.iter().any(|(_, column)| values[*column] == Number::Missing) {
+            return Number::Missing;
+        }
+        if self.wrap.is_none()
+            && let Some(sum) = self.whole(values)
+        {
+            return sum;
+        }
+        let sum = self.terms.iter().fold(0.0, |sum, (factor, column)| sum + factor * values[*column].real());
+        Number::Real(self.wrap.map_or(sum, |period| sum - period * (sum / period).round()))
+    }
+
+    /// The sum of integers with all digits.
+    fn whole(&self, values: &[Number]) -> Option<Number> {
+        let term = |(factor, column): &(f64, usize)| match values[*column] {
+            #[expect(clippy::cast_possible_truncation, reason = "whole, and checked")]
+            Number::Integer(i) if factor.fract() == 0.0 && factor.abs() < 1e15 => i.checked_mul(*factor as i128),
+            _ => None,
+        };
+        let sum = self.terms.iter().try_fold(0_i128, |sum, of| sum.checked_add(term(of)?));
+        sum.map(Number::Integer)
     }
 }
 
@@ -96,24 +123,40 @@ mod tests {
 
     #[test]
     fn sums_are_read() {
-        let terms = |text| Sum::parse(text).unwrap().terms;
+        let none = |_: &str| false;
+        let terms = |text| Sum::parse(text, &none).unwrap().terms;
         let term = |factor, name: &str| (factor, name.to_owned());
         assert_eq!(terms("p.x-1[2]"), [term(1.0, "p.x-1[2]")]);
         assert_eq!(terms("c.theta_est - p.theta_e"), [term(1.0, "c.theta_est"), term(-1.0, "p.theta_e")]);
         assert_eq!(terms("- 9.5 * a + b - 2e-1 * c"), [term(-9.5, "a"), term(1.0, "b"), term(-0.2, "c")]);
+        let known = |name: &str| ["größe 温度", "'c d'", "größe"].contains(&name);
+        let named = Sum::parse("größe 温度 - 2 * 'c d' + größe", &known).unwrap().terms;
+        assert_eq!(named, [term(1.0, "größe 温度"), term(-2.0, "'c d'"), term(1.0, "größe")]);
         for text in ["", "a b", "a +", "2 * ", "a * b", "* a", "a + - b", "2 * 3 * a", "a - - b", "NaN * a"] {
-            assert!(Sum::parse(text).is_err(), "{text}: {:?}", Sum::parse(text));
+            assert!(Sum::parse(text, &none).is_err(), "{text}: {:?}", Sum::parse(text, &none));
         }
     }
 
     #[test]
     fn a_signal_is_wrapped_around_zero() {
-        let sum = Sum::parse("a - 2 * b").unwrap();
+        let sum = Sum::parse("a - 2 * b", &|_| false).unwrap();
         let signal = Signal::new(&sum, Some(360.0), |name| usize::from(name == "b"));
         assert_eq!(
-            [[10.0, 0.0], [350.0, 0.0], [0.0, 90.5], [730.0, 0.0]].map(|v| signal.at(&v)),
+            [[10.0, 0.0], [350.0, 0.0], [0.0, 90.5], [730.0, 0.0]].map(|v| signal.at(&v.map(Number::Real)).real()),
             [10.0, -10.0, 179.0, 10.0]
         );
+    }
+
+    #[test]
+    fn integers_keep_their_digits() {
+        let of = |text: &str, a: i128, b: i128| {
+            let signal = Signal::new(&Sum::parse(text, &|_| false).unwrap(), None, |name| usize::from(name == "b"));
+            signal.at(&[Number::Integer(a), Number::Integer(b)])
+        };
+        let large = 9_007_199_254_740_993;
+        assert_eq!(of("a", large, 0), Number::Integer(large));
+        assert_eq!(of("a - 2 * b", large, 1), Number::Integer(large - 2));
+        assert_eq!(of("a - 0.5 * b", 3, 1), Number::Real(2.5));
     }
 
     #[test]

@@ -4,6 +4,7 @@ use crate::definition::{Runs, Traces, Which};
 use crate::error::invalid;
 use crate::plan::{RUN, last_columns};
 use crate::{Definition, DesignRows, Error, Plan, ResultColumn, RunResult, RunResults, RunVariable, Runner};
+use fmu_import::{Number, csv};
 use fmu_system::cosimulation::item;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
@@ -65,8 +66,8 @@ impl Sweep {
             if rows.names().any(|other| other == name) {
                 return invalid(format!("measure: {name} is the name of a varied variable: rename it"));
             }
-            if name.contains([',', '"', '\n']) {
-                return invalid(format!("measure: {name:?} has a comma, a quote or a line break: rename it"));
+            if name.contains(['\n', '\r']) {
+                return invalid(format!("measure: {name:?} has a line break: rename it"));
             }
         }
         if let Some(Traces { every: Some(0), .. }) = definition.trace {
@@ -118,7 +119,7 @@ impl Sweep {
             let all = self.rows.count();
             return invalid(format!("rows from {first}, {count} of them, of a design with {all} rows"));
         }
-        let row = |k: u64, values: &mut Vec<f64>| self.rows.row(first + k, values);
+        let row = |k: u64, values: &mut Vec<Number>| self.rows.row(first + k, values);
         self.plan.run_rows(&self.variables, count, &row, threads, progress)
     }
 
@@ -136,8 +137,7 @@ impl Sweep {
 
     /// The header of the results, with its line break.
     pub(crate) fn header(&self) -> String {
-        let names: Vec<String> = self.columns().iter().map(|column| cell(&column.name)).collect();
-        names.join(",") + "\n"
+        csv::line(self.columns().iter().map(|column| &column.name))
     }
 
     /// All files of the sweep, FMUs included, with the SHA-256 of their bytes.
@@ -168,34 +168,24 @@ impl Sweep {
     }
 
     /// The line of a row, with its line break.
-    pub(crate) fn line(&self, row: u64, values: &[f64], outcome: &RunResult) -> String {
-        let mut line = row.to_string();
-        let mut put = |(column, x): (&ResultColumn, &f64)| {
-            line.push(',');
-            push_value(&mut line, &column.items, *x);
-        };
+    pub(crate) fn line(&self, row: u64, values: &[Number], outcome: &RunResult) -> String {
+        let mut cells = vec![row.to_string()];
+        let mut put = |(column, x): (&ResultColumn, &Number)| cells.push(value(&column.items, *x));
         self.variables.iter().map(|variable| &variable.column).zip(values).for_each(&mut put);
         match &outcome.result {
             Ok(measures) => self.plan.measures().iter().zip(measures).for_each(put),
-            Err(_) => line.extend(std::iter::repeat_n(',', self.plan.measures().len())),
+            Err(_) => cells.extend(std::iter::repeat_n(String::new(), self.plan.measures().len())),
         }
-        line.push(',');
-        if !outcome.end.is_nan() {
-            push_number(&mut line, outcome.end);
-        }
-        line.push(',');
-        if let Err(error) = &outcome.result {
-            line.push_str(&cell(&error.split_whitespace().collect::<Vec<_>>().join(" ")));
-        }
-        line.push('\n');
-        line
+        cells.push(if outcome.end.is_nan() { String::new() } else { number(Number::Real(outcome.end)) });
+        let error = outcome.result.as_ref().err();
+        cells.push(error.map(|e| e.split_whitespace().collect::<Vec<_>>().join(" ")).unwrap_or_default());
+        csv::line(cells)
     }
 
     /// The error of a line, if it has one.
-    pub(crate) fn error_of<'a>(&self, line: &'a str) -> Option<&'a str> {
-        // Only the last cell may have commas.
-        let columns = 1 + self.variables.len() + self.plan.measures().len() + 1;
-        line.trim_end().splitn(columns + 1, ',').nth(columns).filter(|error| !error.is_empty())
+    pub(crate) fn error_of(line: &str) -> Option<String> {
+        // Most rows end with the comma before an empty error.
+        if line.trim_end().ends_with(',') { None } else { csv::cells(line).pop() }
     }
 
     /// Duration of a run in s, and whether instances can be reused, that is, whether the last row gives the same line after a
@@ -222,7 +212,7 @@ impl Sweep {
 pub(crate) struct Writer<'a> {
     sweep: &'a Sweep,
     runner: Runner,
-    values: Vec<f64>,
+    values: Vec<Number>,
     /// Folder for traces.
     traces: Option<PathBuf>,
     trace: String,
@@ -242,44 +232,33 @@ impl Writer<'_> {
         trace.clear();
         let outcome = runner.run(values, &mut |t, traced| {
             if wanted.is_some() && point % every == 0 {
-                push_number(trace, t);
-                sweep.plan.traced().zip(traced).for_each(|(column, x)| {
-                    trace.push(',');
-                    push_value(trace, &column.items, x);
-                });
-                trace.push('\n');
+                let values = sweep.plan.traced().zip(traced).map(|(column, x)| value(&column.items, x));
+                trace.push_str(&csv::line([number(Number::Real(t))].into_iter().chain(values)));
             }
             point += 1;
         });
         if let (Some(wanted), Some(folder)) = (wanted, traces)
             && (wanted.runs != Runs::Word(Which::Failed) || outcome.result.is_err())
         {
-            let names: Vec<String> = wanted.of.iter().map(|name| cell(name)).collect();
-            let text = format!("time,{}\n{trace}", names.join(","));
+            let names = csv::line(std::iter::once("time").chain(wanted.of.iter().map(String::as_str)));
+            let text = format!("{names}{trace}");
             crate::files::write(&folder.join(format!("run-{row:08}.csv")), text.as_bytes())?;
         }
         Ok(sweep.line(row, values, &outcome))
     }
 }
 
-/// The name of an enumeration's value, or a number. A name that CSV would have to quote stays a number: cells are split at commas.
-fn push_value(text: &mut String, items: &[(i64, String)], x: f64) {
-    match item(items, x).filter(|name| !name.contains([',', '"', '\n'])) {
-        Some(name) => text.push_str(name),
-        None => push_number(text, x),
+/// The name of an enumeration's value, or a number.
+fn value(items: &[(i64, String)], x: Number) -> String {
+    item(items, x.real()).map_or_else(|| number(x), str::to_owned)
+}
+
+/// A number in few characters that reads back as the same one; nothing for a missing one.
+fn number(number: Number) -> String {
+    match number {
+        Number::Real(x) if x != 0.0 && x.is_finite() && !(1e-5..1e16).contains(&x.abs()) => format!("{x:e}"),
+        number => number.to_string(),
     }
-}
-
-/// A number in few characters that reads back as the same double.
-fn push_number(text: &mut String, x: f64) {
-    let plain = x == 0.0 || (1e-5..1e16).contains(&x.abs()) || !x.is_finite();
-    // Writing to a String cannot fail.
-    let _ = if plain { write!(text, "{x}") } else { write!(text, "{x:e}") };
-}
-
-/// A cell of CSV.
-fn cell(text: &str) -> String {
-    if text.contains([',', '"']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_owned() }
 }
 
 struct HashWriter<'a>(&'a mut Sha256);

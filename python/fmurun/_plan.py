@@ -148,7 +148,8 @@ class Plan:
         return self._prefix + name
 
     def simulate(self, start_values=None):
-        """Run once; `start_values` in addition to those of the plan. Returns a structured array with `time` (s) first.
+        """Run once; `start_values` in addition to those of the plan. Returns a structured array with `time` (s) first. Its columns
+        are doubles; one with an integer beyond 2**53 has 64-bit integers.
 
         >>> Plan(PLANT, stop_time=0.01, step_size=1e-3, output=["speed", "i_a"]).simulate().dtype.names
         ('time', 'speed', 'i_a')
@@ -160,7 +161,7 @@ class Plan:
         output = None if self._output is None else [self._name(name) for name in self._output]
         time, columns = self._core.simulate(names, values, output)
         columns = [(name.removeprefix(self._prefix), *more) for name, *more in columns]
-        result = np.empty(len(time), [("time", float)] + [(name, float) for name, *_ in columns])
+        result = np.empty(len(time), [("time", float)] + [(name, values.dtype) for name, values, _ in columns])
         result["time"] = time
         for name, values, _ in columns:
             result[name] = values
@@ -429,4 +430,7 @@ def _values(name, column, core, full):
     bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
     if bad:
         raise TypeError(f"the column {name} must have numbers, not {bad[0]!r}")
-    return np.require(array, np.float64, ["C", "A"])
+    # Doubles, unless they lose digits.
+    exact = array.dtype.kind in "iu" and any(abs(int(x)) > 2**53 for x in (array.min(initial=0), array.max(initial=0)))
+    wide = np.uint64 if array.dtype.kind == "u" else np.int64
+    return np.require(array, wide if exact else np.float64, ["C", "A"])

@@ -1,6 +1,7 @@
 //! Many runs of one system: the implementation behind `fmurun.Plan` in `fmurun/_plan.py`.
 
 use crate::error::{gate, plain, raise};
+use fmu_import::Number;
 use fmu_import::guard::patiently;
 use fmu_sweep::{Definition, RunResults, RunVariable, Sweep};
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
@@ -80,7 +81,7 @@ impl Plan {
         names: Vec<String>,
         values: Vec<String>,
         outputs: Option<Vec<String>>,
-    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyArray1<f64>>, (String, f64, f64))>)> {
+    ) -> PyResult<(Bound<'py, PyArray1<f64>>, Vec<(String, Bound<'py, PyAny>, (String, f64, f64))>)> {
         gate(|| {
             let run = || {
                 let set = self.plan.bind(names.iter().map(String::as_str))?;
@@ -90,13 +91,15 @@ impl Plan {
             };
             let recording = py.detach(run).map_err(failed)?;
             let columns = recording.columns.into_iter().map(|c| {
+                let values = if c.exact.is_empty() { array(py, &c.values) } else { integers(py, &c.exact) };
                 let shown = match &c.display {
                     Some(display) => (c.shown_unit().to_owned(), display.factor, display.offset),
                     None => (c.unit, 1.0, 0.0),
                 };
-                (c.name, c.values.into_pyarray(py), shown)
+                Ok((c.name, values?, shown))
             });
-            Ok((recording.time.into_pyarray(py), columns.collect()))
+            let columns = columns.collect::<PyResult<_>>()?;
+            Ok((recording.time.into_pyarray(py), columns))
         })
     }
 
@@ -106,19 +109,19 @@ impl Plan {
         &self,
         py: Python<'py>,
         names: Vec<String>,
-        columns: Vec<PyReadonlyArray1<'py, f64>>,
+        columns: Vec<Given<'py>>,
         threads: usize,
         progress: Option<Py<PyAny>>,
-    ) -> PyResult<(Vec<Bound<'py, PyArray1<f64>>>, Bound<'py, PyArray1<f64>>, Vec<String>)> {
+    ) -> PyResult<(Vec<Bound<'py, PyAny>>, Bound<'py, PyArray1<f64>>, Vec<String>)> {
         gate(|| {
             // Copies: another thread may write the arrays once Python's lock is released.
-            let columns: Vec<Vec<f64>> = columns.iter().map(|column| column.as_array().to_vec()).collect();
+            let columns: Vec<Vec<Number>> = columns.iter().map(Given::numbers).collect();
             let variables = self.plan.bind(names.iter().map(String::as_str)).map_err(failed)?;
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
-            let columns: Vec<&[f64]> = columns.iter().map(Vec::as_slice).collect();
+            let columns: Vec<&[Number]> = columns.iter().map(Vec::as_slice).collect();
             let run = |go_on: &GoOn<'_>| self.plan.run_many(&variables, &columns, threads, go_on);
             let RunResults { measures, end, errors } = py.detach(|| attended(run, progress.as_ref()))?;
-            let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
+            let measures = measures.iter().map(|x| integers(py, x)).collect::<PyResult<_>>()?;
             Ok((measures, end.into_pyarray(py), errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
     }
@@ -138,7 +141,8 @@ impl Plan {
             let threads = if threads == 0 { fmu_sweep::threads_here() } else { threads };
             let run = |go_on: &GoOn<'_>| self.plan.run_around(&variables, &point, &steps, threads, go_on);
             let RunResults { measures, errors, .. } = py.detach(|| attended(run, None))?;
-            let measures = measures.into_iter().map(|x| x.into_pyarray(py)).collect();
+            let reals = |x: Vec<Number>| x.into_iter().map(Number::real).collect::<Vec<f64>>().into_pyarray(py);
+            let measures = measures.into_iter().map(reals).collect();
             Ok((measures, errors.into_iter().map(Option::unwrap_or_default).collect()))
         })
     }
@@ -156,7 +160,7 @@ impl Plan {
             }
             let dict = PyDict::new(py);
             for (name, column) in rows.names().zip(columns) {
-                dict.set_item(name, column.into_pyarray(py))?;
+                dict.set_item(name, integers(py, &column)?)?;
             }
             Ok((first, dict))
         })
@@ -202,7 +206,7 @@ impl Plan {
     fn number(&self, name: &str, text: &str) -> PyResult<f64> {
         gate(|| {
             let variable = self.plan.bind([name]).map_err(failed)?;
-            self.plan.number(&variable[0], text).map_err(failed)
+            self.plan.number(&variable[0], text).map(Number::real).map_err(failed)
         })
     }
 }
@@ -213,6 +217,54 @@ impl Plan {
             || plain("the plan has no design: Plan.from_toml reads a file that has one; or give rows as a table");
         self.sweep.as_ref().ok_or_else(none)
     }
+}
+
+/// A column of numbers from Python.
+#[derive(FromPyObject)]
+enum Given<'py> {
+    Signed(PyReadonlyArray1<'py, i64>),
+    Unsigned(PyReadonlyArray1<'py, u64>),
+    Real(PyReadonlyArray1<'py, f64>),
+}
+
+impl Given<'_> {
+    fn numbers(&self) -> Vec<Number> {
+        match self {
+            Self::Signed(column) => column.as_array().iter().map(|&i| Number::Integer(i.into())).collect(),
+            Self::Unsigned(column) => column.as_array().iter().map(|&i| Number::Integer(i.into())).collect(),
+            Self::Real(column) => column.as_array().iter().map(|&x| Number::Real(x)).collect(),
+        }
+    }
+}
+
+#[expect(clippy::unnecessary_wraps, reason = "as `integers`")]
+fn array<'py>(py: Python<'py>, values: &[f64]) -> PyResult<Bound<'py, PyAny>> {
+    Ok(values.to_vec().into_pyarray(py).into_any())
+}
+
+/// An array of these numbers: of 64-bit integers if all are integers and doubles would lose digits, else of doubles; where a
+/// number is missing among integers that doubles would round, of Python's numbers.
+fn integers<'py>(py: Python<'py>, numbers: &[Number]) -> PyResult<Bound<'py, PyAny>> {
+    let rounded = |x: &Number| matches!(x, Number::Integer(i) if i.unsigned_abs() > 1 << 53);
+    if !numbers.iter().any(rounded) {
+        return array(py, &numbers.iter().map(|x| x.real()).collect::<Vec<f64>>());
+    }
+    let whole = |x: &Number| if let Number::Integer(i) = x { Some(*i) } else { None };
+    let whole: Option<Vec<i128>> = numbers.iter().map(whole).collect();
+    let fit = |x: &Vec<i128>| x.iter().map(|&i| i64::try_from(i).ok()).collect::<Option<Vec<i64>>>();
+    let fit_unsigned = |x: &Vec<i128>| x.iter().map(|&i| u64::try_from(i).ok()).collect::<Option<Vec<u64>>>();
+    if let Some(signed) = whole.as_ref().and_then(fit) {
+        return Ok(signed.into_pyarray(py).into_any());
+    }
+    if let Some(unsigned) = whole.as_ref().and_then(fit_unsigned) {
+        return Ok(unsigned.into_pyarray(py).into_any());
+    }
+    let any = |x: &Number| match x {
+        Number::Integer(i) => Ok(i.into_pyobject(py)?.into_any().unbind()),
+        other => Ok(other.real().into_pyobject(py)?.into_any().unbind()),
+    };
+    let all: Vec<Py<PyAny>> = numbers.iter().map(any).collect::<PyResult<_>>()?;
+    Ok(all.into_pyarray(py).into_any())
 }
 
 /// Called with the number of rows done; returns whether to continue.

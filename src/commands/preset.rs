@@ -7,6 +7,7 @@ use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_study::tune::{self, setting::Tuned};
 use fmu_import::printable;
+use fmu_import::written::assignment;
 use fmu_system::cosimulation::Schedule;
 use fmu_system::ssp::ssv;
 use std::path::{Path, PathBuf};
@@ -80,7 +81,8 @@ pub fn run(args: &Preset) -> Result<String> {
     }
     let of_motor = tuned.map(|tuned| motor::set(&mut preset, &tuned)).transpose()?;
     for text in &args.set {
-        let (name, value) = text.split_once('=').ok_or_else(|| anyhow!("{text}: is not --set NAME=VALUE"))?;
+        let known = assignment(text, |name| preset.has(name));
+        let (name, value) = known.ok_or_else(|| anyhow!("{text}: is not --set NAME=VALUE"))?;
         preset.set(name.trim(), value.trim(), None).with_context(|| format!("--set {text}"))?;
     }
     let changes = preset.write(args.name.as_deref(), given.or(of_motor).as_ref(), &out)?;

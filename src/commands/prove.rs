@@ -217,7 +217,9 @@ fn own(example: &Example) -> Result<f64> {
 
 /// The values of a column in CSV form.
 fn cells(recording: &Recording, name: &str) -> Option<Vec<String>> {
-    let numbers = |column: &fmu_system::cosimulation::Column| column.values.iter().map(f64::to_string).collect();
+    let numbers = |column: &fmu_system::cosimulation::Column| {
+        (0..column.values.len()).map(|k| column.at(k).to_string()).collect()
+    };
     let texts = || Some(recording.texts.iter().find(|column| column.name == name)?.values.clone());
     recording.column(name).map(numbers).or_else(texts)
 }

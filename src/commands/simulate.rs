@@ -10,7 +10,8 @@ use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
-use fmu_import::{Fmu, Instance, Kind, Message, journal, printable, printable_lines};
+use fmu_import::written::{assignment, names, pair};
+use fmu_import::{Fmu, Instance, Kind, Message, Number, journal, printable, printable_lines};
 use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
@@ -104,8 +105,8 @@ pub struct Simulate {
     /// Communication step in s [default: the shortest of the FMUs, else a thousandth of the duration]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Variables to record [default: all outputs]
-    #[arg(long, value_name = "VARIABLE,...", value_delimiter = ',')]
+    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: all outputs]
+    #[arg(long, value_name = "VARIABLE,...")]
     pub record: Vec<String>,
     /// Write the recording as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]
@@ -240,7 +241,10 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     let (settings, for_plot) = prepare(&mut loaded, args)?;
     let Loaded { mut system, .. } = loaded;
     let settings = system.feasible(&settings)?;
-    system.take_notes().iter().for_each(|note| message::note(&printable(note)));
+    let before = system.take_notes();
+    for note in &before {
+        message::note(&printable(note));
+    }
     let mut progress = Progress::new(settings);
     let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut CommunicationPoint<'_>| {
@@ -257,6 +261,8 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     };
     let (recording, outcome) = system.run_keeping(&settings, &mut hook);
     progress.end();
+    let during = system.take_notes().into_iter().filter(|note| !before.contains(note));
+    during.for_each(|note| message::note(&printable(&note)));
     if args.logging {
         show(&system.take_messages());
     }
@@ -275,7 +281,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     };
     journal::writes();
     std::env::set_current_dir(&home)?;
-    let bad = recording.columns.iter().find(|c| c.values.last().is_some_and(|x| !x.is_finite()));
+    let bad = recording.columns.iter().find(|c| matches!(c.last(), Number::Real(x) if !x.is_finite()));
     let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
     let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
     let written = output::write(recording, for_plot, alone, args, &mut out);
@@ -339,15 +345,18 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
 
 /// Prepares the run; also returns how many of the last columns are only for the plot.
 fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
+    let value =
+        |text| assignment(text, |name| loaded.has(name)).ok_or_else(|| anyhow!("{text}: is not --set VARIABLE=VALUE"));
+    let values = args.set.iter().map(|text| value(text.as_str())).collect::<Result<Vec<_>>>()?;
     let Loaded { system, .. } = loaded;
-    let values = args.set.iter().map(|text| halves(text, "--set VARIABLE=VALUE")).collect::<Result<Vec<_>>>()?;
     // The following arguments name elements of arrays whose sizes are set here.
     let (sizes, values): (Vec<_>, Vec<_>) =
         values.into_iter().partition(|(port, _)| system.is_size(port).unwrap_or(false));
     system.configure(sizes)?;
     for text in &args.connect {
-        let (from, to) = halves(text, "--connect OUTPUT=INPUT")?;
-        system.connect(from, to)?;
+        let both = pair(text, |name| system.has(name), |name| system.has(name));
+        let (from, to) = both.ok_or_else(|| anyhow!("{text}: is not --connect OUTPUT=INPUT"))?;
+        system.connect(from, to.trim())?;
     }
     for text in &args.terminal {
         let (one, other) = halves(text, "--terminal INSTANCE.TERMINAL=INSTANCE.TERMINAL")?;
@@ -356,7 +365,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
         }
     }
     for text in &args.input {
-        match text.split_once('=') {
+        match assignment(text, |name| loaded.has(name)) {
             Some((port, file)) if file.to_lowercase().ends_with(".csv") => {
                 loaded
                     .sequence(port, &column(port, file).map_err(|cause| anyhow!("--input {text}: {cause}"))?)
@@ -403,7 +412,11 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
             for_plot += 1;
         }
     }
-    args.record.iter().try_for_each(|port| loaded.record(port))?;
+    for text in &args.record {
+        for name in names(text, |name| loaded.has(name)) {
+            loaded.record(&name).with_context(|| format!("--record {text}"))?;
+        }
+    }
     Ok((loaded.settings(args.start, args.stop, args.step, args.sequential), for_plot))
 }
 

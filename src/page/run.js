@@ -552,7 +552,7 @@ function read(hash) {
   const list = (key) => (given.get(key) ?? "").split(",").filter(Boolean);
   const value = (name, text) => {
     const v = byName.get(name), wanted = v && (v.causality === "input" || v.causality === "parameter") && v.elements === 1;
-    const x = !wanted ? undefined : v.kind === "Boolean" ? { true: true, false: false }[text] : v.kind === "String" ? decodeURIComponent(text) : Number(text);
+    const x = !wanted ? undefined : v.kind === "Boolean" ? { true: true, false: false }[text] : v.kind === "String" ? name(text) : Number(text);
     if (x === undefined || (typeof x === "number" && (text === "" || !allowed(v, x)))) { wrong.push(`${name}:${text}`); return undefined; }
     return x;
   };

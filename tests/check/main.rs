@@ -9,6 +9,7 @@ mod common;
 mod findings;
 mod foreign;
 mod plant;
+mod scripts;
 mod survives;
 mod terminals;
 #[path = "../../fmu-check/tests/faults/zip.rs"]

@@ -1,8 +1,10 @@
 //! Feedthrough: an input and an output of every type.
 
 use super::{archive, open, script};
-use fmu_import::Values;
+use fmu_import::{Number, Values};
+use fmu_sweep::{Definition, Options, Sweep};
 use fmu_system::cosimulation::{Recording, Sequence, Settings, System};
+use fmu_system::ssp::load::Loaded;
 use model_description::BaseType;
 use model_description::FmiVersion::V3;
 use std::fs;
@@ -86,6 +88,134 @@ fn the_ends_of_every_integer_arrive_exactly() {
     instance.exit_initialization().unwrap();
     assert_eq!(instance.get("UInt64_output").unwrap(), Values::Integers(vec![u64::MAX.into()]));
     assert_eq!(instance.get("Int64_output").unwrap(), Values::Integers(vec![i64::MAX.into()]));
+}
+
+/// From one FMU to another, into a recording, a file and a measure, an integer keeps every digit; texts and bytes travel, too.
+#[test]
+fn connected_values_keep_their_type() {
+    let large = 9_007_199_254_740_993_i128;
+    let mut system = System::default();
+    for name in ["a", "b"] {
+        system.add(name, &open("feedthrough"), false).unwrap();
+    }
+    for name in ["Int64", "UInt64", "String", "Binary", "Boolean", "Enumeration"] {
+        system.connect(&format!("a.{name}_output"), &format!("b.{name}_input")).unwrap();
+    }
+    system.connect("a.Int32_output", "b.Float64_discrete_input").unwrap();
+    let set = [
+        ("Int64", "-9007199254740993"),
+        ("UInt64", "18446744073709551615"),
+        ("String", "x, \"y\""),
+        ("Binary", "00ff"),
+    ];
+    for (name, value) in [&set[..], &[("Boolean", "true"), ("Enumeration", "Option2"), ("Int32", "-7")]].concat() {
+        system.set(&format!("a.{name}_input"), value).unwrap();
+    }
+    system.record_outputs().unwrap();
+    let settings = Settings { start: 0.0, stop: 0.4, step: 0.1, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let last = |name: &str| recording.column(&format!("b.{name}_output")).unwrap().last();
+    assert_eq!(["Int64", "UInt64"].map(last), [Number::Integer(-large), Number::Integer(u64::MAX.into())]);
+    assert_eq!((last("Boolean").real(), last("Enumeration")), (1.0, Number::Integer(2)));
+    assert_eq!(last("Float64_discrete"), Number::Real(-7.0));
+    let texts = |name: &str| recording.texts.iter().find(|c| c.name == name).unwrap().values.last().unwrap().clone();
+    assert_eq!(["b.String_output", "b.Binary_output"].map(texts), ["x, \"y\"", "00ff"]);
+    let mut csv = Vec::new();
+    recording.write_csv(&mut csv).unwrap();
+    let csv = String::from_utf8(csv).unwrap();
+    assert_eq!(csv.lines().last().unwrap().matches("-9007199254740993,18446744073709551615").count(), 2, "{csv}");
+    let wrong = |from: &str, to: &str| {
+        let mut system = System::default();
+        for name in ["a", "b"] {
+            system.add(name, &open("feedthrough"), false).unwrap();
+        }
+        system.connect(from, to).unwrap_err().to_string()
+    };
+    let said = wrong("a.String_output", "b.Binary_input");
+    assert_eq!(said, "b.Binary_input: has the type Binary, a.String_output has String");
+}
+
+/// A sweep varies integers of 64 bits and measures them with all digits; so does a list from a file.
+#[test]
+fn a_sweep_keeps_the_digits_of_integers() {
+    let folder = super::archives().join("sweep-digits");
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join("list.csv"), "it.Int64_input\n9007199254740993\n-9223372036854775808\n").unwrap();
+    let head = format!("fmus = ['it={}']\nstop = 0.2\nstep = 0.1\n", archive("feedthrough", V3).display());
+    let tail = "[measure]\nlast = { of = 'it.Int64_output', is = 'final' }\n\
+        above = { of = 'it.Int64_output - it.Int32_output', is = 'max' }\n";
+    let grid = "design = { kind = 'grid' }\n[vary]\n'it.Int64_input' = { values = [9007199254740993, -9223372036854775808] }\n";
+    for (name, design) in [("grid", grid), ("list", "design = { kind = 'list', file = 'list.csv' }\n")] {
+        let definition = Definition::parse(&format!("{head}{design}{tail}")).unwrap();
+        let sweep = Sweep::new(definition, folder.clone()).unwrap();
+        let out = folder.join(name);
+        let done = fmu_sweep::run(&sweep, &out, &Options { restart: true, ..Options::default() }, &Quiet).unwrap();
+        let rows = fs::read_to_string(done.results.unwrap()).unwrap();
+        let expected = "0,9007199254740993,9007199254740993,9007199254740993,0.2,\n\
+            1,-9223372036854775808,-9223372036854775808,-9223372036854775808,0.2,\n";
+        assert_eq!(rows.split_once('\n').unwrap().1, expected, "{name}");
+    }
+}
+
+struct Quiet;
+
+impl fmu_sweep::Progress for Quiet {
+    fn note(&self, _text: &str) {}
+    fn progress(&self, _done: u64, _failed: u64, _all: u64) {}
+}
+
+/// An SSP whose connections have tables: an item of an enumeration becomes an integer, an integer a truth value.
+#[test]
+fn connections_of_an_ssp_have_tables() {
+    use std::io::Write;
+    let connector = |name: &str, kind: &str| format!("<s:Connector name='{name}' kind='{kind}'/>");
+    let connectors = ["Enumeration", "Int32", "Boolean"]
+        .map(|name| connector(&format!("{name}_input"), "input") + &connector(&format!("{name}_output"), "output"));
+    let component = |name: &str| {
+        let connectors = connectors.concat();
+        format!("<s:Component name='{name}' source='f.fmu'><s:Connectors>{connectors}</s:Connectors></s:Component>")
+    };
+    let connection = |from: &str, to: &str, inside: &str| {
+        format!(
+            "<s:Connection startElement='a' startConnector='{from}_output' endElement='b' endConnector='{to}_input'>{inside}</s:Connection>"
+        )
+    };
+    let items = "<c:EnumerationMappingTransformation><c:MapEntry source='Option1' target='-5'/>\
+        <c:MapEntry source='Option2' target='70'/></c:EnumerationMappingTransformation>";
+    let numbers = "<c:IntegerMappingTransformation><c:MapEntry source='4' target='true'/><c:MapEntry source='0' target='false'/>\
+        </c:IntegerMappingTransformation>";
+    let description = format!(
+        "<s:SystemStructureDescription version='2.0'><s:System name='x'><s:Elements>{}{}</s:Elements><s:Connections>{}{}\
+         </s:Connections></s:System></s:SystemStructureDescription>",
+        component("a"),
+        component("b"),
+        connection("Enumeration", "Int32", items),
+        connection("Int32", "Boolean", numbers),
+    );
+    let path = super::archives().join("tables.ssp");
+    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+    for (name, bytes) in
+        [("SystemStructure.ssd", description.into_bytes()), ("f.fmu", fs::read(archive("feedthrough", V3)).unwrap())]
+    {
+        zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+        zip.write_all(&bytes).unwrap();
+    }
+    zip.finish().unwrap();
+    let run = |number: &str| {
+        let mut loaded = Loaded::open(&path, false).unwrap();
+        loaded.set("a.Enumeration_input", "Option2").unwrap();
+        loaded.set("a.Int32_input", number).unwrap();
+        for name in ["b.Int32_input", "b.Int32_output", "b.Boolean_output"] {
+            loaded.record(name).unwrap();
+        }
+        let settings = Settings { start: 0.0, stop: 0.4, step: 0.1, sequential: false };
+        loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(())))
+    };
+    let recording = run("4").unwrap();
+    let last: Vec<f64> = recording.columns.iter().map(|column| column.last().real()).collect();
+    assert_eq!(last, [70.0, 70.0, 1.0]);
+    let error = run("3").unwrap_err().to_string();
+    assert_eq!(error, "Boolean_input: the table of its connection has no entry for 3");
 }
 
 /// Straight lines for continuous values, jumps where a time occurs twice, and texts and bytes that are held.

@@ -1,8 +1,9 @@
 //! The Reference-FMUs in Rust, `examples/reference-fmus/`: packed, in our importer and in FMPy, with the bits of the originals; and
-//! `examples/current-map`.
+//! `examples/current-map` and `examples/can-bus`.
 #![allow(missing_docs, clippy::float_cmp)]
 
 mod bouncing_ball;
+mod can_bus;
 mod clocks;
 mod current_map;
 mod dahlquist;

@@ -194,6 +194,41 @@ fn elements_of_a_resized_array_are_found() {
     }
 }
 
+/// Whole arrays travel from FMU to FMU; other extents are refused.
+#[test]
+fn arrays_are_connected_whole() {
+    for version in BOTH {
+        let fmu = fmu_import::Fmu::open(archive("state-space", version)).unwrap();
+        let mut system = System::default();
+        for name in ["a", "b"] {
+            system.add(name, &fmu, false).unwrap();
+        }
+        if version == V2 {
+            // FMI 2.0 has no arrays.
+            system.connect("a.y[2]", "b.u[2]").unwrap();
+        } else {
+            let said = system.connect("a.y", "b.u[2]").unwrap_err().to_string();
+            let expected =
+                "b.u[2]: takes one value, and a.y has 3 elements: name an element of the array, as in a.y[1]";
+            assert_eq!(said, expected);
+            system.connect("a.y", "b.u").unwrap();
+        }
+        system.set("a.u[2]", "5").unwrap();
+        system.record("b.y[2]").unwrap();
+        let settings = Settings { start: 0.0, stop: 1e-3, step: 1e-3, sequential: false };
+        let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+        // x = 0 at the start, so y = u: b receives the 5 of a's input at once.
+        assert_eq!(recording.columns[0].values[0], 5.0, "{version}");
+    }
+    let mut system = System::default();
+    for name in ["a", "b"] {
+        system.add(name, &open("state-space"), false).unwrap();
+    }
+    system.configure([("b.m", "2")]).unwrap();
+    let said = system.connect("a.y", "b.u").unwrap_err().to_string();
+    assert_eq!(said, "b.u: takes 2 elements, and a.y has 3 elements");
+}
+
 /// A state saved with other sizes restores them.
 #[test]
 fn a_saved_state_has_its_sizes() {

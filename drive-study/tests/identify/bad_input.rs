@@ -69,7 +69,7 @@ fn bad_files_are_named_by_place() {
     let still = changed(&rows, |r| Row { u: Complex::new(0.0, 0.0), ..*r });
     let duties = good.replace("u_alpha,u_beta", "d_a,d_b").replace("tau_load", "d_c");
     for (text, message) in [
-        (String::new(), "r.csv: is empty; expected a header and rows of numbers"),
+        (String::new(), "r.csv: is empty, expected a header with the names of variables"),
         (line(0), "r.csv: has no row of numbers below t [s],u_alpha"),
         (with(100, &line(99)), "r.csv:101:t: 0.0098 s does not follow 0.0098 s: time must increase"),
         (

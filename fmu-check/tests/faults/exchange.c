@@ -33,12 +33,14 @@ static void fresh(M *m) {
     memset(m, 0, sizeof *m);
     m->exchange = kept.exchange, m->events = kept.events, m->early = kept.early;
     m->gain = FAULT(STIFF) ? 1e4 : 1, m->x = 1, m->above = 1, m->mode = INSTANTIATED;
+    if (FAULT(V07m) && m->exchange) m->x = 2;
     if (FAULT(E12) && kept.mode) m->x = kept.x;
     if (FAULT(E12m) && kept.mode == CONTINUOUS) m->mode = CONTINUOUS;
     if (FAULT(E12g) && kept.mode == CONTINUOUS) m->gain = kept.gain;
 }
 
-static int made;
+/* Instances that were made, and that were freed. */
+static int made, gone;
 
 static M *make(int exchange, int events, int early) {
     if (FAULT(E17) && exchange && made++) return NULL;
@@ -57,6 +59,7 @@ static bool due(const M *m, double t) { return t >= instant(m) - 1e-6; }
 static double slope(M *m) {
     if (FAULT(E16s) && m->mode == EVENT) return 0;
     double dx = m->gain * (m->u - m->x);
+    if (FAULT(E17f)) dx += 0.01 * gone;
     if (FAULT(E06a)) {
         dx += 1e-4 * (m->x - m->last_x);
         m->last_x = m->x;
@@ -71,11 +74,14 @@ static double slope(M *m) {
 
 static double indicator(const M *m) {
     double z = m->x - 0.5;
+    if (FAULT(E25s)) return m->x > 0.9 ? 1 : -1;
     if (FAULT(E25)) return m->n > 3 && m->n < 8 ? 0 : z == 0 ? 1e-12 : z;
     return z == 0 ? 1e-12 : z;
 }
 
 static bool tick(M *m) {
+    /* The event is due, and does nothing. */
+    if (FAULT(E19t) && !m->exchange) return m->k++, false;
     m->n++, m->k++;
     if (m->k % 3) return false;
     m->x += 0.25;
@@ -265,11 +271,11 @@ static int partial(M *m, const unsigned *u, size_t nu, const unsigned *k, size_t
 static int step(M *m, double t, double h, bool *event, bool *early, double *last) {
     *event = *early = false;
     ENTER(STEP);
-    if (!(h > 0) || fabs(t - m->t) > 1e-6) return fail(m);
+    if (!(h > 0 && h < 1e6) || !(fabs(t - m->t) <= 1e-6)) return fail(m);
     double end = t + h;
     while (m->t < end - 1e-9) {
         double to = fmin(end, fmax(instant(m), m->t));
-        m->x = m->u + (m->x - m->u) * exp(-m->gain * (to - m->t));
+        m->x = m->u + (m->x - m->u) * exp(-m->gain * (FAULT(E19) ? 0.2 : 1) * (to - m->t));
         m->t = to;
         if (!due(m, m->t)) continue;
         if (m->events) *event = true;
@@ -321,7 +327,7 @@ typedef struct { int again, terminate, nominals, states, defined; double next; }
 EXPORT const char *fmi2GetTypesPlatform(void) { return "default"; }
 EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 EXPORT void *fmi2Instantiate(const char *n, int type, const char *g, const char *r, const void *c, int v, int l) { return make(type == 0, 0, 0); }
-EXPORT void fmi2FreeInstance(M *m) { free(m); }
+EXPORT void fmi2FreeInstance(M *m) { gone++, free(m); }
 EXPORT int fmi2SetDebugLogging(M *m, int on, size_t n, const char *const *c) { return m ? OK : ERROR; }
 EXPORT int fmi2SetupExperiment(M *m, int a, double b, double start, int c, double d) { ENTER(INSTANTIATED); return m->start = start, OK; }
 EXPORT int fmi2EnterInitializationMode(M *m) { return m ? enter_initialization(m, m->start) : ERROR; }
@@ -363,7 +369,7 @@ EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
 EXPORT void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool events, bool early,
                                          const unsigned *q, size_t nq, void *e, void *log, void *up) { return make(0, events, early); }
 EXPORT void *fmi3InstantiateModelExchange(const char *n, const char *t, const char *r, bool v, bool l, void *e, void *log) { return make(1, 0, 0); }
-EXPORT void fmi3FreeInstance(M *m) { free(m); }
+EXPORT void fmi3FreeInstance(M *m) { gone++, free(m); }
 EXPORT int fmi3SetDebugLogging(M *m, bool on, size_t n, const char *const *c) { return m ? OK : ERROR; }
 EXPORT int fmi3EnterInitializationMode(M *m, bool a, double b, double start, bool c, double d) { return enter_initialization(m, start); }
 EXPORT int fmi3ExitInitializationMode(M *m) { return leave_initialization(m); }

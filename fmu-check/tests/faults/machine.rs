@@ -26,6 +26,47 @@ fn the_limit_on_memory_is_ours() {
     assert!(matches!(verdict(&report, "L00"), Verdict::Pass(_)), "{:?}", verdict(&report, "L00"));
 }
 
+/// An FMU that needs more open files than a probe may have.
+#[test]
+fn the_limit_on_files_is_ours() {
+    let dir = tempfile::tempdir().unwrap();
+    let Some(binary) = compile(2, "FILES") else { return };
+    let hard = Command::new("sh").args(["-c", "ulimit -Hn"]).output().unwrap();
+    let hard = String::from_utf8_lossy(&hard.stdout).trim().to_owned();
+    if hard.parse::<u64>().is_ok_and(|files| files < 1400) {
+        eprintln!("not tested: this system allows {hard} open files");
+        return;
+    }
+    let path = pack(dir.path(), 2, "files", &binary);
+    let report = check(&path, &["L00"]);
+    let Verdict::NotDetermined(why) = verdict(&report, "L00") else { panic!("{:?}", verdict(&report, "L00")) };
+    assert!(why.contains("1024 open files") && why.ends_with("use --memory 0"), "{why}");
+    let mut options = Options { program: Some(crate::PROGRAM.into()), only: vec!["L00".into()], ..Options::default() };
+    options.allowance.memory = 0;
+    let report = fmu_check::run(&path, &options).unwrap();
+    assert!(matches!(verdict(&report, "L00"), Verdict::Pass(_)), "{:?}", verdict(&report, "L00"));
+}
+
+/// A license that is missing here: the FMU says so, or its tool is one whose FMUs ask for one. Any other refusal is a finding.
+#[test]
+fn a_license_is_missing() {
+    let dir = tempfile::tempdir().unwrap();
+    let xml = include_str!("fmu.xml");
+    let made = |tool: &str| xml.replace("generationTool=\"cc\"", &format!("generationTool=\"{tool}\""));
+    let of = |faults: &str, xml: &str| {
+        Some(check(&crate::pack_with(dir.path(), faults, xml, &compile(2, faults)?), &["L00", "L06"]))
+    };
+    let Some(report) = of("LICENSE", xml) else { return };
+    let Verdict::NotDetermined(why) = verdict(&report, "L00") else { panic!("{:?}", verdict(&report, "L00")) };
+    assert!(why.contains("the server has no license for this model"), "{why}");
+    for (tool, needs) in [("Dymola Version 2024x", true), ("Somebody's exporter", false)] {
+        let report = of("SILENT", &made(tool)).unwrap();
+        let found = verdict(&report, "L00");
+        assert_eq!(matches!(&found, Verdict::NotDetermined(why) if why.contains(tool)), needs, "{tool}: {found:?}");
+        assert_eq!(violated(&report).is_empty(), needs, "{tool}: {}", listed(&report));
+    }
+}
+
 /// The limited resource of this computer, and a shell script that runs `"$0" "$@"` under that limit; `$TMP_HERE` is a folder for
 /// a mount.
 const LIMITS: &[(&str, &str)] = &[

@@ -9,6 +9,7 @@ mod description;
 mod exchange;
 mod findings;
 mod machine;
+mod population;
 mod sizes;
 mod starts;
 mod ticks;

@@ -13,9 +13,23 @@ pub(super) fn load(path: &Path) -> Result<Library, Error> {
     unsafe { Library::new(path) }.map_err(|e| Error::file(path, reason(&e)))
 }
 
-/// The system's error message, which libloading wraps.
+/// The system's error message, which libloading wraps, with what may be done about it.
 fn reason(error: &libloading::Error) -> String {
-    std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string)
+    advised(std::error::Error::source(error).map_or_else(|| error.to_string(), ToString::to_string))
+}
+
+fn advised(reason: String) -> String {
+    if reason.contains("failed to map segment") {
+        let folder = std::env::temp_dir();
+        let cause =
+            format!("the folder for temporary files, {}, may be mounted without execution (noexec)", folder.display());
+        return format!("{reason}: {cause}; set TMPDIR to another one");
+    }
+    if reason.contains("undefined symbol: Py") || reason.contains("undefined symbol: _Py") {
+        let remedy = "preload it, LD_PRELOAD=libpython3.X.so.1.0, or run the FMU with fmurun";
+        return format!("{reason}: the FMU needs Python's library: {remedy}");
+    }
+    reason
 }
 
 type Sink = extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);
@@ -51,4 +65,19 @@ pub fn describe(path: &Path, resources: Option<&Path>) -> Result<fmu_core::Descr
         return Err(Error::file(path, format!("fmu_description returned {status}: {said}")));
     }
     serde_json::from_slice(&json).map_err(|e| Error::file(path, format!("the description is of another version: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::advised;
+
+    #[test]
+    fn a_library_that_does_not_load_says_what_may_help() {
+        let said = advised("M.so: failed to map segment from shared object".into());
+        assert!(said.ends_with("may be mounted without execution (noexec); set TMPDIR to another one"), "{said}");
+        assert!(said.contains(&std::env::temp_dir().display().to_string()), "{said}");
+        let said = advised("M.so: undefined symbol: _Py_NoneStruct".into());
+        assert!(said.contains("LD_PRELOAD") && said.contains("fmurun"), "{said}");
+        assert_eq!(advised("M.so: file too short".into()), "M.so: file too short");
+    }
 }

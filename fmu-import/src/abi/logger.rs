@@ -19,6 +19,8 @@ pub(super) struct Called {
     pub(super) status: Status,
     /// `category`.
     pub(super) category: *const c_char,
+    /// The format: NULL or a C string.
+    pub(super) format: *const c_char,
     /// The text with its values, in the FMU's encoding; `None` for NULL.
     pub(super) text: Option<Vec<u8>>,
 }
@@ -52,7 +54,7 @@ macro_rules! logger {
             // SAFETY: the FMU passes C strings, and the arguments that its format names.
             unsafe {
                 let text = (!format.is_null()).then(|| formatted(CStr::from_ptr(format).to_bytes(), arguments));
-                L::hear(Called { environment, instance, status, category, text });
+                L::hear(Called { environment, instance, status, category, format, text });
             }
         }
 

@@ -78,6 +78,7 @@ impl Clocks {
         for clock in &mut self.list {
             (clock.active, clock.due, clock.ticks) = (false, None, 0);
         }
+        self.read.clear();
     }
 
     /// Whether a variable can be used now.
@@ -207,9 +208,14 @@ impl Instance {
         Ok(update)
     }
 
-    /// Reads a variable of an instance with clocks.
-    pub(super) fn get_clocked(&mut self, base: BaseType, reference: u32, count: usize) -> Result<Values, Error> {
-        let Some(mut clocks) = self.clocks.take() else { return self.get_at(base, reference, count) };
+    /// Reads a variable of an instance with clocks; `None` if its clock has not ticked.
+    pub(super) fn get_clocked(
+        &mut self,
+        base: BaseType,
+        reference: u32,
+        count: usize,
+    ) -> Result<Option<Values>, Error> {
+        let Some(mut clocks) = self.clocks.take() else { return self.get_known(base, reference, count) };
         let read = self.read_clocked(&mut clocks, base, reference, count);
         self.clocks = Some(clocks);
         read
@@ -221,26 +227,48 @@ impl Instance {
         base: BaseType,
         reference: u32,
         count: usize,
-    ) -> Result<Values, Error> {
+    ) -> Result<Option<Values>, Error> {
         if base == BaseType::Clock {
-            let is = if clocks.phase == Phase::Event { self.call(Call::Get, |s| s.clock(reference))? } else { false };
-            if let Some(clock) = clocks.list.iter_mut().find(|clock| clock.reference == reference && clock.own) {
-                clock.active = is;
+            return self.ticks(clocks, reference).map(|is| Some(Values::Booleans(vec![is])));
+        }
+        if clocks.phase == Phase::Event {
+            // The clocks of the FMU that the variable is on may have ticked.
+            for clock in clocks.on.get(&reference).cloned().unwrap_or_default() {
+                if clocks.list.iter().any(|c| c.reference == clock && c.own) {
+                    self.ticks(clocks, clock)?;
+                }
             }
-            return Ok(Values::Booleans(vec![is]));
         }
         if !clocks.is_open(reference) {
-            let Some(last) = clocks.read.get(&reference) else {
-                let cause = format!("the variable {reference} is on a clock that has not ticked");
-                return Err(Error::usage(&self.name, cause));
-            };
-            return Ok(last.clone());
+            return Ok(clocks.read.get(&reference).cloned());
         }
         let value = self.call(Call::Get, |s| s.get(base, reference, count))?;
-        if clocks.on.contains_key(&reference) {
+        // A value before the first tick is that of the initialization.
+        if clocks.phase != Phase::Start && clocks.on.contains_key(&reference) {
             clocks.read.insert(reference, value.clone());
         }
-        Ok(value)
+        Ok(Some(value))
+    }
+
+    /// Whether a clock is active. One of the FMU, found active, stays so until the next update: the FMU need not say it twice.
+    fn ticks(&mut self, clocks: &mut Clocks, reference: u32) -> Result<bool, Error> {
+        if clocks.phase != Phase::Event {
+            return Ok(false);
+        }
+        let Some(clock) = clocks.list.iter_mut().find(|clock| clock.reference == reference) else { return Ok(false) };
+        clock.active = clock.active || (clock.own && self.call(Call::Get, |s| s.clock(reference))?);
+        Ok(clock.active)
+    }
+
+    /// Whether a clock is active.
+    pub fn has_active_clock(&self) -> bool {
+        self.clocks.as_ref().is_some_and(|clocks| clocks.list.iter().any(|clock| clock.active))
+    }
+
+    /// Whether a clock that the importer ticks is active.
+    pub fn is_active(&self, reference: u32) -> bool {
+        let is = |clock: &Clock| clock.reference == reference && !clock.own && clock.active;
+        self.clocks.as_ref().is_some_and(|clocks| clocks.list.iter().any(is))
     }
 
     /// Sets a variable of an instance with clocks, or activates a clock.

@@ -10,6 +10,7 @@ mod vary;
 use crate::Error;
 use crate::definition::{Design, Kind, Ordered, Vary};
 use crate::error::invalid;
+use fmu_import::Number;
 use sobol::Dimension;
 use std::path::Path;
 use vary::Source;
@@ -27,7 +28,7 @@ pub struct DesignRows {
     /// Direction numbers of a Sobol design, for each column with its own dimension.
     dimensions: Vec<Dimension>,
     /// Rows of a list.
-    list: Vec<Vec<f64>>,
+    list: Vec<Vec<Number>>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +50,7 @@ impl DesignRows {
         design: &Design,
         vary: &Ordered<Vary>,
         folder: &Path,
-        number: &dyn Fn(&str, &str) -> Result<f64, String>,
+        number: &dyn Fn(&str, &str) -> Result<Number, String>,
     ) -> Result<Self, Error> {
         let kind = design.kind;
         let mut rows = Self { columns: Vec::new(), count: 0, kind, seed: 0, dimensions: Vec::new(), list: Vec::new() };
@@ -94,7 +95,7 @@ impl DesignRows {
         &self,
         vary: &Vary,
         free: &mut usize,
-        number: &dyn Fn(&str) -> Result<f64, String>,
+        number: &dyn Fn(&str) -> Result<Number, String>,
     ) -> Result<Column, String> {
         match Source::new(vary, number)? {
             Source::Same { of, times } => match self.columns.iter().position(|(name, _)| *name == of) {
@@ -156,7 +157,7 @@ impl DesignRows {
     }
 
     /// The values of row `index`, one for each column.
-    pub fn row(&self, index: u64, values: &mut Vec<f64>) {
+    pub fn row(&self, index: u64, values: &mut Vec<Number>) {
         values.clear();
         // In a grid: the remaining index for the preceding columns.
         let mut rest = index;
@@ -170,13 +171,14 @@ impl DesignRows {
         }
         for (k, (_, column)) in self.columns.iter().enumerate() {
             values.push(match column {
-                Column::Tied { to, times } => values[*to] * times,
+                Column::Tied { to, times: 1.0 } => values[*to],
+                Column::Tied { to, times } => Number::Real(values[*to].real() * times),
                 Column::Listed(column) => {
                     let row = usize::try_from(index).ok().and_then(|index| self.list.get(index));
-                    row.map_or(f64::NAN, |row| row[*column])
+                    row.map_or(Number::Missing, |row| row[*column])
                 }
                 Column::Free { source: Source::Levels(values), .. } if self.kind == Kind::Grid => {
-                    usize::try_from(picked[k]).ok().and_then(|level| values.get(level)).copied().unwrap_or(f64::NAN)
+                    usize::try_from(picked[k]).ok().and_then(|level| values.get(level)).copied().unwrap_or_default()
                 }
                 Column::Free { dimension, source } => source.at(self.unit(*dimension, index)),
             });
@@ -219,7 +221,8 @@ mod tests {
 
     fn rows(text: &str) -> Result<DesignRows, Error> {
         let definition = Definition::parse(text).unwrap();
-        let number = |_: &str, text: &str| text.parse().map_err(|_| format!("{text} is not a number"));
+        let number =
+            |_: &str, text: &str| text.parse().map(Number::Real).map_err(|_| format!("{text} is not a number"));
         DesignRows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &number)
     }
 
@@ -227,7 +230,7 @@ mod tests {
         let one = |k| {
             let mut values = Vec::new();
             rows.row(k, &mut values);
-            values
+            values.into_iter().map(Number::real).collect()
         };
         (0..rows.count()).map(one).collect()
     }
@@ -262,8 +265,9 @@ mod tests {
             let rows = design(kind, 100, 7);
             let whole = all(&rows);
             for k in [99, 0, 57] {
-                let mut alone = vec![5.0; 9];
+                let mut alone = vec![Number::Real(5.0); 9];
                 rows.row(k, &mut alone);
+                let alone: Vec<f64> = alone.into_iter().map(Number::real).collect();
                 assert_eq!(alone, whole[usize::try_from(k).unwrap()], "{kind} {k}");
             }
             assert!(whole.iter().all(|r| r[2] == 2.0 * r[0] && [1.0, 2.0, 3.0].contains(&r[3])));

@@ -2,6 +2,7 @@
 
 use super::normal;
 use crate::definition::{SetValue, Vary};
+use fmu_import::Number;
 
 /// A checked [`Vary`].
 #[derive(Clone, Debug, PartialEq)]
@@ -23,7 +24,7 @@ pub(super) enum Source {
         from: f64,
         to: f64,
     },
-    Levels(Vec<f64>),
+    Levels(Vec<Number>),
     /// Column `of` times a factor.
     Same {
         of: String,
@@ -33,7 +34,7 @@ pub(super) enum Source {
 
 impl Source {
     /// `number` reads a text as the variable's number.
-    pub(super) fn new(vary: &Vary, number: &dyn Fn(&str) -> Result<f64, String>) -> Result<Self, String> {
+    pub(super) fn new(vary: &Vary, number: &dyn Fn(&str) -> Result<Number, String>) -> Result<Self, String> {
         let finite = |what: &str, x: &[f64]| match x.iter().find(|x| !x.is_finite()) {
             Some(x) => Err(format!("{what} has {x}, expected finite numbers")),
             None => Ok(()),
@@ -87,7 +88,7 @@ impl Source {
                 return Err("values is empty".into());
             }
             let read = |value: &SetValue| match value {
-                SetValue::Number(x) => Ok(*x),
+                SetValue::Number(x) => Ok(Number::Real(*x)),
                 other => number(&other.to_string()),
             };
             return Ok(Self::Levels(values.iter().map(read).collect::<Result<_, _>>()?));
@@ -108,12 +109,12 @@ impl Source {
         let level = |k: u32| {
             if k + 1 == count { to } else { from + (to - from) * f64::from(k) / f64::from(count - 1) }
         };
-        Ok(Self::Levels((0..count).map(level).collect()))
+        Ok(Self::Levels((0..count).map(|k| Number::Real(level(k))).collect()))
     }
 
     /// The value at `u` between 0 and 1.
-    pub(super) fn at(&self, u: f64) -> f64 {
-        match self {
+    pub(super) fn at(&self, u: f64) -> Number {
+        Number::Real(match self {
             Self::Uniform { low, high } => (low + (high - low) * u).clamp(*low, *high),
             Self::Log { low, high } => (low * libm::exp(libm::log(high / low) * u)).clamp(*low, *high),
             Self::Normal { mean, deviation, low, high, from, to } => {
@@ -127,10 +128,10 @@ impl Source {
                     reason = "far fewer levels than 2^52, u is positive"
                 )]
                 let index = (values.len() as f64 * u) as usize;
-                values[index.min(values.len() - 1)]
+                return values[index.min(values.len() - 1)];
             }
             Self::Same { .. } => f64::NAN,
-        }
+        })
     }
 }
 
@@ -140,8 +141,8 @@ const MOST_LEVELS: u32 = 1_000_000;
 mod tests {
     use super::*;
 
-    fn number(text: &str) -> Result<f64, String> {
-        text.parse().map_err(|_| format!("{text} is not a number"))
+    fn number(text: &str) -> Result<Number, String> {
+        text.parse().map(Number::Real).map_err(|_| format!("{text} is not a number"))
     }
 
     fn source(vary: &Vary) -> Result<Source, String> {
@@ -152,16 +153,19 @@ mod tests {
     #[expect(clippy::float_cmp, reason = "exact at the ends")]
     fn values_stay_where_they_belong() {
         let uniform = source(&Vary { uniform: Some([2.0, 4.0]), ..Vary::default() }).unwrap();
-        assert_eq!([0.0, 0.25, 1.0].map(|u| uniform.at(u)), [2.0, 2.5, 4.0]);
+        assert_eq!([0.0, 0.25, 1.0].map(|u| uniform.at(u).real()), [2.0, 2.5, 4.0]);
         let log = source(&Vary { log: Some([1.0, 100.0]), ..Vary::default() }).unwrap();
-        assert!((log.at(0.5) - 10.0).abs() < 1e-14 && log.at(0.0) == 1.0 && log.at(1.0) == 100.0);
+        assert!((log.at(0.5).real() - 10.0).abs() < 1e-14 && log.at(0.0).real() == 1.0 && log.at(1.0).real() == 100.0);
         let normal = Vary { normal: Some([3.0, 0.15]), within: Some([2.5, 3.2]), ..Vary::default() };
         let normal = source(&normal).unwrap();
-        let all: Vec<f64> = (0..=1000).map(|k| normal.at(f64::from(k) / 1000.0)).collect();
+        let all: Vec<f64> = (0..=1000).map(|k| normal.at(f64::from(k) / 1000.0).real()).collect();
         assert!(all.windows(2).all(|w| w[0] <= w[1]) && all[0] >= 2.5 && all[1000] <= 3.2);
         assert!(all[999] > 3.19 && all[1] < 2.62);
         let levels = source(&Vary { from: Some(0.0), to: Some(0.3), count: Some(4), ..Vary::default() }).unwrap();
-        assert_eq!([0.0, 0.3, 0.6, 0.9, 1.0].map(|u| levels.at(u)), [0.0, 0.3 * 1.0 / 3.0, 0.3 * 2.0 / 3.0, 0.3, 0.3]);
+        assert_eq!(
+            [0.0, 0.3, 0.6, 0.9, 1.0].map(|u| levels.at(u).real()),
+            [0.0, 0.3 * 1.0 / 3.0, 0.3 * 2.0 / 3.0, 0.3, 0.3]
+        );
     }
 
     #[test]

@@ -10,7 +10,7 @@ use super::grid::Grid;
 use super::method::Integration;
 use super::point::{CommunicationPoint, Ended, end};
 use crate::integration::{Driver, TrialError};
-use fmu_import::{Error, Instance, Kind};
+use fmu_import::{Error, Instance, Kind, Number};
 use std::ops::ControlFlow;
 
 impl Feed for Exchange {
@@ -34,7 +34,7 @@ pub(super) fn run(
     exchange: &mut Exchange,
     grid: &Grid,
     integration: &Integration,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let start = grid.settings().start;

@@ -11,7 +11,7 @@ use super::exchange::Exchange;
 use super::grid::Grid;
 use super::iteration::{Iterated, iterate};
 use super::point::{CommunicationPoint, Ended, end};
-use fmu_import::{Error, FmuState, Instance, Kind, Stepped};
+use fmu_import::{Error, FmuState, Instance, Kind, Number, Stepped};
 use model_description::Interface;
 use std::ops::ControlFlow;
 
@@ -161,7 +161,7 @@ pub(super) fn run(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let (start, near) = (grid.settings().start, 1e-9 * grid.settings().step);
@@ -197,6 +197,9 @@ pub(super) fn run(
         let mut t = time;
         while t < point {
             let next = fmus.with_events.iter().filter_map(|&i| fmus.outcomes[i].next).fold(f64::INFINITY, f64::min);
+            // An input that jumps is met like an event.
+            let jump = if grid.meets { fmus.exchange.jumps_between(t, point).next() } else { None };
+            let next = jump.map_or(next, |jump| next.min(jump));
             let to = if next < point - near { next.max(t) } else { point };
             let h = if (t, to) == (time, point) { grid.size(index) } else { to - t };
             let reached = if h > 0.0 { fmus.step(t, to, h)? } else { t };

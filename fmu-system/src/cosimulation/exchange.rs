@@ -1,18 +1,49 @@
 //! Moving values between FMUs: the variables read from each FMU, and the sources of those set.
 
+use super::grid::EARLY;
 use super::parts::Port;
+use super::schedule::SAME;
 use super::sequence::Held;
 use super::{Schedule, loops};
-use fmu_import::{Error, Instance, Kind, Values};
-use model_description::Conversion;
+use fmu_import::{Error, Instance, Kind, Number, Values};
+use model_description::{BaseType, Conversion};
+use std::sync::Arc;
+
+/// What becomes of a value on its way.
+#[derive(Clone)]
+pub(super) enum Change {
+    Linear(Conversion),
+    /// Values and what becomes of each.
+    Table(Arc<[(Number, Number)]>),
+}
+
+impl Change {
+    /// The number that arrives; missing if a table does not have it.
+    fn apply(&self, number: Number) -> Number {
+        match self {
+            _ if number == Number::Missing => number,
+            Self::Linear(conversion) => Number::Real(conversion.apply(number.real())),
+            Self::Table(table) => {
+                table.iter().find(|(sent, _)| *sent == number).map_or(Number::Missing, |(_, taken)| *taken)
+            }
+        }
+    }
+}
 
 /// Source of an input.
 #[derive(Clone)]
 pub(super) enum Source {
     /// A variable of another instance, converted to the unit of the target.
-    Port(Port, Option<Conversion>),
+    Port(Port, Option<Change>),
     /// A schedule.
     Schedule(Schedule),
+}
+
+impl Source {
+    /// Whether it may have no value: before a clock ticks, or beyond a table.
+    fn may_lack(&self) -> bool {
+        matches!(self, Self::Port(port, change) if !port.clocks.is_empty() || matches!(change, Some(Change::Table(_))))
+    }
 }
 
 /// An input and its source.
@@ -47,7 +78,7 @@ impl Wiring {
         both.feeds.extend(self.feeds.iter().map(|feed| Feed {
             target: feed.target.shifted(instances),
             source: match &feed.source {
-                Source::Port(port, conversion) => Source::Port(port.shifted(instances), *conversion),
+                Source::Port(port, conversion) => Source::Port(port.shifted(instances), conversion.clone()),
                 schedule @ Source::Schedule(_) => schedule.clone(),
             },
             continuous: feed.continuous,
@@ -79,31 +110,46 @@ impl Wiring {
     }
 }
 
-/// Location of a number during the run.
+/// Location of a value during the run.
 #[derive(Clone)]
 enum Place {
-    Read { instance: usize, slot: usize, conversion: Option<Conversion> },
+    /// One of the double-precision numbers read from an instance in one call.
+    Fast {
+        instance: usize,
+        slot: usize,
+        conversion: Option<Conversion>,
+    },
+    /// A variable that is read alone.
+    Single {
+        instance: usize,
+        slot: usize,
+        change: Option<Change>,
+    },
     Schedule(Schedule),
 }
 
-/// Traffic of one instance. Double-precision numbers are passed in one call, other values one by one.
+/// Traffic of one instance. Double-precision numbers are passed in one call, other values one by one, in their types.
 #[derive(Clone, Default)]
 struct Traffic {
     read: Vec<u32>,
     read_singly: Vec<Port>,
     /// Numbers of variables in `read` and `read_singly` that feed inputs: these come first.
     feeding: [usize; 2],
-    /// Values read last: those of `read`, then those of `read_singly`.
+    /// Values of `read`, read last.
     values: Vec<f64>,
+    /// Values of `read_singly`, read last; `None` while the clock of one has not ticked.
+    others: Vec<Option<Values>>,
     write: Vec<(u32, Place)>,
+    /// Clocks come last: a tick finds the values of its variables.
     write_singly: Vec<(Port, Place)>,
     /// Numbers of variables in `write` and `write_singly` that are continuous: these come first.
     continuous: [usize; 2],
     references: Vec<u32>,
-    /// Values written last: those of `write`, then those of `write_singly`.
+    /// Values of `write`, written last.
     buffer: Vec<f64>,
-    singles: Vec<f64>,
-    /// Inputs other than single numbers, and the index of the value written last.
+    /// Values of `write_singly`, written last.
+    singles: Vec<Option<Values>>,
+    /// Inputs over time other than single numbers, and the index of the value written last.
     held: Vec<(Port, Held, Option<usize>)>,
 }
 
@@ -111,7 +157,10 @@ struct Traffic {
 #[derive(Clone)]
 pub(super) struct Exchange {
     traffic: Vec<Traffic>,
-    row: Vec<Place>,
+    /// Recorded values and their types.
+    row: Vec<(Place, BaseType)>,
+    /// Times (s) at which inputs over time jump, in ascending order.
+    jumps: Vec<f64>,
     /// Number of inputs that are fed.
     fed: usize,
     /// Time (s) since which step schedules are held; `None` if they are read at every exchange.
@@ -141,13 +190,19 @@ pub enum Inputs {
 }
 
 impl Exchange {
-    pub(super) fn new(instances: usize, wiring: &Wiring, records: &[Port]) -> Self {
+    /// `texts` are recorded, too, elsewhere; here they are read while their clocks are active.
+    pub(super) fn new<'a>(
+        instances: usize,
+        wiring: &Wiring,
+        records: &[Port],
+        texts: impl Iterator<Item = &'a Port>,
+    ) -> Self {
         let mut traffic: Vec<Traffic> = (0..instances).map(|_| Traffic::default()).collect();
         let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
-        // A fed input need not be read: its value is known here.
+        // A fed input need not be read: its value is known here, unless what feeds it may have none yet.
         let origin = |port: &Port| match fed(port) {
-            Some(source) => source.clone(),
-            None => Source::Port(port.clone(), None),
+            Some(source) if !source.may_lack() => source.clone(),
+            _ => Source::Port(port.clone(), None),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
         let sources = wiring.feeds.iter().map(|feed| &feed.source).chain(&origins);
@@ -165,19 +220,32 @@ impl Exchange {
                 traffic.feeding = [traffic.read.len(), traffic.read_singly.len()];
             }
         }
+        for port in texts.filter(|port| !port.clocks.is_empty()) {
+            traffic[port.instance].read_singly.push(port.clone());
+        }
         let place = |traffic: &[Traffic], source: &Source| match source {
             Source::Port(port, conversion) => {
-                let slot = traffic[port.instance].slot(port);
-                Place::Read { instance: port.instance, slot, conversion: *conversion }
+                let (instance, of) = (port.instance, &traffic[port.instance]);
+                let fast = || of.read.iter().position(|reference| *reference == port.reference);
+                let single = || of.read_singly.iter().position(|p| p == port);
+                if port.is_fast() {
+                    // A table is not for real numbers.
+                    let linear = |change: &Change| if let Change::Linear(x) = change { Some(*x) } else { None };
+                    let conversion = conversion.as_ref().and_then(linear);
+                    Place::Fast { instance, slot: fast().unwrap_or_default(), conversion }
+                } else {
+                    Place::Single { instance, slot: single().unwrap_or_default(), change: conversion.clone() }
+                }
             }
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
         };
-        let row = origins.iter().map(|source| place(&traffic, source)).collect();
-        let (continuous, discrete): (Vec<_>, Vec<_>) = wiring.feeds.iter().partition(|feed| feed.continuous);
+        let row = origins.iter().zip(records).map(|(source, port)| (place(&traffic, source), port.base)).collect();
+        let (continuous, mut discrete): (Vec<_>, Vec<_>) = wiring.feeds.iter().partition(|feed| feed.continuous);
+        discrete.sort_by_key(|feed| feed.target.base == BaseType::Clock);
         for Feed { target, source, continuous } in continuous.into_iter().chain(discrete) {
             let place = place(&traffic, source);
             let traffic = &mut traffic[target.instance];
-            let fast = target.is_fast();
+            let fast = target.is_fast() && !source.may_lack();
             if fast {
                 traffic.references.push(target.reference);
                 traffic.write.push((target.reference, place));
@@ -187,20 +255,28 @@ impl Exchange {
             traffic.continuous[usize::from(!fast)] += usize::from(*continuous);
         }
         for t in &mut traffic {
-            t.values = vec![0.0; t.read.len() + t.read_singly.len()];
+            t.values = vec![0.0; t.read.len()];
+            t.others = vec![None; t.read_singly.len()];
             t.buffer = vec![0.0; t.write.len()];
-            t.singles = vec![0.0; t.write_singly.len()];
+            t.singles = vec![None; t.write_singly.len()];
         }
         for (port, values) in &wiring.held {
             traffic[port.instance].held.push((port.clone(), values.clone(), None));
         }
-        Self { traffic, row, fed: wiring.feeds.len(), since: None }
+        let mut jumps: Vec<f64> = wiring.jumps().flat_map(|(_, times)| times).collect();
+        jumps.sort_unstable_by(f64::total_cmp);
+        jumps.dedup_by(|b, a| *b - *a <= SAME);
+        Self { traffic, row, jumps, fed: wiring.feeds.len(), since: None }
     }
 
     /// A run begins: no value is held or has been written.
     pub(super) fn begin(&mut self) {
         self.since = None;
-        self.traffic.iter_mut().flat_map(|t| &mut t.held).for_each(|(_, _, last)| *last = None);
+        for t in &mut self.traffic {
+            t.held.iter_mut().for_each(|(_, _, last)| *last = None);
+            t.others.fill(None);
+            t.singles.fill(None);
+        }
     }
 
     pub(super) fn read_all(&mut self, instances: &mut [Instance]) -> Result<(), Error> {
@@ -218,20 +294,53 @@ impl Exchange {
 
     pub(super) fn write(&mut self, index: usize, instance: &mut Instance, t: f64) -> Result<(), Error> {
         let mut buffer = std::mem::take(&mut self.traffic[index].buffer);
-        let mut singles = std::mem::take(&mut self.traffic[index].singles);
         let traffic = &self.traffic[index];
         for (value, (_, place)) in buffer.iter_mut().zip(&traffic.write) {
-            *value = self.value(place, t);
+            *value = self.number(place, t).real();
         }
         if !buffer.is_empty() {
             instance.set_reals(&traffic.references, &buffer)?;
         }
-        for ((port, place), single) in traffic.write_singly.iter().zip(&mut singles) {
-            *single = self.value(place, t);
-            write_single(instance, port, *single)?;
-        }
-        (self.traffic[index].buffer, self.traffic[index].singles) = (buffer, singles);
+        self.traffic[index].buffer = buffer;
+        self.set_singles(index, instance, t, (usize::MAX, true))?;
         self.hold(index, instance, t).map(drop)
+    }
+
+    /// Sets the first `count` of the inputs that are set one by one: all of them, or those that have changed. Returns whether any
+    /// has changed, and whether a discrete one has.
+    fn set_singles(
+        &mut self,
+        index: usize,
+        instance: &mut Instance,
+        t: f64,
+        (count, all): (usize, bool),
+    ) -> Result<(bool, bool), Error> {
+        let mut singles = std::mem::take(&mut self.traffic[index].singles);
+        let traffic = &self.traffic[index];
+        let (mut changed, mut discrete) = (false, false);
+        for (i, (last, (port, place))) in singles.iter_mut().zip(&traffic.write_singly).enumerate().take(count) {
+            let Some(new) = self.values(place, port, t)? else { continue };
+            if port.base == BaseType::Clock {
+                if new != Values::Booleans(vec![true]) || instance.is_active(port.reference) {
+                    continue;
+                }
+                // A tick brings values also where they are those of the last one.
+                let on_it = |(other, _): &&(Port, Place)| other.clocks.contains(&port.reference);
+                for (other, place) in traffic.write_singly.iter().filter(on_it) {
+                    if let Some(values) = self.values(place, other, t)? {
+                        other.write(instance, &values)?;
+                    }
+                }
+            } else if !all && last.as_ref().is_some_and(|last| same(last, &new)) {
+                continue;
+            }
+            port.write(instance, &new)?;
+            *last = Some(new);
+            changed = true;
+            discrete |= i >= traffic.continuous[1];
+        }
+        self.traffic[index].singles = singles;
+        Ok((changed, discrete))
     }
 
     /// Sets changed inputs other than single numbers; returns whether any has changed.
@@ -260,10 +369,16 @@ impl Exchange {
             let (settled, some) = self.pass(instances, t, inputs)?;
             discrete |= some;
             if settled {
-                return Ok(discrete);
+                return self.read_clocked(instances).map(|()| discrete);
             }
         }
-        loops::solve(self, instances, t).map(|()| discrete)
+        loops::solve(self, instances, t)?;
+        self.read_clocked(instances).map(|()| discrete)
+    }
+
+    /// Reads all variables, recorded ones too, while a clock is active: later they have no other values.
+    fn read_clocked(&mut self, instances: &mut [Instance]) -> Result<(), Error> {
+        if instances.iter().any(Instance::has_active_clock) { self.read_all(instances) } else { Ok(()) }
     }
 
     /// Reads the sources of inputs, and sets the inputs that have changed; returns whether no input has changed, and whether a
@@ -293,20 +408,21 @@ impl Exchange {
                 continue;
             }
             for (slot, (reference, place)) in traffic.write.iter().enumerate() {
-                if self.value(place, t).to_bits() != traffic.buffer[slot].to_bits() {
+                if self.number(place, t).real().to_bits() != traffic.buffer[slot].to_bits() {
                     let (source, factor) = match place {
-                        Place::Read { instance, slot, conversion } => {
+                        Place::Fast { instance, slot, conversion } => {
                             let source = self.traffic[*instance].read.get(*slot).map(|r| (*instance, *r));
                             (source, conversion.map_or(1.0, |conversion| conversion.factor))
                         }
-                        Place::Schedule(_) => (None, 1.0),
+                        Place::Single { .. } | Place::Schedule(_) => (None, 1.0),
                     };
                     let source = source.filter(|_| slot < traffic.continuous[0]);
                     all.push(Unsettled { index, slot, reference: *reference, source, factor });
                 }
             }
             for ((port, place), old) in traffic.write_singly.iter().zip(&traffic.singles) {
-                if self.value(place, t).to_bits() != old.to_bits() {
+                let is = |new: &Values| old.as_ref().is_some_and(|old| same(old, new));
+                if port.base != BaseType::Clock && self.values(place, port, t)?.is_some_and(|new| !is(&new)) {
                     let (slot, reference) = (usize::MAX, port.reference);
                     all.push(Unsettled { index, slot, reference, source: None, factor: 1.0 });
                 }
@@ -328,7 +444,8 @@ impl Exchange {
             instances[input.index].set_reals(&[input.reference], &[*value])?;
         }
         self.read_feeding(instances)?;
-        Ok(inputs.iter().map(|input| self.value(&self.traffic[input.index].write[input.slot].1, t)).collect())
+        let next = |input: &Unsettled| self.number(&self.traffic[input.index].write[input.slot].1, t).real();
+        Ok(inputs.iter().map(next).collect())
     }
 
     /// The present values of these inputs.
@@ -336,14 +453,21 @@ impl Exchange {
         inputs.iter().map(|input| self.traffic[input.index].buffer[input.slot]).collect()
     }
 
-    /// Passes outputs on to inputs once, as at a communication point. Returns whether a discrete input of one of these
-    /// instances changed.
+    /// Passes outputs on to inputs once, as at a communication point; while a clock is active, until nothing changes: what is on
+    /// it depends on the inputs of the same instant. Returns whether a discrete input of one of these instances changed.
     pub(super) fn pass_on_once(&mut self, instances: &mut [Instance], t: f64, of: &[usize]) -> Result<bool, Error> {
-        self.read_all(instances)?;
         let mut discrete = false;
-        for (index, instance) in instances.iter_mut().enumerate() {
-            let (_, some) = self.pass_on(index, instance, t, Inputs::All)?;
-            discrete |= some && of.contains(&index);
+        for _ in 0..self.fed + 2 {
+            self.read_all(instances)?;
+            let mut changed = false;
+            for (index, instance) in instances.iter_mut().enumerate() {
+                let (some, some_discrete) = self.pass_on(index, instance, t, Inputs::All)?;
+                changed |= some;
+                discrete |= some_discrete && of.contains(&index);
+            }
+            if !changed || !instances.iter().any(Instance::has_active_clock) {
+                break;
+            }
         }
         Ok(discrete)
     }
@@ -357,15 +481,14 @@ impl Exchange {
         inputs: Inputs,
     ) -> Result<(bool, bool), Error> {
         let mut buffer = std::mem::take(&mut self.traffic[index].buffer);
-        let mut singles = std::mem::take(&mut self.traffic[index].singles);
         let traffic = &self.traffic[index];
         let [fast, single] = match inputs {
-            Inputs::All => [buffer.len(), singles.len()],
+            Inputs::All => [buffer.len(), usize::MAX],
             Inputs::Continuous => traffic.continuous,
         };
         let (mut changed, mut discrete) = (false, false);
         for (i, (value, (_, place))) in buffer.iter_mut().zip(&traffic.write).enumerate().take(fast) {
-            let new = self.value(place, t);
+            let new = self.number(place, t).real();
             if new.to_bits() != value.to_bits() {
                 *value = new;
                 changed = true;
@@ -375,16 +498,9 @@ impl Exchange {
         if changed {
             instance.set_reals(&traffic.references[..fast], &buffer[..fast])?;
         }
-        for (i, (value, (port, place))) in singles.iter_mut().zip(&traffic.write_singly).enumerate().take(single) {
-            let new = self.value(place, t);
-            if new.to_bits() != value.to_bits() {
-                *value = new;
-                write_single(instance, port, new)?;
-                changed = true;
-                discrete |= i >= traffic.continuous[1];
-            }
-        }
-        (self.traffic[index].buffer, self.traffic[index].singles) = (buffer, singles);
+        self.traffic[index].buffer = buffer;
+        let (some, some_discrete) = self.set_singles(index, instance, t, (single, false))?;
+        (changed, discrete) = (changed || some, discrete || some_discrete);
         if inputs == Inputs::All && self.hold(index, instance, t)? {
             (changed, discrete) = (true, true);
         }
@@ -394,7 +510,7 @@ impl Exchange {
     /// The first point of a schedule after the time `t` (s).
     pub(super) fn next_point(&self, t: f64) -> Option<f64> {
         let next = |place: &Place| match place {
-            Place::Read { .. } => None,
+            Place::Fast { .. } | Place::Single { .. } => None,
             Place::Schedule(schedule) => schedule.next_point(t),
         };
         let fast = self.traffic.iter().flat_map(|t| t.write.iter().map(|(_, place)| place));
@@ -404,55 +520,82 @@ impl Exchange {
         fast.chain(singly).filter_map(next).chain(held).reduce(f64::min)
     }
 
-    /// The recorded values at time `t`.
-    pub(super) fn row(&self, t: f64, row: &mut Vec<f64>) {
-        row.clear();
-        row.extend(self.row.iter().map(|place| self.value(place, t)));
+    /// Times (s) between two communication points at which the value of an input jumps, in ascending order.
+    pub(super) fn jumps_between(&self, from: f64, to: f64) -> impl Iterator<Item = f64> {
+        self.jumps.iter().copied().filter(move |t| *t > from + SAME && *t < to - SAME.max(EARLY * (to - from)))
     }
 
-    fn value(&self, place: &Place, t: f64) -> f64 {
+    /// The recorded values at time `t`.
+    pub(super) fn row(&self, t: f64, row: &mut Vec<Number>) {
+        row.clear();
+        row.extend(self.row.iter().map(|(place, base)| match self.number(place, t) {
+            Number::Missing => Number::Missing,
+            Number::Real(x) if base.is_float() => Number::Real(x),
+            // As the variable receives it.
+            number => Values::from_number(number, *base).map_or(number, |values| values.one(0)),
+        }));
+    }
+
+    /// The number at a place.
+    fn number(&self, place: &Place, t: f64) -> Number {
         match place {
-            Place::Read { instance, slot, conversion } => {
+            Place::Fast { instance, slot, conversion } => {
                 let value = self.traffic[*instance].values[*slot];
-                conversion.map_or(value, |conversion| conversion.apply(value))
+                Number::Real(conversion.map_or(value, |conversion| conversion.apply(value)))
             }
-            Place::Schedule(schedule) => match self.since {
+            Place::Single { instance, slot, change } => {
+                let number = self.traffic[*instance].others[*slot].as_ref().map_or(Number::Missing, |v| v.one(0));
+                change.as_ref().map_or(number, |change| change.apply(number))
+            }
+            Place::Schedule(schedule) => Number::Real(match self.since {
                 None => schedule.at(t),
                 Some(since) => schedule.held(since, t),
-            },
+            }),
         }
+    }
+
+    /// The values at a place, as those of a target; `None` if there are none yet.
+    fn values(&self, place: &Place, target: &Port, t: f64) -> Result<Option<Values>, Error> {
+        let found = match place {
+            Place::Single { instance, slot, change: None } => self.traffic[*instance].others[*slot].clone(),
+            Place::Single { instance, slot, change: Some(Change::Linear(conversion)) } => {
+                let found = self.traffic[*instance].others[*slot].as_ref();
+                let numbers = found.map(|v| (0..v.len()).map(|k| conversion.apply(v.one(k).real())).collect());
+                numbers.map(Values::Reals)
+            }
+            Place::Single { instance, slot, change: Some(table) } => {
+                let Some(found) = &self.traffic[*instance].others[*slot] else { return Ok(None) };
+                let taken = Values::from_number(table.apply(found.one(0)), target.base);
+                let none =
+                    |_| Error::usage(&target.name, format!("the table of its connection has no entry for {found}"));
+                Some(taken.map_err(none)?)
+            }
+            Place::Fast { .. } | Place::Schedule(_) => Some(Values::Reals(vec![self.number(place, t).real()])),
+        };
+        let fitting = found.map(|values| values.into_base(target.base)).transpose();
+        fitting.map_err(|cause| Error::usage(&target.name, cause))
     }
 }
 
-fn write_single(instance: &mut Instance, port: &Port, value: f64) -> Result<(), Error> {
-    let value = Values::from_number(value, port.base).map_err(|cause| Error::usage(instance.name(), cause))?;
-    let Some((element, count)) = port.element else { return instance.set_at(port.base, port.reference, &value) };
-    // The other elements stay.
-    let mut all = instance.get_at(port.base, port.reference, count)?;
-    if !all.replace(element, &value) {
-        return Err(Error::usage(instance.name(), format!("{} has no such element", port.name)));
+/// Whether values are equal to the last bit.
+fn same(a: &Values, b: &Values) -> bool {
+    match (a, b) {
+        (Values::Reals(a), Values::Reals(b)) => {
+            a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
+        }
+        _ => a == b,
     }
-    instance.set_at(port.base, port.reference, &all)
 }
 
 impl Traffic {
     /// Reads the first of `read` and of `read_singly`.
     fn read(&mut self, [fast, single]: [usize; 2], instance: &mut Instance) -> Result<(), Error> {
-        let (numbers, others) = self.values.split_at_mut(self.read.len());
         if fast > 0 {
-            instance.get_reals(&self.read[..fast], &mut numbers[..fast])?;
+            instance.get_reals(&self.read[..fast], &mut self.values[..fast])?;
         }
-        for (port, value) in self.read_singly[..single].iter().zip(others) {
-            let (element, count) = port.element.unwrap_or((0, 1));
-            *value = instance.get_at(port.base, port.reference, count)?.number_at(element).unwrap_or(f64::NAN);
+        for (port, value) in self.read_singly[..single].iter().zip(&mut self.others) {
+            *value = port.read(instance)?;
         }
         Ok(())
-    }
-
-    /// Location of a port's value among those read; the port is one of them.
-    fn slot(&self, port: &Port) -> usize {
-        let fast = || self.read.iter().position(|reference| *reference == port.reference);
-        let slow = || self.read_singly.iter().position(|p| p == port).map(|i| i + self.read.len());
-        (if port.is_fast() { fast() } else { slow() }).unwrap_or_default()
     }
 }

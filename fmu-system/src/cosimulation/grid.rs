@@ -16,6 +16,9 @@ pub struct Settings {
     pub sequential: bool,
 }
 
+/// What happens so short before a communication point, as a share of the step, counts as at that point.
+pub(super) const EARLY: f64 = 0.01;
+
 /// The communication points of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grid {
@@ -23,6 +26,10 @@ pub(super) struct Grid {
     steps: u32,
     /// Relative tolerance for the solvers inside the FMUs; otherwise that of the default experiment of each.
     pub(super) tolerance: Option<f64>,
+    /// Steps end where inputs jump.
+    pub(super) meets: bool,
+    /// States are saved before each step, for FMUs that discard one.
+    pub(super) careful: bool,
 }
 
 impl Settings {
@@ -55,7 +62,7 @@ impl Settings {
             reason = "an integer in the range, see above"
         )]
         let steps = whole as u32;
-        Ok(Grid { settings: *self, steps, tolerance: None })
+        Ok(Grid { settings: *self, steps, tolerance: None, meets: false, careful: false })
     }
 }
 
@@ -79,7 +86,8 @@ impl Grid {
         let Settings { start, stop, step, .. } = self.settings;
         let nearest = start + ((t - start) / step).round() * step;
         let inside = t > start && t < stop && (t - nearest).abs() > SAME;
-        inside.then(|| (start + ((t - start) / step).ceil() * step).min(stop))
+        let next = (start + ((t - start) / step).ceil() * step).min(stop);
+        (inside && next - t > EARLY * step).then_some(next)
     }
 
     /// The settings up to the last whole step, if the last one is shorter.

@@ -52,7 +52,7 @@ pub use grid::Settings;
 pub use method::{Integration, Method};
 pub use plan::{PlanTarget, SystemPlan, Worker};
 pub use point::{CommunicationPoint, Ended};
-pub use recording::{Column, Recording, TextColumn, cell, item};
+pub use recording::{Column, Recording, TextColumn, item};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
 pub use system::{Crossing, System, Units};

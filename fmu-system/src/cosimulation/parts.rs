@@ -4,7 +4,9 @@ use super::Column;
 use fmu_core::variable::position;
 use fmu_import::quantity::suggest;
 use fmu_import::{Error, Fmu, Instance, Kind, Values};
-use model_description::{BaseType, Causality, Initial, ModelDescription, ModelVariable, Variability};
+use model_description::{
+    BaseType, Causality, Initial, IntervalVariability, ModelDescription, ModelVariable, Variability,
+};
 
 /// A variable of one of the instances.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,14 +15,44 @@ pub(super) struct Port {
     pub(super) name: String,
     pub(super) reference: u32,
     pub(super) base: BaseType,
-    /// An element of an array, and the number of elements of the array.
-    pub(super) element: Option<(usize, usize)>,
+    /// Number of elements of the variable; 1 for a scalar.
+    pub(super) count: usize,
+    /// The element that it is, if it is one of an array.
+    pub(super) element: Option<usize>,
+    /// The clocks of the variable, by value reference.
+    pub(super) clocks: Vec<u32>,
+    /// It is an array, or one of its elements.
+    array: bool,
 }
 
 impl Port {
-    /// Whether it is a double-precision number with a separate value reference.
+    /// Whether it is a double-precision number with a separate value reference, and always has a value.
     pub(super) fn is_fast(&self) -> bool {
-        self.base == BaseType::Float64 && self.element.is_none()
+        self.base == BaseType::Float64 && !self.array && self.clocks.is_empty()
+    }
+
+    /// Whether it is a whole array.
+    pub(super) fn is_whole(&self) -> bool {
+        self.array && self.element.is_none()
+    }
+
+    /// Its values now; `None` while its clock has not ticked.
+    pub(super) fn read(&self, instance: &mut Instance) -> Result<Option<Values>, Error> {
+        let values = instance.get_known(self.base, self.reference, self.count)?;
+        Ok(match self.element {
+            Some(element) => values.and_then(|values| values.element(element)),
+            None => values,
+        })
+    }
+
+    /// Sets it; the other elements of an array stay.
+    pub(super) fn write(&self, instance: &mut Instance, values: &Values) -> Result<(), Error> {
+        let Some(element) = self.element else { return instance.set_at(self.base, self.reference, values) };
+        let mut all = instance.get_at(self.base, self.reference, self.count)?;
+        if !all.replace(element, values) {
+            return Err(Error::usage(instance.name(), format!("{} has no such element", self.name)));
+        }
+        instance.set_at(self.base, self.reference, &all)
     }
 
     /// This variable in the instance `count` positions later.
@@ -83,26 +115,23 @@ impl Parts {
         let variable = self.variable(instance, name)?;
         let part = &self.0[instance];
         let is_named = part.description().variable(name).is_some();
-        let element = if is_named { None } else { part.element(name) };
-        let element = element.map(|(_, element)| (element, part.shape(variable).iter().product()));
+        let element = if is_named { None } else { part.element(name).map(|(_, element)| element) };
+        let (array, clocks) = (variable.is_array(), variable.clocks.clone());
+        let count = if array { part.shape(variable).iter().product() } else { 1 };
         let (reference, base) = (variable.value_reference, variable.base);
-        Ok(Port { instance, reference, base, name: name.to_owned(), element })
+        Ok(Port { instance, reference, base, name: name.to_owned(), count, element, clocks, array })
     }
 
     /// A port that is one number.
     pub(super) fn scalar(&self, text: &str) -> Result<Port, Error> {
         let port = self.port(text)?;
-        let variable = self.variable(port.instance, &port.name)?;
-        if variable.is_array() && port.element.is_none() {
-            let shape = self.0[port.instance].shape(variable);
-            let cause = "is an array; only scalars can be connected, fed, varied and recorded";
+        if port.is_whole() {
+            let shape = self.shape(&port);
+            let cause = "is an array, and this needs one number";
             return Err(Error::usage(text, format!("{cause}: name an element, {text}{}", position(&shape, 0))));
         }
         if kind(port.base).is_none() {
-            return Err(Error::usage(
-                text,
-                format!("is a {}; only numbers can be connected, fed, varied and recorded", port.base),
-            ));
+            return Err(Error::usage(text, format!("is a {}, and this needs a number", port.base)));
         }
         Ok(port)
     }
@@ -134,6 +163,18 @@ impl Parts {
         let names = || part.description().variables.iter().map(|v| v.name.as_str());
         let none = || Error::usage(&part.name, format!("has no variable {name}{}", suggest(name, names())));
         part.description().variable(name).or_else(|| Some(part.element(name)?.0)).ok_or_else(none)
+    }
+
+    /// Whether a port is an input clock that the FMU asks the importer to tick: it may then tick a triggered clock of another FMU.
+    pub(super) fn is_timed_clock(&self, port: &Port) -> bool {
+        let timing = self.variable(port.instance, &port.name).ok().and_then(|v| v.timing);
+        timing.is_some_and(|timing| timing.ticks != IntervalVariability::Triggered)
+    }
+
+    /// The extents of the variable of a port.
+    pub(super) fn shape(&self, port: &Port) -> Vec<usize> {
+        let variable = self.variable(port.instance, &port.name);
+        variable.map(|variable| self.0[port.instance].shape(variable)).unwrap_or_default()
     }
 
     pub(super) fn causality(&self, port: &Port) -> Causality {
@@ -170,17 +211,23 @@ impl Parts {
         let definition = variable.and_then(|v| description.type_definition(v.declared_type.as_ref()?));
         let items = definition.map(|d| d.items.iter().map(|i| (i.value, i.name.clone())).collect());
         let (unit, items) = (unit.unwrap_or_default(), items.unwrap_or_default());
-        Column { name: name.into(), unit, display, items, values: Vec::new() }
+        Column { name: name.into(), unit, display, items, ..Column::default() }
     }
 }
 
 /// Types between which a value may travel have the same letter.
-pub(super) fn kind(base: BaseType) -> Option<char> {
+pub(super) fn family(base: BaseType) -> char {
     match base {
-        BaseType::Float32 | BaseType::Float64 => Some('r'),
-        BaseType::Boolean => Some('b'),
-        BaseType::Clock => Some('c'),
-        BaseType::String | BaseType::Binary => None,
-        _ => Some('i'),
+        BaseType::Float32 | BaseType::Float64 => 'r',
+        BaseType::Boolean => 'b',
+        BaseType::Clock => 'c',
+        BaseType::String => 's',
+        BaseType::Binary => 'x',
+        _ => 'i',
     }
+}
+
+/// The letter of a type of numbers.
+pub(super) fn kind(base: BaseType) -> Option<char> {
+    Some(family(base)).filter(|letter| !"sx".contains(*letter))
 }

@@ -13,7 +13,7 @@
 //! for r in [2.9, 3.0, 3.1] {
 //!     let mut peak = 0.0_f64;
 //!     worker.run([(&resistance, r)], |_, values| {
-//!         peak = peak.max(values[0]);
+//!         peak = peak.max(values[0].real());
 //!         std::ops::ControlFlow::Continue(())
 //!     })?;
 //!     println!("{r}: {peak}");
@@ -29,7 +29,7 @@ use super::point::Ended;
 use super::recording::{Column, Recording};
 use super::run::simulate;
 use super::system::System;
-use fmu_import::{Error, Fmu, Instance, Kind, Values};
+use fmu_import::{Error, Fmu, Instance, Kind, Number, Values};
 use model_description::{BaseType, Interface};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -87,7 +87,7 @@ impl System {
     /// The settings are invalid.
     pub fn into_plan(mut self, settings: &Settings) -> Result<SystemPlan, Error> {
         let grid = self.grid(settings)?;
-        let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
+        let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records, [].iter());
         let columns = self.columns().collect();
         let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });
         let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
@@ -132,12 +132,14 @@ impl SystemPlan {
     ///
     /// # Errors
     /// The text is not a value of the target's type.
-    pub fn number(&self, target: &PlanTarget, text: &str) -> Result<f64, Error> {
+    pub fn number(&self, target: &PlanTarget, text: &str) -> Result<Number, Error> {
         let Port { instance, name, .. } = &target.port;
         let part = &self.parts.0[*instance];
         let values = Values::read(text, self.parts.variable(*instance, name)?, part.description());
         let values = values.map_err(|cause| Error::usage(&part.name, cause))?;
-        values.number().ok_or_else(|| Error::usage(target.name(), "takes a number"))
+        Some(values.one(0))
+            .filter(|x| *x != Number::Missing)
+            .ok_or_else(|| Error::usage(target.name(), "takes a number"))
     }
 
     /// The recorded variables, without values.
@@ -158,7 +160,7 @@ impl SystemPlan {
             live: self.live.clone(),
             wiring: self.wiring.clone(),
             set: self.set.clone(),
-            exchange: Exchange::new(self.parts.0.len(), &self.wiring, &ports),
+            exchange: Exchange::new(self.parts.0.len(), &self.wiring, &ports, [].iter()),
             records: ports,
             grid: self.grid,
             columns,
@@ -181,7 +183,7 @@ impl SystemPlan {
             parts: Parts(self.parts.0.iter().chain(&self.parts.0).cloned().collect()),
             live: self.live.iter().chain(&self.live).cloned().collect(),
             set: self.set.iter().cloned().chain(set).collect(),
-            exchange: Exchange::new(2 * count, &wiring, &records),
+            exchange: Exchange::new(2 * count, &wiring, &records, [].iter()),
             wiring,
             records,
             grid: self.grid,
@@ -242,7 +244,7 @@ pub struct Worker {
     /// Generation of the FMU of each instance.
     generations: Vec<u32>,
     exchange: Exchange,
-    row: Vec<f64>,
+    row: Vec<Number>,
     used: bool,
 }
 
@@ -257,10 +259,10 @@ impl Worker {
     ///
     /// # Errors
     /// An FMU refuses a value or a call. The next run has new instances.
-    pub fn run<'a>(
+    pub fn run<'a, N: Into<Number>>(
         &mut self,
-        values: impl IntoIterator<Item = (&'a PlanTarget, f64)>,
-        mut hook: impl FnMut(f64, &[f64]) -> ControlFlow<()>,
+        values: impl IntoIterator<Item = (&'a PlanTarget, N)>,
+        mut hook: impl FnMut(f64, &[Number]) -> ControlFlow<()>,
     ) -> Result<Ended, Error> {
         self.refresh()?;
         self.used = true;
@@ -278,7 +280,10 @@ impl Worker {
     ///
     /// # Errors
     /// As for [`run`](Self::run).
-    pub fn record<'a>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> Result<Recording, Error> {
+    pub fn record<'a>(
+        &mut self,
+        values: impl IntoIterator<Item = (&'a PlanTarget, Number)>,
+    ) -> Result<Recording, Error> {
         let mut recording = Recording::new(self.plan.columns.iter().cloned());
         let ended = self.run(values, |time, values| {
             recording.push(time, values);
@@ -330,11 +335,11 @@ impl Worker {
         Ok(())
     }
 
-    fn set<'a>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, f64)>) -> Result<(), Error> {
+    fn set<'a, N: Into<Number>>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, N)>) -> Result<(), Error> {
         for (PlanTarget { port, written }, value) in values {
-            let instance = &mut self.instances[port.instance];
+            let (instance, value) = (&mut self.instances[port.instance], value.into());
             let outcome = if port.base == BaseType::Float64 {
-                instance.set_reals(&[port.reference], &[value])
+                instance.set_reals(&[port.reference], &[value.real()])
             } else {
                 let values = Values::from_number(value, port.base);
                 let values = values.map_err(|cause| Error::usage(instance.name(), cause));

@@ -1,7 +1,7 @@
 //! A communication point of a run, and the last one.
 
 use super::exchange::Exchange;
-use fmu_import::{Error, Instance, Message};
+use fmu_import::{Error, Instance, Message, Number};
 use std::ops::ControlFlow;
 
 /// A communication point as seen by a hook: outputs are read, inputs are set, the step has not been taken.
@@ -11,7 +11,7 @@ pub struct CommunicationPoint<'a> {
     /// Time in s.
     pub time: f64,
     /// The recorded values, in the order of [`System::record`](super::System::record).
-    pub values: &'a [f64],
+    pub values: &'a [Number],
     pub(super) instances: &'a mut [Instance],
     /// The hook has used an instance.
     pub(super) touched: bool,
@@ -43,7 +43,7 @@ pub struct Ended {
 pub(super) fn end(
     instances: &mut [Instance],
     exchange: &mut Exchange,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     (index, time): (u32, f64),
     ended: &mut Ended,

@@ -1,6 +1,7 @@
 //! Recordings: sampled variables.
 
-use fmu_import::printable;
+use fmu_import::csv::Writer;
+use fmu_import::{Number, printable};
 use model_description::DisplayUnit;
 use std::io::{self, Write};
 
@@ -15,11 +16,34 @@ pub struct Column {
     pub display: Option<DisplayUnit>,
     /// Numbers and names of an enumeration's values; empty for other types.
     pub items: Vec<(i64, String)>,
-    /// One value for each communication point.
+    /// One value for each communication point, as a double for computations and plots.
     pub values: Vec<f64>,
+    /// The same in the type of the variable, where doubles do not say all: for integers, and for a variable without a value
+    /// until its clock ticks. Empty for others.
+    pub exact: Vec<Number>,
 }
 
 impl Column {
+    fn push(&mut self, x: Number) {
+        self.values.push(x.real());
+        if !self.exact.is_empty() || matches!(x, Number::Integer(_) | Number::Missing) {
+            self.exact.push(x);
+        }
+    }
+
+    /// The value at a communication point, with all its digits.
+    pub fn at(&self, point: usize) -> Number {
+        self.exact
+            .get(point)
+            .copied()
+            .unwrap_or_else(|| self.values.get(point).map_or(Number::Missing, |x| Number::Real(*x)))
+    }
+
+    /// The last value.
+    pub fn last(&self) -> Number {
+        self.at(self.values.len().saturating_sub(1))
+    }
+
     /// The unit to show the values in.
     pub fn shown_unit(&self) -> &str {
         self.display.as_ref().map_or(&self.unit, |display| &display.name)
@@ -58,9 +82,9 @@ impl Recording {
         Self { columns: columns.collect(), ..Self::default() }
     }
 
-    pub(super) fn push(&mut self, time: f64, row: &[f64]) {
+    pub(super) fn push(&mut self, time: f64, row: &[Number]) {
         self.time.push(time);
-        self.columns.iter_mut().zip(row).for_each(|(column, x)| column.values.push(*x));
+        self.columns.iter_mut().zip(row).for_each(|(column, x)| column.push(*x));
     }
 
     /// The column of this name.
@@ -75,15 +99,13 @@ impl Recording {
     /// As the writer's.
     pub fn write_csv(&self, out: &mut impl Write) -> io::Result<()> {
         let columns = self.columns.iter().map(|c| c.name.as_str()).chain(self.texts.iter().map(|c| c.name.as_str()));
-        let names: Vec<_> = std::iter::once("time").chain(columns).map(|name| cell(&printable(name))).collect();
-        writeln!(out, "{}", names.join(","))?;
+        let mut out = Writer::new(out);
+        out.row(std::iter::once("time").chain(columns).map(|name| printable(name).into_owned()))?;
         for (k, t) in self.time.iter().enumerate() {
-            write!(out, "{t}")?;
-            self.columns.iter().try_for_each(|c| write!(out, ",{}", c.values[k]))?;
-            self.texts.iter().try_for_each(|c| write!(out, ",{}", cell(&c.values[k])))?;
-            writeln!(out)?;
+            let numbers = self.columns.iter().map(|c| c.at(k).to_string());
+            out.row([t.to_string()].into_iter().chain(numbers).chain(self.texts.iter().map(|c| c.values[k].clone())))?;
         }
-        out.flush()
+        out.finish()
     }
 
     /// The last values as a table, with the display unit where there is one.
@@ -93,8 +115,12 @@ impl Recording {
         let names = self.columns.iter().map(|c| c.name.as_str()).chain(texts().map(|(name, _)| name));
         let width = names.map(str::len).max().unwrap_or(0).min(200);
         let row = |c: &Column| {
-            let x = c.values.last().copied().unwrap_or(f64::NAN);
-            let value = c.item(x).map_or_else(|| six(x), str::to_owned);
+            let (x, last) = (c.last().real(), c.last());
+            let value = match last {
+                Number::Integer(_) | Number::Missing => last.to_string(),
+                _ => six(x),
+            };
+            let value = c.item(x).map_or(value, str::to_owned);
             let shown = c.display.as_ref().map(|d| format!("  = {} {}", six(d.show(x)), d.name));
             format!("{:width$}  {:>12} {}{}", c.name, value, c.unit, shown.unwrap_or_default()).trim_end().to_owned()
         };
@@ -103,11 +129,6 @@ impl Recording {
         let time = self.time.last().copied().unwrap_or(f64::NAN);
         format!("{:width$}  {:>12} s\n{}", "time", six(time), rows.join("\n"))
     }
-}
-
-/// A text in CSV form, in quotation marks where needed (RFC 4180).
-pub fn cell(text: &str) -> String {
-    if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.into() }
 }
 
 /// The name of the value `x` among those of an enumeration.
@@ -131,11 +152,10 @@ mod tests {
     fn recording() -> Recording {
         let display =
             Some(DisplayUnit { name: "rpm".into(), factor: 30.0 / std::f64::consts::PI, offset: 0.0, inverse: false });
-        let speed =
-            Column { name: "p.speed".into(), unit: "rad/s".into(), display, items: Vec::new(), values: Vec::new() };
+        let speed = Column { name: "p.speed".into(), unit: "rad/s".into(), display, ..Column::default() };
         let mut recording = Recording::new([speed].into_iter());
-        recording.push(0.0, &[0.1 + 0.2]);
-        recording.push(1e-4, &[104.719_755_119_659_77]);
+        recording.push(0.0, &[Number::Real(0.1 + 0.2)]);
+        recording.push(1e-4, &[Number::Real(104.719_755_119_659_77)]);
         recording
     }
 
@@ -163,7 +183,7 @@ mod tests {
     fn names_command_no_terminal_and_break_no_row() {
         let column = |name: &str| Column { name: name.into(), ..Column::default() };
         let mut recording = Recording::new([column("p.a\u{1b}[2J\n"), column("p.b[1,2]")].into_iter());
-        recording.push(0.0, &[1.0, 2.0]);
+        recording.push(0.0, &[Number::Real(1.0), Number::Integer(2)]);
         let mut text = Vec::new();
         recording.write_csv(&mut text).unwrap();
         assert_eq!(String::from_utf8(text).unwrap(), "time,p.a\\u{1b}[2J\\u{a},\"p.b[1,2]\"\n0,1,2\n");

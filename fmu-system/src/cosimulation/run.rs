@@ -7,8 +7,11 @@ use super::point::{CommunicationPoint, Ended, end};
 use super::recording::{Recording, TextColumn};
 use super::system::System;
 use super::{continuous, events};
-use fmu_import::{Error, Instance, Kind};
+use fmu_import::{Error, Instance, Kind, Number};
 use std::ops::ControlFlow;
+
+/// Fractions of a step down to which a discarded one is taken in halves.
+const HALVES: u32 = 10;
 
 /// Simulates instances whose values are set, from start to stop. `hook` sees every communication point, the last one included,
 /// and may end the run. All runs begin and end here.
@@ -17,7 +20,7 @@ pub(super) fn simulate(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
@@ -56,12 +59,40 @@ pub(super) fn simulate(
     Ok(ended)
 }
 
+/// Steps an instance; breaks when the FMU requests the end of the simulation. With a careful grid, a step that the FMU discards is
+/// taken in halves from the state before it, and so are these.
+fn advance(instance: &mut Instance, grid: &Grid, (t, h): (f64, f64), halves: u32) -> Result<ControlFlow<()>, Error> {
+    if !grid.careful || halves == HALVES || !may_halve(instance) {
+        return instance.do_step(t, h);
+    }
+    let state = instance.get_state()?;
+    let outcome = match instance.do_step(t, h) {
+        Err(error) if error.is_discard() => {
+            instance.set_state(state)?;
+            let half = 0.5 * h;
+            match advance(instance, grid, (t, half), halves + 1)? {
+                ControlFlow::Continue(()) => advance(instance, grid, (t + half, h - half), halves + 1),
+                end @ ControlFlow::Break(()) => Ok(end),
+            }
+        }
+        outcome => outcome,
+    };
+    instance.free_state(state)?;
+    outcome
+}
+
+/// Whether an FMU can go back before a step and take shorter ones.
+fn may_halve(instance: &Instance) -> bool {
+    let of = instance.description().co_simulation.as_ref();
+    of.is_some_and(|of| of.can_get_and_set_state() && of.flag("canHandleVariableCommunicationStepSize"))
+}
+
 /// Steps instances that are initialized.
 fn step(
     instances: &mut [Instance],
     exchange: &mut Exchange,
     grid: &Grid,
-    row: &mut Vec<f64>,
+    row: &mut Vec<Number>,
     hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
 ) -> Result<Ended, Error> {
     let settings = grid.settings();
@@ -78,18 +109,30 @@ fn step(
         if flow.is_break() || index == grid.steps() {
             break;
         }
-        for (i, instance) in instances.iter_mut().enumerate() {
-            if settings.sequential {
-                exchange.write(i, instance, time)?;
+        let (mut from, next) = (time, grid.time(index + 1));
+        let between: Vec<f64> = if grid.meets { exchange.jumps_between(time, next).collect() } else { Vec::new() };
+        for to in between.iter().copied().chain([next]) {
+            let h = if between.is_empty() { grid.size(index) } else { to - from };
+            if from > time {
+                exchange.read_all(instances)?;
+                exchange.write_all(instances, from)?;
             }
-            if instance.do_step(time, grid.size(index))?.is_break() {
-                let of_step = || grid.time(index + 1);
-                last = instance.last_successful_time().unwrap_or_else(|_| of_step()).min(of_step()).min(last);
-                ended.by = Some(instance.name().into());
+            for (i, instance) in instances.iter_mut().enumerate() {
+                if settings.sequential {
+                    exchange.write(i, instance, from)?;
+                }
+                if advance(instance, grid, (from, h), 0)?.is_break() {
+                    last = instance.last_successful_time().unwrap_or(to).min(to).min(last);
+                    ended.by = Some(instance.name().into());
+                }
+                if settings.sequential {
+                    exchange.read(i, instance)?;
+                }
             }
-            if settings.sequential {
-                exchange.read(i, instance)?;
+            if ended.by.is_some() {
+                break;
             }
+            from = to;
         }
         if ended.by.is_some() {
             end(instances, exchange, row, hook, (index + 1, last), &mut ended)?;
@@ -122,24 +165,65 @@ impl System {
         let mut recording = Recording::new(self.columns());
         recording.texts =
             self.texts.iter().map(|(_, name)| TextColumn { name: name.clone(), values: vec![] }).collect();
-        let grid = match self.grid(settings) {
+        let mut grid = match self.grid(settings) {
             Ok(grid) => grid,
             Err(error) => return (recording, Err(error)),
         };
-        let mut exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records);
-        let texts = &self.texts;
-        let ended = simulate(&self.method, &mut self.instances, &mut exchange, &grid, &mut Vec::new(), |point| {
+        let mut exchange =
+            Exchange::new(self.instances.len(), &self.wiring, &self.records, self.texts.iter().map(|(port, _)| port));
+        let mut ended = self.attempt(&grid, &mut exchange, &mut recording, &mut hook);
+        // A discarded step needs the state before it, which is not saved without need. The run is the same until there.
+        let steps = matches!(self.method, Method::CoSimulation { event_mode: false, early_return: false });
+        let halve = |error: &Error| steps && error.is_discard() && self.instances.iter().any(may_halve);
+        if ended.as_ref().err().is_some_and(halve) && self.restart().is_ok() {
+            grid.careful = true;
+            let at = recording.time.last().copied().unwrap_or_default();
+            let retried = self.attempt(&grid, &mut exchange, &mut recording, &mut hook);
+            if retried.is_ok() {
+                self.note(format!("an FMU refused the step after {at} s as too long: it took shorter ones"));
+            }
+            ended = retried;
+        }
+        let outcome = ended.map(|ended| recording.ended_by = ended.by);
+        (recording, outcome)
+    }
+
+    /// Instances as before the run, with the values set.
+    fn restart(&mut self) -> Result<(), Error> {
+        for (part, instance) in self.parts.0.iter().zip(&mut self.instances) {
+            if instance.reset().is_err() {
+                *instance = part.fmu.instantiate_as(part.kind, &part.name, part.logging)?;
+            }
+            part.configure(instance)?;
+        }
+        let Self { instances, set, .. } = self;
+        set.iter().try_for_each(|(port, values)| instances[port.instance].set_at(port.base, port.reference, values))
+    }
+
+    /// Runs, and records the points after those that are recorded.
+    fn attempt(
+        &mut self,
+        grid: &Grid,
+        exchange: &mut Exchange,
+        recording: &mut Recording,
+        hook: &mut impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
+    ) -> Result<Ended, Error> {
+        let (texts, known) = (&self.texts, recording.time.len());
+        let mut points = 0;
+        simulate(&self.method, &mut self.instances, exchange, grid, &mut Vec::new(), |point| {
+            points += 1;
+            if points <= known {
+                return Ok(ControlFlow::Continue(()));
+            }
             // Texts first: where one cannot be read, no column is longer than another.
             let mut cells = Vec::with_capacity(texts.len());
             for (port, _) in texts {
-                let (_, count) = port.element.unwrap_or((0, 1));
-                cells.push(point.instances[port.instance].get_at(port.base, port.reference, count)?.cell());
+                let values = port.read(&mut point.instances[port.instance])?;
+                cells.push(values.map(|values| values.cell()).unwrap_or_default());
             }
             recording.push(point.time, point.values);
             recording.texts.iter_mut().zip(cells).for_each(|(column, cell)| column.values.push(cell));
             hook(point)
-        });
-        let outcome = ended.map(|ended| recording.ended_by = ended.by);
-        (recording, outcome)
+        })
     }
 }

@@ -2,9 +2,13 @@
 
 use super::schedule::{SAME, Schedule, last_before};
 use fmu_import::Values;
+use fmu_import::csv::{Heading, Table};
 use model_description::{ModelDescription, ModelVariable};
 use std::path::Path;
 use std::sync::Arc;
+
+/// Integers up to this one are doubles.
+const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// Texts over time: values of a variable whose type is not yet known.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,38 +55,23 @@ impl Sequence {
 
     /// [`read_csv`](Self::read_csv) of the content of a file.
     pub(super) fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
-        let mut lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
-        let (first, header) = lines.next().ok_or("is empty")?;
-        if header.contains(';') {
-            return Err(format!(
-                "line {}: has semicolons; write commas between columns and a decimal point",
-                first + 1
-            ));
-        }
-        let mut names = cells(header);
-        let second = seconds(&names.remove(0)).map_err(|cause| format!("line {}: {cause}", first + 1))?;
-        if names.is_empty() {
+        let Table { headings, rows } = Table::parse(text)?;
+        let mut headings = headings.into_iter();
+        let time = headings.next().ok_or("has no column")?;
+        let second = seconds(&time).map_err(|cause| format!("line 1: {cause}"))?;
+        if headings.len() == 0 {
             return Err("has no column but time".into());
         }
-        let mut columns: Vec<Vec<(f64, String, String)>> = vec![Vec::new(); names.len()];
-        for (index, line) in lines {
-            let at = format!("line {}: ", index + 1);
-            let row = cells(line);
-            if row.len() != names.len() + 1 {
-                let (expected, found) = (names.len() + 1, row.len());
-                let commas = if found > expected { "; commas separate columns: write a decimal point" } else { "" };
-                return Err(format!("{at}expected {expected} numbers, found {found}{commas}"));
-            }
+        let mut columns: Vec<Vec<(f64, String, String)>> = vec![Vec::new(); headings.len()];
+        for (line, row) in rows {
+            let at = format!("line {line}: ");
             let mut row = row.into_iter();
             let time = row.next().unwrap_or_default();
             let t = time.parse::<f64>().map_err(|_| format!("{at}{time:?} is not a number"))?;
             columns.iter_mut().zip(row).for_each(|(column, cell)| column.push((t * second, cell, at.clone())));
         }
-        let column = |(name, points): (String, Vec<_>)| {
-            let (name, unit) = name_and_unit(&name);
-            Ok((name.to_owned(), Self::new(points, unit.to_owned())?))
-        };
-        names.into_iter().zip(columns).map(column).collect()
+        let column = |(heading, points): (Heading, Vec<_>)| Ok((heading.name, Self::new(points, heading.unit)?));
+        headings.zip(columns).map(column).collect()
     }
 
     fn new(points: Vec<(f64, String, String)>, unit: String) -> Result<Self, String> {
@@ -104,7 +93,8 @@ impl Sequence {
     /// Names the first text that is not a number, and its line.
     pub fn lines(&self) -> Result<Schedule, String> {
         let number = |(t, text, at): &(f64, String, String)| {
-            text.parse().map(|x| (*t, x)).map_err(|_| format!("{at}{text:?} is not a number"))
+            let what = if text.is_empty() { "a cell is empty".into() } else { format!("{text:?} is not a number") };
+            text.parse().map(|x| (*t, x)).map_err(|_| format!("{at}{what}"))
         };
         let points = self.points.iter().map(number).collect::<Result<Vec<_>, _>>()?;
         Schedule::jumping(points, &self.unit)
@@ -119,7 +109,7 @@ impl Sequence {
     /// The texts as values of this variable.
     pub(super) fn values(&self, variable: &ModelVariable, description: &ModelDescription) -> Result<Held, String> {
         let value = |(t, text, at): &(f64, String, String)| {
-            let number = |_: &String| Values::from_number(text.trim().parse().ok()?, variable.base).ok();
+            let number = |_: &String| Values::from_number(text.trim().parse::<f64>().ok()?, variable.base).ok();
             let read = Values::read(text, variable, description);
             // Tools also write integers and truth values as 1.0.
             let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));
@@ -129,23 +119,12 @@ impl Sequence {
     }
 }
 
-/// `speed_ref [rpm]` as name and unit, which is empty for none. Brackets with numbers name an element of an array.
-fn name_and_unit(heading: &str) -> (&str, &str) {
-    match heading.strip_suffix(']').and_then(|name| name.rsplit_once('[')) {
-        Some((name, unit)) if unit.trim().parse::<f64>().is_err() && !unit.contains(',') => {
-            (name.trim_end(), unit.trim())
-        }
-        _ => (heading, ""),
-    }
-}
-
 /// The unit of the first column in s.
-fn seconds(heading: &str) -> Result<f64, String> {
+fn seconds(Heading { text, unit, .. }: &Heading) -> Result<f64, String> {
     const UNITS: [(&str, f64); 7] =
         [("", 1.0), ("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
-    let (_, unit) = name_and_unit(heading);
-    let known = UNITS.iter().find(|(name, _)| *name == unit).map(|(_, second)| *second);
-    known.ok_or_else(|| format!("{heading}: the first column is time, in s, ms, us, ns, min or h"))
+    let known = UNITS.iter().find(|(name, _)| name == unit).map(|(_, second)| *second);
+    known.ok_or_else(|| format!("{text}: the first column is time, in s, ms, us, ns, min or h"))
 }
 
 impl Schedule {
@@ -174,6 +153,18 @@ impl Held {
         last_before(&self.0, t).saturating_sub(1)
     }
 
+    /// The same as steps, if every value is one number that a double has exactly.
+    pub(super) fn steps(&self) -> Option<Schedule> {
+        let mut points: Vec<(f64, f64)> = Vec::new();
+        for (t, values) in &*self.0 {
+            let x = values.number().filter(|x| values.len() == 1 && x.abs() <= EXACT)?;
+            // Of several values at one time, the last holds.
+            points.pop_if(|(last, _)| last.to_bits() == t.to_bits());
+            points.push((*t, x));
+        }
+        Schedule::steps(points).ok()
+    }
+
     pub(super) fn value(&self, index: usize) -> &Values {
         &self.0[index].1
     }
@@ -191,22 +182,6 @@ impl Held {
     pub(super) fn fits(&self, count: usize) -> bool {
         self.0.iter().all(|(_, values)| values.len() == count)
     }
-}
-
-/// The cells of a line of CSV, without the quotation marks around them.
-fn cells(line: &str) -> Vec<String> {
-    let (mut cells, mut cell, mut quoted) = (Vec::new(), String::new(), false);
-    let mut chars = line.trim().chars().peekable();
-    while let Some(c) = chars.next() {
-        match c {
-            '"' if quoted && chars.peek() == Some(&'"') => cell.extend(chars.next()),
-            '"' => quoted = !quoted,
-            ',' if !quoted => cells.push(std::mem::take(&mut cell).trim().to_owned()),
-            c => cell.push(c),
-        }
-    }
-    cells.push(cell.trim().to_owned());
-    cells
 }
 
 #[cfg(test)]
@@ -243,6 +218,7 @@ mod tests {
             ("time,a\n0\n", "line 2: expected 2 numbers, found 1"),
             ("time,a\n0,1,5\n", "line 2: expected 2 numbers, found 3; commas separate columns: write a decimal point"),
             ("time,a\n0,x\n", "line 2: \"x\" is not a number"),
+            ("time,a\n0,\n", "line 2: a cell is empty"),
             ("time;a\n0;1,5\n", "line 1: has semicolons; write commas between columns and a decimal point"),
         ] {
             assert_eq!(Schedule::parse_csv(text).unwrap_err(), cause, "{text:?}");

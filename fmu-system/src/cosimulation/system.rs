@@ -1,14 +1,16 @@
 //! FMUs and their connections, before a run.
 
-use super::exchange::{Source, Wiring};
+use super::exchange::{Change, Source, Wiring};
 use super::grid::{Grid, Settings};
 use super::method::Method;
-use super::parts::{Part, Parts, Port, kind};
+use super::parts::{Part, Parts, Port, family, kind};
 use super::point::take_messages;
 use super::schedule::Schedule;
 use super::sequence::Sequence;
 use fmu_core::Need;
-use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
+use fmu_core::variable::position;
+use fmu_import::written::matches;
+use fmu_import::{Error, Fmu, Instance, Kind, Message, Number, Values};
 use model_description::{
     BaseType, Causality, Conversion, Interface, Measured, ModelVariable, Passage, Variability, parse_number,
 };
@@ -32,6 +34,8 @@ pub struct Crossing<'a> {
     pub stated: [Option<Measured<'a>>; 2],
     /// Conversion after that of the units.
     pub transformation: Option<Conversion>,
+    /// Source values and what becomes of them, as a user writes them; instead of any conversion.
+    pub table: Option<&'a [(String, String)]>,
 }
 
 /// FMUs and their connections.
@@ -109,11 +113,16 @@ impl System {
                 self.notes.push(format!("{name}: {cause}"));
             }
         }
+        let meets = self.meets();
         let late = self.wiring.jumps().filter_map(|(port, times)| {
             let instance = &self.instances[port.instance];
             let stepped = matches!(instance.kind(), Kind::CoSimulation { event_mode: false, .. });
             let (t, after) = times.into_iter().find_map(|t| Some((t, grid.after(t)?))).filter(|_| stepped)?;
-            let cause = format!("the value of {t} s, between two communication points, acts from {after} s on");
+            let what = format!("the value of {t} s lies between two communication points");
+            let cause = match &meets {
+                Ok(()) => format!("{what}: a step ends there"),
+                Err(why) => format!("{what} and acts from {after} s on: {why}"),
+            };
             Some(format!("{}.{}: {cause}", instance.name(), port.name))
         });
         let late: Vec<String> = late.collect();
@@ -128,10 +137,25 @@ impl System {
         Ok(shorter)
     }
 
+    /// Whether steps may end where an input jumps, or the FMU that does not allow it.
+    fn meets(&self) -> Result<(), String> {
+        if let Method::ModelExchange(_) = self.method {
+            return Err("FMUs for Co-Simulation step from one communication point to the next".into());
+        }
+        let rigid = |i: &&Instance| {
+            let of = i.description().co_simulation.as_ref();
+            !of.is_some_and(|of| {
+                of.flag("canHandleVariableCommunicationStepSize") && of.attribute("fixedInternalStepSize").is_none()
+            })
+        };
+        let fixed = self.instances.iter().find(rigid);
+        fixed.map_or(Ok(()), |i| Err(format!("{} cannot vary its step", i.name())))
+    }
+
     /// The communication points of a run.
     pub(super) fn grid(&mut self, settings: &Settings) -> Result<Grid, Error> {
         let mut grid = self.feasible(settings)?.grid().map_err(|cause| Error::usage("settings", cause))?;
-        grid.tolerance = self.tolerance;
+        (grid.tolerance, grid.meets) = (self.tolerance, self.meets().is_ok());
         Ok(grid)
     }
 
@@ -226,7 +250,8 @@ impl System {
         let read = |text: &str| Values::read(text, variable, description).map_err(wrong);
         let mut values = read(text)?;
         let mut whole = port;
-        if let Some((element, count)) = whole.element.take() {
+        if let Some(element) = whole.element.take() {
+            let count = whole.count;
             let one = values;
             let name = std::mem::replace(&mut whole.name, variable.name.clone());
             let before = self.value_set(index, &whole.name).cloned().or(present);
@@ -255,15 +280,22 @@ impl System {
     /// # Errors
     /// As [`connect`](Self::connect).
     pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing<'_>) -> Result<(), Error> {
-        let Crossing { units, stated, transformation } = crossing;
-        let (source, target) = (self.parts.scalar(from)?, self.parts.scalar(to)?);
-        if !matches!(self.parts.causality(&source), Causality::Output | Causality::Local) {
+        let Crossing { units, stated, transformation, table } = crossing;
+        let (source, target) = (self.parts.port(from)?, self.parts.port(to)?);
+        let sends = matches!(self.parts.causality(&source), Causality::Output | Causality::Local);
+        if !sends && !self.parts.is_timed_clock(&source) {
             return Err(Error::usage(from, "is not an output"));
         }
-        let widens = matches!((kind(source.base), kind(target.base)), (Some('i'), Some('r')));
-        if kind(source.base) != kind(target.base) && !widens {
+        if let Some(table) = table {
+            let table = self.table([(from, &source), (to, &target)], table)?;
+            self.check_fed(&target, to, false)?;
+            return self.feed(target, to, Source::Port(source, Some(Change::Table(table))));
+        }
+        let widens = matches!((family(source.base), family(target.base)), ('i', 'r'));
+        if family(source.base) != family(target.base) && !widens {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
+        self.check_extents([(from, &source), (to, &target)])?;
         self.check_fed(&target, to, false)?;
         let conversion = match units {
             Units::PassOn => None,
@@ -280,7 +312,59 @@ impl System {
                 }
             },
         };
-        self.feed(target, to, Source::Port(source, Conversion::then(conversion, *transformation)))
+        let conversion = Conversion::then(conversion, *transformation).map(Change::Linear);
+        self.feed(target, to, Source::Port(source, conversion))
+    }
+
+    /// A table between two variables of one number each; the source is no real number.
+    fn table(
+        &self,
+        [(from, source), (to, target)]: [(&str, &Port); 2],
+        table: &[(String, String)],
+    ) -> Result<std::sync::Arc<[(Number, Number)]>, Error> {
+        for (name, port) in [(from, source), (to, target)] {
+            if port.is_whole() || kind(port.base).is_none_or(|kind| kind == 'c') {
+                return Err(Error::usage(name, "is not one number, which a table of values needs"));
+            }
+        }
+        if source.base.is_float() {
+            return Err(Error::usage(
+                from,
+                "is a real number: a table of values needs an integer, a Boolean or an item",
+            ));
+        }
+        let read = |port: &Port, text: &str| {
+            let description = self.parts.0[port.instance].description();
+            let values = Values::read(text, self.parts.variable(port.instance, &port.name)?, description);
+            Ok::<_, Error>(values.map(|values| values.one(0)))
+        };
+        let entry = |(one, other): &(String, String)| {
+            let sent = read(source, one)?;
+            let taken = read(target, other)?.map_err(|cause| Error::usage(to, cause))?;
+            // The table may have values beyond those of the source.
+            Ok::<_, Error>(sent.ok().map(|sent| (sent, taken)))
+        };
+        let entries: Vec<Option<_>> = table.iter().map(entry).collect::<Result<_, _>>()?;
+        Ok(entries.into_iter().flatten().collect())
+    }
+
+    /// Both ends of a connection are single values, or arrays of the same extents.
+    fn check_extents(&self, [(from, source), (to, target)]: [(&str, &Port); 2]) -> Result<(), Error> {
+        let extents = |port: &Port| if port.is_whole() { self.parts.shape(port) } else { Vec::new() };
+        let (sent, taken) = (extents(source), extents(target));
+        if sent == taken {
+            return Ok(());
+        }
+        let said = |extents: &[usize]| match extents {
+            [] => "one value".to_owned(),
+            _ => format!("{} elements", extents.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")),
+        };
+        let (whole, shape) = if source.is_whole() { (from, &sent) } else { (to, &taken) };
+        let remedy = match (sent.is_empty(), taken.is_empty()) {
+            (false, false) => String::new(),
+            _ => format!(": name an element of the array, as in {whole}{}", position(shape, 0)),
+        };
+        Err(Error::usage(to, format!("takes {}, and {from} has {}{remedy}", said(&taken), said(&sent))))
     }
 
     /// The known part of the unit of a variable, written `instance.variable`; `stated` if its FMU names none.
@@ -378,8 +462,30 @@ impl System {
         if !values.fits(count) {
             return Err(wrong(format!("has {count} elements, and a value has another number")));
         }
+        if let Some(steps) = values.steps().filter(|_| !target.is_whole()) {
+            return self.feed(target, port, Source::Schedule(steps));
+        }
         self.wiring.hold(target, values);
         Ok(())
+    }
+
+    /// Whether there is a variable of this name, written `instance.variable`.
+    pub fn has(&self, port: &str) -> bool {
+        self.parts.port(port).is_ok()
+    }
+
+    /// The variables whose names have the form of a pattern, in the order of the FMUs; neither clocks nor time.
+    pub fn matching(&self, pattern: &str) -> Vec<String> {
+        let alone = self.instances.len() == 1;
+        let is_value = |v: &&ModelVariable| v.base != BaseType::Clock && v.causality != Causality::Independent;
+        let of = |i: &Instance| {
+            let full = |v: &ModelVariable| {
+                let full = format!("{}.{}", i.name(), v.name);
+                (matches(pattern, &full) || (alone && matches(pattern, &v.name))).then_some(full)
+            };
+            i.description().variables.iter().filter(is_value).filter_map(full).collect::<Vec<_>>()
+        };
+        self.instances.iter().flat_map(of).collect()
     }
 
     /// Records a variable under this name in a column of texts, in a single run: a text, bytes in hexadecimal digits, or an array
@@ -388,13 +494,9 @@ impl System {
     /// # Errors
     /// The variable does not exist, is one number, or is a clock.
     pub fn record_text_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
-        let mut found = self.parts.port(port)?;
-        let variable = self.parts.variable(found.instance, &found.name)?;
+        let found = self.parts.port(port)?;
         if !self.is_text(port)? || found.base == BaseType::Clock {
             return Err(Error::usage(port, "is one number, or a clock"));
-        }
-        if variable.is_array() {
-            found.element = Some((0, self.instances[found.instance].elements(variable)?));
         }
         self.texts.push((found, name.into()));
         Ok(())
@@ -406,8 +508,7 @@ impl System {
     /// The variable does not exist.
     pub fn is_text(&self, port: &str) -> Result<bool, Error> {
         let port = self.parts.port(port)?;
-        let whole = self.parts.variable(port.instance, &port.name)?.is_array() && port.element.is_none();
-        Ok(whole || matches!(port.base, BaseType::String | BaseType::Binary))
+        Ok(port.is_whole() || matches!(port.base, BaseType::String | BaseType::Binary))
     }
 
     /// Whether a variable, written `instance.variable`, is one real number.

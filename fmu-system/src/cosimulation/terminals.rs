@@ -21,10 +21,13 @@ impl System {
             let full = |instance: usize, m: &Member| format!("{}.{}", self.instances[instance].name(), m.variable);
             let (left, right) = (full(i, &m), full(k, &n));
             let causality = |port: &str| self.parts.port(port).map(|p| self.parts.causality(&p));
+            let ticks = |port: &str| self.parts.port(port).is_ok_and(|p| self.parts.is_timed_clock(&p));
             let member = m.name.as_deref().unwrap_or(&m.variable);
             match (causality(&left)?, causality(&right)?) {
                 (Causality::Output, Causality::Input) => found.push((left, right)),
                 (Causality::Input, Causality::Output) => found.push((right, left)),
+                (Causality::Input, Causality::Input) if ticks(&left) && !ticks(&right) => found.push((left, right)),
+                (Causality::Input, Causality::Input) if ticks(&right) && !ticks(&left) => found.push((right, left)),
                 (from, to) => {
                     let cause = format!(
                         "does not fit {b}: member {member} is {from} {left} here and {to} {right} there, expected an output \
@@ -66,8 +69,9 @@ fn pairs(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> {
             return Err(format!("{} members here, {} there", a.members.len(), b.members.len()));
         }
         ("sequence", "sequence") => a.members.iter().cloned().zip(b.members.iter().cloned()).collect(),
-        ("sequence", other) | (other, "sequence") => {
-            return Err(format!("one has the matchingRule sequence, the other {other}"));
+        (TRANSCEIVER, TRANSCEIVER) => return transceivers(a, b),
+        (rule @ ("sequence" | TRANSCEIVER), other) | (other, rule @ ("sequence" | TRANSCEIVER)) => {
+            return Err(format!("one has the matchingRule {rule}, the other {other}"));
         }
         _ => by_name(a, b)?,
     };
@@ -96,9 +100,24 @@ fn pairs(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> {
     if pairs.is_empty() { Err("they have no member in common".into()) } else { Ok(pairs) }
 }
 
+/// The rule of a network (FMI-LS-BUS 1.0.0, Bus Terminal): what one side sends, the other receives.
+const TRANSCEIVER: &str = "org.fmi-ls-bus.transceiver";
+
+/// `Tx_Data` and `Tx_Clock` of each side with `Rx_Data` and `Rx_Clock` of the other. A terminal inside configures a node and is not
+/// connected.
+fn transceivers(a: &Terminal, b: &Terminal) -> Result<Vec<(Member, Member)>, String> {
+    let member = |t: &Terminal, name: &str| {
+        let found = t.members.iter().find(|m| m.name.as_deref() == Some(name)).cloned();
+        found.ok_or_else(|| format!("{} is a transceiver without a member {name}", t.name))
+    };
+    let pair = |[of_a, of_b]: [&str; 2]| Ok((member(a, of_a)?, member(b, of_b)?));
+    let names = [["Tx_Data", "Rx_Data"], ["Tx_Clock", "Rx_Clock"], ["Rx_Data", "Tx_Data"], ["Rx_Clock", "Tx_Clock"]];
+    names.into_iter().map(pair).collect()
+}
+
 fn rule(t: &Terminal) -> Result<&str, String> {
     match t.matching_rule.as_str() {
-        known @ ("plug" | "bus" | "sequence") => Ok(known),
+        known @ ("plug" | "bus" | "sequence" | TRANSCEIVER) => Ok(known),
         other => Err(format!("{} has the matchingRule {other}: connect its variables singly with --connect", t.name)),
     }
 }
@@ -159,6 +178,10 @@ mod tests {
         assert_eq!(of(("plug", "y=b"), ("bus", "y=c z=d")).unwrap(), "b-c");
         assert_eq!(of(("sequence", "x=a y=b"), ("sequence", "=c =d")).unwrap(), "a-c b-d");
         assert_eq!(of(("plug", "q:inflow"), ("plug", "q:outflow")).unwrap(), "q-q");
+        let [one, other] = ["a", "b"]
+            .map(|n| ["Rx_Clock", "Rx_Data", "Tx_Clock", "Tx_Data"].map(|m| format!("{m}={n}.{m}")).join(" "));
+        let crossed = "a.Tx_Data-b.Rx_Data a.Tx_Clock-b.Rx_Clock a.Rx_Data-b.Tx_Data a.Rx_Clock-b.Tx_Clock";
+        assert_eq!(of((TRANSCEIVER, &one), (TRANSCEIVER, &other)).unwrap(), crossed);
     }
 
     #[test]
@@ -170,6 +193,8 @@ mod tests {
             (("sequence", "x y"), ("sequence", "x"), "2 members here, 1 there"),
             (("sequence", "x"), ("plug", "x"), "the matchingRule sequence, the other plug"),
             (("none", "x"), ("plug", "x"), "matchingRule none"),
+            ((TRANSCEIVER, "Tx_Data"), (TRANSCEIVER, "Rx_Data"), "t is a transceiver without a member"),
+            ((TRANSCEIVER, "Tx_Data"), ("bus", "Tx_Data"), "the other bus"),
             (("plug", "=x"), ("plug", "x"), "x of t has no memberName"),
             (("plug", "q:inflow"), ("plug", "q:inflow"), "an inflow on both sides"),
             (("plug", "q:inflow"), ("plug", "q"), "member q is inflow here and signal there"),

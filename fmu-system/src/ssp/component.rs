@@ -34,6 +34,9 @@ pub struct Connector {
     pub line: usize,
 }
 
+/// Source values and what becomes of them.
+pub(super) type Table = std::sync::Arc<[(String, String)]>;
+
 /// Two connectors; which of them sends follows from their kinds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
@@ -45,6 +48,8 @@ pub struct Connection {
     pub no_conversion: bool,
     /// Conversion of the value, after that of the units.
     pub transformation: Option<Conversion>,
+    /// Source values and what becomes of them, instead of a conversion.
+    pub table: Option<Table>,
     /// Line of the element.
     pub line: usize,
 }

@@ -86,6 +86,7 @@ pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
     for edge in edges.iter().filter(|edge| edge.to.is_component || edge.to.is_outside()) {
         let at = |cause: String| format!("line {}: {cause}", edge.of.line);
         let (mut from, mut conversion, mut plain) = (&edge.from, edge.of.transformation, edge.of.no_conversion);
+        let mut table = edge.of.table.clone();
         let mut passed = vec![(from.clone(), conversion)];
         while !from.is_component && !from.is_outside() {
             let mut feeding = edges.iter().filter(|other| other.to == *from);
@@ -96,10 +97,17 @@ pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
             if passed.len() > edges.len() {
                 return Err(at(format!("{} is connected with itself", from.name())));
             }
+            if (table.is_some() || next.of.table.is_some()) && (conversion, &table) != (None, &None) {
+                return Err(at("a table and another transformation on one path are not supported".into()));
+            }
+            table = table.or_else(|| next.of.table.clone());
             conversion = Conversion::then(next.of.transformation, conversion);
             plain |= next.of.no_conversion;
             from = &next.from;
             passed.push((from.clone(), conversion));
+        }
+        if edge.is_parameter && table.is_some() {
+            return Err(at("a table for a parameter is not supported: write a ParameterMapping".into()));
         }
         if edge.to.is_component {
             for (node, conversion) in passed.iter().filter(|(node, _)| !node.is_component) {
@@ -110,12 +118,19 @@ pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
         }
         // What nothing feeds keeps its value, and parameters are set and not connected.
         if !edge.is_parameter && (from.is_component || from.is_outside()) {
-            if conversion.is_some() && (from.is_outside() || edge.to.is_outside()) {
+            if (conversion.is_some() || table.is_some()) && (from.is_outside() || edge.to.is_outside()) {
                 return Err(at("a transformation at a connector of the system is not supported".into()));
             }
             let (start, end) = (from.end(), edge.to.end());
             let line = edge.of.line;
-            flat.connections.push(Connection { start, end, no_conversion: plain, transformation: conversion, line });
+            flat.connections.push(Connection {
+                start,
+                end,
+                no_conversion: plain,
+                transformation: conversion,
+                table,
+                line,
+            });
         }
     }
     flat.connectors.clone_from(&outer.connectors);
@@ -147,11 +162,11 @@ fn edge<'a>(level: &Level, c: &'a Connection) -> Result<Edge<'a>, String> {
     let inside = |end: &ConnectionEnd| end.element.is_some();
     let sends = |end: &ConnectionEnd, kind: &str| match kind {
         "output" | "calculatedParameter" => inside(end),
-        "input" | "parameter" => !inside(end),
+        "input" | "parameter" | "structuralParameter" => !inside(end),
         _ => false,
     };
     let takes = |end: &ConnectionEnd, kind: &str| match kind {
-        "input" | "parameter" => inside(end),
+        "input" | "parameter" | "structuralParameter" => inside(end),
         "output" | "calculatedParameter" => !inside(end),
         _ => false,
     };
@@ -175,7 +190,7 @@ fn edge<'a>(level: &Level, c: &'a Connection) -> Result<Edge<'a>, String> {
     if from.is_outside() && to.is_outside() {
         return Err("connects the system with itself, which is not supported: remove it".into());
     }
-    Ok(Edge { from, to, is_parameter: one == "parameter", of: c })
+    Ok(Edge { from, to, is_parameter: ["parameter", "structuralParameter"].contains(&one.as_str()), of: c })
 }
 
 /// The connector at an end, and its kind.

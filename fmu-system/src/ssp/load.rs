@@ -8,6 +8,7 @@ use super::ssv::Parameter;
 use super::structure::{Connection, ConnectionEnd, Connector, Structure};
 use super::values::{self, Given};
 use crate::cosimulation::{Crossing, Method, Schedule, Sequence, Settings, System, Units};
+use fmu_import::written::{is_pattern, matches};
 use fmu_import::{Fmu, check_entries, limits};
 use model_description::{Experiment, Measured, Passage};
 use std::fs::File;
@@ -230,10 +231,10 @@ impl Loaded {
     pub fn points(&mut self, name: &str, text: &str) -> Result<(), Error> {
         for port in self.connectors.ports(name)? {
             let wrong = Error::Invalid;
-            if self.system.is_text(&port)? {
-                self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
-            } else {
+            if self.system.is_real(&port)? || (!self.system.is_text(&port)? && text.contains('~')) {
                 self.system.input(&port, Schedule::parse(text).map_err(wrong)?)?;
+            } else {
+                self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
             }
         }
         Ok(())
@@ -250,11 +251,28 @@ impl Loaded {
         Ok(())
     }
 
-    /// Records a connector of the system, or `component.variable`.
+    /// Whether a name is that of a connector of the system or of a variable, written `component.variable`.
+    pub fn has(&self, name: &str) -> bool {
+        self.connectors.source(name).is_ok_and(|port| self.system.has(&port))
+    }
+
+    /// Records a connector of the system, or `component.variable`; a pattern with `*` and `?` records all that have its form.
     ///
     /// # Errors
     /// The variable does not exist, or is neither a number nor a text.
     pub fn record(&mut self, name: &str) -> Result<(), Error> {
+        if is_pattern(name) && !self.has(name) {
+            let of_system = self.connectors.outputs.iter().map(|(name, _)| name).filter(|n| matches(name, n));
+            let all: Vec<String> = of_system.cloned().chain(self.system.matching(name)).collect();
+            if all.is_empty() {
+                return invalid(format!("{name}: no variable has a name of this form"));
+            }
+            return all.iter().try_for_each(|name| self.record_one(name));
+        }
+        self.record_one(name)
+    }
+
+    fn record_one(&mut self, name: &str) -> Result<(), Error> {
         let port = self.connectors.source(name)?;
         if self.system.is_text(&port)? {
             return Ok(self.system.record_text_as(&port, name)?);
@@ -312,7 +330,7 @@ impl Loaded {
                 Err(format!("{target} is fed twice: remove one of the connections"))
             }
             (Some(source), Some(target)) => {
-                let crossing = Crossing { units, stated, transformation: c.transformation };
+                let crossing = Crossing { units, stated, transformation: c.transformation, table: c.table.as_deref() };
                 self.system.connect_by(&source, &target, &crossing).map_err(|e| e.to_string())
             }
             (None, Some(target)) => {

@@ -39,11 +39,25 @@ fn entry(e: &Element) -> Result<MappingEntry, String> {
     let transformation = match e.children.iter().find(|c| local(c).ends_with("Transformation")) {
         None => Transformation::None,
         Some(t) if local(t) == "LinearTransformation" => Transformation::Linear(linear(t)?),
-        Some(t) => Transformation::Table(
-            t.children.iter().filter(|c| local(c) == "MapEntry").map(pair).collect::<Result<_, _>>()?,
-        ),
+        Some(t) => Transformation::Table(table(t)?),
     };
     Ok(MappingEntry { source: named("source")?, target: named("target")?, transformation, line: e.line })
+}
+
+/// The entries of a BooleanMappingTransformation, IntegerMappingTransformation or EnumerationMappingTransformation.
+///
+/// # Errors
+/// The line of an entry that lacks something, or whose source another entry has.
+pub(super) fn table(e: &Element) -> Result<Vec<(String, String)>, String> {
+    let mut pairs: Vec<(String, String)> = Vec::new();
+    for entry in e.children.iter().filter(|c| local(c) == "MapEntry") {
+        let (source, target) = pair(entry)?;
+        if pairs.iter().any(|(other, _)| *other == source) {
+            return Err(format!("line {}: source={source:?} is already in the table", entry.line));
+        }
+        pairs.push((source, target));
+    }
+    Ok(pairs)
 }
 
 fn pair(e: &Element) -> Result<(String, String), String> {

@@ -161,13 +161,12 @@ fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
 }
 
 fn connection(e: &Element) -> Result<Connection, String> {
-    let transformation = match e.children.iter().find(|c| local(c).ends_with("Transformation")) {
-        None => None,
-        Some(t) if local(t) == "LinearTransformation" => Some(ssm::linear(t)?),
-        Some(t) => {
-            return Err(unsupported(t, "only LinearTransformation is supported: put the table into a component"));
-        }
+    let (transformation, table) = match e.children.iter().find(|c| local(c).ends_with("Transformation")) {
+        None => (None, None),
+        Some(t) if local(t) == "LinearTransformation" => (Some(ssm::linear(t)?), None),
+        Some(t) => (None, Some(ssm::table(t)?.into())),
     };
+
     let end = |element: &str, connector: &str| {
         Ok::<_, String>(ConnectionEnd {
             element: e.get(element).map(str::to_owned),
@@ -179,6 +178,7 @@ fn connection(e: &Element) -> Result<Connection, String> {
         end: end("endElement", "endConnector")?,
         no_conversion: matches!(e.get("suppressUnitConversion"), Some("true" | "1")),
         transformation,
+        table,
         line: e.line,
     })
 }
@@ -268,9 +268,10 @@ mod tests {
             ),
             (
                 system(
-                    "<Connections><Connection startConnector='a' endConnector='b'><EnumerationMappingTransformation/></Connection></Connections>",
+                    "<Connections><Connection startConnector='a' endConnector='b'><IntegerMappingTransformation>
+                    <MapEntry source='1' target='2'/><MapEntry source='1' target='3'/></IntegerMappingTransformation></Connection></Connections>",
                 ),
-                "<EnumerationMappingTransformation>: only LinearTransformation",
+                "line 3: source=\"1\" is already in the table",
             ),
             (
                 system(

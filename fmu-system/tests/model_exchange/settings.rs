@@ -66,28 +66,79 @@ fn an_fmu_that_cannot_vary_its_step_gets_no_shorter_one() {
     );
 }
 
+/// An input that jumps between two communication points is met by a step that ends there, if all FMUs can vary their steps.
 #[test]
-fn a_jump_between_two_communication_points_is_noted() {
+fn a_jump_between_two_communication_points_is_met_or_acts_late_with_a_note() {
     let workshop = Workshop::new();
-    let fmu = workshop.plain("plant", 2);
-    let notes = |points: &str, method| {
-        let mut system = System::new(method);
-        system.add("p", &fmu, false).unwrap();
-        system.input("p.u", Schedule::parse(points).unwrap()).unwrap();
-        let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
-        system.feasible(&settings).unwrap();
-        system.take_notes()
-    };
-    let exact = Method::ModelExchange(Integration::default());
-    assert_eq!(notes("0:0,0.3:1,2.05:3", Method::default()), [""; 0]);
-    assert_eq!(notes("0:0~0.25:1", Method::default()), [""; 0]);
-    assert_eq!(notes("0:0,0.25:1", exact), [""; 0]);
-    let found = notes("0:0,0.2:1,0.25:2,0.35:3", Method::default());
-    assert!(
-        found.len() == 1
-            && found[0].starts_with("p.u: the value of 0.25 s, between two communication points, acts from 0.3"),
-        "{found:?}"
-    );
+    for version in [2, 3] {
+        let fmu = workshop.plain("plant", version);
+        let rigid = |xml: String| xml.replace("canHandleVariableCommunicationStepSize='true'", "");
+        let rigid = workshop.fmu("plant", version, &[], rigid);
+        let run = |fmu: &Fmu, points: &str, method| {
+            let mut system = System::new(method);
+            system.add("p", fmu, false).unwrap();
+            system.input("p.u", Schedule::parse(points).unwrap()).unwrap();
+            system.record("p.x").unwrap();
+            let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+            let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+            assert_eq!(recording.time.len(), 11);
+            (recording.columns[0].values[10], system.take_notes())
+        };
+        let exact = Method::ModelExchange(Integration::default());
+        for (points, method) in
+            [("0:0,0.3:1,2.05:3", Method::default()), ("0:0~0.25:1", Method::default()), ("0:0,0.25:1", exact)]
+        {
+            assert_eq!(run(&fmu, points, method).1, [""; 0], "{points}");
+        }
+        // x' = u - x from 1: u is 1 until 0.25 s, then 3.
+        let solved = |t: f64| 3.0 - 2.0 * f64::exp(-(1.0 - t));
+        let (x, notes) = run(&fmu, "0:1,0.25:3", Method::default());
+        assert!((x - solved(0.25)).abs() < 1e-12, "{x}");
+        let expected = "p.u: the value of 0.25 s lies between two communication points: a step ends there";
+        assert_eq!(notes, [expected]);
+        let (x, notes) = run(&rigid, "0:1,0.25:3", Method::default());
+        assert!((x - solved(0.3)).abs() < 1e-12, "{x}");
+        assert!(notes[0].ends_with(" and acts from 0.30000000000000004 s on: p cannot vary its step"), "{notes:?}");
+    }
+}
+
+/// A step that is too long for an FMU with states is taken in halves; without states the run ends before it.
+#[test]
+fn a_discarded_step_is_taken_in_halves() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let states = if version == 2 { "canGetAndSetFMUstate='true'" } else { "canGetAndSetFMUState='true'" };
+        for with_states in [true, false] {
+            let fmu = workshop.fmu("plant", version, &["-DLONGEST=0.03"], |xml| {
+                let has = if with_states { states } else { "" };
+                xml.replace("<CoSimulation ", &format!("<CoSimulation {has} "))
+            });
+            let mut system = System::default();
+            system.add("p", &fmu, false).unwrap();
+            system.set("p.u", "2").unwrap();
+            for name in ["p.x", "p.y"] {
+                system.record(name).unwrap();
+            }
+            let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+            let mut points = 0;
+            let (recording, outcome) = system.run_keeping(&settings, |_| {
+                points += 1;
+                Ok(ControlFlow::Continue(()))
+            });
+            let last = |column: usize| *recording.columns[column].values.last().unwrap();
+            // Three whole steps, then four quarters each of the other seven.
+            assert_eq!((last(1), points), if with_states { (3.0 + 28.0, 11) } else { (3.0, 4) }, "{version}");
+            if with_states {
+                outcome.unwrap();
+                let solved = 2.0 - f64::exp(-1.0);
+                assert!((last(0) - solved).abs() < 1e-12, "{}", last(0));
+                let expected = "an FMU refused the step after 0.30000000000000004 s as too long: it took shorter ones";
+                assert_eq!(system.take_notes(), [expected]);
+            } else {
+                assert!(outcome.unwrap_err().is_discard());
+            }
+        }
+    }
 }
 
 /// An SSP file of these entries.

@@ -14,11 +14,10 @@ use fmu_core::terminal::{MatchingRule, MemberKind};
 const STRUCT: &str = "org.fmi-standard.fmi-ls-struct.map";
 
 /// terminalsAndIcons.xml for an FMU of this standard; `None` for a model without terminals and icon. FMI 2.0 has no maps, because
-/// their members are arrays.
+/// their members are arrays, and no networks, whose members are clocks and bytes.
 pub fn write_terminals(description: &Description, version: FmiVersion) -> Option<String> {
     let Description { terminals, icon, .. } = description;
-    let terminals: Vec<_> =
-        terminals.iter().filter(|t| version == FmiVersion::V3 || t.rule != MatchingRule::Map).collect();
+    let terminals: Vec<_> = terminals.iter().filter(|t| version == FmiVersion::V3 || !t.rule.is_layered()).collect();
     if terminals.is_empty() && icon.is_none() {
         return None;
     }
@@ -38,6 +37,7 @@ fn terminal(t: &TerminalDescription) -> Element {
     let rule = match t.rule {
         MatchingRule::Plug => "plug",
         MatchingRule::Bus => "bus",
+        MatchingRule::Transceiver => "org.fmi-ls-bus.transceiver",
         MatchingRule::Map => STRUCT,
     };
     let picture = t.picture.as_ref().map(|p| {
@@ -46,10 +46,10 @@ fn terminal(t: &TerminalDescription) -> Element {
         place(element, p.area).with("iconBaseName", &*p.icon)
     });
     let element = Element::new("Terminal").with("name", &*t.name);
-    let element = if t.rule == MatchingRule::Map {
-        element.with("terminalKind", format!("{STRUCT}.rectilinearGrid"))
-    } else {
-        element
+    let element = match t.rule {
+        MatchingRule::Map => element.with("terminalKind", format!("{STRUCT}.rectilinearGrid")),
+        MatchingRule::Transceiver => element.with("terminalKind", "org.fmi-ls-bus.network-terminal"),
+        MatchingRule::Plug | MatchingRule::Bus => element,
     };
     element
         .with("matchingRule", rule)

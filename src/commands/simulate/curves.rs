@@ -62,6 +62,7 @@ mod tests {
             unit: unit.into(),
             display: None,
             items: Vec::new(),
+            exact: Vec::new(),
             values: vec![0.0, 1.0, f64::NAN],
         };
         let columns = vec![column("c.i_a_ref", "A"), column("p.speed", ""), column("p.i_q", "A"), column("p.i_a", "A")];

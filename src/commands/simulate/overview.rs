@@ -25,7 +25,7 @@ pub(super) fn overview(recording: &Recording) -> Recording {
     let mut columns: Vec<Column> = PANELS.concat().iter().filter_map(named).cloned().collect();
     if let (Some(estimate), Some(rotor)) = (named(&"theta_est"), named(&"theta_e")) {
         let values = estimate.values.iter().zip(&rotor.values).map(|(a, b)| wrap(a - b)).collect();
-        columns.push(Column { name: "theta_est - theta_e".into(), values, ..rotor.clone() });
+        columns.push(Column { name: "theta_est - theta_e".into(), values, exact: Vec::new(), ..rotor.clone() });
     }
     if columns.is_empty() {
         let mut panels: Vec<(&str, usize)> = Vec::new();
@@ -83,6 +83,7 @@ mod tests {
             unit: (*unit).into(),
             display: None,
             items: Vec::new(),
+            exact: Vec::new(),
             values: vec![0.0, 3.0],
         };
         Recording { time: vec![0.0, 1.0], columns: names.iter().map(column).collect(), ..Recording::default() }

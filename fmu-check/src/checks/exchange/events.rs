@@ -1,6 +1,7 @@
 //! Events of Model Exchange (FMI 2.0.5, 3.1 and 3.2.2; FMI 3.0.2, 2.3.5 and 3.1.1).
 
 use crate::check::{Check, Levels, Run};
+use crate::confidence::Confidence;
 use crate::exchange::Importer;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
@@ -34,8 +35,9 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "nominalsOfContinuousStatesChanged is true only if a nominal has changed.",
         tried: "Reads the nominals after every update that sets the flag.", fix: "Clear the flag if no nominal changes." },
     Check { id: "E25", clause: "2.0.5, 3.2.2; 3.0.2, 3.1.1", levels: Levels::MUST, run: Run::Exchange(indicators),
-        requirement: "After Event Mode no event indicator is 0.",
-        tried: "Reads the event indicators after Event Mode.", fix: "Shift an indicator that is 0, with a small hysteresis." },
+        requirement: "After Event Mode no event indicator is 0 (hard: an indicator has more values than its two signs, so that a solver finds its zero).",
+        tried: "Reads the event indicators after Event Mode and over a run.",
+        fix: "Shift an indicator that is 0, with a small hysteresis, and return the expression that crosses 0, not its sign." },
     Check { id: "E26", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.4", levels: Levels::MUST, run: Run::Exchange(discrete),
         requirement: "Discrete variables do not change in Continuous-Time Mode.",
         tried: "Reads discrete variables between events, and before each event.", fix: "Assign discrete variables in updates only." },
@@ -149,6 +151,7 @@ fn indicators(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("there are no event indicators");
     }
     let instance = session.excited()?;
+    let all: RefCell<Vec<Vec<f64>>> = RefCell::new(vec![Vec::new(); session.indicators()]);
     Importer::survey(&instance, STEPS, &mut |_, _| (), &mut |importer, event| {
         session.require(!event || importer.z.iter().all(|z| *z != 0.0), || {
             format!(
@@ -157,8 +160,18 @@ fn indicators(session: &Session) -> Result<(), NotDetermined> {
                 importer.z
             )
         });
+        all.borrow_mut().iter_mut().zip(&importer.z).for_each(|(all, z)| all.push(*z));
         Ok(())
-    })
+    })?;
+    for (i, all) in all.into_inner().iter().enumerate() {
+        let (Some(first), len) = (all.first(), all.len()) else { continue };
+        let is_sign = all.iter().all(|z| z.abs().to_bits() == first.abs().to_bits());
+        if is_sign && len >= 20 && all.iter().any(|z| z.signum() != first.signum()) {
+            let text = format!("event indicator {} is {first:?} or {:?} at all of {len} points", i + 1, -first);
+            session.report(Some(Level::Hard), Confidence::Hint, text);
+        }
+    }
+    Ok(())
 }
 
 fn discrete(session: &Session) -> Result<(), NotDetermined> {

@@ -1,6 +1,7 @@
 //! Model Exchange: life cycle, states and their derivatives (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2).
 
 use crate::check::{Check, Levels, Run};
+use crate::checks::exchange::shared::both::both_interfaces;
 use crate::checks::exchange::shared::dependencies::exchange_dependencies;
 use crate::checks::exchange::shared::evaluation::{
     completed_step, independent, inputs_read_back, interleaved, mode_alone, moved, pure, same_bits, start_times,
@@ -88,10 +89,16 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
         requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
-        tried: "Runs 3 instances in turns and compares each with one alone.", fix: "Keep all data in the instance; no globals and statics." },
+        tried: "Runs 3 instances in turns and compares each with one alone; frees the others, and runs the last one on.",
+        fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "E18", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(start_times),
         requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are later than the start time.",
         tried: "Integrates 20 steps from each.", fix: "Take the start time from its argument, and count time events from it." },
+    Check { id: "E19", clause: "hardening", levels: Levels::HARD, run: Run::Exchange(both_interfaces),
+        requirement: "Co-simulation and Model Exchange of one FMU give approximately the same results with the same inputs.",
+        tried: "Runs both with constant inputs, Model Exchange with Euler's method in two step sizes, and compares what differs at a quarter of \
+            the points by a quarter of the change over the run, and by 10 times the error of the integration.",
+        fix: "Let both interfaces use the same equations, start values and events." },
     Check { id: "E12", clause: "2.0.5, 2.1.6; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(reset),
         requirement: "Reset, in any state of Model Exchange, restores a new instance: a second run equals the first.",
         tried: "Resets in every state, runs again, and compares.", fix: "Assign everything that instantiation assigns, including the event iteration." },

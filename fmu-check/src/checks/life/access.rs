@@ -13,6 +13,7 @@ use crate::encoding::{bits, same, show};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
+use crate::state::State;
 use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
@@ -25,7 +26,8 @@ const GET: &str = "2.0.5, 2.1.7; 3.0.2, 2.2.7.2";
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "V07", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::MUST, run: Run::Any(start_values),
         requirement: "A start value in the description equals the value in the binary.",
-        tried: "Reads every variable with a start value in Initialization Mode, and in FMI 3.0 from a new instance (should), and compares.",
+        tried: "Reads every variable with a start value in Initialization Mode, in each interface, and in FMI 3.0 from a new instance (should), and \
+            compares.",
         fix: "Generate both from one table." },
     Check { id: "V06b", clause: "3.0.2, 2.2.7.3", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(ranges),
         requirement: "Integer and enumeration outputs always lie between min and max.",
@@ -117,6 +119,9 @@ pub(crate) const CHECKS: &[Check] = &[
 
 fn start_values(session: &Session) -> Result<(), NotDetermined> {
     compare_starts(session, &session.initializing()?, true)?;
+    if session.description.co_simulation.is_some() && session.exchanges_here() {
+        compare_starts(session, &session.exchange(State::Initialization)?, true)?;
+    }
     // FMI 3.0.2, 2.3.2: start values can be read in Instantiated, by its table; the calls that it allows do not name it.
     if session.is_v2() { Ok(()) } else { compare_starts(session, &session.fresh()?, false) }
 }

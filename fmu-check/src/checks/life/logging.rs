@@ -56,21 +56,29 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
     if let Err(NotDetermined(why)) = instance.provoke() {
         session.note(why);
     }
-    // What was passed on instantiation stays.
-    if instance.simple(Simple::Reset)?.is_ok() {
-        instance.experiment(session.start(), None);
-        let _ = instance.initialize().and_then(|()| instance.steps(2, session.h()));
-    }
+    // What was passed on instantiation stays. L06 looks at the reset itself.
+    session.prepare(|| {
+        if instance.simple(Simple::Reset)?.is_ok() {
+            instance.experiment(session.start(), None);
+            let _ = instance.initialize().and_then(|()| instance.steps(2, session.h()));
+        }
+        Ok(())
+    })?;
     instance.free()?;
     Ok((take_events(), environment, "a probe's name".into()))
 }
 
 fn show(event: &LogCall) -> String {
     let category = event.category.as_deref().unwrap_or("NULL");
-    let text = event.text.as_deref().map_or_else(
-        || "(NULL, not UTF-8, or in FMI 2.0 a printf format with a % whose argument is missing)".into(),
-        |text| format!("{text:?}"),
-    );
+    let text = match (&event.text, &event.broken, &event.format) {
+        (Some(text), ..) => format!("{text:?}"),
+        (None, Some(text), Some(format)) => format!(
+            "{text:?} is not UTF-8; it is made from the printf format {format:?}: an argument is missing, or a text with a % was passed \
+             as the format"
+        ),
+        (None, Some(text), None) => format!("{text:?} is not UTF-8"),
+        (None, None, _) => "NULL".into(),
+    };
     format!("{} [{category}] {text}", Status(event.status))
 }
 
@@ -137,7 +145,7 @@ fn errors(session: &Session) -> Result<(), NotDetermined> {
                 break;
             }
             instance.experiment(session.start(), None);
-            instance.initialize()?;
+            session.prepare(|| instance.initialize())?;
         }
         let _ = take_events();
         let how = instance.provoke()?;

@@ -1,11 +1,13 @@
 //! Side effects on the importer's process that an FMU must not have: threads, processor, files.
 
 use crate::check::{Check, Levels, Run};
+use crate::checks::process::instances::only_once;
 use crate::checks::process::shared::copies::{copy, failed, second_binary};
 use crate::checks::process::shared::surroundings::{left_behind, settings, written};
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
-use fmu_import::raw::{Raw, Simple, float_control};
+use fmu_import::raw::{Arguments, Raw, Simple, float_control};
+use std::ffi::CString;
 
 #[rustfmt::skip]
 pub(crate) const CHECKS: &[Check] = &[
@@ -28,8 +30,9 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Close and remove files, end threads and processes." },
     Check { id: "Z09", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::SHOULD, run: Run::Probe(unusual_path),
         requirement: "The FMU runs from a folder whose path has blanks, '%', '#', non-ASCII letters and more than 200 characters, and that contains only \
-            its binaries and resources.",
-        tried: "Runs from such a folder and compares.", fix: "Decode the URI in FMI 2.0, and use paths of any length." },
+            its binaries and resources; in FMI 2.0 also with the location file:/PATH.",
+        tried: "Runs from such a folder and compares; in FMI 2.0, initializes with the location file:/PATH.",
+        fix: "Decode the URI in FMI 2.0, and use paths of any length." },
 ];
 
 /// Minimum stack, in bytes, of a thread in which an importer may run the FMU.
@@ -103,6 +106,7 @@ fn floating_point(session: &Session) -> Result<(), NotDetermined> {
             return Ok(());
         }
     }
+    session.record_call("Instantiate once more, after FreeInstance, and a run of all interfaces");
     duplicate.complete_run()?;
     check_control("a run of all interfaces");
     Ok(())
@@ -136,6 +140,24 @@ fn unusual_path(session: &Session) -> Result<(), NotDetermined> {
     match run(&duplicate) {
         Err(why) => session.failed(&format!("in {}", folder_of_run.display()), why),
         Ok(rows) => session.compare("from there", &plain, &rows),
+    }
+    short_uri(session)
+}
+
+/// A URI of a file need not have an authority, not even an empty one (FMI 2.0.5, 2.1.5).
+fn short_uri(session: &Session) -> Result<(), NotDetermined> {
+    let arguments = session.arguments("probe");
+    let uri = arguments.resources.as_ref().map(|uri| uri.to_string_lossy().replacen("file:///", "file:/", 1));
+    let Some(uri) = uri.filter(|uri| session.is_v2() && uri.starts_with("file:/") && !only_once(session)) else {
+        return Ok(());
+    };
+    let Some(instance) = session.instantiate(&Arguments { resources: CString::new(uri).ok(), ..arguments })? else {
+        session
+            .violated("with the resource location file:/PATH instead of file:///PATH, fmi2Instantiate returned NULL");
+        return Ok(());
+    };
+    if let Err(why) = instance.initialize() {
+        session.failed("with the resource location file:/PATH instead of file:///PATH", why);
     }
     Ok(())
 }

@@ -20,6 +20,10 @@ pub struct LogCall {
     pub category: Option<String>,
     /// The message; `None` for NULL and for text that is not UTF-8.
     pub text: Option<String>,
+    /// The message that is not UTF-8, with replacement characters.
+    pub broken: Option<String>,
+    /// The format, if it has values (FMI 2.0 only).
+    pub format: Option<String>,
     /// The FMU used a struct of callbacks that was no longer valid (FMI 2.0 only).
     pub late: bool,
 }
@@ -46,12 +50,25 @@ fn push(event: LogCall) {
 
 /// # Safety
 /// `text` is NULL or a C string.
-pub(super) unsafe fn optional(text: *const c_char) -> Option<String> {
-    if text.is_null() {
-        return None;
-    }
+unsafe fn bytes(text: *const c_char) -> Option<Vec<u8>> {
     // SAFETY: the caller's promise.
-    unsafe { CStr::from_ptr(text) }.to_str().ok().map(str::to_owned)
+    (!text.is_null()).then(|| unsafe { CStr::from_ptr(text) }.to_bytes().to_vec())
+}
+
+/// # Safety
+/// `text` is NULL or a C string.
+pub(super) unsafe fn optional(text: *const c_char) -> Option<String> {
+    // SAFETY: the caller's promise.
+    unsafe { bytes(text) }.and_then(|text| String::from_utf8(text).ok())
+}
+
+/// A text that is UTF-8, or what can be read of one that is not.
+fn readable(text: Option<Vec<u8>>) -> (Option<String>, Option<String>) {
+    match text.map(String::from_utf8) {
+        None => (None, None),
+        Some(Ok(text)) => (Some(text), None),
+        Some(Err(e)) => (None, Some(String::from_utf8_lossy(e.as_bytes()).into_owned())),
+    }
 }
 
 /// Records the messages of FMI 2.0; `LATE`: through callbacks that are no longer valid.
@@ -61,9 +78,12 @@ impl<const LATE: bool> Listener for Recorder<LATE> {
     unsafe fn hear(called: Called) {
         // SAFETY: the FMU passes C strings.
         let (instance, category) = unsafe { (optional(called.instance), optional(called.category)) };
-        let text = called.text.and_then(|text| String::from_utf8(text).ok());
+        let (text, broken) = readable(called.text);
+        // SAFETY: the FMU passes a C string.
+        let format = unsafe { bytes(called.format) }.map(|format| String::from_utf8_lossy(&format).into_owned());
+        let format = format.filter(|format| format.replace("%%", "").contains('%') && format != "%s");
         let (environment, status) = (called.environment.addr(), called.status.0);
-        push(LogCall { environment, instance, status, category, text, late: LATE });
+        push(LogCall { environment, instance, status, category, text, broken, format, late: LATE });
     }
 }
 
@@ -74,8 +94,10 @@ pub(super) unsafe extern "C" fn logger3(
     text: *const c_char,
 ) {
     // SAFETY: the FMU passes C strings.
-    let (category, text) = unsafe { (optional(category), optional(text)) };
-    push(LogCall { environment: environment.addr(), instance: None, status: status.0, category, text, late: false });
+    let (category, text) = unsafe { (optional(category), bytes(text)) };
+    let (text, broken) = readable(text);
+    let (environment, status) = (environment.addr(), status.0);
+    push(LogCall { environment, instance: None, status, category, text, broken, format: None, late: false });
 }
 
 pub(super) unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {

@@ -1,6 +1,7 @@
 //! Dependencies proved by perturbation (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8).
 
 use crate::checks::life::shared::kept::set_all;
+use crate::checks::process::instances::DISTURBED;
 use crate::exchange::{Importer, differ};
 use crate::session::{NotDetermined, Session};
 use crate::subjects::settable;
@@ -14,6 +15,22 @@ fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable,
         let text = format!("line {line}: {name} changes with {other}, which is not among its dependencies");
         session.value_deviates(unknown, old, new.to_vec(), &text);
     }
+}
+
+/// Whether a new instance in which nothing was changed has other values than the first one had.
+fn is_disturbed(
+    session: &Session,
+    moved: bool,
+    variables: &[&ModelVariable],
+    before: &[Vec<u64>],
+) -> Result<bool, NotDetermined> {
+    let control = session.initializing()?;
+    if moved {
+        set_all(&control, 3.0)?;
+    }
+    let found = control.snapshot(variables)?;
+    control.free()?;
+    Ok(found != before)
 }
 
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
@@ -54,6 +71,9 @@ pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
             }
             tried += 1;
             let after = one.snapshot(&variables)?;
+            if before != after && is_disturbed(session, moved, &variables, &before)? {
+                return Err(NotDetermined(DISTURBED.into()));
+            }
             for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
                 let named = dependencies
                     .iter()

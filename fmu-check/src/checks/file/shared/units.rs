@@ -23,7 +23,11 @@ const KNOWN: &[Known] = &[
     ("rad/s", [0, 0, -1, 0, 0, 0, 0, 1], 1.0), ("rad/s2", [0, 0, -2, 0, 0, 0, 0, 1], 1.0), ("m2", [0, 2, 0, 0, 0, 0, 0, 0], 1.0),
     ("m3", [0, 3, 0, 0, 0, 0, 0, 0], 1.0), ("kg.m2", [1, 2, 0, 0, 0, 0, 0, 0], 1.0), ("kg/s", [1, 0, -1, 0, 0, 0, 0, 0], 1.0),
     ("km/h", [0, 1, -1, 0, 0, 0, 0, 0], 1.0 / 3.6), ("kg/m3", [1, -3, 0, 0, 0, 0, 0, 0], 1.0), ("N/m", [1, 0, -2, 0, 0, 0, 0, 0], 1.0),
+    ("degC", [0, 0, 0, 0, 1, 0, 0, 0], 1.0), ("degF", [0, 0, 0, 0, 1, 0, 0, 0], 1.0 / 1.8),
 ];
+
+/// Units of the temperature with an offset, in K.
+const OFFSETS: [(&str, f64); 2] = [("degC", 273.15), ("degF", 273.15 - 32.0 / 1.8)];
 
 /// Revolutions per minute, where a revolution is an angle; without, they are a frequency of 1/60 Hz.
 const REVOLUTIONS_NAMES: [&str; 4] = ["rpm", "r/min", "rev/min", "1/min"];
@@ -51,6 +55,13 @@ pub(crate) fn wrong_bases(description: &ModelDescription) -> Vec<String> {
             _ => &REVOLUTIONS,
         };
         let same = base.exponents[..RADIAN] == exponents[..RADIAN] && !differ(base.factor, *factor);
+        let offset = OFFSETS.iter().find(|(name, _)| *name == unit.name).map_or(base.offset, |(_, offset)| *offset);
+        if same && (base.offset - offset).abs() > 0.01 {
+            return Some(format!(
+                "line {}: unit {:?} has the offset {}, expected {offset}",
+                unit.line, unit.name, base.offset
+            ));
+        }
         (!same).then(|| {
             format!(
                 "line {}: unit {:?} has exponents {:?} and factor {}, expected {exponents:?} and {factor}",

@@ -1,7 +1,7 @@
 //! Values that a run must keep or return as they are: several in one call, inputs, parameters, Booleans, numbers.
 
 use crate::checks::life::shared::values::is_rounded;
-use crate::encoding::{bits, same, show};
+use crate::encoding::{bits, quoted, same, show};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::subjects::settable;
@@ -350,7 +350,9 @@ pub(crate) fn texts(instance: &Instance<'_>) -> Result<Vec<(String, Option<Strin
         let (status, mut found) =
             instance.call_for(&call, |raw| raw.get_strings(instance.handle, &[v.value_reference], 1))?;
         if status.is_ok() {
-            all.push((v.name.clone(), found.pop().flatten()));
+            let text = found.pop().flatten();
+            session.record_value(&text.as_deref().map_or_else(|| "NULL".into(), quoted));
+            all.push((v.name.clone(), text));
         }
     }
     Ok(all)
@@ -363,9 +365,9 @@ pub(crate) fn set_all(instance: &Instance<'_>, scale: f64) -> Result<(), NotDete
         if v.base == BaseType::String && !v.is_array() {
             // Longer than a fixed buffer of an FMU may be, and different for each scale.
             let text = CString::new(format!("another text {scale} ").repeat(6)).unwrap_or_default();
-            let _ = instance.call(&format!("SetString({})", v.name), |raw| {
-                raw.set_strings(instance.handle, &[v.value_reference], &[Some(&text)])
-            })?;
+            let call = format!("SetString({} = {text:?})", v.name);
+            let _ =
+                instance.call(&call, |raw| raw.set_strings(instance.handle, &[v.value_reference], &[Some(&text)]))?;
         } else if !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock)
             && let Some(values) = session.different_value(v, scale)
             && instance.set(v, &values)? == Status::ERROR

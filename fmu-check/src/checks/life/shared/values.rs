@@ -1,6 +1,6 @@
 //! Setting values: they read back, take effect, and do no harm if they are invalid.
 
-use crate::encoding::{bits, same, show};
+use crate::encoding::{bits, quoted, same, show};
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
 use crate::subjects::settable;
@@ -122,7 +122,7 @@ pub(crate) fn strings(session: &Session) -> Result<(), NotDetermined> {
     session.cases(["", "probe \u{e4}\u{1f50b}", &"x".repeat(1000), &"x".repeat(1 << 20)], |text| {
         let instance = session.initializing()?;
         let c_text = CString::new(text).unwrap_or_default();
-        let status = instance.call(&format!("SetString({})", v.name), |raw| {
+        let status = instance.call(&format!("SetString({} = {})", v.name, quoted(text)), |raw| {
             raw.set_strings(instance.handle, &[v.value_reference], &[Some(&c_text)])
         })?;
         if !status.is_ok() {
@@ -135,6 +135,7 @@ pub(crate) fn strings(session: &Session) -> Result<(), NotDetermined> {
             return Err(NotDetermined(format!("GetString({}) returned {status}", v.name)));
         }
         let got = back.first().and_then(Option::as_deref);
+        session.record_value(&got.map_or_else(|| "NULL".into(), quoted));
         if got != Some(text) {
             let finding = format!("{}: a string of {} bytes {}", v.name, text.len(), read_back(text, got));
             // The standards set no limit, but no application needs a text of this length.
