@@ -8,11 +8,11 @@ pub enum Number {
     /// There is none: the clock of the variable has not ticked.
     #[default]
     Missing,
-    /// Of a real variable.
+    /// Value of a real variable.
     Real(f64),
-    /// Of an integer or an enumeration.
+    /// Value of an integer or an enumeration.
     Integer(i128),
-    /// Of a Boolean or a clock.
+    /// Value of a Boolean or a clock.
     Boolean(bool),
 }
 
