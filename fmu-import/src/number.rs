@@ -35,7 +35,7 @@ impl From<f64> for Number {
     }
 }
 
-/// As in a cell of CSV: digits that read back to the same number, 1 for true, nothing for a missing number.
+/// Writes a cell of CSV: digits that read back to the same number, 1 for true, nothing for a missing number.
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
