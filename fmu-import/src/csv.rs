@@ -14,7 +14,7 @@ pub struct Table {
 /// The heading of a column.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Heading {
-    /// As written.
+    /// The text, unchanged.
     pub text: String,
     /// `speed` of `speed [rpm]`.
     pub name: String,

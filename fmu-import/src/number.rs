@@ -8,11 +8,11 @@ pub enum Number {
     /// There is none: the clock of the variable has not ticked.
     #[default]
     Missing,
-    /// Of a real variable.
+    /// Value of a real variable.
     Real(f64),
-    /// Of an integer or an enumeration.
+    /// Value of an integer or an enumeration.
     Integer(i128),
-    /// Of a Boolean or a clock.
+    /// Value of a Boolean or a clock.
     Boolean(bool),
 }
 
@@ -35,7 +35,7 @@ impl From<f64> for Number {
     }
 }
 
-/// As in a cell of CSV: digits that read back to the same number, 1 for true, nothing for a missing number.
+/// Writes a cell of CSV: digits that read back to the same number, 1 for true, nothing for a missing number.
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -182,7 +182,7 @@ impl Values {
                 reals(x.into_iter().map(|b| f64::from(u8::from(b))).collect())
             }
             (Self::Booleans(x), _) => Ok(Self::Integers(x.into_iter().map(i128::from).collect())),
-            (Self::Strings(_) | Self::Binaries(_), _) => Err(format!("a text is no {base}")),
+            (Self::Strings(_) | Self::Binaries(_), _) => Err(format!("a text cannot become a {base}")),
         }
     }
 

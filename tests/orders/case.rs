@@ -58,6 +58,16 @@ impl Case {
         f64::from(k) * self.apart
     }
 
+    /// The case whose inputs jump at its points: our importer ends a step where an input jumps.
+    pub fn jumping_at_points(self) -> Self {
+        let moved = |input: &Input| {
+            let points = input.points.iter().map(|(t, x)| ((t / self.apart).ceil() * self.apart, *x));
+            let points = if input.linear { input.points } else { points.collect::<Vec<_>>().leak() };
+            Input { points, ..*input }
+        };
+        Self { inputs: self.inputs.iter().map(moved).collect::<Vec<_>>().leak(), ..self }
+    }
+
     pub fn stop(&self) -> f64 {
         self.point(self.points)
     }

@@ -6,7 +6,7 @@ use fmu_system::cosimulation::{Recording, Schedule, Settings, System};
 use model_description::FmiVersion::V3;
 use std::ops::ControlFlow;
 
-/// A frame with this identifier, and its confirmation, as in FMI-LS-BUS 1.0.0, 4.4.1: operations in hexadecimal digits.
+/// A frame with this identifier, and its confirmation, as in FMI-LS-BUS 1.0.0: operations in hexadecimal digits.
 fn operations(id: u8, speed: f64) -> [String; 2] {
     let hex = |bytes: &[u8]| bytes.iter().map(|b| format!("{b:02x}")).collect::<Vec<_>>().concat();
     let frame = [&[0x10, 0, 0, 0, 24, 0, 0, 0, id, 1, 0, 0, 0, 0, 8, 0][..], &speed.to_le_bytes()].concat();

@@ -40,6 +40,7 @@ pub fn chosen(data: &Data, fixed: Tuned) -> Tuned {
         None => with,
         Some(reason) => {
             let mut fixed = fixed;
+            fixed.controller.push(set("adaptation.resistance", Value::Boolean(false), "see the note"));
             fixed.notes.push(format!(
                 "adaptation.resistance is left off: {reason}. R^ stays {:.3} of the R_s given, so a winding much colder or hotter than \
                  its data may swing or lose its load",

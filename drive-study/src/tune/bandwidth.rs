@@ -12,7 +12,7 @@
 //!   ([`limits`](super::limits)).
 //! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
 
-use super::motor::{Data, Number, torque_constant};
+use super::motor::{Data, Located, torque_constant};
 use super::setting::{LEVELS, Setting, Value};
 use drive::estimator::Kind;
 use std::f64::consts::{E, TAU};
@@ -40,7 +40,7 @@ pub struct Chosen {
 }
 
 impl Chosen {
-    fn new(given: Option<&Number>, rule: &str, value: impl FnOnce() -> f64) -> Self {
+    fn new(given: Option<&Located>, rule: &str, value: impl FnOnce() -> f64) -> Self {
         given.map_or_else(
             || Self { value: value(), rule: rule.into(), origin: None },
             |x| Self { value: *x.get_ref(), rule: "as given".into(), origin: Some(x.span().start) },

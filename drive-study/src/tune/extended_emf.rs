@@ -55,6 +55,7 @@ pub fn settings(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) -
         real("limit.i_q", limit, "the maximum current"),
         real("limit.tau", GREATEST_TORQUE * torque, "1.6 times the rated torque"),
         real("tracker.bandwidth", rho, "bandwidth.observer"),
+        set("adaptation.resistance", Value::Boolean(false), "the estimator does not adapt it"),
         real("emf.bandwidth", EMF_PER_TRACKER * rho, "7.5 times the tracker's; at least 3 times is needed"),
         real("emf.w_sign", 0.01 * n_p * rating.speed.get_ref(), "0.01 of the rated electrical speed"),
         set("emf.hold_reversal", Value::Boolean(true), "a load step at low speed passes zero"),

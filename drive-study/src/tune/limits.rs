@@ -13,7 +13,7 @@
 //!   settle there after the hand-over.
 
 use super::bandwidth::{DIP_OF_A_STEP, GREATEST_GAIN, gain_per_bandwidth};
-use super::motor::{Data, MotorFile, Number, torque_constant};
+use super::motor::{Data, Located, MotorFile, torque_constant};
 use super::rasmussen::{LEAST_MARGIN, resistance_margin};
 use super::remedy::{self, Cure, What};
 use super::setting::Tuned;
@@ -101,7 +101,7 @@ fn step(trial: &Trial) -> String {
 fn of_load(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
     let dip = DIP_OF_A_STEP * trial.task.torque / (data.mechanics.J.get_ref() * par.speed_loop.bandwidth);
     let speed = trial.task.level * data.rating.speed.get_ref();
-    let part = |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref());
+    let part = |x: &Option<Located>| x.as_ref().map_or(0.0, |x| *x.get_ref());
     let friction = part(&data.mechanics.tau_coulomb) + part(&data.mechanics.B) * speed;
     if trial.most < trial.task.torque + friction {
         return format!(

@@ -1,7 +1,7 @@
 //! Losses of the inverter and temperature coefficients: values from the file for the plant alone, and the dead time, which the
 //! controller compensates.
 
-use super::motor::{Inverter, MotorFile, Number};
+use super::motor::{Inverter, Located, MotorFile};
 use super::setting::{Setting, Value, given, real};
 use anyhow::{Result, bail};
 use drive::estimator::Kind;
@@ -17,7 +17,7 @@ const ZERO: f64 = 0.02;
 #[expect(non_snake_case, reason = "the symbols of the model")]
 pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
     let mut all = Vec::new();
-    let mut add = |name, x: &Option<Number>| all.extend(x.as_ref().map(|x| given(name, x)));
+    let mut add = |name, x: &Option<Located>| all.extend(x.as_ref().map(|x| given(name, x)));
     if let Some(temperature) = &motor.data.temperature {
         add("winding.alpha", &temperature.winding);
         add("magnet.alpha", &temperature.magnet);
@@ -67,7 +67,7 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
 /// addition: Rasmussen's observer would take it for R i, swing with it at higher speeds, and adapt R^ to it.
 pub fn compensation(motor: &MotorFile, estimator: Kind) -> Vec<Setting> {
     let Some(Inverter { u_dead, u_transistor, u_diode, .. }) = &motor.data.inverter else { return Vec::new() };
-    let part = |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref());
+    let part = |x: &Option<Located>| x.as_ref().map_or(0.0, |x| *x.get_ref());
     let threshold = if estimator == Kind::Rasmussen { 0.5 * (part(u_transistor) + part(u_diode)) } else { 0.0 };
     let lost = match u_dead {
         Some(u_dead) if threshold == 0.0 => given("compensation.u_dead", u_dead),

@@ -11,7 +11,7 @@ use toml::Spanned;
 pub const RULED: [Kind; 2] = [Kind::Rasmussen, Kind::ExtendedEmf];
 
 /// A number of the file with its position.
-pub type Number = Spanned<f64>;
+pub type Located = Spanned<f64>;
 
 /// A machine's file, read.
 #[derive(Clone, Debug)]
@@ -64,13 +64,13 @@ pub struct Machine {
     /// Pole pairs.
     pub n_p: Spanned<i32>,
     /// Stator resistance in Ohm.
-    pub R_s: Number,
+    pub R_s: Located,
     /// d-axis inductance in H.
-    pub L_d: Number,
+    pub L_d: Located,
     /// q-axis inductance in H.
-    pub L_q: Number,
+    pub L_q: Located,
     /// Permanent-magnet flux linkage in Wb, peak value.
-    pub psi_M: Number,
+    pub psi_M: Located,
 }
 
 /// Inertia and friction.
@@ -79,15 +79,15 @@ pub struct Machine {
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Mechanics {
     /// Inertia in kg.m2.
-    pub J: Number,
+    pub J: Located,
     /// Viscous friction in N.m.s/rad; none if omitted.
-    pub B: Option<Number>,
+    pub B: Option<Located>,
     /// Coulomb friction in N.m; none if omitted.
-    pub tau_coulomb: Option<Number>,
+    pub tau_coulomb: Option<Located>,
     /// Speed range in rad/s over which the Coulomb friction changes sign.
-    pub w_coulomb: Option<Number>,
+    pub w_coulomb: Option<Located>,
     /// Windage in N.m.s2/rad2: torque over the square of the speed; none if omitted.
-    pub k_w: Option<Number>,
+    pub k_w: Option<Located>,
 }
 
 /// Ratings.
@@ -95,13 +95,13 @@ pub struct Mechanics {
 #[serde(deny_unknown_fields)]
 pub struct Rating {
     /// Rated mechanical speed in rad/s.
-    pub speed: Number,
+    pub speed: Located,
     /// Highest mechanical speed in rad/s, with field weakening; `speed` if omitted.
-    pub speed_max: Option<Number>,
+    pub speed_max: Option<Located>,
     /// Rated torque in N.m.
-    pub torque: Number,
+    pub torque: Located,
     /// Maximum current in A, peak value of a phase: what inverter and magnets allow for a short time, not the rated current.
-    pub current: Number,
+    pub current: Located,
 }
 
 impl Rating {
@@ -116,7 +116,7 @@ impl Rating {
 #[serde(deny_unknown_fields)]
 pub struct DcLink {
     /// Voltage in V.
-    pub u_dc: Number,
+    pub u_dc: Located,
 }
 
 /// Bandwidths of the loops, in rad/s; by the rules where omitted.
@@ -124,11 +124,11 @@ pub struct DcLink {
 #[serde(deny_unknown_fields)]
 pub struct Bandwidth {
     /// Current loop.
-    pub current: Option<Number>,
+    pub current: Option<Located>,
     /// Speed loop.
-    pub speed: Option<Number>,
+    pub speed: Option<Located>,
     /// Speed adaptation of the flux observer, or tracker of the other estimators.
-    pub observer: Option<Number>,
+    pub observer: Option<Located>,
 }
 
 /// Saturation of the plant, in A/Wb2 and A/Wb3.
@@ -136,11 +136,11 @@ pub struct Bandwidth {
 #[serde(deny_unknown_fields)]
 pub struct Saturation {
     /// Second-order d-axis coefficient.
-    pub s_2: Option<Number>,
+    pub s_2: Option<Located>,
     /// Third-order d-axis coefficient.
-    pub s_3: Option<Number>,
+    pub s_3: Option<Located>,
     /// Cross-saturation coefficient.
-    pub s_dq: Option<Number>,
+    pub s_dq: Option<Located>,
 }
 
 /// Flux map of the plant.
@@ -154,9 +154,9 @@ pub struct FluxMap {
     /// Values of the table: "peak" or "rms"; "peak" if omitted.
     pub scale: Option<Spanned<String>>,
     /// Temperature of the magnet in degC; 20 if omitted.
-    pub temperature: Option<Number>,
+    pub temperature: Option<Located>,
     /// Temperature coefficient of the magnet in 1/K, where the temperature is not 20 degC.
-    pub alpha: Option<Number>,
+    pub alpha: Option<Located>,
 }
 
 /// Iron loss of the plant.
@@ -173,27 +173,27 @@ pub struct Iron {
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Inverter {
     /// Threshold voltage of a transistor in V; none if omitted, like the three below.
-    pub u_transistor: Option<Number>,
+    pub u_transistor: Option<Located>,
     /// Resistance of a transistor in Ohm.
-    pub r_transistor: Option<Number>,
+    pub r_transistor: Option<Located>,
     /// Threshold voltage of a diode in V.
-    pub u_diode: Option<Number>,
+    pub u_diode: Option<Located>,
     /// Resistance of a diode in Ohm.
-    pub r_diode: Option<Number>,
+    pub r_diode: Option<Located>,
     /// Switching energy of a leg and PWM period in J at `i_sw` and `u_sw`: turn-on, turn-off and recovery; none if omitted.
-    pub E_sw: Option<Number>,
+    pub E_sw: Option<Located>,
     /// Current of `E_sw` in A.
-    pub i_sw: Option<Number>,
+    pub i_sw: Option<Located>,
     /// DC-link voltage of `E_sw` in V.
-    pub u_sw: Option<Number>,
+    pub u_sw: Option<Located>,
     /// Exponent of the DC-link voltage in the switching energy; 1.3 if omitted.
-    pub k_sw: Option<Number>,
+    pub k_sw: Option<Located>,
     /// Switching frequency in Hz; 1 / T_s if omitted.
-    pub f_sw: Option<Number>,
+    pub f_sw: Option<Located>,
     /// Voltage in V that a leg loses to the dead time; none if omitted.
-    pub u_dead: Option<Number>,
+    pub u_dead: Option<Located>,
     /// Current in A below which that voltage falls linearly to zero; 2 % of the maximum current if omitted.
-    pub i_zero: Option<Number>,
+    pub i_zero: Option<Located>,
 }
 
 /// Temperature coefficients in 1/K, from the 20 degC of the file's values.
@@ -201,9 +201,9 @@ pub struct Inverter {
 #[serde(deny_unknown_fields)]
 pub struct Temperature {
     /// Coefficient of the resistance: copper 3.93e-3.
-    pub winding: Option<Number>,
+    pub winding: Option<Located>,
     /// Coefficient of the magnet's flux linkage: NdFeB -1.1e-3, SmCo -0.4e-3, ferrite -2e-3.
-    pub magnet: Option<Number>,
+    pub magnet: Option<Located>,
 }
 
 /// Overrides of what the rules choose.
@@ -214,7 +214,7 @@ pub struct Control {
     /// Estimator: Rasmussen or ExtendedEmf.
     pub estimator: Option<Spanned<String>>,
     /// Sample period in s.
-    pub T_s: Option<Number>,
+    pub T_s: Option<Located>,
 }
 
 /// Torque constant K = 1.5 n_p psi_M in N.m/A.

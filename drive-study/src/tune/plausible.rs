@@ -6,13 +6,13 @@
 //! torque reaches the rated speed; the rated torque against that of the maximum current; the
 //! highest speed against the rated speed.
 
-use super::motor::{Data, MotorFile, Number};
+use super::motor::{Data, Located, MotorFile};
 use anyhow::{Result, bail};
 
 /// A value, its plausible range, and other units in which it may have been written, with their size in the expected unit.
 struct Check<'a> {
     name: &'static str,
-    value: &'a Number,
+    value: &'a Located,
     unit: &'static str,
     /// The judged quantity per unit of the value; it is proportional to the value.
     per_unit: f64,
@@ -64,7 +64,7 @@ const INDUCTANCE: &[(&str, f64)] = &[("mH", 1e-3), ("uH", 1e-6)];
 
 fn checks(data: &Data) -> Vec<Check<'_>> {
     let (machine, rating) = (&data.machine, &data.rating);
-    let of = |x: &Number| *x.get_ref();
+    let of = |x: &Located| *x.get_ref();
     let (n_p, psi_M, i, u_dc) =
         (f64::from(*machine.n_p.get_ref()), of(&machine.psi_M), of(&rating.current), of(&data.dc_link.u_dc));
     let (speed, torque) = (of(&rating.speed), of(&rating.torque));

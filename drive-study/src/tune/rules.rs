@@ -15,7 +15,7 @@
 use super::bandwidth::Bandwidths;
 use super::check::check;
 use super::iron;
-use super::motor::{Data, MotorFile, Number, RULED, swing};
+use super::motor::{Data, Located, MotorFile, RULED, swing};
 use super::setting::{Setting, Tuned, Value, given, real, set};
 use super::voltage::{self, Voltage};
 use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, saturation};
@@ -124,7 +124,7 @@ fn plant(data: &Data) -> Vec<Setting> {
         given("mechanics.J", &mechanics.J),
     ];
     let optional =
-        |name, x: &Option<Number>| x.as_ref().map_or_else(|| real(name, 0.0, "none given"), |x| given(name, x));
+        |name, x: &Option<Located>| x.as_ref().map_or_else(|| real(name, 0.0, "none given"), |x| given(name, x));
     all.push(optional("mechanics.B", &mechanics.B));
     all.push(optional("mechanics.tau_coulomb", &mechanics.tau_coulomb));
     all.extend(mechanics.w_coulomb.as_ref().map(|x| given("mechanics.w_coulomb", x)));

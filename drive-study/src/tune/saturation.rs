@@ -5,7 +5,7 @@
 //! incremental inductances, is positive definite; beyond that, more flux requires less current, and the plant runs away.
 
 use super::flux_map::Fitted;
-use super::motor::{Data, MotorFile, Number, electrical};
+use super::motor::{Data, Located, MotorFile, electrical};
 use anyhow::{Result, bail};
 use drive::frame::Dq;
 use drive::motor::Motor;
@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 const DIRECTIONS: u32 = 72;
 
 fn of(data: &Data) -> Saturation {
-    let value = |x: &Option<Number>| x.as_ref().map_or(0.0, |x| *x.get_ref());
+    let value = |x: &Option<Located>| x.as_ref().map_or(0.0, |x| *x.get_ref());
     data.saturation.as_ref().map_or_else(Saturation::default, |s| Saturation {
         s_2: value(&s.s_2),
         s_3: value(&s.s_3),

@@ -1,6 +1,6 @@
 //! The values of both FMUs, each with its rule, and the machine data for a trial.
 
-use super::motor::Number;
+use super::motor::Located;
 
 /// Speeds in pu at which every drive is tried, in addition to its highest speed.
 pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
@@ -59,7 +59,7 @@ pub struct Tuned {
 }
 
 /// A value as the machine's file gives it.
-pub(super) fn given(name: &'static str, x: &Number) -> Setting {
+pub(super) fn given(name: &'static str, x: &Located) -> Setting {
     Setting { name, value: Value::Real(*x.get_ref()), rule: "as given".into(), origin: Some(x.span().start) }
 }
 

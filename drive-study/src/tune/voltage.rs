@@ -60,7 +60,7 @@ pub fn of(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<V
             most(speed)
         );
     }
-    let part = |x: &Option<super::motor::Number>| x.as_ref().map_or(0.0, |x| *x.get_ref());
+    let part = |x: &Option<super::motor::Located>| x.as_ref().map_or(0.0, |x| *x.get_ref());
     let friction = part(&mechanics.tau_coulomb) + (part(&mechanics.B) + part(&mechanics.k_w) * top) * top;
     let top_torque = (torque * speed / top).min(TOP_SHARE * most(top) - friction);
     if let Some(given) = rating.speed_max.as_ref().filter(|_| top_torque <= 0.0) {

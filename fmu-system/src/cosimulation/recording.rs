@@ -18,7 +18,7 @@ pub struct Column {
     pub items: Vec<(i64, String)>,
     /// One value for each communication point, as a double for computations and plots.
     pub values: Vec<f64>,
-    /// The same in the type of the variable, where doubles do not say all: for integers, and for a variable without a value
+    /// Values in the type of the variable, where doubles lose information: for integers, and for a variable without a value
     /// until its clock ticks. Empty for others.
     pub exact: Vec<Number>,
 }

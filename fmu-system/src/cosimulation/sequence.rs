@@ -153,7 +153,7 @@ impl Held {
         last_before(&self.0, t).saturating_sub(1)
     }
 
-    /// The same as steps, if every value is one number that a double has exactly.
+    /// Converts the sequence to steps, if every value is one number that a double represents exactly.
     pub(super) fn steps(&self) -> Option<Schedule> {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (t, values) in &*self.0 {

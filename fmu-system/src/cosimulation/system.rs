@@ -316,7 +316,7 @@ impl System {
         self.feed(target, to, Source::Port(source, conversion))
     }
 
-    /// A table between two variables of one number each; the source is no real number.
+    /// A table between two variables of one number each; the source is an integer, a Boolean or an enumeration.
     fn table(
         &self,
         [(from, source), (to, target)]: [(&str, &Port); 2],
