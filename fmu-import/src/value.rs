@@ -133,7 +133,7 @@ impl Values {
     /// A text or bytes are not a number, or the number is missing.
     pub fn from_number(x: impl Into<Number>, base: BaseType) -> Result<Self, String> {
         match (x.into(), base) {
-            (Number::Missing, _) => Err("there is no number".into()),
+            (Number::Missing, _) => Err("the number is missing".into()),
             (Number::Integer(i), _) => Self::Integers(vec![i]).into_base(base),
             (Number::Boolean(b), _) => Self::Booleans(vec![b]).into_base(base),
             (Number::Real(x), base) => Self::from_numbers(&[x], base),
@@ -148,7 +148,7 @@ impl Values {
         match base {
             BaseType::Float32 | BaseType::Float64 => Ok(Self::Reals(numbers.to_vec())),
             BaseType::Boolean | BaseType::Clock => Ok(Self::Booleans(numbers.iter().map(|x| *x != 0.0).collect())),
-            BaseType::String | BaseType::Binary => Err(format!("a {base} takes no number")),
+            BaseType::String | BaseType::Binary => Err(format!("a number cannot become a {base}")),
             _ => {
                 // The setter refuses values outside the range of the variable's type; a NaN becomes 0.
                 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
@@ -158,10 +158,10 @@ impl Values {
         }
     }
 
-    /// These values for a variable of another type; integers stay integers, whatever their width.
+    /// These values for a variable of another type; integers of every width stay integers.
     ///
     /// # Errors
-    /// A text is not a number, and no number is a text.
+    /// A text cannot become a number, nor a number a text.
     pub fn into_base(self, base: BaseType) -> Result<Self, String> {
         let reals = |numbers: Vec<f64>| Self::from_numbers(&numbers, base);
         match (self, base) {
@@ -169,7 +169,7 @@ impl Values {
             | (all @ Self::Booleans(_), BaseType::Boolean | BaseType::Clock)
             | (all @ Self::Strings(_), BaseType::String)
             | (all @ Self::Binaries(_), BaseType::Binary) => Ok(all),
-            (_, BaseType::String | BaseType::Binary) => Err(format!("a {base} takes no number")),
+            (_, BaseType::String | BaseType::Binary) => Err(format!("a number cannot become a {base}")),
             (Self::Reals(x), _) => reals(x),
             (Self::Integers(x), BaseType::Float32 | BaseType::Float64) => {
                 reals(x.into_iter().map(|i| Number::Integer(i).real()).collect())

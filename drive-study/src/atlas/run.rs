@@ -103,9 +103,9 @@ pub struct Verdict {
     pub lock_lost: f64,
     /// Maximum `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
     pub while_held: f64,
-    /// Maximum speed error while judged, as a share of the rated speed.
+    /// Maximum speed error in the evaluated time, as a share of the rated speed.
     pub speed_error: f64,
-    /// Maximum angle error while judged, in deg.
+    /// Maximum angle error in the evaluated time, in deg.
     pub angle_error: f64,
 }
 

@@ -255,7 +255,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
     let (mut before, mut slip, mut span) = (0.0, 0.0, (0.0_f64, 0.0_f64));
     // lock_lost in each part.
     let mut locks = vec![0.0_f64];
-    let (mut limited, mut judged, mut alarm, mut warned) = (0.0, 0.0, false, false);
+    let (mut limited, mut evaluated, mut alarm, mut warned) = (0.0, 0.0, false, false);
     let (mut k, mut t) = (0_u32, 0.0);
     while t < stop {
         let asked = if t >= turn { 1.0 } else { 0.0 };
@@ -286,7 +286,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
         before = error;
         if t > stop - LAST {
             limited += f64::from(u8::from(controller.current_limited || controller.voltage_limited));
-            judged += 1.0;
+            evaluated += 1.0;
         }
         if cell.torque_mode && k % 1000 == 0 {
             let mut hear = |(_, key, _): fmu_core::log::Said<'_>| warned |= key == "stands";
@@ -314,7 +314,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
     let from = if matches!(lost, Some((Loss::Apart, _))) { at - 1.0 } else { at };
     let seen = locks[parts(from).min(locks.len() - 1)..].iter().take(parts(until - from) + 1);
     let lock_lost = seen.fold(0.0_f64, |most, lock| most.max(*lock));
-    (end, lost, lock_lost, warned || limited > 0.5 * judged, alarm)
+    (end, lost, lock_lost, warned || limited > 0.5 * evaluated, alarm)
 }
 
 /// Whether the drive has fulfilled the task at the `end`; in torque mode, whether it has reached the `goal` of the sensor.

@@ -1,4 +1,4 @@
-//! The importer's callbacks that may call the instance again. The gate calls them while no part of the instance is borrowed.
+//! The importer's callbacks, during which the importer may call the instance. The gate runs them while no part of the instance is borrowed.
 
 use super::types::Fmi3Boolean;
 use crate::inside::{Pause, Reply};

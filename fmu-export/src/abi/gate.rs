@@ -129,7 +129,7 @@ const fn calls_back<E: Exported>() -> bool {
     E::CAN.intermediate.is_some() || E::CAN.scheduled
 }
 
-/// Passes a call to the instance in parts. After a part that requests it, the importer is called, while no part of the instance
+/// Passes a call to the instance in parts. If a part requests it, the gate then calls the importer, while no part of the instance
 /// is borrowed and it is not busy; the lifecycle table lists the calls that the callback may make. If one of them fails, this
 /// call fails.
 ///

@@ -27,6 +27,7 @@
 //!
 //! For many runs of one system there is [`SystemPlan`].
 
+mod connect;
 mod continuous;
 mod coupled;
 mod events;
@@ -44,6 +45,7 @@ mod schedule;
 mod sequence;
 mod system;
 mod terminals;
+mod wiring;
 
 pub use crate::integration::Solver;
 pub use coupled::{Equations, Feed, Fmus};
@@ -55,4 +57,5 @@ pub use point::{CommunicationPoint, Ended};
 pub use recording::{Column, Recording, TextColumn, item};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
-pub use system::{Crossing, System, Units};
+pub use system::System;
+pub use wiring::{Crossing, Units};

@@ -21,7 +21,7 @@
 //! # Ok(()) }
 //! ```
 
-use super::exchange::{Exchange, Wiring};
+use super::exchange::Exchange;
 use super::grid::{Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port};
@@ -29,6 +29,7 @@ use super::point::Ended;
 use super::recording::{Column, Recording};
 use super::run::simulate;
 use super::system::System;
+use super::wiring::Wiring;
 use fmu_import::{Error, Fmu, Instance, Kind, Number, Values};
 use model_description::{BaseType, Interface};
 use std::ops::ControlFlow;

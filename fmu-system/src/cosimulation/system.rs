@@ -1,42 +1,16 @@
 //! FMUs and their connections, before a run.
 
-use super::exchange::{Change, Source, Wiring};
 use super::grid::{Grid, Settings};
 use super::method::Method;
-use super::parts::{Part, Parts, Port, family, kind};
+use super::parts::{Part, Parts, Port, kind};
 use super::point::take_messages;
 use super::schedule::Schedule;
 use super::sequence::Sequence;
+use super::wiring::{Source, Units, Wiring};
 use fmu_core::Need;
-use fmu_core::variable::position;
 use fmu_import::written::matches;
-use fmu_import::{Error, Fmu, Instance, Kind, Message, Number, Values};
-use model_description::{
-    BaseType, Causality, Conversion, Interface, Measured, ModelVariable, Passage, Variability, parse_number,
-};
-
-/// The effect of a connection between different units.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Units {
-    /// It converts the number.
-    #[default]
-    Convert,
-    /// It passes the number on as it is.
-    PassOn,
-}
-
-/// The path of a value from an output to an input.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Crossing<'a> {
-    /// Whether units are converted.
-    pub units: Units,
-    /// Units of source and target, for an FMU that names none.
-    pub stated: [Option<Measured<'a>>; 2],
-    /// Conversion after that of the units.
-    pub transformation: Option<Conversion>,
-    /// Source values and what becomes of them, as a user writes them; instead of any conversion.
-    pub table: Option<&'a [(String, String)]>,
-}
+use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
+use model_description::{BaseType, Causality, Interface, ModelVariable, Variability, parse_number};
 
 /// FMUs and their connections.
 #[derive(Default)]
@@ -53,9 +27,9 @@ pub struct System {
     pub(super) columns: Vec<String>,
     /// Texts that a single run records, with the names of their columns.
     pub(super) texts: Vec<(Port, String)>,
-    units: Units,
+    pub(super) units: Units,
     tolerance: Option<f64>,
-    notes: Vec<String>,
+    pub(super) notes: Vec<String>,
 }
 
 impl System {
@@ -266,151 +240,6 @@ impl System {
         Ok(())
     }
 
-    /// Connects an output to an input, both written `instance.variable`. A number in another unit of the same quantity is converted
-    /// (see [`with_units`](Self::with_units)); without a unit on one side it passes unchanged, with a [note](Self::take_notes).
-    ///
-    /// # Errors
-    /// A variable does not exist, causalities, types or units do not fit, or the input is already fed.
-    pub fn connect(&mut self, from: &str, to: &str) -> Result<(), Error> {
-        self.connect_by(from, to, &Crossing { units: self.units, ..Crossing::default() })
-    }
-
-    /// [`connect`](Self::connect) for a crossing.
-    ///
-    /// # Errors
-    /// As [`connect`](Self::connect).
-    pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing<'_>) -> Result<(), Error> {
-        let Crossing { units, stated, transformation, table } = crossing;
-        let (source, target) = (self.parts.port(from)?, self.parts.port(to)?);
-        let sends = matches!(self.parts.causality(&source), Causality::Output | Causality::Local);
-        if !sends && !self.parts.is_timed_clock(&source) {
-            return Err(Error::usage(from, "is not an output"));
-        }
-        if let Some(table) = table {
-            let table = self.table([(from, &source), (to, &target)], table)?;
-            self.check_fed(&target, to, false)?;
-            return self.feed(target, to, Source::Port(source, Some(Change::Table(table))));
-        }
-        let widens = matches!((family(source.base), family(target.base)), ('i', 'r'));
-        if family(source.base) != family(target.base) && !widens {
-            return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
-        }
-        self.check_extents([(from, &source), (to, &target)])?;
-        self.check_fed(&target, to, false)?;
-        let conversion = match units {
-            Units::PassOn => None,
-            Units::Convert => match self.measured(from, stated[0])?.into_unit(self.measured(to, stated[1])?) {
-                Ok(Passage::Equal) => None,
-                Ok(Passage::Converted(conversion)) => Some(conversion),
-                Ok(Passage::Unknown(cause)) => {
-                    self.notes.push(format!("{from} to {to}: {cause}: the number passes unchanged"));
-                    None
-                }
-                Err(cause) => {
-                    let remedy = "connect variables of the same quantity, or pass the number without conversion";
-                    return Err(Error::usage(to, format!("cannot be fed by {from}: {cause}: {remedy}")));
-                }
-            },
-        };
-        let conversion = Conversion::then(conversion, *transformation).map(Change::Linear);
-        self.feed(target, to, Source::Port(source, conversion))
-    }
-
-    /// A table between two variables of one number each; the source is an integer, a Boolean or an enumeration.
-    fn table(
-        &self,
-        [(from, source), (to, target)]: [(&str, &Port); 2],
-        table: &[(String, String)],
-    ) -> Result<std::sync::Arc<[(Number, Number)]>, Error> {
-        for (name, port) in [(from, source), (to, target)] {
-            if port.is_whole() || kind(port.base).is_none_or(|kind| kind == 'c') {
-                return Err(Error::usage(name, "is not one number, which a table of values needs"));
-            }
-        }
-        if source.base.is_float() {
-            return Err(Error::usage(
-                from,
-                "is a real number: a table of values needs an integer, a Boolean or an item",
-            ));
-        }
-        let read = |port: &Port, text: &str| {
-            let description = self.parts.0[port.instance].description();
-            let values = Values::read(text, self.parts.variable(port.instance, &port.name)?, description);
-            Ok::<_, Error>(values.map(|values| values.one(0)))
-        };
-        let entry = |(one, other): &(String, String)| {
-            let sent = read(source, one)?;
-            let taken = read(target, other)?.map_err(|cause| Error::usage(to, cause))?;
-            // The table may have values beyond those of the source.
-            Ok::<_, Error>(sent.ok().map(|sent| (sent, taken)))
-        };
-        let entries: Vec<Option<_>> = table.iter().map(entry).collect::<Result<_, _>>()?;
-        Ok(entries.into_iter().flatten().collect())
-    }
-
-    /// Both ends of a connection are single values, or arrays of the same extents.
-    fn check_extents(&self, [(from, source), (to, target)]: [(&str, &Port); 2]) -> Result<(), Error> {
-        let extents = |port: &Port| if port.is_whole() { self.parts.shape(port) } else { Vec::new() };
-        let (sent, taken) = (extents(source), extents(target));
-        if sent == taken {
-            return Ok(());
-        }
-        let said = |extents: &[usize]| match extents {
-            [] => "one value".to_owned(),
-            _ => format!("{} elements", extents.iter().map(usize::to_string).collect::<Vec<_>>().join(" x ")),
-        };
-        let (whole, shape) = if source.is_whole() { (from, &sent) } else { (to, &taken) };
-        let remedy = match (sent.is_empty(), taken.is_empty()) {
-            (false, false) => String::new(),
-            _ => format!(": name an element of the array, as in {whole}{}", position(shape, 0)),
-        };
-        Err(Error::usage(to, format!("takes {}, and {from} has {}{remedy}", said(&taken), said(&sent))))
-    }
-
-    /// The known part of the unit of a variable, written `instance.variable`; `stated` if its FMU names none.
-    ///
-    /// # Errors
-    /// The variable does not exist.
-    pub fn measured<'a>(&'a self, port: &str, stated: Option<Measured<'a>>) -> Result<Measured<'a>, Error> {
-        let port = self.parts.port(port)?;
-        let variable = self.parts.variable(port.instance, &port.name)?;
-        let own = self.parts.0[port.instance].description().measured(variable);
-        Ok(stated.filter(|_| own.unit.is_none()).unwrap_or(own))
-    }
-
-    /// Connects every input that nothing feeds to the output of the same name of another FMU; returns the connections.
-    ///
-    /// # Errors
-    /// Several FMUs have the output.
-    pub fn connect_by_name(&mut self) -> Result<Vec<(String, String)>, Error> {
-        let mut found = Vec::new();
-        let names = |i: &Instance, causality| -> Vec<String> {
-            i.description().variables.iter().filter(|v| v.causality == causality).map(|v| v.name.clone()).collect()
-        };
-        for (index, target) in self.instances.iter().enumerate() {
-            for input in names(target, Causality::Input) {
-                if self.wiring.feeds(index, &input) {
-                    continue;
-                }
-                let others = self.instances.iter().enumerate().filter(|(i, _)| *i != index).map(|(_, other)| other);
-                let sources: Vec<_> = others.filter(|o| names(o, Causality::Output).contains(&input)).collect();
-                let to = format!("{}.{input}", target.name());
-                match sources.as_slice() {
-                    [] => {}
-                    [one] => found.push((format!("{}.{input}", one.name()), to)),
-                    [one, two, ..] => {
-                        let cause = format!("both {} and {} have an output of this name", one.name(), two.name());
-                        return Err(Error::usage(&to, cause));
-                    }
-                }
-            }
-        }
-        for (from, to) in &found {
-            self.connect(from, to)?;
-        }
-        Ok(found)
-    }
-
     /// Feeds an input or a tunable parameter over time.
     ///
     /// # Errors
@@ -601,7 +430,7 @@ impl System {
         self.instances.iter().flat_map(outputs).collect()
     }
 
-    fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
+    pub(super) fn feed(&mut self, target: Port, written: &str, source: Source) -> Result<(), Error> {
         self.check_fed(&target, written, matches!(source, Source::Schedule(_)))?;
         let variable = self.parts.variable(target.instance, &target.name)?;
         let continuous = variable.variability == Variability::Continuous && variable.base.is_float();
@@ -610,7 +439,7 @@ impl System {
     }
 
     /// Whether the variable takes values, over time or from a connection, and nothing feeds it yet.
-    fn check_fed(&self, target: &Port, written: &str, over_time: bool) -> Result<(), Error> {
+    pub(super) fn check_fed(&self, target: &Port, written: &str, over_time: bool) -> Result<(), Error> {
         if self.wiring.feeds(target.instance, &target.name) {
             return Err(Error::usage(written, "is fed twice"));
         }
