@@ -2,7 +2,7 @@
 
 use crate::abi::Functions;
 use crate::abi::journal::{self, Call};
-use crate::abi::log::Log;
+use crate::abi::log::{Log, Logging};
 use crate::archive::{self, Archive, Extracted};
 use crate::error::Error;
 use crate::folder::Folder;
@@ -163,11 +163,11 @@ impl Fmu {
         &self.path
     }
 
-    /// Creates an instance for co-simulation; with `logging`, the FMU logs more than errors.
+    /// Creates an instance for co-simulation; with `true`, the FMU logs everything, with `false` only errors.
     ///
     /// # Errors
     /// The FMU refuses or has no Co-Simulation, or a name has a null byte.
-    pub fn instantiate(&self, name: &str, logging: bool) -> Result<Instance, Error> {
+    pub fn instantiate(&self, name: &str, logging: impl Into<Logging>) -> Result<Instance, Error> {
         self.instantiate_as(Kind::default(), name, logging)
     }
 
@@ -175,7 +175,7 @@ impl Fmu {
     ///
     /// # Errors
     /// The FMU refuses or has no such interface, or a name has a null byte.
-    pub fn instantiate_as(&self, kind: Kind, name: &str, logging: bool) -> Result<Instance, Error> {
+    pub fn instantiate_as(&self, kind: Kind, name: &str, logging: impl Into<Logging>) -> Result<Instance, Error> {
         self.instantiate_with(kind, name, logging, false)
     }
 
@@ -183,7 +183,24 @@ impl Fmu {
     ///
     /// # Errors
     /// As [`instantiate_as`](Self::instantiate_as).
-    pub fn instantiate_with(&self, kind: Kind, name: &str, logging: bool, visible: bool) -> Result<Instance, Error> {
+    pub fn instantiate_with(
+        &self,
+        kind: Kind,
+        name: &str,
+        logging: impl Into<Logging>,
+        visible: bool,
+    ) -> Result<Instance, Error> {
+        let logging = logging.into();
+        let mut instance = self.made(kind, name, logging == Logging::All, visible)?;
+        if logging == Logging::Warnings && instance.log_warnings().is_err() {
+            // After an error, an instance can only be freed; one without warnings is better than none.
+            drop(instance);
+            return self.made(kind, name, false, visible);
+        }
+        Ok(instance)
+    }
+
+    fn made(&self, kind: Kind, name: &str, logging: bool, visible: bool) -> Result<Instance, Error> {
         let functions = self.functions(kind, name)?;
         let c_name = text(name, name)?;
         let token = text(name, &self.description.token)?;

@@ -14,6 +14,7 @@ use crate::value::Values;
 use clocks::Clocks;
 use model_description::{BaseType, Causality, ModelDescription, ModelVariable};
 use std::collections::BTreeMap;
+use std::ffi::CStr;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
@@ -193,7 +194,15 @@ impl Instance {
     /// # Errors
     /// The FMU refuses.
     pub fn set_debug_logging(&mut self, on: bool) -> Result<(), Error> {
-        self.call(Call::Evaluation, |s| s.set_debug_logging(on))
+        self.call(Call::Evaluation, |s| s.set_debug_logging(on, None))
+    }
+
+    /// Requests warnings from an FMU that has a category for them.
+    pub(crate) fn log_warnings(&mut self) -> Result<(), Error> {
+        const WARNING: &CStr = c"logStatusWarning";
+        let listed =
+            self.description.log_categories.iter().any(|category| category.name.as_bytes() == WARNING.to_bytes());
+        if listed { self.call(Call::Evaluation, |s| s.set_debug_logging(true, Some(WARNING))) } else { Ok(()) }
     }
 
     /// Sets the start time of the simulation and, if it is known, the stop time.

@@ -49,7 +49,7 @@ pub mod written;
 
 pub use abi::journal;
 pub use abi::library::describe;
-pub use abi::log::{Message, Status};
+pub use abi::log::{Logging, Message, Status};
 pub use abi::raw;
 pub use archive::{check_entries, document};
 pub use error::Error;

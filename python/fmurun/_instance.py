@@ -4,6 +4,7 @@ import io
 import os
 import shutil
 import tempfile
+import warnings
 import zipfile
 from functools import lru_cache
 
@@ -85,7 +86,7 @@ class _Instance(_core.Instance):
         kind = kind or (issubclass(cls, (FMU2Model, FMU3Model)), False, False)
         talks = logger is not None or fmiCallLogger is not None
         made = super().__new__(_talking(cls) if talks else cls, fmu, instanceName or description.modelName, kind,
-                               bool(loggingOn), bool(visible), fmiCallLogger is not None)  # fmt: skip
+                               loggingOn if loggingOn is None else bool(loggingOn), bool(visible), fmiCallLogger is not None)  # fmt: skip
         made.fmu, made.unzipDirectory, made.modelDescription = fmu, unzipDirectory, description
         made._loggers, made._freed = (logger, fmiCallLogger), False
         return made
@@ -108,6 +109,14 @@ class _Instance(_core.Instance):
     def messages(self):
         """Take the FMU's messages since the last call: (status, category, text)."""
         return self._take_messages()
+
+    def _warn(self):
+        """Give each warning of the FMU once as a Python warning."""
+        texts = {text: None for status, _, text in self._take_messages() if status == "Warning"}
+        for text in texts:
+            # Many FMUs begin with the name of the instance.
+            named = text.startswith(f"{self.instanceName}: ")
+            warnings.warn(text if named else f"{self.instanceName}: {text}", stacklevel=3)
 
     def _talk(self):
         """Pass new messages and calls to the loggers."""

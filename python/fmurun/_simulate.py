@@ -93,7 +93,8 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         input: structured array, its first column is time (s), the others are inputs and tunable parameters
         output: names to record; by default the outputs
         timeout: end after this much time of the clock (s)
-        debug_logging: the FMU logs; `logger` gets its messages, without one they are printed
+        debug_logging: the FMU logs; `logger` gets its messages, without one they are printed. Without `debug_logging`, `logger`
+            and `fmi_call_logger`, each warning of the FMU becomes one Python warning
         logger: called like FMPy's for each message, after the step that caused it
         fmi_call_logger: called with a line for each call to the FMU, "fmi3DoStep -> OK"
         step_finished: called with (time, recorder) after each step; False ends the simulation
@@ -148,10 +149,12 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
             raise ValueError(f"set_input_derivatives = True: {description.modelName} does not interpolate inputs")
         way["input_derivatives"] = True
 
-    instance = fmu_instance
+    instance, warns = fmu_instance, False
     if instance is None:
         talk = logger or (_print_message(description) if debug_logging else None)
-        instance = _instance(fmu, kind, filename, debug_logging, visible, talk, fmi_call_logger)
+        # None asks the FMU for warnings alone.
+        warns = not debug_logging and logger is None and fmi_call_logger is None
+        instance = _instance(fmu, kind, filename, None if warns else debug_logging, visible, talk, fmi_call_logger)
     talks = instance._loggers != (None, None)
     try:
         if fmu_state is not None:
@@ -182,6 +185,8 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
     finally:
         if talks:
             instance._talk()
+        if warns:
+            instance._warn()
         if fmu_instance is None:
             instance.freeInstance()
 

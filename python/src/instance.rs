@@ -3,7 +3,7 @@
 use crate::cache::{self, Opened};
 use crate::error::{gate, raise, usage};
 use fmu_import::trace::traced;
-use fmu_import::{Error, Kind, Values};
+use fmu_import::{Error, Kind, Logging, Values};
 use model_description::BaseType;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -37,7 +37,8 @@ impl Instance {
         opened: &Arc<Opened>,
         name: &str,
         kind: Kind,
-        [logging, visible, traces]: [bool; 3],
+        logging: Logging,
+        [visible, traces]: [bool; 2],
     ) -> PyResult<Self> {
         static IDS: AtomicU64 = AtomicU64::new(0);
         let make = || opened.fmu.instantiate_with(kind, name, logging, visible);
@@ -152,19 +153,20 @@ fn values(base: BaseType, items: &Bound<'_, PyAny>) -> PyResult<Values> {
 #[pymethods]
 impl Instance {
     #[new]
-    #[pyo3(signature = (fmu, name, kind, logging = false, visible = false, traces = false))]
+    #[pyo3(signature = (fmu, name, kind, logging = Some(false), visible = false, traces = false))]
     fn create(
         py: Python<'_>,
         fmu: &Bound<'_, crate::cache::Fmu>,
         name: &str,
         kind: (bool, bool, bool),
-        logging: bool,
+        logging: Option<bool>,
         visible: bool,
         traces: bool,
     ) -> PyResult<Self> {
         let (exchange, event_mode, early_return) = kind;
         let kind = if exchange { Kind::ModelExchange } else { Kind::CoSimulation { event_mode, early_return } };
-        gate(|| Self::new(py, &fmu.get().0, name, kind, [logging, visible, traces]))
+        let logging = logging.map_or(Logging::Warnings, Logging::from);
+        gate(|| Self::new(py, &fmu.get().0, name, kind, logging, [visible, traces]))
     }
 
     /// Name in errors and messages.

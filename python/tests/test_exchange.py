@@ -10,6 +10,9 @@ import pytest
 from fmurun import FmuError, simulate_fmu
 from test_figures import LONG, SLACK, ratio, report
 
+# Controllers without a motor warn of their lost rotor.
+pytestmark = pytest.mark.filterwarnings("ignore:SensorlessController:UserWarning")
+
 VOLTAGES = {"u_a": 10.0, "u_b": -5.0, "u_c": -5.0}
 LOAD = np.array([(0.0, 0.0), (0.0057, 0.0), (0.0057, 1.0), (0.02, 1.5)], dtype=[("time", float), ("tau_load", float)])
 SPEED = np.array([(0.0, 0.0), (0.00513, 30.0), (0.00513, 50.0), (0.02, 50.0)], dtype=[("time", float), ("speed_ref", float)])
@@ -201,6 +204,19 @@ def test_bad_input_is_one_line(reference, wrong):
     with pytest.raises(kind, match=re.escape(part)) as caught:
         simulate_fmu(reference / "fmi3" / "VanDerPol.fmu", **{"fmi_type": "ModelExchange"} | arguments)
     assert "\n" not in str(caught.value)
+
+
+def test_warnings_of_the_fmu(standard):
+    archive, arguments = standard / "PmsmDrive.fmu", {"start_values": {"u_dc": 0.0}, "stop_time": 0.1, "output_interval": 1e-3}
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        result = simulate_fmu(archive, **arguments)
+        said = [str(w.message) for w in caught]
+        assert sum("the DC link has no voltage" in text for text in said) == 1, said
+        assert all(text.startswith("PmsmDrive: at ") for text in said) and caught[0].filename == __file__
+        # Whoever takes the messages, or asks for none, gets no Python warning.
+        others = [simulate_fmu(archive, logger=lambda *_: None, **arguments), simulate_fmu(archive, fmi_call_logger=print, **arguments)]
+        assert len(caught) == len(said) and all(one.tobytes() == result.tobytes() for one in others)
 
 
 def test_cvode_warns_once(reference):

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from fmurun import FmuError, simulate_fmu
 
+# Controllers without a motor warn of their lost rotor.
+pytestmark = pytest.mark.filterwarnings("ignore:SensorlessController:UserWarning")
+
 STEP = np.array([(0.0, 0.0), (0.01, 0.0), (0.01, 1.0), (0.03, 1.5)], dtype=[("time", float), ("tau_load", float)])
 RAMP = np.array([(0.0, 0.1), (0.0137, 0.7), (0.1, 0.2)], dtype=[("time", float), ("tau_load", float)])
 ONE = np.array([(0.0, 0.3)], dtype=[("time", float), ("tau_load", float)])

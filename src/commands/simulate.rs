@@ -1,6 +1,7 @@
 //! `fmu simulate`: co-simulates FMUs, or integrates those for Model Exchange.
 
 mod curves;
+mod log;
 mod output;
 mod overview;
 mod worker;
@@ -11,12 +12,13 @@ use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_import::guard::{Allowance, Streams};
 use fmu_import::written::{assignment, names, pair};
-use fmu_import::{Fmu, Instance, Kind, Message, Number, journal, printable, printable_lines};
+use fmu_import::{Fmu, Instance, Kind, Number, journal, printable, printable_lines};
 use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System, Units};
 use fmu_system::ssp::load::Loaded;
 use fmu_system::ssp::ssv;
 use fmu_system::ssp::values::{self, Given};
 use indicatif::{ProgressBar, ProgressStyle};
+use log::Log;
 use model_description::ModelVariable;
 use std::io::{self, IsTerminal, Write};
 use std::ops::ControlFlow;
@@ -142,7 +144,7 @@ pub struct Simulate {
     /// Let FMUs of FMI 3.0 return early from a step (Co-Simulation)
     #[arg(long, conflicts_with_all = ["me", "sequential"])]
     pub early_return: bool,
-    /// Show all messages that the FMUs log
+    /// Show all messages that the FMUs log, not only each warning once
     #[arg(long)]
     pub logging: bool,
     /// Maximum time in s for loading, for initialization, and between two communication points; 0 for no limit
@@ -245,12 +247,10 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     for note in &before {
         message::note(&printable(note));
     }
-    let mut progress = Progress::new(settings);
+    let (mut progress, mut log) = (Progress::new(settings), Log::new(args.logging));
     let (mut look, mut interrupted) = (worker::look(args), None);
     let mut hook = |point: &mut CommunicationPoint<'_>| {
-        if args.logging {
-            show(&point.take_messages());
-        }
+        log.show(&point.take_messages());
         progress.at(point.time);
         journal::reached(point.time);
         if look() {
@@ -263,9 +263,8 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     progress.end();
     let during = system.take_notes().into_iter().filter(|note| !before.contains(note));
     during.for_each(|note| message::note(&printable(&note)));
-    if args.logging {
-        show(&system.take_messages());
-    }
+    log.show(&system.take_messages());
+    log.end();
     // The numbers of closed descriptors would become those of the files of the command.
     let lost = streams.lost();
     if !lost.is_empty() {
@@ -432,12 +431,6 @@ fn column(port: &str, file: &str) -> Result<Sequence, String> {
 
 fn halves<'a>(text: &'a str, form: &str) -> Result<(&'a str, &'a str)> {
     text.split_once('=').ok_or_else(|| anyhow!("{text}: is not {form}"))
-}
-
-fn show(messages: &[(String, Message)]) {
-    for (instance, Message { status, category, text }) in messages {
-        eprintln!("{}: {status} [{}] {}", printable(instance), printable(category), printable_lines(text));
-    }
 }
 
 /// A progress bar on a terminal, if the run takes longer than a second.

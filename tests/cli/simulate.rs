@@ -238,6 +238,30 @@ fn inputs_left_alone_and_long_steps_are_told() {
     assert!(!printed.contains("tau_load"), "{printed}");
 }
 
+/// A warning of an FMU is shown without `--logging`, once, in both standards and interfaces; an instance without one is quiet.
+#[test]
+fn warnings_of_the_fmus_are_shown() {
+    for standard in ["fmi2", "fmi3"] {
+        for interface in [&[][..], &["--me"]] {
+            let drive = |name: &str| format!("{name}={}", archive(standard, "PmsmDrive").display());
+            let run =
+                ["simulate", &drive("low"), &drive("d"), "--set", "low.u_dc=0", "--stop", "2.5", "--step", "0.001"];
+            let output = fmu(&[&run[..], interface].concat());
+            assert_eq!(output.status.code(), Some(0), "{standard} {interface:?}");
+            let printed = text(&output.stderr);
+            let shown = |part: &str| {
+                printed.lines().filter(|line| line.starts_with("warning: low: at ") && line.contains(part)).count()
+            };
+            assert_eq!(
+                (shown("u_dc = 0 V: the DC link has no voltage"), shown("begins with u_dc = 0")),
+                (1, 1),
+                "{printed}"
+            );
+            assert!(!printed.contains(": d: at "), "{printed}");
+        }
+    }
+}
+
 /// The README's first run ends with useful output: the speed reached, and the page with a command to open it.
 #[test]
 fn the_first_run_of_the_readme() {

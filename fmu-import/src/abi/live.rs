@@ -220,8 +220,11 @@ impl Live {
         outcome
     }
 
-    pub(crate) fn set_debug_logging(&mut self, on: bool) -> Outcome {
-        self.calls.debug_logging(self.given(), on, None, 0).outcome()
+    /// With a category, for it alone.
+    pub(crate) fn set_debug_logging(&mut self, on: bool, category: Option<&CStr>) -> Outcome {
+        let list = category.map(|category| [Some(category)]);
+        let list = list.as_ref().map(<[_; 1]>::as_slice);
+        self.calls.debug_logging(self.given(), on, list, list.map_or(0, <[_]>::len)).outcome()
     }
 
     pub(crate) fn setup(&mut self, x: Experiment) -> Outcome {

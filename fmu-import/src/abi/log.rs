@@ -20,6 +20,24 @@ pub struct Message {
     pub text: String,
 }
 
+/// The messages that an instance asks its FMU for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Logging {
+    /// Errors, which an FMU logs without being asked.
+    #[default]
+    Errors,
+    /// Warnings too, if the FMU lists the standards' category for them (`logStatusWarning`).
+    Warnings,
+    /// All categories.
+    All,
+}
+
+impl From<bool> for Logging {
+    fn from(all: bool) -> Self {
+        if all { Self::All } else { Self::Errors }
+    }
+}
+
 /// A status of either standard; the two agree up to `Fatal`.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(transparent)]

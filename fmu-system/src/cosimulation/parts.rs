@@ -3,7 +3,7 @@
 use super::Column;
 use fmu_core::variable::position;
 use fmu_import::quantity::suggest;
-use fmu_import::{Error, Fmu, Instance, Kind, Values};
+use fmu_import::{Error, Fmu, Instance, Kind, Logging, Values};
 use model_description::{
     BaseType, Causality, Initial, IntervalVariability, ModelDescription, ModelVariable, Variability,
 };
@@ -66,7 +66,7 @@ impl Port {
 pub(super) struct Part {
     pub(super) name: String,
     pub(super) fmu: Fmu,
-    pub(super) logging: bool,
+    pub(super) logging: Logging,
     pub(super) kind: Kind,
     /// Structural parameters that were set, and their values.
     pub(super) sizes: Vec<(Port, Values)>,

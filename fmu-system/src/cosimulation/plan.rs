@@ -30,7 +30,7 @@ use super::recording::{Column, Recording};
 use super::run::simulate;
 use super::system::System;
 use super::wiring::Wiring;
-use fmu_import::{Error, Fmu, Instance, Kind, Number, Values};
+use fmu_import::{Error, Fmu, Instance, Kind, Logging, Number, Values};
 use model_description::{BaseType, Interface};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -305,7 +305,8 @@ impl Worker {
         for (part, live) in self.plan.parts.0.iter().zip(self.plan.live.iter()) {
             let fmu = live.fmu();
             self.generations.push(live.generation());
-            self.instances.push(fmu.instantiate_as(part.kind, &part.name, part.logging)?);
+            // Nobody reads the warnings of thousands of runs, and some take longer than a short run.
+            self.instances.push(fmu.instantiate_as(part.kind, &part.name, part.logging == Logging::All)?);
         }
         self.used = false;
         Ok(())

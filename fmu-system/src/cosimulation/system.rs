@@ -9,7 +9,7 @@ use super::sequence::Sequence;
 use super::wiring::{Source, Units, Wiring};
 use fmu_core::Need;
 use fmu_import::written::matches;
-use fmu_import::{Error, Fmu, Instance, Kind, Message, Values};
+use fmu_import::{Error, Fmu, Instance, Kind, Logging, Message, Values};
 use model_description::{BaseType, Causality, Interface, ModelVariable, Variability, parse_number};
 
 /// FMUs and their connections.
@@ -143,7 +143,7 @@ impl System {
         std::mem::take(&mut self.notes)
     }
 
-    /// Adds an instance of an FMU.
+    /// Adds an instance of an FMU, which logs everything or, without `logging`, warnings and errors.
     ///
     /// # Errors
     /// The name is taken, or the FMU refuses.
@@ -157,6 +157,7 @@ impl System {
             *event_mode |= clocked;
         }
         let kind = self.method.kind(name, fmu);
+        let logging = if logging { Logging::All } else { Logging::Warnings };
         self.instances.push(fmu.instantiate_as(kind, name, logging)?);
         self.parts.0.push(Part { name: name.into(), fmu: fmu.clone(), logging, kind, sizes: Vec::new() });
         Ok(())
