@@ -7,8 +7,8 @@
 //! - [`message`]: errors, warnings and notes on standard error.
 //! - [`ssp`], [`ssv`]: write systems and parameter values; [`modelica`]: a Modelica package around an FMU.
 //!
-//! [`fmu_import`] runs FMUs, [`fmu_check`] checks them, [`drive_study`] reproduces, compares and tunes drives, and [`fmu_plot`]
-//! draws.
+//! [`fmu_import`] runs FMUs, [`fmu_check`] checks them, [`drive_tools`] tunes and identifies drives, [`drive_study`] reproduces the
+//! papers and compares estimators, and [`fmu_plot`] draws.
 
 #![forbid(unsafe_code)]
 

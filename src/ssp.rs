@@ -6,7 +6,7 @@ use crate::TOOL;
 use crate::pack::{GenerationTime, PackedFile};
 use crate::ssv;
 use anyhow::{Context, Result};
-use drive_study::tune::setting::Value;
+use drive_tools::tune::setting::Value;
 use fmu_import::{Fmu, Values as Read};
 use fmu_system::cosimulation::{Settings, System};
 use fmu_system::ssp::ssv::{Parameter, read};

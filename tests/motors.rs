@@ -5,7 +5,7 @@ use drive::plant::power::Powers;
 use drive::plant::signals::PlantOutputs;
 use drive::plant::tables::PlantParameters;
 use drive::{Pair, PmsmDrive};
-use drive_study::tune::{self, motor::MotorFile, setting::Tuned};
+use drive_tools::tune::{self, motor::MotorFile, setting::Tuned};
 use fmu_core::{Block, Elapsed, Step};
 use std::collections::VecDeque;
 use std::path::Path;

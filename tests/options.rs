@@ -413,7 +413,7 @@ fn inputs(folder: &Path) {
     write("known.toml", "[\"PmsmPlant, FMI 3.0\"]\nmust = [\"I01\"]\n");
     write("stimuli.csv", "time,tau_load\n0,0\n0.1,1\n");
     let ssv = |name: &str| {
-        let value = std::iter::once((name, &drive_study::tune::setting::Value::Real(1.0)));
+        let value = std::iter::once((name, &drive_tools::tune::setting::Value::Real(1.0)));
         fmu::ssv::text_of("values", value)
     };
     write("plant.ssv", &ssv("motor.R_s"));

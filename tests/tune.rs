@@ -3,9 +3,9 @@
 
 mod common;
 
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::setting::{Setting, Value};
-use drive_study::tune::{self, rules};
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::setting::{Setting, Value};
+use drive_tools::tune::{self, rules};
 use fmu::ssv;
 use fmu_system::ssp::ssv::{Parameter, read};
 use std::path::{Path, PathBuf};
@@ -259,7 +259,7 @@ fn the_check_prints_what_holds_and_what_was_announced() {
     let out = dir.path().to_str().unwrap();
     // A slow speed loop: a step of the rated torque takes more than the speed at 0.1 pu.
     let light = dir.path().join("light.toml");
-    let given = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive-study/tests/verdicts/machines/light-24v.toml");
+    let given = Path::new(env!("CARGO_MANIFEST_DIR")).join("drive-tools/tests/verdicts/machines/light-24v.toml");
     std::fs::write(&light, std::fs::read_to_string(given).unwrap() + "[bandwidth]\nspeed = 60.0\n").unwrap();
     let checked = |motor: &Path, ends: [&str; 3]| {
         let checked = fmu(&["tune", motor.to_str().unwrap(), "--check", "--out", out]);

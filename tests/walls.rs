@@ -22,18 +22,20 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("drive-control", &["drive-base", "fmu-core"]),
     ("drive-plant", &["drive-base", "fmu-core"]),
     ("drive", &["drive-base", "drive-control", "drive-plant", "fmu-core"]),
-    ("drive-study", &["drive", "fmu-core", "fmu-import", "fmu-plot"]),
+    ("drive-tools", &["drive", "fmu-core", "fmu-import", "fmu-plot"]),
+    ("drive-study", &["drive", "drive-tools", "fmu-core", "fmu-import", "fmu-plot"]),
     ("pmsm-plant", &["drive", "fmu-export"]),
     ("sensorless-controller", &["drive", "fmu-export"]),
     ("sensorless-controller-clocked", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("pmsm-drive-mean", &["drive", "fmu-export"]),
-    ("fmurun", &["drive-study", "fmu-import", "fmu-plot", "fmu-sweep", "fmu-system", "model-description"]),
+    ("fmurun", &["drive-tools", "fmu-import", "fmu-plot", "fmu-sweep", "fmu-system", "model-description"]),
     (
         "fmu",
         &[
             "drive",
             "drive-study",
+            "drive-tools",
             "fmu-check",
             "fmu-core",
             "fmu-import",
@@ -103,7 +105,9 @@ fn known_to(name: &str) -> BTreeSet<String> {
 fn the_checker_knows_no_motor_no_plotter_and_no_system() {
     let known = known_to("fmu-check");
     assert!(known.contains("fmu-import") && known.contains("quick-xml"), "{known:?}");
-    for foreign in ["drive", "drive-study", "fmu-plot", "fmu-system", "nalgebra", "resvg", "libm", "anyhow"] {
+    for foreign in
+        ["drive", "drive-tools", "drive-study", "fmu-plot", "fmu-system", "nalgebra", "resvg", "libm", "anyhow"]
+    {
         assert!(!known.contains(foreign), "fmu-check depends on {foreign}");
     }
 }
@@ -113,7 +117,9 @@ fn the_checker_knows_no_motor_no_plotter_and_no_system() {
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     let known = known_to("fmu-sweep");
     assert!(known.contains("fmu-system") && known.contains("libm"), "{known:?}");
-    for foreign in ["drive", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"] {
+    for foreign in
+        ["drive", "drive-tools", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"]
+    {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
     }
 }
@@ -383,8 +389,8 @@ const SMALL: &[(&str, &[&str])] = &[
 const OF_THE_DRIVE: &[(&str, &[&str])] = &[
     ("drive-study", &["atlas/map.rs", "atlas/mod.rs", "atlas/report.rs"]),
     ("drive-study", &["atlas/drive.rs", "atlas/run.rs"]),
-    ("drive-study", &["map/files.rs", "map/mod.rs", "map/page.rs", "map/picture.rs", "map/report.rs"]),
-    ("drive-study", &["tune/flux_map.rs", "tune/flux_map/judge.rs", "tune/flux_map/squares.rs"]),
+    ("drive-tools", &["map/files.rs", "map/mod.rs", "map/page.rs", "map/picture.rs", "map/report.rs"]),
+    ("drive-tools", &["tune/flux_map.rs", "tune/flux_map/judge.rs", "tune/flux_map/squares.rs"]),
 ];
 
 /// Dependencies between files go one way, so that a file can be read alone.

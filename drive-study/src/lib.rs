@@ -3,9 +3,6 @@
 //! - [`reproduce`]: the paper's experiments with packed FMUs.
 //! - [`compare`]: the estimators side by side.
 //! - [`atlas`]: the effect of wrong estimates of resistance and magnet flux at low speed.
-//! - [`tune`]: parameter values for a machine.
-//! - [`map`]: efficiency over speed and torque.
-//! - [`identify`]: a machine's data from a record.
 //! - [`plane`]: torque and losses over speed, drawn for the documentation.
 
 #![forbid(unsafe_code)]
@@ -14,14 +11,9 @@
 
 pub mod atlas;
 pub mod compare;
-pub mod csv;
 pub mod expected;
-pub mod identify;
 pub mod ink;
-pub mod map;
 mod output;
 pub mod plane;
-pub mod queue;
 pub mod reproduce;
 pub mod runner;
-pub mod tune;

@@ -15,7 +15,6 @@
 //!
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
-use crate::map::{self, picture};
 use crate::runner::{self, REFERENCE_SPEED, REFERENCE_TORQUE};
 use anyhow::{Result, anyhow};
 use drive::Pair;
@@ -25,6 +24,7 @@ use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
 use drive::plant::machine;
 use drive::steady::Steady;
+use drive_tools::map::{self, picture};
 use fmu_plot::chart::Chart;
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, Ink};

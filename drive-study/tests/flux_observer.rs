@@ -5,8 +5,8 @@
 use drive::Pair;
 use drive::estimator::Kind;
 use drive::math::tanh;
-use drive_study::queue;
 use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE, line};
+use drive_tools::queue;
 
 /// Resistance estimate as a share of the true value, load in pu, speed in pu.
 #[derive(Clone, Copy, Debug, PartialEq)]

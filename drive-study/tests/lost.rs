@@ -12,7 +12,7 @@ use drive::estimator::Kind;
 use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::run::{self, Verdict};
-use drive_study::queue;
+use drive_tools::queue;
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

@@ -12,11 +12,11 @@
 mod on_bench;
 
 use drive::Pair;
-use drive_study::identify::columns::Signals;
-use drive_study::identify::verdict::Quantity;
-use drive_study::identify::{Identified, Options, identify, machine_file};
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules;
+use drive_tools::identify::columns::Signals;
+use drive_tools::identify::verdict::Quantity;
+use drive_tools::identify::{Identified, Options, identify, machine_file};
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
 use std::path::Path;
 
 const EXAMPLE: &str = include_str!("../../examples/bench.csv");

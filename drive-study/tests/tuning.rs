@@ -9,9 +9,9 @@ use drive::estimator::Kind::{
 };
 use drive::{Pair, PmsmPlant, SensorlessController};
 use drive_study::runner;
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules;
-use drive_study::tune::setting::Tuned;
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
+use drive_tools::tune::setting::Tuned;
 use fmu_core::{Block, Elapsed, Fault, Model, Slot, Step, Variability};
 use std::f64::consts::PI;
 use std::path::Path;
@@ -317,7 +317,7 @@ fn three_machines_need_it_at_their_rated_point() {
         ("pmsyrm-5.5kw", true),
         ("traction-63kw", true),
     ] {
-        let tuned = drive_study::tune::tune(&folder.join(format!("{name}.toml"))).unwrap();
+        let tuned = drive_tools::tune::tune(&folder.join(format!("{name}.toml"))).unwrap();
         assert_eq!(tuned.controller.iter().any(|s| s.name == "weakening.use"), needed, "{name}");
         tuned.pair().start().unwrap();
     }
@@ -328,7 +328,7 @@ fn three_machines_need_it_at_their_rated_point() {
 #[test]
 fn the_traction_drive_reaches_two_and_a_half_times_its_base_speed() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors/traction-63kw.toml");
-    let tuned = drive_study::tune::tune(&path).unwrap();
+    let tuned = drive_tools::tune::tune(&path).unwrap();
     for kind in [Kind::Sensored, ExtendedEmf, EmfObserver] {
         let mut pair = tuned.pair();
         let par = &mut pair.controller.model.parameters;

@@ -1,9 +1,9 @@
 //! A machine from a record: `fmurun.identify`.
 
 use crate::error::{gate, plain};
-use drive_study::csv::Columns;
-use drive_study::identify::columns::Signals;
-use drive_study::identify::{Options, identify as of};
+use drive_tools::csv::Columns;
+use drive_tools::identify::columns::Signals;
+use drive_tools::identify::{Options, identify as of};
 use pyo3::prelude::*;
 
 /// The result of `fmu identify --json` for columns in memory; `options` is the JSON of [`Options`].

@@ -275,7 +275,7 @@ fn presets(workspace: &Workspace, folder: &Path) -> Result<Vec<PathBuf>> {
     files.sort();
     let mut written = Vec::new();
     for file in files {
-        let tuned = drive_study::tune::tune(&file)?;
+        let tuned = drive_tools::tune::tune(&file)?;
         let path = folder.join("presets").join(format!("{}.PmsmDrive.fmu", tuned.name));
         fs::create_dir_all(folder.join("presets"))?;
         preset::of_machine(&drive, &tuned, &path)?;

@@ -3,11 +3,11 @@
 use crate::{pack, release};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use drive_study::identify::columns::{Naming, Signals};
-use drive_study::identify::electrical::Fit;
-use drive_study::identify::run::commissioned;
-use drive_study::identify::verdict::Quantity;
-use drive_study::identify::{self, Identified, Options, machine_file, page};
+use drive_tools::identify::columns::{Naming, Signals};
+use drive_tools::identify::electrical::Fit;
+use drive_tools::identify::run::commissioned;
+use drive_tools::identify::verdict::Quantity;
+use drive_tools::identify::{self, Identified, Options, machine_file, page};
 use std::path::PathBuf;
 
 /// Identifies a machine from a record of its running drive: resistance, inductances, magnet flux, inertia, friction.

@@ -5,10 +5,10 @@ use crate::pack;
 use crate::workspace::output_folder;
 use anyhow::{Context, Result, bail};
 use clap::Args;
-use drive_study::map::cycle::{CYCLE, Cycle, VEHICLE};
-use drive_study::map::request::{self, Request};
-use drive_study::map::{self, report};
-use drive_study::tune::motor::MotorFile;
+use drive_tools::map::cycle::{CYCLE, Cycle, VEHICLE};
+use drive_tools::map::request::{self, Request};
+use drive_tools::map::{self, report};
+use drive_tools::tune::motor::MotorFile;
 use std::path::PathBuf;
 
 /// Computes the efficiency map and the envelope of a machine with the values of `fmu tune`.

@@ -5,7 +5,7 @@ mod motor;
 use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
-use drive_study::tune::{self, setting::Tuned};
+use drive_tools::tune::{self, setting::Tuned};
 use fmu_import::printable;
 use fmu_import::written::assignment;
 use fmu_system::cosimulation::Schedule;

@@ -6,7 +6,7 @@ use crate::ssp::{self, COMPONENTS, ComponentValues, Options};
 use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
-use drive_study::tune;
+use drive_tools::tune;
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 

@@ -6,10 +6,10 @@ use crate::{pack, ssv};
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
-use drive_study::tune::motor::{MotorFile, torque_constant};
-use drive_study::tune::setting::{Setting, Tuned, Value};
-use drive_study::tune::trial::{self, Trial};
-use drive_study::tune::{self, limits, remedy, rules};
+use drive_tools::tune::motor::{MotorFile, torque_constant};
+use drive_tools::tune::setting::{Setting, Tuned, Value};
+use drive_tools::tune::trial::{self, Trial};
+use drive_tools::tune::{self, limits, remedy, rules};
 use fmu_core::{Description, Model};
 use std::path::{Path, PathBuf};
 

@@ -4,7 +4,7 @@ use super::base::dialog;
 use super::interface::{Interface, Kind, Variable};
 use super::text::{declare, html, identifier};
 use anyhow::{Context, Result, bail, ensure};
-use drive_study::tune::{
+use drive_tools::tune::{
     self,
     setting::{Tuned, Value},
 };

@@ -3,12 +3,12 @@
 use super::run::Approach;
 use crate::compare::candidate::{Candidate, Class, Entry};
 use crate::runner::{Bench, REFERENCE_SPEED};
-use crate::tune::motor::MotorFile;
-use crate::tune::rules;
 use anyhow::{Context, Result, anyhow, bail};
 use drive::SensorlessController;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
 use fmu_core::description::VariableKind;
 use fmu_core::variable::Causality;
 use fmu_core::{Description, Model, Slot};
@@ -49,7 +49,7 @@ impl Drive {
     /// for Rasmussen's, any other by those for the extended EMF.
     ///
     /// # Errors
-    /// Those of [`crate::tune::tune`].
+    /// Those of [`drive_tools::tune::tune`].
     pub fn tuned(path: &Path, kind: Kind) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
         let mut file = MotorFile::parse(&text, path)?;

@@ -12,10 +12,10 @@ pub mod report;
 pub mod run;
 
 use crate::output::Folder;
-use crate::queue;
 use anyhow::{Result, anyhow};
 use cell::Cell;
 use drive::Drive;
+use drive_tools::queue;
 use run::Verdict;
 use std::path::Path;
 

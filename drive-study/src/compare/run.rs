@@ -4,7 +4,7 @@ use super::candidate::{Candidate, Entry};
 use super::figures;
 use super::measure::{Effort, Measure, Outcome, Trace};
 use super::scenario::{SCENARIOS, Scenario};
-use crate::queue;
+use drive_tools::queue;
 
 /// One estimator in one scenario, with the result.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use super::candidate::Entry;
 use super::measure::{Measure, Outcome};
 use super::run::Run;
 use crate::compare::candidate::Class;
-use crate::output::{self, aligned};
+use drive_tools::text_table::{self, aligned};
 use std::fmt::Write as _;
 
 /// A group of scenarios with its runs.
@@ -207,7 +207,7 @@ pub fn markdown(cells: &[Run]) -> String {
         let heads = block.headings.iter().map(heading);
         let mut rows: Vec<Vec<String>> = vec![std::iter::once("estimator".to_owned()).chain(heads).collect()];
         rows.extend(block.texts());
-        text.push_str(&output::markdown(&rows));
+        text.push_str(&text_table::markdown(&rows));
         text.push('\n');
         block.notes.iter().for_each(|note| {
             let _ = writeln!(text, "- {note}");

@@ -7,8 +7,8 @@ pub mod plots;
 mod report;
 
 use crate::output::Folder;
-use crate::queue;
 use anyhow::{Context, Result};
+use drive_tools::queue;
 use experiment::{ALL, ClosedLoop, Record};
 use packed::Packed;
 use report::Table;

@@ -2,8 +2,8 @@
 
 use super::experiment::{Experiment, Record};
 use super::figures::PaperFigure;
-use crate::output;
 use anyhow::Result;
+use drive_tools::text_table::markdown;
 use fmu_plot::figure::Figure;
 use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
@@ -41,7 +41,7 @@ impl Table {
     /// The table in plain text (Markdown).
     pub(super) fn text(&self) -> String {
         let heads = HEADINGS.map(String::from).to_vec();
-        output::markdown(&std::iter::once(heads).chain(self.rows()).collect::<Vec<_>>())
+        markdown(&std::iter::once(heads).chain(self.rows()).collect::<Vec<_>>())
     }
 
     /// The figures of one experiment: a column for each quantity.

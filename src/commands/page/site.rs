@@ -9,7 +9,7 @@ use crate::compile::module;
 use crate::workspace::Workspace;
 use crate::{message, pack};
 use anyhow::{Context, Result, bail};
-use drive_study::tune;
+use drive_tools::tune;
 use fmu_plot::page::{escape, page};
 use std::fmt::Write as _;
 use std::fs;

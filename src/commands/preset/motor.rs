@@ -4,7 +4,7 @@ use crate::commands::tune::place;
 use crate::message;
 use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Result, bail};
-use drive_study::tune::{
+use drive_tools::tune::{
     joined,
     setting::{Setting, Tuned, Value},
 };

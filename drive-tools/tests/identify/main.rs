@@ -12,9 +12,9 @@ mod bad_input;
 mod bench;
 
 use bench::{Bench, IDEAL, REAL, Row, U_DC, file, phases, vector};
-use drive_study::identify::columns::Signals;
-use drive_study::identify::{Complex, Identified, Options, identify, machine_file};
-use drive_study::tune::motor::MotorFile;
+use drive_tools::identify::columns::Signals;
+use drive_tools::identify::{Complex, Identified, Options, identify, machine_file};
+use drive_tools::tune::motor::MotorFile;
 use std::f64::consts::PI;
 use std::fmt::Write;
 use std::path::Path;

@@ -1,12 +1,12 @@
 //! The machines of `motors/`: each starts from many angles and takes rated torque; notes name the exceptions.
 #![allow(missing_docs, non_snake_case)]
 
-use drive_study::tune::limits::{self, Limit};
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::remedy::What;
-use drive_study::tune::rules;
-use drive_study::tune::setting::{Tuned, Value};
-use drive_study::tune::trial::{self, Task, Trial};
+use drive_tools::tune::limits::{self, Limit};
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::remedy::What;
+use drive_tools::tune::rules;
+use drive_tools::tune::setting::{Tuned, Value};
+use drive_tools::tune::trial::{self, Task, Trial};
 use std::path::{Path, PathBuf};
 
 /// The eleven classes of machine that were measured from outside.
@@ -29,7 +29,7 @@ fn file(name: &str) -> PathBuf {
 }
 
 fn tuned(name: &str) -> Tuned {
-    drive_study::tune::tune(&file(name)).unwrap()
+    drive_tools::tune::tune(&file(name)).unwrap()
 }
 
 /// The file of a machine with its inertia changed by a factor, and `more` at its end.
@@ -79,7 +79,7 @@ fn each_machine_starts_and_holds_its_rated_torque() {
     all(4);
 }
 
-/// `cargo test --release -p drive-study --test machines -- --ignored`
+/// `cargo test --release -p drive-tools --test machines -- --ignored`
 #[test]
 #[ignore = "a minute in a debug build"]
 fn from_all_24_angles() {

@@ -1,6 +1,6 @@
 //! A machine and a controller that share no formula with the drive's plant.
 
-use drive_study::identify::Complex;
+use drive_tools::identify::Complex;
 use std::f64::consts::PI;
 use std::fmt::Write;
 

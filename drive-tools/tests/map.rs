@@ -4,13 +4,13 @@
 
 use drive::plant::losses::Losses;
 use drive::steady::{Region, Steady};
-use drive_study::map::cycle::{self, Cycle};
-use drive_study::map::request::{Request, ZERO_CELSIUS};
-use drive_study::map::sheet::{self, Axes, Sheet};
-use drive_study::map::table::Table;
-use drive_study::map::{self, Map, files, page, report, verify};
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules;
+use drive_tools::map::cycle::{self, Cycle};
+use drive_tools::map::request::{Request, ZERO_CELSIUS};
+use drive_tools::map::sheet::{self, Axes, Sheet};
+use drive_tools::map::table::Table;
+use drive_tools::map::{self, Map, files, page, report, verify};
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
 use std::f64::consts::PI;
 use std::fmt::Write as _;
 use std::io::{Cursor, Read};

@@ -2,8 +2,8 @@
 //! temperatures, in speed and torque mode, at 0.1 to 1 pu, compared with the same drive on a sensor.
 //!
 //! ```sh
-//! cargo test --release -p drive-study --test hold -- --ignored --nocapture                 # all machines, a table a machine
-//! HOLD_ONLY=hub-36v cargo test --release -p drive-study --test hold -- --ignored --nocapture     # machines with this in the name
+//! cargo test --release -p drive-tools --test hold -- --ignored --nocapture                 # all machines, a table a machine
+//! HOLD_ONLY=hub-36v cargo test --release -p drive-tools --test hold -- --ignored --nocapture     # machines with this in the name
 //! HOLD_MACHINES=DIR ...      # the machine files of a folder, in addition
 //! HOLD_CELLS=1 ...           # a line for each cell that is not held
 //! HOLD_FIXED=1 ...      # without the adaptation of the resistance that `fmu tune` may choose
@@ -23,11 +23,11 @@
 mod cell;
 
 use cell::{Cell, Outcome};
-use drive_study::queue;
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules;
-use drive_study::tune::setting::{Tuned, Value};
-use drive_study::tune::{limits, trial};
+use drive_tools::queue;
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
+use drive_tools::tune::setting::{Tuned, Value};
+use drive_tools::tune::{limits, trial};
 use std::path::{Path, PathBuf};
 
 /// Start angles of the trial whose notes count.
@@ -175,7 +175,7 @@ impl Named {
     }
 }
 
-/// `cargo test --release -p drive-study --test hold -- --ignored --nocapture`
+/// `cargo test --release -p drive-tools --test hold -- --ignored --nocapture`
 #[test]
 #[ignore = "thousands of runs of some seconds"]
 fn held_or_said() {

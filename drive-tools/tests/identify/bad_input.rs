@@ -2,8 +2,8 @@
 
 use crate::bench::{Bench, IDEAL, REAL, Row, T_S, file};
 use crate::{given, of, refused, value};
-use drive_study::identify::columns::Naming;
-use drive_study::identify::{Complex, Options};
+use drive_tools::identify::columns::Naming;
+use drive_tools::identify::{Complex, Options};
 use std::f64::consts::PI;
 
 /// A record with every row changed.

@@ -4,8 +4,8 @@
 use drive::Pair;
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Identified, Results};
 use drive::control::commissioning::CommissionMode;
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules;
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
 use std::path::{Path, PathBuf};
 
 fn motors() -> PathBuf {
@@ -144,7 +144,7 @@ fn machines_find_their_values() {
 
 #[test]
 #[ignore = "17 machines, free and blocked, with an ideal and a real inverter, a minute: \
-            cargo test -p drive-study --test commissioning -- --ignored --nocapture"]
+            cargo test -p drive-tools --test commissioning -- --ignored --nocapture"]
 fn all_machines_find_their_values() {
     let mut names: Vec<_> = std::fs::read_dir(motors()).unwrap().map(|e| e.unwrap().path()).collect();
     names.sort();

@@ -10,14 +10,14 @@
 
 mod foreign;
 
-use drive_study::csv::Columns;
-use drive_study::identify::columns::{Naming, Signals};
-use drive_study::identify::verdict::Quantity;
-use drive_study::identify::{Identified, Options, identify, machine_file};
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::rules;
-use drive_study::tune::setting::Tuned;
-use drive_study::tune::trial::{self, Task};
+use drive_tools::csv::Columns;
+use drive_tools::identify::columns::{Naming, Signals};
+use drive_tools::identify::verdict::Quantity;
+use drive_tools::identify::{Identified, Options, identify, machine_file};
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
+use drive_tools::tune::setting::Tuned;
+use drive_tools::tune::trial::{self, Task};
 use foreign::{Machine, PLAIN, Part, THOROUGH};
 use std::path::Path;
 
@@ -73,7 +73,7 @@ fn value<'a>(found: &'a Identified, name: &str) -> &'a Quantity {
 }
 
 /// Accepted values, their errors, and how many lie inside their intervals:
-/// `FMU_SEED=3 FMU_RECORDS=300 cargo test --release -p drive-study --test population figures -- --ignored --nocapture`.
+/// `FMU_SEED=3 FMU_RECORDS=300 cargo test --release -p drive-tools --test population figures -- --ignored --nocapture`.
 #[test]
 #[ignore = "two minutes for 300 records"]
 fn figures() {
@@ -145,7 +145,7 @@ fn held(tuned: &Tuned) -> u32 {
 
 /// From a record to a running drive: the machine with its true values runs with the controller that `fmu tune` makes of the
 /// identified ones, and holds as many loads as with the controller made of the true values, less 2 %.
-/// `FMU_RECORDS=40 cargo test --release -p drive-study --test population chain -- --ignored --nocapture`.
+/// `FMU_RECORDS=40 cargo test --release -p drive-tools --test population chain -- --ignored --nocapture`.
 #[test]
 #[ignore = "minutes for 40 machines"]
 fn chain() {

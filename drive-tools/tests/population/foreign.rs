@@ -2,7 +2,7 @@
 //! saturation), a dead time with a tail in 1/i, thresholds of the devices, cogging, Coulomb friction; 12-bit sensors with noise and
 //! offset, an encoder of 4096 steps with an offset and a delay. The population covers 12 V to 700 V and 20 W to 100 kW.
 
-use drive_study::identify::Complex;
+use drive_tools::identify::Complex;
 use std::f64::consts::{PI, TAU};
 
 /// Numbers of a seed (SplitMix64).

@@ -4,7 +4,7 @@ use super::cycle::{Cycle, Energy};
 use super::linear::{self, Cost};
 use super::verify::Verified;
 use super::{Map, short};
-use crate::output::markdown;
+use crate::text_table::markdown;
 use drive::plant::losses::Losses;
 use std::f64::consts::PI;
 

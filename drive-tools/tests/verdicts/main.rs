@@ -10,13 +10,13 @@ use draw::{Dice, machine};
 use drive::PmsmDrive;
 use drive::estimator::Kind;
 use drive::math::wrap;
-use drive_study::tune::limits::{self, Limit};
-use drive_study::tune::motor::MotorFile;
-use drive_study::tune::pace::Begin;
-use drive_study::tune::remedy::What;
-use drive_study::tune::rules;
-use drive_study::tune::setting::{Tuned, Value};
-use drive_study::tune::trial::{self, Task, Trial};
+use drive_tools::tune::limits::{self, Limit};
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::pace::Begin;
+use drive_tools::tune::remedy::What;
+use drive_tools::tune::rules;
+use drive_tools::tune::setting::{Tuned, Value};
+use drive_tools::tune::trial::{self, Task, Trial};
 use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::{E, TAU};
 use std::path::Path;
@@ -250,7 +250,7 @@ fn what_is_told_of_some_machines_is_what_long_runs_show() {
     assert!(compared >= 48, "{compared} cells");
 }
 
-/// `cargo test --release -p drive-study --test verdicts -- --ignored --nocapture`
+/// `cargo test --release -p drive-tools --test verdicts -- --ignored --nocapture`
 #[test]
 #[ignore = "minutes"]
 fn what_is_told_of_forty_machines_is_what_long_runs_show() {

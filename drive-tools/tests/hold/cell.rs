@@ -2,8 +2,8 @@
 
 use drive::Pair;
 use drive::math::wrap;
-use drive_study::tune::pace::{Begin, Pace};
-use drive_study::tune::setting::{Tuned, Value};
+use drive_tools::tune::pace::{Begin, Pace};
+use drive_tools::tune::setting::{Tuned, Value};
 use fmu_core::Warns;
 use std::f64::consts::TAU;
 use std::fmt;

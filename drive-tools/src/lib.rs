@@ -1,0 +1,16 @@
+//! What a user does with a machine.
+//!
+//! - [`tune`]: parameter values for a machine, from its motor file.
+//! - [`map`]: efficiency over speed and torque.
+//! - [`identify`]: a machine's data from a record.
+
+#![forbid(unsafe_code)]
+// The papers' symbols keep their case: J, T_s.
+#![allow(non_snake_case)]
+
+pub mod csv;
+pub mod identify;
+pub mod map;
+pub mod queue;
+pub mod text_table;
+pub mod tune;
