@@ -2,12 +2,12 @@
 //! remaining variables become connectors of the system, named as in `PmsmDrive`. Features that some importers do not
 //! support are optional.
 
-use crate::TOOL;
-use crate::pack::{GenerationTime, PackedFile};
 use crate::ssv;
 use anyhow::{Context, Result};
 use drive_tools::tune::setting::Value;
 use fmu_import::{Fmu, Values as Read};
+use fmu_pack::TOOL;
+use fmu_pack::archive::{GenerationTime, PackedFile};
 use fmu_system::cosimulation::{Settings, System};
 use fmu_system::ssp::ssv::{Parameter, read};
 use fmu_system::ssp::values::{self, Given};

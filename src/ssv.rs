@@ -2,9 +2,9 @@
 //!
 //! Numbers are in the units of the variables (SI), so no unit is named; an enumeration's value is the name of its item.
 
-use crate::TOOL;
 use drive_tools::tune::setting::{Setting, Value};
 use fmu_core::variable::position;
+use fmu_pack::TOOL;
 use fmu_plot::page::escape;
 use std::fmt::Write as _;
 

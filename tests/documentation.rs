@@ -13,9 +13,9 @@ use drive_study::reproduce::experiment::{
     ClosedLoop, Experiment, LOAD_0, LOAD_1000, Record, START, STEP_20, STEP_500, STEP_1000, STEP_1500,
 };
 use drive_study::reproduce::plots;
-use fmu::documentation;
 use fmu_core::{Description, Model};
 use fmu_import::elf::FLOOR;
+use fmu_pack::documentation;
 use fmu_plot::{chart, svg};
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};

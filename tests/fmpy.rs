@@ -96,7 +96,7 @@ fn misuse_of_the_c_interface() {
 fn misuse_under_asan() {
     let libasan = Command::new("gcc").arg("-print-file-name=libasan.so").output().expect("gcc, for its libasan");
     let libasan = fs::canonicalize(String::from_utf8_lossy(&libasan.stdout).trim()).expect("libasan.so of gcc");
-    let (target, triple) = (scratch().join("asan"), fmu::target::host_triple().unwrap());
+    let (target, triple) = (scratch().join("asan"), fmu_pack::target::host_triple().unwrap());
     let (libraries, archives) = (target.join(&triple).join("release"), target.join("fmu"));
     let fmus = ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller"];
     let mut build = Command::new(env!("CARGO"));

@@ -5,10 +5,10 @@ mod common;
 
 use fmu::commands::build::Linux64;
 use fmu::commands::merge::{self, Merge};
-use fmu::pack::{GenerationTime, PackedFile, archive, write};
 use fmu_check as check;
 use fmu_import::platform::Platform;
 use fmu_import::{Fmu, contents, machine};
+use fmu_pack::archive::{GenerationTime, PackedFile, archive, write};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;

@@ -87,7 +87,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     assert!((last - (333.15 - 40.0 * (-4.0_f64).exp())).abs() < 1e-6, "{last}");
 
     // A release: correct checksums, and the crates with their licenses.
-    let host = fmu::target::host_triple().unwrap();
+    let host = fmu_pack::target::host_triple().unwrap();
     succeeds(command("fmu", &folder).args(["build", "--release-dir", "release", "--target", &host]));
     let release = folder.join("release");
     if cfg!(target_os = "linux") {

@@ -4,9 +4,9 @@
 mod common;
 
 use drive::PmsmDrive;
-use fmu::page::own::{Own, PresetRun};
-use fmu::page::{Source, judged, page};
 use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
+use fmu_pack::page::own::{Own, PresetRun};
+use fmu_pack::page::{Source, judged, page};
 use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
@@ -193,9 +193,9 @@ fn a_page_stands_alone_and_knows_the_model() {
 #[test]
 fn a_model_without_co_simulation_has_no_page() {
     let mut of = drive();
-    fmu::page::is_possible(&of).unwrap();
+    fmu_pack::page::is_possible(&of).unwrap();
     of.model_exchange = Description::exported::<Alone>().unwrap().model_exchange;
-    let said = fmu::page::is_possible(&of).unwrap_err().to_string();
+    let said = fmu_pack::page::is_possible(&of).unwrap_err().to_string();
     assert!(said.contains("for Model Exchange only"), "{said}");
 }
 

@@ -4,10 +4,10 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use fmu::commands::build::{self, Build};
-use fmu::target::{ZIG, find};
 use fmu_check as check;
 use fmu_import as importer;
 use fmu_import::platform::Platform;
+use fmu_pack::target::{ZIG, find};
 use model_description::ModelDescription;
 use std::fs;
 use std::path::{Path, PathBuf};

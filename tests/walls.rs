@@ -18,6 +18,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-sweep", &["fmu-import", "fmu-system", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
     ("fmu-plot", &[]),
+    ("fmu-pack", &["fmu-core", "fmu-import", "fmu-plot", "fmu-system", "model-description"]),
     ("drive-base", &["fmu-core"]),
     ("drive-control", &["drive-base", "fmu-core"]),
     ("drive-plant", &["drive-base", "fmu-core"]),
@@ -39,6 +40,7 @@ const ARROWS: &[(&str, &[&str])] = &[
             "fmu-check",
             "fmu-core",
             "fmu-import",
+            "fmu-pack",
             "fmu-plot",
             "fmu-sweep",
             "fmu-system",
@@ -112,6 +114,15 @@ fn the_checker_knows_no_motor_no_plotter_and_no_system() {
     }
 }
 
+#[test]
+fn what_builds_fmus_knows_no_motor_and_no_command_line() {
+    let known = known_to("fmu-pack");
+    assert!(known.contains("fmu-system") && known.contains("resvg"), "{known:?}");
+    for foreign in ["drive", "drive-tools", "drive-study", "fmu-check", "fmu-sweep", "nalgebra", "anyhow", "clap"] {
+        assert!(!known.contains(foreign), "fmu-pack depends on {foreign}");
+    }
+}
+
 /// A thread pool that outlives a call does not survive a fork, and random numbers come from the row.
 #[test]
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
@@ -121,6 +132,22 @@ fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
         ["drive", "drive-tools", "drive-study", "fmu-plot", "resvg", "clap", "indicatif", "rayon", "rayon-core", "rand"]
     {
         assert!(!known.contains(foreign), "fmu-sweep depends on {foreign}");
+    }
+}
+
+/// The release profile saves compile time in the crates of the command alone.
+#[test]
+fn what_an_fmu_links_is_fully_optimized() {
+    let manifest: toml::Table = std::fs::read_to_string(root().join("Cargo.toml")).unwrap().parse().unwrap();
+    let lower = manifest["profile"]["release"]["package"].as_table().unwrap();
+    assert!(lower.contains_key("fmu-check"));
+    let examples = crates().into_iter().filter(|(_, (folder, _))| folder.starts_with(root().join("examples")));
+    let examples: Vec<String> = examples.map(|(name, _)| name).collect();
+    let fmus = ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller", "sensorless-controller-clocked"];
+    for fmu in fmus.into_iter().chain(examples.iter().map(String::as_str)) {
+        let linked = known_to(fmu);
+        let slow: Vec<_> = linked.iter().filter(|name| lower.contains_key(name.as_str())).collect();
+        assert!(slow.is_empty(), "{fmu} links {slow:?}");
     }
 }
 

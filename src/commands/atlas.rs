@@ -1,7 +1,6 @@
 //! `fmu atlas`: at which low speeds a drive with wrong estimates carries its load.
 
 use super::{bar_of_cells, numbers};
-use crate::workspace::output_folder;
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use drive::estimator::Kind;
@@ -9,6 +8,7 @@ use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, report};
 use drive_study::compare::candidate::Entry;
+use fmu_pack::workspace::output_folder;
 use std::num::NonZero;
 use std::path::{Path, PathBuf};
 use std::thread;

@@ -2,20 +2,20 @@
 
 use super::page::{self, Page};
 use super::{preset, tune};
-use crate::compile::{Library, compile, program};
-use crate::icons;
-use crate::licenses::Licenses;
 use crate::message;
-use crate::pack::{self, GenerationTime, PackedFile};
-use crate::target::{Target, Tools, ZIG, has_modules};
-use crate::workspace::{Package, Workspace, output_folder};
-use crate::{reference, release};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_core::Description;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
 use fmu_import::{describe, printable};
+use fmu_pack::archive::{self, GenerationTime, PackedFile};
+use fmu_pack::compile::{Library, compile, program};
+use fmu_pack::icons;
+use fmu_pack::licenses::Licenses;
+use fmu_pack::target::{Target, Tools, ZIG, has_modules};
+use fmu_pack::workspace::{Package, Workspace, output_folder};
+use fmu_pack::{reference, release};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;
@@ -189,11 +189,11 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
             let folder = if version == FmiVersion::V2 { "fmi2" } else { "fmi3" };
             let path = out.join(folder).join(format!("{name}.fmu"));
             let mut files =
-                pack::contents(&model.description, &model.binaries, &model.licenses, version, moment, linux64)?;
+                archive::contents(&model.description, &model.binaries, &model.licenses, version, moment, linux64)?;
             files.extend(icons::files(&model.description, version)?);
             files.extend(model.resources.clone());
             files.extend(reference.clone());
-            pack::write(&path, &pack::archive(&files, moment)?)?;
+            archive::write(&path, &archive::archive(&files, moment)?)?;
             written.push(path);
         }
     }
@@ -205,9 +205,9 @@ fn reference(model: &Model, version: FmiVersion, moment: GenerationTime) -> Resu
     let Model { description, stimuli, .. } = model;
     let dir = tempfile::tempdir()?;
     let archive = dir.path().join("reference.fmu");
-    let mut files = pack::contents(description, &model.own, &model.licenses, version, moment, Platform::host())?;
+    let mut files = archive::contents(description, &model.own, &model.licenses, version, moment, Platform::host())?;
     files.extend(model.resources.clone());
-    pack::write(&archive, &pack::archive(&files, moment)?)?;
+    archive::write(&archive, &archive::archive(&files, moment)?)?;
     let parameters = tune::example_for(description)?;
     let parameters = parameters.as_ref().map(|(name, text)| (name.as_str(), text.as_str()));
     reference::files(&archive, description, stimuli, parameters).or_else(|why| {
@@ -454,7 +454,7 @@ fn load(
 ) -> Result<Model> {
     let folder =
         resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
-    let files = folder.as_deref().map_or_else(|| Ok(BTreeMap::new()), pack::resources)?;
+    let files = folder.as_deref().map_or_else(|| Ok(BTreeMap::new()), archive::resources)?;
     let description = describe(own, folder.as_deref())?;
     let read = |(platform, path): &(Platform, PathBuf)| anyhow::Ok((*platform, read(path)?));
     let binaries = libraries.iter().map(read).collect::<Result<_>>()?;

@@ -1,12 +1,12 @@
 //! `fmu compare`: every estimator through every scenario.
 
 use super::bar_of_cells;
-use crate::workspace::output_folder;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive_study::compare::candidate::Entry;
 use drive_study::compare::scenario::{self, Effort, SCENARIOS};
 use drive_study::compare::{self, Run, Selection, table};
+use fmu_pack::workspace::output_folder;
 use std::path::PathBuf;
 
 /// Runs every estimator through start-up, load steps, wrong parameters and more, and compares the figures.

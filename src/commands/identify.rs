@@ -1,6 +1,5 @@
 //! The command `fmu identify`: a machine's data from a record.
 
-use crate::{pack, release};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use drive_tools::identify::columns::{Naming, Signals};
@@ -8,6 +7,7 @@ use drive_tools::identify::electrical::Fit;
 use drive_tools::identify::run::commissioned;
 use drive_tools::identify::verdict::Quantity;
 use drive_tools::identify::{self, Identified, Options, machine_file, page};
+use fmu_pack::{archive, release};
 use std::path::PathBuf;
 
 /// Identifies a machine from a record of its running drive: resistance, inductances, magnet flux, inertia, friction.
@@ -139,10 +139,10 @@ impl Written {
                 "--out {}: expected a file name with .toml",
                 out.display()
             );
-            pack::write(out, self.machine.as_bytes())?;
+            archive::write(out, self.machine.as_bytes())?;
         }
         if let (Some(html), Some(page)) = (&args.html, &self.page) {
-            pack::write(html, page.as_bytes())?;
+            archive::write(html, page.as_bytes())?;
         }
         if args.json {
             println!("{:#}", self.json);

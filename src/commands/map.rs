@@ -1,14 +1,14 @@
 //! `fmu map`: the efficiency map of a machine.
 
 use super::numbers;
-use crate::pack;
-use crate::workspace::output_folder;
 use anyhow::{Context, Result, bail};
 use clap::Args;
 use drive_tools::map::cycle::{CYCLE, Cycle, VEHICLE};
 use drive_tools::map::request::{self, Request};
 use drive_tools::map::{self, report};
 use drive_tools::tune::motor::MotorFile;
+use fmu_pack::archive;
+use fmu_pack::workspace::output_folder;
 use std::path::PathBuf;
 
 /// Computes the efficiency map and the envelope of a machine with the values of `fmu tune`.
@@ -94,7 +94,7 @@ pub fn run(args: &Map) -> Result<()> {
     let files = map::files(&map, &report)?;
     let out = args.out.clone().map_or_else(|| output_folder("map"), Ok)?;
     for (name, bytes) in &files {
-        pack::write(&out.join(name), bytes)?;
+        archive::write(&out.join(name), bytes)?;
     }
     println!("{}\n{}\n\n{}", map.name, map.source, report.text());
     for (name, _) in &files {

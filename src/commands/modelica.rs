@@ -1,9 +1,9 @@
 //! `fmu modelica`: a Modelica package around an FMU.
 
 use crate::modelica::{self, Wrapping};
-use crate::pack;
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use fmu_pack::archive;
 use std::path::PathBuf;
 
 /// Writes a Modelica package around a drive's FMU: a flange, ports for DC link and heat, a dialog.
@@ -57,7 +57,7 @@ pub fn run(args: &Modelica) -> Result<String> {
     }
     let (package, files) = modelica::files(&args.file, &options)?;
     for (name, bytes) in &files {
-        pack::write(&args.out.join(name), bytes).with_context(|| format!("--out {out}"))?;
+        archive::write(&args.out.join(name), bytes).with_context(|| format!("--out {out}"))?;
     }
     let next = if files.contains_key("import.mos") {
         format!("omc import.mos in {out} imports the FMU and runs an example\n")

@@ -1,9 +1,9 @@
 //! `fmu new`: a project for a new FMU.
 
-use crate::pack::GenerationTime;
 use crate::vendor;
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use fmu_pack::archive::GenerationTime;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;

@@ -2,12 +2,13 @@
 
 mod motor;
 
-use crate::preset::{NewExperiment, PresetFmu};
+use crate::message;
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use clap::Args;
 use drive_tools::tune::{self, setting::Tuned};
 use fmu_import::printable;
 use fmu_import::written::assignment;
+use fmu_pack::preset::{NewExperiment, PresetFmu};
 use fmu_system::cosimulation::Schedule;
 use fmu_system::ssp::ssv;
 use std::path::{Path, PathBuf};
@@ -85,7 +86,7 @@ pub fn run(args: &Preset) -> Result<String> {
         let (name, value) = known.ok_or_else(|| anyhow!("{text}: is not --set NAME=VALUE"))?;
         preset.set(name.trim(), value.trim(), None).with_context(|| format!("--set {text}"))?;
     }
-    let changes = preset.write(args.name.as_deref(), given.or(of_motor).as_ref(), &out)?;
+    let changes = written(preset, args.name.as_deref(), given.or(of_motor).as_ref(), &out)?;
     let lines = changes.iter().map(|line| format!("  {}\n", printable(line)));
     Ok(lines.chain([format!("{}\n", out.display())]).collect())
 }
@@ -97,7 +98,14 @@ pub fn run(args: &Preset) -> Result<String> {
 pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
     let mut preset = PresetFmu::open(file)?;
     let course = motor::set(&mut preset, tuned)?;
-    preset.write(None, Some(&course), out).map(drop)
+    written(preset, None, Some(&course), out).map(drop)
+}
+
+/// Writes the FMU and shows what it cannot do; returns its changes.
+fn written(preset: PresetFmu, name: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Vec<String>> {
+    let written = preset.write(name, course, out)?;
+    written.notes.iter().for_each(|note| message::note(&printable(note)));
+    Ok(written.changes)
 }
 
 /// The default experiment with the inputs of a file.

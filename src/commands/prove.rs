@@ -1,15 +1,15 @@
 //! `fmu prove`: the folders of examples required by the FMI tools page, and the importers that replayed them.
 
 use super::build::{self, Build};
-use crate::TOOL;
 use crate::message;
-use crate::pack;
-use crate::reference::{self, FOLDER};
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use fmu_core::Experiment;
 use fmu_import::platform::Platform;
 use fmu_import::printable;
+use fmu_pack::TOOL;
+use fmu_pack::archive;
+use fmu_pack::reference::{self, FOLDER};
 use fmu_system::cosimulation::{Recording, Sequence};
 use model_description::{BaseType, Causality, FmiVersion, Interface, ModelDescription, ModelVariable};
 use serde::Deserialize;
@@ -77,7 +77,7 @@ pub fn run(args: &Prove) -> Result<(Vec<PathBuf>, bool)> {
     for file in &files {
         let (example, md) = example(file, &args.folder)?;
         let (text, replayed) = proof(&example, &md, &args.python)?;
-        pack::write(&example.folder.join("Readme.txt"), text.as_bytes())?;
+        archive::write(&example.folder.join("Readme.txt"), text.as_bytes())?;
         folders.push(example.folder);
         good &= replayed;
     }
@@ -98,7 +98,7 @@ fn example(archive: &Path, folder: &Path) -> Result<(Example, ModelDescription)>
     }
     for file in [format!("{name}_ref.csv"), format!("{name}_in.csv")] {
         if let Some(bytes) = files.get(&format!("{FOLDER}{file}")) {
-            pack::write(&folder.join(file), bytes)?;
+            archive::write(&folder.join(file), bytes)?;
         }
     }
     let of = &md.default_experiment;
@@ -112,8 +112,8 @@ fn example(archive: &Path, folder: &Path) -> Result<(Example, ModelDescription)>
         "StartTime, {start:?}\nStopTime, {stop:?}\nStepSize, {step:?}\nRelTol, 1e-6\nSolverType, FixedStep\n\
          OutputIntervalLength, {interval:?}\n"
     );
-    pack::write(&folder.join(format!("{name}_ref.opt")), options.as_bytes())?;
-    pack::write(&folder.join(format!("{name}.fmu")), &fs::read(archive)?)?;
+    archive::write(&folder.join(format!("{name}_ref.opt")), options.as_bytes())?;
+    archive::write(&folder.join(format!("{name}.fmu")), &fs::read(archive)?)?;
     Ok((Example { folder, name, experiment }, md))
 }
 

@@ -1,9 +1,9 @@
 //! `fmu reproduce`: the paper's experiments through the packed FMUs.
 
 use super::build::{self, Build};
-use crate::workspace::Workspace;
 use anyhow::Result;
 use clap::Args;
+use fmu_pack::workspace::Workspace;
 use std::path::PathBuf;
 
 /// Builds the FMUs, runs the paper's experiments through them in both standards and compares the figures.

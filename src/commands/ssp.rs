@@ -1,12 +1,12 @@
 //! `fmu ssp`: the closed loop of plant and controller as one file.
 
 use super::build::{self, Build};
-use crate::pack::{self, GenerationTime};
 use crate::ssp::{self, COMPONENTS, ComponentValues, Options};
 use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use drive_tools::tune;
+use fmu_pack::archive::{self, GenerationTime};
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 
@@ -86,7 +86,7 @@ pub fn run(args: &Ssp) -> Result<()> {
     };
     let options = Options { gates: args.gates, geometry: args.geometry, names: args.names };
     let files = ssp::files(&folder, &values, options, moment)?;
-    pack::write(&args.out, &pack::archive(&files, moment)?)?;
+    archive::write(&args.out, &archive::archive(&files, moment)?)?;
     println!("{}", args.out.display());
     Ok(())
 }

@@ -1,8 +1,7 @@
 //! The command `fmu tune`: parameter values of the FMUs for a motor.
 
 use super::preset;
-use crate::workspace::output_folder;
-use crate::{pack, ssv};
+use crate::ssv;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
@@ -11,6 +10,8 @@ use drive_tools::tune::setting::{Setting, Tuned, Value};
 use drive_tools::tune::trial::{self, Trial};
 use drive_tools::tune::{self, limits, remedy, rules};
 use fmu_core::{Description, Model};
+use fmu_pack::archive;
+use fmu_pack::workspace::output_folder;
 use std::path::{Path, PathBuf};
 
 /// Computes parameter values of PmsmPlant, SensorlessController and PmsmDrive from motor data.
@@ -190,7 +191,7 @@ pub(super) fn place(description: &Description) -> Result<Option<usize>> {
 fn write(tuned: &Tuned, folder: &Path, integers: bool) -> Result<Vec<PathBuf>> {
     let write = |(model, text): (&str, String)| {
         let path = folder.join(format!("{}.{model}.ssv", tuned.name));
-        pack::write(&path, text.as_bytes())?;
+        archive::write(&path, text.as_bytes())?;
         Ok(path)
     };
     texts(tuned, integers)?.into_iter().map(write).collect()

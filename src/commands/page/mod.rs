@@ -3,19 +3,19 @@
 mod site;
 
 use super::build::choose;
-use crate::compile::{compile, module};
-use crate::licenses::Licenses;
-use crate::page::{self, FILE, Source};
-use crate::preset::PresetFmu;
-use crate::reference::STIMULI;
-use crate::target::{Tools, has_modules};
-use crate::workspace::{Package, Workspace};
-use crate::{Failed, message, pack};
+use crate::{Failed, message};
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use fmu_core::Description;
 use fmu_core::description::VariableKind;
 use fmu_import::describe;
+use fmu_pack::compile::{compile, module};
+use fmu_pack::licenses::Licenses;
+use fmu_pack::page::{self, FILE, Source};
+use fmu_pack::preset::PresetFmu;
+use fmu_pack::reference::STIMULI;
+use fmu_pack::target::{Tools, has_modules};
+use fmu_pack::workspace::{Package, Workspace};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -130,7 +130,7 @@ fn write(workspace: &Workspace, model: &Model, module: &[u8], out: &Path) -> Res
         licenses: &Licenses::of_package(workspace, &model.package).text(&model.description),
     };
     let html = page::page(&source).with_context(|| model.description.model_name().to_owned())?;
-    pack::write(out, html.as_bytes())
+    Ok(fmu_pack::archive::write(out, html.as_bytes())?)
 }
 
 /// The `page.toml` of a model, checked against it.

@@ -5,11 +5,11 @@ use crate::commands::atlas::{self, Atlas};
 use crate::commands::build::{self, Build};
 use crate::commands::compare::{self, Compare};
 use crate::commands::preset;
-use crate::compile::module;
-use crate::workspace::Workspace;
-use crate::{message, pack};
+use crate::message;
 use anyhow::{Context, Result, bail};
 use drive_tools::tune;
+use fmu_pack::compile::module;
+use fmu_pack::workspace::Workspace;
 use fmu_plot::page::{escape, page};
 use std::fmt::Write as _;
 use std::fs;
@@ -61,7 +61,7 @@ pub(super) fn run(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     } else {
         &name
     };
-    pack::write(&first, page(title, &body).as_bytes())?;
+    fmu_pack::archive::write(&first, page(title, &body).as_bytes())?;
     no_dead_link(out)?;
     Ok(first)
 }
@@ -78,7 +78,7 @@ fn document(file: &Path, model: &Model, out: &Path) -> Result<Link> {
     let (_, files) = fmu_import::contents(file)?;
     let name = model.description.model_name();
     for (path, bytes) in files.iter().filter_map(|(path, bytes)| Some((path.strip_prefix("documentation/")?, bytes))) {
-        pack::write(&out.join(name).join(path), bytes)?;
+        fmu_pack::archive::write(&out.join(name).join(path), bytes)?;
     }
     Ok((format!("{name}/index.html"), name.into(), "equations, how to connect it, all variables".into()))
 }

@@ -2,13 +2,13 @@
 
 use crate::commands::tune::place;
 use crate::message;
-use crate::preset::{NewExperiment, PresetFmu};
 use anyhow::{Result, bail};
 use drive_tools::tune::{
     joined,
     setting::{Setting, Tuned, Value},
 };
 use fmu_core::Description;
+use fmu_pack::preset::{NewExperiment, PresetFmu};
 
 /// Sets the values of the machine, even those that equal the model's start values, because the FMU may be a preset for another
 /// machine. A note lists the values of that machine that remain. Returns the default experiment.

@@ -1,8 +1,8 @@
 //! The output of a run: its files, and the last lines that the command prints.
 
 use super::{Simulate, curves, overview};
-use crate::{pack, picture};
 use anyhow::{Context, Result};
+use fmu_pack::{archive, picture};
 use fmu_plot::{page, svg};
 use fmu_system::cosimulation::Recording;
 use std::io::{self, BufWriter, Write};
@@ -36,7 +36,7 @@ pub(super) fn write(
         Some(path) => {
             let mut bytes = Vec::new();
             recording.write_csv(&mut bytes)?;
-            pack::write(path, &bytes)?;
+            archive::write(path, &bytes)?;
             lines.push(format!("recording: {}", path.display()));
         }
         None => {}
@@ -45,9 +45,9 @@ pub(super) fn write(
         let svg = svg::draw(plotted)?;
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
             let png = picture::with_text(&svg).with_context(|| path.display().to_string())?;
-            pack::write(path, &png)?;
+            archive::write(path, &png)?;
         } else {
-            pack::write(path, svg.as_bytes())?;
+            archive::write(path, svg.as_bytes())?;
         }
         lines.push(format!("plot: {}", path.display()));
     }
@@ -60,7 +60,7 @@ pub(super) fn write(
             .as_ref()
             .map(|name| format!("<p>{} asked to end the simulation.</p>\n", page::escape(name)));
         let body = format!("{}{figure}", ended.unwrap_or_default());
-        pack::write(path, page::page(&names.join(", "), &body).as_bytes())?;
+        archive::write(path, page::page(&names.join(", "), &body).as_bytes())?;
         lines.push(format!("page: {}\n{}", path.display(), how_to_open(&std::path::absolute(path)?)));
     }
     if let Some(name) = &recording.ended_by {

@@ -1,9 +1,9 @@
 //! Checksums and bill of materials of a release.
 
 use crate::TOOL;
-use crate::pack::{self, GenerationTime};
+use crate::archive::{self, GenerationTime};
+use crate::error::{Context, Result};
 use crate::workspace::{Package, Workspace};
-use anyhow::{Context, Result};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
@@ -30,7 +30,7 @@ pub fn finish(
 ) -> Result<[PathBuf; 2]> {
     let materials = folder.join(MATERIALS);
     let text = serde_json::to_string_pretty(&bill(workspace, packages, moment))? + "\n";
-    pack::write(&materials, text.as_bytes())?;
+    archive::write(&materials, text.as_bytes())?;
     let mut sums = BTreeMap::new();
     for file in written.iter().chain([&materials]) {
         let bytes = fs::read(file).with_context(|| file.display().to_string())?;
@@ -43,7 +43,7 @@ pub fn finish(
         let _ = writeln!(text, "{hash}  {name}");
     }
     let sums = folder.join(SUMS);
-    pack::write(&sums, text.as_bytes())?;
+    archive::write(&sums, text.as_bytes())?;
     Ok([sums, materials])
 }
 

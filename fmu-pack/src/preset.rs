@@ -2,16 +2,15 @@
 //! matching description.
 
 use crate::TOOL;
+use crate::archive::{self, GenerationTime, PackedFile};
 use crate::documentation;
-use crate::message;
-use crate::pack::{self, GenerationTime, PackedFile};
+use crate::error::{Context, Error, Result, ensure, invalid};
 use crate::reference::{self, FOLDER};
-use anyhow::{Context, Result, anyhow, bail, ensure};
 use fmu_core::description::{Value, Variable, VariableKind};
 use fmu_core::preset::{self, FILE};
 use fmu_core::variable::{Causality, position};
 use fmu_core::{Bytes, Description};
-use fmu_import::{Fmu, Kind, Unpacked, Values, describe, printable, suggest};
+use fmu_import::{Fmu, Kind, Unpacked, Values, describe, suggest};
 use model_description::{FmiVersion, Generation, ModelDescription};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -29,6 +28,14 @@ pub struct NewExperiment {
     pub stop: f64,
     /// Communication step, if it differs from that of the archive.
     pub step: Option<f64>,
+}
+
+/// What was written.
+pub struct Written {
+    /// A line for every start value that differs from the model's.
+    pub changes: Vec<String>,
+    /// What the new FMU cannot do, although it is written.
+    pub notes: Vec<String>,
 }
 
 /// An FMU, and its new start values.
@@ -63,7 +70,7 @@ impl PresetFmu {
         }
         let name = file.display();
         let own = describe(&unpacked.library, Some(&unpacked.resources())).map_err(|e| {
-            anyhow!("{name}: {}: a preset is for FMUs of this program (fmu build)", cause(&e.to_string(), &unpacked))
+            invalid!("{name}: {}: a preset is for FMUs of this program (fmu build)", cause(&e.to_string(), &unpacked))
         })?;
         let suffix = preset::suffix_of(&md.token, &own.token).with_context(|| {
             format!("{name}: {DESCRIPTION} and binary are of different builds: build the FMU again")
@@ -76,7 +83,7 @@ impl PresetFmu {
             let old =
                 old.with_context(|| format!("{name}: resources/{FILE} is missing, or not that of {DESCRIPTION}"))?;
             for preset::PresetValue { name, value, .. } in
-                preset::read(&old).map_err(|e| anyhow!("{}: {e}", file.display()))?
+                preset::read(&old).map_err(|e| invalid!("{}: {e}", file.display()))?
             {
                 let (variable, element) =
                     find(&own, &reader, &name).with_context(|| format!("{name} in resources/{FILE}"))?;
@@ -136,7 +143,7 @@ impl PresetFmu {
         let model = &self.own.name;
         let Some((variable, element)) = find(&self.own, &self.reader, name) else {
             let names = self.own.variables.iter().filter(|v| v.takes_start()).map(|v| v.name.as_str());
-            bail!("{model} has no variable {name}{}", suggest(name, names));
+            return Err(invalid!("{model} has no variable {name}{}", suggest(name, names)));
         };
         if !variable.takes_start() {
             let what = match variable.causality {
@@ -145,14 +152,16 @@ impl PresetFmu {
                 Causality::StructuralParameter => "a structural parameter, which sizes arrays",
                 _ => "a local variable",
             };
-            bail!("{name} is {what}: a preset has start values of inputs and parameters, and of exact variables");
+            return Err(invalid!(
+                "{name} is {what}: a preset has start values of inputs and parameters, and of exact variables"
+            ));
         }
         let read = self.reader.variable(&variable.name).context(variable.name.clone())?;
         let own_unit = read.unit.as_deref().unwrap_or("1");
         if let Some(unit) = unit.filter(|unit| *unit != own_unit) {
-            bail!("{name} is given in {unit}, but {model} has it in {own_unit}: convert the value");
+            return Err(invalid!("{name} is given in {unit}, but {model} has it in {own_unit}: convert the value"));
         }
-        let elements = texts(&Values::read(text, read, &self.reader).map_err(anyhow::Error::msg)?, variable);
+        let elements = texts(&Values::read(text, read, &self.reader).map_err(Error::Invalid)?, variable);
         let places: Vec<usize> = element.map_or_else(|| (0..variable.elements()).collect(), |one| vec![one]);
         ensure!(elements.len() == places.len(), "{name} has {} elements, not {}", places.len(), elements.len());
         for (place, text) in places.into_iter().zip(elements) {
@@ -163,13 +172,12 @@ impl PresetFmu {
     }
 
     /// Writes the FMU with these start values to `out`; nothing is written unless all are allowed. `title` is the name that
-    /// users see; by default, name and experiment are those of the archive. Returns a line for every start value that differs
-    /// from the model's.
+    /// users see; by default, name and experiment are those of the archive.
     ///
     /// # Errors
     /// The binary does not support presets; a value is not allowed, or the FMU refuses them together; the file cannot be
     /// written.
-    pub fn write(self, title: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Vec<String>> {
+    pub fn write(self, title: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Written> {
         let moment = GenerationTime::of_environment()?;
         let mut description = self.described(title)?;
         self.take_experiment(&mut description, course);
@@ -187,12 +195,17 @@ impl PresetFmu {
         let documentation = documentation::preset::preset(&description, &self.own);
         put(PAGE, documentation::page(&Description { documentation, ..description.clone() }, version));
         let dir = tempfile::tempdir()?;
-        let archive = dir.path().join("preset.fmu");
-        pack::write(&archive, &pack::archive(&files, moment)?)?;
-        self.starts(&archive)?;
-        files.extend(self.reference(&archive, &description, course, dir.path())?);
-        pack::write(out, &pack::archive(&files, moment)?)?;
-        Ok(changes)
+        let first = dir.path().join("preset.fmu");
+        archive::write(&first, &archive::archive(&files, moment)?)?;
+        let mut notes: Vec<String> = self.starts(&first)?.into_iter().collect();
+        match self.reference(&first, &description, course, dir.path()) {
+            Ok(more) => files.extend(more),
+            Err(why) => {
+                notes.push(format!("{}: the archive gets no reference result: {}", self.file.display(), why.whole()));
+            }
+        }
+        archive::write(out, &archive::archive(&files, moment)?)?;
+        Ok(Written { changes, notes })
     }
 
     /// The file of the preset.
@@ -205,7 +218,7 @@ impl PresetFmu {
         let (name, text) = (self.file.display(), self.text());
         fs::write(self.unpacked.resources().join(FILE), &text)?;
         let described = describe(&self.unpacked.library, Some(&self.unpacked.resources()));
-        let mut description = described.map_err(|e| anyhow!("{name}: {}", cause(&e.to_string(), &self.unpacked)))?;
+        let mut description = described.map_err(|e| invalid!("{name}: {}", cause(&e.to_string(), &self.unpacked)))?;
         let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
         ensure!(
             description.token == token,
@@ -213,12 +226,12 @@ impl PresetFmu {
         );
         let title = title.unwrap_or(&self.md.model_name);
         description.title = (title != description.name).then(|| title.to_owned());
-        model_description::fits(&description, self.md.version).map_err(|e| anyhow!("{name}: {e}"))?;
+        model_description::fits(&description, self.md.version).map_err(|e| invalid!("{name}: {e}"))?;
         Ok(description)
     }
 
-    /// Requires that the FMU initializes with the preset if it does so without.
-    fn starts(&self, archive: &Path) -> Result<()> {
+    /// Requires that the FMU initializes with the preset if it does so without; for Model Exchange, a note says that it does not.
+    fn starts(&self, archive: &Path) -> Result<Option<String>> {
         let (fmu, name) = (Fmu::open(archive)?, self.file.display());
         for (kind, what) in [(Kind::default(), "Co-Simulation"), (Kind::ModelExchange, "Model Exchange")] {
             let steps = kind == Kind::default();
@@ -229,9 +242,9 @@ impl PresetFmu {
             }
             let why = format!("{name}: the FMU does not initialize for {what} with these start values: {why}");
             ensure!(!steps, "{why}");
-            message::note(&printable(&why));
+            return Ok(Some(why));
         }
-        Ok(())
+        Ok(None)
     }
 
     /// The reference files of a new run.
@@ -247,11 +260,7 @@ impl PresetFmu {
         if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(self.stimuli()) {
             fs::write(&stimuli, bytes)?;
         }
-        reference::files(archive, description, &stimuli, None).or_else(|why| {
-            let name = self.file.display();
-            message::note(&printable(&format!("{name}: the archive gets no reference result: {why:#}")));
-            Ok(BTreeMap::new())
-        })
+        reference::files(archive, description, &stimuli, None)
     }
 }
 

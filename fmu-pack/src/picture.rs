@@ -1,6 +1,6 @@
 //! Renders pictures as PNG; their only source is SVG.
 
-use anyhow::{Result, anyhow, bail};
+use crate::error::{Result, ensure, invalid};
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
 
@@ -13,9 +13,7 @@ const LARGEST: f32 = 8192.0;
 /// It is not an SVG document, is too large, or contains text.
 pub fn without_text(svg: &str) -> Result<Vec<u8>> {
     // Without fonts, the renderer silently omits text.
-    if svg.contains("<text") {
-        bail!("has <text>, which looks different with other fonts: draw paths instead");
-    }
+    ensure!(!svg.contains("<text"), "has <text>, which looks different with other fonts: draw paths instead");
     draw(svg, &Options::default(), 1.0)
 }
 
@@ -32,25 +30,24 @@ pub fn with_text(svg: &str) -> Result<Vec<u8>> {
         name.contains("Sans").then(|| name.clone())
     });
     let any = || options.fontdb.faces().find_map(|face| Some(face.families.first()?.0.clone()));
-    let Some(family) = family.or_else(any) else {
-        bail!("this system has no font for the text of the picture: write an .svg");
-    };
+    let none = || invalid!("this system has no font for the text of the picture: write an .svg");
+    let family = family.or_else(any).ok_or_else(none)?;
     options.fontdb_mut().set_sans_serif_family(family);
     draw(svg, &options, 2.0)
 }
 
 fn draw(svg: &str, options: &Options<'_>, scale: f32) -> Result<Vec<u8>> {
-    let tree = Tree::from_str(svg, options).map_err(|e| anyhow!("is not an SVG document: {e}"))?;
+    let tree = Tree::from_str(svg, options).map_err(|e| invalid!("is not an SVG document: {e}"))?;
     let size = tree.size();
     let pixels = |x: f32| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and at most LARGEST")]
         (x * scale <= LARGEST).then_some((x * scale).ceil() as u32)
     };
-    let too_large = || anyhow!("is {} x {} pixels; at most {} each", size.width(), size.height(), LARGEST / scale);
+    let too_large = || invalid!("is {} x {} pixels; at most {} each", size.width(), size.height(), LARGEST / scale);
     let (width, height) = pixels(size.width()).zip(pixels(size.height())).ok_or_else(too_large)?;
-    let mut map = Pixmap::new(width, height).ok_or_else(|| anyhow!("has no size"))?;
+    let mut map = Pixmap::new(width, height).ok_or_else(|| invalid!("has no size"))?;
     resvg::render(&tree, Transform::from_scale(scale, scale), &mut map.as_mut());
-    Ok(map.encode_png()?)
+    map.encode_png().map_err(|e| invalid!("{e}"))
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 use crate::TOOL;
 use crate::documentation;
+use crate::error::{Context, Result, ensure, invalid};
 use crate::licenses::Licenses;
-use anyhow::{Context, Result, anyhow, ensure};
 use fmu_core::Description;
 use fmu_import::machine;
 use fmu_import::platform::Platform;
@@ -135,7 +135,7 @@ pub fn libraries_of(
         let bytes = match &images[..] {
             [(_, bytes)] => bytes.to_vec(),
             all => machine::universal(&all.iter().map(|(_, bytes)| *bytes).collect::<Vec<_>>())
-                .map_err(|why| anyhow!("{path}: one of the libraries for macOS {why}"))?,
+                .map_err(|why| invalid!("{path}: one of the libraries for macOS {why}"))?,
         };
         Ok((path, bytes))
     };

@@ -2,7 +2,7 @@
 
 pub mod own;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use crate::error::{Context, Error, Result, ensure, invalid};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use flate2::{Compression, GzBuilder};
@@ -139,7 +139,7 @@ pub fn judged(of: &Description, own: Option<(&Path, &str)>) -> Result<Judged> {
     let file = own.map_or(Path::new(FILE), |(path, _)| path).display();
     let parsed = own.map_or(Ok(Own::default()), |(_, text)| Own::read(text));
     let judged = parsed.and_then(|own| own.judge(of, &reader));
-    judged.map_err(|cause| anyhow!("{file}: {cause}"))
+    judged.map_err(|cause| invalid!("{file}: {cause}"))
 }
 
 /// The page's description of the model.
@@ -293,7 +293,7 @@ fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<Preset
         compare: false,
     };
     let Some(path) = stimuli.filter(|path| path.is_file()) else { return Ok(run) };
-    let fed = Schedule::read_csv(path).map_err(anyhow::Error::msg)?;
+    let fed = Schedule::read_csv(path).map_err(Error::Invalid)?;
     for (name, schedule) in fed {
         let v = of.variable(&name).with_context(|| format!("{}: there is no input {name}", path.display()))?;
         let of_kind = |x: f64| if matches!(v.kind, VariableKind::Boolean) { json!(x != 0.0) } else { json!(x) };

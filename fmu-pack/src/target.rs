@@ -1,6 +1,6 @@
 //! The Rust targets of FMUs, and a check that this machine can build for them.
 
-use anyhow::{Context, Result, anyhow, bail};
+use crate::error::{Context, Result, invalid};
 use fmu_import::platform::Platform;
 use std::env;
 use std::path::{Path, PathBuf};
@@ -67,7 +67,7 @@ impl Tools {
     /// rustc does not support the target, FMI has no platform for it, or its standard library or a linker is missing; the error
     /// explains how to install it.
     pub fn target(&self, triple: &str) -> Result<Target> {
-        let wrong = |cause: String| anyhow!("--target {triple}: {cause}");
+        let wrong = |cause: String| invalid!("--target {triple}: {cause}");
         let mut rustc = rustc();
         rustc.args(["--print", "cfg", "--print", "target-libdir", "--target", triple]);
         let output = rustc.stdin(Stdio::null()).output().context("rustc cannot be run")?;
@@ -129,7 +129,7 @@ pub fn has_modules() -> Result<()> {
     let mut rustc = rustc();
     rustc.args(["--print", "target-libdir", "--target", MODULE]);
     let output = rustc.stdin(Stdio::null()).output().context("rustc cannot be run")?;
-    has_std(&String::from_utf8_lossy(&output.stdout), MODULE).map_err(|cause| anyhow!("{MODULE}: {cause}"))
+    has_std(&String::from_utf8_lossy(&output.stdout), MODULE).map_err(|cause| invalid!("{MODULE}: {cause}"))
 }
 
 /// The compiler.
@@ -149,10 +149,8 @@ pub fn cargo() -> Command {
 pub fn host_triple() -> Result<String> {
     let output = rustc().arg("-vV").output().context("rustc cannot be run")?;
     let text = String::from_utf8_lossy(&output.stdout).into_owned();
-    let Some(host) = text.lines().find_map(|line| line.strip_prefix("host: ")) else {
-        bail!("rustc -vV does not name the host")
-    };
-    Ok(host.to_owned())
+    let host = text.lines().find_map(|line| line.strip_prefix("host: "));
+    host.map(str::to_owned).context("rustc -vV does not name the host")
 }
 
 /// Whether cargo-zigbuild is installed and finds zig.

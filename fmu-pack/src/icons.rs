@@ -3,9 +3,9 @@
 //! A terminal of a layered standard, a map or a network, comes with the manifest of that standard. A picture is written once, as SVG; its PNG is drawn here,
 //! in the size stated by the SVG.
 
-use crate::pack::PackedFile;
+use crate::archive::PackedFile;
+use crate::error::{Context, Result};
 use crate::picture;
-use anyhow::{Context, Result};
 use fmu_core::Description;
 use fmu_core::terminal::MatchingRule;
 use model_description::{FmiVersion, write_terminals};

@@ -5,8 +5,8 @@
 //! The CSV files follow the rules for the examples that the FMI tools page lists: names in quotes, time first, at most ten
 //! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
-use crate::pack::PackedFile;
-use anyhow::{Context, Result, bail};
+use crate::archive::PackedFile;
+use crate::error::{Context, Error, Result, ensure};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
 use fmu_import::csv;
@@ -44,7 +44,7 @@ pub fn files(
     parameters: Option<(&str, &str)>,
 ) -> Result<BTreeMap<String, PackedFile>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
-    let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(anyhow::Error::msg)? } else { Vec::new() };
+    let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(Error::Invalid)? } else { Vec::new() };
     let system = system(archive, &fed).with_context(|| stimuli.display().to_string())?;
     let inputs: Vec<Feed> = fed.iter().map(|(input, texts)| Feed::of(&system, input, texts)).collect::<Result<_>>()?;
     let inputs = held(&inputs, experiment);
@@ -134,9 +134,7 @@ fn system(archive: &Path, fed: &[(String, Sequence)]) -> Result<System> {
 
 fn simulate(mut system: System, experiment: &Experiment) -> Result<Recording> {
     let Experiment { start, stop, step, .. } = *experiment;
-    if (stop - start) / step > MOST_STEPS {
-        bail!("the default experiment has more than {MOST_STEPS:e} steps");
-    }
+    ensure!((stop - start) / step <= MOST_STEPS, "the default experiment has more than {MOST_STEPS:e} steps");
     let settings = Settings { start, stop, step, sequential: false };
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
 }
@@ -152,7 +150,7 @@ enum Feed {
 impl Feed {
     fn of(system: &System, input: &str, texts: &Sequence) -> Result<Self> {
         let real = system.is_real(&format!("fmu.{input}"))?;
-        Ok(if real { Self::Lines(texts.lines().map_err(anyhow::Error::msg)?) } else { Self::Held(texts.clone()) })
+        Ok(if real { Self::Lines(texts.lines().map_err(Error::Invalid)?) } else { Self::Held(texts.clone()) })
     }
 
     /// The cell at time `t` (s).

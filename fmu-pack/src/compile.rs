@@ -1,8 +1,8 @@
 //! Compiling the libraries of a workspace, for this machine or another.
 
+use crate::error::{Context, Error, Result};
 use crate::target::{BUILD_STD, Linker, MODULE, Target, cargo, rustc};
 use crate::workspace::Workspace;
-use anyhow::{Context, Result};
 use fmu_import::elf::FLOOR;
 use fmu_import::platform::Platform;
 use serde::Deserialize;
@@ -87,7 +87,7 @@ pub fn program(workspace: &Workspace, package: &str, name: &str, target: &Target
     let program = build.get_program().to_string_lossy().into_owned();
     let status = build.stdin(Stdio::null()).stdout(Stdio::null()).status();
     if !status.with_context(|| format!("{program} cannot be run"))?.success() {
-        return Err(crate::Failed(format!("building {name} failed")).into());
+        return Err(Error::Failed(format!("building {name} failed")));
     }
     // `build` puts it below the target's name if one was given.
     let below = if target.linker == Linker::Zig { target.triple.as_str() } else { "" };
@@ -165,7 +165,7 @@ fn artifacts(
     let output = output.with_context(|| format!("{program} cannot be run"))?;
     if !output.status.success() {
         let what = format!("building for {triple} failed ({})", output.status);
-        return Err(crate::Failed(what).into());
+        return Err(Error::Failed(what));
     }
     let mut libraries = Vec::new();
     for line in String::from_utf8_lossy(&output.stdout).lines() {

@@ -1,7 +1,7 @@
 //! The Cargo workspace around the current folder, and its packages.
 
+use crate::error::{Context, Result, invalid};
 use crate::target::{cargo, host_triple};
-use anyhow::{Context, Result, bail};
 use serde::Deserialize;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
@@ -119,10 +119,10 @@ impl Workspace {
     pub fn find() -> Result<Self> {
         let here = std::env::current_dir().context("the current folder")?;
         if !has_manifest(&here) {
-            bail!(
+            return Err(invalid!(
                 "no Cargo package here: expected a Cargo.toml in {} or above it; change to the folder of a package, or create one with fmu new my-model",
                 here.display()
-            );
+            ));
         }
         let mut metadata = cargo();
         metadata.args(["metadata", "--format-version", "1", "--filter-platform", &host_triple()?]);
@@ -130,7 +130,7 @@ impl Workspace {
         if !output.status.success() {
             let message = String::from_utf8_lossy(&output.stderr);
             let message = message.split_whitespace().collect::<Vec<_>>().join(" ");
-            bail!("cargo metadata: {}", message.trim_start_matches("error: "));
+            return Err(invalid!("cargo metadata: {}", message.trim_start_matches("error: ")));
         }
         let metadata: Metadata = serde_json::from_slice(&output.stdout).context("cargo metadata")?;
         let normal = |d: Dependency| d.dep_kinds.iter().any(|k| k.kind.is_none()).then_some(d.pkg);

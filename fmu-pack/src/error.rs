@@ -1,0 +1,97 @@
+//! Why an FMU or a part of it is not made.
+
+use std::error::Error as Cause;
+
+/// Why an FMU or a part of it is not made. [`source`](Cause::source) is the cause where the text does not have it.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// A compiler fails; it has printed the reason.
+    #[error("{0}")]
+    Failed(String),
+    /// Something does not fit: names it, its value, and what is allowed.
+    #[error("{0}")]
+    Invalid(String),
+    /// A file or a program cannot be used: names it.
+    #[error("{what}")]
+    Of {
+        /// What was used or attempted.
+        what: String,
+        /// Why it failed.
+        source: Box<dyn Cause + Send + Sync>,
+    },
+    /// A system call fails.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// An FMU cannot be read, or fails.
+    #[error(transparent)]
+    Fmu(#[from] fmu_import::Error),
+    /// A description cannot be read.
+    #[error(transparent)]
+    Description(#[from] model_description::Error),
+    /// JSON cannot be written.
+    #[error(transparent)]
+    Json(#[from] serde_json::Error),
+    /// An archive cannot be written.
+    #[error(transparent)]
+    Zip(#[from] zip::result::ZipError),
+}
+
+impl Error {
+    /// The error of an FMU that this one wraps.
+    pub fn of_fmu(&self) -> Option<&fmu_import::Error> {
+        if let Self::Fmu(error) = self { Some(error) } else { None }
+    }
+
+    /// The text with all causes, separated by colons.
+    pub(crate) fn whole(&self) -> String {
+        let (mut text, mut next) = (self.to_string(), self.source());
+        while let Some(cause) = next {
+            text = format!("{text}: {cause}");
+            next = cause.source();
+        }
+        text
+    }
+}
+
+/// The result of this crate's functions.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Names what was used when an error occurred, or what is missing.
+pub(crate) trait Context<T> {
+    fn with_context<W: Into<String>>(self, what: impl FnOnce() -> W) -> Result<T>;
+
+    fn context(self, what: impl Into<String>) -> Result<T>
+    where
+        Self: Sized,
+    {
+        self.with_context(|| what)
+    }
+}
+
+impl<T, E: Into<Box<dyn Cause + Send + Sync>>> Context<T> for Result<T, E> {
+    fn with_context<W: Into<String>>(self, what: impl FnOnce() -> W) -> Result<T> {
+        self.map_err(|source| Error::Of { what: what().into(), source: source.into() })
+    }
+}
+
+impl<T> Context<T> for Option<T> {
+    fn with_context<W: Into<String>>(self, what: impl FnOnce() -> W) -> Result<T> {
+        self.ok_or_else(|| Error::Invalid(what().into()))
+    }
+}
+
+/// The error that something does not fit.
+macro_rules! invalid {
+    ($($text:tt)*) => { $crate::error::Error::Invalid(format!($($text)*)) };
+}
+
+/// Returns the error that something does not fit unless the condition is true.
+macro_rules! ensure {
+    ($condition:expr, $($text:tt)*) => {
+        if !$condition {
+            return Err($crate::error::invalid!($($text)*));
+        }
+    };
+}
+
+pub(crate) use {ensure, invalid};

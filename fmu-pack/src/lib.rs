@@ -1,0 +1,30 @@
+//! From Rust packages to `.fmu` files.
+//!
+//! - [`workspace`], [`target`], [`compile`]: Cargo's packages, this machine's tools, and the libraries and modules built with them.
+//! - [`documentation`], [`icons`], [`picture`], [`licenses`], [`mod@reference`]: what an archive has besides its binaries and its
+//!   description.
+//! - [`archive`]: all files of an FMU, and a writer that gives equal bytes for equal files; [`merge`]: one archive from several;
+//!   [`release`]: checksums and bill of materials.
+//! - [`preset`]: an FMU with other start values, from its archive; [`page`]: a page that runs an FMU in a browser.
+
+#![forbid(unsafe_code)]
+
+pub mod archive;
+pub mod compile;
+pub mod documentation;
+mod error;
+pub mod icons;
+pub mod licenses;
+pub mod merge;
+pub mod page;
+pub mod picture;
+pub mod preset;
+pub mod reference;
+pub mod release;
+pub mod target;
+pub mod workspace;
+
+pub use error::{Error, Result};
+
+/// The name of the tool in `generationTool`.
+pub const TOOL: &str = concat!("fmu ", env!("CARGO_PKG_VERSION"));
