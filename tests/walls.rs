@@ -143,7 +143,8 @@ fn what_an_fmu_links_is_fully_optimized() {
     assert!(lower.contains_key("fmu-check"));
     let examples = crates().into_iter().filter(|(_, (folder, _))| folder.starts_with(root().join("examples")));
     let examples: Vec<String> = examples.map(|(name, _)| name).collect();
-    let fmus = ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller", "sensorless-controller-clocked"];
+    let fmus =
+        ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller", "sensorless-controller-clocked"];
     for fmu in fmus.into_iter().chain(examples.iter().map(String::as_str)) {
         let linked = known_to(fmu);
         let slow: Vec<_> = linked.iter().filter(|name| lower.contains_key(name.as_str())).collect();

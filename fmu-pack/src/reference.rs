@@ -6,7 +6,7 @@
 //! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
 use crate::archive::PackedFile;
-use crate::error::{Context, Error, Result, ensure};
+use crate::error::{Context, Error, Result, invalid};
 use fmu_core::{Description, Experiment};
 use fmu_import::Fmu;
 use fmu_import::csv;
@@ -134,7 +134,9 @@ fn system(archive: &Path, fed: &[(String, Sequence)]) -> Result<System> {
 
 fn simulate(mut system: System, experiment: &Experiment) -> Result<Recording> {
     let Experiment { start, stop, step, .. } = *experiment;
-    ensure!((stop - start) / step <= MOST_STEPS, "the default experiment has more than {MOST_STEPS:e} steps");
+    if (stop - start) / step > MOST_STEPS {
+        return Err(invalid!("the default experiment has more than {MOST_STEPS:e} steps"));
+    }
     let settings = Settings { start, stop, step, sequential: false };
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
 }
