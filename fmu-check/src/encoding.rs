@@ -47,6 +47,17 @@ pub(super) fn quoted(text: &str) -> String {
     format!("{text:?}")
 }
 
+/// A text of the FMU in quotes, or NULL.
+#[expect(clippy::ref_option, reason = "callers have a field of this type")]
+pub(super) fn or_null(text: &Option<String>) -> String {
+    text.as_deref().map_or_else(|| "NULL".into(), quoted)
+}
+
+/// The value of an attribute in quotes.
+pub(super) fn attribute(text: Option<&str>) -> String {
+    text.map_or_else(|| "(missing)".into(), quoted)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

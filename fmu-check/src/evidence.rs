@@ -6,6 +6,7 @@ use crate::level::Level;
 use crate::lines::Line;
 use crate::session::{BEGUN, FOUND};
 use fmu_import::guard::End;
+use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::Read;
 use std::path::Path;
@@ -91,10 +92,11 @@ pub(super) fn printed(folder: &Path) -> Vec<String> {
 /// Unwanted console output and files of the process.
 pub(super) fn side_effects(folder: &Path, working_directory: &Path) -> Vec<String> {
     let console = console(folder);
-    let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l}")).collect();
+    let mut findings: Vec<_> = console.lines().take(5).map(|l| format!("wrote to the console: {l:?}")).collect();
     let files = fs::read_dir(working_directory).into_iter().flatten().flatten().take(5);
-    findings
-        .extend(files.map(|f| format!("created a file in the working directory: {}", f.file_name().to_string_lossy())));
+    findings.extend(
+        files.map(|f| format!("created a file in the working directory: {:?}", f.file_name().to_string_lossy())),
+    );
     findings
 }
 
@@ -130,7 +132,10 @@ pub(super) fn conclude(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)
     let lower = violated.iter().map(|(lower, ..)| *lower).min().flatten();
     let decisive = violated.iter().filter(|(of, ..)| *of == lower);
     let confidence = decisive.map(|(_, confidence, _)| *confidence).min().unwrap_or(Confidence::Certain);
-    let violated: Vec<_> = violated.into_iter().map(|(.., text)| text).collect();
+    // A message that a run repeats is one finding.
+    let mut seen = HashSet::new();
+    let violated: Vec<_> =
+        violated.into_iter().map(|(.., text)| text).filter(|text| seen.insert(text.clone())).collect();
     let verdict = match (violated.is_empty(), not_determined, not_applicable) {
         (false, ..) => Verdict::Violated(violated),
         (_, Some(why), _) => Verdict::NotDetermined(why),

@@ -48,6 +48,31 @@ impl Session {
         values.into_iter().zip(of).filter_map(|(x, steady)| steady.then_some(x)).collect()
     }
 
+    /// Names of the values of these variables.
+    pub(super) fn element_names<'v>(&self, variables: impl IntoIterator<Item = &'v ModelVariable>) -> Vec<String> {
+        let of = |v: &ModelVariable| match self.elements(v) {
+            1 => vec![v.name.clone()],
+            n => (1..=n).map(|k| format!("element {k} of {}", v.name)).collect(),
+        };
+        variables.into_iter().flat_map(of).collect()
+    }
+
+    /// Names of the values that can be compared: those that [`steady`](Self::steady) keeps.
+    pub(super) fn names_of(&self, variables: &[&ModelVariable]) -> Vec<String> {
+        self.element_names(variables.iter().copied().filter(|v| self.is_steady(v)))
+    }
+
+    /// Names of the values of a row of [`Importer::trajectory`].
+    pub(super) fn names_of_rows(&self) -> Vec<String> {
+        let outputs: Vec<_> = self.watched().into_iter().filter(|v| v.base == BaseType::Float64).collect();
+        [self.names_of(&self.description.states()), self.names_of(&outputs)].concat()
+    }
+
+    /// Names of the event indicators.
+    pub(super) fn names_of_indicators(&self) -> Vec<String> {
+        (1..=self.indicators()).map(|k| format!("event indicator {k}")).collect()
+    }
+
     /// The variables that are the derivatives of the continuous states.
     pub(super) fn derivative_variables(&self) -> Vec<&ModelVariable> {
         self.description.derivatives.iter().filter_map(|u| self.description.referenced(u.reference)).collect()
@@ -74,10 +99,17 @@ impl Session {
     }
 }
 
+/// A continuous state, by its number, that an update changes.
+pub(super) struct Jump {
+    pub(super) state: usize,
+    pub(super) from: f64,
+    pub(super) to: f64,
+}
+
 /// What an event did.
 pub(super) struct Event {
-    /// The results of each update, and whether it changed a state.
-    pub(super) updates: Vec<(UpdateResults, bool)>,
+    /// The results of each update, and the first state that it changed.
+    pub(super) updates: Vec<(UpdateResults, Option<Jump>)>,
 }
 
 impl Event {
@@ -98,7 +130,7 @@ impl Event {
 
     /// A state changed.
     pub(super) fn jumped(&self) -> bool {
-        self.updates.iter().any(|(u, changed)| *changed || u.states_changed != 0)
+        self.updates.iter().any(|(u, jump)| jump.is_some() || u.states_changed != 0)
     }
 }
 
@@ -117,9 +149,14 @@ impl Instance<'_> {
             let (status, updated) = self.update()?;
             self.must("UpdateDiscreteStates", status)?;
             let after = self.states()?;
-            let changed = before.iter().zip(&after).any(|(a, b)| (a - b).abs() > 0.0 || a.is_nan() != b.is_nan());
+            let changed = |k: &usize| {
+                let (a, b) = (before[*k], after[*k]);
+                (a - b).abs() > 0.0 || a.is_nan() != b.is_nan()
+            };
+            let jump =
+                (0..before.len()).find(changed).map(|state| Jump { state, from: before[state], to: after[state] });
             before = after;
-            event.updates.push((updated, changed));
+            event.updates.push((updated, jump));
             if updated.again == 0 || updated.terminate != 0 {
                 break;
             }
@@ -159,6 +196,11 @@ impl Instance<'_> {
     /// The continuous states.
     pub(super) fn states(&self) -> Result<Vec<f64>, NotDetermined> {
         self.read(Vector::GetContinuousStates, self.session.states())
+    }
+
+    /// The nominals of the continuous states.
+    pub(super) fn nominals(&self) -> Result<Vec<f64>, NotDetermined> {
+        self.read(Vector::GetNominalsOfContinuousStates, self.session.states())
     }
 
     /// The function that returns the derivatives of the states.
@@ -207,7 +249,7 @@ impl Instance<'_> {
         seed: &[f64],
     ) -> Result<(Status, Vec<f64>), NotDetermined> {
         let adjoint = name == Sensitivity::GetAdjointDerivative;
-        let mut result = vec![f64::NAN; self.session.values_of(if adjoint { knowns } else { unknowns })];
+        let mut result = vec![UNTOUCHED; self.session.values_of(if adjoint { knowns } else { unknowns })];
         let n = result.len();
         let arguments = SensitivityArguments {
             unknowns: (Some(unknowns), unknowns.len()),
@@ -216,6 +258,11 @@ impl Instance<'_> {
         };
         let call = format!("{}(unknowns {unknowns:?}, knowns {knowns:?}, seed {seed:?})", name.as_str());
         let status = self.call(&call, |raw| raw.sensitivity(name, self.handle, arguments, Some(&mut result), n))?;
+        // What the array was filled with is no value of the FMU.
+        if status.is_ok() && result.iter().any(|x| x.to_bits() == UNTOUCHED.to_bits()) {
+            self.session.violated(format!("{call} returned OK and did not write all of the {n} values"));
+            return Err(NotDetermined(format!("{} did not write all values", name.as_str())));
+        }
         Ok((status, result))
     }
 
@@ -411,10 +458,29 @@ pub(super) fn differ(a: &[f64], b: &[f64]) -> bool {
     deviation(&[a.to_vec()], &[b.to_vec()]).is_some()
 }
 
-/// Where two trajectories differ by more than rounding: the step, from 1, and the relative difference.
-pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> {
+/// Where two trajectories differ by more than rounding.
+pub(super) struct Deviation {
+    /// The first such step, from 1.
+    pub(super) step: usize,
+    /// The largest difference in this step, relative to the largest value of the run.
+    pub(super) largest: f64,
+    /// The number of the value in its row, the one expected, and the one found; `None` if one trajectory is longer.
+    values: Option<(usize, f64, f64)>,
+}
+
+impl Deviation {
+    /// The value, with its name: `x is 2.0, expected 1.0`.
+    pub(super) fn text(&self, names: &[String]) -> String {
+        let Some((column, expected, found)) = self.values else { return "only one of the two runs goes on".into() };
+        let name = names.get(column).map_or("a value", String::as_str);
+        format!("{name} is {found:?}, expected {expected:?}")
+    }
+}
+
+/// Where two trajectories differ by more than rounding.
+pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<Deviation> {
     if a.len() != b.len() {
-        return Some((a.len().min(b.len()) + 1, f64::INFINITY));
+        return Some(Deviation { step: a.len().min(b.len()) + 1, largest: f64::INFINITY, values: None });
     }
     let columns = a.first().map_or(0, Vec::len);
     let scale: Vec<f64> = (0..columns).map(|i| a.iter().map(|row| row[i].abs()).fold(0.0, f64::max)).collect();
@@ -423,11 +489,13 @@ pub(super) fn deviation(a: &[Vec<f64>], b: &[Vec<f64>]) -> Option<(usize, f64)> 
             if x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) {
                 0.0
             } else {
-                (x - y).abs() / scale.max(MIN_SCALE)
+                let difference = (x - y).abs() / scale.max(MIN_SCALE);
+                if difference.is_nan() { f64::INFINITY } else { difference }
             }
         });
-        let largest = differences.fold(0.0, |a: f64, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });
-        (largest > 1e-9).then_some((k + 1, largest))
+        let (column, largest) = differences.enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let values = Some((column, x[column], y[column]));
+        (largest > 1e-9).then_some(Deviation { step: k + 1, largest, values })
     })
 }
 
@@ -473,13 +541,15 @@ mod tests {
     #[test]
     fn rounding_is_no_deviation() {
         let rows = |last: f64| [vec![1.0, 0.0], vec![2.0, last]];
-        assert_eq!(deviation(&rows(5.0), &rows(5.0)), None);
-        assert_eq!(deviation(&rows(5.0), &rows(5.0 + 4e-9)), None, "below 1e-9 of the largest value");
-        let (step, largest) = deviation(&rows(5.0), &rows(5.0 + 1e-8)).unwrap();
+        assert!(deviation(&rows(5.0), &rows(5.0)).is_none());
+        assert!(deviation(&rows(5.0), &rows(5.0 + 4e-9)).is_none(), "below 1e-9 of the largest value");
+        let found = deviation(&rows(5.0), &rows(5.0 + 1e-8)).unwrap();
+        let Deviation { step, largest, .. } = found;
+        assert_eq!(found.text(&["t".into(), "x".into()]), "x is 5.00000001, expected 5.0");
         assert!(step == 2 && (largest - 2e-9).abs() < 1e-12, "{step} {largest}");
-        assert_eq!(deviation(&rows(5.0), &rows(f64::NAN)), Some((2, f64::INFINITY)));
-        assert_eq!(deviation(&rows(f64::NAN), &rows(f64::NAN)), None);
-        assert_eq!(deviation(&rows(0.0), &rows(-8.7e-18)), None, "noise about 0");
-        assert_eq!(deviation(&rows(5.0), &rows(5.0)[..1]), Some((2, f64::INFINITY)));
+        assert!(deviation(&rows(5.0), &rows(f64::NAN)).is_some_and(|d| d.step == 2 && d.largest.is_infinite()));
+        assert!(deviation(&rows(f64::NAN), &rows(f64::NAN)).is_none());
+        assert!(deviation(&rows(0.0), &rows(-8.7e-18)).is_none(), "noise about 0");
+        assert!(deviation(&rows(5.0), &rows(5.0)[..1]).is_some_and(|d| d.step == 2 && d.largest.is_infinite()));
     }
 }

@@ -71,7 +71,7 @@ impl Session {
     }
 
     /// Name of the function that makes instances for this interface.
-    fn function_for(&self, interface: Interface) -> &'static str {
+    pub(super) fn function_for(&self, interface: Interface) -> &'static str {
         match (self.description.version, interface) {
             (FmiVersion::V3, Interface::ModelExchange) => "fmi3InstantiateModelExchange",
             (FmiVersion::V3, Interface::ScheduledExecution) => "fmi3InstantiateScheduledExecution",
@@ -156,7 +156,8 @@ impl Instance<'_> {
     pub(super) fn enter(&self) -> Result<(), NotDetermined> {
         let (start, stop) = (self.start.get(), self.stop.get());
         let name = if self.session.is_v2() { "SetupExperiment" } else { "EnterInitializationMode" };
-        let status = self.call(&format!("{name}(startTime={start}, stopTime={stop:?})"), |raw| {
+        let end = stop.map_or_else(|| "undefined".into(), |stop| format!("{stop:?}"));
+        let status = self.call(&format!("{name}(startTime={start}, stopTime={end})"), |raw| {
             raw.experiment(self.handle, None, start, stop)
         })?;
         self.must(name, status)?;
@@ -247,11 +248,10 @@ impl Instance<'_> {
         let n = self.session.elements(v);
         let version = self.session.description.version;
         let mut buffer = Buffer::room(v.base, version, n);
-        let untouched = buffer.clone();
         let status = self.call(&format!("Get({})", v.name), |raw| {
             raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
         })?;
-        let not_written = status.is_ok() && n > 0 && buffer == untouched;
+        let not_written = status.is_ok() && buffer.is_unwritten();
         self.session.unwritten.set(self.session.unwritten.get() || not_written);
         if !self.session.silent.get() && status.is_ok() {
             let value = if not_written { "not written".into() } else { show(v, version, &buffer.bits()) };

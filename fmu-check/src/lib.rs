@@ -28,6 +28,7 @@ pub mod report;
 mod runner;
 mod scripts;
 mod session;
+mod settable;
 mod state;
 mod states;
 mod subjects;

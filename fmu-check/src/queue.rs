@@ -75,14 +75,18 @@ struct FirstRuns {
     found: Vec<(&'static str, Conclusion)>,
     /// The FMU has no co-simulation: checks that make no steps are for Model Exchange.
     exchange_alone: bool,
+    /// The checks that run with instances for Scheduled Execution.
+    scheduled: Vec<&'static str>,
     /// Why no probe of co-simulation and of Model Exchange can run.
     obstacles: [Option<Verdict>; 2],
 }
 
 impl FirstRuns {
     fn new(runner: &Result<Runner, String>, probes: &[&Check]) -> Self {
-        let mut first = Self { found: Vec::new(), exchange_alone: false, obstacles: [None, None] };
+        let mut first =
+            Self { found: Vec::new(), exchange_alone: false, scheduled: Vec::new(), obstacles: [None, None] };
         let Ok(runner) = runner else { return first };
+        first.scheduled = probes.iter().filter(|check| runner.is_scheduled(check)).map(|check| check.id).collect();
         first.exchange_alone = runner.simulation.is_none();
         let needed = [("L00", false), ("E00", true)];
         let needed = needed.iter().filter(|(_, exchange)| probes.iter().any(|c| first.by_exchange(c) == *exchange));
@@ -131,10 +135,10 @@ impl FirstRuns {
 
     /// Why a check cannot run.
     fn obstacle(&self, check: &Check) -> Option<&Verdict> {
-        match check.run {
-            Run::Scheduled(_) => None,
-            _ => self.obstacles[usize::from(self.by_exchange(check))].as_ref(),
+        if self.scheduled.contains(&check.id) {
+            return None;
         }
+        self.obstacles[usize::from(self.by_exchange(check))].as_ref()
     }
 }
 

@@ -8,7 +8,7 @@ use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::evidence::{calls, conclude, is_after_free, is_of_second, panic, printed, read, script, side_effects};
 use crate::fmu_file::FmuFile;
-use crate::lines::Line;
+use crate::lines::{Line, PROBE_FOLDER};
 use crate::probe::NOT_WRITTEN;
 use crate::watch::{Pace, Watch};
 use fmu_import::guard::{self, Allowance, End, Guarded};
@@ -27,6 +27,8 @@ const TIMEOUT: Duration = Duration::from_secs(10);
 pub(super) const PLAIN_RUNS: &str = "T10";
 /// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
+/// Checks that only make an instance: also for Scheduled Execution alone.
+const INSTANCE_ALONE: [&str; 5] = ["X04", "L01a", "G-L2a", "G-L2b", "G-L3c"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
 pub(super) const OUT_OF_TIME: &str = "the run reached its time limit (see --timeout)";
@@ -138,6 +140,13 @@ impl Runner {
         let _ = self.wild.set((20 * run).clamp(minimum, self.timeout));
     }
 
+    /// Whether a check runs with instances for Scheduled Execution, of which there is no minimal run.
+    pub(super) fn is_scheduled(&self, check: &Check) -> bool {
+        let alone = self.simulation.is_none() && self.exchange.is_none();
+        matches!(check.run, Run::Scheduled(_))
+            || (alone && INSTANCE_ALONE.iter().chain(&WITHOUT_INSTANCE).any(|id| *id == check.id))
+    }
+
     /// The time limit of a call of a check.
     fn limit(&self, id: &str) -> Duration {
         let wild = self.wild.get().filter(|_| WILD.contains(&id));
@@ -155,6 +164,7 @@ impl Runner {
         };
         let any = || self.exchange.as_ref().or(self.scheduled.as_ref());
         let other = || match check.run {
+            Run::Any(_) if INSTANCE_ALONE.contains(&check.id) => any(),
             Run::Any(_) | Run::Silent(_) => self.exchange.as_ref(),
             _ => any().filter(|_| WITHOUT_INSTANCE.contains(&check.id)),
         };
@@ -203,7 +213,7 @@ impl Runner {
     }
 
     fn try_attempt(&self, check: &Check, conditions: &Conditions) -> io::Result<Conclusion> {
-        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        let folder = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
         let (mut crashes, mut slow) = (Vec::new(), None);
@@ -293,7 +303,7 @@ impl Runner {
             let first = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == first && c.id != check.id);
             let _ = first.map(|first| self.run(first));
         }
-        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        let folder = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir()?;
         fs::create_dir(folder.path().join("home"))?;
         let out = folder.path().join("out");
         let conditions = Conditions { dir: self.dir.clone(), binary: binary.into(), allowance: self.allowance };
@@ -401,7 +411,7 @@ impl Runner {
 
     /// All calls of a check up to its first finding, one by one, from one more run of it.
     fn full(&self, check: &Check, conditions: &Conditions) -> io::Result<Vec<String>> {
-        let folder = tempfile::Builder::new().prefix("fmu-probe-").tempdir()?;
+        let folder = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir()?;
         fs::create_dir(folder.path().join("home"))?;
         let console = File::create(folder.path().join("console"))?;
         let mut command = self.command(check, conditions, folder.path(), 0)?;

@@ -6,6 +6,7 @@
 use crate::confidence::Confidence;
 use crate::level::Level;
 use crate::lines::{Line, ProbeArguments};
+use crate::settable::aliases;
 use fmu_import::platform::Platform;
 use fmu_import::raw::{Arguments, Interface, Raw};
 use fmu_import::{file_uri, machine, printable_lines};
@@ -34,6 +35,8 @@ pub(super) enum NotOpened {
 pub(super) struct Session {
     pub(super) raw: Raw,
     pub(super) description: ModelDescription,
+    /// Which variables are further names of a value.
+    pub(super) aliases: Vec<bool>,
     /// Path of the binary.
     pub(super) binary: PathBuf,
     /// Folder that the FMU was unpacked to.
@@ -134,6 +137,7 @@ impl Session {
     ) -> Self {
         Self {
             raw,
+            aliases: aliases(&description),
             description,
             binary,
             dir,
@@ -396,9 +400,10 @@ impl Session {
             name: Some(text(name)),
             token: Some(text(&self.description.token)),
             resources: Some(text(&resources)),
-            interface: match self.description.co_simulation {
-                Some(_) => Interface::CoSimulation,
-                None => Interface::ModelExchange,
+            interface: match (&self.description.co_simulation, &self.description.model_exchange) {
+                (Some(_), _) => Interface::CoSimulation,
+                (None, None) => Interface::ScheduledExecution,
+                (None, _) => Interface::ModelExchange,
             },
             logger: true,
             callbacks: true,

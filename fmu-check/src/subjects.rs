@@ -2,15 +2,13 @@
 
 use crate::encoding::bits;
 use crate::session::Session;
-use model_description::{BaseType, Causality, Initial, ModelVariable, Variability};
+use model_description::{BaseType, Causality, ModelVariable};
 
 impl Session {
-    /// Variables whose values are numbers, which all probes can compare.
+    /// Variables whose values are numbers, which all probes can compare; of several names of one value, the first.
     pub(super) fn numeric(&self) -> impl Iterator<Item = &ModelVariable> {
-        self.description
-            .variables
-            .iter()
-            .filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
+        let all = self.description.variables.iter().zip(&self.aliases).filter(|(_, alias)| !**alias).map(|(v, _)| v);
+        all.filter(|v| !matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock))
     }
 
     /// Whether two plain runs agree in this variable, so that it can be compared.
@@ -67,16 +65,4 @@ impl Session {
         let value = [start + 1.0, start - 1.0].into_iter().find(|x| (min..=max).contains(x) && *x >= 0.0)?;
         Some(vec![bits(v.base, value); n])
     }
-}
-
-/// Whether a variable can be set before initialization mode ends.
-pub(super) fn settable(v: &ModelVariable) -> bool {
-    v.variability != Variability::Constant
-        && v.causality != Causality::Independent
-        && v.clocks.is_empty()
-        && match v.causality {
-            Causality::Input | Causality::Parameter => true,
-            Causality::StructuralParameter | Causality::CalculatedParameter => false,
-            _ => v.initial_or_default() == Some(Initial::Exact),
-        }
 }

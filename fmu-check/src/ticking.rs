@@ -3,7 +3,7 @@
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Simple};
+use fmu_import::raw::{Arguments, Simple, flag_text, number_text};
 use model_description::IntervalVariability::{Changing, Constant, Countdown, Fixed, Triggered, Tunable};
 use model_description::{BaseType, Causality, ClockTiming, IntervalVariability, ModelVariable};
 
@@ -39,7 +39,7 @@ impl Instance<'_> {
     pub(super) fn clock(&self, v: &ModelVariable) -> Result<(Status, u8), NotDetermined> {
         let call = format!("GetClock({})", v.name);
         let (status, active) = self.call_for(&call, |raw| raw.clock(self.handle, v.value_reference))?;
-        self.session.record_value(&active.to_string());
+        self.session.record_value(&flag_text(active.into()));
         Ok((status, active))
     }
 
@@ -52,7 +52,7 @@ impl Instance<'_> {
     pub(super) fn interval(&self, v: &ModelVariable) -> Result<(Status, (f64, i32)), NotDetermined> {
         let call = format!("GetIntervalDecimal({})", v.name);
         let (status, answer) = self.call_for(&call, |raw| raw.interval(self.handle, v.value_reference))?;
-        self.session.record_value(&format!("{} s, qualifier {}", answer.0, answer.1));
+        self.session.record_value(&format!("{} s, qualifier {}", number_text(answer.0), flag_text(answer.1)));
         Ok((status, answer))
     }
 
@@ -60,7 +60,7 @@ impl Instance<'_> {
     pub(super) fn shift(&self, v: &ModelVariable) -> Result<(Status, f64), NotDetermined> {
         let call = format!("GetShiftDecimal({})", v.name);
         let (status, shift) = self.call_for(&call, |raw| raw.shift(self.handle, v.value_reference))?;
-        self.session.record_value(&shift.to_string());
+        self.session.record_value(&number_text(shift));
         Ok((status, shift))
     }
 

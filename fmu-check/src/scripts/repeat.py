@@ -104,7 +104,7 @@ class Instance:
             return fmu.doStep(float(known[1]), float(known[2]), bool(known[3]))
         if function in ("SetupExperiment", "EnterInitializationMode"):
             start = re.search(r"startTime=([^,)]+)", arguments)
-            stop = re.search(r"stopTime=Some\((.*?)\)", arguments)
+            stop = re.search(r"stopTime=([-+.\deE]+)", arguments)
             times = {"startTime": float(start[1]), "stopTime": float(stop[1]) if stop else None} if start else {}
             return (fmu.setupExperiment if function == "SetupExperiment" else fmu.enterInitializationMode)(**times)
         if function == "SetTime":

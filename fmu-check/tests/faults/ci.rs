@@ -1,14 +1,12 @@
 //! Features for the CI of another exporter: known findings, formats, explanations, several files, time limits, calls.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::binary::{compile, pack};
 use crate::zip::{Entry, write};
-use crate::{check, check_within};
+use crate::{check, compile, pack};
 use fmu_check::Level;
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 /// Status, output and errors of the command.
 fn fmu_check(arguments: &[&str]) -> (Option<i32>, String, String) {
@@ -199,22 +197,6 @@ fn a_common_reason_has_one_line() {
     assert!(text.contains("\nNot determined, "), "{text}");
 }
 
-/// A hang of one case is enough: the others of the probe are not waited for.
-#[test]
-fn a_second_hang_is_not_waited_for() {
-    let dir = tempfile::tempdir().unwrap();
-    let Some(binary) = compile(2, "T02b") else { return };
-    // Two of five cases hang.
-    let path = pack(dir.path(), 2, "hang", &binary);
-    let began = Instant::now();
-    let report = check_within(&path, &["T02b"], 20);
-    assert_eq!(report.fatal(), ["T02b"]);
-    // One call has 1 s, because the arguments are wild; a busy machine may double that, and more.
-    assert!(began.elapsed() < Duration::from_secs(18), "{:?}", began.elapsed());
-    let printed = format!("{:?}", report.finding("T02b").unwrap().verdict);
-    assert_eq!(printed.matches("did not return").count(), 1, "{printed}");
-}
-
 #[test]
 fn the_whole_run_has_a_limit() {
     let dir = tempfile::tempdir().unwrap();
@@ -244,8 +226,8 @@ fn calls_are_told_and_repeated() {
         assert!(parts.iter().all(|part| text.contains(part)), "{faults}: {text}");
     };
     replay("G15", "G15", &["fmi2Get(gain) -> OK, 2.0", "fmi2Get(n) -> OK, not written"]);
-    replay("L06t", "L06", &["[2] fmi2Reset -> OK", "bias differs: 0.0 and 0.02, 2.0e-2 apart"]);
-    replay("L06e", "L06", &["n differs: 1 and 4"]);
+    replay("L06t", "L06", &["[2] fmi2Reset -> OK", "bias differs: 0.02, expected 0.0"]);
+    replay("L06e", "L06", &["n differs: 4, expected 1"]);
     // A crash shows the call without a result.
     let binary = compile(2, "L08n").unwrap();
     let path = pack(dir.path(), 2, "crash", &binary);

@@ -86,8 +86,23 @@ static int say(Fmu *f, int status, const char *text) {
     if (FAULT(G_L1b)) category = "other";
     if (FAULT(G_L4)) environment = NULL;
     if (FAULT(G_L3b)) text = "something\n";
+    if (FAULT(G_L3u)) text = "y is %g";
+    if (FAULT(G_L3x)) text = "y is \1";
+    /* The name of the instance is part of a format. */
+    char named[200], formatted[200];
+    snprintf(named, sizeof named, "%s: %s", f->name, text);
+    if (FAULT(G_L3n)) {
+        snprintf(formatted, sizeof formatted, named, 12);
+        text = formatted;
+    }
 #ifndef FMI3
-    if (FAULT(G_L3f) && f->data.steps) return c->logger(environment, f->name, status, category, "100%s of it"), status;
+    if (FAULT(G_L3f) && f->data.steps) {
+        /* As a compiler passes it that calls through the register of the argument that is missing. */
+        return c->logger(environment, f->name, status, category, "100%s of it", c->logger), status;
+    }
+    if (FAULT(G_L3p)) return c->logger(environment, f->name, status, category, "100% done", 7), status;
+    if (FAULT(G_L3y)) return c->logger(environment, f->name, status, category, "100%yes"), status;
+    if (FAULT(G_L3i)) return c->logger(environment, f->name, status, category, named, 12), status;
 #endif
 #ifdef FMI3
     ((void (*)(void *, int, const char *, const char *))c->logger)(environment, status, category, text);

@@ -1,8 +1,7 @@
 //! A limit of the checker and the state of this computer are no fault of the FMU.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::binary::{compile, pack};
-use crate::{check, listed, verdict, violated};
+use crate::{check, compile, listed, pack, verdict, violated};
 use fmu_check::{Options, Verdict};
 use std::os::unix::fs::PermissionsExt;
 use std::path::Path;

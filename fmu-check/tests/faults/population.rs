@@ -3,9 +3,8 @@
 //! The reports are of exporters and of FMUs of many tools. A row has the thread, the fault, and what the check finds.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::binary::compile;
 use crate::zip::{Entry, write};
-use crate::{check, each, library, listed, pack_with, violated};
+use crate::{check, compile, each, library, listed, pack_with, violated};
 use std::path::Path;
 
 /// Where a fault is made.

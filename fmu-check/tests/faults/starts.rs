@@ -1,8 +1,7 @@
 //! Start values that the importer sets, and the end of the simulation: faults of a small C FMU.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::binary::{compile, pack};
-use crate::{check, each, listed, pack_with, violated};
+use crate::{check, compile, each, listed, pack, pack_with, violated};
 use fmu_check::Verdict;
 
 /// The descriptions with an output that starts exactly.

@@ -4,6 +4,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 #include <stdlib.h>
+#include <string.h>
 #include "fault.h"
 
 #define EXPORT __attribute__((visibility("default")))
@@ -26,10 +27,24 @@ static int fail(Fmu *f) { f->state = BROKEN; return ERROR; }
 
 #define IN(condition) Fmu *f = c; if (!f) return ERROR; if (!(condition)) return fail(f)
 
-EXPORT const char *fmi3GetVersion(void) { return "3.0"; }
+static bool good(const char *name, const char *token) {
+    if (!FAULT(L01a) && (!name || !*name || !token)) return false;
+    return FAULT(X04) || !token || !strcmp(token, "{c0ffee00-1234-5678-9abc-def012345679}");
+}
+
+EXPORT const char *fmi3GetVersion(void) { return FAULT(X02b) ? "3.0.2" : "3.0"; }
+EXPORT int fmi3SetDebugLogging(void *c, bool on, size_t n, const char *const names[]) {
+    Fmu *f = c;
+    if (!f || (n && FAULT(G_L2a))) return ERROR;
+    for (size_t i = 0; i < n; i++) {
+        if (!FAULT(G_L2b) && (!names[i] || strcmp(names[i], "logStatusError"))) return fail(f);
+    }
+    return OK;
+}
 EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *resources, bool visible, bool logging,
     bool event_mode, bool early, Refs required, size_t n, void *environment, void *log, Intermediate intermediate) {
     if (!event_mode && !FAULT(K08)) return NULL;
+    if (!good(name, token)) return NULL;
     Fmu *f = calloc(1, sizeof *f);
     f->early = early;
     f->environment = environment;
@@ -38,6 +53,10 @@ EXPORT void *fmi3InstantiateCoSimulation(const char *name, const char *token, co
 }
 EXPORT void *fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *resources, bool visible, bool logging,
     void *environment, void *log, void (*clocks)(void *), void (*lock)(void), void (*unlock)(void)) {
+    if (!good(name, token)) {
+        if (log && logging && !FAULT(G_L3c)) ((void (*)(void *, int, const char *, const char *))log)(environment, ERROR, "logStatusError", "wrong name or token");
+        return NULL;
+    }
     Fmu *f = calloc(1, sizeof *f);
     f->scheduled = true;
     f->environment = environment;
@@ -98,7 +117,7 @@ EXPORT int fmi3UpdateDiscreteStates(void *c, bool *again, bool *terminate, bool 
     return OK;
 }
 EXPORT int fmi3GetIntervalDecimal(void *c, Refs vr, size_t n, double x[], int qualifiers[]) {
-    bool known = ((Fmu *)c)->state == INITIALIZATION;
+    bool known = c && ((Fmu *)c)->state == INITIALIZATION;
     IN(n == 1 && (vr[0] == SAMPLE && known || vr[0] == WAKE && (known || f->state == EVENT || f->state == CLOCK_UPDATE)));
     x[0] = vr[0] == SAMPLE ? FAULT(K03) ? 0.2 : 0.1 : FAULT(K05) ? -0.01 : 0.03;
     qualifiers[0] = vr[0] == SAMPLE ? 2 : f->qualifier;

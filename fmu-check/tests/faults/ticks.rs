@@ -82,3 +82,65 @@ fn scheduled_execution_alone() {
         assert!(matches!(report.finding(id).unwrap().verdict, Verdict::Pass(_)), "{id}: {report:?}");
     }
 }
+
+/// What FMI 3.0 requires or recommends holds for an FMU of Scheduled Execution alone, too: a fault of the library, or an edit of the
+/// description, and the violated checks.
+#[test]
+fn faults_of_scheduled_execution_alone() {
+    const ELEMENT: &str = "<ScheduledExecution modelIdentifier=\"Small\"/>";
+    const IN_ELEMENT: [(&str, &[&str]); 4] = [
+        ("", &[]),
+        ("canGetAndSetFMUstate=\"true\"", &["X01s"]),
+        ("canSerializeFMUState=\"true\"", &["X08"]),
+        ("needsExecutionTool=\"true\"", &["Z04c"]),
+    ];
+    const EDITS: [(&str, &str, &[&str]); 4] = [
+        ("modelIdentifier=\"Small\"", "modelIdentifier=\"Other\"", &["X03"]),
+        (
+            "causality=\"output\" intervalVariability=\"triggered\"",
+            "causality=\"output\" intervalVariability=\"countdown\"",
+            &["V17"],
+        ),
+        ("intervalDecimal=\"0.25\"", "intervalDecimal=\"250\"", &["V19"]),
+        ("stopTime=\"4\"", "stopTime=\"0\"", &["X10"]),
+    ];
+    const LIBRARY: [(&str, &[&str]); 8] = [
+        ("NONE", &[]),
+        ("X02b", &["X02b"]),
+        ("X04", &["X04"]),
+        ("L01a", &["L01a"]),
+        ("G_L2a", &["G-L2a"]),
+        ("G_L2b", &["G-L2b"]),
+        ("P01", &["P01"]),
+        ("P02", &["P02"]),
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    if library("ticks.c", &[], "NONE").is_none() {
+        return;
+    }
+    let text = include_str!("ticks.xml").replace(
+        "<DefaultExperiment",
+        "<LogCategories><Category name=\"logStatusError\"/></LogCategories>\n  <DefaultExperiment",
+    );
+    let xml = text.lines().filter(|line| !line.contains("<CoSimulation")).collect::<Vec<_>>().join("\n");
+    let groups = ["archive", "xml", "variables", "structure"];
+    // What the description lacks in any case.
+    let lacks = violated(&check(&pack_with(dir.path(), "plain", &xml, b"no library"), &groups));
+    assert!(!lacks.iter().any(|id| ["X01s", "X08", "Z04c", "X03", "V17", "V19", "X10"].contains(id)), "{lacks:?}");
+    let elements = IN_ELEMENT.iter().map(|(flag, ids)| (ELEMENT, ELEMENT.replace("/>", &format!(" {flag}/>")), *ids));
+    let edits: Vec<_> = elements.chain(EDITS.iter().map(|(from, to, ids)| (*from, (*to).to_owned(), *ids))).collect();
+    each(&edits.iter().enumerate().collect::<Vec<_>>(), |(k, (from, to, ids))| {
+        assert!(xml.contains(from), "{from}");
+        let report = check(&pack_with(dir.path(), &format!("edit{k}"), &xml.replace(from, to), b"no library"), &groups);
+        let found: Vec<_> = violated(&report).into_iter().filter(|id| !lacks.contains(id)).collect();
+        if found == *ids { Ok(()) } else { Err(format!("{to}: {found:?}\n{}", listed(&report))) }
+    });
+    let probes = ["X02b", "X04", "L01a", "L08n", "G-L2a", "G-L2b", "G-L3c", "scheduled-execution"];
+    each(&LIBRARY, |(fault, ids)| {
+        let path = pack_with(dir.path(), &format!("library-{fault}"), &xml, &library("ticks.c", &[], fault).unwrap());
+        let report = check(&path, &probes);
+        let open = report.findings.iter().find(|f| !matches!(f.verdict, Verdict::Pass(_) | Verdict::Violated(_)));
+        let good = violated(&report) == *ids && (*fault != "NONE" || open.is_none());
+        if good { Ok(()) } else { Err(format!("{fault}: {} {open:?}", listed(&report))) }
+    });
+}

@@ -1,8 +1,7 @@
 //! An output that two runs cannot reproduce is one finding: no other check compares it, and the others still find their faults.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use crate::binary::{compile, pack};
-use crate::{check, library, listed, pack_with, violated};
+use crate::{check, compile, library, listed, pack, pack_with, violated};
 use fmu_check::{Confidence, Level};
 
 #[test]

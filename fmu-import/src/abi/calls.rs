@@ -287,11 +287,11 @@ impl Calls {
         self.set_clock.call(|f| unsafe { f(i.0, &raw const clock, 1, &raw const ACTIVE) })
     }
 
-    /// `fmi3GetIntervalDecimal` of one clock: interval and qualifier.
-    pub(super) fn interval(&self, i: Given<'_>, clock: u32) -> Answer<(f64, c_int)> {
+    /// `fmi3GetIntervalDecimal` of one clock: interval and qualifier, which are `before` before the call.
+    pub(super) fn interval(&self, i: Given<'_>, clock: u32, before: (f64, c_int)) -> Answer<(f64, c_int)> {
         // SAFETY: the standard's type; one reference, variables of ours.
         self.get_interval
-            .write((0.0, 0), |f, (interval, qualifier)| unsafe { f(i.0, &raw const clock, 1, interval, qualifier) })
+            .write(before, |f, (interval, qualifier)| unsafe { f(i.0, &raw const clock, 1, interval, qualifier) })
     }
 
     /// `fmi3SetIntervalDecimal` of one clock.
@@ -307,9 +307,9 @@ impl Calls {
     }
 
     /// `fmi3GetShiftDecimal` of one clock.
-    pub(super) fn shift(&self, i: Given<'_>, clock: u32) -> Answer<f64> {
+    pub(super) fn shift(&self, i: Given<'_>, clock: u32, before: f64) -> Answer<f64> {
         // SAFETY: the standard's type; one reference, one variable of ours.
-        self.get_shift.write(0.0, |f, shift| unsafe { f(i.0, &raw const clock, 1, shift) })
+        self.get_shift.write(before, |f, shift| unsafe { f(i.0, &raw const clock, 1, shift) })
     }
 
     /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`. `before` is the content of the results before the call; with

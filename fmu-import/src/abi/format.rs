@@ -3,6 +3,9 @@
 //! The format is divided into conversions, and the C library formats each with its value, so the text is the same as in C.
 //! `%n`, which writes, and `%L...`, whose values have no common size, are not supported; from there on the format is copied
 //! unchanged, and the text says so.
+//!
+//! A variadic function cannot see how many arguments it was given. One case of a missing argument is certain: compilers often call
+//! the callback through the next free register, which is where the first argument would be, so its value is the callback's address.
 
 use std::ffi::{CStr, CString, c_char, c_int};
 
@@ -19,12 +22,19 @@ pub(super) struct Arguments<'a> {
     integers: std::slice::Iter<'a, u64>,
     floats: std::slice::Iter<'a, f64>,
     words: std::slice::Iter<'a, u64>,
+    callback: u64,
 }
 
 impl<'a> Arguments<'a> {
-    /// Registers for integers and for floating-point numbers, and words of the stack, which follow for both.
-    pub(super) fn new(integers: &'a [u64], floats: &'a [f64], words: &'a [u64]) -> Self {
-        Self { integers: integers.iter(), floats: floats.iter(), words: words.iter() }
+    /// Registers for integers and for floating-point numbers, words of the stack, which follow for both, and the address of the
+    /// function that was called.
+    pub(super) fn new(integers: &'a [u64], floats: &'a [f64], words: &'a [u64], callback: u64) -> Self {
+        Self { integers: integers.iter(), floats: floats.iter(), words: words.iter(), callback }
+    }
+
+    /// Whether the next integer or pointer is one that no caller passes.
+    fn is_missing(&self) -> bool {
+        self.integers.clone().next().or_else(|| self.words.clone().next()) == Some(&self.callback)
     }
 
     fn integer(&mut self) -> Option<u64> {
@@ -108,6 +118,16 @@ fn conversion(format: &[u8]) -> (Conversion<'_>, &[u8]) {
 }
 
 impl Conversion<'_> {
+    /// Whether C or POSIX defines it.
+    fn exists(&self) -> bool {
+        b"diouxXfFeEgGaAcspnCSm".contains(&self.letter)
+    }
+
+    /// Whether its value is in the registers for integers.
+    fn takes_integer(&self) -> bool {
+        b"diouxXcs".contains(&self.letter) || self.width == Number::Argument || self.precision == Number::Argument
+    }
+
     /// The text of the next argument; `None` if this conversion is not supported or no argument is left.
     ///
     /// # Safety
@@ -204,17 +224,28 @@ unsafe fn print<T: Copy>(format: Vec<u8>, value: T) -> Option<Vec<u8>> {
     Some(text)
 }
 
+/// A text with its values.
+pub(super) struct Formatted {
+    /// In the encoding of the format and of its arguments.
+    pub(super) text: Vec<u8>,
+    /// What is certainly wrong with the format or its arguments.
+    pub(super) fault: Option<String>,
+}
+
 /// The text of a format and its arguments.
 ///
 /// # Safety
 /// The arguments are those of the format; one of `%s` is NULL or a C string, or as long as the precision.
-pub(super) unsafe fn formatted(format: &[u8], mut arguments: Arguments<'_>) -> Vec<u8> {
-    let (mut text, mut rest) = (Vec::new(), format);
+pub(super) unsafe fn formatted(format: &[u8], mut arguments: Arguments<'_>) -> Formatted {
+    let (mut text, mut rest, mut fault) = (Vec::new(), format, None);
     loop {
         text.extend(run(&mut rest, |c| c != b'%'));
         if rest.len() < 2 {
+            if !rest.is_empty() {
+                fault = fault.or_else(|| Some("it ends with a single \"%\"".into()));
+            }
             text.extend(rest);
-            return text;
+            return Formatted { text, fault };
         }
         if let [b'%', b'%', back @ ..] = rest {
             text.push(b'%');
@@ -222,13 +253,24 @@ pub(super) unsafe fn formatted(format: &[u8], mut arguments: Arguments<'_>) -> V
             continue;
         }
         let (conversion, back) = conversion(rest);
+        let shown = String::from_utf8_lossy(conversion.text);
+        if !conversion.exists() {
+            fault = fault.or_else(|| Some(format!("\"{shown}\" is not a conversion of printf")));
+        }
+        if conversion.takes_integer() && arguments.is_missing() {
+            fault = fault.or_else(|| Some(format!("there is no argument for \"{shown}\"")));
+            text.extend(b"(no argument)");
+            let _ = arguments.integer();
+            rest = back;
+            continue;
+        }
         // SAFETY: the caller's promise.
         let Some(value) = (unsafe { conversion.write(&mut arguments) }) else {
             text.extend(rest);
             text.extend(b" (the values of this message from \"");
             text.extend(conversion.text);
             text.extend(b"\" on are not shown)");
-            return text;
+            return Formatted { text, fault };
         };
         text.extend(value);
         rest = back;

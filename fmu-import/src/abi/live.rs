@@ -31,7 +31,8 @@ struct Facade;
 
 impl Listener for Facade {
     unsafe fn hear(called: Called) {
-        let text = String::from_utf8_lossy(&called.text.unwrap_or_default()).into_owned();
+        let text = called.text.map(|formatted| formatted.text).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text).into_owned();
         // SAFETY: the FMU passes C strings.
         let category = unsafe { copy_text(called.category) };
         Log::receive(called.environment, Message { status: called.status, category, text });
@@ -356,12 +357,12 @@ impl Live {
     pub(crate) fn interval(&mut self, clock: u32) -> Outcome<Option<f64>> {
         /// `fmi3IntervalChanged`.
         const CHANGED: i32 = 2;
-        let (interval, qualifier) = self.calls.interval(self.given(), clock).outcome()?;
+        let (interval, qualifier) = self.calls.interval(self.given(), clock, (0.0, 0)).outcome()?;
         Ok((qualifier == CHANGED).then_some(interval))
     }
 
     pub(crate) fn shift(&mut self, clock: u32) -> Outcome<f64> {
-        self.calls.shift(self.given(), clock).outcome()
+        self.calls.shift(self.given(), clock, 0.0).outcome()
     }
 
     pub(crate) fn completed_integrator_step(&mut self) -> Outcome<CompletedStep> {

@@ -5,7 +5,7 @@
 //! arrive; those beyond the arguments of the FMU are undefined, and only those that the format names are read
 //! ([`format`](super::format)).
 
-use super::format::{Arguments, formatted};
+use super::format::{Arguments, Formatted, formatted};
 use super::log::Status;
 use std::ffi::{CStr, c_char, c_void};
 
@@ -21,8 +21,8 @@ pub(super) struct Called {
     pub(super) category: *const c_char,
     /// The format: NULL or a C string.
     pub(super) format: *const c_char,
-    /// The text with its values, in the FMU's encoding; `None` for NULL.
-    pub(super) text: Option<Vec<u8>>,
+    /// The text with its values; `None` for NULL.
+    pub(super) text: Option<Formatted>,
 }
 
 /// Receives messages.
@@ -50,7 +50,8 @@ macro_rules! logger {
         ) {
             $(let _ = $unused;)*
             let (integers, floats, words): ([u64; _], [f64; _], [u64; _]) = ([$($integer),*], [$($float),*], [$($word),*]);
-            let arguments = Arguments::new(&integers, &floats, &words);
+            let callback = (logger::<L> as Logger as *const ()).addr() as u64;
+            let arguments = Arguments::new(&integers, &floats, &words, callback);
             // SAFETY: the FMU passes C strings, and the arguments that its format names.
             unsafe {
                 let text = (!format.is_null()).then(|| formatted(CStr::from_ptr(format).to_bytes(), arguments));
@@ -104,7 +105,13 @@ mod tests {
 
     impl Listener for Ear {
         unsafe fn hear(called: Called) {
-            let text = called.text.map_or_else(|| "NULL".into(), |text| String::from_utf8_lossy(&text).into_owned());
+            let text = called.text.map_or_else(
+                || "NULL".into(),
+                |Formatted { text, fault }| {
+                    let fault = fault.map(|fault| format!(" ({fault})")).unwrap_or_default();
+                    String::from_utf8_lossy(&text).into_owned() + &fault
+                },
+            );
             HEARD.with_borrow_mut(|all| all.push(text));
         }
     }
@@ -166,11 +173,22 @@ mod tests {
         let note = " (the values of this message from \"%";
         assert!(heard!("a %Lf b", 1.0_f64).starts_with(&format!("a %Lf b{note}Lf\" on")));
         assert!(heard!("a %n b", ptr::null_mut::<i32>()).contains("%n"), "nothing is written through a pointer");
-        assert!(heard!("%d%%%y%d", 1_i32, 2_i32).starts_with("1%%y%d (the values"));
+        let unknown = heard!("%d%%%y%d", 1_i32, 2_i32);
+        assert!(unknown.starts_with("1%%y%d (the values"), "{unknown}");
+        assert!(unknown.ends_with("(\"%y\" is not a conversion of printf)"), "{unknown}");
         assert!(heard!("%99999d", 1_i32).contains("%99999d"));
         let many = "%d ".repeat(40);
         let first = heard!(many, 1_i32, 2_i32, 3_i32);
         assert!(first.starts_with("1 2 3 ") && first.contains("are not shown)"), "{first}");
-        assert_eq!(heard!("50 %"), "50 %");
+        assert_eq!(heard!("50 %"), "50 % (it ends with a single \"%\")");
+    }
+
+    /// A call through the register of the first argument, as compilers make it, passes the callback's address there.
+    #[test]
+    fn an_argument_that_is_missing_is_named() {
+        let callback = logger::<Ear> as Logger as *const ();
+        assert_eq!(heard!("100%s of it", callback), "100(no argument) of it (there is no argument for \"%s\")");
+        assert_eq!(heard!("%.1f %d", 1.0_f64, callback), "1.0 (no argument) (there is no argument for \"%d\")");
+        assert!(!heard!("%p", callback).contains("no argument"), "a pointer may be shown");
     }
 }

@@ -2,10 +2,10 @@
 
 use crate::check::{Check, Levels, Run};
 use crate::confidence::Confidence;
-use crate::exchange::Importer;
+use crate::encoding::show;
+use crate::exchange::{Importer, Jump};
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
-use fmu_import::raw::Vector;
 use model_description::{Causality, ModelVariable, Variability};
 use std::cell::{Cell, RefCell};
 
@@ -81,9 +81,9 @@ fn update_results(session: &Session) -> Result<(), NotDetermined> {
             let time = u.next_event_time_defined == 0 || !u.next_event_time.is_nan();
             // An event at an infinite time never occurs, but an importer can still integrate up to it.
             if u.next_event_time_defined == 1 && u.next_event_time.is_infinite() && !infinite.replace(true) {
-                session.lesser(Level::Should, format!("{u:?}: the time of the next event is infinite"));
+                session.lesser(Level::Should, format!("{u}: the time of the next event is infinite"));
             }
-            (!good || !time).then(|| format!("{u:?}: a Boolean is not 0 or 1, or a result was not written"))
+            (!good || !time).then(|| format!("{u}: a Boolean is not 0 or 1, or a result was not written"))
         })
     })
 }
@@ -91,47 +91,48 @@ fn update_results(session: &Session) -> Result<(), NotDetermined> {
 fn next_event_time(session: &Session) -> Result<(), NotDetermined> {
     each_event(session, &|t, event| {
         let next = event.next().filter(|_| event.ended() && !event.terminates())?;
-        (next <= t).then(|| format!("nextEventTime is {next:?}"))
+        (next <= t).then(|| format!("nextEventTime is {next:?}, not after now"))
     })
 }
 
 fn ends(session: &Session) -> Result<(), NotDetermined> {
     each_event(session, &|_, event| {
         (!event.ended() && !event.terminates())
-            .then(|| format!("{} updates, and it needs another", event.updates.len()))
+            .then(|| format!("after {} updates the FMU needs another", event.updates.len()))
     })
 }
 
 fn told_changes(session: &Session) -> Result<(), NotDetermined> {
     each_event(session, &|_, event| {
-        let silent = event.updates.iter().any(|(u, changed)| *changed && u.states_changed == 0);
-        silent.then(|| "a state changed, and valuesOfContinuousStatesChanged is false".into())
+        let silent = event.updates.iter().filter(|(u, _)| u.states_changed == 0).find_map(|(_, jump)| jump.as_ref());
+        silent.map(|Jump { state, from, to }| {
+            let name = session.element_names(session.description.states()).get(*state).cloned().unwrap_or_default();
+            format!("the state {name} changed from {from:?} to {to:?}, and valuesOfContinuousStatesChanged is false")
+        })
     })
 }
 
 fn true_changes(session: &Session) -> Result<(), NotDetermined> {
     each_event(session, &|_, event| {
-        let idle = event.updates.iter().any(|(u, changed)| !changed && u.states_changed == 1);
+        let idle = event.updates.iter().any(|(u, jump)| jump.is_none() && u.states_changed == 1);
         idle.then(|| "valuesOfContinuousStatesChanged is true, and no state changed".into())
     })
 }
 
 fn true_nominals(session: &Session) -> Result<(), NotDetermined> {
-    let n = session.states();
-    if n == 0 {
+    if session.states() == 0 {
         return session.not_applicable("there are no continuous states");
     }
     let instance = session.excited()?;
-    let nominals = |instance: &crate::instance::Instance<'_>| instance.vector(Vector::GetNominalsOfContinuousStates, n);
-    let last = RefCell::new(nominals(&instance)?.1);
+    let last = RefCell::new(instance.nominals()?);
     let mut idle = 0;
     Importer::survey(
         &instance,
         STEPS,
         &mut |instance, event| {
-            let Ok((status, now, _)) = nominals(instance) else { return };
+            let Ok(now) = instance.nominals() else { return };
             let reported = event.updates.iter().any(|(u, _)| u.nominals_changed == 1);
-            if reported && status.is_ok() && *last.borrow() == now {
+            if reported && *last.borrow() == now {
                 idle += 1;
                 if idle == 3 {
                     session.violated(format!(
@@ -153,13 +154,11 @@ fn indicators(session: &Session) -> Result<(), NotDetermined> {
     let instance = session.excited()?;
     let all: RefCell<Vec<Vec<f64>>> = RefCell::new(vec![Vec::new(); session.indicators()]);
     Importer::survey(&instance, STEPS, &mut |_, _| (), &mut |importer, event| {
-        session.require(!event || importer.z.iter().all(|z| *z != 0.0), || {
-            format!(
-                "after the event at t = {:?} the event indicators are {:?}",
-                importer.instance.time.get(),
-                importer.z
-            )
-        });
+        let zero = importer.z.iter().position(|z| *z == 0.0).filter(|_| event);
+        if let Some(k) = zero {
+            let t = importer.instance.time.get();
+            session.violated(format!("after the event at t = {t:?} event indicator {} is {:?}", k + 1, importer.z[k]));
+        }
         all.borrow_mut().iter_mut().zip(&importer.z).for_each(|(all, z)| all.push(*z));
         Ok(())
     })?;
@@ -199,11 +198,15 @@ fn discrete(session: &Session) -> Result<(), NotDetermined> {
             let event = importer.step(dt, &mut |_, _| ())?;
             let now = instance.snapshot(&variables)?;
             let end = if event { &importer.before } else { &now };
-            for (v, _) in variables.iter().zip(last.iter().zip(end)).filter(|(_, (old, new))| old != new) {
+            for (v, (old, new)) in variables.iter().zip(last.iter().zip(end)).filter(|(_, (old, new))| old != new) {
                 found += 1;
                 if found <= 10 {
                     let t = instance.time.get();
-                    session.violated(format!("{}, discrete, changed in Continuous-Time Mode before t = {t:?}", v.name));
+                    let [old, new] = [old, new].map(|bits| show(v, session.description.version, bits));
+                    session.violated(format!(
+                        "the discrete variable {} changed from {old} to {new} in Continuous-Time Mode before t = {t:?}",
+                        v.name
+                    ));
                 }
             }
             last = now;
@@ -240,8 +243,9 @@ fn renewed(session: &Session) -> Result<(), NotDetermined> {
             tried += 1;
             let lost = kept.is_none_or(|kept| kept > next + 1e-6 * (next - t));
             if lost && !event.jumped() && !event.terminates() {
+                let kept = kept.map_or_else(|| "there is none".into(), |kept| format!("it is at {kept:?}"));
                 session.violated(format!(
-                    "the next event was at {next:?}; after an event at {now:?} that nothing asked for, it is at {kept:?}"
+                    "the next event was at {next:?}; after an event at {now:?} that nothing asked for, {kept}"
                 ));
                 return Ok(());
             }

@@ -15,6 +15,7 @@ use crate::level::Level;
 use crate::lines::Line;
 use crate::session::{NotDetermined, Session};
 use crate::state::{Life, State};
+use crate::trajectory::steps;
 use fmu_import::Status;
 use fmu_import::raw::{Count, Simple, Vector};
 use model_description::{BaseType, Causality, ModelVariable};
@@ -218,16 +219,15 @@ macro_rules! needs_states {
 
 fn nominals(session: &Session) -> Result<Vec<f64>, NotDetermined> {
     let instance = session.exchange(State::Continuous)?;
-    let (status, values, _) = instance.vector(Vector::GetNominalsOfContinuousStates, session.states())?;
-    instance.must("GetNominalsOfContinuousStates", status)?;
-    Ok(values)
+    instance.nominals()
 }
 
 fn positive_nominals(session: &Session) -> Result<(), NotDetermined> {
     needs_states!(session);
     let found = nominals(session)?;
-    let bad = found.iter().any(|n| !(n.is_finite() && *n > 0.0));
-    session.require(!bad, || format!("the nominals are {found:?}"));
+    for (name, nominal) in session.element_names(session.description.states()).iter().zip(&found) {
+        session.require(nominal.is_finite() && *nominal > 0.0, || format!("the nominal of {name} is {nominal:?}"));
+    }
     Ok(())
 }
 
@@ -253,7 +253,12 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         return Err(NotDetermined(format!("SetContinuousStates({x:?}) returned {status}")));
     }
     let found = instance.states()?;
-    session.require(found == x, || format!("the states were set to {x:?}, and read as {found:?}"));
+    let names = session.element_names(session.description.states());
+    for ((name, set), got) in names.iter().zip(&x).zip(&found) {
+        session.require((set - got).abs() <= 0.0, || {
+            format!("{name}: set to {set:?} in the vector of states, read as {got:?}")
+        });
+    }
     let mut rest = &x[..];
     for v in session.description.states() {
         let (one, more) = rest.split_at(session.elements(v).min(rest.len()));
@@ -261,7 +266,8 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         let (status, found) = instance.get(v)?;
         let found: Vec<f64> = found.into_iter().map(f64::from_bits).collect();
         session.require(status.is_ok() && found == one, || {
-            format!("the state {} was set to {one:?}, but getting it returned {status}, {found:?}", v.name)
+            let found = if found.is_empty() { String::new() } else { format!(", {found:?}") };
+            format!("the state {} was set to {one:?}, and Get returned {status}{found}", v.name)
         });
     }
     Ok(())
@@ -295,11 +301,10 @@ fn both_ways(session: &Session) -> Result<(), NotDetermined> {
             if !status.is_ok() || v.base != BaseType::Float64 {
                 continue;
             }
-            if let Some((_, largest)) = deviation(&[of_vector.to_vec()], std::slice::from_ref(&found)) {
-                session.deviates(
-                    largest,
-                    &format!("line {}: {} is {found:?}, and {of_vector:?} in the vector", v.line, v.name),
-                );
+            if let Some(deviation) = deviation(&[of_vector.to_vec()], std::slice::from_ref(&found)) {
+                let (text, t) = (deviation.text(&session.names_of(&[v])), instance.time.get());
+                let text = format!("line {}: t = {t:?}: {text} as in the vector", v.line);
+                session.deviates(deviation.largest, &text);
                 return Ok(());
             }
         }
@@ -378,17 +383,18 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
         }
         let status = instance.simple(Simple::Reset)?;
         if !status.is_ok() {
-            session.violated(format!("Reset after {state:?} returned {status}"));
+            session.violated(format!("Reset in {state:?} returned {status}"));
             return Ok(());
         }
         instance.experiment(session.start(), None);
         if let Err(why) = instance.bring_to(State::Event) {
-            session.failed(&format!("after Reset after {state:?}"), why);
+            session.failed(&format!("after Reset in {state:?}"), why);
             return Ok(());
         }
-        if let Some((k, largest)) = deviation(&first, &run(&instance)?) {
-            let text = format!("Reset after {state:?}: the run differs from that of a new instance after {k} steps");
-            session.deviates(largest, &text);
+        if let Some(found) = deviation(&first, &run(&instance)?) {
+            let (step, text) = (steps(found.step), found.text(&session.names_of_rows()));
+            let text = format!("after Reset in {state:?}, compared with a new instance: after {step} {text}");
+            session.deviates(found.largest, &text);
         }
         Ok(())
     })
@@ -402,8 +408,9 @@ fn saved_states(session: &Session) -> Result<(), NotDetermined> {
     let all: Vec<&ModelVariable> = session.numeric().filter(comparable).collect();
     session.case(|| in_initialization(session, &|| session.exchange(State::Initialization), &all));
     let compare = |mode: &str, first: &[Vec<f64>], second: &[Vec<f64>]| {
-        if let Some((k, largest)) = deviation(first, second) {
-            session.deviates(largest, &format!("restored in {mode}: the run differs from the first after {k} steps"));
+        if let Some(found) = deviation(first, second) {
+            let (step, text) = (steps(found.step), found.text(&session.names_of_rows()));
+            session.deviates(found.largest, &format!("restored in {mode}: {step} later {text}"));
         }
     };
     session.case(|| {

@@ -1,6 +1,7 @@
 //! Directional and adjoint derivatives (FMI 2.0.5, 2.1.9; FMI 3.0.2, 2.2.12).
 
 use crate::check::{Check, Levels, Run};
+use crate::encoding::show;
 use crate::exchange::Importer;
 use crate::instance::Instance;
 use crate::level::Level;
@@ -172,7 +173,11 @@ fn together(
         let parts = || columns.iter().zip(&seed).map(|(column, seed)| column[i] * seed);
         let (sum, scale) = (parts().sum::<f64>(), parts().map(f64::abs).sum::<f64>());
         session.require(status.is_ok() && (found - sum).abs() <= 1e-6 * scale, || {
-            format!("with the seed {seed:?} the derivative {i} is {found} ({status}), and {sum} by those of each known")
+            let name = session.description.variables.iter().find(|v| v.value_reference == unknowns[i]);
+            let name = name.map_or_else(|| format!("unknown {}", i + 1), |v| v.name.clone());
+            format!(
+                "{name}: with the seed {seed:?} the derivative is {found} ({status}); the sum over the knowns is {sum}"
+            )
         });
     }
     Ok(())
@@ -272,7 +277,25 @@ fn unchanged(session: &Session) -> Result<(), NotDetermined> {
             let _ = instance.sensitivity(name, [&unknowns, &knowns], &pattern(unknowns.len()))?;
         }
     }
-    session.require(look()? == before, || "states, derivatives, event indicators or outputs have changed".into());
+    let ((old, old_outputs), (new, new_outputs)) = (before, look()?);
+    let names = [
+        session.element_names(session.description.states()),
+        session.element_names(session.derivative_variables()),
+        session.names_of_indicators(),
+    ];
+    for (names, (old, new)) in names.iter().zip(old.iter().zip(&new)) {
+        for (k, (old, new)) in old.iter().zip(new).enumerate().filter(|(_, (old, new))| old != new) {
+            let name = names.get(k).map_or("a value", String::as_str);
+            let [old, new] = [old, new].map(|bits| f64::from_bits(*bits));
+            session.violated(format!("after a partial derivative {name} is {new:?}; it was {old:?}"));
+        }
+    }
+    for (v, (old, new)) in session.watched().iter().zip(old_outputs.iter().zip(&new_outputs)) {
+        session.require(old == new, || {
+            let [old, new] = [old, new].map(|bits| show(v, session.description.version, bits));
+            format!("after a partial derivative {} is {new}; it was {old}", v.name)
+        });
+    }
     Ok(())
 }
 
@@ -292,7 +315,8 @@ fn at_communication_points(session: &Session) -> Result<(), NotDetermined> {
     let name = Sensitivity::GetDirectionalDerivative;
     let (status, found) = instance.sensitivity(name, [&unknowns, &knowns], &pattern(knowns.len()))?;
     session.require(status.is_ok() && found.iter().all(|d| d.is_finite()), || {
-        format!("GetDirectionalDerivative after a step returned {status}, {found:?}")
+        let found = if status.is_ok() { format!(", {found:?}") } else { String::new() };
+        format!("GetDirectionalDerivative after a step returned {status}{found}")
     });
     Ok(())
 }

@@ -170,7 +170,7 @@ fn split(fmu: &FmuFile) -> Verdict {
     let other = |e: &Entry| (e.disk != 0).then(|| format!("entry {:?}: on disk {}", e.name(), e.disk));
     let mut findings: Vec<_> = fmu.zip.entries.iter().filter_map(other).collect();
     if fmu.zip.split {
-        findings.push("the end record counts disks".into());
+        findings.push("the end record names more than one disk".into());
     }
     Verdict::of(findings)
 }

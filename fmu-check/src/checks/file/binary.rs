@@ -3,6 +3,7 @@
 use crate::check::{Check, Levels, Run, Verdict};
 use crate::checks::file::shared::libraries::{ALL3, COMMON2, COSIMULATION2, EXCHANGE2, libraries};
 use crate::checks::file::shared::paths::paths;
+use crate::encoding::or_null;
 use crate::fmu_file::{Binary, FmuFile};
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
@@ -352,7 +353,7 @@ fn versions(session: &Session) -> Result<(), NotDetermined> {
         session.record_call(&session.raw.name(name.as_str()));
         let version = session.raw.text(name);
         session.require(version.as_ref() == Some(&expected), || {
-            format!("{} returned {version:?}, expected {expected:?}", session.raw.name(name.as_str()))
+            format!("{} returned {}, expected {expected:?}", session.raw.name(name.as_str()), or_null(&version))
         });
     }
     Ok(())

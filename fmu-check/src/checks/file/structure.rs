@@ -61,6 +61,12 @@ fn list(d: &ModelDescription, unknowns: &[Unknown]) -> BTreeSet<String> {
     unknowns.iter().map(|u| name(d, u.reference)).collect()
 }
 
+/// The line of this name in the list, or that of the variable.
+fn line(d: &ModelDescription, unknowns: &[Unknown], of: &str) -> usize {
+    let listed = unknowns.iter().find(|u| name(d, u.reference) == of).map(|u| u.line);
+    listed.or_else(|| d.variables.iter().find(|v| v.name == of).map(|v| v.line)).unwrap_or_default()
+}
+
 fn twice(d: &ModelDescription, unknowns: &[Unknown]) -> Vec<String> {
     let mut seen = BTreeSet::new();
     let again = unknowns.iter().filter(|u| !seen.insert(u.reference));
@@ -73,8 +79,11 @@ fn outputs(fmu: &FmuFile) -> Verdict {
         let listed = list(d, &d.outputs);
         let all: BTreeSet<_> =
             d.variables.iter().filter(|v| v.causality == Causality::Output).map(|v| v.name.clone()).collect();
-        findings.extend(all.difference(&listed).map(|n| format!("the output {n} is missing in the list")));
-        findings.extend(listed.difference(&all).map(|n| format!("{n} is in the list but is not an output")));
+        let line = |n: &str| line(d, &d.outputs, n);
+        findings.extend(all.difference(&listed).map(|n| format!("line {}: Outputs lacks the output {n}", line(n))));
+        findings.extend(
+            listed.difference(&all).map(|n| format!("line {}: Outputs lists {n}, which is not an output", line(n))),
+        );
         findings
     })
 }
@@ -101,9 +110,12 @@ fn initial_unknowns(fmu: &FmuFile) -> Verdict {
         // FMI 3.0 leaves clocked variables to the exporter.
         let optional: BTreeSet<String> = variables().filter(clocked).map(|v| v.name.clone()).collect();
         let listed = list(d, &d.initial_unknowns);
-        findings.extend(needed.difference(&listed).map(|n| format!("{n} is missing in the list")));
+        let line = |n: &str| line(d, &d.initial_unknowns, n);
+        findings.extend(needed.difference(&listed).map(|n| format!("line {}: InitialUnknowns lacks {n}", line(n))));
         let more = listed.difference(&needed).filter(|n| !optional.contains(*n));
-        findings.extend(more.map(|n| format!("{n} is in the list but is not an initial unknown")));
+        findings.extend(
+            more.map(|n| format!("line {}: InitialUnknowns lists {n}, which is not an initial unknown", line(n))),
+        );
         findings
     })
 }

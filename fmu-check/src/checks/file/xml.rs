@@ -157,7 +157,8 @@ fn flags(fmu: &FmuFile) -> Verdict {
                 findings.push(format!("line {}: {what}", i.line));
             }
         };
-        for i in [&description.co_simulation, &description.model_exchange].into_iter().flatten() {
+        let all = [&description.co_simulation, &description.model_exchange, &description.scheduled_execution];
+        for i in all.into_iter().flatten() {
             let state = i.can_get_and_set_state() || !i.can_serialize_state();
             implies(i, state, "canSerializeFMUState requires canGetAndSetFMUState");
         }
@@ -237,7 +238,7 @@ fn categories(fmu: &FmuFile) -> Verdict {
         let mut findings = Vec::new();
         for (i, name) in names.iter().enumerate() {
             if names[..i].contains(name) {
-                findings.push(format!("the log category {name} occurs twice"));
+                findings.push(format!("the log category {name:?} occurs twice"));
             }
         }
         findings

@@ -9,12 +9,12 @@ use crate::checks::life::shared::values::{
     binaries, booleans, expected, iterated_initialization, not_a_number, out_of_range, round_trip, strings,
     too_many_bytes, tunable,
 };
-use crate::encoding::{bits, same, show};
+use crate::encoding::{attribute, bits, or_null, same, show};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
+use crate::settable::settable;
 use crate::state::State;
-use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::Buffer;
 use model_description::{BaseType, Causality, FmiVersion, Initial, ModelVariable, Variability};
@@ -58,8 +58,9 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "A set call for several variables that fails changes none of them.",
         tried: "Sets an input together with a reference that does not exist.", fix: "Check all references before assigning any." },
     Check { id: "G04", clause: GET, levels: Levels::MUST, run: Run::Any(round_trip),
-        requirement: "A value set before the end of initialization reads back unchanged.",
-        tried: "Sets every settable number in Initialization Mode, then all before it, and reads them in it.", fix: "Store the value unchanged." },
+        requirement: "A parameter or input that is set before the end of initialization reads back unchanged.",
+        tried: "Sets every parameter and input that is a number in Initialization Mode, then all before it, and reads them in it.",
+        fix: "Store the value unchanged." },
     Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Any(strings),
         requirement: "A string that is set reads back unchanged, at any length, after the importer has overwritten its own copy.",
         tried: "Sets strings of up to 1 MiB, and several strings in one call, overwrites them, and reads them back.",
@@ -156,10 +157,9 @@ fn compare_starts(session: &Session, instance: &Instance<'_>, initializing: bool
         let Some((status, found)) = session.raw.get_strings(instance.handle, &[v.value_reference], 1) else { continue };
         compared += 1;
         if !status.is_ok() || found.first().is_none_or(|f| f.as_deref() != v.start.as_deref()) {
-            tell(format!(
-                "line {}: {}: start={:?}, but the binary returned {status}, {found:?}",
-                v.line, v.name, v.start
-            ));
+            let found = found.first().map_or_else(String::new, |text| format!(", {}", or_null(text)));
+            let start = attribute(v.start.as_deref());
+            tell(format!("line {}: {}: start={start}, but the binary returned {status}{found}", v.line, v.name));
         }
     }
     session.note(format!("compared {compared} start values"));
@@ -187,7 +187,11 @@ fn ranges(session: &Session) -> Result<(), NotDetermined> {
             let text = show(v, session.description.version, &found);
             let outside = |x: f64| v.min.is_some_and(|min| x < min) || v.max.is_some_and(|max| x > max);
             if text.split(' ').filter_map(|t| t.parse().ok()).any(outside) {
-                session.violated(format!("line {}: {} is {text} after {k} steps", v.line, v.name));
+                let [min, max] = [v.min, v.max].map(|x| x.map_or_else(|| "no limit".into(), |x| x.to_string()));
+                session.violated(format!(
+                    "line {}: {} is {text} after {k} steps (min: {min}, max: {max})",
+                    v.line, v.name
+                ));
                 return Ok(());
             }
         }
@@ -413,7 +417,8 @@ fn not_settable(session: &Session) -> Result<(), NotDetermined> {
             });
             let (status, after) = instance.get(v)?;
             session.require(!status.is_ok() || before == after || !session.is_steady(v), || {
-                format!("Set({}) in step mode changed the value", v.name)
+                let [old, new] = [&before, &after].map(|bits| show(v, session.description.version, bits));
+                format!("Set({}) in step mode changed the value from {old} to {new}", v.name)
             });
             Ok(())
         });
@@ -453,7 +458,8 @@ fn all_or_nothing(session: &Session) -> Result<(), NotDetermined> {
     }
     let (status, after) = instance.get(v)?;
     session.require(!status.is_ok() || before == after, || {
-        format!("{} was changed by a set call that returned Error", v.name)
+        let [old, new] = [&before, &after].map(|bits| show(v, session.description.version, bits));
+        format!("a set call that returned Error changed {} from {old} to {new}", v.name)
     });
     Ok(())
 }

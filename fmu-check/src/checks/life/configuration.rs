@@ -5,7 +5,7 @@ use crate::encoding::{bits, show};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
-use crate::subjects::settable;
+use crate::settable::settable;
 use fmu_import::Status;
 use fmu_import::raw::{Buffer, Simple};
 use model_description::{BaseType, Causality, CoSimulation, Dimension, ModelVariable, Variability};
@@ -95,8 +95,8 @@ impl<'a> Size<'a> {
         for (array, count) in self.arrays(n) {
             let (status, intact) = get(instance, array, count)?;
             self.session.require(status.is_ok() && intact, || {
-                let name = &array.name;
-                format!("{when}, with {} = {n}, Get({name}) of {count} values returned {status}", self.v.name)
+                let (name, past) = (&array.name, if intact { "" } else { " and wrote past them" });
+                format!("{when}, with {} = {n}, Get({name}) of {count} values returned {status}{past}", self.v.name)
             });
         }
         Ok(())
@@ -220,7 +220,7 @@ fn bounds(session: &Session) -> Result<(), NotDetermined> {
             instance.perform(Simple::EnterConfigurationMode)?;
             let set = instance.set(size.v, &[value])?;
             let left = if set.is_ok() { instance.simple(Simple::ExitConfigurationMode)? } else { set };
-            session.require(!left.is_ok(), || format!("{} = {value} is accepted", size.v.name));
+            session.require(!left.is_ok(), || format!("{} = {value}, outside min and max, was accepted", size.v.name));
         }
         Ok(())
     })

@@ -6,6 +6,7 @@ use crate::checks::life::shared::by_name::{configuration, null_instance, unsuppo
 use crate::checks::life::shared::calls::attempt;
 use crate::checks::life::shared::kept::{set_all, texts};
 use crate::checks::process::instances::DISTURBED;
+use crate::encoding::{or_null, show};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{ENDED, NotDetermined, Session};
@@ -220,7 +221,9 @@ fn callbacks(session: &Session) -> Result<(), NotDetermined> {
     let arguments = Arguments { lasting: false, logging: true, ..session.arguments("probe") };
     short_run(session, &arguments, "valid arguments", Level::Must)?;
     let late = fmu_import::raw::take_events().iter().filter(|e| e.late).count();
-    session.require(late == 0, || format!("{late} messages used the struct after fmi2Instantiate had returned"));
+    session.require(late == 0, || {
+        format!("{late} messages were sent through the struct after fmi2Instantiate had returned")
+    });
     Ok(())
 }
 
@@ -228,18 +231,20 @@ fn interfaces(session: &Session) -> Result<(), NotDetermined> {
     let v3 = !session.is_v2();
     let mut cases = Vec::new();
     if session.description.model_exchange.is_none() {
-        cases.push(("model exchange", Interface::ModelExchange, false));
+        cases.push(("the description has no ModelExchange", Interface::ModelExchange, false));
     }
     if v3 && session.description.scheduled_execution.is_none() {
-        cases.push(("scheduled execution", Interface::ScheduledExecution, false));
+        cases.push(("the description has no ScheduledExecution", Interface::ScheduledExecution, false));
     }
     if v3 && !session.flag("hasEventMode") {
-        cases.push(("eventModeUsed = true", Interface::CoSimulation, true));
+        cases.push(("hasEventMode is false, and eventModeUsed was true", Interface::CoSimulation, true));
     }
-    session.cases(cases, |(what, interface, event_mode)| {
+    session.cases(cases, |(lacks, interface, event_mode)| {
         let arguments = Arguments { interface, event_mode, ..session.arguments("probe") };
         let created = session.instantiate(&arguments)?;
-        session.require(created.is_none(), || format!("an instantiation for {what} created an instance"));
+        session.require(created.is_none(), || {
+            format!("{} created an instance, although {lacks}", session.function_for(interface))
+        });
         Ok(())
     })
 }
@@ -275,15 +280,19 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             }
             let status = instance.simple(Simple::Reset)?;
             if !status.is_ok() {
-                session.violated(format!("Reset after {state:?} returned {status}"));
+                session.violated(format!("Reset in {state:?} returned {status}"));
                 return Ok(());
             }
             instance.experiment(session.start(), None);
             match run(&instance) {
                 Ok(second) => {
-                    session.compare(&format!("Reset after {state:?}, compared with a new instance"), &first, &second);
+                    session.compare(
+                        &format!("after Reset in {state:?}, compared with a new instance"),
+                        &first,
+                        &second,
+                    );
                 }
-                Err(why) => session.failed(&format!("after Reset after {state:?}"), why),
+                Err(why) => session.failed(&format!("after Reset in {state:?}"), why),
             }
             Ok(())
         });
@@ -321,12 +330,21 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
         }
         let [old, new] = [texts(&fresh)?, texts(&instance)?];
         for (old, new) in old.iter().zip(&new).filter(|(old, new)| old != new) {
-            session.violated(format!("after Reset {} is {:?}, and {:?} in a new instance", old.0, new.1, old.1));
+            session.violated(format!(
+                "after Reset, {} is {}; in a new instance it is {}",
+                old.0,
+                or_null(&new.1),
+                or_null(&old.1)
+            ));
         }
         instance.perform(Simple::Reset)?;
         instance.experiment(session.start(), None);
         let second = run(&instance)?;
-        session.compare("Reset after setting parameters, compared with a new instance", &first, &second);
+        session.compare(
+            "after Reset of an instance whose parameters were set, compared with a new instance",
+            &first,
+            &second,
+        );
         Ok(())
     });
     Ok(())
@@ -391,7 +409,8 @@ fn terminated(session: &Session) -> Result<(), NotDetermined> {
         let (status, now) = instance.get(v)?;
         session.require(status.is_ok(), || format!("Get({}) after Terminate returned {status}", v.name));
         if status.is_ok() && now != old {
-            session.lesser(Level::Hard, format!("Terminate changed {}", v.name));
+            let [old, new] = [&old, &now].map(|bits| show(v, session.description.version, bits));
+            session.lesser(Level::Hard, format!("Terminate changed {} from {old} to {new}", v.name));
         }
     }
     Ok(())

@@ -1,7 +1,10 @@
 //! Logging and memory (FMI 2.0.5, 2.1.5; FMI 3.0.2, 2.3.1).
 
+use super::shared::messages::{self, PERCENT, START};
 use crate::check::{Check, Levels, Run};
 use crate::checks::process::instances::only_once;
+use crate::encoding::or_null;
+use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
@@ -28,9 +31,10 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "With logging on, an instantiation that returns NULL is accompanied by a message.",
         tried: "Instantiates with a wrong token.", fix: "Log the reason before returning NULL." },
     Check { id: "G-L3b", clause: LOG, levels: Levels::SHOULD, run: Run::Probe(texts),
-        requirement: "Messages are UTF-8, not empty, and have no trailing line break.",
-        tried: "Reads the messages of a run with an Error.",
-        fix: "Write UTF-8 without a line break at the end; in FMI 2.0 a message is a printf format, so pass text with a % as the argument of \"%s\"." },
+        requirement: "Messages are finished text in UTF-8: not empty, without control characters or a trailing line break, and with a value for \
+            every conversion.",
+        tried: "Reads the messages of a run with an Error and of an instantiation with a wrong token, with a % in the instance name and in the token.",
+        fix: "Write UTF-8 without a line break at the end; in FMI 2.0 a message is a printf format, so pass text as the argument of \"%s\"." },
     Check { id: "G-L4", clause: LOG, levels: Levels::MUST, run: Run::Probe(identity),
         requirement: "Messages have the environment, and in FMI 2.0 the instance name, that were passed on instantiation.",
         tried: "Reads environment and name of all messages, also of the first of two instances.", fix: "Store both per instance." },
@@ -42,10 +46,13 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Runs with counting memory functions, then with NULL instead.", fix: "Use malloc and free, or drop the flag." },
 ];
 
-/// The log of a run with an error, and the environment and name of its instance.
-fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize, String), NotDetermined> {
+/// Name of the instance in most runs.
+const NAME: &str = "a probe's name";
+
+/// The log of a run with an error by an instance of this name, and the environment of the instance.
+fn log_of_a_run(session: &Session, name: &str, logging: bool) -> Result<(Vec<LogCall>, usize), NotDetermined> {
     let _ = take_events();
-    let mut arguments = session.arguments("a probe's name");
+    let mut arguments = session.arguments(name);
     arguments.logging = logging;
     let environment = arguments.environment;
     let instance = session.instantiate(&arguments)?.ok_or_else(|| NotDetermined("no instance".into()))?;
@@ -65,26 +72,20 @@ fn log_of_a_run(session: &Session, logging: bool) -> Result<(Vec<LogCall>, usize
         Ok(())
     })?;
     instance.free()?;
-    Ok((take_events(), environment, "a probe's name".into()))
+    Ok((take_events(), environment))
 }
 
+/// A message, and its format if that explains the text.
 fn show(event: &LogCall) -> String {
     let category = event.category.as_deref().unwrap_or("NULL");
-    let text = match (&event.text, &event.broken, &event.format) {
-        (Some(text), ..) => format!("{text:?}"),
-        (None, Some(text), Some(format)) => format!(
-            "{text:?} is not UTF-8; it is made from the printf format {format:?}: an argument is missing, or a text with a % was passed \
-             as the format"
-        ),
-        (None, Some(text), None) => format!("{text:?} is not UTF-8"),
-        (None, None, _) => "NULL".into(),
-    };
-    format!("{} [{category}] {text}", Status(event.status))
+    let text = event.text.as_ref().or(event.broken.as_ref()).map_or_else(|| "NULL".into(), |text| format!("{text:?}"));
+    let format = event.format.as_ref().map(|format| format!(", from the printf format {format:?}")).unwrap_or_default();
+    format!("{} [{category}] {text}{format}", Status(event.status))
 }
 
 fn categories(session: &Session) -> Result<(), NotDetermined> {
     let known: Vec<&str> = session.description.log_categories.iter().map(|c| c.name.as_str()).collect();
-    let (events, ..) = log_of_a_run(session, true)?;
+    let (events, _) = log_of_a_run(session, NAME, true)?;
     for event in &events {
         let good = event.category.as_deref().map_or(known.is_empty(), |c| known.contains(&c));
         session.require(good, || format!("{}; the categories are: {}", show(event), known.join(", ")));
@@ -171,18 +172,23 @@ fn refusals(session: &Session) -> Result<(), NotDetermined> {
 }
 
 fn texts(session: &Session) -> Result<(), NotDetermined> {
-    let (events, ..) = log_of_a_run(session, true)?;
-    for event in &events {
-        let good = event.text.as_deref().is_some_and(|t| !t.trim().is_empty() && !t.ends_with(['\n', '\r']));
-        session.require(good, || show(event));
-    }
+    let (mut events, _) = log_of_a_run(session, &format!("{START}{PERCENT}"), true)?;
+    let token = CString::new(format!("{{{START}{PERCENT}}}")).ok();
+    let arguments = Arguments { logging: true, token, ..session.arguments("probe") };
+    session.prepare(|| session.instantiate(&arguments)?.map_or(Ok(()), Instance::free))?;
+    events.extend(take_events());
     session.note(format!("{} messages", events.len()));
+    for event in &events {
+        if let Some((confidence, why)) = messages::fault(event) {
+            session.report(None, confidence, format!("{}: {why}", show(event)));
+        }
+    }
     Ok(())
 }
 
 fn identity(session: &Session) -> Result<(), NotDetermined> {
-    let (events, environment, name) = log_of_a_run(session, true)?;
-    whose(session, &events, environment, &name);
+    let (events, environment) = log_of_a_run(session, NAME, true)?;
+    whose(session, &events, environment, NAME);
     if events.is_empty() {
         return Err(NotDetermined("the FMU logged no message".into()));
     }
@@ -208,16 +214,16 @@ fn whose(session: &Session, events: &[LogCall], environment: usize, name: &str) 
     for event in events {
         session.require(event.environment == environment, || format!("{} has another environment", show(event)));
         if session.is_v2() {
-            let logged_name = event.instance.as_deref();
-            session.require(logged_name == Some(name), || {
-                format!("{} has the instance name {logged_name:?}, expected {name:?}", show(event))
+            session.require(event.instance.as_deref() == Some(name), || {
+                let found = or_null(&event.instance);
+                format!("{} has the instance name {found}, expected {name:?}", show(event))
             });
         }
     }
 }
 
 fn silence(session: &Session) -> Result<(), NotDetermined> {
-    let (events, ..) = log_of_a_run(session, false)?;
+    let (events, _) = log_of_a_run(session, NAME, false)?;
     for event in events.iter().filter(|e| e.status < Status::ERROR.0) {
         session.violated(format!("with loggingOn = false: {}", show(event)));
     }

@@ -3,6 +3,7 @@
 use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::kept::{set_all, texts};
 use crate::checks::process::instances::{LEFT_BY_STATE, leak};
+use crate::encoding::or_null;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
@@ -174,7 +175,9 @@ fn report(
 fn rerun_given_f02a(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str) -> Result<(), NotDetermined> {
     let (session, h) = (instance.session, instance.session.h());
     let same = |second: &Result<Vec<Vec<Vec<u64>>>, NotDetermined>, first: &[Vec<Vec<u64>>]| {
-        second.as_ref().is_ok_and(|second| difference(&session.watched(), first, second).is_none())
+        second
+            .as_ref()
+            .is_ok_and(|second| difference(session.description.version, &session.watched(), first, second).is_none())
     };
     let second = instance.run(first.len(), h);
     if same(&second, first) {
@@ -202,7 +205,7 @@ fn rerun_from_state(session: &Session) -> Result<(), NotDetermined> {
     let first = instance.run(50, h)?;
     for again in 1..=2 {
         instance.restore(state, time)?;
-        rerun(&instance, &first, &format!("restored {again} times"));
+        rerun(&instance, &first, &format!("restored {}", if again == 1 { "once" } else { "twice" }));
         // A state must also undo what a longer run and other inputs did.
         instance.change_inputs(4)?;
         instance.steps(7, h)?;
@@ -227,7 +230,7 @@ fn variables(session: &Session) -> Result<(), NotDetermined> {
     instance.steps(5, h)?;
     instance.restore(state, time)?;
     for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(&all)?)) {
-        session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
+        session.compare_variables(&[*v], "restored, compared with the time of saving", &[vec![old]], &[vec![new]]);
     }
     in_initialization(session, &|| session.initializing(), &all)
 }
@@ -249,10 +252,15 @@ pub(crate) fn in_initialization<'b>(
     }
     instance.restore(state, time)?;
     for (v, (old, new)) in all.iter().zip(before.into_iter().zip(instance.snapshot(all)?)) {
-        session.compare_variables(&[*v], "compared with the time of saving", &[vec![old]], &[vec![new]]);
+        session.compare_variables(&[*v], "restored, compared with the time of saving", &[vec![old]], &[vec![new]]);
     }
     for (old, new) in words.iter().zip(&texts(&instance)?).filter(|(old, new)| old != new) {
-        session.violated(format!("restored, {} is {:?}; it was {:?} at the time of saving", old.0, new.1, old.1));
+        session.violated(format!(
+            "restored, {} is {}; it was {} at the time of saving",
+            old.0,
+            or_null(&new.1),
+            or_null(&old.1)
+        ));
     }
     Ok(())
 }
@@ -371,7 +379,12 @@ fn serialized_variables(session: &Session) -> Result<(), NotDetermined> {
         session.compare_variables(&[*v], "deserialized, compared with the original", &[vec![old]], &[vec![new]]);
     }
     for (old, new) in texts(&instance)?.iter().zip(&texts(&other)?).filter(|(old, new)| old != new) {
-        session.violated(format!("deserialized, {} is {:?}; it was {:?} in the original", old.0, new.1, old.1));
+        session.violated(format!(
+            "deserialized, {} is {}; it was {} in the original",
+            old.0,
+            or_null(&new.1),
+            or_null(&old.1)
+        ));
     }
     // The model may reject these values in combination.
     if let (Ok(()), Err(why)) = (instance.exit(), other.exit()) {
@@ -388,7 +401,9 @@ fn equal_bytes(session: &Session) -> Result<(), NotDetermined> {
         instance.serialize(state)
     };
     let (one, two) = (make()?, make()?);
-    session.require(one.len() == two.len(), || format!("{} and {} bytes", one.len(), two.len()));
+    session.require(one.len() == two.len(), || {
+        format!("two instances after the same run give {} and {} bytes", one.len(), two.len())
+    });
     let places: Vec<_> = one.iter().zip(&two).enumerate().filter(|(_, (a, b))| a != b).map(|(i, _)| i).collect();
     if let Some(first) = places.first() {
         session.violated(format!(

@@ -3,6 +3,7 @@
 use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::kept::{set_all, texts};
 use crate::checks::process::shared::copies::{failed, second_binary};
+use crate::encoding::or_null;
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
 use crate::state::State;
@@ -95,7 +96,12 @@ fn interleaved(session: &Session) -> Result<(), NotDetermined> {
         let (alone, words) = &expected[k % kinds];
         session.compare(&format!("instance {k}"), alone, rows);
         for (old, new) in words.iter().zip(&texts(instance)?).filter(|(old, new)| old != new) {
-            session.violated(format!("instance {k}: {} is {:?}, and {:?} alone", old.0, new.1, old.1));
+            session.violated(format!(
+                "instance {k}: {} is {}; alone it is {}",
+                old.0,
+                or_null(&new.1),
+                or_null(&old.1)
+            ));
         }
     }
     free_others(session, all.into_iter().map(|(instance, _)| instance).collect())
@@ -299,7 +305,7 @@ fn reloads(session: &Session) -> Result<(), NotDetermined> {
     if let Ok(maps) = std::fs::read_to_string("/proc/self/maps") {
         let text = binary.to_string_lossy();
         session.require(!maps.lines().any(|l| l.ends_with(&*text)), || {
-            "the binary is still loaded after unloading".into()
+            format!("{} is still loaded after unloading", session.binary.file_name().unwrap_or_default().display())
         });
     }
     Ok(())

@@ -5,7 +5,7 @@ use crate::level::Level;
 use crate::session::{NotDetermined, Session};
 use crate::ticking::{CHANGED, Moment, NOT_YET_KNOWN, Served, UNCHANGED, clocks, is_periodic};
 use fmu_import::Status;
-use fmu_import::raw::Arguments;
+use fmu_import::raw::{Arguments, flag_text, number_text};
 use model_description::IntervalVariability::{Constant, Countdown, Fixed, Tunable};
 use model_description::{Causality, IntervalVariability, ModelVariable};
 
@@ -70,7 +70,7 @@ fn served(session: &Session) -> Result<(), NotDetermined> {
     needs_clocks!(session);
     let run = Served::start(session).and_then(|mut served| served.run(EVENTS, &mut |_, _, _| Ok(())));
     if let Err(why) = run {
-        session.failed("clocks are ticked when they are due", why);
+        session.failed("when clocks tick as they are due", why);
     }
     Ok(())
 }
@@ -83,7 +83,11 @@ fn deactivated(session: &Session) -> Result<(), NotDetermined> {
             let v = served.clocks[i].v;
             let (status, active) = served.instance.clock(v)?;
             if status.is_ok() && active != 0 && !std::mem::replace(&mut found, true) {
-                session.violated(format!("after UpdateDiscreteStates, GetClock({}) gave {active}", v.name));
+                session.violated(format!(
+                    "after UpdateDiscreteStates, GetClock({}) gave {}",
+                    v.name,
+                    flag_text(active.into())
+                ));
             }
         }
         Ok(())
@@ -104,6 +108,7 @@ fn activated(session: &Session) -> Result<(), NotDetermined> {
             let right = status.is_ok() && active == wanted;
             if !right && !std::mem::replace(&mut found, true) {
                 let name = &clock.v.name;
+                let active = flag_text(active.into());
                 session.violated(format!("GetClock({name}) returned {status} and gave {active} instead of {wanted}"));
             }
         }
@@ -139,14 +144,15 @@ fn described(session: &Session) -> Result<(), NotDetermined> {
         if timing.ticks == Constant || timing.interval.is_none() {
             let (status, (interval, _)) = instance.interval(v)?;
             session.require(status.is_ok() && wanted.is_none_or(|wanted| equal(interval, wanted)), || {
-                let wanted = wanted.map(|x| format!(" instead of {x} s")).unwrap_or_default();
+                let (wanted, interval) = (wanted.map(|x| format!(" instead of {x} s")), number_text(interval));
+                let wanted = wanted.unwrap_or_default();
                 format!("GetIntervalDecimal({}) returned {status} and gave {interval} s{wanted}", v.name)
             });
             let instance = session.initializing()?;
             let (status, shift) = instance.shift(v)?;
             let fits = timing.interval.is_none() || equal(shift, timing.shift);
             session.require(status.is_ok() && fits, || {
-                let wanted = timing.shift;
+                let (wanted, shift) = (timing.shift, number_text(shift));
                 format!("GetShiftDecimal({}) returned {status} and gave {shift} s instead of {wanted} s", v.name)
             });
         }
@@ -179,7 +185,8 @@ fn qualified(session: &Session) -> Result<(), NotDetermined> {
             _ => false,
         };
         if !good {
-            session.violated(format!("two calls of GetIntervalDecimal({}) gave the qualifiers {qualifiers:?}", v.name));
+            let given = qualifiers.into_iter().map(flag_text).collect::<Vec<_>>().join(" and ");
+            session.violated(format!("two calls of GetIntervalDecimal({}) gave the qualifiers {given}", v.name));
             break;
         }
     }
@@ -191,7 +198,7 @@ fn counted(session: &Session) -> Result<(), NotDetermined> {
     for (v, _, answers) in intervals(session)? {
         let wrong = answers.iter().find(|(x, qualifier)| *qualifier == CHANGED && !(x.is_finite() && *x >= 0.0));
         if let Some((interval, _)) = wrong {
-            session.violated(format!("GetIntervalDecimal({}) gave {interval} s", v.name));
+            session.violated(format!("GetIntervalDecimal({}) gave {} s", v.name, number_text(*interval)));
             break;
         }
     }
@@ -243,6 +250,8 @@ fn closed(session: &Session) -> Result<(), NotDetermined> {
 fn with_event_mode(session: &Session) -> Result<(), NotDetermined> {
     needs_clocks!(session);
     let made = session.instantiate(&Arguments { event_mode: false, ..session.arguments("probe") })?;
-    session.require(made.is_none(), || "an instance was made with eventModeUsed = false".into());
+    session.require(made.is_none(), || {
+        "fmi3InstantiateCoSimulation with eventModeUsed = false created an instance".into()
+    });
     Ok(())
 }

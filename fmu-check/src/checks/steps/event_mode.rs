@@ -7,6 +7,7 @@ use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
 use crate::state::Life;
+use crate::trajectory::steps;
 use fmu_import::Status;
 use fmu_import::raw::{Arguments, Simple, StepResults};
 use model_description::BaseType;
@@ -195,7 +196,7 @@ fn permitted(session: &Session) -> Result<(), NotDetermined> {
         if !status.is_ok() {
             None
         } else if flags.iter().any(|f| *f > 1) {
-            Some(format!("gave {stepped:?}: a Boolean is not 0 or 1, or was not written"))
+            Some(format!("gave {stepped}: a Boolean is not 0 or 1, or was not written"))
         } else if stepped.early == 1 && !stepper.early {
             Some("returned early, which was not allowed".into())
         } else if stepped.event == 1 && !stepper.event_mode {
@@ -216,7 +217,7 @@ fn reached(session: &Session) -> Result<(), NotDetermined> {
         let early = stepped.early == 1;
         standing.set(if stepped.last <= t { standing.get() + 1 } else { 0 });
         let good = stepped.last.is_finite() && stepped.last >= t && (!early || stepped.last <= end + 1e-9 * (end - t));
-        let text = format!("gave earlyReturn={}, lastSuccessfulTime={:?}", stepped.early, stepped.last);
+        let text = format!("gave {stepped}");
         // An early return may leave the time unchanged, but not repeatedly.
         if good && standing.get() == 20 {
             session.lesser(Level::Should, format!("DoStep(t={t:?}), the 20th in succession, {text}"));
@@ -275,8 +276,9 @@ fn round_trip(session: &Session) -> Result<(), NotDetermined> {
         }
         Ok(rows)
     };
-    if let Some((k, largest)) = deviation(&run(false)?, &run(true)?) {
-        session.violated(format!("after {k} steps the outputs differ (relative {largest:e})"));
+    if let Some(found) = deviation(&run(false)?, &run(true)?) {
+        let text = found.text(&session.names_of(&outputs));
+        session.violated(format!("with visits of Event Mode, after {} {text}", steps(found.step)));
     }
     Ok(())
 }

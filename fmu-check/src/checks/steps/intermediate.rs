@@ -5,8 +5,9 @@ use crate::exchange::deviation;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
+use crate::trajectory::steps;
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Heard, Inside, Meanwhile, Simple, StepResults};
+use fmu_import::raw::{Arguments, Heard, Inside, Meanwhile, Simple, StepResults, number_text};
 use model_description::{BaseType, Causality, ModelVariable};
 
 const CLAUSE: &str = "3.0.2, 4.2.2";
@@ -108,7 +109,9 @@ fn in_order(session: &Session) -> Result<(), NotDetermined> {
             let flags = [set_requested, get_allowed, finished, can_return];
             let outside = !(time >= earliest - near && time <= end + near);
             if outside || flags.iter().any(|flag| *flag > 1) || environment != own {
-                session.violated(format!("in the step from {t:?} to {end:?} after {earliest:?}: {heard:?}"));
+                session.violated(format!(
+                    "in the step from {t:?} to {end:?}, after an internal step to {earliest:?}: {heard}"
+                ));
                 return Ok(());
             }
             if finished == 1 {
@@ -118,7 +121,7 @@ fn in_order(session: &Session) -> Result<(), NotDetermined> {
         let _ = instance.snapshot(&session.watched())?;
         let late = session.raw.take_heard();
         if let Some(heard) = late.first() {
-            session.violated(format!("after the step to {end:?}: {heard:?}"));
+            session.violated(format!("in a getter after the step to {end:?}: {heard}"));
             return Ok(());
         }
     }
@@ -140,7 +143,7 @@ fn outputs(session: &Session) -> Result<(), NotDetermined> {
         let all = meanwhile.heard.iter().filter(open).count() == meanwhile.heard.len();
         let refused = meanwhile.answers.iter().find(|(_, (status, value, _))| !status.is_ok() || value.is_nan());
         if let Some((act, (answer, value, _))) = refused.filter(|_| all) {
-            session.violated(format!("in a callback, {act:?} returned {answer} and gave {value}"));
+            session.violated(format!("in a callback, {act:?} returned {answer} and gave {}", number_text(*value)));
             return Ok(());
         }
         instance.must("DoStep", status)?;
@@ -175,7 +178,7 @@ fn returned(session: &Session) -> Result<(), NotDetermined> {
         let early = stepped.early == u8::from(stepped.last < end - near);
         session.require(status.is_ok() && reached && (early || wanted >= end - near), || {
             format!(
-                "asked at {chance:?} to return at {wanted:?} of a step to {end:?}, DoStep returned {status}, {stepped:?} after {} callbacks",
+                "asked at {chance:?} to return at {wanted:?} of a step to {end:?}, DoStep returned {status}, {stepped}, after {} callbacks",
                 meanwhile.heard.len()
             )
         });
@@ -195,8 +198,8 @@ fn allowed(session: &Session) -> Result<(), NotDetermined> {
         let (status, stepped, meanwhile, [_, end]) = instance.step_updated(&[Inside::Return(t)])?;
         if first_chance(&meanwhile).is_some() || stepped.early == 1 {
             session.violated(format!(
-                "with earlyReturnAllowed = false, the step to {end:?} returned {status}, {stepped:?}; callbacks: {:?}",
-                meanwhile.heard
+                "with earlyReturnAllowed = false, the step to {end:?} returned {status}, {stepped}; {}",
+                meanwhile.heard.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")
             ));
             return Ok(());
         }
@@ -216,7 +219,9 @@ fn announced(session: &Session) -> Result<(), NotDetermined> {
     for _ in 0..5 {
         let (status, _, meanwhile, _) = instance.step_updated(&[])?;
         let calls = meanwhile.heard.len();
-        session.require(calls == 0, || format!("{calls} calls of intermediateUpdate in a step"));
+        session.require(calls == 0, || {
+            format!("a step made {calls} calls of intermediateUpdate, and providesIntermediateUpdate is false")
+        });
         if calls > 0 || !status.is_ok() {
             break;
         }
@@ -258,8 +263,9 @@ fn silent(session: &Session) -> Result<(), NotDetermined> {
         }
         Ok(rows)
     };
-    if let Some((k, largest)) = deviation(&run(false)?, &run(true)?) {
-        session.violated(format!("after {k} steps the outputs differ (relative {largest:e})"));
+    if let Some(found) = deviation(&run(false)?, &run(true)?) {
+        let text = found.text(&session.names_of(&outputs));
+        session.violated(format!("with a callback that does nothing, after {} {text}", steps(found.step)));
     }
     Ok(())
 }

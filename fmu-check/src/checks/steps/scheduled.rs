@@ -153,7 +153,7 @@ fn activated(session: &Session) -> Result<(), NotDetermined> {
         schedule.instance.perform(Simple::Terminate)
     });
     if let Err(why) = run {
-        session.failed("partitions are activated when their clocks tick", why);
+        session.failed("when partitions are activated as their clocks tick", why);
     }
     Ok(())
 }
@@ -213,7 +213,7 @@ fn locked(session: &Session) -> Result<(), NotDetermined> {
                     session.violated(format!("{what} {why}"));
                 }
             };
-            say(format!("the activation of {}", clock.name), unpaired(&meanwhile.heard));
+            say(format!("ActivateModelPartition({})", clock.name), unpaired(&meanwhile.heard));
             for v in on(session, clock) {
                 let _ = schedule.instance.get(v)?;
                 say(format!("Get({})", v.name), unpaired(&session.raw.take_heard()));

@@ -6,12 +6,13 @@ use crate::checks::life::shared::starts::{ended, no_step_after};
 use crate::checks::steps::shared::derivatives::{input_derivatives, output_derivatives, slopes};
 use crate::checks::steps::shared::plain_runs::determinism;
 use crate::checks::steps::shared::step_sizes::step_sizes;
+use crate::encoding::show;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{ENDED, NotDetermined, Session};
 use crate::trajectory::{difference, trajectory};
 use fmu_import::Status;
-use fmu_import::raw::StepStatus;
+use fmu_import::raw::{StepStatus, number_text};
 use model_description::{BaseType, Causality, CoSimulation, ModelVariable};
 use std::time::{Duration, Instant};
 
@@ -241,7 +242,7 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
         instance.must("DoStep", status)?;
         session
             .require([step_results.event, step_results.terminate, step_results.early].iter().all(|b| *b <= 1), || {
-                format!("DoStep(t={t}, h={h}) gave {step_results:?}: a Boolean is not 0 or 1, or was not written")
+                format!("DoStep(t={t}, h={h}) gave {step_results}: a Boolean is not 0 or 1, or was not written")
             });
         session.require(step_results.event != 1, || {
             format!("DoStep(t={t}, h={h}) asked for event handling, and the instance has no event mode")
@@ -251,7 +252,7 @@ fn step_results(session: &Session) -> Result<(), NotDetermined> {
         });
         // A step may end a little elsewhere: a fixed-step integrator cannot reach every time.
         let last = step_results.last;
-        let text = format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={last}");
+        let text = format!("DoStep(t={t}, h={h}) gave lastSuccessfulTime={}", number_text(last));
         if !last.is_finite() {
             session.violated(text);
         } else if step_results.early == 0 && step_results.terminate == 0 && (last - (t + h)).abs() >= h {
@@ -286,10 +287,11 @@ fn independent(session: &Session) -> Result<(), NotDetermined> {
             instance.steps(1, if varies { part * h } else { h })?;
         }
         let (status, bits) = instance.get(time)?;
-        let (t, step_results) = (instance.time.get(), bits.first().map_or(f64::NAN, |b| f64::from_bits(*b)));
-        let is_close = status.is_ok() && (step_results - t).abs() <= 1e-6 * h + 4.0 * f64::EPSILON * t.abs();
+        let (t, found) = (instance.time.get(), bits.first().map_or(f64::NAN, |b| f64::from_bits(*b)));
+        let is_close = status.is_ok() && (found - t).abs() <= 1e-6 * h + 4.0 * f64::EPSILON * t.abs();
         session.require(is_close, || {
-            format!("at the communication point {t}, Get({}) returned {status}, {step_results}", time.name)
+            let found = show(time, session.description.version, &bits);
+            format!("at the communication point {t}, Get({}) returned {status}, {found}", time.name)
         });
     }
     Ok(())
@@ -368,8 +370,9 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     let (unrestricted, restricted) = (session.stepping()?, session.stepping()?);
     let (a, b) = (run(&unrestricted, 0, false)?, run(&restricted, 0, true)?);
     // For the text the flag is a hint: that it changes no result is not said.
-    if let Some(found) = difference(&session.watched(), &a, &b) {
-        let text = format!("with noSetFMUStatePriorToCurrentPoint an output differs{}", found.text());
+    if let Some(found) = difference(session.description.version, &session.watched(), &a, &b) {
+        let name = session.watched().get(found.variable).map_or_else(String::new, |v| v.name.clone());
+        let text = format!("with noSetFMUStatePriorToCurrentPoint {name} differs{}", found.text());
         session.deviates_at(Some(Level::Should), found.largest, &text);
     }
     if !saves {
@@ -381,7 +384,8 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
     let first = unrestricted.run(10, session.h())?;
     unrestricted.restore(here, time)?;
     let leads_back = unrestricted.run(10, session.h()).is_ok_and(|again| {
-        difference(&session.watched(), &first, &again).is_none_or(|d| d.largest <= session.tolerance())
+        difference(session.description.version, &session.watched(), &first, &again)
+            .is_none_or(|d| d.largest <= session.tolerance())
     });
     if !leads_back {
         return Err(NotDetermined("without the flag, a state that was set does not lead back either (F02a)".into()));
@@ -393,6 +397,6 @@ fn no_set_state_before(session: &Session) -> Result<(), NotDetermined> {
             .violated(format!("restoring the current point after a step with noSetFMUStatePriorToCurrentPoint: {why}"));
         return Ok(());
     }
-    session.compare("after the state was set", &first, &run(&restricted, 10, false)?);
+    session.compare("after a state was restored", &first, &run(&restricted, 10, false)?);
     Ok(())
 }

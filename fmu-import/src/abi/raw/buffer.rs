@@ -52,6 +52,12 @@ impl Buffer {
         (0..self.count).map(|i| (0..self.width).map(|k| byte(i * self.width + k) << (8 * k)).sum()).collect()
     }
 
+    /// Whether a value was not written. Bytes and 16-bit numbers may have the bits of the pattern: of these, none was.
+    pub fn is_unwritten(&self) -> bool {
+        let mut untouched = self.bits().into_iter().map(|bits| bits == CANARY >> (64 - 8 * self.width));
+        if self.width < 4 { self.count > 0 && untouched.all(|u| u) } else { untouched.any(|u| u) }
+    }
+
     /// Whether nothing was written past the values.
     pub fn intact(&self) -> bool {
         self.words[(self.count * self.width).div_ceil(8)..].iter().all(|w| *w == CANARY)
@@ -109,7 +115,21 @@ mod tests {
         ] {
             let buffer = Buffer::of(base, FmiVersion::V3, &bits);
             assert_eq!(buffer.bits(), bits);
-            assert!(buffer.intact());
+            assert!(buffer.intact() && !buffer.is_unwritten());
+        }
+    }
+
+    #[test]
+    fn values_that_were_not_written_are_known() {
+        let pattern = CANARY & 0xffff_ffff;
+        for (base, bits, unwritten) in [
+            (BaseType::Float64, &[1, CANARY][..], true),
+            (BaseType::Int32, &[pattern, 3], true),
+            (BaseType::UInt8, &[0xc5, 3], false),
+            (BaseType::UInt8, &[0xc5, 0xc5], true),
+            (BaseType::Float64, &[], false),
+        ] {
+            assert_eq!(Buffer::of(base, FmiVersion::V3, bits).is_unwritten(), unwritten, "{base} {bits:?}");
         }
     }
 }

@@ -24,6 +24,8 @@ pub struct LogCall {
     pub broken: Option<String>,
     /// The format, if it has values (FMI 2.0 only).
     pub format: Option<String>,
+    /// What is certainly wrong with the format or its arguments (FMI 2.0 only).
+    pub fault: Option<String>,
     /// The FMU used a struct of callbacks that was no longer valid (FMI 2.0 only).
     pub late: bool,
 }
@@ -78,12 +80,13 @@ impl<const LATE: bool> Listener for Recorder<LATE> {
     unsafe fn hear(called: Called) {
         // SAFETY: the FMU passes C strings.
         let (instance, category) = unsafe { (optional(called.instance), optional(called.category)) };
-        let (text, broken) = readable(called.text);
+        let (text, fault) = called.text.map_or((None, None), |formatted| (Some(formatted.text), formatted.fault));
+        let (text, broken) = readable(text);
         // SAFETY: the FMU passes a C string.
         let format = unsafe { bytes(called.format) }.map(|format| String::from_utf8_lossy(&format).into_owned());
         let format = format.filter(|format| format.replace("%%", "").contains('%') && format != "%s");
         let (environment, status) = (called.environment.addr(), called.status.0);
-        push(LogCall { environment, instance, status, category, text, broken, format, late: LATE });
+        push(LogCall { environment, instance, status, category, text, broken, format, fault, late: LATE });
     }
 }
 
@@ -97,7 +100,17 @@ pub(super) unsafe extern "C" fn logger3(
     let (category, text) = unsafe { (optional(category), bytes(text)) };
     let (text, broken) = readable(text);
     let (environment, status) = (environment.addr(), status.0);
-    push(LogCall { environment, instance: None, status, category, text, broken, format: None, late: false });
+    push(LogCall {
+        environment,
+        instance: None,
+        status,
+        category,
+        text,
+        broken,
+        format: None,
+        fault: None,
+        late: false,
+    });
 }
 
 pub(super) unsafe extern "C" fn allocate(count: usize, size: usize) -> *mut c_void {

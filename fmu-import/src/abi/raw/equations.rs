@@ -3,7 +3,7 @@
 use super::library::Raw;
 use super::names::{Count, Sensitivity, Vector};
 use super::owned::Handle;
-use super::results::{UNTOUCHED, UpdateResults};
+use super::results::{UNTOUCHED, UNTOUCHED_NUMBER, UpdateResults};
 use crate::abi::arguments::{Array, ArrayMut};
 use crate::abi::log::Status;
 use std::ffi::c_int;
@@ -22,7 +22,7 @@ pub struct SensitivityArguments<'a> {
 impl Raw {
     /// `fmi2NewDiscreteStates` or `fmi3UpdateDiscreteStates`; with `null`, all results get NULL.
     pub fn update_discrete_states(&self, instance: Handle, null: bool) -> Option<(Status, UpdateResults)> {
-        self.calls.update_discrete_states(self.owned().pointer(instance), null, (UNTOUCHED, f64::NAN)).result()
+        self.calls.update_discrete_states(self.owned().pointer(instance), null, (UNTOUCHED, UNTOUCHED_NUMBER)).result()
     }
 
     /// `SetTime`.
@@ -74,7 +74,7 @@ impl Raw {
 
     /// Derivatives of outputs with respect to time.
     pub fn output_derivatives(&self, instance: Handle, references: &[u32], order: c_int) -> Option<(Status, Vec<f64>)> {
-        let (orders, mut values) = (vec![order; references.len()], vec![f64::NAN; references.len()]);
+        let (orders, mut values) = (vec![order; references.len()], vec![UNTOUCHED_NUMBER; references.len()]);
         let i = self.owned();
         let status = self.calls.output_derivatives(i.pointer(instance), references, &orders, &mut values).status()?;
         Some((status, values))

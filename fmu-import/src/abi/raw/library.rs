@@ -1,10 +1,10 @@
 //! A loaded binary with its instances: the calls of every FMU.
 
-use super::buffer::{Buffer, CANARY, type_name};
+use super::buffer::{Buffer, type_name};
 use super::callbacks::optional;
 use super::names::{Simple, StepStatus, Text};
 use super::owned::{Handle, Owned};
-use super::results::{ResultPointers, StepResults, UNTOUCHED};
+use super::results::{ResultPointers, StepResults, UNTOUCHED, UNTOUCHED_NUMBER};
 use crate::abi::arguments::Array;
 use crate::abi::functions::{CType, Calls, Way};
 use crate::abi::library;
@@ -246,7 +246,7 @@ impl Raw {
         no_prior: bool,
         pointers: ResultPointers,
     ) -> Option<(Status, StepResults)> {
-        let before = StepResults { event: UNTOUCHED, terminate: UNTOUCHED, early: UNTOUCHED, last: f64::NAN };
+        let before = StepResults { event: UNTOUCHED, terminate: UNTOUCHED, early: UNTOUCHED, last: UNTOUCHED_NUMBER };
         self.calls.do_step(self.owned().pointer(instance), (t, h), no_prior, pointers, before).result()
     }
 
@@ -266,6 +266,6 @@ impl Raw {
 
     /// `fmi2Get...Status` with a buffer for any of its results; returns its first eight bytes.
     pub fn step_status(&self, name: StepStatus, instance: Handle, kind: c_int) -> Option<(Status, u64)> {
-        self.calls.step_status(name, self.owned().pointer(instance), kind, CANARY).result()
+        self.calls.step_status(name, self.owned().pointer(instance), kind, UNTOUCHED_NUMBER.to_bits()).result()
     }
 }

@@ -31,5 +31,5 @@ pub use library::Raw;
 pub use names::{Count, Interface, Optional, Sensitivity, Simple, StepStatus, Text, Vector};
 pub use owned::{Handle, SavedState};
 pub use processor::{armed_timers, float_control, locale};
-pub use results::{ResultPointers, StepResults, UpdateResults};
+pub use results::{ResultPointers, StepResults, UpdateResults, flag_text, number_text};
 pub use updates::{Answered, Heard, Inside, Meanwhile};

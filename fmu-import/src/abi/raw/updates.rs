@@ -8,9 +8,10 @@ use super::super::log::Status;
 use super::library::Raw;
 use super::names::Simple;
 use super::owned::Handle;
-use super::results::{StepResults, UNTOUCHED};
+use super::results::{StepResults, UNTOUCHED, UNTOUCHED_NUMBER};
 use crate::abi::arguments::Given;
 use std::ffi::c_void;
+use std::fmt;
 use std::ptr;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -38,6 +39,21 @@ pub enum Heard {
     Lock,
     /// `unlockPreemption`.
     Unlock,
+}
+
+impl fmt::Display for Heard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Intermediate { environment, time, set_requested, get_allowed, finished, can_return } => write!(
+                f,
+                "intermediateUpdate(environment={environment:#x}, time={time:?}, setRequested={set_requested}, getAllowed={get_allowed}, \
+                 stepFinished={finished}, canReturnEarly={can_return})"
+            ),
+            Self::Clocks(environment) => write!(f, "clockUpdate(environment={environment:#x})"),
+            Self::Lock => f.write_str("lockPreemption"),
+            Self::Unlock => f.write_str("unlockPreemption"),
+        }
+    }
 }
 
 /// Actions of the importer in `intermediateUpdate` and in `clockUpdate`.
@@ -106,7 +122,7 @@ impl Plan {
         };
         let mut end = None;
         for &act in &self.acts {
-            let (mut value, mut qualifier) = (f64::NAN, 0);
+            let (mut value, mut qualifier) = (UNTOUCHED_NUMBER, 0);
             let status = match act {
                 Inside::Return(time) => {
                     end = Some(time);
@@ -118,10 +134,13 @@ impl Plan {
                     value = active.into();
                     status
                 }),
-                Inside::Interval(clock) => calls.interval(instance, clock).result().map(|(status, answer)| {
-                    (value, qualifier) = answer;
-                    status
-                }),
+                Inside::Interval(clock) => calls
+                    .interval(instance, clock, (UNTOUCHED_NUMBER, UNTOUCHED.into()))
+                    .result()
+                    .map(|(status, answer)| {
+                        (value, qualifier) = answer;
+                        status
+                    }),
             };
             if let Some(status) = status {
                 scene().meanwhile.answers.push((act, (status, value, qualifier)));
@@ -195,7 +214,7 @@ impl Raw {
         (t, h): (f64, f64),
         acts: &[Inside],
     ) -> Option<(Status, (StepResults, Meanwhile))> {
-        let before = StepResults { event: UNTOUCHED, terminate: UNTOUCHED, early: UNTOUCHED, last: f64::NAN };
+        let before = StepResults { event: UNTOUCHED, terminate: UNTOUCHED, early: UNTOUCHED, last: UNTOUCHED_NUMBER };
         let step = |given: Given<'_>| self.calls.do_step(given, (t, h), false, [true; 4], before).result();
         let (result, meanwhile) = self.under_way(instance, acts, step);
         result.map(|(status, stepped)| (status, (stepped, meanwhile)))
@@ -226,7 +245,7 @@ impl Raw {
 
     /// `fmi3GetIntervalDecimal` of one clock: interval in s, and qualifier.
     pub fn interval(&self, instance: Handle, clock: u32) -> Option<(Status, (f64, i32))> {
-        self.calls.interval(self.owned().pointer(instance), clock).result()
+        self.calls.interval(self.owned().pointer(instance), clock, (UNTOUCHED_NUMBER, UNTOUCHED.into())).result()
     }
 
     /// `fmi3SetIntervalDecimal` of one clock.
@@ -236,7 +255,7 @@ impl Raw {
 
     /// `fmi3GetShiftDecimal` of one clock.
     pub fn shift(&self, instance: Handle, clock: u32) -> Option<(Status, f64)> {
-        self.calls.shift(self.owned().pointer(instance), clock).result()
+        self.calls.shift(self.owned().pointer(instance), clock, UNTOUCHED_NUMBER).result()
     }
 }
 

@@ -2,9 +2,10 @@
 
 use crate::checks::life::shared::kept::set_all;
 use crate::checks::process::instances::DISTURBED;
+use crate::encoding::show;
 use crate::exchange::{Importer, differ};
 use crate::session::{NotDetermined, Session};
-use crate::subjects::settable;
+use crate::settable::settable;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, ModelVariable, Unknown, Variability};
 
@@ -12,7 +13,9 @@ use model_description::{BaseType, ModelVariable, Unknown, Variability};
 fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable, (old, new): (&[u64], &[u64])) {
     if !old.is_empty() && !new.is_empty() {
         let (line, name, other) = (unknown.line, &unknown.name, &known.name);
-        let text = format!("line {line}: {name} changes with {other}, which is not among its dependencies");
+        let [before, after] = [old, new].map(|bits| show(unknown, session.description.version, bits));
+        let change = format!("{name} changes from {before} to {after} with {other}");
+        let text = format!("line {line}: {change}, which is not among its dependencies");
         session.value_deviates(unknown, old, new.to_vec(), &text);
     }
 }

@@ -3,12 +3,13 @@
 use crate::checks::life::shared::values::is_rounded;
 use crate::checks::process::instances::only_once;
 use crate::encoding::{same, show};
-use crate::exchange::{Importer, deviation, differ};
+use crate::exchange::{Importer, deviation};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
 use crate::state::State;
-use fmu_import::raw::{Arguments, Interface, Simple};
+use crate::trajectory::steps;
+use fmu_import::raw::{Arguments, Interface, Simple, flag_text};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 
 /// States near those given: one of them, or all, moved slightly.
@@ -108,13 +109,14 @@ pub(crate) fn pure(session: &Session) -> Result<(), NotDetermined> {
         }
     };
     let Some((_, derivatives, indicators)) = found.first() else { return Ok(()) };
+    let names = session.names_of(&session.derivative_variables());
     for (what, values, z) in &found[1..] {
-        if let Some((_, largest)) = deviation(std::slice::from_ref(derivatives), std::slice::from_ref(values)) {
-            session.deviates(largest, &format!("the derivatives are {derivatives:?}; {what}, {values:?}"));
+        if let Some(found) = deviation(std::slice::from_ref(derivatives), std::slice::from_ref(values)) {
+            session.deviates(found.largest, &format!("{what}: {}", found.text(&names)));
         }
-        if let Some((_, largest)) = deviation(std::slice::from_ref(indicators), std::slice::from_ref(z)) {
-            let text = format!("the event indicators are {indicators:?}; {what}, {z:?}");
-            session.deviates_at(Some(Level::Should), largest, &text);
+        if let Some(found) = deviation(std::slice::from_ref(indicators), std::slice::from_ref(z)) {
+            let text = format!("{what}: {}", found.text(&session.names_of_indicators()));
+            session.deviates_at(Some(Level::Should), found.largest, &text);
         }
     }
     Ok(())
@@ -127,8 +129,11 @@ pub(crate) fn same_bits(session: &Session) -> Result<(), NotDetermined> {
     let found = evaluations(session)?.map_err(NotDetermined)?;
     let Some((_, first, _)) = found.first() else { return Ok(()) };
     for (what, values, _) in &found[1..] {
-        let same = first.iter().zip(values).all(|(a, b)| a.to_bits() == b.to_bits());
-        session.require(same, || format!("the derivatives are {first:?}; {what}, {values:?}"));
+        let names = session.names_of(&session.derivative_variables());
+        for ((name, a), b) in names.iter().zip(first).zip(values) {
+            let apart = || format!("{what}: {name} is {b:?}, expected {a:?} ({:.1e} apart)", (a - b).abs());
+            session.require(a.to_bits() == b.to_bits(), apart);
+        }
     }
     Ok(())
 }
@@ -164,9 +169,14 @@ impl<'a, 'b> Snapshot<'a, 'b> {
     fn require(&self, call: &str) -> Result<(), NotDetermined> {
         let session = self.instance.session;
         let now = vectors(self.instance)?;
-        for (what, (before, after)) in ["states", "derivatives"].iter().zip(self.vectors.iter().zip(&now)) {
-            session
-                .require(!differ(before, after), || format!("{call}: the {what} were {before:?}, and are {after:?}"));
+        let names =
+            [session.names_of(&session.description.states()), session.names_of(&session.derivative_variables())];
+        for (names, (before, after)) in names.iter().zip(self.vectors.iter().zip(&now)) {
+            let found = deviation(std::slice::from_ref(before), std::slice::from_ref(after));
+            if let Some(found) = found {
+                let t = self.instance.time.get();
+                session.violated(format!("after {call} at t = {t:?}: {}", found.text(names)));
+            }
         }
         self.require_but_states(call)
     }
@@ -194,7 +204,8 @@ pub(crate) fn completed_step(session: &Session) -> Result<(), NotDetermined> {
         let before = Snapshot::read(&instance)?;
         let (status, flags) = instance.completed()?;
         session.require(status.is_ok() && flags.iter().all(|f| matches!(f, 0 | 1)), || {
-            format!("CompletedIntegratorStep returned {status}, enterEventMode and terminateSimulation {flags:?}")
+            let [enter, end] = flags.map(flag_text);
+            format!("CompletedIntegratorStep returned {status}, enterEventMode={enter}, terminateSimulation={end}")
         });
         if !status.is_ok() || flags != [0, 0] {
             return Ok(());
@@ -218,7 +229,8 @@ pub(crate) fn independent(session: &Session) -> Result<(), NotDetermined> {
         let (status, bits) = instance.get(time)?;
         let found = bits.first().map_or(f64::NAN, |b| f64::from_bits(*b));
         session.require(status.is_ok() && (found - t).abs() <= 1e-9 * t.abs(), || {
-            format!("after SetTime({t:?}), Get({}) returned {status}, {found:?}", time.name)
+            let found = show(time, session.description.version, &bits);
+            format!("after SetTime({t:?}), Get({}) returned {status}, {found}", time.name)
         });
     }
     Ok(())
@@ -272,9 +284,10 @@ pub(crate) fn interleaved(session: &Session) -> Result<(), NotDetermined> {
         rows_of_last.extend(of_last.trajectory(1)?);
     }
     let compare = |k: usize, rows: &[Vec<f64>], when: &str| {
-        if let Some((step, largest)) = deviation(&expected[..expected.len().min(rows.len().max(60))], rows) {
-            let text = format!("instance {}: the run differs from one alone after {step} steps{when}", k + 2);
-            session.deviates(largest, &text);
+        if let Some(found) = deviation(&expected[..expected.len().min(rows.len().max(60))], rows) {
+            let (step, text) = (steps(found.step), found.text(&session.names_of_rows()));
+            let text = format!("instance {}, compared with one alone: after {step} {text}{when}", k + 2);
+            session.deviates(found.largest, &text);
             return false;
         }
         true
@@ -303,9 +316,11 @@ pub(crate) fn start_times(session: &Session) -> Result<(), NotDetermined> {
         };
         match run() {
             Err(why) => session.failed(&format!("startTime={start}"), why),
-            Ok(next) => session.require(next.is_none_or(|next| next > start), || {
-                format!("startTime={start}: nextEventTime of the first event is {next:?}")
-            }),
+            Ok(next) => {
+                if let Some(next) = next.filter(|next| *next <= start) {
+                    session.violated(format!("startTime={start}: nextEventTime of the first event is {next:?}"));
+                }
+            }
         }
         Ok(())
     })

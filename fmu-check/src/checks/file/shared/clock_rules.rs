@@ -2,6 +2,7 @@
 
 use crate::check::Verdict;
 use crate::checks::file::xml::with_description;
+use crate::encoding::attribute;
 use crate::fmu_file::FmuFile;
 use model_description::{Element, FmiVersion, parse_number};
 use std::collections::HashMap;
@@ -148,7 +149,7 @@ pub(crate) fn names_of_types(fmu: &FmuFile) -> Verdict {
         d.types
             .iter()
             .filter(|t| names.contains(t.name.as_str()))
-            .map(|t| format!("the type {} has the name of a variable", t.name))
+            .map(|t| format!("line {}: the type {:?} has the name of a variable", t.line, t.name))
             .collect()
     })
 }
@@ -212,7 +213,11 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
     // FMI 2.0 borrowed the file from FMI 3.0.
     let (own, version) = (fmu.root().and_then(|r| r.get("fmiVersion")), root.get("fmiVersion"));
     if version.is_none() || (fmu.version == FmiVersion::V3 && version != own) {
-        found.push(format!("{FILE}: fmiVersion is {version:?}, and {own:?} in modelDescription.xml"));
+        found.push(format!(
+            "{FILE}: fmiVersion is {}, and {} in modelDescription.xml",
+            attribute(version),
+            attribute(own)
+        ));
     }
     let configurations: Vec<&Element> = root.all("BuildConfiguration").collect();
     if configurations.is_empty() {
@@ -237,12 +242,18 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
         }
         for file in configuration.all("SourceFileSet").flat_map(|set| set.all("SourceFile").collect::<Vec<_>>()) {
             let name = file.get("name").unwrap_or_default();
-            if fmu.zip.find(&format!("sources/{name}")).is_none() {
+            if !is_source(fmu, name) {
                 found.push(format!("{FILE}: line {}: the file sources/{name} is missing", file.line));
             }
         }
     }
     Verdict::of(found)
+}
+
+/// Whether a file below sources/ is in the archive. Its name may have parts that are `.`, as those of OpenModelica have.
+fn is_source(fmu: &FmuFile, name: &str) -> bool {
+    let parts: Vec<_> = name.split('/').filter(|part| *part != ".").collect();
+    fmu.zip.find(&format!("sources/{}", parts.join("/"))).is_some()
 }
 
 /// Files that modelDescription.xml of FMI 2.0 lists.
@@ -256,8 +267,7 @@ pub(crate) fn source_files(fmu: &FmuFile) -> Verdict {
     let files = lists.iter().flat_map(|list| list.all("File"));
     let missing = files.filter_map(|file| {
         let name = file.get("name").unwrap_or_default();
-        let there = fmu.zip.find(&format!("sources/{name}")).is_some();
-        (!there).then(|| format!("line {}: the file sources/{name} is missing", file.line))
+        (!is_source(fmu, name)).then(|| format!("line {}: the file sources/{name} is missing", file.line))
     });
     Verdict::of(missing.collect())
 }
@@ -270,7 +280,7 @@ pub(crate) fn long_intervals(fmu: &FmuFile) -> Verdict {
     };
     each(fmu, |v, _| {
         let interval = v.get("intervalDecimal").and_then(|text| parse_number(text.trim()));
-        let long = interval.filter(|x| v.name == "Clock" && *x > span);
+        let long = interval.filter(|x| v.name == "Clock" && *x > span && span > 0.0);
         long.map(|x| format!("has an interval of {x} s, and the default experiment takes {span} s"))
             .into_iter()
             .collect()

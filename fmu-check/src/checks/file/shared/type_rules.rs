@@ -33,9 +33,6 @@ pub(crate) fn definitions(fmu: &FmuFile) -> Verdict {
             if d.types[..i].iter().any(|other| other.name == t.name) {
                 findings.push(format!("line {}: there is another type {:?}", t.line, t.name));
             }
-            if d.version == FmiVersion::V2 && d.variables.iter().any(|v| v.name == t.name) {
-                findings.push(format!("line {}: type {:?} has the name of a variable", t.line, t.name));
-            }
             for (j, item) in t.items.iter().enumerate() {
                 if t.items[..j].iter().any(|other| other.name == item.name || other.value == item.value) {
                     findings.push(format!(

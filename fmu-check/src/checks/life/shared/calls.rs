@@ -3,8 +3,8 @@
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
+use crate::settable::settable;
 use crate::state::{Life, State};
-use crate::subjects::settable;
 use fmu_import::Status;
 use fmu_import::raw::{SavedState, Sensitivity, Simple, Vector, take_events};
 use model_description::{Causality, CoSimulation, FmiVersion, ModelVariable, Variability};

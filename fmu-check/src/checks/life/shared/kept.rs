@@ -4,7 +4,7 @@ use crate::checks::life::shared::values::is_rounded;
 use crate::encoding::{bits, quoted, same, show};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use crate::subjects::settable;
+use crate::settable::settable;
 use fmu_import::Status;
 use fmu_import::raw::{Buffer, take_events};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
@@ -36,14 +36,14 @@ pub(crate) fn several(session: &Session) -> Result<(), NotDetermined> {
             let turned = |n: usize| if order == "in order" { n } else { list.len() - 1 - n };
             let references: Vec<u32> = (0..list.len()).map(|n| list[turned(n)].value_reference).collect();
             let mut buffer = Buffer::room(base, version, list.len());
-            let untouched = buffer.clone();
             let call = format!("Get({} variables of the type {base}, {order})", list.len());
             let status = instance.call(&call, |raw| {
                 raw.get(instance.handle, base, Some(&references), list.len(), Some(&mut buffer), list.len())
             })?;
             session.require(status.is_ok(), || format!("{call} returned {status}"));
-            session.require(!status.is_ok() || buffer != untouched, || format!("{call} returned OK and wrote nothing"));
-            if !status.is_ok() || buffer == untouched {
+            let written = status.is_ok() && !buffer.is_unwritten();
+            session.require(!status.is_ok() || written, || format!("{call} returned OK and did not write all values"));
+            if !written {
                 return Ok(());
             }
             tried += 1;
@@ -129,7 +129,7 @@ pub(crate) fn written(session: &Session) -> Result<(), NotDetermined> {
             }
             if status.is_ok() && session.unwritten.get() {
                 session.violated(format!(
-                    "line {}: Get({}) after {k} steps returned OK and wrote nothing",
+                    "line {}: Get({}) after {k} steps returned OK and did not write the value",
                     v.line, v.name
                 ));
                 return Ok(true);
@@ -169,7 +169,7 @@ pub(crate) fn booleans_read(session: &Session) -> Result<(), NotDetermined> {
             let (status, found) = instance.get(v)?;
             if status.is_ok() && found.iter().any(|b| *b > 1) {
                 let text = show(v, session.description.version, &found);
-                session.violated(format!("line {}: {} is {text} after {k} steps", v.line, v.name));
+                session.violated(format!("line {}: {} is {text} after {k} steps, neither 0 nor 1", v.line, v.name));
                 return Ok(true);
             }
         }

@@ -4,9 +4,9 @@
 use crate::encoding::{same, show};
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
-use crate::subjects::settable;
+use crate::settable::settable;
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Interface, Raw, Simple, StepStatus};
+use fmu_import::raw::{Arguments, Interface, Raw, Simple, StepStatus, number_text};
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 
 /// `fmi2LastSuccessfulTime`, a status kind.
@@ -44,7 +44,7 @@ pub(crate) fn stand(session: &Session) -> Result<(), NotDetermined> {
             must(status, &format!("{of}Get({}) {when}", v.name));
             session.require(!status.is_ok() || same(v, version, wanted, &found), || {
                 let [wanted, got] = [wanted, &found].map(|bits| show(v, version, bits));
-                format!("{of}{} = {got} {when}, expected {wanted}", v.name)
+                format!("{of}{} is {got} {when}, expected {wanted}", v.name)
             });
             Ok::<_, NotDetermined>(())
         };
@@ -88,6 +88,7 @@ fn end(session: &Session) -> Result<Option<(Instance<'_>, f64)>, NotDetermined> 
 
 const NO_END: &str = "the FMU does not end the simulation within the default experiment";
 
+/// The time, which is NaN if the FMU did not write it.
 fn last_successful_time(instance: &Instance<'_>) -> Result<(Status, f64), NotDetermined> {
     let call = "GetRealStatus(fmi2LastSuccessfulTime)";
     let ask = |raw: &Raw| raw.step_status(StepStatus::GetRealStatus, instance.handle, LAST_SUCCESSFUL_TIME);
@@ -104,6 +105,7 @@ pub(crate) fn ended(session: &Session) -> Result<(), NotDetermined> {
         let rounding = 1e-9 * h + 4.0 * f64::EPSILON * t.abs();
         let inside = last >= t - rounding && last <= t + h + rounding;
         session.require(status.is_ok() && inside, || {
+            let last = number_text(last);
             format!("fmi2LastSuccessfulTime after the end in the step from {t} to {} returned {status}, {last}", t + h)
         });
     }
@@ -122,7 +124,9 @@ pub(crate) fn ended(session: &Session) -> Result<(), NotDetermined> {
 pub(crate) fn no_step_after(session: &Session) -> Result<(), NotDetermined> {
     let Some((instance, t)) = end(session)? else { return session.not_applicable(NO_END) };
     let h = session.h();
-    let from = if session.is_v2() { last_successful_time(&instance)?.1 } else { t + h };
+    // T12 looks at the time that the FMU returns.
+    let last = if session.is_v2() { last_successful_time(&instance)?.1 } else { t + h };
+    let from = if last.is_nan() { t + h } else { last };
     let status = instance.step_at(from, h)?;
     session.require(!status.is_ok(), || {
         format!("the FMU ended the simulation in the step from {t}, and DoStep(t={from}, h={h}) returned {status}")

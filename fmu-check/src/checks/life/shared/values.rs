@@ -3,7 +3,7 @@
 use crate::encoding::{bits, quoted, same, show};
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};
-use crate::subjects::settable;
+use crate::settable::settable;
 use fmu_import::Status;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, Causality, FmiVersion, ModelVariable, Variability, parse_number};
@@ -28,7 +28,9 @@ pub(crate) fn expected(v: &ModelVariable, n: usize) -> Option<Vec<u64>> {
 pub(crate) fn round_trip(session: &Session) -> Result<(), NotDetermined> {
     let mut instance = session.initializing()?;
     let (mut refused, mut kept) = (Vec::new(), Vec::new());
-    for v in session.numeric().filter(|v| settable(v)) {
+    // G09 looks at outputs and local variables.
+    let given = |v: &&ModelVariable| settable(v) && matches!(v.causality, Causality::Input | Causality::Parameter);
+    for v in session.numeric().filter(given) {
         let Some(values) = session.different_value(v, 1.0) else { continue };
         let status = instance.set(v, &values)?;
         if !status.is_ok() {

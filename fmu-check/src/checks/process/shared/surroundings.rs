@@ -1,6 +1,7 @@
 //! State that an FMU must leave unchanged: settings of the process, the folder of the FMU, and everything that outlives a run.
 
 use crate::checks::process::shared::copies::{Files, MANY, failed, list, second_binary};
+use crate::lines::PROBE_FOLDER;
 use crate::session::{NotDetermined, Session};
 use fmu_import::raw::{armed_timers, locale};
 use fmu_import::{guard, limits};
@@ -33,7 +34,8 @@ fn without_those_of_the_library(signals: &str) -> String {
 fn current_settings() -> BTreeMap<String, String> {
     let mut all = BTreeMap::new();
     let mut put = |name: &str, value: String| drop(all.insert(name.to_owned(), value));
-    put("the working directory", format!("{:?}", std::env::current_dir().ok()));
+    let here = std::env::current_dir().map(|path| path.display().to_string());
+    put("the working directory", here.unwrap_or_default());
     put("the locale", locale().unwrap_or_default());
     put("the interval timers", armed_timers().unwrap_or_default().join(", "));
     put("the timers", fs::read_to_string("/proc/self/timers").unwrap_or_default());
@@ -57,7 +59,10 @@ fn current_settings() -> BTreeMap<String, String> {
     }
     for line in fs::read_to_string("/proc/self/limits").unwrap_or_default().lines().skip(1) {
         let name = line.get(..26).unwrap_or_default().trim().to_owned();
-        put(&format!("the limit \u{22}{name}\u{22}"), line.get(26..).unwrap_or_default().trim().into());
+        put(
+            &format!("the limit \u{22}{name}\u{22}"),
+            line.get(26..).unwrap_or_default().split_whitespace().collect::<Vec<_>>().join(" "),
+        );
     }
     all
 }
@@ -105,7 +110,8 @@ fn remaining() -> (usize, Vec<String>) {
     (fs::read_dir("/proc/self/task").map_or(0, Iterator::count), all)
 }
 
-/// The contents of shared and user folders, with the time of its last change. The number of this process is removed from names.
+/// The contents of shared and user folders, with the time of its last change, without the folders of the checker's own probes, which
+/// come and go meanwhile. The number of this process is removed from names.
 fn stray_files() -> Vec<(String, Option<SystemTime>)> {
     let folders = [Some(PathBuf::from("/dev/shm")), Some(std::env::temp_dir()), std::env::home_dir()];
     let own = std::process::id().to_string();
@@ -113,6 +119,7 @@ fn stray_files() -> Vec<(String, Option<SystemTime>)> {
         folders.into_iter().flatten().filter(|f| f.parent().is_some()).filter_map(|f| fs::read_dir(f).ok()).flatten();
     entries
         .flatten()
+        .filter(|e| !e.file_name().to_string_lossy().starts_with(PROBE_FOLDER))
         .filter_map(|e| Some((e.path().display().to_string().replace(&own, "PID"), e.metadata().ok()?.modified().ok())))
         .collect()
 }

@@ -4,6 +4,7 @@
 
 use crate::checks::life::shared::kept::texts;
 use crate::checks::process::instances::only_once;
+use crate::encoding::or_null;
 use crate::exchange::Importer;
 use crate::instance::Instance;
 use crate::lines::Line;
@@ -110,16 +111,22 @@ impl<'b> Varying<'b> {
         for (i, v) in self.variables.clone().into_iter().enumerate() {
             let column =
                 |rows: &[Vec<Vec<u64>>]| rows[..steps].iter().map(|row| vec![row[i].clone()]).collect::<Vec<_>>();
-            if let Some(found) = difference(&[v], &column(&rows), &column(&again))
+            if let Some(found) = difference(self.session.description.version, &[v], &column(&rows), &column(&again))
                 && self.is_new(&v.name)
             {
-                let text = format!("{} differs between two runs of {interface}{}", v.name, found.text());
+                let ([one, other], at) = (&found.values, found.at());
+                let text = format!("{} differs between two runs of {interface}{at}: {one} and {other}", v.name);
                 self.session.deviates(found.largest, &text);
             }
         }
         for (one, other) in words.iter().zip(&words_again).filter(|(one, other)| one != other) {
             if self.is_new(&one.0) {
-                let text = format!("{} differs between two runs of {interface}: {:?} and {:?}", one.0, one.1, other.1);
+                let text = format!(
+                    "{} differs between two runs of {interface}: {} and {}",
+                    one.0,
+                    or_null(&one.1),
+                    or_null(&other.1)
+                );
                 self.session.violated(text);
             }
         }
