@@ -17,7 +17,7 @@ use crate::probe;
 use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
-use checks::{check_names, check_rate, check_start, check_types};
+use checks::{check_names, check_start, check_types};
 use serde::{Deserialize, Serialize};
 use sizes::{check_sizes, exchange, size};
 
@@ -287,9 +287,6 @@ impl Description {
                 derivative: Some(reference(states[number])),
                 ..variable(name, &meta, reference(index), None)
             };
-            if let Some(of) = variables.iter().find(|v| v.value_reference == reference(states[number])) {
-                check_rate(of, &derivative)?;
-            }
             for place in place + 1..place + state.most() {
                 join(&mut derivative.initial_dependencies, references(&initial[place]));
                 join(&mut derivative.dependencies, references(&between[place]));

@@ -22,6 +22,7 @@ pub(crate) struct Names {
 }
 
 impl Names {
+    #[expect(clippy::large_stack_arrays, reason = "only while compiling")]
     pub(crate) const fn new() -> Self {
         Self { heads: [NONE; CHAINS], next: [NONE; MOST_ROWS], texts: [""; MOST_ROWS], len: 0 }
     }
@@ -146,11 +147,9 @@ const fn form(name: &str, is_prefix: bool) -> Form {
                 At::Quoted
             }
             (At::Quoted, b'\'') | (At::Index, b']') => At::Last,
-            (At::Quoted, _) => At::Quoted,
-            (At::First, b'\'') => At::Quoted,
+            (At::Quoted, _) | (At::First, b'\'') => At::Quoted,
             (At::First | At::Word, b'_' | b'a'..=b'z' | b'A'..=b'Z') | (At::Word, b'0'..=b'9') => At::Word,
-            (At::Word | At::Last, b'[') => At::Index,
-            (At::Index, b'0'..=b'9' | b',') => At::Index,
+            (At::Word | At::Last, b'[') | (At::Index, b'0'..=b'9' | b',') => At::Index,
             (At::Word | At::Last, b'.') => At::First,
             (at, _) => {
                 structured = false;
@@ -211,7 +210,9 @@ mod tests {
     fn names_are_found() {
         let mut names = Box::new(Names::new());
         let all: Vec<&'static str> = (0..5000).map(|i| &*String::leak(format!("a.long.prefix.of.names_{i}"))).collect();
-        all.iter().for_each(|name| names.add(name, "twice"));
+        for name in &all {
+            names.add(name, "twice");
+        }
         for (i, name) in all.iter().enumerate() {
             assert_eq!(names.find(name), Some(i));
         }

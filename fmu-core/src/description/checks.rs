@@ -36,7 +36,7 @@ pub(super) fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fau
     }
 }
 
-/// Checks that no type definition has the name of a variable, and that no unit has two meanings.
+/// Checks that no type definition has the name of a variable, that no unit has two meanings, and the units of derivatives.
 pub(super) fn check_types(variables: &[Variable]) -> Result<(), Fault> {
     let names: BTreeSet<&str> = variables.iter().map(|v| v.name.as_str()).collect();
     let mut units: BTreeMap<&str, (&Variable, Exponents, f64)> = BTreeMap::new();
@@ -56,25 +56,30 @@ pub(super) fn check_types(variables: &[Variable]) -> Result<(), Fault> {
             )));
         }
     }
-    Ok(())
+    check_rates(variables)
 }
 
-/// Checks that the derivative of a state has its unit per second, if both have one.
-pub(super) fn check_rate(state: &Variable, rate: &Variable) -> Result<(), Fault> {
+/// Checks that the derivative of each state has its unit per second, if both have one.
+fn check_rates(variables: &[Variable]) -> Result<(), Fault> {
     let unit = |v: &Variable| match &v.kind {
         VariableKind::Real { unit, exponents, factor, .. } if !unit.is_empty() => {
             Some((unit.clone(), *exponents, *factor))
         }
         _ => None,
     };
-    let (Some((of, base, factor)), Some((per_second, rate_base, rate_factor))) = (unit(state), unit(rate)) else {
-        return Ok(());
-    };
-    if rate_base == (Exponents { s: base.s - 1, ..base }) && (rate_factor / factor - 1.0).abs() < 1e-9 {
-        return Ok(());
+    let states: BTreeMap<u32, &Variable> = variables.iter().map(|v| (v.value_reference, v)).collect();
+    for rate in variables {
+        let Some(state) = rate.derivative.and_then(|reference| states.get(&reference)) else { continue };
+        let (Some((of, base, factor)), Some((per_second, rate_base, rate_factor))) = (unit(state), unit(rate)) else {
+            continue;
+        };
+        if rate_base != (Exponents { s: base.s - 1, ..base }) || (rate_factor / factor - 1.0).abs() > 1e-9 {
+            return Err(Fault::new(format!(
+                "{} has the unit {per_second}, which is not the unit {of} of {} per second: State::new has the quantity of the \
+                 derivative",
+                rate.name, state.name
+            )));
+        }
     }
-    Err(Fault::new(format!(
-        "{} has the unit {per_second}, which is not the unit {of} of {} per second: State::new has the quantity of the derivative",
-        rate.name, state.name
-    )))
+    Ok(())
 }
