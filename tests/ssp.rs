@@ -490,3 +490,92 @@ fn packed_fmus_are_enough_outside_a_checkout() {
     refused(&["reproduce"], &["no Cargo package here"]);
     assert!(!dir.path().join("none.ssp").exists());
 }
+
+/// A thing that a message names twice, as in `--record x: x: is no variable`.
+fn repeated(message: &str) -> Option<&str> {
+    let parts: Vec<&str> = message.split(": ").collect();
+    let ends = |before: &str, name: &str| {
+        let last = before.rsplit(' ').next().unwrap_or(before);
+        before == name || last == name || last.split('=').next() == Some(name)
+    };
+    parts.windows(2).find(|pair| ends(pair[0], pair[1])).map(|pair| pair[1])
+}
+
+/// Bad input of every kind, in commands that name variables, files and lines.
+#[test]
+fn no_message_names_a_thing_twice() {
+    assert_eq!(repeated("error: --record x: x: is no variable"), Some("x"));
+    assert_eq!(repeated("error: --input x=0:1: x: is fed twice"), Some("x"));
+    assert_eq!(repeated("error: a.ssp: line 3: b: is no a"), None);
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let plant = common::archives().join("fmi3/PmsmPlant.fmu").display().to_string();
+    let system = ssp("fmi3.ssp");
+    let csv = |name: &str, text: &str| file(name, text);
+    let sweep = |name: &str, rest: &str| file(name, &format!("fmus = [{plant:?}]\nstop = 0.001\n{rest}"));
+    let measure = "[measure]\na = { of = 'speed', is = 'final' }\n";
+    let unknown_column = csv("unknown.csv", "time,speedy\n0,1\n");
+    let wrong_cell = csv("cell.csv", "time,u_dc\n0,much\n");
+    let no_time = csv("time.csv", "speed\n1\n");
+    let values = csv(
+        "values.ssv",
+        "<ParameterSet><Parameters><Parameter name='no'><Real value='1'/></Parameter></Parameters></ParameterSet>",
+    );
+    let nothing = dir.path().join("nothing.fmu").display().to_string();
+    let plain = file("plain.fmu", "hello");
+    let table: Vec<(Vec<String>, &str)> = [
+        (vec!["simulate", &plant, "--record", "speedy"], "speedy"),
+        (vec!["simulate", &plant, "--record", "PmsmPlant.speedy"], "speedy"),
+        (vec!["simulate", &plant, "--record", "q*"], "q*"),
+        (vec!["simulate", &plant, "--input", "speedy=1"], "speedy"),
+        (vec!["simulate", &plant, "--input", "speed=1"], "is not an input"),
+        (vec!["simulate", &plant, "--input", "u_dc=much"], "much"),
+        (vec!["simulate", &plant, "--input", "u_dc=0:1", "--input", "u_dc=0:2"], "is fed twice"),
+        (vec!["simulate", &plant, "--input", &unknown_column], "speedy"),
+        (vec!["simulate", &plant, "--input", &wrong_cell], "much"),
+        (vec!["simulate", &plant, "--input", &no_time], "time.csv"),
+        (vec!["simulate", &plant, "--set", "speedy=1"], "speedy"),
+        (vec!["simulate", &plant, "--set", "motor.R_s=much"], "motor.R_s"),
+        (vec!["simulate", &plant, "--set", "motor.R_s=-1"], "motor.R_s"),
+        (vec!["simulate", &plant, "--connect", "speed=speedy"], "speedy"),
+        (vec!["simulate", &plant, "--connect", "u_dc=u_a"], "is not an output"),
+        (vec!["simulate", &plant, "--terminal", "a.b=c.d"], "a.b"),
+        (vec!["simulate", &plant, "--parameters", &format!("PmsmPlant={values}")], "values.ssv"),
+        (vec!["simulate", &nothing], "nothing.fmu"),
+        (vec!["simulate", &plain], "plain.fmu"),
+        (vec!["simulate", &system, "--record", "speedy"], "speedy"),
+        (vec!["simulate", &system, "--record", "plant.speedy"], "speedy"),
+        (vec!["simulate", &system, "--input", "speedy=1"], "speedy"),
+        (vec!["simulate", &system, "--set", "u_dc=much"], "much"),
+        (vec!["simulate", &format!("{system}#B.ssd")], "B.ssd"),
+        (vec!["sweep", &sweep("a.toml", &format!("[vary]\nspeedy = {{ values = [1] }}\n{measure}"))], "speedy"),
+        (vec!["sweep", &sweep("b.toml", &format!("[vary]\nspeed = {{ values = [1] }}\n{measure}"))], "speed"),
+        (vec!["sweep", &sweep("c.toml", &format!("[input]\nspeedy = '1'\n{measure}"))], "speedy"),
+        (vec!["sweep", &sweep("d.toml", "[measure]\na = { of = 'speedy', is = 'final' }\n")], "speedy"),
+        (vec!["sweep", &sweep("e.toml", &format!("[set]\nspeedy = 1\n{measure}"))], "speedy"),
+        (vec!["sweep", &sweep("f.toml", &format!("[set]\n'motor.R_s' = -1\n{measure}"))], "motor.R_s"),
+        (vec!["sweep", &sweep("g.toml", &format!("conect = []\n{measure}"))], "conect"),
+        (vec!["sweep", &nothing], "nothing.fmu"),
+        (vec!["ssp", "--parameters", "plant=nothing.ssv", "--out", "x.ssp"], "nothing.ssv"),
+        (vec!["ssp", "--fmus", "nothing", "--out", "x.ssp"], "nothing"),
+        (vec!["check", &nothing], "nothing.fmu"),
+        (vec!["check", &plant, "--only", "Q99"], "Q99"),
+    ]
+    .into_iter()
+    .map(|(arguments, part)| (arguments.into_iter().map(str::to_owned).collect(), part))
+    .collect();
+    for (arguments, part) in table {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let output = fmu(&arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success(), "{arguments:?} succeeds");
+        assert!(said.contains(part), "{arguments:?}: {part:?} is not in {said}");
+        for line in said.lines() {
+            assert_eq!(repeated(line), None, "{arguments:?}: {line}");
+        }
+    }
+}
