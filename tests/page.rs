@@ -239,7 +239,7 @@ fn the_default_experiment_has_names_and_units() {
         "time [ms],speed_ref [rpm],enable,controller.estimator\n0,30,true,ExtendedEmf\n100,30,true,ExtendedEmf\n100,60,false,ExtendedEmf\n",
     );
     let run = run.unwrap();
-    assert_eq!(run["set"][1..], [json!(["enable", true]), json!(["controller.estimator", 4])]);
+    assert_eq!([&run["set"][1], &run["set"][2]], [&json!(["enable", true]), &json!(["controller.estimator", 4])]);
     let speed = |value: &Value| value.as_f64().unwrap() * 30.0 / PI;
     assert!((speed(&run["set"][0][1]) - 30.0).abs() < 1e-12, "{run}");
     assert_eq!((&run["events"][0][0], &run["events"][1]), (&json!(100), &json!([100, "enable", false])));

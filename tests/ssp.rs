@@ -387,9 +387,18 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     let output = fmu(&["simulate", &path, "--stop", "0.001"]);
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && said.contains("and rpm has no BaseUnit: the number passes unchanged"), "{said}");
-    let units = "</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit rad=\"1\" s=\"-1\" factor=\"0.1047\"/></ssc:Unit></ssd:Units>";
-    let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", units);
-    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "the connector of the system is in rpm"]);
+    for (base, cause) in
+        [("rad=\"1\" s=\"-1\" factor=\"0.1047\"", ""), ("m=\"1\"", "the source is in rpm = m, the target in rad/s")]
+    {
+        let units =
+            format!("</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit {base}/></ssc:Unit></ssd:Units>");
+        let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", &units);
+        if cause.is_empty() {
+            done(&["simulate", &path, "--stop", "0.001"]);
+        } else {
+            fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "cannot be fed by", cause]);
+        }
+    }
     let (old, new) = ("implementation=\"CoSimulation\"", "implementation=\"ModelExchange\"");
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
     fails(
@@ -526,6 +535,7 @@ fn no_message_names_a_thing_twice() {
         "<ParameterSet><Parameters><Parameter name='no'><Real value='1'/></Parameter></Parameters></ParameterSet>",
     );
     let nothing = dir.path().join("nothing.fmu").display().to_string();
+    let out = dir.path().join("out").display().to_string();
     let plain = file("plain.fmu", "hello");
     let table: Vec<(Vec<String>, &str)> = [
         (vec!["simulate", &plant, "--record", "speedy"], "speedy"),
@@ -552,8 +562,26 @@ fn no_message_names_a_thing_twice() {
         (vec!["simulate", &system, "--input", "speedy=1"], "speedy"),
         (vec!["simulate", &system, "--set", "u_dc=much"], "much"),
         (vec!["simulate", &format!("{system}#B.ssd")], "B.ssd"),
-        (vec!["sweep", &sweep("a.toml", &format!("[vary]\nspeedy = {{ values = [1] }}\n{measure}"))], "speedy"),
-        (vec!["sweep", &sweep("b.toml", &format!("[vary]\nspeed = {{ values = [1] }}\n{measure}"))], "speed"),
+        (
+            vec![
+                "sweep",
+                &sweep(
+                    "a.toml",
+                    &format!("design = {{ kind = 'grid' }}\n[vary]\nspeedy = {{ values = [1] }}\n{measure}"),
+                ),
+            ],
+            "speedy",
+        ),
+        (
+            vec![
+                "sweep",
+                &sweep(
+                    "b.toml",
+                    &format!("design = {{ kind = 'grid' }}\n[vary]\nspeed = {{ values = [1] }}\n{measure}"),
+                ),
+            ],
+            "speed",
+        ),
         (vec!["sweep", &sweep("c.toml", &format!("[input]\nspeedy = '1'\n{measure}"))], "speedy"),
         (vec!["sweep", &sweep("d.toml", "[measure]\na = { of = 'speedy', is = 'final' }\n")], "speedy"),
         (vec!["sweep", &sweep("e.toml", &format!("[set]\nspeedy = 1\n{measure}"))], "speedy"),
@@ -569,7 +597,10 @@ fn no_message_names_a_thing_twice() {
     .map(|(arguments, part)| (arguments.into_iter().map(str::to_owned).collect(), part))
     .collect();
     for (arguments, part) in table {
-        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        if arguments[0] == "sweep" {
+            arguments.extend(["--out", &out]);
+        }
         let output = fmu(&arguments);
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(!output.status.success(), "{arguments:?} succeeds");

@@ -33,7 +33,7 @@ fn commands(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// A message that names each thing once: `--record x: x: is no variable` becomes `--record x: is no variable`. A name is what stands
+/// A message that names each thing once: `--record x: x: is not there` becomes `--record x: is not there`. A name is what stands
 /// between colons, and is there already if the part before ends with it, or with it and a value.
 pub fn once(text: &str) -> String {
     let mut kept: Vec<&str> = Vec::new();

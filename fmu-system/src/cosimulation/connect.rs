@@ -26,7 +26,7 @@ impl System {
         let (source, target) = (self.parts.port(from)?, self.parts.port(to)?);
         let variable = self.parts.variable(source.instance, &source.name)?;
         let sends = matches!(variable.causality, Causality::Output | Causality::Local | Causality::CalculatedParameter);
-        if !(sends || variable.variability == Variability::Constant) && !self.parts.is_timed_clock(&source) {
+        if !(sends || variable.variability == Variability::Constant || self.parts.is_timed_clock(&source)) {
             return Err(Error::usage(from, "is not an output"));
         }
         if let Some(Transformation::Table(table)) = &crossing.transformation {

@@ -1,7 +1,6 @@
 //! The FMUs of a system with their names, and their variables, written `instance.variable`.
 
 use super::Column;
-use super::wiring::{Outlet, Transformation};
 use fmu_core::variable::position;
 use fmu_import::quantity::suggest;
 use fmu_import::{Error, Fmu, Instance, Kind, Logging, Values};
@@ -213,17 +212,6 @@ impl Parts {
         let items = definition.map(|d| d.items.iter().map(|i| (i.value, i.name.clone())).collect());
         let (unit, items) = (unit.unwrap_or_default(), items.unwrap_or_default());
         Column { name: name.into(), unit, display, items, ..Column::default() }
-    }
-}
-
-impl Parts {
-    /// A column for a recorded variable, with its unit after the change.
-    pub(super) fn outlet(&self, port: &Port, outlet: &Outlet) -> Column {
-        let column = self.column(port, &outlet.name);
-        let Some(transformation) = &outlet.transformation else { return column };
-        let unit = outlet.unit.clone().unwrap_or_default();
-        let items = if let Transformation::Table(_) = transformation { outlet.items.clone() } else { Vec::new() };
-        Column { unit, display: None, items, ..column }
     }
 }
 

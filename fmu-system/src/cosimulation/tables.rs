@@ -1,18 +1,28 @@
-//! Tables of values: of connections, and of variables that are recorded.
+//! Tables of values of connections, and of variables that are recorded through a transformation.
 
+use super::Column;
 use super::parts::{Parts, Port, family, kind};
 use super::wiring::{Change, Outlet, Transformation};
 use fmu_import::{Error, Number, Values};
 
 impl Parts {
+    /// A column for a recorded variable, with its unit after the change.
+    pub(super) fn outlet(&self, port: &Port, outlet: &Outlet) -> Column {
+        let column = self.column(port, &outlet.name);
+        let Some(transformation) = &outlet.transformation else { return column };
+        let unit = outlet.unit.clone().unwrap_or_default();
+        let items = if let Transformation::Table(_) = transformation { outlet.items.clone() } else { Vec::new() };
+        Column { unit, display: None, items, ..column }
+    }
+
     /// A table between two variables of one number each; the source is an integer, a Boolean or an enumeration.
     pub(super) fn table(
         &self,
         [(from, source), (to, target)]: [(&str, &Port); 2],
         table: &[(String, String)],
     ) -> Result<Change, Error> {
-        self.check_table(from, source)?;
-        self.check_table(to, target)?;
+        check_table(from, source)?;
+        check_table(to, target)?;
         let entry = |(one, other): &(String, String)| {
             let taken = self.read(target, other)?.map_err(|cause| Error::usage(to, cause))?;
             // The table may have values beyond those of the source.
@@ -21,20 +31,6 @@ impl Parts {
         let entries: Vec<Option<_>> = table.iter().map(entry).collect::<Result<_, _>>()?;
         let keeps = family(source.base) == family(target.base) || widens(source, target);
         Ok(Change::Table { entries: entries.into_iter().flatten().collect(), keeps })
-    }
-
-    /// A table takes and gives one integer, Boolean or item.
-    fn check_table(&self, name: &str, port: &Port) -> Result<(), Error> {
-        if port.is_whole() || kind(port.base).is_none_or(|kind| kind == 'c') {
-            return Err(Error::usage(name, "is not one number, which a table of values needs"));
-        }
-        if port.base.is_float() {
-            return Err(Error::usage(
-                name,
-                "is a real number: a table of values needs an integer, a Boolean or an item",
-            ));
-        }
-        Ok(())
     }
 
     /// A text as the number of a port, or why it is none.
@@ -56,7 +52,7 @@ impl Parts {
             }
             Some(Transformation::Table(table)) => table,
         };
-        self.check_table(&outlet.port, port)?;
+        check_table(&outlet.port, port)?;
         let taken = |text: &String| {
             let item = outlet.items.iter().find(|(_, name)| name == text);
             let number = item.map(|(value, _)| i128::from(*value)).or_else(|| text.parse().ok()).map(Number::Integer);
@@ -80,4 +76,15 @@ impl Parts {
 /// An integer feeds a real number.
 pub(super) fn widens(source: &Port, target: &Port) -> bool {
     matches!((family(source.base), family(target.base)), ('i', 'r'))
+}
+
+/// A table takes and gives one integer, Boolean or item.
+fn check_table(name: &str, port: &Port) -> Result<(), Error> {
+    if port.is_whole() || kind(port.base).is_none_or(|kind| kind == 'c') {
+        return Err(Error::usage(name, "is not one number, which a table of values needs"));
+    }
+    if port.base.is_float() {
+        return Err(Error::usage(name, "is a real number: a table of values needs an integer, a Boolean or an item"));
+    }
+    Ok(())
 }

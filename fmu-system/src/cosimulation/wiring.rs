@@ -29,7 +29,7 @@ pub struct Crossing {
 /// The transformation of a value, as a user writes it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Transformation {
-    /// Of a number.
+    /// A number is converted.
     Linear(Conversion),
     /// Values and what becomes of each; other values stay as they are.
     Table(Arc<[(String, String)]>),

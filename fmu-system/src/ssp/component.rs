@@ -1,9 +1,8 @@
 //! The elements of a system.
 
+use super::path::{Hop, StatedUnit};
 use super::ssm::MappingEntry;
 use super::ssv::Parameter;
-use crate::cosimulation::Transformation;
-use model_description::{BaseUnit, Measured};
 
 /// An FMU of the system.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,33 +44,6 @@ pub struct Connector {
     pub line: usize,
 }
 
-/// A unit of the file.
-#[derive(Clone, Debug, PartialEq)]
-pub struct StatedUnit {
-    /// Name.
-    pub name: String,
-    /// Relation to the SI base units, if the file defines it.
-    pub base: Option<BaseUnit>,
-}
-
-impl StatedUnit {
-    /// The unit of a number that is a difference or not.
-    pub(super) fn measured(&self, relative: bool) -> Measured<'_> {
-        Measured { unit: Some(&self.name), base: self.base, relative }
-    }
-}
-
-/// A part of the path of a value: from one connector to the next.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Hop {
-    /// Unit of the connector at its end, if the file gives one.
-    pub unit: Option<StatedUnit>,
-    /// Whether values pass without conversion, even between different units.
-    pub no_conversion: bool,
-    /// Transformation after the conversion of the units.
-    pub transformation: Option<Transformation>,
-}
-
 /// Two connectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
@@ -107,18 +79,18 @@ impl std::fmt::Display for ConnectionEnd {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Binding {
     /// File within the SSP, or the values themselves.
-    pub values: Content<Vec<Parameter>>,
+    pub values: Contents<Vec<Parameter>>,
     /// Prefix of every name of the values.
     pub prefix: String,
     /// Mapping of the names, and where these names begin.
-    pub mapping: Option<Content<Vec<MappingEntry>>>,
+    pub mapping: Option<Contents<Vec<MappingEntry>>>,
     /// Path of the system of the binding, which ends with a dot; empty for a component and the outer system.
     pub path: String,
 }
 
 /// Content of a file or of the description itself.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Content<T> {
+pub enum Contents<T> {
     /// In a file of the archive.
     File(String),
     /// In a file of the component's archive.

@@ -1,6 +1,6 @@
 //! Elements of the files of SSP: names without their prefixes, lists, units.
 
-use super::component::StatedUnit;
+use super::path::StatedUnit;
 use model_description::{BaseUnit, Element};
 
 /// Name without its namespace prefix.

@@ -3,7 +3,8 @@
 //! A component `b` of the inner system `in` becomes the component `in.b`. A connector of a system is a name for the connectors of
 //! components that it reaches. The references to a signal dictionary share its entries.
 
-use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Hop, StatedUnit};
+use super::component::{Binding, Component, Connection, ConnectionEnd, Connector};
+use super::path::{Hop, StatedUnit};
 
 /// A system as its element has it.
 #[derive(Default)]
@@ -114,7 +115,7 @@ struct Edge {
 /// The line of a connection, and what is wrong with it.
 pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
     let mut levels = Vec::new();
-    collect(vec![outer], &mut levels);
+    collect(&[outer], &mut levels);
     let mut edges = Vec::new();
     for around in &levels {
         for connection in around.last().into_iter().flat_map(|level| &level.connections) {
@@ -169,10 +170,10 @@ pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
 }
 
 /// Every system, after those around it.
-fn collect<'a>(around: Vec<&'a Level>, all: &mut Vec<Vec<&'a Level>>) {
-    all.push(around.clone());
+fn collect<'a>(around: &[&'a Level], all: &mut Vec<Vec<&'a Level>>) {
+    all.push(around.to_vec());
     for inner in around.last().into_iter().flat_map(|level| &level.inner) {
-        collect(around.iter().copied().chain([inner]).collect(), all);
+        collect(&[around, &[inner]].concat(), all);
     }
 }
 
@@ -186,9 +187,10 @@ fn allowed([(from_element, from), (to_element, to)]: [(bool, &str); 2]) -> bool 
         (false, "input", true) | (true, "output" | "local", true) => &["input", "inout"],
         (true, "inout", true) => &["input"],
         (true, "constant", false) => &["constant", "calculatedParameter", "output", "local"],
-        (true, "calculatedParameter", false) => &["calculatedParameter", "output", "local"],
         (true, "output" | "local" | "inout", false) | (false, "input", false) => &["output", "local"],
-        (false, "parameter" | "structuralParameter", false) => &["calculatedParameter", "output", "local"],
+        (true, "calculatedParameter", false) | (false, "parameter" | "structuralParameter", false) => {
+            &["calculatedParameter", "output", "local"]
+        }
         _ => &[],
     };
     targets.contains(&to)

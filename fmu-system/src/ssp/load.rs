@@ -1,12 +1,12 @@
 //! An SSP as a system of our co-simulation.
 
 use super::DESCRIPTION;
-use super::component::{Component, Hop};
+use super::component::Component;
 use super::error::{Error, invalid};
 use super::flat::Reached;
 pub use super::outside::{Connectors, Inlet};
 use super::package::Package;
-use super::path::{Way, along};
+use super::path::{Hop, Way, along};
 use super::ssv::Parameter;
 use super::structure::{Connection, ConnectionEnd, Connector, Structure};
 use super::values::{self, Given};

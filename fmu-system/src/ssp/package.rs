@@ -1,7 +1,8 @@
 //! The archive of an SSP: its files, and the values of its bindings.
 
-use super::component::{Binding, Content, Hop};
+use super::component::{Binding, Contents};
 use super::error::{Error, invalid};
+use super::path::Hop;
 use super::ssv::{self, Parameter};
 use super::{known, ssm};
 use fmu_import::{document, limits};
@@ -75,15 +76,15 @@ impl Package<'_> {
     /// The content, and a name for its file.
     fn content<T: Clone>(
         &mut self,
-        content: &Content<T>,
+        located: &Contents<T>,
         fmu: &str,
         read: impl Fn(&Element) -> Result<T, String>,
     ) -> Result<(String, T), Error> {
         let path = self.path.display().to_string();
-        let (file, text) = match content {
-            Content::Inline(content) => return Ok((format!("{path}: {}", self.description), content.clone())),
-            Content::File(name) => (format!("{path}: {name}"), self.text(name)?),
-            Content::InComponent(name) => (format!("{path}: {fmu}: {name}"), self.text_in(fmu, name)?),
+        let (file, text) = match located {
+            Contents::Inline(content) => return Ok((format!("{path}: {}", self.description), content.clone())),
+            Contents::File(name) => (format!("{path}: {name}"), self.text(name)?),
+            Contents::InComponent(name) => (format!("{path}: {fmu}: {name}"), self.text_in(fmu, name)?),
         };
         let wrong = |cause: String| Error::Invalid(format!("{file}: {cause}"));
         let root = Element::parse(&text).map_err(|e| wrong(e.to_string()))?;

@@ -1,10 +1,36 @@
 //! The path of a value through connectors: the units of each, and transformations.
 
-use super::component::Hop;
 use crate::cosimulation::Transformation;
 use fmu_import::quantity::split;
-use model_description::{Measured, Passage, format_number, parse_number};
+use model_description::{BaseUnit, Measured, Passage, format_number, parse_number};
 use std::borrow::Cow;
+
+/// A unit of the file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StatedUnit {
+    /// Name.
+    pub name: String,
+    /// Relation to the SI base units, if the file defines it.
+    pub base: Option<BaseUnit>,
+}
+
+impl StatedUnit {
+    /// The unit of a number that is a difference or not.
+    pub(super) fn measured(&self, relative: bool) -> Measured<'_> {
+        Measured { unit: Some(&self.name), base: self.base, relative }
+    }
+}
+
+/// A part of the path of a value: from one connector to the next.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Hop {
+    /// Unit of the connector at its end, if the file gives one.
+    pub unit: Option<StatedUnit>,
+    /// Whether values pass without conversion, even between different units.
+    pub no_conversion: bool,
+    /// Transformation after the conversion of the units.
+    pub transformation: Option<Transformation>,
+}
 
 /// What becomes of a value from the beginning of a path to its end.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -91,16 +117,15 @@ pub(super) fn transformed<'a>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::component::StatedUnit;
     use super::*;
-    use model_description::{BaseUnit, Conversion};
+    use model_description::Conversion;
 
     fn unit(name: &str, factor: f64) -> StatedUnit {
         StatedUnit { name: name.into(), base: Some(BaseUnit { exponents: [0; 8], factor, offset: 0.0 }) }
     }
 
-    fn linear(factor: f64, offset: f64) -> Option<Transformation> {
-        Some(Transformation::Linear(Conversion { factor, offset }))
+    fn linear(factor: f64, offset: f64) -> Transformation {
+        Transformation::Linear(Conversion { factor, offset })
     }
 
     /// Each connection converts the unit and then transforms: 2 km are 2000 m, 2010 m after the offset, 2.01 km, 4.02 km.
@@ -109,16 +134,16 @@ mod tests {
         let (km, m) = (unit("km", 1e3), unit("m", 1.0));
         let hop =
             |unit: &StatedUnit, transformation| Hop { unit: Some(unit.clone()), transformation, ..Hop::default() };
-        let hops = [hop(&m, linear(1.0, 10.0)), hop(&km, linear(2.0, 0.0))];
+        let hops = [hop(&m, Some(linear(1.0, 10.0))), hop(&km, Some(linear(2.0, 0.0)))];
         let way = along(Some(km.measured(false)), &hops, None, false).unwrap();
         let Some(Transformation::Linear(conversion)) = way.transformation else { panic!("{way:?}") };
         assert!((conversion.apply(2.0) - 4.02).abs() < 1e-12);
         assert_eq!((way.unit.as_deref(), way.only_units), (Some("km"), false));
         let way = along(Some(km.measured(false)), &hops, None, true).unwrap();
-        assert_eq!(way.transformation, linear(2.0, 20.0));
+        assert_eq!(way.transformation, Some(linear(2.0, 20.0)));
         let plain = [Hop { transformation: None, ..hops[0].clone() }, Hop::default()];
         let way = along(Some(km.measured(true)), &plain, None, false).unwrap();
-        assert_eq!((way.transformation, way.only_units), (linear(1e3, 0.0), true));
+        assert_eq!((way.transformation, way.only_units), (Some(linear(1e3, 0.0)), true));
     }
 
     #[test]
@@ -129,10 +154,10 @@ mod tests {
         let both = Transformation::then(table(&[("a", "b"), ("c", "d")]), table(&[("b", "x"), ("e", "y")])).unwrap();
         let after = |text| transformed(text, both.as_ref(), false).unwrap().into_owned();
         assert_eq!(["a", "b", "c", "d", "e", "f"].map(after), ["x", "x", "d", "d", "y", "f"]);
-        assert!(Transformation::then(both, linear(2.0, 0.0)).unwrap_err().contains("a table and a linear"));
+        assert!(Transformation::then(both, Some(linear(2.0, 0.0))).unwrap_err().contains("a table and a linear"));
         let not = table(&[("true", "false"), ("false", "true")]);
         assert_eq!(["1", "false"].map(|text| transformed(text, not.as_ref(), false).unwrap()), ["false", "true"]);
-        let twice = linear(2.0, 1.0);
+        let twice = Some(linear(2.0, 1.0));
         assert_eq!(transformed("1 2", twice.as_ref(), false).unwrap(), "3 5");
         assert_eq!(transformed("1 rpm", twice.as_ref(), true).unwrap(), "1 rpm");
         assert!(transformed("1 rpm", twice.as_ref(), false).unwrap_err().contains("write the number alone"));

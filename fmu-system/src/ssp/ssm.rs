@@ -1,7 +1,7 @@
 //! Mappings of the values of one file to the parameters of another system (System Structure Parameter Mapping, SSP 1.0, 5.5).
 
-use super::component::Hop;
 use super::element::{at, is_true, local, required};
+use super::path::Hop;
 use super::ssv::Parameter;
 use crate::cosimulation::Transformation;
 use model_description::{Conversion, Element, parse_number};

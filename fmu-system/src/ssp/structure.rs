@@ -2,9 +2,10 @@
 //! its line, and what has no effect is named in a note, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
-pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Content, Hop, StatedUnit};
+pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Contents};
 use super::element::{Definitions, TYPES, at, child, list, local, required};
 use super::flat::{Flat, Level, Reach, Reference, flat};
+pub use super::path::{Hop, StatedUnit};
 use super::{known, ssm, ssv};
 use model_description::{Element, parse_number};
 
@@ -229,7 +230,7 @@ impl Reader<'_> {
             }
             let inline = child(mapping, "ParameterMapping");
             let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
-            Ok(Content::Inline(ssm::read(inline)?))
+            Ok(Contents::Inline(ssm::read(inline)?))
         });
         let mapping = mapping.transpose()?;
         let values = if let Some(source) = e.get("source") {
@@ -237,16 +238,16 @@ impl Reader<'_> {
         } else {
             let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
             let set = set.ok_or_else(|| at(e, "a binding without source and without values"))?;
-            Content::Inline(ssv::parameters(set)?)
+            Contents::Inline(ssv::parameters(set)?)
         };
         Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into(), mapping, path: path.into() })
     }
 
     /// A file beside the description, or within the component.
-    fn located<T>(&self, e: &Element, source: &str, of_component: bool) -> Result<Content<T>, String> {
+    fn located<T>(&self, e: &Element, source: &str, of_component: bool) -> Result<Contents<T>, String> {
         match e.get("sourceBase") {
-            None | Some("SSD") => Ok(Content::File(self.within(e, source)?)),
-            Some("component") if of_component => Ok(Content::InComponent(relative(e, source)?)),
+            None | Some("SSD") => Ok(Contents::File(self.within(e, source)?)),
+            Some("component") if of_component => Ok(Contents::InComponent(relative(e, source)?)),
             Some("component") => Err(at(e, "sourceBase=\"component\" is for an FMU, not for a system")),
             Some(other) => Err(at(e, format!("sourceBase={other:?} is not known, expected SSD or component"))),
         }
@@ -362,8 +363,11 @@ mod tests {
         )
         .unwrap();
         assert_eq!(s.connectors[0].unit.as_ref().map(|unit| unit.name.as_str()), Some("V"));
-        assert_eq!((&s.bindings[0].values, &*s.bindings[0].prefix), (&Content::File("resources/a b.ssv".into()), "a."));
-        let Content::Inline(values) = &s.bindings[1].values else { panic!("inline") };
+        assert_eq!(
+            (&s.bindings[0].values, &*s.bindings[0].prefix),
+            (&Contents::File("resources/a b.ssv".into()), "a.")
+        );
+        let Contents::Inline(values) = &s.bindings[1].values else { panic!("inline") };
         assert_eq!((values[0].name.as_str(), values[0].unit.as_deref()), ("a.x", Some("V")));
         assert_eq!(
             (s.connections[0].start.to_string(), s.connections[0].end.to_string()),

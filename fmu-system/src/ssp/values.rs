@@ -1,8 +1,7 @@
 //! Parameter values of SSV files, set on the instances of a system.
 
-use super::component::Hop;
 use super::error::{Error, invalid};
-use super::path::{along, transformed};
+use super::path::{Hop, along, transformed};
 use super::ssv::Parameter;
 use crate::cosimulation::System;
 use fmu_import::quantity;

@@ -167,7 +167,8 @@ fn connectors_of_systems_have_units_and_transformations() {
     let inner = format!(
         "<s:System name='i'><s:Connectors><s:Connector name='u' kind='input'>{m}</s:Connector><s:Connector name='z' kind='output'>{m}</s:Connector>\
          <s:Connector name='T' kind='parameter'>{m}</s:Connector></s:Connectors><s:Elements><s:Component name='c' source='plant.fmu'><s:Connectors>\
-         <s:Connector name='u' kind='input'/><s:Connector name='z' kind='output'/><s:Connector name='T' kind='parameter'/></s:Connectors></s:Component></s:Elements>\
+         <s:Connector name='u' kind='input'/><s:Connector name='z' kind='output'/><s:Connector name='T' kind='parameter'/>\
+         </s:Connectors></s:Component></s:Elements>\
          <s:Connections><s:Connection startConnector='u' endElement='c' endConnector='u'/><s:Connection startElement='c' startConnector='z' endConnector='z'/>\
          <s:Connection startConnector='T' endElement='c' endConnector='T'/></s:Connections></s:System>",
         m = length("m"),
@@ -321,12 +322,10 @@ fn files_within_files() {
     assert!(error.ends_with("plant.fmu: has no resources/no.ssv"), "{error}");
 
     let prefixed = |entry: &str| {
-        let binding = format!(
-            "<s:ParameterBindings><s:ParameterBinding prefix='p.' source='v.ssv'><s:ParameterMapping source='m.ssm'/>\
-             </s:ParameterBinding></s:ParameterBindings><s:Elements>"
-        );
+        let binding = "<s:ParameterBindings><s:ParameterBinding prefix='p.' source='v.ssv'><s:ParameterMapping source='m.ssm'/>\
+             </s:ParameterBinding></s:ParameterBindings><s:Elements>";
         let mapping = format!("<m:ParameterMapping>{entry}</m:ParameterMapping>");
-        let text = description("", "", "").replacen("<s:Elements>", &binding, 1);
+        let text = description("", "", "").replacen("<s:Elements>", binding, 1);
         let given = values("<v:Parameter name='u'><v:Real value='3'/></v:Parameter>");
         open(&ssp(&text, &[("v.ssv", &given), ("m.ssm", &mapping)]))
     };
