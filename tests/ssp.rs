@@ -414,7 +414,7 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     fails(
         &["simulate", &ssp("fmi2.ssp"), "--input", "speed_rev=1"],
         2,
-        &["speed_rev: is not an input of the system", "speed_ref"],
+        &["--input speed_rev=1: is not an input of the system", "speed_ref"],
     );
 }
 
