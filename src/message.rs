@@ -1,8 +1,9 @@
-//! Messages on standard error, with a colored first word on a terminal. `NO_COLOR` disables the color, `CLICOLOR_FORCE` enables
+//! Messages on standard error, which name each thing once, with a colored first word on a terminal. `NO_COLOR` disables the color, `CLICOLOR_FORCE` enables
 //! it for files and pipes too.
 
 use clap::builder::Styles;
 use clap::builder::styling::{AnsiColor, Style};
+use fmu_import::once;
 
 /// Colors of the help.
 pub const HELP: Styles = Styles::styled()
@@ -28,5 +29,5 @@ pub fn note(text: &str) {
 
 fn say(color: AnsiColor, word: &str, text: &str) {
     let style: Style = color.on_default().bold();
-    anstream::eprintln!("{style}{word}:{style:#} {text}");
+    anstream::eprintln!("{style}{word}:{style:#} {}", once(text));
 }

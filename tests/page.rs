@@ -222,6 +222,103 @@ fn another_module_is_refused() {
     }
 }
 
+/// Names of items, units in headings and truth values in the file that feeds the default experiment.
+#[test]
+fn the_default_experiment_has_names_and_units() {
+    let of = drive();
+    let module = module(&of);
+    let dir = tempfile::tempdir().unwrap();
+    let stimuli = dir.path().join("stimuli.csv");
+    let made = |text: &str| {
+        std::fs::write(&stimuli, text).unwrap();
+        let html = page(&Source { own: None, stimuli: Some(&stimuli), ..source(&of, &of, &module) })?;
+        let json = html.split_once("id=\"fmu\">").unwrap().1.split_once("</script>").unwrap().0;
+        Ok::<_, anyhow::Error>(serde_json::from_str::<Value>(json).unwrap()["presets"][0].clone())
+    };
+    let run = made(
+        "time [ms],speed_ref [rpm],enable,controller.estimator\n0,30,true,ExtendedEmf\n100,30,true,ExtendedEmf\n100,60,false,ExtendedEmf\n",
+    );
+    let run = run.unwrap();
+    assert_eq!([&run["set"][1], &run["set"][2]], [&json!(["enable", true]), &json!(["controller.estimator", 4])]);
+    let speed = |value: &Value| value.as_f64().unwrap() * 30.0 / PI;
+    assert!((speed(&run["set"][0][1]) - 30.0).abs() < 1e-12, "{run}");
+    assert_eq!((&run["events"][0][0], &run["events"][1]), (&json!(100), &json!([100, "enable", false])));
+    assert!((speed(&run["events"][0][2]) - 60.0).abs() < 1e-12, "{run}");
+    for (text, cause) in [
+        (
+            "time,controller.estimator\n0,Magic\n",
+            "controller.estimator: line 2: controller.estimator = Magic is not one of",
+        ),
+        ("time,speed_ref [V]\n0,1\n", "speed_ref: speed_ref = 1V is not a number in rad/s or"),
+    ] {
+        let said = format!("{:#}", made(text).unwrap_err());
+        assert!(said.contains(cause), "{said}");
+    }
+}
+
+/// The functions of the page that write and read values, in Node.
+fn in_node(script: &str) -> Option<String> {
+    let text = include_str!("../fmu-pack/src/page/text.js");
+    let output = Command::new("node").args(["-e", &format!("{text}\n{script}")]).output();
+    let Ok(output) = output else {
+        println!("not run: node is missing");
+        return None;
+    };
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+/// A CSV file of a page is one of `fmu_import::csv`: the same quotation marks, headings with units, and numbers with all bits.
+#[test]
+fn a_csv_of_a_page_is_one_of_ours() {
+    let names = ["time", "a,b", "m[1,2]", "say \"x\"", "plain name", "two\nlines", " blank "];
+    let (numbers, given) =
+        ([0.1 + 0.2, -0.0, 1e-300, f64::MAX, 4.0, f64::MIN_POSITIVE, 0.0], ["s", "", "V", "", "rad/s", "", ""]);
+    let bits: Vec<String> = numbers.iter().map(|x| format!("{}n", x.to_bits())).collect();
+    let script = format!(
+        "const names = {}, units = {}, bits = [{}];\n\
+         const numbers = bits.map((b) => new DataView(new BigUint64Array([b]).buffer).getFloat64(0, true));\n\
+         process.stdout.write(line(names.map((name, i) => heading({{ name, unit: units[i] }}))) + line(numbers) + line([NaN, Infinity, -Infinity]));",
+        json!(names),
+        json!(given),
+        bits.join(", ")
+    );
+    let Some(csv) = in_node(&script) else { return };
+    let headings = names
+        .iter()
+        .zip(given)
+        .map(|(name, unit)| if unit.is_empty() { (*name).to_owned() } else { format!("{name} [{unit}]") });
+    assert!(csv.starts_with(&fmu_import::csv::line(headings)), "{csv}");
+    assert!(csv.ends_with("NaN,inf,-inf\n"), "{csv}");
+    let table = fmu_import::csv::Table::parse(csv.trim_end_matches("NaN,inf,-inf\n")).unwrap();
+    let read: Vec<(&str, &str)> = table.headings.iter().map(|h| (h.name.as_str(), h.unit.as_str())).collect();
+    let expected: Vec<(&str, &str)> = names.iter().map(|name| name.trim()).zip(given).collect();
+    assert_eq!(read, expected);
+    let back: Vec<u64> = table.rows[0].1.iter().map(|cell| cell.parse::<f64>().unwrap().to_bits()).collect();
+    assert_eq!(back, numbers.map(f64::to_bits));
+}
+
+/// An address names the items of enumerations, and takes their numbers, too; a number may have the unit of the page.
+#[test]
+fn an_address_has_names_of_items() {
+    let script = "
+        globalThis.model = { enumerations: { E: [[1, 'Off', ''], [4, 'On, now', '']] } };
+        const e = { kind: 'Enumeration', type: 'E' }, x = { kind: 'Float64', unit: 'rad/s', display: ['rpm', 2, 1] };
+        const i = { kind: 'Int32' }, b = { kind: 'Boolean' }, s = { kind: 'String' };
+        process.stdout.write(JSON.stringify([
+          textOf(e, 4), textOf(e, 7), textOf(x, 0.5), textOf(b, false), textOf(s, ''),
+          valueOf(e, 'On, now'), valueOf(e, '1'), valueOf(e, '2') ?? null, valueOf(e, 'on') ?? null,
+          valueOf(x, '-1.5e3'), valueOf(x, '5 rpm'), valueOf(x, '5rad/s'), valueOf(x, '5 V') ?? null, valueOf(x, '') ?? null, valueOf(x, 'x') ?? null,
+          valueOf(x, '1e999') ?? null, valueOf(i, '3'), valueOf(i, '3.5') ?? null, valueOf(b, 'true'), valueOf(b, '1') ?? null, valueOf(s, 'a:b'),
+        ]));";
+    let Some(said) = in_node(script) else { return };
+    let expected = json!([
+        "On, now", "7", "0.5", "false", "", 4, 1, null, null, -1500, 2, 5, null, null, null, null, 3, null, true, null,
+        "a:b"
+    ]);
+    assert_eq!(serde_json::from_str::<Value>(&said).unwrap(), expected);
+}
+
 /// The serialized state of the packed FMU at the end of a run, in hexadecimal digits.
 fn state(run: &PresetRun) -> String {
     let fmu = fmu_import::Fmu::open(common::archives().join("fmi3/PmsmDrive.fmu")).unwrap();

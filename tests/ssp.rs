@@ -387,9 +387,18 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     let output = fmu(&["simulate", &path, "--stop", "0.001"]);
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && said.contains("and rpm has no BaseUnit: the number passes unchanged"), "{said}");
-    let units = "</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit rad=\"1\" s=\"-1\" factor=\"0.1047\"/></ssc:Unit></ssd:Units>";
-    let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", units);
-    fails(&["simulate", &path], 2, &["x.ssp: SystemStructure.ssd: line", "the connector of the system is in rpm"]);
+    for (base, cause) in
+        [("rad=\"1\" s=\"-1\" factor=\"0.1047\"", ""), ("m=\"1\"", "the source is in rpm = m, the target in rad/s")]
+    {
+        let units =
+            format!("</ssd:System><ssd:Units><ssc:Unit name=\"rpm\"><ssc:BaseUnit {base}/></ssc:Unit></ssd:Units>");
+        let (_defined, path) = changed(&path, "SystemStructure.ssd", "</ssd:System>", &units);
+        if cause.is_empty() {
+            done(&["simulate", &path, "--stop", "0.001"]);
+        } else {
+            fails(&["simulate", &path], 2, &["x.ssp: ", ": line ", cause]);
+        }
+    }
     let (old, new) = ("implementation=\"CoSimulation\"", "implementation=\"ModelExchange\"");
     let (_dir, path) = changed(&ssp("fmi2.ssp"), "SystemStructure.ssd", old, new);
     fails(
@@ -405,7 +414,7 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     fails(
         &["simulate", &ssp("fmi2.ssp"), "--input", "speed_rev=1"],
         2,
-        &["speed_rev: is not an input of the system", "speed_ref"],
+        &["--input speed_rev=1: is not an input of the system", "speed_ref"],
     );
 }
 
@@ -489,4 +498,115 @@ fn packed_fmus_are_enough_outside_a_checkout() {
     refused(&["ssp", "--out", "none.ssp"], &["--fmus DIR takes those of a folder", "no Cargo package here"]);
     refused(&["reproduce"], &["no Cargo package here"]);
     assert!(!dir.path().join("none.ssp").exists());
+}
+
+/// A thing that a message names twice, as in `--record x: x: is no variable`.
+fn repeated(message: &str) -> Option<&str> {
+    let parts: Vec<&str> = message.split(": ").collect();
+    let ends = |before: &str, name: &str| {
+        let last = before.rsplit(' ').next().unwrap_or(before);
+        before == name || last == name || last.split('=').next() == Some(name)
+    };
+    parts.windows(2).find(|pair| ends(pair[0], pair[1])).map(|pair| pair[1])
+}
+
+/// Bad input of every kind, in commands that name variables, files and lines.
+#[test]
+fn no_message_names_a_thing_twice() {
+    assert_eq!(repeated("error: --record x: x: is no variable"), Some("x"));
+    assert_eq!(repeated("error: --input x=0:1: x: is fed twice"), Some("x"));
+    assert_eq!(repeated("error: a.ssp: line 3: b: is no a"), None);
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| {
+        let path = dir.path().join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let plant = common::archives().join("fmi3/PmsmPlant.fmu").display().to_string();
+    let system = ssp("fmi3.ssp");
+    let csv = |name: &str, text: &str| file(name, text);
+    let sweep = |name: &str, rest: &str| file(name, &format!("fmus = [{plant:?}]\nstop = 0.001\n{rest}"));
+    let measure = "[measure]\na = { of = 'speed', is = 'final' }\n";
+    let unknown_column = csv("unknown.csv", "time,speedy\n0,1\n");
+    let wrong_cell = csv("cell.csv", "time,u_dc\n0,much\n");
+    let no_time = csv("time.csv", "speed\n1\n");
+    let values = csv(
+        "values.ssv",
+        "<ParameterSet><Parameters><Parameter name='no'><Real value='1'/></Parameter></Parameters></ParameterSet>",
+    );
+    let nothing = dir.path().join("nothing.fmu").display().to_string();
+    let out = dir.path().join("out").display().to_string();
+    let plain = file("plain.fmu", "hello");
+    let table: Vec<(Vec<String>, &str)> = [
+        (vec!["simulate", &plant, "--record", "speedy"], "speedy"),
+        (vec!["simulate", &plant, "--record", "PmsmPlant.speedy"], "speedy"),
+        (vec!["simulate", &plant, "--record", "q*"], "q*"),
+        (vec!["simulate", &plant, "--input", "speedy=1"], "speedy"),
+        (vec!["simulate", &plant, "--input", "speed=1"], "is not an input"),
+        (vec!["simulate", &plant, "--input", "u_dc=much"], "much"),
+        (vec!["simulate", &plant, "--input", "u_dc=0:1", "--input", "u_dc=0:2"], "is fed twice"),
+        (vec!["simulate", &plant, "--input", &unknown_column], "speedy"),
+        (vec!["simulate", &plant, "--input", &wrong_cell], "much"),
+        (vec!["simulate", &plant, "--input", &no_time], "time.csv"),
+        (vec!["simulate", &plant, "--set", "speedy=1"], "speedy"),
+        (vec!["simulate", &plant, "--set", "motor.R_s=much"], "motor.R_s"),
+        (vec!["simulate", &plant, "--set", "motor.R_s=-1"], "motor.R_s"),
+        (vec!["simulate", &plant, "--connect", "speed=speedy"], "speedy"),
+        (vec!["simulate", &plant, "--connect", "u_dc=u_a"], "is not an output"),
+        (vec!["simulate", &plant, "--terminal", "a.b=c.d"], "a.b"),
+        (vec!["simulate", &plant, "--parameters", &format!("PmsmPlant={values}")], "values.ssv"),
+        (vec!["simulate", &nothing], "nothing.fmu"),
+        (vec!["simulate", &plain], "plain.fmu"),
+        (vec!["simulate", &system, "--record", "speedy"], "speedy"),
+        (vec!["simulate", &system, "--record", "plant.speedy"], "speedy"),
+        (vec!["simulate", &system, "--input", "speedy=1"], "speedy"),
+        (vec!["simulate", &system, "--set", "u_dc=much"], "much"),
+        (vec!["simulate", &format!("{system}#B.ssd")], "B.ssd"),
+        (
+            vec![
+                "sweep",
+                &sweep(
+                    "a.toml",
+                    &format!("design = {{ kind = 'grid' }}\n[vary]\nspeedy = {{ values = [1] }}\n{measure}"),
+                ),
+            ],
+            "speedy",
+        ),
+        (
+            vec![
+                "sweep",
+                &sweep(
+                    "b.toml",
+                    &format!("design = {{ kind = 'grid' }}\n[vary]\nspeed = {{ values = [1] }}\n{measure}"),
+                ),
+            ],
+            "speed",
+        ),
+        (vec!["sweep", &sweep("c.toml", &format!("[input]\nspeedy = '1'\n{measure}"))], "speedy"),
+        (vec!["sweep", &sweep("d.toml", "[measure]\na = { of = 'speedy', is = 'final' }\n")], "speedy"),
+        (vec!["sweep", &sweep("e.toml", &format!("[set]\nspeedy = 1\n{measure}"))], "speedy"),
+        (vec!["sweep", &sweep("f.toml", &format!("[set]\n'motor.R_s' = -1\n{measure}"))], "motor.R_s"),
+        (vec!["sweep", &sweep("g.toml", &format!("conect = []\n{measure}"))], "conect"),
+        (vec!["sweep", &nothing], "nothing.fmu"),
+        (vec!["ssp", "--parameters", "plant=nothing.ssv", "--out", "x.ssp"], "nothing.ssv"),
+        (vec!["ssp", "--fmus", "nothing", "--out", "x.ssp"], "nothing"),
+        (vec!["check", &nothing], "nothing.fmu"),
+        (vec!["check", &plant, "--only", "Q99"], "Q99"),
+    ]
+    .into_iter()
+    .map(|(arguments, part)| (arguments.into_iter().map(str::to_owned).collect(), part))
+    .collect();
+    for (arguments, part) in table {
+        let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        if arguments[0] == "sweep" {
+            arguments.extend(["--out", &out]);
+        }
+        let output = fmu(&arguments);
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(!output.status.success(), "{arguments:?} succeeds");
+        assert!(said.contains(part), "{arguments:?}: {part:?} is not in {said}");
+        for line in said.lines() {
+            assert_eq!(repeated(line), None, "{arguments:?}: {line}");
+        }
+    }
 }

@@ -354,11 +354,11 @@ fn the_command_line_takes_texts_and_names_what_it_cannot_do() {
     assert!(said.contains("EveryType.status") && said.contains(r#""a b,c""#), "{said}");
     for (option, value, why) in [
         ("--record", "sums[3]", "has no variable sums[3]"),
-        ("--input", "vector=0:1", "vector: has 3 elements, and a value has another number"),
+        ("--input", "vector=0:1", "vector=0:1: has 3 elements, and a value has another number"),
         ("--input", "vector[4]=0:1", "has no variable vector[4]"),
         ("--set", "weights[1,1]=1,2", "weights[1,1] = 1,2 is not one value"),
         ("--set", "weights=1 2", "weights has 6 elements, not 2"),
-        ("--input", "label=3", "label: is not an input or a tunable parameter"),
+        ("--input", "label=3", "label=3: is not an input or a tunable parameter"),
         ("--set", "weights=1,2", "weights has 6 elements, not 2"),
         ("--set", "in.uint8=x", "in.uint8 = x is not an integer"),
         ("--set", "in.uint8=300", "in.uint8 = 300 is not of the type UInt8: 0 to 255"),

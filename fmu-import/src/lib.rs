@@ -59,5 +59,5 @@ pub use instance::{FmuState, Instance};
 pub use number::Number;
 pub use quantity::suggest;
 pub use standard::{CompletedStep, Kind, Stepped, Update};
-pub use text::{file_uri, printable, printable_lines};
+pub use text::{file_uri, once, printable, printable_lines};
 pub use value::Values;

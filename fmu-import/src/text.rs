@@ -33,6 +33,23 @@ fn commands(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
+/// A message that names each thing once: `--record x: x: is not there` becomes `--record x: is not there`. A name is what stands
+/// between colons, and is there already if the part before ends with it, or with it and a value.
+pub fn once(text: &str) -> String {
+    let mut kept: Vec<&str> = Vec::new();
+    for part in text.split(": ") {
+        let is_named = kept.last().is_some_and(|before| {
+            let mut ends = before.match_indices(part).map(|(at, _)| (at, &before[at + part.len()..]));
+            let begins = |at: usize| at == 0 || before[..at].ends_with(' ');
+            !part.is_empty() && ends.any(|(at, rest)| begins(at) && (rest.is_empty() || rest.starts_with('=')))
+        });
+        if !is_named {
+            kept.push(part);
+        }
+    }
+    kept.join(": ")
+}
+
 /// `file:///` and the path, other characters than those of RFC 3986 percent-encoded.
 pub fn file_uri(path: &Path) -> String {
     let path = path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
@@ -54,6 +71,21 @@ mod tests {
         assert_eq!(printable("a\nb \u{202e}c"), "a\\u{a}b \\u{202e}c");
         assert_eq!(printable_lines("a\u{1b}\nb\u{e9}\u{4e2d}\n"), "a\\u{1b}\nb\u{e9}\u{4e2d}\n");
         assert!(matches!(printable("plain \u{e9}"), Cow::Borrowed(_)));
+    }
+
+    #[test]
+    fn a_message_names_each_thing_once() {
+        for (text, expected) in [
+            ("--record x: x: is no variable", "--record x: is no variable"),
+            ("--input u=0:1,1:2: u: is no input", "--input u=0:1,1:2: is no input"),
+            ("input: a b: a b: is no input; it has b", "input: a b: is no input; it has b"),
+            ("--record p.x: x: is no variable", "--record p.x: x: is no variable"),
+            ("a.ssp: line 3: x has 3: y", "a.ssp: line 3: x has 3: y"),
+            ("a: b: a", "a: b: a"),
+            ("", ""),
+        ] {
+            assert_eq!(once(text), expected);
+        }
     }
 
     #[test]

@@ -6,7 +6,7 @@ use crate::error::invalid;
 use crate::measure::{Measure, Reading};
 use crate::pool::{self, BLOCK};
 use crate::signal::{Signal, Sum, period};
-use fmu_import::{Fmu, Kind, Number};
+use fmu_import::{Fmu, Kind, Number, once};
 use fmu_system::cosimulation::{
     self, Integration, Method, PlanTarget, Recording, Settings, Solver, System, Units, Worker, item,
 };
@@ -142,7 +142,7 @@ impl Plan {
             loaded.system.connect_terminals(one, other)?;
         }
         for (name, points) in &definition.input.0 {
-            loaded.points(name, points).map_err(|error| Error::Invalid(format!("input: {name}: {error}")))?;
+            loaded.points(name, points).map_err(|error| Error::Invalid(once(&format!("input: {name}: {error}"))))?;
         }
         if definition.auto_connect {
             loaded.system.connect_by_name()?;
@@ -161,7 +161,7 @@ impl Plan {
             if name == RUN {
                 return invalid(format!("measure: {name} is the column with the number of each run: rename it"));
             }
-            let wrong = |cause: String| Error::Invalid(format!("measure: {name}: {cause}"));
+            let wrong = |cause: String| Error::Invalid(once(&format!("measure: {name}: {cause}")));
             measures.push(of(measure, &settings, &mut recorded, &|name| loaded.has(name)).map_err(wrong)?);
         }
         let traced = definition.trace.iter().flat_map(|trace| &trace.of);
@@ -172,7 +172,7 @@ impl Plan {
         let outputs = if loaded.connectors.outputs.is_empty() {
             loaded.system.outputs()
         } else {
-            loaded.connectors.outputs.iter().map(|(name, _)| name.clone()).collect()
+            loaded.connectors.outputs.iter().map(|outlet| outlet.name.clone()).collect()
         };
         let Loaded { mut system, connectors, mut notes, .. } = loaded;
         notes.extend(system.take_notes());
@@ -250,18 +250,23 @@ impl Plan {
         for name in names {
             let system = &self.0.system;
             let mut targets = Vec::new();
-            for port in self.0.connectors.ports(name)? {
+            let mut own = None;
+            for inlet in self.0.connectors.inlets(name)? {
                 // A run may replace values of an SSP file, but not those of the definition.
-                if self.0.set.contains(&port) {
+                if self.0.set.contains(&inlet.port) {
                     return invalid(format!("{name} is set for all runs and varied: remove one of them"));
                 }
-                targets.push(system.target(&port)?);
+                let wrong = |error| Error::Invalid(format!("{name}: {error}"));
+                let conversion = inlet.conversion().map_err(wrong)?;
+                own = own.or_else(|| conversion.map(|_| inlet.unit.clone().unwrap_or_default()));
+                targets.push(system.target(&inlet.port)?.through(conversion));
             }
             if all.iter().any(|other| other.column.name == name) {
                 return invalid(format!("{name} is varied twice"));
             }
             let of = targets.first().map(|target| system.column(target));
             let (unit, items) = of.map(|c| (c.unit, c.items)).unwrap_or_default();
+            let unit = own.unwrap_or(unit);
             all.push(RunVariable { column: ResultColumn { name: name.into(), unit, items }, targets });
         }
         Ok(all)
@@ -282,8 +287,8 @@ impl Plan {
     /// The variable does not exist, or an FMU refuses.
     pub fn simulate(&self, values: &[(RunVariable, Number)], outputs: Option<&[String]>) -> Result<Recording, Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
-        let source = |name: &String| Ok((self.0.connectors.source(name)?, name.clone()));
-        let variables = outputs.iter().map(source).collect::<Result<Vec<_>, Error>>()?;
+        let outlet = |name: &String| Ok(self.0.connectors.outlet(name)?);
+        let variables = outputs.iter().map(outlet).collect::<Result<Vec<_>, Error>>()?;
         let mut worker = Arc::new(self.0.system.recording(&variables)?).worker()?;
         Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
     }

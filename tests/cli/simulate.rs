@@ -122,7 +122,7 @@ fn bad_usage_names_what_is_wrong() {
         (["--set", "p.motor.R_s=3,3"], "motor.R_s = 3,3 is not a number: write a decimal point"),
         (["--set", "p.motor.R_s=3 mH"], "motor.R_s = 3mH is not a number in Ohm"),
         (["--input", "c.speed_ref=0:0,1:5rps"], "c: speed_ref = 5rps is not a number in rad/s or rpm"),
-        (["--input", "p.motor.L_d=0:1"], "p.motor.L_d: is not an input or a tunable parameter"),
+        (["--input", "p.motor.L_d=0:1"], "p.motor.L_d=0:1: is not an input or a tunable parameter"),
         (["--plot", "run.pdf"], "plots are written as .svg or .png"),
         (["--set", "q.motor.R_s=3"], "q.motor.R_s: is not INSTANCE.VARIABLE; the instances are p, c"),
         (["--set", "p.motor.n_p=2.5"], "motor.n_p = 2.5 is not an integer"),

@@ -4,7 +4,6 @@ use super::{archive, open, script};
 use fmu_import::{Number, Values};
 use fmu_sweep::{Definition, Options, Sweep};
 use fmu_system::cosimulation::{Recording, Sequence, Settings, System};
-use fmu_system::ssp::load::Loaded;
 use model_description::BaseType;
 use model_description::FmiVersion::V3;
 use std::fs;
@@ -157,65 +156,11 @@ fn a_sweep_keeps_the_digits_of_integers() {
     }
 }
 
-struct Quiet;
+pub(crate) struct Quiet;
 
 impl fmu_sweep::Progress for Quiet {
     fn note(&self, _text: &str) {}
     fn progress(&self, _done: u64, _failed: u64, _all: u64) {}
-}
-
-/// An SSP whose connections have tables: an item of an enumeration becomes an integer, an integer a truth value.
-#[test]
-fn connections_of_an_ssp_have_tables() {
-    use std::io::Write;
-    let connector = |name: &str, kind: &str| format!("<s:Connector name='{name}' kind='{kind}'/>");
-    let connectors = ["Enumeration", "Int32", "Boolean"]
-        .map(|name| connector(&format!("{name}_input"), "input") + &connector(&format!("{name}_output"), "output"));
-    let component = |name: &str| {
-        let connectors = connectors.concat();
-        format!("<s:Component name='{name}' source='f.fmu'><s:Connectors>{connectors}</s:Connectors></s:Component>")
-    };
-    let connection = |from: &str, to: &str, inside: &str| {
-        format!(
-            "<s:Connection startElement='a' startConnector='{from}_output' endElement='b' endConnector='{to}_input'>{inside}</s:Connection>"
-        )
-    };
-    let items = "<c:EnumerationMappingTransformation><c:MapEntry source='Option1' target='-5'/>\
-        <c:MapEntry source='Option2' target='70'/></c:EnumerationMappingTransformation>";
-    let numbers = "<c:IntegerMappingTransformation><c:MapEntry source='4' target='true'/><c:MapEntry source='0' target='false'/>\
-        </c:IntegerMappingTransformation>";
-    let description = format!(
-        "<s:SystemStructureDescription version='2.0'><s:System name='x'><s:Elements>{}{}</s:Elements><s:Connections>{}{}\
-         </s:Connections></s:System></s:SystemStructureDescription>",
-        component("a"),
-        component("b"),
-        connection("Enumeration", "Int32", items),
-        connection("Int32", "Boolean", numbers),
-    );
-    let path = super::archives().join("tables.ssp");
-    let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
-    for (name, bytes) in
-        [("SystemStructure.ssd", description.into_bytes()), ("f.fmu", fs::read(archive("feedthrough", V3)).unwrap())]
-    {
-        zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
-        zip.write_all(&bytes).unwrap();
-    }
-    zip.finish().unwrap();
-    let run = |number: &str| {
-        let mut loaded = Loaded::open(&path, false).unwrap();
-        loaded.set("a.Enumeration_input", "Option2").unwrap();
-        loaded.set("a.Int32_input", number).unwrap();
-        for name in ["b.Int32_input", "b.Int32_output", "b.Boolean_output"] {
-            loaded.record(name).unwrap();
-        }
-        let settings = Settings { start: 0.0, stop: 0.4, step: 0.1, sequential: false };
-        loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(())))
-    };
-    let recording = run("4").unwrap();
-    let last: Vec<f64> = recording.columns.iter().map(|column| column.last().real()).collect();
-    assert_eq!(last, [70.0, 70.0, 1.0]);
-    let error = run("3").unwrap_err().to_string();
-    assert_eq!(error, "Boolean_input: the table of its connection has no entry for 3");
 }
 
 /// Straight lines for continuous values, jumps where a time occurs twice, and texts and bytes that are held.

@@ -15,6 +15,7 @@ mod prove;
 mod python;
 mod resource;
 mod roberts;
+mod ssp;
 mod stair;
 mod state_space;
 mod van_der_pol;

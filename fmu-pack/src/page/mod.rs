@@ -11,8 +11,8 @@ use fmu_core::description::{Value as Start, Variable, VariableKind};
 use fmu_core::variable::{Causality, Variability};
 use fmu_plot::ink::CURVES;
 use fmu_plot::page::{AXIS, document, escape};
-use fmu_system::cosimulation::Schedule;
-use model_description::{FmiVersion, Generation};
+use fmu_system::cosimulation::Sequence;
+use model_description::{FmiVersion, Generation, ModelDescription};
 use own::{Judged, Own, PresetRun, is_curve};
 use serde_json::{Map, Value, json};
 use std::io::Write as _;
@@ -24,6 +24,7 @@ pub const FILE: &str = "page.toml";
 const BODY: &str = include_str!("body.html");
 const STYLE: &str = include_str!("run.css");
 const RUN: &str = include_str!("run.js");
+const TEXT: &str = include_str!("text.js");
 const WORKER: &str = include_str!("worker.js");
 
 /// The page loads nothing: scripts, styles and the worker are part of it.
@@ -93,7 +94,7 @@ pub fn page(source: &Source<'_>) -> Result<String> {
         "{body}<script type=\"application/json\" id=\"fmu\">{json}</script>\n\
          <script type=\"text/plain\" id=\"module\">{packed}</script>\n\
          <script type=\"text/plain\" id=\"license\">{licenses}</script>\n\
-         <script type=\"text/plain\" id=\"worker\">{WORKER}</script>\n<script>\n{AXIS}{RUN}</script>\n"
+         <script type=\"text/plain\" id=\"worker\">{WORKER}</script>\n<script>\n{AXIS}{TEXT}{RUN}</script>\n"
     );
     Ok(document(of.model_name(), POLICY, STYLE, &body))
 }
@@ -134,12 +135,17 @@ fn fits(module: &[u8], plain: &Description) -> Result<()> {
 /// # Errors
 /// Names the file, the location in it, and the fault.
 pub fn judged(of: &Description, own: Option<(&Path, &str)>) -> Result<Judged> {
-    let generation = Generation { tool: String::new(), date_and_time: String::new() };
-    let reader = model_description::read(model_description::write(of, FmiVersion::V3, &generation))?;
+    let reader = reader(of)?;
     let file = own.map_or(Path::new(FILE), |(path, _)| path).display();
     let parsed = own.map_or(Ok(Own::default()), |(_, text)| Own::read(text));
     let judged = parsed.and_then(|own| own.judge(of, &reader));
     judged.map_err(|cause| invalid!("{file}: {cause}"))
+}
+
+/// The model as FMI 3.0 describes it.
+fn reader(of: &Description) -> Result<ModelDescription> {
+    let generation = Generation { tool: String::new(), date_and_time: String::new() };
+    Ok(model_description::read(model_description::write(of, FmiVersion::V3, &generation))?)
 }
 
 /// The page's description of the model.
@@ -229,7 +235,7 @@ fn variable(v: &Variable, ranges: &Value) -> Value {
     if v.elements() != 1 {
         put("elements", json!(v.elements()));
     }
-    put("unit", json!(unit.filter(|unit| display.is_none() && !unit.is_empty())));
+    put("unit", json!(unit.filter(|unit| !unit.is_empty())));
     put("display", json!(display));
     put("type", json!(enumeration));
     put("min", json!(v.min));
@@ -293,10 +299,19 @@ fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<Preset
         compare: false,
     };
     let Some(path) = stimuli.filter(|path| path.is_file()) else { return Ok(run) };
-    let fed = Schedule::read_csv(path).map_err(Error::Invalid)?;
-    for (name, schedule) in fed {
+    let fed = Sequence::read_csv(path).map_err(Error::Invalid)?;
+    let reader = reader(of)?;
+    for (name, texts) in fed {
+        let wrong = |cause: String| invalid!("{}: {name}: {cause}", path.display());
         let v = of.variable(&name).with_context(|| format!("{}: there is no input {name}", path.display()))?;
-        let of_kind = |x: f64| if matches!(v.kind, VariableKind::Boolean) { json!(x != 0.0) } else { json!(x) };
+        let read = reader.variable(&name).with_context(|| name.clone())?;
+        let schedule = texts.schedule(read, &reader).map_err(wrong)?;
+        let of_kind = |x: f64| match v.kind {
+            VariableKind::Boolean => json!(x != 0.0),
+            VariableKind::Real { .. } => json!(x),
+            #[expect(clippy::cast_possible_truncation, reason = "an integer that a double has exactly")]
+            _ => json!(x as i64),
+        };
         let mut last = schedule.at(experiment.start);
         run.set.push((name.clone(), of_kind(last)));
         for k in 1_u32.. {

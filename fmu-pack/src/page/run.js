@@ -25,6 +25,9 @@ const element = (parent, name, attributes = {}, text = "") => {
   return parent.appendChild(made);
 };
 
+// A value beside the name of its curve.
+const reading = (v, x) => (v.type ? textOf(v, x) : shown(seen(v, x)));
+
 function tell(text, kind = "") {
   $("message").textContent = text;
   $("message").className = kind;
@@ -358,7 +361,7 @@ class Plot {
       button.append(name);
       const value = element(button, "output");
       button.addEventListener("click", () => { this.curves.splice(i, 1); if (this.curves.length) { this.heading(); draw(); } else this.remove(); });
-      return () => { const row = rec.row(view.at); value.textContent = row < 0 ? "" : shown(seen(curve(name), rec.columns.get(name)[row])); };
+      return () => { const row = rec.row(view.at); value.textContent = row < 0 ? "" : reading(curve(name), rec.columns.get(name)[row]); };
     });
     if (unit) element(this.head, "small", {}, `[${unit}]`);
     const more = names().filter((name) => !this.curves.includes(name) && scale(curve(name))[0] === unit);
@@ -426,6 +429,12 @@ class Plot {
     [this.low, this.high, this.top, this.bottom] = [low - margin, high + margin, 6, h - 20];
     const [values, decimals] = ticks(this.low, this.high, 4);
     [this.values, this.labels] = [values, values.map((x) => onAxis(x, decimals))];
+    // Curves of one enumeration have the names of its items on the axis.
+    const types = new Set(this.curves.map((name) => curve(name).type)), [type] = types;
+    if (types.size === 1 && type) {
+      const items = model.enumerations[type].filter(([x]) => x >= low && x <= high);
+      [this.values, this.labels] = [items.map(([x]) => x), items.map(([, name]) => name)];
+    }
     pen.font = "12px system-ui, sans-serif";
     this.wide = 10 + Math.max(24, ...this.labels.map((label) => pen.measureText(label).width));
     return true;
@@ -539,9 +548,9 @@ const names = () => [...recorded.map((v) => v.name), ...differences.keys()];
 const coded = (name) => encodeURIComponent(name).replace(/[+]/g, "%2B");
 function address() {
   const parts = [];
-  const value = (x) => (typeof x === "string" ? coded(x) : String(x));
-  if (plan.set.size) parts.push(`set=${[...plan.set].map(([name, x]) => `${coded(name)}:${value(x)}`).join(",")}`);
-  parts.push(`do=${plan.events.map(([at, name, x]) => `${at}:${coded(name)}:${value(x)}`).join(",")}`);
+  const value = (name, x) => coded(textOf(byName.get(name), x));
+  if (plan.set.size) parts.push(`set=${[...plan.set].map(([name, x]) => `${coded(name)}:${value(name, x)}`).join(",")}`);
+  parts.push(`do=${plan.events.map(([at, name, x]) => `${at}:${coded(name)}:${value(name, x)}`).join(",")}`);
   parts.push(`plot=${plots.map((plot) => plot.curves.map(coded).join("+")).join(",")}`);
   parts.push(`stop=${plan.stop ?? "none"}`, `rate=${$("rate").value}`, `step=${plan.step}`);
   return `#${parts.join("&")}`;
@@ -552,17 +561,17 @@ function read(hash) {
   const list = (key) => (given.get(key) ?? "").split(",").filter(Boolean);
   const value = (name, text) => {
     const v = byName.get(name), wanted = v && (v.causality === "input" || v.causality === "parameter") && v.elements === 1;
-    const x = !wanted ? undefined : v.kind === "Boolean" ? { true: true, false: false }[text] : v.kind === "String" ? name(text) : Number(text);
-    if (x === undefined || (typeof x === "number" && (text === "" || !allowed(v, x)))) { wrong.push(`${name}:${text}`); return undefined; }
+    const x = wanted ? valueOf(v, text) : undefined;
+    if (x === undefined || (typeof x === "number" && !allowed(v, x))) { wrong.push(`${name}:${text}`); return undefined; }
     return x;
   };
   const name = (text) => { try { return decodeURIComponent(text); } catch { return text; } };
   for (const part of list("set")) {
-    const [key, text = ""] = part.split(":"), x = value(name(key), text);
+    const [key, text = ""] = part.split(":"), x = value(name(key), name(text));
     if (x !== undefined) plan.set.set(name(key), x);
   }
   for (const part of list("do")) {
-    const [at, key = "", text = ""] = part.split(":"), x = value(name(key), text);
+    const [at, key = "", text = ""] = part.split(":"), x = value(name(key), name(text));
     if (!/^\d+$/.test(at) || (x !== undefined && !acts(byName.get(name(key))))) wrong.push(part);
     else if (x !== undefined) plan.events.push([Number(at), name(key), x]);
   }
@@ -579,9 +588,9 @@ function read(hash) {
   return { go: given.has("do"), wrong };
 }
 function csv() {
-  const columns = recorded.map((v) => v.name), lines = [["time", ...columns].map((name) => `"${name.replace(/"/g, '""')}"`).join(",")];
-  for (let i = 0; i < rec.n; i++) lines.push(["time", ...columns].map((name) => rec.columns.get(name)[i]).join(","));
-  const link = element(document.body, "a", { href: URL.createObjectURL(new Blob([lines.join("\n"), "\n"], { type: "text/csv" })), download: `${model.title}.csv` });
+  const columns = [{ name: "time", unit: "s" }, ...recorded], lines = [line(columns.map(heading))];
+  for (let i = 0; i < rec.n; i++) lines.push(line(columns.map(({ name }) => rec.columns.get(name)[i])));
+  const link = element(document.body, "a", { href: URL.createObjectURL(new Blob(lines, { type: "text/csv" })), download: `${model.title}.csv` });
   link.click();
   link.remove();
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);

@@ -1,11 +1,12 @@
 //! Connections between the FMUs of a system: types, extents, units and tables.
 
-use super::parts::{Port, family, kind};
+use super::parts::{Port, family};
 use super::system::System;
-use super::wiring::{Change, Crossing, Source, Units};
+use super::tables::widens;
+use super::wiring::{Change, Crossing, Source, Transformation, Units};
 use fmu_core::variable::position;
-use fmu_import::{Error, Instance, Number, Values};
-use model_description::{Causality, Conversion, Measured, Passage};
+use fmu_import::{Error, Instance};
+use model_description::{Causality, Conversion, Measured, Passage, Variability};
 
 impl System {
     /// Connects an output to an input, both written `instance.variable`. A number in another unit of the same quantity is converted
@@ -21,73 +22,38 @@ impl System {
     ///
     /// # Errors
     /// As [`connect`](Self::connect).
-    pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing<'_>) -> Result<(), Error> {
-        let Crossing { units, stated, transformation, table } = crossing;
+    pub fn connect_by(&mut self, from: &str, to: &str, crossing: &Crossing) -> Result<(), Error> {
         let (source, target) = (self.parts.port(from)?, self.parts.port(to)?);
-        let sends = matches!(self.parts.causality(&source), Causality::Output | Causality::Local);
-        if !sends && !self.parts.is_timed_clock(&source) {
+        let variable = self.parts.variable(source.instance, &source.name)?;
+        let sends = matches!(variable.causality, Causality::Output | Causality::Local | Causality::CalculatedParameter);
+        if !(sends || variable.variability == Variability::Constant || self.parts.is_timed_clock(&source)) {
             return Err(Error::usage(from, "is not an output"));
         }
-        if let Some(table) = table {
-            let table = self.table([(from, &source), (to, &target)], table)?;
+        if let Some(Transformation::Table(table)) = &crossing.transformation {
+            let change = self.parts.table([(from, &source), (to, &target)], table)?;
             self.check_fed(&target, to, false)?;
-            return self.feed(target, to, Source::Port(source, Some(Change::Table(table))));
+            return self.feed(target, to, Source::Port(source, Some(change)));
         }
-        let widens = matches!((family(source.base), family(target.base)), ('i', 'r'));
-        if family(source.base) != family(target.base) && !widens {
+        if family(source.base) != family(target.base) && !widens(&source, &target) {
             return Err(Error::usage(to, format!("has the type {}, {from} has {}", target.base, source.base)));
         }
         self.check_extents([(from, &source), (to, &target)])?;
         self.check_fed(&target, to, false)?;
-        let conversion = match units {
+        let conversion = match crossing.units {
             Units::PassOn => None,
-            Units::Convert => match self.measured(from, stated[0])?.into_unit(self.measured(to, stated[1])?) {
+            Units::Convert => match self.measured(from)?.into_unit(self.measured(to)?) {
                 Ok(Passage::Equal) => None,
                 Ok(Passage::Converted(conversion)) => Some(conversion),
                 Ok(Passage::Unknown(cause)) => {
                     self.notes.push(format!("{from} to {to}: {cause}: the number passes unchanged"));
                     None
                 }
-                Err(cause) => {
-                    let remedy = "connect variables of the same quantity, or pass the number without conversion";
-                    return Err(Error::usage(to, format!("cannot be fed by {from}: {cause}: {remedy}")));
-                }
+                Err(cause) => return Err(Error::usage(to, incompatible(from, &cause))),
             },
         };
-        let conversion = Conversion::then(conversion, *transformation).map(Change::Linear);
+        let after = if let Some(Transformation::Linear(after)) = crossing.transformation { Some(after) } else { None };
+        let conversion = Conversion::then(conversion, after).map(Change::Linear);
         self.feed(target, to, Source::Port(source, conversion))
-    }
-
-    /// A table between two variables of one number each; the source is an integer, a Boolean or an enumeration.
-    fn table(
-        &self,
-        [(from, source), (to, target)]: [(&str, &Port); 2],
-        table: &[(String, String)],
-    ) -> Result<std::sync::Arc<[(Number, Number)]>, Error> {
-        for (name, port) in [(from, source), (to, target)] {
-            if port.is_whole() || kind(port.base).is_none_or(|kind| kind == 'c') {
-                return Err(Error::usage(name, "is not one number, which a table of values needs"));
-            }
-        }
-        if source.base.is_float() {
-            return Err(Error::usage(
-                from,
-                "is a real number: a table of values needs an integer, a Boolean or an item",
-            ));
-        }
-        let read = |port: &Port, text: &str| {
-            let description = self.parts.0[port.instance].description();
-            let values = Values::read(text, self.parts.variable(port.instance, &port.name)?, description);
-            Ok::<_, Error>(values.map(|values| values.one(0)))
-        };
-        let entry = |(one, other): &(String, String)| {
-            let sent = read(source, one)?;
-            let taken = read(target, other)?.map_err(|cause| Error::usage(to, cause))?;
-            // The table may have values beyond those of the source.
-            Ok::<_, Error>(sent.ok().map(|sent| (sent, taken)))
-        };
-        let entries: Vec<Option<_>> = table.iter().map(entry).collect::<Result<_, _>>()?;
-        Ok(entries.into_iter().flatten().collect())
     }
 
     /// Both ends of a connection are single values, or arrays of the same extents.
@@ -109,15 +75,14 @@ impl System {
         Err(Error::usage(to, format!("takes {}, and {from} has {}{remedy}", said(&taken), said(&sent))))
     }
 
-    /// The known part of the unit of a variable, written `instance.variable`; `stated` if its FMU names none.
+    /// The known part of the unit of a variable, written `instance.variable`.
     ///
     /// # Errors
     /// The variable does not exist.
-    pub fn measured<'a>(&'a self, port: &str, stated: Option<Measured<'a>>) -> Result<Measured<'a>, Error> {
+    pub fn measured(&self, port: &str) -> Result<Measured<'_>, Error> {
         let port = self.parts.port(port)?;
         let variable = self.parts.variable(port.instance, &port.name)?;
-        let own = self.parts.0[port.instance].description().measured(variable);
-        Ok(stated.filter(|_| own.unit.is_none()).unwrap_or(own))
+        Ok(self.parts.0[port.instance].description().measured(variable))
     }
 
     /// Connects every input that nothing feeds to the output of the same name of another FMU; returns the connections.
@@ -152,4 +117,10 @@ impl System {
         }
         Ok(found)
     }
+}
+
+/// Why a variable in another unit cannot feed an input, and the remedy.
+pub fn incompatible(from: &str, cause: &str) -> String {
+    let remedy = "connect variables of the same quantity, or pass the number without conversion";
+    format!("cannot be fed by {from}: {cause}: {remedy}")
 }

@@ -4,7 +4,7 @@ use super::grid::EARLY;
 use super::parts::Port;
 use super::schedule::SAME;
 use super::sequence::Held;
-use super::wiring::{Change, Feed, Source, Wiring};
+use super::wiring::{Change, Feed, Record, Source, Wiring};
 use super::{Schedule, loops};
 use fmu_import::{Error, Instance, Kind, Number, Values};
 use model_description::{BaseType, Conversion};
@@ -56,8 +56,8 @@ struct Traffic {
 #[derive(Clone)]
 pub(super) struct Exchange {
     traffic: Vec<Traffic>,
-    /// Recorded values and their types.
-    row: Vec<(Place, BaseType)>,
+    /// Recorded values and their types; none after a change.
+    row: Vec<(Place, Option<BaseType>)>,
     /// Times (s) at which inputs over time jump, in ascending order.
     jumps: Vec<f64>,
     /// Number of inputs that are fed.
@@ -93,15 +93,15 @@ impl Exchange {
     pub(super) fn new<'a>(
         instances: usize,
         wiring: &Wiring,
-        records: &[Port],
+        records: &[Record],
         texts: impl Iterator<Item = &'a Port>,
     ) -> Self {
         let mut traffic: Vec<Traffic> = (0..instances).map(|_| Traffic::default()).collect();
         let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
         // A fed input need not be read: its value is known here, unless what feeds it may have none yet.
-        let origin = |port: &Port| match fed(port) {
-            Some(source) if !source.may_lack() => source.clone(),
-            _ => Source::Port(port.clone(), None),
+        let origin = |record: &Record| match fed(&record.port) {
+            Some(source) if !source.may_lack() && record.change.is_none() => source.clone(),
+            _ => Source::Port(record.port.clone(), record.change.clone()),
         };
         let origins: Vec<Source> = records.iter().map(origin).collect();
         let sources = wiring.feeds.iter().map(|feed| &feed.source).chain(&origins);
@@ -138,7 +138,8 @@ impl Exchange {
             }
             Source::Schedule(schedule) => Place::Schedule(schedule.clone()),
         };
-        let row = origins.iter().zip(records).map(|(source, port)| (place(&traffic, source), port.base)).collect();
+        let base = |record: &Record| record.change.is_none().then_some(record.port.base);
+        let row = origins.iter().zip(records).map(|(source, record)| (place(&traffic, source), base(record))).collect();
         let (continuous, mut discrete): (Vec<_>, Vec<_>) = wiring.feeds.iter().partition(|feed| feed.continuous);
         discrete.sort_by_key(|feed| feed.target.base == BaseType::Clock);
         for Feed { target, source, continuous } in continuous.into_iter().chain(discrete) {
@@ -427,11 +428,11 @@ impl Exchange {
     /// The recorded values at time `t`.
     pub(super) fn row(&self, t: f64, row: &mut Vec<Number>) {
         row.clear();
-        row.extend(self.row.iter().map(|(place, base)| match self.number(place, t) {
-            Number::Missing => Number::Missing,
-            Number::Real(x) if base.is_float() => Number::Real(x),
+        row.extend(self.row.iter().map(|(place, base)| match (self.number(place, t), base) {
+            (number @ Number::Missing, _) | (number, None) => number,
+            (Number::Real(x), Some(base)) if base.is_float() => Number::Real(x),
             // As the variable receives it.
-            number => Values::from_number(number, *base).map_or(number, |values| values.one(0)),
+            (number, Some(base)) => Values::from_number(number, *base).map_or(number, |values| values.one(0)),
         }));
     }
 

@@ -44,10 +44,12 @@ mod run;
 mod schedule;
 mod sequence;
 mod system;
+mod tables;
 mod terminals;
 mod wiring;
 
 pub use crate::integration::Solver;
+pub use connect::incompatible;
 pub use coupled::{Equations, Feed, Fmus};
 pub use exchange::Inputs;
 pub use grid::Settings;
@@ -58,4 +60,4 @@ pub use recording::{Column, Recording, TextColumn, item};
 pub use schedule::Schedule;
 pub use sequence::Sequence;
 pub use system::System;
-pub use wiring::{Crossing, Units};
+pub use wiring::{Crossing, Outlet, Transformation, Units};

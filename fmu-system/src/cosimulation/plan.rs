@@ -29,9 +29,9 @@ use super::point::Ended;
 use super::recording::{Column, Recording};
 use super::run::simulate;
 use super::system::System;
-use super::wiring::Wiring;
+use super::wiring::{Change, Outlet, Record, Wiring};
 use fmu_import::{Error, Fmu, Instance, Kind, Logging, Number, Values};
-use model_description::{BaseType, Interface};
+use model_description::{BaseType, Conversion, Interface, parse_number};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -44,7 +44,7 @@ pub struct SystemPlan {
     live: Vec<Arc<Live>>,
     wiring: Wiring,
     set: Vec<(Port, Values)>,
-    records: Vec<Port>,
+    records: Vec<Record>,
     exchange: Exchange,
     grid: Grid,
     columns: Vec<Column>,
@@ -72,12 +72,20 @@ impl Live {
 pub struct PlanTarget {
     port: Port,
     written: String,
+    /// Conversion of a number before it is set.
+    conversion: Option<Conversion>,
 }
 
 impl PlanTarget {
     /// `instance.variable`.
     pub fn name(&self) -> &str {
         &self.written
+    }
+
+    /// This target, set through a conversion.
+    #[must_use]
+    pub fn through(self, conversion: Option<Conversion>) -> Self {
+        Self { conversion, ..self }
     }
 }
 
@@ -89,7 +97,7 @@ impl System {
     pub fn into_plan(mut self, settings: &Settings) -> Result<SystemPlan, Error> {
         let grid = self.grid(settings)?;
         let exchange = Exchange::new(self.instances.len(), &self.wiring, &self.records, [].iter());
-        let columns = self.columns().collect();
+        let columns = self.columns;
         let live = |fmu: &Fmu| Arc::new(Live { fmu: Mutex::new(fmu.clone()), generation: AtomicU32::new(0) });
         let live = self.parts.0.iter().map(|part| live(&part.fmu)).collect();
         Ok(SystemPlan {
@@ -104,11 +112,6 @@ impl System {
             records: self.records,
         })
     }
-
-    /// The recorded columns, without values.
-    pub(super) fn columns(&self) -> impl Iterator<Item = Column> {
-        self.records.iter().zip(&self.columns).map(|(port, name)| self.parts.column(port, name))
-    }
 }
 
 impl SystemPlan {
@@ -121,7 +124,7 @@ impl SystemPlan {
         if self.wiring.feeds(port.instance, &port.name) {
             return Err(Error::usage(written, "is fed by a connection or a schedule: remove that, or do not vary it"));
         }
-        Ok(PlanTarget { port, written: written.into() })
+        Ok(PlanTarget { port, written: written.into(), conversion: None })
     }
 
     /// Units and, of an enumeration, names of the values of a target.
@@ -134,6 +137,10 @@ impl SystemPlan {
     /// # Errors
     /// The text is not a value of the target's type.
     pub fn number(&self, target: &PlanTarget, text: &str) -> Result<Number, Error> {
+        if target.conversion.is_some() {
+            let number = parse_number(text).map(Number::Real);
+            return number.ok_or_else(|| Error::usage(target.name(), "takes a number, without a unit"));
+        }
         let Port { instance, name, .. } = &target.port;
         let part = &self.parts.0[*instance];
         let values = Values::read(text, self.parts.variable(*instance, name)?, part.description());
@@ -148,21 +155,26 @@ impl SystemPlan {
         &self.columns
     }
 
-    /// A plan for this system and these times that records other variables, each a pair of `instance.variable` and the name of its column.
+    /// A plan for this system and these times that records other variables.
     ///
     /// # Errors
     /// The variable does not exist or is not a number.
-    pub fn recording(&self, variables: &[(String, String)]) -> Result<Self, Error> {
-        let ports = variables.iter().map(|(port, _)| self.parts.scalar(port)).collect::<Result<Vec<_>, _>>()?;
-        let columns = ports.iter().zip(variables).map(|(port, (_, name))| self.parts.column(port, name)).collect();
+    pub fn recording(&self, outlets: &[Outlet]) -> Result<Self, Error> {
+        let mut columns = Vec::new();
+        let mut records = Vec::new();
+        for outlet in outlets {
+            let port = self.parts.scalar(&outlet.port)?;
+            columns.push(self.parts.outlet(&port, outlet));
+            records.push(Record { change: self.parts.change(&port, outlet)?, port });
+        }
         Ok(Self {
             method: self.method.clone(),
             parts: self.parts.clone(),
             live: self.live.clone(),
             wiring: self.wiring.clone(),
             set: self.set.clone(),
-            exchange: Exchange::new(self.parts.0.len(), &self.wiring, &ports, [].iter()),
-            records: ports,
+            exchange: Exchange::new(self.parts.0.len(), &self.wiring, &records, [].iter()),
+            records,
             grid: self.grid,
             columns,
         })
@@ -174,8 +186,9 @@ impl SystemPlan {
     #[must_use]
     pub fn with_copy(&self) -> Self {
         let count = self.parts.0.len();
-        let both =
-            |ports: &[Port]| ports.iter().cloned().chain(ports.iter().map(|p| p.shifted(count))).collect::<Vec<_>>();
+        let both = |records: &[Record]| {
+            records.iter().cloned().chain(records.iter().map(|r| r.shifted(count))).collect::<Vec<_>>()
+        };
         let twice = |columns: &[Column]| columns.iter().chain(columns).cloned().collect();
         let (wiring, records) = (self.wiring.with_copy(count), both(&self.records));
         let set = self.set.iter().map(|(port, values)| (port.shifted(count), values.clone()));
@@ -195,7 +208,7 @@ impl SystemPlan {
     /// The variable of the copy in [`with_copy`](Self::with_copy) that a target of this plan is.
     #[must_use]
     pub fn in_copy(&self, target: &PlanTarget) -> PlanTarget {
-        PlanTarget { port: target.port.shifted(self.parts.0.len()), written: target.written.clone() }
+        PlanTarget { port: target.port.shifted(self.parts.0.len()), ..target.clone() }
     }
 
     /// Whether the master integrates an FMU (Model Exchange).
@@ -338,8 +351,9 @@ impl Worker {
     }
 
     fn set<'a, N: Into<Number>>(&mut self, values: impl IntoIterator<Item = (&'a PlanTarget, N)>) -> Result<(), Error> {
-        for (PlanTarget { port, written }, value) in values {
+        for (PlanTarget { port, written, conversion }, value) in values {
             let (instance, value) = (&mut self.instances[port.instance], value.into());
+            let value = conversion.map_or(value, |conversion| Change::Linear(conversion).apply(value));
             let outcome = if port.base == BaseType::Float64 {
                 instance.set_reals(&[port.reference], &[value.real()])
             } else {

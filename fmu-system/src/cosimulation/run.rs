@@ -162,7 +162,7 @@ impl System {
         settings: &Settings,
         mut hook: impl FnMut(&mut CommunicationPoint<'_>) -> Result<ControlFlow<()>, Error>,
     ) -> (Recording, Result<(), Error>) {
-        let mut recording = Recording::new(self.columns());
+        let mut recording = Recording::new(self.columns.iter().cloned());
         recording.texts =
             self.texts.iter().map(|(_, name)| TextColumn { name: name.clone(), values: vec![] }).collect();
         let mut grid = match self.grid(settings) {

@@ -1,7 +1,7 @@
 //! Inputs over time.
 
 use fmu_import::quantity::{convert, split};
-use model_description::{ModelDescription, ModelVariable};
+use model_description::{Conversion, ModelDescription, ModelVariable};
 use std::fmt;
 
 /// Values of one input over time.
@@ -63,6 +63,16 @@ impl Schedule {
         let converted = |(&(t, x), unit): (&(f64, f64), &String)| Ok((t, convert(x, unit, variable, description)?));
         let points = self.points.iter().zip(&self.units).map(converted).collect::<Result<_, String>>()?;
         Ok(Self { points, units: Vec::new(), ..self })
+    }
+
+    /// Whether values have a unit other than that of the variable.
+    pub(crate) fn has_units(&self) -> bool {
+        !self.units.is_empty()
+    }
+
+    /// All values, converted.
+    pub(crate) fn through(self, conversion: &Conversion) -> Self {
+        Self { points: self.points.iter().map(|(t, x)| (*t, conversion.apply(*x))).collect(), ..self }
     }
 
     /// With these units of the values, if there is one.

@@ -87,6 +87,17 @@ impl Sequence {
         }
     }
 
+    /// Whether the values have a unit other than that of the variable.
+    pub(crate) fn has_unit(&self) -> bool {
+        !self.unit.is_empty()
+    }
+
+    /// All texts, changed.
+    pub(crate) fn through<E>(&self, change: impl Fn(&str) -> Result<String, E>) -> Result<Self, E> {
+        let one = |(t, text, at): &(f64, String, String)| Ok((*t, change(text)?, at.clone()));
+        Ok(Self { points: self.points.iter().map(one).collect::<Result<_, E>>()?, unit: self.unit.clone() })
+    }
+
     /// The texts as numbers, connected by lines; a time that occurs twice is a jump.
     ///
     /// # Errors
@@ -104,6 +115,17 @@ impl Sequence {
     pub fn at(&self, t: f64) -> &str {
         let until = self.points.partition_point(|(time, ..)| *time <= t + SAME);
         &self.points[until.saturating_sub(1)].1
+    }
+
+    /// The texts as numbers of this variable, in its unit: a real number on lines, every other held until the next.
+    ///
+    /// # Errors
+    /// Names the first text that is not a value of the variable, or a unit.
+    pub fn schedule(&self, variable: &ModelVariable, description: &ModelDescription) -> Result<Schedule, String> {
+        if variable.base.is_float() {
+            return self.lines()?.in_unit_of(variable, description);
+        }
+        self.values(variable, description)?.steps().ok_or_else(|| "is not one number".to_owned())
     }
 
     /// The texts as values of this variable.

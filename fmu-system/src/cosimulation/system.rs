@@ -1,12 +1,13 @@
 //! FMUs and their connections, before a run.
 
+use super::Column;
 use super::grid::{Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port, kind};
 use super::point::take_messages;
 use super::schedule::Schedule;
 use super::sequence::Sequence;
-use super::wiring::{Source, Units, Wiring};
+use super::wiring::{Outlet, Record, Source, Units, Wiring};
 use fmu_core::Need;
 use fmu_import::written::matches;
 use fmu_import::{Error, Fmu, Instance, Kind, Logging, Message, Values};
@@ -22,9 +23,9 @@ pub struct System {
     pub(super) wiring: Wiring,
     /// Values set by the user.
     pub(super) set: Vec<(Port, Values)>,
-    pub(super) records: Vec<Port>,
-    /// Names of the recorded columns.
-    pub(super) columns: Vec<String>,
+    pub(super) records: Vec<Record>,
+    /// The recorded columns, without values.
+    pub(super) columns: Vec<Column>,
     /// Texts that a single run records, with the names of their columns.
     pub(super) texts: Vec<(Port, String)>,
     pub(super) units: Units,
@@ -266,9 +267,17 @@ impl System {
     /// # Errors
     /// As [`record`](Self::record).
     pub fn record_as(&mut self, port: &str, name: &str) -> Result<(), Error> {
-        let port = self.parts.scalar(port)?;
-        self.records.push(port);
-        self.columns.push(name.into());
+        self.record_through(&Outlet { port: port.into(), name: name.into(), ..Outlet::default() })
+    }
+
+    /// Records a variable under another name and through a transformation.
+    ///
+    /// # Errors
+    /// As [`record`](Self::record), or its type does not fit the transformation.
+    pub fn record_through(&mut self, outlet: &Outlet) -> Result<(), Error> {
+        let port = self.parts.scalar(&outlet.port)?;
+        self.columns.push(self.parts.outlet(&port, outlet));
+        self.records.push(Record { change: self.parts.change(&port, outlet)?, port });
         Ok(())
     }
 
@@ -302,6 +311,15 @@ impl System {
     /// Whether there is a variable of this name, written `instance.variable`.
     pub fn has(&self, port: &str) -> bool {
         self.parts.port(port).is_ok()
+    }
+
+    /// The extents of an array, written `instance.variable`, with the sizes set; none for one value.
+    ///
+    /// # Errors
+    /// The variable does not exist.
+    pub fn shape(&self, port: &str) -> Result<Vec<usize>, Error> {
+        let port = self.parts.port(port)?;
+        Ok(if port.is_whole() { self.parts.shape(&port) } else { Vec::new() })
     }
 
     /// The variables whose names have the form of a pattern, in the order of the FMUs; neither clocks nor time.

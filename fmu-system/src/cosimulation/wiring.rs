@@ -4,7 +4,7 @@ use super::parts::Port;
 use super::schedule::Schedule;
 use super::sequence::Held;
 use fmu_import::Number;
-use model_description::{Conversion, Measured};
+use model_description::Conversion;
 use std::sync::Arc;
 
 /// The effect of a connection between different units.
@@ -18,24 +18,70 @@ pub enum Units {
 }
 
 /// The path of a value from an output to an input.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Crossing<'a> {
+#[derive(Clone, Debug, Default)]
+pub struct Crossing {
     /// Whether units are converted.
     pub units: Units,
-    /// Units of source and target, for an FMU that names none.
-    pub stated: [Option<Measured<'a>>; 2],
-    /// Conversion after that of the units.
-    pub transformation: Option<Conversion>,
-    /// Source values and what becomes of them, as a user writes them; instead of any conversion.
-    pub table: Option<&'a [(String, String)]>,
+    /// Transformation after the conversion of the units.
+    pub transformation: Option<Transformation>,
+}
+
+/// The transformation of a value, as a user writes it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Transformation {
+    /// A number is converted.
+    Linear(Conversion),
+    /// Values and what becomes of each; other values stay as they are.
+    Table(Arc<[(String, String)]>),
+}
+
+impl Transformation {
+    /// One transformation after the other; `None` is none.
+    ///
+    /// # Errors
+    /// One is a table, and the other is not.
+    pub fn then(first: Option<Self>, second: Option<Self>) -> Result<Option<Self>, String> {
+        match (first, second) {
+            (Some(Self::Linear(a)), Some(Self::Linear(b))) => {
+                Ok(Conversion::then(Some(a), Some(b)).map(Transformation::Linear))
+            }
+            (Some(Self::Table(a)), Some(Self::Table(b))) => {
+                let after = |x: &String| b.iter().find(|(sent, _)| sent == x).map_or(x, |(_, taken)| taken).clone();
+                let known = |x: &String| a.iter().any(|(sent, _)| sent == x);
+                let all = a.iter().map(|(sent, taken)| (sent.clone(), after(taken)));
+                Ok(Some(Self::Table(all.chain(b.iter().filter(|(sent, _)| !known(sent)).cloned()).collect())))
+            }
+            (Some(_), Some(_)) => Err("a table and a linear transformation on one path are not supported".into()),
+            (one, other) => Ok(one.or(other)),
+        }
+    }
+}
+
+/// A variable to record, and what becomes of its values.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Outlet {
+    /// `instance.variable`.
+    pub port: String,
+    /// Name of the column.
+    pub name: String,
+    /// Transformation of the values.
+    pub transformation: Option<Transformation>,
+    /// Unit after the transformation; `None` is that of the variable.
+    pub unit: Option<String>,
+    /// Numbers and names of the values after a table.
+    pub items: Vec<(i64, String)>,
 }
 
 /// What becomes of a value on its way.
-#[derive(Clone)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum Change {
     Linear(Conversion),
     /// Values and what becomes of each.
-    Table(Arc<[(Number, Number)]>),
+    Table {
+        entries: Arc<[(Number, Number)]>,
+        /// Values without an entry stay as they are; otherwise they are missing, because the type of the target has no such value.
+        keeps: bool,
+    },
 }
 
 impl Change {
@@ -44,10 +90,25 @@ impl Change {
         match self {
             _ if number == Number::Missing => number,
             Self::Linear(conversion) => Number::Real(conversion.apply(number.real())),
-            Self::Table(table) => {
-                table.iter().find(|(sent, _)| *sent == number).map_or(Number::Missing, |(_, taken)| *taken)
+            Self::Table { entries, keeps } => {
+                let otherwise = if *keeps { number } else { Number::Missing };
+                entries.iter().find(|(sent, _)| *sent == number).map_or(otherwise, |(_, taken)| *taken)
             }
         }
+    }
+}
+
+/// A recorded variable.
+#[derive(Clone)]
+pub(super) struct Record {
+    pub(super) port: Port,
+    pub(super) change: Option<Change>,
+}
+
+impl Record {
+    /// This variable in the instance `count` positions later.
+    pub(super) fn shifted(&self, count: usize) -> Self {
+        Self { port: self.port.shifted(count), change: self.change.clone() }
     }
 }
 
@@ -63,7 +124,7 @@ pub(super) enum Source {
 impl Source {
     /// Whether it may have no value: before a clock ticks, or beyond a table.
     pub(super) fn may_lack(&self) -> bool {
-        matches!(self, Self::Port(port, change) if !port.clocks.is_empty() || matches!(change, Some(Change::Table(_))))
+        matches!(self, Self::Port(port, change) if !port.clocks.is_empty() || matches!(change, Some(Change::Table { .. })))
     }
 }
 

@@ -1,8 +1,8 @@
 //! The elements of a system.
 
+use super::path::{Hop, StatedUnit};
 use super::ssm::MappingEntry;
 use super::ssv::Parameter;
-use model_description::Conversion;
 
 /// An FMU of the system.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,41 +15,44 @@ pub struct Component {
     pub connectors: Vec<Connector>,
     /// Values of its variables.
     pub bindings: Vec<Binding>,
-    /// It is made for Model Exchange alone.
-    pub model_exchange: bool,
+    /// `CoSimulation` or `ModelExchange`, if it runs in this way alone.
+    pub implementation: Option<String>,
     /// Line of the element.
     pub line: usize,
 }
 
 /// A variable that can be connected.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connector {
     /// Name; of a component, that of the variable.
     pub name: String,
-    /// `input`, `output`, `parameter`, `calculatedParameter` or `inout`.
+    /// `input`, `output`, `parameter` and so on.
     pub kind: String,
+    /// Its type, as in `Real`, if the file gives one.
+    pub base: Option<String>,
     /// Unit, if the file gives one.
-    pub unit: Option<String>,
+    pub unit: Option<StatedUnit>,
+    /// Numbers and names of an enumeration.
+    pub items: Vec<(i64, String)>,
+    /// `intervalVariability` of a clock.
+    pub ticks: Option<String>,
+    /// The clocks of the variable.
+    pub clocks: Vec<String>,
+    /// Extents of an array; `None` for one that the file leaves open.
+    pub extents: Vec<Option<usize>>,
     /// Line of the element.
     pub line: usize,
 }
 
-/// Source values and what becomes of them.
-pub(super) type Table = std::sync::Arc<[(String, String)]>;
-
-/// Two connectors; which of them sends follows from their kinds.
+/// Two connectors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
-    /// One end.
+    /// One end; in a [`Structure`](super::structure::Structure), the source.
     pub start: ConnectionEnd,
     /// The other.
     pub end: ConnectionEnd,
-    /// Whether values pass without conversion, even between different units.
-    pub no_conversion: bool,
-    /// Conversion of the value, after that of the units.
-    pub transformation: Option<Conversion>,
-    /// Source values and what becomes of them, instead of a conversion.
-    pub table: Option<Table>,
+    /// The path of the value: in a [`Structure`](super::structure::Structure) through the connectors of inner systems.
+    pub hops: Vec<Hop>,
     /// Line of the element.
     pub line: usize,
 }
@@ -76,27 +79,22 @@ impl std::fmt::Display for ConnectionEnd {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Binding {
     /// File within the SSP, or the values themselves.
-    pub values: ParameterValues,
-    /// Prefix of every name.
+    pub values: Contents<Vec<Parameter>>,
+    /// Prefix of every name of the values.
     pub prefix: String,
-    /// Mapping of the names.
-    pub mapping: Option<Mapping>,
+    /// Mapping of the names, and where these names begin.
+    pub mapping: Option<Contents<Vec<MappingEntry>>>,
+    /// Path of the system of the binding, which ends with a dot; empty for a component and the outer system.
+    pub path: String,
 }
 
-/// Location of a mapping.
+/// Content of a file or of the description itself.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Mapping {
+pub enum Contents<T> {
     /// In a file of the archive.
     File(String),
+    /// In a file of the component's archive.
+    InComponent(String),
     /// In the description itself.
-    Inline(Vec<MappingEntry>),
-}
-
-/// Location of values.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ParameterValues {
-    /// In a file of the archive.
-    File(String),
-    /// In the description itself.
-    Inline(Vec<Parameter>),
+    Inline(T),
 }

@@ -1,10 +1,10 @@
 //! Inner systems of an SSP, resolved: only components, connections between them and the connectors of the outer system remain.
 //!
-//! A component `b` of the inner system `in` becomes the component `in.b`. A connector of an inner system, and a parameter of any
-//! system, is a name for the connectors of components that it reaches.
+//! A component `b` of the inner system `in` becomes the component `in.b`. A connector of a system is a name for the connectors of
+//! components that it reaches. The references to a signal dictionary share its entries.
 
 use super::component::{Binding, Component, Connection, ConnectionEnd, Connector};
-use model_description::Conversion;
+use super::path::{Hop, StatedUnit};
 
 /// A system as its element has it.
 #[derive(Default)]
@@ -16,10 +16,30 @@ pub(super) struct Level {
     pub connections: Vec<Connection>,
     pub bindings: Vec<Binding>,
     pub inner: Vec<Level>,
+    /// Names of signal dictionaries and their entries.
+    pub dictionaries: Vec<(String, Vec<Connector>)>,
+    pub references: Vec<Reference>,
 }
 
-/// Names and what they reach: connectors of components, each with a conversion of the value.
-pub(super) type Reach = Vec<(String, Vec<(String, Option<Conversion>)>)>;
+/// A signal dictionary, seen as an element of a system.
+pub(super) struct Reference {
+    pub name: String,
+    pub dictionary: String,
+    pub connectors: Vec<Connector>,
+}
+
+/// Connector of a component that a name reaches.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Reached {
+    /// `component.variable`.
+    pub port: String,
+    /// Unit of the connector with the name.
+    pub unit: Option<StatedUnit>,
+    pub hops: Vec<Hop>,
+}
+
+/// Names and what they reach.
+pub(super) type Reach = Vec<(String, Vec<Reached>)>;
 
 /// A system without inner ones.
 #[derive(Default)]
@@ -30,29 +50,45 @@ pub(super) struct Flat {
     /// Inner ones first.
     pub bindings: Vec<Binding>,
     pub reach: Reach,
+    /// Connections without effect.
+    pub notes: Vec<String>,
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Owner {
+    Component,
+    System,
+    Dictionary,
 }
 
 /// A connector with the full name of its owner.
 #[derive(Clone, PartialEq)]
 struct Node {
-    /// Full name of a component, or path of a system, which ends with a dot.
+    of: Owner,
+    /// Full name of a component, or path of a system or of a dictionary, which ends with a dot.
     owner: String,
     connector: String,
-    is_component: bool,
 }
 
 impl Node {
     fn name(&self) -> String {
-        if self.is_component {
-            format!("{}.{}", self.owner, self.connector)
-        } else {
-            format!("{}{}", self.owner, self.connector)
+        match self.of {
+            Owner::Component => format!("{}.{}", self.owner, self.connector),
+            Owner::System => format!("{}{}", self.owner, self.connector),
+            Owner::Dictionary => {
+                format!("the entry {} of the dictionary {}", self.connector, self.owner.trim_end_matches('.'))
+            }
         }
     }
 
     /// A connector of the outer system.
     fn is_outside(&self) -> bool {
-        !self.is_component && self.owner.is_empty()
+        self.of == Owner::System && self.owner.is_empty()
+    }
+
+    /// Where a path begins or ends.
+    fn is_end(&self) -> bool {
+        self.of == Owner::Component || self.is_outside()
     }
 
     fn end(&self) -> ConnectionEnd {
@@ -62,11 +98,15 @@ impl Node {
 }
 
 /// A connection from its source to its target.
-struct Edge<'a> {
+struct Edge {
     from: Node,
     to: Node,
+    /// Unit of the source.
+    unit: Option<StatedUnit>,
+    hop: Hop,
+    /// It sets a value before the run.
     is_parameter: bool,
-    of: &'a Connection,
+    line: usize,
 }
 
 /// Resolves the inner systems.
@@ -75,148 +115,180 @@ struct Edge<'a> {
 /// The line of a connection, and what is wrong with it.
 pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
     let mut levels = Vec::new();
-    collect(outer, &mut levels);
+    collect(&[outer], &mut levels);
     let mut edges = Vec::new();
-    for level in &levels {
-        for connection in &level.connections {
-            edges.push(edge(level, connection).map_err(|cause| format!("line {}: {cause}", connection.line))?);
+    for around in &levels {
+        for connection in around.last().into_iter().flat_map(|level| &level.connections) {
+            edges.push(edge(around, connection).map_err(|cause| format!("line {}: {cause}", connection.line))?);
         }
     }
     let mut flat = Flat::default();
-    for edge in edges.iter().filter(|edge| edge.to.is_component || edge.to.is_outside()) {
-        let at = |cause: String| format!("line {}: {cause}", edge.of.line);
-        let (mut from, mut conversion, mut plain) = (&edge.from, edge.of.transformation, edge.of.no_conversion);
-        let mut table = edge.of.table.clone();
-        let mut passed = vec![(from.clone(), conversion)];
-        while !from.is_component && !from.is_outside() {
-            let mut feeding = edges.iter().filter(|other| other.to == *from);
+    for edge in edges.iter().filter(|edge| edge.to.is_end()) {
+        let at = |cause: String| format!("line {}: {cause}", edge.line);
+        let mut path = vec![edge];
+        while let Some(first) = path.last().filter(|first| !first.from.is_end()) {
+            let mut feeding = edges.iter().filter(|other| other.to == first.from);
             let Some(next) = feeding.next() else { break };
             if feeding.next().is_some() {
-                return Err(at(format!("{} is fed twice: remove one of the connections", from.name())));
+                return Err(at(format!("{} is fed twice: remove one of the connections", first.from.name())));
             }
-            if passed.len() > edges.len() {
-                return Err(at(format!("{} is connected with itself", from.name())));
+            if path.len() > edges.len() {
+                return Err(at(format!("{} is connected with itself", first.from.name())));
             }
-            if (table.is_some() || next.of.table.is_some()) && (conversion, &table) != (None, &None) {
-                return Err(at("a table and another transformation on one path are not supported".into()));
-            }
-            table = table.or_else(|| next.of.table.clone());
-            conversion = Conversion::then(next.of.transformation, conversion);
-            plain |= next.of.no_conversion;
-            from = &next.from;
-            passed.push((from.clone(), conversion));
+            path.push(next);
         }
-        if edge.is_parameter && table.is_some() {
-            return Err(at("a table for a parameter is not supported: write a ParameterMapping".into()));
-        }
-        if edge.to.is_component {
-            for (node, conversion) in passed.iter().filter(|(node, _)| !node.is_component) {
-                if edge.is_parameter || !node.is_outside() {
-                    reached(&mut flat.reach, node.name(), (edge.to.name(), *conversion));
+        path.reverse();
+        let hops: Vec<Hop> = path.iter().map(|edge| edge.hop.clone()).collect();
+        if edge.to.of == Owner::Component {
+            for (k, from) in path.iter().enumerate().filter(|(_, edge)| edge.from.of == Owner::System) {
+                let reached = Reached { port: edge.to.name(), unit: from.unit.clone(), hops: hops[k..].to_vec() };
+                let name = from.from.name();
+                match flat.reach.iter_mut().find(|(known, _)| *known == name) {
+                    Some((_, targets)) => targets.push(reached),
+                    None => flat.reach.push((name, vec![reached])),
                 }
             }
         }
-        // What nothing feeds keeps its value, and parameters are set and not connected.
-        if !edge.is_parameter && (from.is_component || from.is_outside()) {
-            if (conversion.is_some() || table.is_some()) && (from.is_outside() || edge.to.is_outside()) {
-                return Err(at("a transformation at a connector of the system is not supported".into()));
-            }
+        let from = &path[0].from;
+        // Parameters are set and not connected, and what nothing feeds keeps its value.
+        if path.iter().any(|edge| edge.is_parameter) {
+            continue;
+        }
+        if from.is_end() {
             let (start, end) = (from.end(), edge.to.end());
-            let line = edge.of.line;
-            flat.connections.push(Connection {
-                start,
-                end,
-                no_conversion: plain,
-                transformation: conversion,
-                table,
-                line,
-            });
+            flat.connections.push(Connection { start, end, hops, line: edge.line });
+        } else {
+            let (from, to) = (from.name(), edge.to.name());
+            flat.notes.push(format!("line {}: nothing feeds {from}: {to} keeps its value", edge.line));
         }
     }
     flat.connectors.clone_from(&outer.connectors);
-    for level in levels.iter().rev() {
-        flat.bindings.extend(
-            level.bindings.iter().map(|b| Binding { prefix: format!("{}{}", level.path, b.prefix), ..b.clone() }),
-        );
-    }
+    let levels: Vec<&Level> = levels.iter().filter_map(|around| around.last().copied()).collect();
+    flat.bindings.extend(levels.iter().rev().flat_map(|level| level.bindings.iter().cloned()));
     flat.components = levels.iter().flat_map(|level| level.components.iter().cloned()).collect();
     Ok(flat)
 }
 
-fn collect<'a>(level: &'a Level, all: &mut Vec<&'a Level>) {
-    all.push(level);
-    level.inner.iter().for_each(|inner| collect(inner, all));
-}
-
-fn reached(reach: &mut Reach, name: String, target: (String, Option<Conversion>)) {
-    match reach.iter_mut().find(|(known, _)| *known == name) {
-        Some((_, targets)) => targets.push(target),
-        None => reach.push((name, vec![target])),
+/// Every system, after those around it.
+fn collect<'a>(around: &[&'a Level], all: &mut Vec<Vec<&'a Level>>) {
+    all.push(around.to_vec());
+    for inner in around.last().into_iter().flat_map(|level| &level.inner) {
+        collect(&[around, &[inner]].concat(), all);
     }
 }
 
-/// The connection with its direction: an output of an element or an input of the system is the source, regardless of start and
-/// end.
-fn edge<'a>(level: &Level, c: &'a Connection) -> Result<Edge<'a>, String> {
-    let ((start, one), (end, other)) = (node(level, &c.start)?, node(level, &c.end)?);
-    let inside = |end: &ConnectionEnd| end.element.is_some();
-    let sends = |end: &ConnectionEnd, kind: &str| match kind {
-        "output" | "calculatedParameter" => inside(end),
-        "input" | "parameter" | "structuralParameter" => !inside(end),
-        _ => false,
+/// Whether a value may pass (SSP 2.0, Allowed Connections); each side with its owner, an element or the system around it.
+fn allowed([(from_element, from), (to_element, to)]: [(bool, &str); 2]) -> bool {
+    let targets: &[&str] = match (from_element, from, to_element) {
+        (false, "structuralParameter", true) | (true, "constant", true) => {
+            &["structuralParameter", "parameter", "input", "inout"]
+        }
+        (false, "parameter", true) | (true, "calculatedParameter", true) => &["parameter", "input", "inout"],
+        (false, "input", true) | (true, "output" | "local", true) => &["input", "inout"],
+        (true, "inout", true) => &["input"],
+        (true, "constant", false) => &["constant", "calculatedParameter", "output", "local"],
+        (true, "output" | "local" | "inout", false) | (false, "input", false) => &["output", "local"],
+        (true, "calculatedParameter", false) | (false, "parameter" | "structuralParameter", false) => {
+            &["calculatedParameter", "output", "local"]
+        }
+        _ => &[],
     };
-    let takes = |end: &ConnectionEnd, kind: &str| match kind {
-        "input" | "parameter" | "structuralParameter" => inside(end),
-        "output" | "calculatedParameter" => !inside(end),
-        _ => false,
-    };
-    let value = |kind: &str| ["input", "output"].contains(&kind);
-    let alike = value(&one) == value(&other);
-    let (from, to) = if alike && sends(&c.start, &one) && takes(&c.end, &other) {
-        (start, end)
-    } else if alike && sends(&c.end, &other) && takes(&c.start, &one) {
-        (end, start)
-    } else {
-        return Err(format!(
-            "connects {} ({one}) with {} ({other}): expected an output and an input of components, or one of them and the \
-             same kind of the system",
-            c.start, c.end
-        ));
-    };
-    let calculated = [&one, &other].iter().any(|kind| *kind == "calculatedParameter");
-    if calculated {
-        return Err(format!("connects {} with {}: a calculatedParameter cannot be connected", c.start, c.end));
-    }
-    if from.is_outside() && to.is_outside() {
-        return Err("connects the system with itself, which is not supported: remove it".into());
-    }
-    Ok(Edge { from, to, is_parameter: ["parameter", "structuralParameter"].contains(&one.as_str()), of: c })
+    targets.contains(&to)
 }
 
-/// The connector at an end, and its kind.
-fn node(level: &Level, end: &ConnectionEnd) -> Result<(Node, String), String> {
-    let (of, connectors, owner, is_component) = match &end.element {
-        None => ("the system".to_owned(), &level.connectors, level.path.clone(), false),
-        Some(element) => {
-            let full = format!("{}{element}", level.path);
-            let component =
-                level.components.iter().find(|c| c.name == full).map(|c| (&c.connectors, full.clone(), true));
-            let inner = level.inner.iter().find(|inner| inner.path == format!("{full}."));
-            let found = component.or_else(|| inner.map(|inner| (&inner.connectors, inner.path.clone(), false)));
-            let none = || {
-                let names = level.components.iter().map(|c| c.name.as_str());
-                let inner = level.inner.iter().map(|inner| inner.path.trim_end_matches('.'));
-                format!(
-                    "there is no component {element}; available: {}",
-                    names.chain(inner).collect::<Vec<_>>().join(", ")
-                )
-            };
-            let (connectors, owner, is_component) = found.ok_or_else(none)?;
-            (element.clone(), connectors, owner, is_component)
+/// The connection with its direction, which follows from the kinds of the connectors and not from start and end.
+fn edge(around: &[&Level], c: &Connection) -> Result<Edge, String> {
+    let ((start, one), (end, other)) = (node(around, &c.start)?, node(around, &c.end)?);
+    // A clock that asks to be ticked counts as an output.
+    let kind = |c: &Connector| match c.ticks.as_deref() {
+        Some(ticks) if ticks != "triggered" => "output".to_owned(),
+        _ => c.kind.clone(),
+    };
+    let (one_kind, other_kind) = (kind(&one), kind(&other));
+    let side = |end: &ConnectionEnd| end.element.is_some();
+    let ends = [(side(&c.start), one_kind.as_str()), (side(&c.end), other_kind.as_str())];
+    for (end, connector) in [(&c.start, &one), (&c.end, &other)] {
+        if connector.kind == "unspecified" {
+            return Err(format!("{end} is of kind unspecified, which is not supported: give its kind"));
+        }
+    }
+    let (from, to, unit, into) = match (allowed(ends), allowed([ends[1], ends[0]])) {
+        (true, _) => (start, end, one.unit, other),
+        (_, true) => (end, start, other.unit, one),
+        _ => {
+            return Err(format!(
+                "connects {} ({one_kind}) with {} ({other_kind}): expected an output and an input of components, or one of \
+                 them and the same kind of the system",
+                c.start, c.end
+            ));
         }
     };
-    let names = || connectors.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
-    let found = connectors.iter().find(|c| c.name == end.connector);
-    let found = found.ok_or_else(|| format!("{of} has no connector {}; it has {}", end.connector, names()))?;
-    Ok((Node { owner, connector: end.connector.clone(), is_component }, found.kind.clone()))
+    if !side(&c.start) && !side(&c.end) {
+        return Err("connects the system with itself, which is not supported: remove it".into());
+    }
+    let from_kind = if allowed(ends) { &one_kind } else { &other_kind };
+    let is_parameter = |kind: &str| ["parameter", "structuralParameter"].contains(&kind);
+    if ["constant", "calculatedParameter"].contains(&from_kind.as_str()) && is_parameter(&into.kind) {
+        let (from, to) = (from.name(), to.name());
+        return Err(format!("a value that is computed cannot set a parameter: give {to} a value instead of {from}"));
+    }
+    let hop = Hop { unit: into.unit, ..c.hops.first().cloned().unwrap_or_default() };
+    Ok(Edge { is_parameter: is_parameter(from_kind), from, to, unit, hop, line: c.line })
+}
+
+/// The connector at an end.
+fn node(around: &[&Level], end: &ConnectionEnd) -> Result<(Node, Connector), String> {
+    let Some(level) = around.last() else { return Err("is in no system".into()) };
+    let (of, connectors, owner, label) = match &end.element {
+        None => (Owner::System, &level.connectors, level.path.clone(), "the system"),
+        Some(element) => {
+            let full = format!("{}{element}", level.path);
+            let path = format!("{full}.");
+            let component = level.components.iter().find(|c| c.name == full);
+            let inner = level.inner.iter().find(|inner| inner.path == path);
+            if let Some(component) = component {
+                (Owner::Component, &component.connectors, full, element.as_str())
+            } else if let Some(inner) = inner {
+                (Owner::System, &inner.connectors, path, element.as_str())
+            } else if let Some(reference) = level.references.iter().find(|reference| reference.name == *element) {
+                return entry(around, reference, end);
+            } else {
+                let names = level.components.iter().map(|c| c.name.as_str());
+                let inner = level.inner.iter().map(|inner| inner.path.trim_end_matches('.'));
+                let all = names.chain(inner).chain(level.references.iter().map(|r| r.name.as_str()));
+                let all = all.collect::<Vec<_>>().join(", ");
+                return Err(format!("there is no component {element}; available: {all}"));
+            }
+        }
+    };
+    let connector = connector(connectors, &end.connector, label)?.clone();
+    Ok((Node { of, owner, connector: end.connector.clone() }, connector))
+}
+
+/// The entry of a dictionary, seen through a reference. Its name is sought in the system of the reference, then in those around it.
+fn entry(around: &[&Level], reference: &Reference, end: &ConnectionEnd) -> Result<(Node, Connector), String> {
+    let mut seen = connector(&reference.connectors, &end.connector, &reference.name)?.clone();
+    let defined = |level: &&&Level| level.dictionaries.iter().any(|(name, _)| *name == reference.dictionary);
+    let level = around.iter().rev().find(defined);
+    let none = || format!("{} refers to the dictionary {}, which no system has", reference.name, reference.dictionary);
+    let level = level.ok_or_else(none)?;
+    let entries = level.dictionaries.iter().filter(|(name, _)| *name == reference.dictionary);
+    let entries: Vec<Connector> = entries.flat_map(|(_, entries)| entries.iter().cloned()).collect();
+    let label = format!("the dictionary {}", reference.dictionary);
+    let entry = connector(&entries, &end.connector, &label)?;
+    match (&seen.unit, &entry.unit) {
+        (Some(one), Some(other)) if one != other => {
+            let (name, one, other) = (&end.connector, &one.name, &other.name);
+            return Err(format!("{}.{name} is in {one}, and {label} has {name} in {other}", reference.name));
+        }
+        (None, _) => seen.unit.clone_from(&entry.unit),
+        _ => {}
+    }
+    let owner = format!("{}{}.", level.path, reference.dictionary);
+    Ok((Node { of: Owner::Dictionary, owner, connector: end.connector.clone() }, seen))
+}
+
+fn connector<'a>(all: &'a [Connector], name: &str, of: &str) -> Result<&'a Connector, String> {
+    let names = || all.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
+    all.iter().find(|c| c.name == name).ok_or_else(|| format!("{of} has no connector {name}; it has {}", names()))
 }

@@ -1,16 +1,19 @@
 //! An SSP as a system of our co-simulation.
 
 use super::DESCRIPTION;
+use super::component::Component;
 use super::error::{Error, invalid};
+use super::flat::Reached;
+pub use super::outside::{Connectors, Inlet};
 use super::package::Package;
-use super::ssm;
+use super::path::{Hop, Way, along};
 use super::ssv::Parameter;
 use super::structure::{Connection, ConnectionEnd, Connector, Structure};
 use super::values::{self, Given};
-use crate::cosimulation::{Crossing, Method, Schedule, Sequence, Settings, System, Units};
+use crate::cosimulation::{Crossing, Method, Outlet, Schedule, Sequence, Settings, System, Units, incompatible};
 use fmu_import::written::{is_pattern, matches};
-use fmu_import::{Fmu, check_entries, limits};
-use model_description::{Experiment, Measured, Passage};
+use fmu_import::{Fmu, Instance, check_entries, limits};
+use model_description::{BaseType, Experiment, ModelVariable, Variability};
 use std::fs::File;
 use std::path::Path;
 use zip::ZipArchive;
@@ -26,44 +29,6 @@ pub struct Loaded {
     pub connectors: Connectors,
     /// Values for unknown names, which SSP 1.0 allows (4.4, ParameterBindings).
     pub notes: Vec<String>,
-}
-
-/// Connectors of a system, none for FMUs without an SSP.
-#[derive(Clone, Debug, Default)]
-pub struct Connectors {
-    /// Names of the inputs, each with the inputs `component.variable` that it feeds.
-    pub inputs: Vec<(String, Vec<String>)>,
-    /// Names of the outputs, each with its source `component.variable`.
-    pub outputs: Vec<(String, String)>,
-}
-
-impl Connectors {
-    /// The ports denoted by a name to set: the inputs that an input of the system feeds, or the name itself.
-    ///
-    /// # Errors
-    /// The name has no dot, and the system has no such input.
-    pub fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
-        if let Some((_, targets)) = self.inputs.iter().find(|(n, _)| n == name) {
-            return Ok(targets.clone());
-        }
-        let of_system = !(self.inputs.is_empty() && self.outputs.is_empty());
-        if of_system && !name.contains('.') {
-            let names: Vec<&str> = self.inputs.iter().map(|(n, _)| n.as_str()).collect();
-            return invalid(format!("{name}: is not an input of the system; it has {}", names.join(", ")));
-        }
-        Ok(vec![name.to_owned()])
-    }
-
-    /// The port denoted by a name to record: an output of the system, an input fed by one of the system, or the name itself.
-    ///
-    /// # Errors
-    /// As for [`ports`](Self::ports).
-    pub fn source(&self, name: &str) -> Result<String, Error> {
-        match self.outputs.iter().find(|(n, _)| n == name) {
-            Some((_, source)) => Ok(source.clone()),
-            None => Ok(self.ports(name)?.swap_remove(0)),
-        }
-    }
 }
 
 impl Loaded {
@@ -150,10 +115,13 @@ impl Loaded {
                 variants[0]
             )));
         }
-        let mut package = Package { path, description, zip };
+        let mut package = Package { path, description, zip, notes: Vec::new() };
         let text = package.text(description)?;
         let in_description = |cause: String| within(format!("{description}: {cause}"));
-        let structure = Structure::read(&text).map_err(in_description)?;
+        // The name of the archive is in front of every message.
+        let named = format!("{}: ", path.display());
+        let mut files = |name: &str| package.text(name).map_err(|e| e.to_string().replacen(&named, "", 1));
+        let structure = Structure::read_with(&text, &mut files).map_err(in_description)?;
         let mut fmus = Vec::new();
         let temporary = |e: std::io::Error| within(format!("no temporary folder: {e}"));
         let dir = tempfile::tempdir().map_err(temporary)?;
@@ -164,40 +132,50 @@ impl Loaded {
             fmus.push((component.name.clone(), fmu));
         }
         let system = system(&fmus);
-        if let (Method::CoSimulation { .. }, Some(component)) =
-            (system.method(), structure.components.iter().find(|component| component.model_exchange))
-        {
-            let cause = "implementation=\"ModelExchange\" is not Co-Simulation: simulate it with --me";
-            return Err(in_description(format!("line {}: {cause}", component.line)));
+        let (other, remedy) = match system.method() {
+            Method::CoSimulation { .. } => ("ModelExchange", "is not Co-Simulation: simulate it with --me"),
+            Method::ModelExchange(_) => ("CoSimulation", "is not Model Exchange: simulate it without --me"),
+        };
+        let is_other = |component: &&Component| component.implementation.as_deref() == Some(other);
+        if let Some(component) = structure.components.iter().find(is_other) {
+            return Err(in_description(format!("line {}: implementation=\"{other}\" {remedy}", component.line)));
         }
         let mut loaded = Self { system, ..Self::default() };
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
-        for (component, (name, fmu)) in structure.components.iter().zip(&fmus) {
+        for (name, fmu) in &fmus {
             let experiment = fmu.description().default_experiment;
             // The system's times take precedence over those of its parts.
             let times = structure.start.or(structure.stop).is_some();
             let part = Experiment { step: experiment.step, ..Experiment::default() };
             loaded.experiments.push(if times { part } else { experiment });
             loaded.system.add(name, fmu, logging)?;
-            loaded.check_connectors(&component.connectors, &component.name).map_err(in_description)?;
+        }
+        for component in &structure.components {
+            let notes = check_connectors(&loaded.system, component).map_err(in_description)?;
+            loaded.notes.extend(notes.into_iter().map(|note| format!("{}: {description}: {note}", of())));
+        }
+        loaded.notes.extend(structure.notes.iter().map(|note| format!("{}: {description}: {note}", of())));
+        // Inner values first: those of the system replace them. Sizes of arrays are set before arrays are connected.
+        let mut given = Vec::new();
+        for component in &structure.components {
+            for binding in &component.bindings {
+                let (file, parameters) = package.parameters(binding, &component.source)?;
+                given.extend(loaded.bound(&file, parameters, &format!("{}.", component.name), &structure));
+            }
+        }
+        for binding in &structure.bindings {
+            let (file, parameters) = package.parameters(binding, "")?;
+            given.extend(loaded.bound(&file, parameters, &binding.path, &structure));
+        }
+        loaded.notes.append(&mut package.notes);
+        values::set(&mut loaded.system, &given)?;
+        for component in &structure.components {
+            check_extents(&loaded.system, component).map_err(in_description)?;
         }
         for connection in &structure.connections {
             let wrong = |cause: String| in_description(format!("line {}: {cause}", connection.line));
             loaded.connect(&structure, connection).map_err(wrong)?;
         }
-        // Inner values first: those of the system replace them.
-        let mut given = Vec::new();
-        for component in &structure.components {
-            for binding in &component.bindings {
-                let (file, parameters) = package.parameters(binding)?;
-                given.extend(loaded.bound(&file, &parameters, &format!("{}.", component.name), &structure)?);
-            }
-        }
-        for binding in &structure.bindings {
-            let (file, parameters) = package.parameters(binding)?;
-            given.extend(loaded.bound(&file, &parameters, "", &structure)?);
-        }
-        values::set(&mut loaded.system, &given)?;
         Ok(loaded)
     }
 
@@ -206,8 +184,8 @@ impl Loaded {
     /// # Errors
     /// No input has this name, or it is already fed.
     pub fn input(&mut self, name: &str, schedule: &Schedule) -> Result<(), Error> {
-        for port in self.connectors.ports(name)? {
-            self.system.input(&port, schedule.clone())?;
+        for inlet in self.connectors.inlets(name)? {
+            self.system.input(&inlet.port, inlet.schedule(schedule.clone())?)?;
         }
         Ok(())
     }
@@ -217,8 +195,8 @@ impl Loaded {
     /// # Errors
     /// No input has this name, it is already fed, or a text is not a value of its type.
     pub fn sequence(&mut self, name: &str, texts: &Sequence) -> Result<(), Error> {
-        for port in self.connectors.ports(name)? {
-            self.system.sequence(&port, texts)?;
+        for inlet in self.connectors.inlets(name)? {
+            self.system.sequence(&inlet.port, &inlet.sequence(texts)?)?;
         }
         Ok(())
     }
@@ -229,12 +207,12 @@ impl Loaded {
     /// # Errors
     /// As [`input`](Self::input), or the text has another form.
     pub fn points(&mut self, name: &str, text: &str) -> Result<(), Error> {
-        for port in self.connectors.ports(name)? {
-            let wrong = Error::Invalid;
-            if self.system.is_real(&port)? || (!self.system.is_text(&port)? && text.contains('~')) {
-                self.system.input(&port, Schedule::parse(text).map_err(wrong)?)?;
+        for inlet in self.connectors.inlets(name)? {
+            let (port, wrong) = (&inlet.port, Error::Invalid);
+            if self.system.is_real(port)? || (!self.system.is_text(port)? && text.contains('~')) {
+                self.system.input(port, inlet.schedule(Schedule::parse(text).map_err(wrong)?)?)?;
             } else {
-                self.system.sequence(&port, &Sequence::parse(text).map_err(wrong)?)?;
+                self.system.sequence(port, &inlet.sequence(&Sequence::parse(text).map_err(wrong)?)?)?;
             }
         }
         Ok(())
@@ -245,15 +223,15 @@ impl Loaded {
     /// # Errors
     /// No variable has this name, or the FMU refuses the value.
     pub fn set(&mut self, name: &str, value: &str) -> Result<(), Error> {
-        for port in self.connectors.ports(name)? {
-            self.system.set(&port, value)?;
+        for inlet in self.connectors.inlets(name)? {
+            self.system.set(&inlet.port, &inlet.text(value)?)?;
         }
         Ok(())
     }
 
     /// Whether a name is that of a connector of the system or of a variable, written `component.variable`.
     pub fn has(&self, name: &str) -> bool {
-        self.connectors.source(name).is_ok_and(|port| self.system.has(&port))
+        self.connectors.outlet(name).is_ok_and(|outlet| self.system.has(&outlet.port))
     }
 
     /// Records a connector of the system, or `component.variable`; a pattern with `*` and `?` records all that have its form.
@@ -262,7 +240,7 @@ impl Loaded {
     /// The variable does not exist, or is neither a number nor a text.
     pub fn record(&mut self, name: &str) -> Result<(), Error> {
         if is_pattern(name) && !self.has(name) {
-            let of_system = self.connectors.outputs.iter().map(|(name, _)| name).filter(|n| matches(name, n));
+            let of_system = self.connectors.outputs.iter().map(|outlet| &outlet.name).filter(|n| matches(name, n));
             let all: Vec<String> = of_system.cloned().chain(self.system.matching(name)).collect();
             if all.is_empty() {
                 return invalid(format!("{name}: no variable has a name of this form"));
@@ -273,11 +251,11 @@ impl Loaded {
     }
 
     fn record_one(&mut self, name: &str) -> Result<(), Error> {
-        let port = self.connectors.source(name)?;
-        if self.system.is_text(&port)? {
-            return Ok(self.system.record_text_as(&port, name)?);
+        let outlet = self.connectors.outlet(name)?;
+        if outlet.transformation.is_none() && self.system.is_text(&outlet.port)? {
+            return Ok(self.system.record_text_as(&outlet.port, name)?);
         }
-        Ok(self.system.record_as(&port, name)?)
+        Ok(self.system.record_through(&outlet)?)
     }
 
     /// Records all outputs of the system, or those of all FMUs if it has none.
@@ -288,141 +266,179 @@ impl Loaded {
         if self.connectors.outputs.is_empty() {
             return Ok(self.system.record_outputs()?);
         }
-        self.connectors.outputs.clone().iter().try_for_each(|(name, _)| self.record(name))
-    }
-
-    /// Every connector of a component is a variable of its FMU, of that causality.
-    fn check_connectors(&self, connectors: &[Connector], component: &str) -> Result<(), String> {
-        let Some(instance) = self.system.instances().iter().find(|i| i.name() == component) else { return Ok(()) };
-        let md = instance.description();
-        for Connector { name, kind, line, .. } in connectors {
-            match md.variable(name) {
-                None => {
-                    let of_kind: Vec<&str> =
-                        md.variables.iter().filter(|v| v.causality.as_str() == kind).map(|v| v.name.as_str()).collect();
-                    let known = format!("its variables of kind {kind} are {}", of_kind.join(", "));
-                    return Err(format!(
-                        "line {line}: {component} ({}) has no variable {name}; {known}",
-                        md.model_name
-                    ));
-                }
-                Some(v) if v.causality.as_str() != kind => {
-                    return Err(format!(
-                        "line {line}: {component}.{name} is {} and not {kind}: correct kind",
-                        v.causality
-                    ));
-                }
-                Some(_) => {}
-            }
-        }
-        Ok(())
+        self.connectors.outputs.clone().iter().try_for_each(|outlet| self.record(&outlet.name))
     }
 
     fn connect(&mut self, structure: &Structure, c: &Connection) -> Result<(), String> {
         // `flat` has determined the direction.
         let (from, to) = (&c.start, &c.end);
         let (start, end) = (find(structure, from)?, find(structure, to)?);
-        let units = if c.no_conversion { Units::PassOn } else { self.system.units() };
-        let stated = [start, end].map(|end| structure.measured(end));
+        let text = |e: fmu_import::Error| e.to_string();
         let port = |end: &ConnectionEnd| end.element.as_ref().map(|element| format!("{element}.{}", end.connector));
-        match (port(from), port(to)) {
-            (_, Some(target)) if self.is_fed(&target)? => {
-                Err(format!("{target} is fed twice: remove one of the connections"))
-            }
+        let (source, target) = (port(from), port(to));
+        if let Some(target) = target.as_ref().filter(|target| self.is_fed(target) == Ok(true)) {
+            return Err(format!("{target} is fed twice: remove one of the connections"));
+        }
+        let way = self.way([(source.as_deref(), start), (target.as_deref(), end)], &c.hops);
+        let named = |port: &Option<String>, end: &ConnectionEnd| port.clone().unwrap_or_else(|| end.to_string());
+        let (from_name, to_name) = (named(&source, from), named(&target, to));
+        let way = way.map_err(|cause| format!("{to_name}: {}", incompatible(&from_name, &cause)))?;
+        for note in way.notes {
+            self.system.note(format!("{from_name} to {to_name}: {note}"));
+        }
+        match (source, target) {
             (Some(source), Some(target)) => {
-                let crossing = Crossing { units, stated, transformation: c.transformation, table: c.table.as_deref() };
-                self.system.connect_by(&source, &target, &crossing).map_err(|e| e.to_string())
+                let crossing = Crossing { units: Units::PassOn, transformation: way.transformation };
+                self.system.connect_by(&source, &target, &crossing).map_err(text)
             }
-            (None, Some(target)) => {
-                self.check_unit(&target, units, stated)?;
+            (None, Some(port)) => {
+                let unit = start.unit.as_ref().map(|unit| unit.name.clone());
+                let (transformation, only_units) = (way.transformation, way.only_units);
+                let inlet = Inlet { port, transformation, unit, only_units };
                 match self.connectors.inputs.iter_mut().find(|(name, _)| *name == from.connector) {
-                    Some((_, targets)) => targets.push(target),
-                    None => self.connectors.inputs.push((from.connector.clone(), vec![target])),
+                    Some((_, targets)) => targets.push(inlet),
+                    None => self.connectors.inputs.push((from.connector.clone(), vec![inlet])),
                 }
                 Ok(())
             }
-            (Some(source), None) => {
-                if self.connectors.outputs.iter().any(|(name, _)| *name == to.connector) {
-                    return Err(format!(
-                        "the output {} is connected twice: remove one of the connections",
-                        to.connector
-                    ));
+            (Some(port), None) => {
+                let name = to.connector.clone();
+                if self.connectors.outputs.iter().any(|outlet| outlet.name == name) {
+                    return Err(format!("the output {name} is connected twice: remove one of the connections"));
                 }
-                self.check_unit(&source, units, [stated[1], stated[0]])?;
-                self.connectors.outputs.push((to.connector.clone(), source));
+                let (transformation, unit, items) = (way.transformation, way.unit, end.items.clone());
+                self.connectors.outputs.push(Outlet { port, name, transformation, unit, items });
                 Ok(())
             }
             (None, None) => Err("connects the system with itself, which is not supported: remove it".into()),
         }
     }
 
-    /// A connector of the system has the unit of the variable that it represents. `stated` are the units of the connector of the
-    /// system and of that of the component.
-    fn check_unit(&mut self, port: &str, units: Units, stated: [Option<Measured<'_>>; 2]) -> Result<(), String> {
-        let [Some(of_system), _] = stated else { return Ok(()) };
-        if units == Units::PassOn {
-            return Ok(());
-        }
-        match of_system.into_unit(self.system.measured(port, stated[1]).map_err(|e| e.to_string())?) {
-            Ok(Passage::Converted(_)) => Err(format!(
-                "the connector of the system is in {}, and {port} in another unit: give both in one",
-                of_system.unit.unwrap_or_default()
-            )),
-            Ok(Passage::Unknown(cause)) => {
-                self.system.note(format!("the system to {port}: {cause}: the number passes unchanged"));
-                Ok(())
-            }
-            Ok(Passage::Equal) => Ok(()),
-            Err(cause) => Err(format!("{port}: {cause}")),
-        }
+    /// What becomes of a value between two connectors, each with its variable if it is that of a component.
+    fn way(&self, ends: [(Option<&str>, &Connector); 2], hops: &[Hop]) -> Result<Way, String> {
+        let own =
+            |port: Option<&str>| port.map(|port| self.system.measured(port)).transpose().map_err(|e| e.to_string());
+        let [(source, start), (target, end)] = ends;
+        let (of_source, of_target) = (own(source)?, own(target)?);
+        let relative = of_source.or(of_target).is_some_and(|unit| unit.relative);
+        // An FMU knows the units of its variables, a file those of variables without one.
+        let first = of_source.filter(|unit| unit.unit.is_some());
+        let first = first.or_else(|| start.unit.as_ref().map(|unit| unit.measured(relative))).or(of_source);
+        let last = of_target.filter(|unit| unit.unit.is_some());
+        let last = last.or_else(|| end.unit.as_ref().map(|unit| unit.measured(relative))).or(of_target);
+        along(first, hops, last, self.system.units() == Units::PassOn)
     }
 
     fn is_fed(&self, target: &str) -> Result<bool, String> {
-        let outside = self.connectors.inputs.iter().any(|(_, targets)| targets.iter().any(|t| t == target));
+        let outside = self.connectors.inputs.iter().any(|(_, targets)| targets.iter().any(|t| t.port == target));
         Ok(outside || self.system.is_fed(target).map_err(|e| e.to_string())?)
     }
 
-    /// The values of a binding; names begin with `prefix`; the name of a system's connector refers to the variable connected to
+    /// The values of a binding; names begin with `prefix`; the name of a system's connector refers to the variables connected to
     /// it.
     fn bound(
         &mut self,
         file: &str,
-        parameters: &[Parameter],
+        parameters: Vec<(Parameter, Hop)>,
         prefix: &str,
         structure: &Structure,
-    ) -> Result<Vec<Given>, Error> {
+    ) -> Vec<Given> {
         let mut given = Vec::new();
-        for p in parameters {
+        for (p, hop) in parameters {
             let full = format!("{prefix}{}", p.name);
-            let input = self.connectors.inputs.iter().find(|(name, _)| prefix.is_empty() && *name == p.name);
             let reached = structure.reach.iter().find(|(name, _)| *name == full);
-            let ports = match (input, reached) {
-                (Some((_, targets)), _) => targets.iter().map(|target| (target.clone(), None)).collect(),
-                (None, Some((_, targets))) => targets.clone(),
-                (None, None) => vec![(full, None)],
-            };
-            for (port, conversion) in ports {
-                let has = |i: &fmu_import::Instance| {
+            let itself = || vec![Reached { port: full.clone(), unit: None, hops: Vec::new() }];
+            for Reached { port, unit, hops } in reached.map_or_else(itself, |(_, targets)| targets.clone()) {
+                let has = |i: &Instance| {
                     let variable = port.strip_prefix(i.name())?.strip_prefix('.')?;
                     values::find(i.description(), variable).map(|_| (i.name().to_owned(), variable.to_owned()))
                 };
-                match self.system.instances().iter().find_map(has) {
-                    Some((instance, name)) => {
-                        let mut parameter = Parameter { name, ..p.clone() };
-                        if let Some(conversion) = &conversion {
-                            let wrong = |cause| Error::Invalid(format!("{file}: line {}: {}: {cause}", p.line, p.name));
-                            parameter.value = ssm::transformed(&p.value, conversion).map_err(wrong)?;
-                        }
-                        given.push(Given { instance, file: file.into(), parameter });
-                    }
-                    None => {
-                        self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line));
-                    }
+                let Some((instance, name)) = self.system.instances().iter().find_map(has) else {
+                    self.notes.push(format!("{file}: line {}: there is no {port}; the value is ignored", p.line));
+                    continue;
+                };
+                let mut parameter = Parameter { name, ..p.clone() };
+                // A number without a unit has that of the connector.
+                if let (None, Some(unit)) = (&parameter.unit, &unit) {
+                    (parameter.unit, parameter.base) = (Some(unit.name.clone()), unit.base);
                 }
+                let mut hops = hops;
+                if hop != Hop::default() || hops.is_empty() {
+                    hops.insert(0, Hop { unit, ..hop.clone() });
+                }
+                given.push(Given { instance, file: file.into(), parameter, hops });
             }
         }
-        Ok(given)
+        given
     }
+}
+
+/// Every connector of a component is a variable of its FMU, of that kind; returns notes on what it says otherwise.
+fn check_connectors(system: &System, component: &Component) -> Result<Vec<String>, String> {
+    let Some(instance) = system.instances().iter().find(|i| i.name() == component.name) else { return Ok(Vec::new()) };
+    let (md, of) = (instance.description(), &component.name);
+    let mut notes = Vec::new();
+    for Connector { name, kind, base, unit, ticks, clocks, line, .. } in &component.connectors {
+        let Some(v) = values::find(md, name) else {
+            let of_kind: Vec<&str> =
+                md.variables.iter().filter(|v| v.causality.as_str() == kind).map(|v| v.name.as_str()).collect();
+            let known = format!("its variables of kind {kind} are {}", of_kind.join(", "));
+            return Err(format!("line {line}: {of} ({}) has no variable {name}; {known}", md.model_name));
+        };
+        let is_constant = v.variability == Variability::Constant && kind == "constant";
+        if v.causality.as_str() != kind && !is_constant {
+            return Err(format!("line {line}: {of}.{name} is {} and not {kind}: correct kind", v.causality));
+        }
+        let timing = v.timing.map(|timing| timing.ticks.as_str());
+        if let Some(ticks) = ticks.as_deref().filter(|ticks| Some(*ticks) != timing) {
+            let own = timing.unwrap_or("no clock");
+            return Err(format!("line {line}: {of}.{name} is {own} and not {ticks}: correct intervalVariability"));
+        }
+        for clock in clocks {
+            let on = |v: &ModelVariable| Some(v.value_reference) == md.variable(clock).map(|c| c.value_reference);
+            if !md.variables.iter().any(|c| on(c) && v.clocks.contains(&c.value_reference)) {
+                return Err(format!("line {line}: {of}.{name} is not on the clock {clock}: remove it"));
+            }
+        }
+        if let Some(base) = base.as_deref().filter(|base| !is_of_type(v.base, base)) {
+            notes.push(format!("line {line}: {of}.{name} is not {base} but {}, which counts", v.base));
+        }
+        if let (Some(stated), Some(own)) = (unit, &v.unit)
+            && stated.name != *own
+        {
+            notes.push(format!("line {line}: {of}.{name} is not in {} but in {own}, which counts", stated.name));
+        }
+    }
+    Ok(notes)
+}
+
+/// Whether a type of a connector is that of a variable. Types of integers convert, and FMI 2.0 has one of each kind.
+fn is_of_type(base: BaseType, stated: &str) -> bool {
+    match stated {
+        "Real" | "Float64" | "Float32" => base.is_float(),
+        "Boolean" => base == BaseType::Boolean,
+        "String" => base == BaseType::String,
+        "Binary" => base == BaseType::Binary,
+        "Clock" => base == BaseType::Clock,
+        _ => base.is_integer(),
+    }
+}
+
+/// Every connector has the extents of its variable, with the sizes set.
+fn check_extents(system: &System, component: &Component) -> Result<(), String> {
+    for Connector { name, extents, line, .. } in component.connectors.iter().filter(|c| !c.extents.is_empty()) {
+        let port = format!("{}.{name}", component.name);
+        let own = system.shape(&port).map_err(|e| e.to_string())?;
+        let fits =
+            own.len() == extents.len() && extents.iter().zip(&own).all(|(one, own)| one.is_none_or(|n| n == *own));
+        if !fits {
+            let said = |all: Vec<String>| all.join(" x ");
+            let stated = said(extents.iter().map(|n| n.map_or("?".into(), |n| n.to_string())).collect());
+            let own = said(own.iter().map(usize::to_string).collect());
+            return Err(format!("line {line}: {port} has the extents {own:?} and not {stated}: correct Dimension"));
+        }
+    }
+    Ok(())
 }
 
 /// `plant=a/b.fmu`, or `a/b.fmu` with the name `b`.

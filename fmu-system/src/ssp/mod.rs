@@ -1,4 +1,4 @@
-//! Systems of FMUs as one file: System Structure and Parameterization, SSP 1.0.
+//! Systems of FMUs as one file: System Structure and Parameterization, SSP 1.0 and 2.0.
 //!
 //! [`structure`]: the structure of any system; [`load`]: a system prepared for co-simulation; [`values`], [`ssv`] and [`ssm`]:
 //! parameter values from SSV files and their mappings.
@@ -7,8 +7,11 @@ mod component;
 mod element;
 mod error;
 mod flat;
+mod known;
 pub mod load;
+mod outside;
 mod package;
+mod path;
 pub mod ssm;
 pub mod ssv;
 pub mod structure;

@@ -1,13 +1,14 @@
 //! The archive of an SSP: its files, and the values of its bindings.
 
-use super::component::{Binding, Mapping, ParameterValues};
+use super::component::{Binding, Contents};
 use super::error::{Error, invalid};
-use super::ssm;
+use super::path::Hop;
 use super::ssv::{self, Parameter};
+use super::{known, ssm};
 use fmu_import::{document, limits};
 use model_description::{Element, decode};
 use std::fs::File;
-use std::io::Read;
+use std::io::{Cursor, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -17,6 +18,8 @@ pub(super) struct Package<'a> {
     /// Name of the description that is read.
     pub(super) description: &'a str,
     pub(super) zip: ZipArchive<File>,
+    /// What files of values have that is not used.
+    pub(super) notes: Vec<String>,
 }
 
 impl Package<'_> {
@@ -43,29 +46,50 @@ impl Package<'_> {
         Ok(text.to_owned())
     }
 
-    /// The values of a binding, its prefix before every name, with a name for their file.
-    pub(super) fn parameters(&mut self, binding: &Binding) -> Result<(String, Vec<Parameter>), Error> {
-        let (path, description) = (self.path.display().to_string(), self.description);
-        let (file, parameters) = match &binding.values {
-            ParameterValues::Inline(parameters) => (format!("{path}: {description}"), parameters.clone()),
-            ParameterValues::File(name) => {
-                let file = format!("{path}: {name}");
-                let read = ssv::read(&self.text(name)?).map_err(|cause| Error::Invalid(format!("{file}: {cause}")))?;
-                (file, read)
-            }
-        };
-        let parameters = match &binding.mapping {
-            None => parameters,
-            Some(Mapping::Inline(entries)) => ssm::apply(entries, &parameters)
-                .map_err(|cause| Error::Invalid(format!("{path}: {description}: {cause}")))?,
-            Some(Mapping::File(name)) => {
-                let wrong = |cause: String| Error::Invalid(format!("{path}: {name}: {cause}"));
-                let root = Element::parse(&self.text(name)?).map_err(|e| wrong(e.to_string()))?;
-                let entries = ssm::read(&root).map_err(wrong)?;
-                ssm::apply(&entries, &parameters).map_err(wrong)?
-            }
-        };
+    /// Text of a file in an FMU of the archive.
+    fn text_in(&mut self, fmu: &str, name: &str) -> Result<String, Error> {
+        let bytes = self.bytes(fmu)?;
+        let of = |cause: String| Error::Invalid(format!("{}: {fmu}: {cause}", self.path.display()));
+        let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(|e| of(e.to_string()))?;
+        let bytes = document(&mut zip, name).map_err(of)?.ok_or_else(|| of(format!("has no {name}")))?;
+        Ok(decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?.to_owned())
+    }
+
+    /// The values of a binding and the transformation of each, with a name for their file. `fmu` is the archive of the component
+    /// that has the binding.
+    pub(super) fn parameters(
+        &mut self,
+        binding: &Binding,
+        fmu: &str,
+    ) -> Result<(String, Vec<(Parameter, Hop)>), Error> {
+        let (file, parameters) = self.content(&binding.values, fmu, ssv::parameters)?;
         let named = |p: Parameter| Parameter { name: format!("{}{}", binding.prefix, p.name), ..p };
-        Ok((file, parameters.into_iter().map(named).collect()))
+        let parameters: Vec<Parameter> = parameters.into_iter().map(named).collect();
+        let Some(mapping) = &binding.mapping else {
+            return Ok((file, parameters.into_iter().map(|p| (p, Hop::default())).collect()));
+        };
+        let (of_mapping, entries) = self.content(mapping, fmu, ssm::read)?;
+        let mapped = ssm::apply(&entries, &parameters);
+        Ok((file, mapped.map_err(|cause| Error::Invalid(format!("{of_mapping}: {cause}")))?))
+    }
+
+    /// The content, and a name for its file.
+    fn content<T: Clone>(
+        &mut self,
+        located: &Contents<T>,
+        fmu: &str,
+        read: impl Fn(&Element) -> Result<T, String>,
+    ) -> Result<(String, T), Error> {
+        let path = self.path.display().to_string();
+        let (file, text) = match located {
+            Contents::Inline(content) => return Ok((format!("{path}: {}", self.description), content.clone())),
+            Contents::File(name) => (format!("{path}: {name}"), self.text(name)?),
+            Contents::InComponent(name) => (format!("{path}: {fmu}: {name}"), self.text_in(fmu, name)?),
+        };
+        let wrong = |cause: String| Error::Invalid(format!("{file}: {cause}"));
+        let root = Element::parse(&text).map_err(|e| wrong(e.to_string()))?;
+        self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
+        let content = read(&root).map_err(wrong)?;
+        Ok((file, content))
     }
 }

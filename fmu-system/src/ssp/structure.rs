@@ -1,12 +1,13 @@
-//! SystemStructure.ssd, read (SSP 1.0, 4). A feature that our co-simulation does not support is an error with
-//! its line, so that nothing is ignored silently.
+//! SystemStructure.ssd, read (SSP 1.0 and 2.0, 5). A feature that our co-simulation does not support is an error with
+//! its line, and what has no effect is named in a note, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
-pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Mapping, ParameterValues};
-use super::element::{at, child, list, local, required, unit, units};
-use super::flat::{Flat, Level, Reach, flat};
-use super::{ssm, ssv};
-use model_description::{BaseUnit, Element, Measured, parse_number};
+pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Contents};
+use super::element::{Definitions, TYPES, at, child, list, local, required};
+use super::flat::{Flat, Level, Reach, Reference, flat};
+pub use super::path::{Hop, StatedUnit};
+use super::{known, ssm, ssv};
+use model_description::{Element, parse_number};
 
 /// A system of FMUs.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,14 +22,14 @@ pub struct Structure {
     pub components: Vec<Component>,
     /// Connectors of the system itself.
     pub connectors: Vec<Connector>,
-    /// Connections between connectors.
+    /// Connections between connectors, from their sources.
     pub connections: Vec<Connection>,
-    /// Values by names `component.variable`, and of the system's connectors.
+    /// Values by names `component.variable`, and of the systems' connectors.
     pub bindings: Vec<Binding>,
-    /// Units that the file defines.
-    pub units: Vec<(String, BaseUnit)>,
-    /// Parameters of systems, and connectors of inner systems: the variables behind them.
+    /// Connectors of systems: the variables behind them.
     pub(super) reach: Reach,
+    /// What the file has that is not used.
+    pub notes: Vec<String>,
 }
 
 /// An unsupported feature, and the remedy.
@@ -36,21 +37,25 @@ fn unsupported(e: &Element, what: &str) -> String {
     at(e, format!("<{}>: {what}", e.name))
 }
 
+/// Inner descriptions may be this many inside each other.
+const DEEPEST: usize = 20;
+
 impl Structure {
-    /// Reads the text of a SystemStructure.ssd.
+    /// Reads the text of a SystemStructure.ssd that refers to no file of signals or of systems.
     ///
     /// # Errors
     /// The line, and the element that is missing, wrong or not supported.
     pub fn read(text: &str) -> Result<Self, String> {
+        Self::read_with(text, &mut |name| Err(format!("there is no file {name}")))
+    }
+
+    /// Reads the text of a SystemStructure.ssd; `files` reads another file of the archive.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), or those of `files`.
+    pub fn read_with(text: &str, files: &mut dyn FnMut(&str) -> Result<String, String>) -> Result<Self, String> {
         let root = Element::parse(text).map_err(|e| e.to_string())?;
-        if local(&root) != "SystemStructureDescription" {
-            return Err(at(
-                &root,
-                format!("the root element is <{}>, expected <SystemStructureDescription>", root.name),
-            ));
-        }
-        let system =
-            child(&root, "System").ok_or_else(|| at(&root, format!("<{}> has no element <System>", root.name)))?;
+        let system = system(&root)?;
         let experiment = child(&root, "DefaultExperiment");
         let time = |name: &str| {
             let read = |text: &str| parse_number(text).ok_or_else(|| format!("{name}={text:?} is not a number"));
@@ -59,7 +64,12 @@ impl Structure {
                 .map(|(e, text)| read(text).map_err(|w| at(e, w)))
                 .transpose()
         };
-        let Flat { components, connectors, connections, bindings, reach } = flat(&level(system, String::new())?)?;
+        let mut notes = known::notes(&root);
+        let mut reader =
+            Reader { of: Definitions::read(&root)?, folder: String::new(), files, notes: &mut notes, depth: 0 };
+        let level = reader.level(system, String::new())?;
+        let Flat { components, connectors, connections, bindings, reach, notes: unfed } = flat(&level)?;
+        notes.extend(unfed);
         Ok(Self {
             name: required(system, "name")?,
             start: time("startTime")?,
@@ -68,16 +78,9 @@ impl Structure {
             connectors,
             connections,
             bindings,
-            units: units(&root)?,
             reach,
+            notes,
         })
-    }
-
-    /// The unit of a connector according to the file.
-    pub fn measured<'a>(&self, connector: &'a Connector) -> Option<Measured<'a>> {
-        let unit = connector.unit.as_deref()?;
-        let base = self.units.iter().find(|(name, _)| name == unit).map(|(_, base)| *base);
-        Some(Measured { unit: Some(unit), base, relative: false })
     }
 
     /// The component of this name.
@@ -86,54 +89,183 @@ impl Structure {
     }
 }
 
-/// A system with what is inside it.
-fn level(e: &Element, path: String) -> Result<Level, String> {
-    if let Some(e) = child(e, "SignalDictionaries") {
-        return Err(unsupported(e, "signal dictionaries are not supported: connect the components directly"));
+/// The system of a description.
+fn system(root: &Element) -> Result<&Element, String> {
+    if local(root) != "SystemStructureDescription" {
+        let expected = "expected <SystemStructureDescription>";
+        return Err(at(root, format!("the root element is <{}>, {expected}", root.name)));
     }
-    let (mut components, mut inner): (Vec<Component>, Vec<Level>) = (Vec::new(), Vec::new());
-    for element in list(e, "Elements") {
-        if local(element) == "System" {
-            inner.push(level(element, format!("{path}{}.", required(element, "name")?))?);
+    child(root, "System").ok_or_else(|| at(root, format!("<{}> has no element <System>", root.name)))
+}
+
+/// Reads one file.
+struct Reader<'a> {
+    of: Definitions,
+    /// Folder of the file in the archive, which ends with a slash; empty for the top.
+    folder: String,
+    files: &'a mut dyn FnMut(&str) -> Result<String, String>,
+    notes: &'a mut Vec<String>,
+    /// Number of descriptions around this one.
+    depth: usize,
+}
+
+impl Reader<'_> {
+    /// A system with what is inside it.
+    fn level(&mut self, e: &Element, path: String) -> Result<Level, String> {
+        let mut level = Level { connectors: connectors(e, &self.of)?, path, ..Level::default() };
+        level.bindings = self.bindings(e, &level.path, false)?;
+        level.connections = list(e, "Connections").map(connection).collect::<Result<_, _>>()?;
+        for dictionary in list(e, "SignalDictionaries") {
+            let name = required(dictionary, "name")?;
+            if level.dictionaries.iter().any(|(other, _)| *other == name) {
+                return Err(at(dictionary, format!("two dictionaries have the name {name}: rename one")));
+            }
+            level.dictionaries.push((name, self.dictionary(dictionary)?));
+        }
+        let mut names: Vec<String> = Vec::new();
+        for element in list(e, "Elements") {
+            let name = required(element, "name")?;
+            if names.contains(&name) {
+                return Err(at(element, format!("two elements have the name {name}: rename one")));
+            }
+            match (local(element), element.get("type").unwrap_or(FMU_TYPE)) {
+                ("System", _) => level.inner.push(self.level(element, format!("{}{name}.", level.path))?),
+                ("Component", DEFINITION_TYPE) => level.inner.push(self.definition(element, &level.path)?),
+                ("Component", _) => level.components.push(self.component(element, &level.path)?),
+                ("SignalDictionaryReference", _) if child(element, "ParameterBindings").is_some() => {
+                    return Err(at(element, "values for signals are not supported: bind them to the system"));
+                }
+                ("SignalDictionaryReference", _) => level.references.push(Reference {
+                    name: name.clone(),
+                    dictionary: required(element, "dictionary")?,
+                    connectors: connectors(element, &self.of)?,
+                }),
+                _ => {
+                    return Err(unsupported(
+                        element,
+                        "only components, systems and references to signals are supported",
+                    ));
+                }
+            }
+            names.push(name);
+        }
+        Ok(level)
+    }
+
+    fn component(&mut self, e: &Element, path: &str) -> Result<Component, String> {
+        let kind = e.get("type").unwrap_or(FMU_TYPE);
+        if kind != FMU_TYPE {
+            return Err(at(e, format!("type={kind:?} is not supported, expected {FMU_TYPE} or {DEFINITION_TYPE}")));
+        }
+        let implementation = match e.get("implementation") {
+            None | Some("any") => None,
+            Some(known @ ("CoSimulation" | "ModelExchange")) => Some(known.to_owned()),
+            Some(other) => {
+                let expected = "expected any, CoSimulation or ModelExchange";
+                return Err(at(e, format!("implementation={other:?} is not supported, {expected}")));
+            }
+        };
+        Ok(Component {
+            name: format!("{path}{}", required(e, "name")?),
+            source: self.within(e, &required(e, "source")?)?,
+            connectors: connectors(e, &self.of)?,
+            bindings: self.bindings(e, "", true)?,
+            implementation,
+            line: e.line,
+        })
+    }
+
+    /// A component that is a description of a system.
+    fn definition(&mut self, e: &Element, path: &str) -> Result<Level, String> {
+        let file = self.within(e, &required(e, "source")?)?;
+        let inside = |cause: String| at(e, format!("{file}: {cause}"));
+        if self.depth == DEEPEST {
+            return Err(inside(format!("more than {DEEPEST} descriptions are inside each other")));
+        }
+        let text = (self.files)(&file).map_err(|cause| at(e, cause))?;
+        let root = Element::parse(&text).map_err(|e| inside(e.to_string()))?;
+        let of = Definitions::read(&root).map_err(inside)?;
+        self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
+        let path = format!("{path}{}.", required(e, "name")?);
+        // Values of the component replace those of the system.
+        let more = self.bindings(e, &path, false)?;
+        let folder = file.rfind('/').map_or("", |slash| &file[..=slash]).to_owned();
+        let mut reader = Reader { of, folder, files: &mut *self.files, notes: &mut *self.notes, depth: self.depth + 1 };
+        let mut level = system(&root).and_then(|system| reader.level(system, path)).map_err(inside)?;
+        level.bindings.extend(more);
+        Ok(level)
+    }
+
+    /// The entries of a signal dictionary.
+    fn dictionary(&mut self, e: &Element) -> Result<Vec<Connector>, String> {
+        expect_type(e, "application/x-ssp-signal-dictionary")?;
+        let Some(source) = e.get("source") else {
+            let inline = child(e, "SignalDictionary");
+            return entries(inline.ok_or_else(|| at(e, "a dictionary without source and without entries"))?);
+        };
+        let file = self.within(e, source)?;
+        let inside = |cause: String| at(e, format!("{file}: {cause}"));
+        let text = (self.files)(&file).map_err(|cause| at(e, cause))?;
+        let root = Element::parse(&text).map_err(|e| inside(e.to_string()))?;
+        self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
+        entries(&root).map_err(inside)
+    }
+
+    /// A relative URI as a path within the archive.
+    fn within(&self, e: &Element, uri: &str) -> Result<String, String> {
+        let path = relative(e, uri)?;
+        Ok(format!("{}{path}", self.folder))
+    }
+
+    fn bindings(&mut self, e: &Element, path: &str, of_component: bool) -> Result<Vec<Binding>, String> {
+        list(e, "ParameterBindings").map(|binding| self.binding(binding, path, of_component)).collect()
+    }
+
+    fn binding(&mut self, e: &Element, path: &str, of_component: bool) -> Result<Binding, String> {
+        expect_type(e, "application/x-ssp-parameter-set")?;
+        let mapping = child(e, "ParameterMapping").map(|mapping| {
+            expect_type(mapping, "application/x-ssp-parameter-mapping")?;
+            if let Some(source) = mapping.get("source") {
+                return self.located(mapping, source, of_component);
+            }
+            let inline = child(mapping, "ParameterMapping");
+            let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
+            Ok(Contents::Inline(ssm::read(inline)?))
+        });
+        let mapping = mapping.transpose()?;
+        let values = if let Some(source) = e.get("source") {
+            self.located(e, source, of_component)?
         } else {
-            components.push(component(element, &path)?);
+            let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
+            let set = set.ok_or_else(|| at(e, "a binding without source and without values"))?;
+            Contents::Inline(ssv::parameters(set)?)
+        };
+        Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into(), mapping, path: path.into() })
+    }
+
+    /// A file beside the description, or within the component.
+    fn located<T>(&self, e: &Element, source: &str, of_component: bool) -> Result<Contents<T>, String> {
+        match e.get("sourceBase") {
+            None | Some("SSD") => Ok(Contents::File(self.within(e, source)?)),
+            Some("component") if of_component => Ok(Contents::InComponent(relative(e, source)?)),
+            Some("component") => Err(at(e, "sourceBase=\"component\" is for an FMU, not for a system")),
+            Some(other) => Err(at(e, format!("sourceBase={other:?} is not known, expected SSD or component"))),
         }
     }
-    let twice = components.iter().enumerate().find(|(k, c)| components[..*k].iter().any(|b| b.name == c.name));
-    if let Some((_, Component { name, line, .. })) = twice {
-        return Err(format!("line {line}: two components have the name {name}: rename one"));
-    }
-    Ok(Level {
-        components,
-        connectors: connectors(e)?,
-        connections: list(e, "Connections").map(connection).collect::<Result<_, _>>()?,
-        bindings: bindings(e)?,
-        path,
-        inner,
-    })
 }
 
-fn component(e: &Element, path: &str) -> Result<Component, String> {
-    if local(e) != "Component" {
-        return Err(unsupported(e, "only components and systems are supported"));
+/// MIME type of a component that is a description of a system.
+const DEFINITION_TYPE: &str = "application/x-ssp-definition";
+
+/// Only the type of SSP is supported.
+fn expect_type(e: &Element, expected: &str) -> Result<(), String> {
+    match e.get("type").filter(|kind| *kind != expected) {
+        Some(other) => Err(at(e, format!("type={other:?} is not supported, expected {expected}"))),
+        None => Ok(()),
     }
-    let source = required(e, "source")?;
-    let kind = e.get("type").unwrap_or(FMU_TYPE);
-    if kind != FMU_TYPE {
-        return Err(at(e, format!("type={kind:?} is not supported, expected {FMU_TYPE}")));
-    }
-    Ok(Component {
-        name: format!("{path}{}", required(e, "name")?),
-        source: within(e, &source)?,
-        connectors: connectors(e)?,
-        bindings: bindings(e)?,
-        model_exchange: e.get("implementation") == Some("ModelExchange"),
-        line: e.line,
-    })
 }
 
-/// A relative URI as a path within the archive.
-fn within(e: &Element, uri: &str) -> Result<String, String> {
+fn relative(e: &Element, uri: &str) -> Result<String, String> {
     let bad =
         || at(e, format!("source={uri:?} is not a file within the archive, expected for example resources/plant.fmu"));
     let mut bytes = Vec::new();
@@ -148,67 +280,64 @@ fn within(e: &Element, uri: &str) -> Result<String, String> {
         });
     }
     let path = String::from_utf8(bytes).map_err(|_| bad())?;
-    let inside = !path.contains([':', '\\']) && !path.starts_with('/') && path.split('/').all(|part| part != "..");
+    let inside = !path.contains([':', '\\', '#']) && !path.starts_with('/') && path.split('/').all(|part| part != "..");
     if inside && !path.is_empty() { Ok(path) } else { Err(bad()) }
 }
 
-fn connectors(e: &Element) -> Result<Vec<Connector>, String> {
-    let one = |c: &Element| {
-        let unit = c.children.iter().find_map(unit);
-        Ok(Connector { name: required(c, "name")?, kind: required(c, "kind")?, unit, line: c.line })
+fn connectors(e: &Element, of: &Definitions) -> Result<Vec<Connector>, String> {
+    list(e, "Connectors").map(|c| typed(c, of, required(c, "kind")?)).collect()
+}
+
+/// The entries of a signal dictionary.
+fn entries(root: &Element) -> Result<Vec<Connector>, String> {
+    if local(root) != "SignalDictionary" {
+        return Err(at(root, format!("<{}> is not a SignalDictionary of SSP", root.name)));
+    }
+    let of = Definitions::read(root)?;
+    let all = root.children.iter().filter(|c| local(c) == "DictionaryEntry");
+    all.map(|entry| typed(entry, &of, "inout".into())).collect()
+}
+
+/// A connector, or an entry of a dictionary.
+fn typed(e: &Element, of: &Definitions, kind: String) -> Result<Connector, String> {
+    // A clock with a name is one that the connector is on.
+    let on = |c: &&Element| local(c) == "Clock" && c.get("name").is_some();
+    let base = e.children.iter().find(|c| TYPES.contains(&local(c)) && !on(c));
+    let extent = |d: &Element| {
+        let number = |text: &str| text.parse().map_err(|_| at(d, format!("size={text:?} is not a size")));
+        d.get("size").map(number).transpose()
     };
-    list(e, "Connectors").map(one).collect()
+    Ok(Connector {
+        name: required(e, "name")?,
+        kind,
+        base: base.map(|base| local(base).to_owned()),
+        unit: base.and_then(|base| of.unit(base)),
+        items: base.map(|base| of.items(base)).unwrap_or_default(),
+        ticks: base.filter(|base| local(base) == "Clock").and_then(|c| c.get("intervalVariability")).map(str::to_owned),
+        clocks: e.children.iter().filter(on).filter_map(|c| c.get("name")).map(str::to_owned).collect(),
+        extents: e.children.iter().filter(|c| local(c) == "Dimension").map(extent).collect::<Result<_, _>>()?,
+        line: e.line,
+    })
 }
 
 fn connection(e: &Element) -> Result<Connection, String> {
-    let (transformation, table) = match e.children.iter().find(|c| local(c).ends_with("Transformation")) {
-        None => (None, None),
-        Some(t) if local(t) == "LinearTransformation" => (Some(ssm::linear(t)?), None),
-        Some(t) => (None, Some(ssm::table(t)?.into())),
-    };
-
     let end = |element: &str, connector: &str| {
         Ok::<_, String>(ConnectionEnd {
             element: e.get(element).map(str::to_owned),
             connector: required(e, connector)?,
         })
     };
+    if let Some(name) = ["startIndices", "endIndices"].into_iter().find(|name| e.get(name).is_some()) {
+        let remedy = "SSP does not say whether it counts from 0 or 1: name the element, as in m[1,2]";
+        return Err(at(e, format!("{name} is not supported, and {remedy}")));
+    }
+    let hop = Hop { unit: None, no_conversion: ssm::suppresses(e), transformation: ssm::transformation(e)? };
     Ok(Connection {
         start: end("startElement", "startConnector")?,
         end: end("endElement", "endConnector")?,
-        no_conversion: matches!(e.get("suppressUnitConversion"), Some("true" | "1")),
-        transformation,
-        table,
+        hops: vec![hop],
         line: e.line,
     })
-}
-
-fn bindings(e: &Element) -> Result<Vec<Binding>, String> {
-    list(e, "ParameterBindings").map(binding).collect()
-}
-
-fn binding(e: &Element) -> Result<Binding, String> {
-    let mapping = child(e, "ParameterMapping").map(|mapping| {
-        if let Some(source) = mapping.get("source") {
-            return Ok::<_, String>(Mapping::File(within(mapping, source)?));
-        }
-        let inline = child(mapping, "ParameterMapping");
-        let inline = inline.ok_or_else(|| at(mapping, "a mapping without source and without entries"))?;
-        Ok(Mapping::Inline(ssm::read(inline)?))
-    });
-    let mapping = mapping.transpose()?;
-    if e.get("sourceBase") == Some("component") {
-        return Err(at(e, "sourceBase=\"component\" is not supported: put the file beside the FMU"));
-    }
-    let values = if let Some(source) = e.get("source") {
-        ParameterValues::File(within(e, source)?)
-    } else {
-        let set = child(e, "ParameterValues").and_then(|v| child(v, "ParameterSet"));
-        ParameterValues::Inline(ssv::parameters(
-            set.ok_or_else(|| at(e, "a binding without source and without values"))?,
-        )?)
-    };
-    Ok(Binding { values, prefix: e.get("prefix").unwrap_or_default().into(), mapping })
 }
 
 #[cfg(test)]
@@ -233,12 +362,12 @@ mod tests {
             <s:Connections><s:Connection startConnector='u' endElement='a' endConnector='v'/></s:Connections>",
         )
         .unwrap();
-        assert_eq!(s.connectors[0].unit.as_deref(), Some("V"));
+        assert_eq!(s.connectors[0].unit.as_ref().map(|unit| unit.name.as_str()), Some("V"));
         assert_eq!(
             (&s.bindings[0].values, &*s.bindings[0].prefix),
-            (&ParameterValues::File("resources/a b.ssv".into()), "a.")
+            (&Contents::File("resources/a b.ssv".into()), "a.")
         );
-        let ParameterValues::Inline(values) = &s.bindings[1].values else { panic!("inline") };
+        let Contents::Inline(values) = &s.bindings[1].values else { panic!("inline") };
         assert_eq!((values[0].name.as_str(), values[0].unit.as_deref()), ("a.x", Some("V")));
         assert_eq!(
             (s.connections[0].start.to_string(), s.connections[0].end.to_string()),
@@ -254,9 +383,24 @@ mod tests {
             (system("<Elements><System/></Elements>"), "line 2: <System> has no attribute name"),
             (
                 system("<Elements><SignalDictionaryReference name='i'/></Elements>"),
-                "line 2: <SignalDictionaryReference>",
+                "line 2: <SignalDictionaryReference> has no attribute dictionary",
             ),
-            (system("<SignalDictionaries/>"), "signal dictionaries"),
+            (system("<Elements><Sytem name='a'/></Elements>"), "line 2: <Sytem>: only components, systems and references"),
+            (component("source='a.fmu' implementation='ScheduledExecution'"), "implementation=\"ScheduledExecution\""),
+            (component("source='#other'"), "is not a file within the archive"),
+            (component("source='a' type='text/x-modelica'"), "type=\"text/x-modelica\" is not supported"),
+            (
+                system("<Connections><Connection startConnector='a' endConnector='b' startIndices='1'/></Connections>"),
+                "line 2: startIndices is not supported, and SSP does not say whether it counts from 0 or 1",
+            ),
+            (
+                system("<ParameterBindings><ParameterBinding source='a' type='text/csv'/></ParameterBindings>"),
+                "line 2: type=\"text/csv\" is not supported, expected application/x-ssp-parameter-set",
+            ),
+            (
+                system("<ParameterBindings><ParameterBinding source='a' sourceBase='component'/></ParameterBindings>"),
+                "line 2: sourceBase=\"component\" is for an FMU, not for a system",
+            ),
             (component(""), "line 2: <Component> has no attribute source"),
             (component("source='../a.fmu'"), "is not a file within the archive"),
             (component("source='http://a/b.fmu'"), "is not a file within the archive"),
@@ -264,7 +408,7 @@ mod tests {
             (component("source='a.ssp' type='application/x-ssp-package'"), "type=\"application/x-ssp-package\""),
             (
                 system("<Elements><Component name='a' source='a'/><Component name='a' source='a'/></Elements>"),
-                "two components",
+                "two elements have the name a",
             ),
             (
                 system(

@@ -1,6 +1,7 @@
 //! Parameter values of SSV files, set on the instances of a system.
 
 use super::error::{Error, invalid};
+use super::path::{Hop, along, transformed};
 use super::ssv::Parameter;
 use crate::cosimulation::System;
 use fmu_import::quantity;
@@ -15,12 +16,19 @@ pub struct Given {
     pub file: String,
     /// Name and value of the variable.
     pub parameter: Parameter,
+    /// The path of the value to the variable: one part if nothing is in between.
+    pub hops: Vec<Hop>,
 }
 
 impl Given {
     /// The values of a file for one instance.
     pub fn all(instance: &str, file: &str, parameters: &[Parameter]) -> Vec<Self> {
-        let one = |p: &Parameter| Self { instance: instance.into(), file: file.into(), parameter: p.clone() };
+        let one = |p: &Parameter| Self {
+            instance: instance.into(),
+            file: file.into(),
+            parameter: p.clone(),
+            hops: vec![Hop::default()],
+        };
         parameters.iter().map(one).collect()
     }
 
@@ -42,31 +50,61 @@ pub fn set(system: &mut System, given: &[Given]) -> Result<(), Error> {
     files.dedup();
     let configured = system.configure(ports.iter().map(|(port, value)| (port.as_str(), *value)));
     configured.map_err(|error| Error::from(error).at(files.join(", ")))?;
-    for Given { instance, file, parameter } in others {
-        one(system, instance, parameter).map_err(|error| error.at(format!("{file}: line {}", parameter.line)))?;
+    for Given { instance, file, parameter, hops } in others {
+        one(system, instance, parameter, hops).map_err(|error| error.at(format!("{file}: line {}", parameter.line)))?;
     }
     Ok(())
 }
 
-fn one(system: &mut System, instance: &str, p: &Parameter) -> Result<(), Error> {
+fn one(system: &mut System, instance: &str, p: &Parameter, hops: &[Hop]) -> Result<(), Error> {
     let (name, mut value, mut notes) = (&p.name, std::borrow::Cow::from(&p.value), Vec::new());
     if let Some(i) = system.instances().iter().find(|i| i.name() == instance) {
         let model = &i.description().model_name;
         let Some(variable) = find(i.description(), name) else {
             return invalid(format!("{model} has no variable {name}: correct the name, or remove the parameter"));
         };
-        match in_unit_of(p, variable, i.description()) {
-            Ok((converted, note)) => {
-                value = converted.map_or(value, Into::into);
-                notes.extend(note.map(|note| format!("{instance}.{name}: {note}")));
-            }
-            Err(cause) => return invalid(format!("{name} {cause}")),
-        }
+        let wrong = |cause| Error::Invalid(format!("{name} {cause}"));
+        let found = match hops {
+            [] => Ok((None, Vec::new())),
+            [hop] => through(p, hop, variable, i.description()),
+            hops => along_path(p, hops, variable, i.description()),
+        };
+        let (converted, unknown) = found.map_err(wrong)?;
+        value = converted.map_or(value, Into::into);
+        notes.extend(unknown.into_iter().map(|note| format!("{instance}.{name}: {note}")));
     }
     for note in notes {
         system.note(note);
     }
     Ok(system.set(&format!("{instance}.{name}"), &value)?)
+}
+
+/// The value as the variable takes it, if it is another one, and notes on units that are not known.
+type Arrived = Result<(Option<String>, Vec<String>), String>;
+
+/// The value in the unit of the variable, then transformed.
+fn through(p: &Parameter, hop: &Hop, variable: &ModelVariable, description: &ModelDescription) -> Arrived {
+    let as_it_is = Ok((None, None));
+    let (converted, note) = if hop.no_conversion { as_it_is } else { in_unit_of(p, variable, description) }?;
+    let notes = note.into_iter().collect();
+    let Some(transformation) = &hop.transformation else { return Ok((converted, notes)) };
+    let text = converted.as_ref().unwrap_or(&p.value);
+    let taken = transformed(text, Some(transformation), false).map_err(|cause| format!("does not fit: {cause}"))?;
+    Ok((Some(taken.into_owned()), notes))
+}
+
+/// The value after connectors of systems, each with its unit.
+fn along_path(p: &Parameter, hops: &[Hop], variable: &ModelVariable, description: &ModelDescription) -> Arrived {
+    let relative = variable.relative;
+    let named = p.unit.as_deref().map(|unit| {
+        let base = p.base.or_else(|| description.unit(unit).and_then(|defined| defined.base));
+        Measured { unit: Some(unit), base, relative }
+    });
+    let wrong = |cause| format!("does not fit: {cause}");
+    let end = Some(description.measured(variable)).filter(|own| own.unit.is_some());
+    let way = along(named, hops, end, false).map_err(wrong)?;
+    let taken = transformed(&p.value, way.transformation.as_ref(), way.only_units).map_err(wrong)?;
+    Ok((Some(taken.into_owned()), way.notes))
 }
 
 /// The value in the unit of the variable, if that is another one, and a note if one of the units is unknown.

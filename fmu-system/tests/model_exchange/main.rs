@@ -3,6 +3,7 @@
 #![allow(clippy::float_cmp)] // Counts, and numbers that nothing rounds.
 
 mod settings;
+mod ssp;
 mod workshop;
 
 use fmu_import::{Fmu, Kind};

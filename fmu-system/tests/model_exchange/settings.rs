@@ -1,9 +1,8 @@
-//! Settings of a run: tolerance, steps, jumps of inputs, results before an error; and a system from an SSP file.
+//! Settings of a run: tolerance, steps, jumps of inputs, results before an error.
 
 use crate::workshop::Workshop;
 use fmu_import::Fmu;
-use fmu_system::cosimulation::{Crossing, Integration, Method, Schedule, Settings, Solver, System};
-use fmu_system::ssp::load::Loaded;
+use fmu_system::cosimulation::{Crossing, Integration, Method, Schedule, Settings, Solver, System, Transformation};
 use model_description::Conversion;
 use std::ops::ControlFlow;
 
@@ -141,91 +140,6 @@ fn a_discarded_step_is_taken_in_halves() {
     }
 }
 
-/// An SSP file of these entries.
-fn packed(path: &std::path::Path, entries: &[(&str, &[u8])]) {
-    use std::io::Write;
-    let mut zip = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
-    for (name, bytes) in entries {
-        zip.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
-        zip.write_all(bytes).unwrap();
-    }
-    zip.finish().unwrap();
-}
-
-const NESTED: &str = "<s:SystemStructureDescription><s:System name='outer'>
-    <s:Connectors><s:Connector name='T0' kind='parameter'/><s:Connector name='out' kind='output'/></s:Connectors>
-    <s:ParameterBindings>
-      <s:ParameterBinding source='p.ssv'><s:ParameterMapping source='p.ssm'/></s:ParameterBinding>
-      <s:ParameterBinding><s:ParameterValues><v:ParameterSet><v:Parameters>
-        <v:Parameter name='T0'><v:Real value='0.2'/></v:Parameter></v:Parameters></v:ParameterSet></s:ParameterValues></s:ParameterBinding>
-    </s:ParameterBindings>
-    <s:Elements>
-      <s:Component name='a' source='plant.fmu'><s:Connectors><s:Connector name='z' kind='output'/>
-        <s:Connector name='T' kind='parameter'/></s:Connectors></s:Component>
-      <s:System name='in'>
-        <s:Connectors><s:Connector name='w' kind='input'/><s:Connector name='T1' kind='parameter'/>
-          <s:Connector name='r' kind='output'/></s:Connectors>
-        <s:Elements><s:Component name='b' source='plant.fmu'><s:Connectors><s:Connector name='u' kind='input'/>
-          <s:Connector name='z' kind='output'/><s:Connector name='T' kind='parameter'/></s:Connectors></s:Component></s:Elements>
-        <s:Connections><s:Connection startConnector='w' endElement='b' endConnector='u'/>
-          <s:Connection startElement='b' startConnector='z' endConnector='r'/>
-          <s:Connection startConnector='T1' endElement='b' endConnector='T'><c:LinearTransformation factor='3'/></s:Connection></s:Connections>
-      </s:System>
-    </s:Elements>
-    <s:Connections>
-      <s:Connection startElement='a' startConnector='z' endElement='in' endConnector='w'>
-        <c:LinearTransformation factor='0.5' offset='1'/></s:Connection>
-      <s:Connection startElement='in' startConnector='r' endConnector='out'/>
-      <s:Connection startConnector='T0' endElement='a' endConnector='T'/>
-      <s:Connection startConnector='T0' endElement='in' endConnector='T1'/>
-    </s:Connections>
-  </s:System></s:SystemStructureDescription>";
-
-#[test]
-fn an_ssp_with_inner_systems_mappings_and_transformations() {
-    let workshop = Workshop::new();
-    let fmu = std::fs::read(workshop.archive("plant", 2, &[], |xml| xml)).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("nested.ssp");
-    let values = b"<v:ParameterSet><v:Parameters><v:Parameter name='drive'><v:Real value='3'/></v:Parameter>\
-        <v:Parameter name='unused'><v:Real value='3'/></v:Parameter></v:Parameters></v:ParameterSet>";
-    let mapping =
-        b"<m:ParameterMapping><m:MappingEntry source='drive' target='a.u'><c:LinearTransformation factor='2'/>\
-        </m:MappingEntry></m:ParameterMapping>";
-    let entries: [(&str, &[u8]); 4] =
-        [("SystemStructure.ssd", NESTED.as_bytes()), ("plant.fmu", &fmu), ("p.ssv", values), ("p.ssm", mapping)];
-    packed(&path, &entries);
-    let mut loaded = Loaded::open(&path, false).unwrap();
-    assert_eq!(loaded.notes, [""; 0]);
-    for name in ["a.u", "a.z", "in.b.u", "out", "a.T", "in.b.T"] {
-        loaded.record(name).unwrap();
-    }
-    let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
-    let recording = loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
-    let last: Vec<f64> = recording.columns.iter().map(|column| *column.values.last().unwrap()).collect();
-    // z = 1 - 2 u.
-    let expected = [6.0, -11.0, -4.5, 10.0, 0.2, 0.6];
-    assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{last:?}");
-
-    // Another variant, and what is missing.
-    packed(&path, &[("B.ssd", NESTED.as_bytes()), ("A.ssd", NESTED.as_bytes()), entries[1], entries[2], entries[3]]);
-    let open =
-        |name: &str| Loaded::open_files(&[name.to_owned()], folder.path(), false).map(drop).map_err(|e| e.to_string());
-    assert!(open("nested.ssp#A.ssd").is_ok());
-    let error = open("nested.ssp").unwrap_err();
-    assert!(
-        error.contains("has no SystemStructure.ssd; its variants are A.ssd, B.ssd: name one, as in nested.ssp#A.ssd"),
-        "{error}"
-    );
-    let twice = NESTED.replace(
-        "<s:Connection startElement='in' startConnector='r'",
-        "<s:Connection startElement='a' startConnector='z' endElement='in' endConnector='w'/><s:Connection startElement='in' startConnector='r'",
-    );
-    packed(&path, &[("SystemStructure.ssd", twice.as_bytes()), entries[1], entries[2], entries[3]]);
-    let error = open("nested.ssp").unwrap_err();
-    assert!(error.contains("in.w is fed twice"), "{error}");
-}
-
 #[test]
 fn what_was_recorded_before_an_error_is_kept() {
     let workshop = Workshop::new();
@@ -257,7 +171,7 @@ fn a_loop_through_a_conversion_is_solved() {
                 system.add(name, &fmu, false).unwrap();
                 system.record(&format!("{name}.u")).unwrap();
             }
-            let transformation = Some(Conversion { factor: 4.0, offset: 3.0 });
+            let transformation = Some(Transformation::Linear(Conversion { factor: 4.0, offset: 3.0 }));
             system.connect_by("a.z", "b.u", &Crossing { transformation, ..Crossing::default() }).unwrap();
             system.connect("b.z", "a.u").unwrap();
             let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
