@@ -123,6 +123,15 @@ fn what_builds_fmus_knows_no_motor_and_no_command_line() {
     }
 }
 
+/// A library has an error type with cases or a text; the command alone collects errors of every kind.
+#[test]
+fn the_command_alone_depends_on_anyhow() {
+    for (name, (folder, _)) in &crates() {
+        let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        assert_eq!(manifest.contains("\nanyhow"), name == "fmu", "{name}");
+    }
+}
+
 /// A thread pool that outlives a call does not survive a fork, and random numbers come from the row.
 #[test]
 fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
@@ -271,7 +280,10 @@ fn no_two_public_types_of_a_crate_share_a_name() {
 
 /// Names of public types that several crates share.
 const SHARED: &[(&str, &[&str])] = &[
-    ("one for each crate or command", &["Atlas", "Error", "Info", "Kind", "Map", "Options", "Report", "Sweep"]),
+    (
+        "one for each crate or command",
+        &["Atlas", "Error", "Info", "Kind", "Map", "Options", "Report", "Result", "Sweep"],
+    ),
     (
         "a term of FMI or of XML, in the exporter, the importer and the description",
         &[

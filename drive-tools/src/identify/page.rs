@@ -5,7 +5,7 @@ use super::run::Commissioned;
 use super::verdict::Quantity;
 use super::windows::Window;
 use super::{Identified, Seen};
-use anyhow::Result;
+use crate::error::Result;
 use drive::control::commission::CommissionState;
 use fmu_core::Enumerated;
 use fmu_plot::figure::{Curve, Figure, Panel};

@@ -2,7 +2,7 @@
 
 use super::Map;
 use super::request::ZERO_CELSIUS;
-use anyhow::Result;
+use crate::error::Result;
 use drive::steady::Point;
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};

@@ -20,10 +20,10 @@ pub mod sheet;
 pub mod table;
 pub mod verify;
 
+use crate::error::{Result, bail};
 use crate::tune::motor::MotorFile;
 use crate::tune::rules;
 use crate::tune::setting::Tuned;
-use anyhow::{Result, bail};
 use cycle::{Cycle, Energy};
 use drive::control::start::StartMode;
 use drive::estimator::Kind;

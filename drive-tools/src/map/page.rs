@@ -2,7 +2,7 @@
 
 use super::report::Report;
 use super::{Map, picture, short};
-use anyhow::Result;
+use crate::error::Result;
 use drive::plant::losses::Losses;
 use fmu_plot::chart;
 use fmu_plot::page::{self, escape};

@@ -7,7 +7,7 @@
 //! highest speed against the rated speed.
 
 use super::motor::{Data, Located, MotorFile};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
 
 /// A value, its plausible range, and other units in which it may have been written, with their size in the expected unit.
 struct Check<'a> {

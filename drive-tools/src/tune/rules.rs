@@ -19,7 +19,7 @@ use super::motor::{Data, Located, MotorFile, RULED, swing};
 use super::setting::{Setting, Tuned, Value, given, real, set};
 use super::voltage::{self, Voltage};
 use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, saturation};
-use anyhow::{Result, anyhow, bail};
+use crate::error::{Error, Result, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 use std::f64::consts::TAU;
@@ -92,7 +92,10 @@ pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
         top_torque,
         rest,
     };
-    tuned.pair().start().map_err(|e| anyhow!("{}: these values do not fit together: {e}", motor.place_at(0)))?;
+    tuned
+        .pair()
+        .start()
+        .map_err(|e| Error::new(format!("{}: these values do not fit together: {e}", motor.place_at(0))))?;
     Ok(tuned)
 }
 
@@ -108,7 +111,7 @@ fn estimator(motor: &MotorFile) -> Result<Kind> {
     let known = RULED.into_iter().find(|kind| kind.name() == given.get_ref());
     known.ok_or_else(|| {
         let (place, name) = (motor.place(given), given.get_ref());
-        anyhow!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out")
+        Error::new(format!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out"))
     })
 }
 
