@@ -15,7 +15,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("model-description", &["fmu-core"]),
     ("fmu-import", &["fmu-core", "model-description"]),
     ("fmu-system", &["fmu-core", "fmu-import", "model-description"]),
-    ("fmu-sweep", &["fmu-import", "fmu-system", "model-description"]),
+    ("fmu-sweep", &["fmu-core", "fmu-import", "fmu-system", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
     ("fmu-plot", &[]),
     ("fmu-pack", &["fmu-core", "fmu-import", "fmu-plot", "fmu-system", "model-description"]),
