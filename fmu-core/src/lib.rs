@@ -88,6 +88,7 @@ pub mod capability;
 pub mod clock;
 pub mod continuous;
 pub mod description;
+pub mod digits;
 pub mod draw;
 pub mod dual;
 pub mod enumeration;

@@ -22,6 +22,7 @@ use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, sa
 use crate::error::{Error, Result, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
+use fmu_core::digits::rounded;
 use std::f64::consts::TAU;
 
 /// Derives the values.
@@ -178,12 +179,7 @@ fn lock(data: &Data) -> Setting {
     let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
     let resistive = 0.2 * machine.R_s.get_ref() * rating.current.get_ref();
     let rule = "0.035 of the EMF at rated speed, at least 0.2 R_s times the maximum current";
-    real("lock.u", short((SHARE * emf).max(resistive)), rule)
-}
-
-/// A number with three digits.
-fn short(x: f64) -> f64 {
-    format!("{x:.2e}").parse().unwrap_or(x)
+    real("lock.u", rounded((SHARE * emf).max(resistive), 3), rule)
 }
 
 /// Checks that the ratings are positive.

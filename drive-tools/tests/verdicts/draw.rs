@@ -1,6 +1,7 @@
 //! Machines drawn within the ranges of data sheets: 5 W to 300 kW at 12 V to 800 V. Everything is scaled to the rated point,
 //! as machines are: EMF, resistance and reactances in per unit, the inertia as the time to the rated speed.
 
+use fmu_core::digits::rounded;
 use fmu_core::draw::Draw;
 use std::f64::consts::{PI, TAU};
 
@@ -11,7 +12,7 @@ fn one_of<T: Copy>(draw: &mut Draw, all: &[T]) -> T {
 
 /// A number with three digits, as a data sheet has it.
 fn short(x: f64) -> f64 {
-    format!("{x:.2e}").parse().unwrap_or(x)
+    rounded(x, 3)
 }
 
 /// The text of a machine's file.
