@@ -4,6 +4,7 @@ use super::super::*;
 use super::bits;
 use super::turn::{Call, Turn, extent, is_element};
 use super::twin::Twin;
+use crate::solver::draw::Choices;
 use std::fmt::Write;
 
 impl<M: Twin> Turn<'_, M> {
