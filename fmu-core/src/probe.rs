@@ -2,7 +2,6 @@
 //! changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 
 use crate::capability::Capabilities;
-use crate::draw::Draw;
 use crate::model::{Block, Model};
 use crate::row::Slot;
 use crate::variable::{Causality, Kind, Meta, Variability};
@@ -316,6 +315,24 @@ fn change_one<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[u
             }
         }
         Slot::Text(_) | Slot::Said(_) | Slot::Binary(_) | Slot::Constant(_) | Slot::Clock(_) => {}
+    }
+}
+
+/// A deterministic stream of numbers (Knuth's 64-bit congruential generator).
+struct Draw(u64);
+
+impl Draw {
+    fn next(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        u32::try_from(self.0 >> 32).unwrap_or_default()
+    }
+
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * f64::from(self.next()) / f64::from(u32::MAX)
+    }
+
+    fn below(&mut self, n: u32) -> usize {
+        usize::try_from(self.next() % n).unwrap_or_default()
     }
 }
 
