@@ -62,7 +62,7 @@ pub trait WithContext<T> {
     /// There is no value.
     fn with_context<D: Display>(self, text: impl FnOnce() -> D) -> Result<T>;
 
-    /// As [`with_context`](Self::with_context), with a fixed text.
+    /// [`with_context`](Self::with_context) with a fixed text.
     ///
     /// # Errors
     /// There is no value.
