@@ -1,8 +1,8 @@
 //! Clocks (FMI 3.0.2, 2.2.8): they announce when a part of a model acts; the importer generates the ticks.
 
 use crate::events::Sampled;
+use crate::refusal::demand;
 use crate::row::{Access, Row};
-use crate::rules::demand;
 use crate::variable::{Causality, Kind, Variability};
 use crate::{Elapsed, Fault, Model};
 use serde::{Deserialize, Serialize};
@@ -201,6 +201,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// A clock that the model ticks: [`Clocked::ticked`].
+    #[track_caller]
     pub const fn clock_output(name: &'static str, description: &'static str) -> Self {
         Self::new(name, description, Kind::Clock(Clock::<W>::triggered().timing), Access::Clock(None))
             .with(Causality::Output, Variability::Discrete)

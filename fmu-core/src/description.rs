@@ -1,5 +1,6 @@
 //! The neutral description of a model, from which the XML, documentation and tools are generated.
 
+mod checks;
 mod sizes;
 mod terminals;
 
@@ -16,9 +17,9 @@ use crate::probe;
 use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
+use checks::{check_names, check_start, check_types};
 use serde::{Deserialize, Serialize};
 use sizes::{check_sizes, exchange, size};
-use std::collections::BTreeSet;
 
 /// Value reference of the independent variable `time`, which archives of FMI 3.0 have; the table's variable `i` has value reference `i + 1`.
 pub const TIME: u32 = 0;
@@ -563,25 +564,6 @@ fn kind(kind: &Kind) -> VariableKind {
     }
 }
 
-/// Checks a start value by the rules of a set call. A text must be valid in XML (XML 1.0, 2.2).
-fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
-    let text = match slot {
-        Slot::Text(text) => text.as_str(),
-        Slot::Said(text) => text,
-        _ => "",
-    };
-    if text.contains(|c: char| c.is_control() && !"\t\n\r".contains(c) || "\u{fffe}\u{ffff}".contains(c)) {
-        return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not allow")));
-    }
-    if slot.is_allowed(meta) {
-        return Ok(());
-    }
-    if let Kind::Binary { most, .. } = meta.kind {
-        return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
-    }
-    Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
-}
-
 /// A wide array, by its first index and its number of elements.
 fn wide_array<M: Model>(
     can: &Capabilities<M>,
@@ -599,26 +581,4 @@ fn wide_array<M: Model>(
         }
     }
     Ok(array)
-}
-
-/// Checks that no two variables or aliases share a name.
-fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fault> {
-    let mut names = BTreeSet::new();
-    let all = variables.iter().flat_map(|v| v.aliases.iter().map(|a| &a.name).chain([&v.name]));
-    match all.into_iter().find(|name| !names.insert(name.as_str())) {
-        Some(name) => Err(Fault::new(format!("two variables of {model} have the name {name}"))),
-        None => Ok(()),
-    }
-}
-
-fn check_types(variables: &[Variable]) -> Result<(), Fault> {
-    for of in variables {
-        let (VariableKind::Real { quantity: name, .. } | VariableKind::Enumeration { name, .. }) = &of.kind else {
-            continue;
-        };
-        if variables.iter().any(|v| v.name == *name) {
-            return Err(Fault::new(format!("the type definition {name} has the name of a variable")));
-        }
-    }
-    Ok(())
 }

@@ -68,6 +68,7 @@ macro_rules! integers {
                 integers!($name $type $parameter Parameter Fixed "A parameter");
 
                 #[doc = concat!("A constant of the type ", stringify!($name), ": `", stringify!($type), "`.")]
+                #[track_caller]
                 pub const fn $constant(name: &'static str, description: &'static str, value: $type) -> Self {
                     let access = Access::Constant(Constant::Integer(value as i128));
                     Self::new(name, description, Kind::Integer(IntegerType::$name), access).constant_local()
@@ -77,6 +78,7 @@ macro_rules! integers {
     };
     ($name:ident $type:ident $constructor:ident $causality:ident $variability:ident $what:literal) => {
         #[doc = concat!($what, " of the type ", stringify!($name), ": `", stringify!($type), "`.")]
+        #[track_caller]
         pub const fn $constructor(
             name: &'static str,
             description: &'static str,

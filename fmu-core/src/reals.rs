@@ -2,7 +2,7 @@
 //!
 //! A part is looked up once for all its consecutive variables, and no value is wrapped.
 
-use crate::row::{Access, Row};
+use crate::row::Access;
 use crate::table::Table;
 use crate::variable::{Causality, Kind, Meta, Range, Variability};
 use std::mem::{MaybeUninit, replace};
@@ -22,18 +22,19 @@ impl<W: 'static> Table<W> {
     /// Reads real scalars up to the first reference of another kind; returns their number. `first` is the reference of the
     /// table's first variable.
     #[inline]
+    #[expect(clippy::cast_possible_truncation, reason = "indices fit in references")]
     pub fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize {
         let n = list.len().min(out.len());
         let (list, out, mut i) = (&list[..n], &mut out[..n], 0);
         while i < n {
-            let Some((row, inner)) = self.find(list[i].wrapping_sub(first)) else { break };
+            let Some((row, inner)) = self.near_or_far(list[i].wrapping_sub(first) as usize) else { break };
             match &row.access {
                 Access::Real(get) => {
                     out[i].write(*get(whole));
                     i += 1;
                 }
                 Access::Part { node, .. } => {
-                    let done = node.read(whole, &list[i..], list[i].wrapping_sub(inner), &mut out[i..]);
+                    let done = node.read(whole, &list[i..], list[i].wrapping_sub(inner as u32), &mut out[i..]);
                     if done == 0 {
                         break;
                     }
@@ -48,12 +49,13 @@ impl<W: 'static> Table<W> {
     /// Writes real scalar inputs up to the first reference of another kind, the first input that may not be set, or the first
     /// value out of range; returns their number. The buffer for previous values is large enough.
     #[inline]
+    #[expect(clippy::cast_possible_truncation, reason = "indices fit in references")]
     pub fn write(&self, whole: &mut W, list: &[u32], first: u32, inputs: RealInputs<'_>) -> usize {
         let RealInputs { values, before, continuous } = inputs;
         let n = list.len().min(values.len()).min(before.len());
         let (list, values, before, mut i) = (&list[..n], &values[..n], &mut before[..n], 0);
         while i < n {
-            let Some((row, inner)) = self.find(list[i].wrapping_sub(first)) else { break };
+            let Some((row, inner)) = self.near_or_far(list[i].wrapping_sub(first) as usize) else { break };
             match &row.access {
                 Access::Real(get) => {
                     let open = !continuous || row.meta.variability == Variability::Continuous;
@@ -65,7 +67,7 @@ impl<W: 'static> Table<W> {
                 }
                 Access::Part { node, .. } => {
                     let rest = RealInputs { values: &values[i..], before: &mut before[i..], continuous };
-                    let done = node.write(whole, &list[i..], list[i].wrapping_sub(inner), rest);
+                    let done = node.write(whole, &list[i..], list[i].wrapping_sub(inner as u32), rest);
                     if done == 0 {
                         break;
                     }
@@ -75,13 +77,6 @@ impl<W: 'static> Table<W> {
             }
         }
         i
-    }
-
-    /// The row of variable `index`, and the index inside that row.
-    #[inline]
-    fn find(&self, index: u32) -> Option<(&'static Row<W>, u32)> {
-        let place = self.places.get(index as usize)?;
-        Some((self.rows.get(usize::from(place.row))?, place.inner.into()))
     }
 }
 

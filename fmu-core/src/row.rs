@@ -14,6 +14,7 @@ use crate::fault::Fault;
 use crate::integer::Getter;
 use crate::kinds::Kinds;
 use crate::list::List;
+use crate::names::check_form;
 use crate::need::Need;
 use crate::reals::{Interval, RealInputs};
 use crate::sizes::Sizes;
@@ -223,15 +224,38 @@ pub(crate) enum Access<W: 'static> {
 /// ];
 /// # let _ = TABLE.len();
 /// ```
+///
+/// Nor does a name that is not a structured name of FMI; single quotes make one of any characters of ASCII:
+///
+/// ```compile_fail,E0080
+/// # use fmu_core::unit::WATT;
+/// # use fmu_core::{Row, Table, table};
+/// # struct Model { loss: f64 }
+/// const TABLE: &Table<Model> = table![
+///     Row::output("loss [W]", &WATT, "Loss", |m: &mut Model| &mut m.loss), // 'loss [W]'
+/// ];
+/// # let _ = TABLE.len();
+/// ```
 pub struct Row<W: 'static> {
     pub(crate) meta: Meta,
     pub(crate) access: Access<W>,
     pub(crate) settable: Interval,
+    /// Indices of the rows before it.
+    pub(crate) start: Start,
+}
+
+/// Numbers of indices: those that count one by one, and those of wide arrays.
+#[derive(Clone, Copy)]
+pub(crate) struct Start {
+    pub(crate) dense: usize,
+    pub(crate) wide: usize,
 }
 
 impl<W: 'static> Row<W> {
     /// A fixed local variable; [`with`](Self::with) makes it another.
+    #[track_caller]
     pub(crate) const fn new(name: &'static str, description: &'static str, kind: Kind, access: Access<W>) -> Self {
+        check_form(name, matches!(access, Access::Part { .. }));
         let meta = Meta {
             name,
             description,
@@ -251,7 +275,7 @@ impl<W: 'static> Row<W> {
             sized: &[],
             aliases: &[],
         };
-        Self { settable: Interval::of(&meta), meta, access }
+        Self { settable: Interval::of(&meta), meta, access, start: Start { dense: 0, wide: 0 } }
     }
 
     pub(crate) const fn with(mut self, causality: Causality, variability: Variability) -> Self {

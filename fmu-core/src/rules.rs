@@ -5,6 +5,8 @@ use crate::clock::word;
 use crate::continuous::ContinuousTime;
 use crate::log;
 use crate::model::{Experiment, Info, Model};
+use crate::names::Names;
+use crate::refusal::{demand, digits, fail, same_text, starts_with};
 use crate::row::{Access, Row};
 use crate::variable::{Causality, Kind, Meta, Variability};
 
@@ -25,21 +27,43 @@ pub const fn check<E: Exported>() {
     demand(exchanges, model, "ModelExchangeOnly is for a model with states or events, and without EventMode");
     demand(complete, model, "EventMode is for a model that is exported with ContinuousTime and Events");
     let (rows, states, can) = (E::Model::TABLE.rows, E::CAN.states().len(), E::CAN);
-    let mut i = 0;
     check_intermediate::<E>(model);
     check_clocks::<E>(model);
     check_resizable::<E>(model);
-    while i < states {
-        let name = can.states()[i].name;
-        let mut other = 0;
-        while other < i {
-            let twice = same_text(can.states()[other].name, name);
-            demand(!twice, name, "two states have this name");
-            other += 1;
-        }
-        check_state(rows, model, name, can.states()[i].dimension());
+    if states == 0 {
+        return;
+    }
+    let (mut of_rows, mut of_states, mut i) = (Names::new(), Names::new(), 0);
+    while i < rows.len() {
+        of_rows.add(rows[i].meta.name, "two rows of the table have this name");
         i += 1;
     }
+    i = 0;
+    while i < states {
+        let name = can.states()[i].name;
+        of_states.add(name, "two states have this name");
+        match of_rows.find(name) {
+            Some(row) if !matches!(rows[row].access, Access::Part { .. }) => {
+                check_state(&rows[row].meta, name, can.states()[i].dimension());
+            }
+            // The compiler cannot read the names of a part's rows.
+            _ if is_in_part(rows, name) => {}
+            _ => fail(&["STATES of ", model, ": no row of the table has the name ", name]),
+        }
+        i += 1;
+    }
+}
+
+/// Whether a name begins with the prefix of a part.
+const fn is_in_part<W>(rows: &[Row<W>], name: &str) -> bool {
+    let mut row = 0;
+    while row < rows.len() {
+        if matches!(rows[row].access, Access::Part { .. }) && starts_with(name, rows[row].meta.name) {
+            return true;
+        }
+        row += 1;
+    }
+    false
 }
 
 /// Checks the experiment and the log categories.
@@ -130,28 +154,13 @@ const fn is_clock<W>(rows: &[Row<W>], name: &str) -> bool {
 }
 
 #[track_caller]
-const fn check_state<W>(rows: &[Row<W>], model: &str, name: &str, dimension: Option<usize>) {
-    let mut row = 0;
-    while row < rows.len() {
-        let meta = &rows[row].meta;
-        if let Access::Part { .. } = rows[row].access {
-            // The compiler cannot read the names of a part's rows.
-            if starts_with(name, meta.name) {
-                return;
-            }
-        } else if same_text(meta.name, name) {
-            let array = meta.dimension.is_none() || dimension.is_some();
-            demand(array, name, "the row is an array: its state is State::array");
-            let one = same_dimension(meta.dimension, dimension);
-            demand(one, name, "State::array and its row have different numbers of elements");
-            let rule =
-                "the row of a state is V::output or V::state, that of an array V::array_output or V::array_local";
-            demand(can_be_state(meta, dimension), name, rule);
-            return;
-        }
-        row += 1;
-    }
-    fail(&["STATES of ", model, ": no row of the table has the name ", name]);
+const fn check_state(meta: &Meta, name: &str, dimension: Option<usize>) {
+    let array = meta.dimension.is_none() || dimension.is_some();
+    demand(array, name, "the row is an array: its state is State::array");
+    let one = same_dimension(meta.dimension, dimension);
+    demand(one, name, "State::array and its row have different numbers of elements");
+    let rule = "the row of a state is V::output or V::state, that of an array V::array_output or V::array_local";
+    demand(can_be_state(meta, dimension), name, rule);
 }
 
 const fn same_dimension(a: Option<usize>, b: Option<usize>) -> bool {
@@ -188,48 +197,6 @@ pub(crate) const fn check_number<M: ContinuousTime>(given: usize) {
     }
 }
 
-/// A compile-time check of a row. The error is reported at the caller, which is the row, with the variable's name.
-#[track_caller]
-pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
-    if !fits {
-        fail(&[name, ": ", why]);
-    }
-}
-
-/// An error of the compiler with this text.
-#[track_caller]
-const fn fail(parts: &[&str]) -> ! {
-    // A panic while compiling takes one text.
-    let (mut text, mut len, mut part) = ([0_u8; 256], 0, 0);
-    while part < parts.len() {
-        let (bytes, mut i) = (parts[part].as_bytes(), 0);
-        while i < bytes.len() && len < text.len() {
-            text[len] = bytes[i];
-            (i, len) = (i + 1, len + 1);
-        }
-        part += 1;
-    }
-    match std::str::from_utf8(text.split_at(len).0) {
-        Ok(text) => panic!("{}", text),
-        Err(_) => panic!("{}", parts[parts.len() - 1]),
-    }
-}
-
-/// A number in decimal.
-#[expect(clippy::cast_possible_truncation, reason = "a digit")]
-const fn digits(mut number: usize, text: &mut [u8; 20]) -> &str {
-    let mut first = text.len();
-    while first == text.len() || number > 0 {
-        first -= 1;
-        text[first] = b'0' + (number % 10) as u8;
-        number /= 10;
-    }
-    match std::str::from_utf8(text.split_at(first).1) {
-        Ok(text) => text,
-        Err(_) => "",
-    }
-}
-
 const fn is_identifier(name: &str) -> bool {
     let (bytes, mut i) = (name.as_bytes(), 0);
     while i < bytes.len() {
@@ -239,20 +206,4 @@ const fn is_identifier(name: &str) -> bool {
         i += 1;
     }
     !bytes.is_empty()
-}
-
-const fn starts_with(text: &str, start: &str) -> bool {
-    let (text, start, mut i) = (text.as_bytes(), start.as_bytes(), 0);
-    while i < start.len() {
-        if i >= text.len() || text[i] != start[i] {
-            return false;
-        }
-        i += 1;
-    }
-    true
-}
-
-/// Whether two texts are equal.
-pub(crate) const fn same_text(a: &str, b: &str) -> bool {
-    a.len() == b.len() && starts_with(a, b)
 }

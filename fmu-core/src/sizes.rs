@@ -8,8 +8,9 @@ use crate::capability::Capabilities;
 use crate::continuous::State;
 use crate::fault::Fault;
 use crate::model::Model;
+use crate::names::Names;
+use crate::refusal::demand;
 use crate::row::{Access, Row, Slot};
-use crate::rules::{demand, same_text};
 use crate::table::Table;
 use crate::variable::{Causality, Meta};
 
@@ -88,7 +89,7 @@ impl Sizes {
 
 /// Checks that the number of elements of a row is the product of the maximum sizes that it names.
 #[track_caller]
-pub(crate) const fn check_sized<W>(rows: &[Row<W>], row: usize) {
+pub(crate) const fn check_sized<W>(rows: &[Row<W>], row: usize, names: &Names) {
     let meta = &rows[row].meta;
     let structural = matches!(meta.causality, Causality::StructuralParameter);
     let bounded = meta.range.max < f64::INFINITY && meta.range.max >= 1.0;
@@ -98,13 +99,14 @@ pub(crate) const fn check_sized<W>(rows: &[Row<W>], row: usize) {
     }
     let (mut product, mut i) = (1, 0);
     while i < meta.sized.len() {
-        let mut other = 0;
-        while other < rows.len() && !same_text(rows[other].meta.name, meta.sized[i]) {
-            other += 1;
-        }
-        let found = other < rows.len() && matches!(rows[other].meta.causality, Causality::StructuralParameter);
-        demand(found, meta.name, "the table has no structural parameter of the name that sizes it");
-        product *= greatest(&rows[other].meta);
+        let size = match names.find(meta.sized[i]) {
+            Some(other) if matches!(rows[other].meta.causality, Causality::StructuralParameter) => {
+                greatest(&rows[other].meta)
+            }
+            _ => 0,
+        };
+        demand(size > 0, meta.name, "the table has no structural parameter of the name that sizes it");
+        product *= size;
         i += 1;
     }
     let fits = matches!(meta.dimension, Some(n) if n == product);

@@ -1,15 +1,17 @@
 //! The variable table of a type, composed of variables and of other types' tables.
 //!
 //! A variable's index is its running offset: a scalar takes one, an array one per element, a part as many as its table. A wide
-//! array, of more than [`DENSE`] elements, has separate indices, from [`WIDE`] on, and is found by a scan. Everything that does
-//! not need a value is checked at compile time: names, ranges, the number of variables.
+//! array, of more than [`DENSE`] elements, has separate indices, from [`WIDE`] on. The rows of the first [`DIRECT`] indices are in
+//! a list; the others, and wide arrays, are found by bisection. Everything that does not need a value is checked at compile time:
+//! names, ranges, the number of variables.
 
 use crate::clock::Ticks;
 use crate::fault::Fault;
 use crate::kinds::Kinds;
+use crate::names::{MOST_ROWS, Names};
 use crate::reals::RealInputs;
-use crate::row::{Access, Constant, Node, Row, SizedNode, Slot};
-use crate::rules::{demand, same_text};
+use crate::refusal::demand;
+use crate::row::{Access, Constant, Node, Row, SizedNode, Slot, Start};
 use crate::sizes::{Sizes, check_sized};
 use crate::token::Hash;
 use crate::variable::{Causality, Kind, Meta, Variability};
@@ -17,17 +19,14 @@ use std::fmt::Display;
 use std::mem::MaybeUninit;
 use std::ptr;
 
-/// Maximum number of variables in a table, including those of its parts, without wide arrays.
-pub const CAPACITY: usize = 512;
+/// Number of indices whose rows are in a list.
+pub const DIRECT: usize = 512;
 
 /// Maximum number of elements of an array that is not wide.
 pub const DENSE: usize = 128;
 
 /// Index of the first element of the first wide array.
 pub const WIDE: usize = 1 << 30;
-
-/// Maximum number of wide arrays in a table, and of parts that have some.
-const WIDE_ROWS: usize = 16;
 
 /// The table of `P` seen through `W`, of which `P` is a part.
 pub struct Part<W: 'static, P: 'static> {
@@ -79,6 +78,7 @@ impl<W, P> SizedNode<W> for Part<W, P> {
 
 impl<W: 'static> Row<W> {
     /// All variables of a part, under a prefix that ends with a dot (or none).
+    #[track_caller]
     pub const fn part<P>(prefix: &'static str, part: &'static Part<W, P>) -> Self {
         let Table { len, wide, hash, kinds, intermediate, sizes, .. } = *part.table;
         let sized = if sizes.any { Some(part as &dyn SizedNode<W>) } else { None };
@@ -93,8 +93,40 @@ impl<W: 'static> Row<W> {
 #[macro_export]
 macro_rules! table {
     ($($row:expr),* $(,)?) => {
-        &$crate::Table::new(const { &[$($row),*] })
+        &$crate::Table::new(const { &$crate::table::numbered([$($row),*]) })
     };
+}
+
+/// The rows of a table, for several tables that share some.
+#[macro_export]
+macro_rules! rows {
+    ($($row:expr),* $(,)?) => {
+        const { &$crate::table::numbered([$($row),*]) }
+    };
+}
+
+/// The rows with the number of indices before each.
+#[doc(hidden)]
+pub const fn numbered<W: 'static, const N: usize>(mut rows: [Row<W>; N]) -> [Row<W>; N] {
+    let (mut row, mut dense, mut wide) = (0, 0, 0);
+    while row < N {
+        rows[row].start = Start { dense, wide };
+        let Start { dense: more, wide: wider } = rows[row].indices();
+        (dense, wide, row) = (dense + more, wide + wider, row + 1);
+    }
+    rows
+}
+
+impl<W: 'static> Row<W> {
+    /// Number of its indices.
+    const fn indices(&self) -> Start {
+        match (&self.access, self.meta.dimension) {
+            (Access::Part { len, wide, .. }, _) => Start { dense: *len, wide: *wide },
+            (_, Some(n)) if n > DENSE => Start { dense: 0, wide: n },
+            (_, Some(n)) => Start { dense: n, wide: 0 },
+            (_, None) => Start { dense: 1, wide: 0 },
+        }
+    }
 }
 
 /// A value of an enumeration with the name of its item.
@@ -108,15 +140,7 @@ fn item(meta: &Meta, value: i32) -> String {
 #[derive(Clone, Copy)]
 pub(crate) struct RowPlace {
     pub(crate) row: u16,
-    pub(crate) inner: u16,
-}
-
-/// A wide array, or a part that has some: its row, and the elements before it.
-#[derive(Clone, Copy)]
-struct WidePlace {
-    row: u16,
-    first: usize,
-    len: usize,
+    inner: u16,
 }
 
 /// Finds a value of a rare kind.
@@ -125,12 +149,14 @@ type Rare<W> = for<'a> fn(&'static Row<W>, &'a mut W, usize) -> Option<Slot<'a>>
 /// Finds an element of a wide array.
 type Beyond<W> = for<'a> fn(&Table<W>, &'a mut W, usize) -> Option<(&'static Meta, Slot<'a>)>;
 
+/// Finds the row of an index after the first ones, and the index in the row.
+type Far<W> = fn(&Table<W>, usize) -> Option<(&'static Row<W>, usize)>;
+
 /// All variables of `W`; [`table!`](crate::table!) makes one from its rows.
 pub struct Table<W: 'static> {
     pub(crate) rows: &'static [Row<W>],
-    pub(crate) places: [RowPlace; CAPACITY],
+    places: [RowPlace; DIRECT],
     len: usize,
-    wide_places: [WidePlace; WIDE_ROWS],
     /// Number of elements of wide arrays.
     wide: usize,
     hash: Hash,
@@ -143,66 +169,63 @@ pub struct Table<W: 'static> {
     /// Functions that only some tables need: other tables do not contain their code.
     rare: Option<Rare<W>>,
     beyond: Option<Beyond<W>>,
+    far: Option<Far<W>>,
 }
 
 impl<W: 'static> Table<W> {
-    /// Builds the table.
+    /// Builds the table from [`rows!`](crate::rows!), or from consecutive ones of them.
     ///
     /// # Panics
-    /// At compile time, on a duplicate name, an array without an element, more than [`CAPACITY`] variables, or too many wide arrays.
-    #[expect(clippy::cast_possible_truncation, reason = "CAPACITY fits in 16 bits, asserted below")]
+    /// At compile time, on a duplicate name, an array without an element, or more than 16384 rows.
+    #[track_caller]
+    #[expect(clippy::cast_possible_truncation, reason = "rows and DIRECT fit in 16 bits")]
     pub const fn new(rows: &'static [Row<W>]) -> Self {
-        assert!(CAPACITY <= u16::MAX as usize);
+        assert!(MOST_ROWS < u16::MAX as usize);
+        let mut names = Names::new();
+        let mut row = 0;
+        while row < rows.len() {
+            // A part without a prefix has no name; its variables are checked by the description.
+            names.add(rows[row].meta.name, "two rows of the table have this name");
+            row += 1;
+        }
         // No row past the end.
-        let mut places = [RowPlace { row: u16::MAX, inner: 0 }; CAPACITY];
+        let mut places = [RowPlace { row: u16::MAX, inner: 0 }; DIRECT];
         let (mut len, mut row, mut hash, mut kinds, mut intermediate) = (0, 0, Hash::START, Kinds::NONE, false);
         let (mut sizes, mut has_rare) = (Sizes::NONE, false);
-        let (mut wide_places, mut wide, mut wide_rows) = ([WidePlace { row: 0, first: 0, len: 0 }; WIDE_ROWS], 0, 0);
+        let mut wide = 0;
         while row < rows.len() {
             let meta = &rows[row].meta;
             intermediate |= meta.intermediate;
             has_rare |= rows[row].access.is_rare();
-            let (count, beyond) = match (&rows[row].access, meta.dimension) {
-                (Access::Part { len, wide, hash: of_part, kinds: of_kinds, sizes: of_sizes, .. }, _) => {
-                    kinds = kinds.and(*of_kinds);
-                    sizes = sizes.and(*of_sizes);
-                    hash = hash.text(meta.name).join(of_part);
-                    if !meta.clocks.is_empty() {
-                        hash = hash.text("on").text(meta.clocks);
-                    }
-                    (*len, *wide)
+            if let Access::Part { hash: of_part, kinds: of_kinds, sizes: of_sizes, .. } = &rows[row].access {
+                kinds = kinds.and(*of_kinds);
+                sizes = sizes.and(*of_sizes);
+                hash = hash.text(meta.name).join(of_part);
+                if !meta.clocks.is_empty() {
+                    hash = hash.text("on").text(meta.clocks);
                 }
-                (_, dimension) => {
-                    check(meta);
-                    check_sized(rows, row);
-                    sizes = sizes.and(Sizes::of(meta));
-                    kinds = kinds.and(Kinds::of(&meta.kind));
-                    hash = hash.meta(meta);
-                    match dimension {
-                        Some(n) if n > DENSE => (0, n),
-                        Some(n) => (n, 0),
-                        None => (1, 0),
-                    }
-                }
-            };
+            } else {
+                demand(!meta.name.is_empty(), meta.description, "a variable needs a name");
+                demand(!matches!(meta.dimension, Some(0)), meta.name, "an array needs an element");
+                check_sized(rows, row, &names);
+                sizes = sizes.and(Sizes::of(meta));
+                kinds = kinds.and(Kinds::of(&meta.kind));
+                hash = hash.meta(meta);
+            }
+            let Start { dense, wide: wider } = rows[row].indices();
             let mut inner = 0;
-            while inner < count {
-                assert!(len < CAPACITY, "the table holds more variables than CAPACITY");
-                places[len] = RowPlace { row: row as u16, inner: inner as u16 };
-                len += 1;
+            while inner < dense && len + inner < DIRECT {
+                places[len + inner] = RowPlace { row: row as u16, inner: inner as u16 };
                 inner += 1;
             }
-            if beyond > 0 {
-                demand(wide_rows < WIDE_ROWS, meta.name, "the table has too many arrays of more than 128 elements");
-                wide_places[wide_rows] = WidePlace { row: row as u16, first: wide, len: beyond };
-                (wide, wide_rows) = (wide + beyond, wide_rows + 1);
-            }
-            check_unique(rows, row);
+            (len, wide) = (len + dense, wide + wider);
             row += 1;
         }
+        assert!(len < WIDE);
         let rare: Option<Rare<W>> = if has_rare { Some(find_rare) } else { None };
         let beyond: Option<Beyond<W>> = if wide > 0 { Some(Self::wide_entry) } else { None };
-        Self { rows, places, len, wide_places, wide, hash, kinds, intermediate, sizes, rare, beyond }
+        let far: Option<Far<W>> = if len > DIRECT { Some(Self::far_row) } else { None };
+        Self { rows, places, len, wide, hash, kinds, intermediate, sizes, rare, beyond, far }
     }
 
     /// Whether a row is a clock that the model ticks, or one whose ticks the model requests.
@@ -256,20 +279,36 @@ impl<W: 'static> Table<W> {
         if index >= self.len {
             return (self.beyond?)(self, whole, index);
         }
-        let place = self.places[index];
-        let row = &self.rows[usize::from(place.row)];
+        let (row, inner) = self.near_or_far(index)?;
         let slot = match &row.access {
             Access::Real(get) => Slot::Real(get(whole)),
-            Access::Reals(get) => Slot::Real(get(whole).get_mut(usize::from(place.inner))?),
+            Access::Reals(get) => Slot::Real(get(whole).get_mut(inner)?),
             Access::Integer(get) => Slot::Integer(get.find(whole)),
             Access::Boolean(get) => Slot::Boolean(get(whole)),
             Access::Enumeration(field) => Slot::Enumeration(field.find(whole)),
             Access::Text(get) => Slot::Text(get(whole)),
             Access::Said(say) => Slot::Said(say(whole)),
-            Access::Part { node, .. } => return node.entry(whole, usize::from(place.inner)),
-            _ => (self.rare?)(row, whole, usize::from(place.inner))?,
+            Access::Part { node, .. } => return node.entry(whole, inner),
+            _ => (self.rare?)(row, whole, inner)?,
         };
         Some((&row.meta, slot))
+    }
+
+    /// The row of an index that does not belong to a wide array, and the index in the row.
+    #[inline]
+    pub(crate) fn near_or_far(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
+        let Some(place) = self.places.get(index) else { return (self.far?)(self, index) };
+        Some((self.rows.get(usize::from(place.row))?, usize::from(place.inner)))
+    }
+
+    /// [`near_or_far`](Self::near_or_far) of an index after the first ones.
+    #[cold]
+    fn far_row(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
+        let at = self.rows.first()?.start.dense + index;
+        // A row without such indices begins where the next one does.
+        let after = self.rows.partition_point(|row| row.start.dense <= at);
+        let row = self.rows.get(after.checked_sub(1)?)?;
+        (index < self.len).then_some((row, at - row.start.dense))
     }
 
     /// [`entry`](Self::entry) of an element of a wide array.
@@ -288,15 +327,16 @@ impl<W: 'static> Table<W> {
 
     /// The row of an element of a wide array, and its position in the row.
     fn wide_place(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
-        let at = index.checked_sub(WIDE).filter(|at| *at < self.wide)?;
-        let place = self.wide_places.iter().find(|place| (place.first..place.first + place.len).contains(&at))?;
-        Some((&self.rows[usize::from(place.row)], at - place.first))
+        let at = index.checked_sub(WIDE).filter(|at| *at < self.wide)? + self.rows.first()?.start.wide;
+        let after = self.rows.partition_point(|row| row.start.wide <= at);
+        let row = self.rows.get(after.checked_sub(1)?)?;
+        Some((row, at - row.start.wide))
     }
 
     /// The row of a variable, and the index in it; for wide arrays of a part it counts from [`WIDE`].
     pub(crate) fn row_of(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
-        if let Some(place) = self.places[..self.len].get(index) {
-            return Some((&self.rows[usize::from(place.row)], usize::from(place.inner)));
+        if index < self.len {
+            return self.near_or_far(index);
         }
         let (row, inner) = self.wide_place(index)?;
         Some((row, if matches!(row.access, Access::Part { .. }) { WIDE + inner } else { inner }))
@@ -311,13 +351,12 @@ impl<W: 'static> Table<W> {
     /// Names of the clocks of variable `index`, separated by spaces; empty for none. If a part is on a clock, all its variables
     /// except parameters are.
     pub fn clocks_of(&self, index: usize) -> &'static str {
-        let Some(place) = self.places[..self.len].get(index) else { return "" };
-        let row = &self.rows[usize::from(place.row)];
+        let Some((row, place)) = self.near_or_far(index) else { return "" };
         match &row.access {
             Access::Part { node, .. } => {
-                let inner = node.clocks_of(usize::from(place.inner));
+                let inner = node.clocks_of(place);
                 let changes = || {
-                    let found = node.locate(usize::from(place.inner), &mut String::new());
+                    let found = node.locate(place, &mut String::new());
                     found.is_some_and(|(meta, _)| {
                         matches!(meta.causality, Causality::Input | Causality::Output | Causality::Local)
                             && !matches!(meta.kind, Kind::Clock(_))
@@ -433,18 +472,5 @@ fn find_rare<'a, W: 'static>(row: &'static Row<W>, whole: &'a mut W, inner: usiz
     })
 }
 
-const fn check(meta: &Meta) {
-    demand(!meta.name.is_empty(), meta.description, "a variable needs a name");
-    demand(!matches!(meta.dimension, Some(0)), meta.name, "an array needs an element");
-}
-
-/// Checks that the name of row `last` differs from all before it.
-const fn check_unique<W>(rows: &[Row<W>], last: usize) {
-    let mut row = 0;
-    while row < last {
-        // A part without a prefix has no name; its variables are checked by the description.
-        let same = !rows[row].meta.name.is_empty() && same_text(rows[row].meta.name, rows[last].meta.name);
-        demand(!same, rows[last].meta.name, "two rows of the table have this name");
-        row += 1;
-    }
-}
+#[cfg(test)]
+mod tests;

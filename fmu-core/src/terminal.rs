@@ -3,7 +3,7 @@
 //! A terminal names variables of the table and adds nothing to them: an importer without support for terminals loses nothing, and
 //! the instantiation token does not change.
 
-use crate::rules::{demand, same_text};
+use crate::refusal::{demand, same_text};
 use serde::{Deserialize, Serialize};
 
 /// A group of variables that is connected as a whole.

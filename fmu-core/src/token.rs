@@ -16,14 +16,34 @@ pub struct Hash(u128);
 impl Hash {
     /// The empty hash (FNV-1a offset basis).
     pub const START: Self = Self(0x6c62_272e_07bb_0142_62b8_2175_6295_c58d);
-    const PRIME: u128 = 0x0000_0000_0100_0000_0000_0000_0000_013b;
+    const HALF: u128 = u64::MAX as u128;
 
     /// Hash of this and `bytes`.
     pub const fn bytes(self, bytes: &[u8]) -> Self {
+        // The compiler counts rounds of loops and calls, and stops at some millions: eight bytes in a round, and no call.
+        macro_rules! fold {
+            ($hash:expr, $byte:expr) => {{
+                let hash = $hash ^ $byte as u128;
+                // The product modulo 2^128, with the factor 2^88 + 0x13b.
+                let low = (hash & Self::HALF) * 0x13b;
+                let high = (hash >> 64) * 0x13b + (low >> 64) + ((hash & 0xff_ffff_ffff) << 24);
+                (low & Self::HALF) | ((high & Self::HALF) << 64)
+            }};
+        }
         let (mut hash, mut i) = (self.0, 0);
         while i < bytes.len() {
-            hash = (hash ^ bytes[i] as u128).wrapping_mul(Self::PRIME);
+            hash = fold!(hash, bytes[i]);
             i += 1;
+            if i + 7 <= bytes.len() {
+                hash = fold!(hash, bytes[i]);
+                hash = fold!(hash, bytes[i + 1]);
+                hash = fold!(hash, bytes[i + 2]);
+                hash = fold!(hash, bytes[i + 3]);
+                hash = fold!(hash, bytes[i + 4]);
+                hash = fold!(hash, bytes[i + 5]);
+                hash = fold!(hash, bytes[i + 6]);
+                i += 7;
+            }
         }
         Self(hash)
     }

@@ -204,21 +204,72 @@ pub const NEWTON: Quantity = Quantity::new("Force", Unit::si("N", Exponents::mec
 /// Pressure in Pa.
 pub const PASCAL: Quantity = Quantity::new("Pressure", Unit::si("Pa", Exponents::mechanical(1, -1, -2, 0)));
 
+/// Stiffness of a spring in N/m.
+pub const NEWTON_PER_M: Quantity = Quantity::new("Stiffness", Unit::si("N/m", Exponents::mechanical(1, 0, -2, 0)));
+/// Damping of a translation in N.s/m.
+pub const NEWTON_S_PER_M: Quantity = Quantity::new("Damping", Unit::si("N.s/m", Exponents::mechanical(1, 0, -1, 0)));
+/// Stiffness of a torsion spring in N.m/rad.
+pub const NM_PER_RAD: Quantity =
+    Quantity::new("TorsionalStiffness", Unit::si("N.m/rad", Exponents::mechanical(1, 2, -2, 0).with_rad(-1)));
+/// Momentum in kg.m/s.
+pub const KG_M_PER_S: Quantity = Quantity::new("Momentum", Unit::si("kg.m/s", Exponents::mechanical(1, 1, -1, 0)));
+/// Density in kg/m3.
+pub const KG_PER_M3: Quantity = Quantity::new("Density", Unit::si("kg/m3", Exponents::mechanical(1, -3, 0, 0)));
+/// Frequency in Hz.
+pub const HERTZ: Quantity = Quantity::new("Frequency", Unit::si("Hz", Exponents::mechanical(0, 0, -1, 0)));
+/// Charge in C.
+pub const COULOMB: Quantity = Quantity::new("Charge", Unit::si("C", Exponents::mechanical(0, 0, 1, 1)));
+/// Rate of a current in A/s.
+pub const AMPERE_PER_S: Quantity = Quantity::new("CurrentRate", Unit::si("A/s", Exponents::mechanical(0, 0, -1, 1)));
+/// Magnetic flux density in T.
+pub const TESLA: Quantity = Quantity::new("FluxDensity", Unit::si("T", Exponents::mechanical(1, 0, -2, -1)));
+/// Electric field strength in V/m.
+pub const VOLT_PER_M: Quantity = Quantity::new("FieldStrength", Unit::si("V/m", Exponents::mechanical(1, 1, -3, -1)));
+/// Rate of a temperature in K/s.
+pub const KELVIN_PER_S: Quantity =
+    Quantity::new("TemperatureRate", Unit::si("K/s", Exponents::mechanical(0, 0, -1, 0).with_kelvin(1)));
+/// Thermal resistance in K/W.
+pub const KELVIN_PER_WATT: Quantity =
+    Quantity::new("ThermalResistance", Unit::si("K/W", Exponents::mechanical(-1, -2, 3, 0).with_kelvin(1)));
+/// Specific heat capacity in J/(kg.K).
+pub const J_PER_KG_K: Quantity =
+    Quantity::new("SpecificHeatCapacity", Unit::si("J/(kg.K)", Exponents::mechanical(0, 2, -2, 0).with_kelvin(-1)));
+/// Thermal conductivity in W/(m.K).
+pub const W_PER_M_K: Quantity =
+    Quantity::new("ThermalConductivity", Unit::si("W/(m.K)", Exponents::mechanical(1, 1, -3, 0).with_kelvin(-1)));
+/// Heat transfer coefficient in W/(m2.K).
+pub const W_PER_M2_K: Quantity =
+    Quantity::new("HeatTransferCoefficient", Unit::si("W/(m2.K)", Exponents::mechanical(1, 0, -3, 0).with_kelvin(-1)));
+/// Heat flux in W/m2.
+pub const W_PER_M2: Quantity = Quantity::new("HeatFlux", Unit::si("W/m2", Exponents::mechanical(1, 0, -3, 0)));
+/// Specific energy or enthalpy in J/kg.
+pub const J_PER_KG: Quantity = Quantity::new("SpecificEnthalpy", Unit::si("J/kg", Exponents::mechanical(0, 2, -2, 0)));
+/// Mass flow in kg/s.
+pub const KG_PER_S: Quantity = Quantity::new("MassFlow", Unit::si("kg/s", Exponents::mechanical(1, 0, -1, 0)));
+/// Volume flow in m3/s.
+pub const M3_PER_S: Quantity = Quantity::new("VolumeFlow", Unit::si("m3/s", Exponents::mechanical(0, 3, -1, 0)));
+/// Rate of a pressure in Pa/s.
+pub const PASCAL_PER_S: Quantity = Quantity::new("PressureRate", Unit::si("Pa/s", Exponents::mechanical(1, -1, -3, 0)));
+/// Dynamic viscosity in Pa.s.
+pub const PASCAL_S: Quantity = Quantity::new("DynamicViscosity", Unit::si("Pa.s", Exponents::mechanical(1, -1, -1, 0)));
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Exponents of kilogram, meter, second and ampere of a product.
+    /// Exponents of a product.
     fn product(factors: &[(&Quantity, i8)]) -> Exponents {
         factors.iter().fold(Exponents::NONE, |sum, (quantity, power)| {
             let of = quantity.unit.exponents;
             let add = |sum: i8, of: i8| sum + power * of;
             Exponents::mechanical(add(sum.kg, of.kg), add(sum.m, of.m), add(sum.s, of.s), add(sum.ampere, of.ampere))
+                .with_kelvin(add(sum.kelvin, of.kelvin))
+                .with_rad(add(sum.rad, of.rad))
         })
     }
 
     #[test]
-    fn mechanical_units_fit_together() {
+    fn units_fit_together() {
         for (quantity, factors) in [
             (METER2, &[(&METER, 2)][..]),
             (METER3, &[(&METER, 3)]),
@@ -230,6 +281,27 @@ mod tests {
             (JOULE, &[(&NEWTON, 1), (&METER, 1)]),
             (WATT, &[(&PASCAL, 1), (&METER3, 1), (&SECOND, -1)]),
             (WATT, &[(&VOLT, 1), (&AMPERE, 1)]),
+            (NEWTON_PER_M, &[(&NEWTON, 1), (&METER, -1)]),
+            (NEWTON_S_PER_M, &[(&NEWTON, 1), (&SECOND, 1), (&METER, -1)]),
+            (NM_PER_RAD, &[(&NEWTON_METER, 1), (&RADIAN, -1)]),
+            (KG_M_PER_S, &[(&KILOGRAM, 1), (&METER_PER_S, 1)]),
+            (KG_PER_M3, &[(&KILOGRAM, 1), (&METER3, -1)]),
+            (HERTZ, &[(&SECOND, -1)]),
+            (COULOMB, &[(&AMPERE, 1), (&SECOND, 1)]),
+            (AMPERE_PER_S, &[(&AMPERE, 1), (&SECOND, -1)]),
+            (TESLA, &[(&WEBER, 1), (&METER2, -1)]),
+            (VOLT_PER_M, &[(&VOLT, 1), (&METER, -1)]),
+            (KELVIN_PER_S, &[(&KELVIN, 1), (&SECOND, -1)]),
+            (KELVIN_PER_WATT, &[(&WATT_PER_KELVIN, -1)]),
+            (J_PER_KG_K, &[(&JOULE_PER_KELVIN, 1), (&KILOGRAM, -1)]),
+            (W_PER_M_K, &[(&WATT_PER_KELVIN, 1), (&METER, -1)]),
+            (W_PER_M2_K, &[(&WATT_PER_KELVIN, 1), (&METER2, -1)]),
+            (W_PER_M2, &[(&WATT, 1), (&METER2, -1)]),
+            (J_PER_KG, &[(&JOULE, 1), (&KILOGRAM, -1)]),
+            (KG_PER_S, &[(&KILOGRAM, 1), (&SECOND, -1)]),
+            (M3_PER_S, &[(&METER3, 1), (&SECOND, -1)]),
+            (PASCAL_PER_S, &[(&PASCAL, 1), (&SECOND, -1)]),
+            (PASCAL_S, &[(&PASCAL, 1), (&SECOND, 1)]),
         ] {
             assert_eq!(quantity.unit.exponents, product(factors), "{}", quantity.name);
         }

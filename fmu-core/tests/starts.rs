@@ -1,7 +1,7 @@
 //! Contradictory starts, sizes and names, which the description of a model refuses before it is built.
 #![allow(missing_docs)]
 
-use fmu_core::unit::{METER, ONE};
+use fmu_core::unit::{Exponents, METER, ONE, Quantity, Unit};
 use fmu_core::*;
 use serde::{Deserialize, Serialize};
 
@@ -86,6 +86,17 @@ wrong!(
     |_| {}
 );
 
+const SWAPPED: &Quantity = &Quantity::new("Swapped", Unit::si("m", Exponents::mechanical(0, 0, 1, 0)));
+wrong!(
+    Twofold,
+    start(2),
+    table![
+        V::output("x", &METER, "", |m| &mut m.model.0.x),
+        V::discrete_input("n", SWAPPED, "", |m| &mut m.model.0.a[0]),
+    ],
+    |_| {}
+);
+
 #[test]
 fn a_model_that_contradicts_itself_is_told_why() {
     fn why<M: Model>() -> Option<String> {
@@ -99,4 +110,8 @@ fn a_model_that_contradicts_itself_is_told_why() {
     assert_eq!(why::<Longer>().unwrap(), "a has 2 elements, and n is 3");
     assert_eq!(why::<Nothing>().unwrap(), "n must be greater than 0 at the start");
     assert_eq!(why::<Taken>().unwrap(), "two variables of Taken have the name n");
+    assert_eq!(
+        why::<Twofold>().unwrap(),
+        "the unit m of n is not that of x: it has other base units, or another factor"
+    );
 }

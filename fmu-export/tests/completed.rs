@@ -4,7 +4,7 @@
 
 mod solver;
 
-use fmu_core::unit::{Exponents, Quantity, SECOND, Unit};
+use fmu_core::unit::{ONE, PER_SECOND};
 use fmu_core::{
     Account, Block, CompletedSteps, ContinuousTime, Description, Elapsed, Events, Fault, Info, Kept, Model, Next,
     Outcome, Row, State, Step, Table, integrate, table,
@@ -12,8 +12,6 @@ use fmu_core::{
 use serde::{Deserialize, Serialize};
 use solver::{CS, ERROR, Fmu, ME, OK, has_logger};
 use std::ptr::null_mut;
-
-const ONE_PER_S: Quantity = Quantity::new("Rate", Unit::si("1/s", Exponents::mechanical(0, 0, -1, 0)));
 
 /// dx/dt = u, and the area under x by the trapezoidal rule between the points of the solution.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -43,9 +41,9 @@ impl Model for Meter {
     type Outputs = Outputs;
     const INFO: Info = Info { name: "Meter", description: "An area under a curve", version: "1.0", ..Info::DEFAULT };
     const TABLE: &'static Table<Block<Self>> = table![
-        Var::input("u", &ONE_PER_S, "Slope", |m| &mut m.model.u),
-        Var::output("x", &SECOND, "Height", |m| &mut m.model.x),
-        Var::output("area", &SECOND, "Area below x", |m| &mut m.out.area),
+        Var::input("u", &PER_SECOND, "Slope", |m| &mut m.model.u),
+        Var::output("x", &ONE, "Height", |m| &mut m.model.x),
+        Var::output("area", &ONE, "Area below x", |m| &mut m.out.area),
         Var::integer_output("points", "Points reported", |m| &mut m.out.points),
     ];
 
@@ -63,7 +61,7 @@ impl Model for Meter {
 }
 
 impl ContinuousTime for Meter {
-    const STATES: &'static [State<Self>] = &[State::new("x", &ONE_PER_S, |m: &mut Meter| &mut m.x).reinit()];
+    const STATES: &'static [State<Self>] = &[State::new("x", &PER_SECOND, |m: &mut Meter| &mut m.x).reinit()];
 
     fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
         dx[0] = self.u;

@@ -22,7 +22,7 @@ use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
 use fmu_core::{
     Block, Elapsed, Enumerated, Experiment, Fault, Info, Interface, Model, Part, Row, Sampled, Step, Table, Terminal,
-    Warns, integrate,
+    Warns, integrate, rows,
 };
 use serde::{Deserialize, Serialize};
 
@@ -456,8 +456,7 @@ type V = Row<Block<SensorlessController>>;
 const TABLE: &Table<Block<SensorlessController>> = &Table::new(ROWS);
 
 /// The inputs, the outputs, and last the parameters.
-pub(crate) const ROWS: &[V] = const {
-    &[
+pub(crate) const ROWS: &[V] = rows![
     V::input("speed_ref", &SPEED, "Mechanical speed reference", |m| &mut m.model.inputs.speed_ref),
     V::input("tau_ref", &NEWTON_METER, TAU_REF, |m| &mut m.model.inputs.tau_ref)
         .read_with("speed_loop.torque_mode", "true"),
@@ -493,8 +492,7 @@ pub(crate) const ROWS: &[V] = const {
     V::part("", &Part { table: OUTPUTS, lens: |m| &mut m.out }),
     V::part("", &Part { table: IDENTIFIED, lens: |m| &mut m.model.commissioning }),
     V::part("", &Part { table: PARAMETERS, lens: |m| &mut m.model.parameters }),
-]
-};
+];
 
 #[cfg(test)]
 mod tests {

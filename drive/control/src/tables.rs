@@ -20,7 +20,7 @@ use crate::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use drive_base::motor::A_PER_WB2;
 use drive_base::motor::{MOTOR, Motor};
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
-use fmu_core::{Field, Part, Row, Table, table};
+use fmu_core::{Field, Part, Row, Table, rows, table};
 use serde::{Deserialize, Serialize};
 
 /// Dead-time compensation, added to the command, and the voltage that the estimators receive. With u_loss(i) of
@@ -201,63 +201,61 @@ type P = Row<ControllerParameters>;
 pub const PARAMETERS: &Table<ControllerParameters> = &Table::new(PARAMETER_ROWS);
 
 /// The sample period, and all other parameters.
-pub(crate) const PARAMETER_ROWS: &[P] = const {
-    &[
-        P::parameter("T_s", &SECOND, "Sample period, independent of the communication step", |p| &mut p.T_s).above(0.0),
-        P::integer_parameter(
-            "timing.delay",
-            "Samples from taking the currents to the voltage acting, as the importer exchanges values: 1 (all \
+pub(crate) const PARAMETER_ROWS: &[P] = rows![
+    P::parameter("T_s", &SECOND, "Sample period, independent of the communication step", |p| &mut p.T_s).above(0.0),
+    P::integer_parameter(
+        "timing.delay",
+        "Samples from taking the currents to the voltage acting, as the importer exchanges values: 1 (all \
                  outputs read, then all inputs set), 0 (one FMU gets what the other has computed in this step) or 2 \
                  (voltages or currents take a step more)",
-            |p| &mut p.delay,
-        )
-        .at_least(0.0)
-        .at_most(2.0),
-        P::enumeration_parameter("estimator", "Estimator of rotor angle and speed", &Field(|p| &mut p.estimator)),
-        P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
-        P::parameter(
-            "saturation.s_2",
-            &A_PER_WB2,
-            "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
-            |p| &mut p.s_2,
-        )
-        .at_least(0.0),
-        P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
-            .above(0.0)
-            .tunable(),
-        P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
-            &mut p.theta_est
-        }),
-        P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
-        P::parameter("limit.i_q", &AMPERE, "Maximum magnitude of the q-axis current", |p| &mut p.limit.i_q)
-            .above(0.0)
-            .tunable(),
-        P::parameter("limit.i", &AMPERE, "Maximum phase current (peak); i_d has priority over i_q", |p| &mut p.limit.i)
-            .above(0.0)
-            .tunable(),
-        P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
-            .above(0.0)
-            .tunable(),
-        P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
-        P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
-        P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
-        P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
-        P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
-        P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
-        P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
-        P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
-        P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
-        P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
-        P::enumeration_parameter(
-            "sensor.fallback",
-            "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
-            &Field(|p| &mut p.fallback),
-        ),
-        P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
-        P::part("commission.", &Part { table: COMMISSION, lens: |p| &mut p.commission }),
-        P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
-    ]
-};
+        |p| &mut p.delay,
+    )
+    .at_least(0.0)
+    .at_most(2.0),
+    P::enumeration_parameter("estimator", "Estimator of rotor angle and speed", &Field(|p| &mut p.estimator)),
+    P::part("motor.", &Part { table: MOTOR, lens: |p| &mut p.motor }),
+    P::parameter(
+        "saturation.s_2",
+        &A_PER_WB2,
+        "Second-order d-axis saturation coefficient (estimate), read by the start by injection; 0: unknown",
+        |p| &mut p.s_2,
+    )
+    .at_least(0.0),
+    P::parameter("mechanics.J", &KG_M2, "Moment of inertia used to tune the speed loop", |p| &mut p.J)
+        .above(0.0)
+        .tunable(),
+    P::parameter("initial.theta_est", &RADIAN, "First estimate of the electrical rotor angle", |p| {
+        &mut p.theta_est
+    }),
+    P::parameter("initial.speed_est", &SPEED, "First estimate of the mechanical speed", |p| &mut p.speed_est),
+    P::parameter("limit.i_q", &AMPERE, "Maximum magnitude of the q-axis current", |p| &mut p.limit.i_q)
+        .above(0.0)
+        .tunable(),
+    P::parameter("limit.i", &AMPERE, "Maximum phase current (peak); i_d has priority over i_q", |p| &mut p.limit.i)
+        .above(0.0)
+        .tunable(),
+    P::parameter("limit.tau", &NEWTON_METER, "Maximum magnitude of the torque reference", |p| &mut p.limit.tau)
+        .above(0.0)
+        .tunable(),
+    P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
+    P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
+    P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
+    P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
+    P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
+    P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
+    P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
+    P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
+    P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
+    P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+    P::enumeration_parameter(
+        "sensor.fallback",
+        "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
+        &Field(|p| &mut p.fallback),
+    ),
+    P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
+    P::part("commission.", &Part { table: COMMISSION, lens: |p| &mut p.commission }),
+    P::part("", &Part { table: ESTIMATOR_PARAMETERS, lens: |p| &mut p.estimators }),
+];
 
 type O = Row<ControllerOutputs>;
 

@@ -9,11 +9,10 @@ use crate::pmsm_drive::Means;
 use drive_base::math::all_finite;
 use drive_control::signals::ControllerOutputs;
 use drive_plant::power::{Energy, Powers};
-use fmu_core::unit::{Exponents, Quantity, RAD_PER_S2, SPEED, Unit, WATT};
+use fmu_core::unit::{AMPERE_PER_S, Exponents, Quantity, RAD_PER_S2, SPEED, Unit, WATT};
 use fmu_core::{ContinuousTime, Elapsed, Events, Fault, Next, Outcome, State as Variable};
 
 const NEWTON_METER_PER_S: Quantity = Quantity::new("TorqueRate", Unit::si("N.m/s", Exponents::mechanical(1, 2, -3, 0)));
-const AMPERE_PER_S: Quantity = Quantity::new("CurrentRate", Unit::si("A/s", Exponents::mechanical(0, 0, -1, 1)));
 
 impl PmsmDriveMean {
     /// The state with the speed reference of the loop: on the ramp, if there is one.

@@ -5,8 +5,8 @@ use crate::bytes::Bytes;
 use crate::enumeration::{Enumerated, Field};
 use crate::integer::{Getter, IntegerType};
 use crate::list::{Element, Items};
+use crate::refusal::demand;
 use crate::row::{Access, Constant, Row};
-use crate::rules::demand;
 use crate::unit::Quantity;
 use crate::variable::{Causality, Kind, Variability};
 
@@ -23,6 +23,7 @@ macro_rules! constructors {
     };
     (@ [$($generic:tt)*] $arguments:tt [$row:expr]; $(#[$doc:meta])* $name:ident $causality:ident $variability:ident) => {
         $(#[$doc])*
+        #[track_caller]
         pub const fn $name<$($generic)*> $arguments -> Self {
             $row.with(Causality::$causality, Variability::$variability)
         }
@@ -157,18 +158,21 @@ impl<W: 'static> Row<W> {
     /// A structural parameter (FMI 3.0), the size of arrays that name it in [`sized`](Self::sized); an
     /// [upper bound](Self::at_most) belongs to it. The importer sets it in Configuration Mode, before the simulation; also in
     /// Reconfiguration Mode if it is [`tunable`](Self::tunable). In FMI 2.0 it is a constant.
+    #[track_caller]
     pub const fn structural(name: &'static str, description: &'static str, get: fn(&mut W) -> &mut u64) -> Self {
         let (kind, access) = (Kind::Integer(IntegerType::UInt64), Access::Integer(Getter::UInt64(get)));
         Self::new(name, description, kind, access).with(Causality::StructuralParameter, Variability::Fixed)
     }
 
     /// A text output. The model stores it or selects a constant: reading it in a step does not allocate.
+    #[track_caller]
     pub const fn text_output(name: &'static str, description: &'static str, say: fn(&W) -> &str) -> Self {
         Self::new(name, description, Kind::Text, Access::Said(say)).with(Causality::Output, Variability::Discrete)
     }
 
     /// A real output that changes at sample instants and is not stored: `compute` reads it from the state, without an
     /// allocation.
+    #[track_caller]
     pub const fn computed_output(
         name: &'static str,
         quantity: &'static Quantity,
@@ -180,11 +184,13 @@ impl<W: 'static> Row<W> {
     }
 
     /// A text that never changes, for inspection: a revision, a source.
+    #[track_caller]
     pub const fn text_constant(name: &'static str, description: &'static str, text: &'static str) -> Self {
         Self::new(name, description, Kind::Text, Access::ConstantText(text)).constant_local()
     }
 
     /// A real number that never changes, for inspection; [`as_output`](Self::as_output) makes it an output.
+    #[track_caller]
     pub const fn constant(
         name: &'static str,
         quantity: &'static Quantity,
@@ -195,6 +201,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// A real number in single precision that never changes.
+    #[track_caller]
     pub const fn float32_constant(
         name: &'static str,
         quantity: &'static Quantity,
@@ -206,6 +213,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// A truth value that never changes.
+    #[track_caller]
     pub const fn boolean_constant(name: &'static str, description: &'static str, value: bool) -> Self {
         Self::new(name, description, Kind::Boolean, Access::Constant(Constant::Boolean(value))).constant_local()
     }
@@ -230,6 +238,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// An array of real numbers that never changes.
+    #[track_caller]
     pub const fn array_constant(
         name: &'static str,
         quantity: &'static Quantity,

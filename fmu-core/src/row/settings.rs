@@ -2,8 +2,8 @@
 
 use crate::need::Need;
 use crate::reals::Interval;
+use crate::refusal::{demand, same_text};
 use crate::row::Row;
-use crate::rules::{demand, same_text};
 use crate::variable::{Alias, Causality, Kind, Range, Variability};
 
 impl<W: 'static> Row<W> {

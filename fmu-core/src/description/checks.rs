@@ -1,0 +1,85 @@
+//! What a description must not have: start values out of range, and names, types and units that mean two things.
+
+use super::{Variable, VariableKind, value};
+use crate::fault::Fault;
+use crate::row::Slot;
+use crate::unit::Exponents;
+use crate::variable::{Kind, Meta, Range};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Checks a start value by the rules of a set call. A text must be valid in XML (XML 1.0, 2.2).
+pub(super) fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<(), Fault> {
+    let text = match slot {
+        Slot::Text(text) => text.as_str(),
+        Slot::Said(text) => text,
+        _ => "",
+    };
+    if text.contains(|c: char| c.is_control() && !"\t\n\r".contains(c) || "\u{fffe}\u{ffff}".contains(c)) {
+        return Err(Fault::new(format!("{name} = {slot} at the start has a character that XML does not allow")));
+    }
+    if slot.is_allowed(meta) {
+        return Ok(());
+    }
+    if let Kind::Binary { most, .. } = meta.kind {
+        return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
+    }
+    Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+}
+
+/// Checks that no two variables or aliases share a name.
+pub(super) fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fault> {
+    let mut names = BTreeSet::new();
+    let all = variables.iter().flat_map(|v| v.aliases.iter().map(|a| &a.name).chain([&v.name]));
+    match all.into_iter().find(|name| !names.insert(name.as_str())) {
+        Some(name) => Err(Fault::new(format!("two variables of {model} have the name {name}"))),
+        None => Ok(()),
+    }
+}
+
+/// Checks that no type definition has the name of a variable, that no unit has two meanings, and the units of derivatives.
+pub(super) fn check_types(variables: &[Variable]) -> Result<(), Fault> {
+    let names: BTreeSet<&str> = variables.iter().map(|v| v.name.as_str()).collect();
+    let mut units: BTreeMap<&str, (&Variable, Exponents, f64)> = BTreeMap::new();
+    for of in variables {
+        let (VariableKind::Real { quantity: name, .. } | VariableKind::Enumeration { name, .. }) = &of.kind else {
+            continue;
+        };
+        if names.contains(name.as_str()) {
+            return Err(Fault::new(format!("the type definition {name} has the name of a variable")));
+        }
+        let VariableKind::Real { unit, exponents, factor, .. } = &of.kind else { continue };
+        let (first, others, another) = units.entry(unit).or_insert((of, *exponents, *factor));
+        if (*others, *another) != (*exponents, *factor) {
+            return Err(Fault::new(format!(
+                "the unit {unit} of {} is not that of {}: it has other base units, or another factor",
+                of.name, first.name
+            )));
+        }
+    }
+    check_rates(variables)
+}
+
+/// Checks that the derivative of each state has its unit per second, if both have one.
+fn check_rates(variables: &[Variable]) -> Result<(), Fault> {
+    let unit = |v: &Variable| match &v.kind {
+        VariableKind::Real { unit, exponents, factor, .. } if !unit.is_empty() => {
+            Some((unit.clone(), *exponents, *factor))
+        }
+        _ => None,
+    };
+    let states: BTreeMap<u32, &Variable> = variables.iter().map(|v| (v.value_reference, v)).collect();
+    for rate in variables {
+        let Some(state) = rate.derivative.and_then(|reference| states.get(&reference)) else { continue };
+        let (Some((of, base, factor)), Some((per_second, rate_base, rate_factor))) = (unit(state), unit(rate)) else {
+            continue;
+        };
+        if rate_base != (Exponents { s: base.s - 1, ..base }) || (rate_factor / factor - 1.0).abs() > 1e-9 {
+            return Err(Fault::new(format!(
+                "{} has the unit {per_second}, which is not the unit {of} of {} per second: State::new has the quantity of the \
+                 derivative",
+                rate.name, state.name
+            )));
+        }
+    }
+    Ok(())
+}
