@@ -6,6 +6,7 @@
 use drive::estimator::Kind;
 use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
 use drive_study::runner;
+use fmu_core::draw::Draw;
 use fmu_core::{Block, Model, Plain};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::{Next, Standard, State};
@@ -33,26 +34,6 @@ impl Sink for Silent {
 
     fn hears(&self) -> bool {
         false
-    }
-}
-
-/// Random numbers: `SplitMix64` (Steele, Lea, Flood: Fast splittable pseudorandom number generators, 2014).
-struct Dice(u64);
-
-impl Dice {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        usize::try_from(self.next() % n.max(1) as u64).unwrap_or(0)
-    }
-
-    fn of<'a, T>(&mut self, choices: &'a [T]) -> &'a T {
-        &choices[self.below(choices.len())]
     }
 }
 
@@ -127,20 +108,20 @@ fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
 
 /// Bytes with damage of one kind or several, and whether it shows without a look at the content: in the header, the
 /// size or the checksum.
-fn damaged(seeds: &[Vec<u8>], dice: &mut Dice) -> (Vec<u8>, bool) {
+fn damaged(seeds: &[Vec<u8>], draw: &mut Draw) -> (Vec<u8>, bool) {
     const NUMBERS: [f64; 12] =
         [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, 5e-324, 1e-300, 1e300, -1e300, 1e6, 1e-9, -1.0];
-    let seed = dice.of(seeds);
+    let seed = &seeds[draw.below(seeds.len())];
     let body = seed.len() - 4;
     let length = u32::from_le_bytes(seed[28..HEADER].try_into().unwrap()) as usize;
     let mut bytes = seed[..body].to_vec();
-    for _ in 0..*dice.of(&[1, 1, 1, 2, 8]) {
-        let at = HEADER + dice.below(length);
-        match dice.below(10) {
-            0..=2 => bytes[at] ^= 1 << dice.below(8),
-            3 => bytes[at] = *dice.of(&[0, 1, 2, 0x7f, 0x80, 0xff]),
+    for _ in 0..draw.of(&[1, 1, 1, 2, 8]) {
+        let at = HEADER + draw.below(length);
+        match draw.below(10) {
+            0..=2 => bytes[at] ^= 1 << draw.below(8),
+            3 => bytes[at] = draw.of(&[0, 1, 2, 0x7f, 0x80, 0xff]),
             4 | 5 => {
-                let number = dice.of(&NUMBERS).to_le_bytes();
+                let number = draw.of(&NUMBERS).to_le_bytes();
                 let end = body.min(at + 8);
                 bytes[at..end].copy_from_slice(&number[..end - at]);
             }
@@ -148,30 +129,30 @@ fn damaged(seeds: &[Vec<u8>], dice: &mut Dice) -> (Vec<u8>, bool) {
             6 => bytes[at..body.min(at + 10)].fill(0xff),
             7 => {
                 // The beginning of one and the rest of another, not always at its offset.
-                let other = dice.of(seeds);
-                let from = HEADER + dice.below(length);
+                let other = &seeds[draw.below(seeds.len())];
+                let from = HEADER + draw.below(length);
                 let end = body.min(at + (other.len() - 4).saturating_sub(from));
-                let from = if dice.below(2) == 0 { at.min(other.len() - 4) } else { from };
+                let from = if draw.below(2) == 0 { at.min(other.len() - 4) } else { from };
                 let n = (end - at).min(other.len() - 4 - from);
                 bytes[at..at + n].copy_from_slice(&other[from..from + n]);
             }
             8 => {
                 // Cut short, or longer than the content.
-                let new = u32::try_from(dice.below(body - HEADER + 1)).unwrap();
+                let new = u32::try_from(draw.below(body - HEADER + 1)).unwrap();
                 bytes[28..HEADER].copy_from_slice(&new.to_le_bytes());
             }
             _ => {
-                let at = dice.below(HEADER);
-                bytes[at] ^= 1 << dice.below(8);
+                let at = draw.below(HEADER);
+                bytes[at] ^= 1 << draw.below(8);
             }
         }
     }
-    if dice.below(100) == 0 {
-        bytes.truncate(dice.below(body));
+    if draw.below(100) == 0 {
+        bytes.truncate(draw.below(body));
     }
     let mut crc = flate2::Crc::new();
     crc.update(&bytes);
-    let wrong_sum = dice.below(50) == 0;
+    let wrong_sum = draw.below(50) == 0;
     let shows = wrong_sum || bytes.len() < body || bytes[..HEADER - 4] != seed[..HEADER - 4];
     bytes.extend((crc.sum() ^ u32::from(wrong_sum)).to_le_bytes());
     (bytes, shows)
@@ -228,14 +209,14 @@ fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
 
 fn damage<M: Model>(seeds: &[Vec<u8>], trials: u64) {
     let name = M::INFO.name;
-    let (number, mut dice) = (watch(name), Dice(asked("FMU_SEED", 1)));
+    let (number, mut draw) = (watch(name), Draw(asked("FMU_SEED", 1)));
     let (mut taken, mut longest) = (0_u64, Duration::ZERO);
     for seed in seeds {
         assert!(blob::read::<M>(seed).is_ok(), "a seed is whole");
     }
     for k in 0..trials {
         number.store(k, Relaxed);
-        let (bytes, shows) = damaged(seeds, &mut dice);
+        let (bytes, shows) = damaged(seeds, &mut draw);
         if let Some(time) = trial::<M>(&bytes) {
             assert!(!shows, "{name}: trial {k} was taken with a damaged header, size or checksum");
             taken += 1;

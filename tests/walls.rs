@@ -15,7 +15,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("model-description", &["fmu-core"]),
     ("fmu-import", &["fmu-core", "model-description"]),
     ("fmu-system", &["fmu-core", "fmu-import", "model-description"]),
-    ("fmu-sweep", &["fmu-import", "fmu-system", "model-description"]),
+    ("fmu-sweep", &["fmu-core", "fmu-import", "fmu-system", "model-description"]),
     ("fmu-check", &["fmu-import", "model-description"]),
     ("fmu-plot", &[]),
     ("fmu-pack", &["fmu-core", "fmu-import", "fmu-plot", "fmu-system", "model-description"]),
@@ -120,6 +120,15 @@ fn what_builds_fmus_knows_no_motor_and_no_command_line() {
     assert!(known.contains("fmu-system") && known.contains("resvg"), "{known:?}");
     for foreign in ["drive", "drive-tools", "drive-study", "fmu-check", "fmu-sweep", "nalgebra", "anyhow", "clap"] {
         assert!(!known.contains(foreign), "fmu-pack depends on {foreign}");
+    }
+}
+
+/// A library has an error type with cases or a text; the command alone collects errors of every kind.
+#[test]
+fn the_command_alone_depends_on_anyhow() {
+    for (name, (folder, _)) in &crates() {
+        let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
+        assert_eq!(manifest.contains("\nanyhow"), name == "fmu", "{name}");
     }
 }
 
@@ -271,7 +280,10 @@ fn no_two_public_types_of_a_crate_share_a_name() {
 
 /// Names of public types that several crates share.
 const SHARED: &[(&str, &[&str])] = &[
-    ("one for each crate or command", &["Atlas", "Error", "Info", "Kind", "Map", "Options", "Report", "Sweep"]),
+    (
+        "one for each crate or command",
+        &["Atlas", "Error", "Info", "Kind", "Map", "Options", "Report", "Result", "Sweep"],
+    ),
     (
         "a term of FMI or of XML, in the exporter, the importer and the description",
         &[

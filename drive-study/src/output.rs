@@ -1,6 +1,6 @@
 //! The output of the studies: files in a folder.
 
-use anyhow::{Context, Result};
+use drive_tools::error::{Result, WithContext};
 use std::path::Path;
 
 /// A folder for the files of a study.

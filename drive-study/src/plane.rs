@@ -16,7 +16,6 @@
 //! u_on, r_on of transistor and diode alike, so the duty cycle has no influence; k is the switching loss per ampere.
 
 use crate::runner::{self, REFERENCE_SPEED, REFERENCE_TORQUE};
-use anyhow::{Result, anyhow};
 use drive::Pair;
 use drive::control::envelope::{Envelope, Limit};
 use drive::estimator::Kind;
@@ -24,6 +23,7 @@ use drive::frame::{Dq, DqHat};
 use drive::plant::losses::{Losses, efficiency, switching};
 use drive::plant::machine;
 use drive::steady::Steady;
+use drive_tools::error::{Error, Result};
 use drive_tools::map::{self, picture};
 use fmu_plot::chart::Chart;
 use fmu_plot::figure::{Curve, Figure, Panel};
@@ -168,9 +168,9 @@ impl Reference {
                 losses.add(&powers.losses);
             }
         })
-        .map_err(|fault| anyhow!("{fault}"))?;
+        .map_err(Error::new)?;
         if !survived {
-            return Err(anyhow!("a step failed at {rpm} rpm"));
+            return Err(Error::new(format!("a step failed at {rpm} rpm")));
         }
         let (tau_shaft, efficiency) = (p_mech / n / (rpm * RPM), efficiency(p_in, p_mech));
         Ok(OperatingPoint { rpm, tau, tau_e: torque / n, tau_shaft, losses: losses.map(|sum| sum / n), efficiency })

@@ -283,7 +283,7 @@ fn the_plant_warms_up() {
 }
 
 /// The values of the reference machine's file with some lines replaced.
-fn tuned_with(changes: &[(&str, &str)]) -> anyhow::Result<Tuned> {
+fn tuned_with(changes: &[(&str, &str)]) -> drive_tools::error::Result<Tuned> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors/reference.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     let changed = changes.iter().fold(text, |text, (from, to)| {

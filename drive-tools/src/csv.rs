@@ -1,6 +1,6 @@
 //! A table of numbers from a CSV file: a header with names, `#` before comments.
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use crate::error::{Error, Result, WithContext, bail, ensure};
 use fmu_import::csv::Table;
 use std::path::Path;
 
@@ -30,7 +30,7 @@ impl Columns {
     /// File and line, and what was expected: no header, semicolons, another number of cells than names, a cell that is not a
     /// finite number, no row.
     pub fn parse(text: &str, file: &str) -> Result<Self> {
-        let (_, separator) = Table::of_instrument(text).map_err(|cause| anyhow!(placed(file, &cause)))?;
+        let (_, separator) = Table::of_instrument(text).map_err(|cause| Error::new(placed(file, &cause)))?;
         ensure!(separator == ',', "{file}:1: has semicolons or tabs; write commas between columns and a decimal point");
         Self::parse_some(text, file, |_| true)
     }
@@ -41,7 +41,7 @@ impl Columns {
     /// # Errors
     /// Those of [`parse`](Self::parse), except that semicolons and the cells of other columns are allowed.
     pub fn parse_some(text: &str, file: &str, wanted: impl Fn(&str) -> bool) -> Result<Self> {
-        let (table, separator) = Table::of_instrument(text).map_err(|cause| anyhow!(placed(file, &cause)))?;
+        let (table, separator) = Table::of_instrument(text).map_err(|cause| Error::new(placed(file, &cause)))?;
         let all: Vec<&str> = table.headings.iter().map(|heading| heading.text.as_str()).collect();
         let chosen: Vec<usize> = (0..all.len()).filter(|&k| wanted(all[k])).collect();
         let names: Vec<String> = chosen.iter().map(|&k| all[k].to_owned()).collect();

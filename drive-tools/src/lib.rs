@@ -9,6 +9,7 @@
 #![allow(non_snake_case)]
 
 pub mod csv;
+pub mod error;
 pub mod identify;
 pub mod map;
 pub mod queue;

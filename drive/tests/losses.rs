@@ -8,6 +8,7 @@ use drive::plant::machine;
 use drive::plant::tables::PlantParameters;
 use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::{PmsmDrive, PmsmPlant};
+use fmu_core::draw::Draw;
 use fmu_core::{Block, Capabilities, ContinuousTime, Description, Elapsed, Events, Exported, Step, integrate};
 use std::f64::consts::PI;
 
@@ -32,15 +33,9 @@ fn machine_of(par: &PlantParameters) -> Motor {
     par.thermal.motor(&par.motor, &Temperatures::all(par.thermal.T_start))
 }
 
-/// A deterministic number in -1..1.
-fn draw(seed: &mut u64) -> f64 {
-    *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-    f64::from(u32::try_from(*seed >> 32).unwrap()) / f64::from(u32::MAX) * 2.0 - 1.0
-}
-
 #[test]
 fn the_powers_are_balanced_at_every_instant() {
-    let (mut seed, mut worst, mut conducting) = (7_u64, 0.0_f64, 0);
+    let (mut draw, mut worst, mut conducting) = (Draw(7), 0.0_f64, 0);
     for point in 0..300_u32 {
         let mut block = Block::<PmsmPlant>::default();
         let par = &mut block.model.parameters;
@@ -53,10 +48,10 @@ fn the_powers_are_balanced_at_every_instant() {
         }
         let inputs = &mut block.model.inputs;
         (inputs.u_dc, inputs.enable) = (540.0, point % 3 != 0);
-        inputs.u = Phases { a: 300.0 * draw(&mut seed), b: 300.0 * draw(&mut seed), c: 300.0 * draw(&mut seed) };
-        inputs.tau_load = 10.0 * draw(&mut seed);
+        inputs.u = Phases { a: draw.around(300.0), b: draw.around(300.0), c: draw.around(300.0) };
+        inputs.tau_load = draw.around(10.0);
         block.initialize();
-        let values = [0.545 + 0.4 * draw(&mut seed), 0.4 * draw(&mut seed), 300.0 * draw(&mut seed), draw(&mut seed)];
+        let values = [0.545 + draw.around(0.4), draw.around(0.4), draw.around(300.0), draw.around(1.0)];
         for (state, value) in PmsmPlant::STATES.iter().zip(values) {
             *state.at(&mut block.model) = value;
         }

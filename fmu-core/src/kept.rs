@@ -86,6 +86,7 @@ impl<C: Clone> Kept<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::Draw;
 
     fn at(t: u32) -> Elapsed {
         Elapsed::ZERO.plus(f64::from(t))
@@ -95,10 +96,9 @@ mod tests {
     fn the_counts_are_those_of_the_newest_point_until_then() {
         // A list that is searched, instead of a ring.
         let (mut kept, mut event, mut list) = (Kept::default(), (0, 0), Vec::<(u32, u32)>::new());
-        let (mut now, mut seed, mut far) = (0, 7_u32, 0);
+        let (mut now, mut draw, mut far) = (0, Draw(7), 0);
         for i in 1..100_000 {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let n = seed >> 16;
+            let n = u32::try_from(draw.below(1 << 16)).unwrap();
             match n % 8 {
                 0 => {
                     now = event.0 + n / 8 % (now - event.0 + 1);

@@ -88,6 +88,8 @@ pub mod capability;
 pub mod clock;
 pub mod continuous;
 pub mod description;
+pub mod digits;
+pub mod draw;
 pub mod dual;
 pub mod enumeration;
 pub mod events;

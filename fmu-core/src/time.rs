@@ -165,6 +165,7 @@ impl SampleGrid {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::draw::Draw;
 
     #[test]
     fn ten_million_steps_do_not_drift() {
@@ -194,11 +195,8 @@ mod tests {
     /// the time.
     #[test]
     fn the_quick_comparison_decides_as_the_exact_one() {
-        let (mut seed, mut exactly) = (1_u64, 0);
-        let mut random = move || {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            seed >> 11
-        };
+        let (mut draw, mut exactly) = (Draw(1), 0);
+        let mut random = move || draw.bits() >> 11;
         for _ in 0..200_000 {
             let period = count(random() % 1_000_000 + 1) * 1e-9;
             let (grid, k) = (SampleGrid { period }, random() >> (random() % 53));

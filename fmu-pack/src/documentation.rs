@@ -3,6 +3,7 @@
 pub mod preset;
 
 use fmu_core::description::{Description, MemberDescription, Value, Variable, VariableKind};
+use fmu_core::digits;
 use fmu_core::terminal::MemberKind;
 use fmu_core::variable::{Causality, Variability};
 use fmu_core::{Bytes, IntegerType};
@@ -285,9 +286,7 @@ fn enumerations(d: &Description) -> String {
 
 /// A number for display: six digits are enough for an engineer; the XML has all digits.
 fn number(x: f64) -> String {
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    let plain = rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs());
-    if plain { format!("{rounded}") } else { format!("{rounded:e}") }.replace('-', "\u{2212}")
+    digits::text(x, 6, 1e6).replace('-', "\u{2212}")
 }
 
 #[cfg(test)]

@@ -134,7 +134,7 @@ fn drives(args: &Atlas) -> Result<Vec<Drive>> {
 
 fn tuned(path: &Path, name: &str) -> Result<Drive> {
     let found = Kind::ALL.iter().find(|kind| kind.name().eq_ignore_ascii_case(name));
-    Drive::tuned(path, *found.ok_or_else(|| unknown(name, Kind::ALL.iter().map(|kind| kind.name())))?)
+    Ok(Drive::tuned(path, *found.ok_or_else(|| unknown(name, Kind::ALL.iter().map(|kind| kind.name())))?)?)
 }
 
 fn unknown<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> anyhow::Error {

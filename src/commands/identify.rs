@@ -7,6 +7,7 @@ use drive_tools::identify::electrical::Fit;
 use drive_tools::identify::run::commissioned;
 use drive_tools::identify::verdict::Quantity;
 use drive_tools::identify::{self, Identified, Options, machine_file, page};
+use fmu_core::digits::rounded;
 use fmu_pack::{archive, release};
 use std::path::PathBuf;
 
@@ -198,7 +199,7 @@ fn options(args: &Identify) -> Result<Options> {
 /// The values, one per line.
 fn rows<'a>(values: impl Iterator<Item = &'a Quantity>) -> String {
     let row = |value: &Quantity| {
-        let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value);
+        let number = rounded(value.value, 5);
         let width = format!("+-{:.2} %", 100.0 * value.half_width);
         let width = if value.half_width.is_nan() { "given".to_owned() } else { width };
         match &value.refused {

@@ -64,7 +64,7 @@ fn cycle(args: &Map) -> Result<Cycle> {
     let of = |file: &Option<PathBuf>| file.as_ref().map(|file| file.display().to_string());
     let files: Vec<_> = [of(&args.vehicle), of(&args.cycle)].into_iter().flatten().collect();
     let found = Cycle::new(&vehicle, &cycle);
-    if files.is_empty() { found } else { found.with_context(|| files.join(", ")) }
+    if files.is_empty() { Ok(found?) } else { found.with_context(|| files.join(", ")) }
 }
 
 /// Runs the command.

@@ -9,6 +9,7 @@ use drive_tools::tune::motor::{MotorFile, torque_constant};
 use drive_tools::tune::setting::{Setting, Tuned, Value};
 use drive_tools::tune::trial::{self, Trial};
 use drive_tools::tune::{self, limits, remedy, rules};
+use fmu_core::digits::rounded;
 use fmu_core::{Description, Model};
 use fmu_pack::archive;
 use fmu_pack::workspace::output_folder;
@@ -213,7 +214,7 @@ fn texts(tuned: &Tuned, integers: bool) -> Result<Vec<(&'static str, String)>> {
 fn shown(value: &Value) -> String {
     match value {
         // Six digits suffice for reading; the file has all digits.
-        Value::Real(x) => format!("{}", format!("{x:.5e}").parse::<f64>().unwrap_or(*x)),
+        Value::Real(x) => rounded(*x, 6).to_string(),
         Value::Reals(all) => format!("{} values", all.len()),
         Value::Integer(i) => i.to_string(),
         Value::Boolean(b) => b.to_string(),

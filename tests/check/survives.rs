@@ -2,6 +2,7 @@
 
 use crate::zip::{Entry, write};
 use crate::{check, common};
+use fmu_core::draw::Draw;
 use std::path::Path;
 use std::process::Command;
 
@@ -44,13 +45,12 @@ fn changed_bytes_are_judged() {
         ],
     );
     let good = std::fs::read(&path).unwrap();
-    let mut random = 1_u32;
+    let mut draw = Draw(1);
     for _ in 0..400 {
         let mut bytes = good.clone();
         for _ in 0..3 {
-            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let at = random as usize / 7 % bytes.len();
-            bytes[at] = u8::try_from(random >> 24).unwrap();
+            let at = draw.below(bytes.len());
+            bytes[at] = u8::try_from(draw.below(256)).unwrap();
         }
         std::fs::write(&path, bytes).unwrap();
         if let Ok(report) = fmu_check::run(&path, &fmu_check::Options::default()) {

@@ -58,7 +58,7 @@ pub fn pair(plant: &[(&str, f64)], controller: &[(&str, f64)]) -> Pair {
 pub struct Native;
 
 impl ClosedLoop for Native {
-    fn run(&self, experiment: &Experiment, h: f64) -> anyhow::Result<Record> {
+    fn run(&self, experiment: &Experiment, h: f64) -> Result<Record, fmu_import::Error> {
         let mut record = Record::default();
         let (mut k, every) = (0, samples_apart(h));
         run(&mut pair(experiment.plant, experiment.controller), h, experiment.duration, |t, p| {

@@ -2,6 +2,7 @@
 
 use crate::zip::{Entry, write};
 use crate::{Place, STATIC, XML, each, entries, library};
+use fmu_core::draw::Draw;
 use std::fs;
 
 fn with(more: &[Entry]) -> Place {
@@ -182,11 +183,8 @@ fn libraries_that_are_cut_short() {
 fn bytes_that_are_changed() {
     let Some(library) = library() else { return };
     let whole = fs::read(with(&[Entry::new("resources/x", b"contents")]).fmu()).unwrap();
-    let mut random = 1_u32;
-    let mut next = |below: usize| {
-        random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (random >> 8) as usize % below
-    };
+    let mut draw = Draw(1);
+    let mut next = |below: usize| draw.below(below);
     let flips: Vec<(bool, usize, u8)> = (0..250)
         .map(|k| {
             let of_library = k % 2 == 0;

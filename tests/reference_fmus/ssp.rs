@@ -17,8 +17,12 @@ fn packed(path: &Path, texts: &[(&str, &str)], packages: &[&str]) {
         zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
         zip.write_all(bytes).unwrap();
     };
-    texts.iter().for_each(|(name, text)| put(name, text.as_bytes()));
-    packages.iter().for_each(|name| put(&format!("{name}.fmu"), &std::fs::read(archive(name, V3)).unwrap()));
+    for (name, text) in texts {
+        put(name, text.as_bytes());
+    }
+    for name in packages {
+        put(&format!("{name}.fmu"), &std::fs::read(archive(name, V3)).unwrap());
+    }
     zip.finish().unwrap();
 }
 

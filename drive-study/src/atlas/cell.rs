@@ -1,6 +1,6 @@
 //! A cell of the atlas and the grid of all cells.
 
-use anyhow::{Result, bail};
+use drive_tools::error::{Result, bail};
 
 /// What happens in a run; the scenario of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,10 +3,10 @@
 use super::run::Approach;
 use crate::compare::candidate::{Candidate, Class, Entry};
 use crate::runner::{Bench, REFERENCE_SPEED};
-use anyhow::{Context, Result, anyhow, bail};
 use drive::SensorlessController;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
+use drive_tools::error::{Error, Result, WithContext, bail};
 use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
 use fmu_core::description::VariableKind;
@@ -78,20 +78,23 @@ impl Drive {
     pub fn set(&mut self, text: &str) -> Result<()> {
         let (name, value) = text
             .split_once('=')
-            .ok_or_else(|| anyhow!("--set {text}: is not NAME=VALUE; write for example T_s=1e-4"))?;
-        let description = Description::of::<SensorlessController>().map_err(|e| anyhow!("{e}"))?;
+            .ok_or_else(|| Error::new(format!("--set {text}: is not NAME=VALUE; write for example T_s=1e-4")))?;
+        let description = Description::of::<SensorlessController>().map_err(Error::new)?;
         let variable = description.variable(name).filter(|v| v.causality == Causality::Parameter).ok_or_else(|| {
-            anyhow!("--set {name}: is not a parameter of SensorlessController; its documentation page lists them")
+            Error::new(format!(
+                "--set {name}: is not a parameter of SensorlessController; its documentation page lists them"
+            ))
         })?;
         if name.starts_with("motor.") {
             bail!("--set {name}: the atlas sets the motor's values from the machine; choose --resistance or --flux");
         }
-        let wrong = |expected: &str| anyhow!("--set {name}={value}: must be {expected}; correct the value");
+        let wrong = |expected: &str| Error::new(format!("--set {name}={value}: must be {expected}; correct the value"));
         let table = <SensorlessController as Model>::TABLE;
         let index = (0..table.len()).find(|&i| table.locate(i).is_some_and(|(found, ..)| found == name));
         let block = &mut self.bench.pair.controller;
-        let (_, slot) =
-            index.and_then(|i| table.entry(block, i)).ok_or_else(|| anyhow!("--set {name}: has no place"))?;
+        let (_, slot) = index
+            .and_then(|i| table.entry(block, i))
+            .ok_or_else(|| Error::new(format!("--set {name}: has no place")))?;
         match (slot, &variable.kind) {
             (Slot::Real(x), _) => {
                 let range = variable.range();

@@ -12,9 +12,9 @@ pub mod report;
 pub mod run;
 
 use crate::output::Folder;
-use anyhow::{Result, anyhow};
 use cell::Cell;
 use drive::Drive;
+use drive_tools::error::{Error, Result};
 use drive_tools::queue;
 use run::Verdict;
 use std::path::Path;
@@ -50,8 +50,9 @@ pub fn run(drives: &[Drive], cells: &[Cell], threads: usize, done: impl Fn() + S
     let mut verdicts = verdicts.into_iter();
     let of = |drive: &Drive| {
         let one = |(cell, verdict): (&Cell, Result<Verdict, _>)| {
-            let fault =
-                |fault: fmu_core::Fault| anyhow!("{} on the {}: {}", drive.name, drive.machine, fault.message());
+            let fault = |fault: fmu_core::Fault| {
+                Error::new(format!("{} on the {}: {}", drive.name, drive.machine, fault.message()))
+            };
             Ok((*cell, verdict.map_err(fault)?))
         };
         let runs = cells.iter().zip(verdicts.by_ref()).map(one).collect::<Result<_>>()?;

@@ -7,7 +7,7 @@ use super::run::Run;
 use super::table;
 use super::table::{Block, mark, number};
 use crate::ink;
-use anyhow::Result;
+use drive_tools::error::Result;
 use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 

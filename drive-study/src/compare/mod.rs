@@ -21,7 +21,7 @@ pub mod table;
 mod weakening;
 
 use crate::output::Folder;
-use anyhow::Result;
+use drive_tools::error::Result;
 use plots::Plot;
 use std::path::Path;
 

@@ -171,7 +171,7 @@ pub trait ClosedLoop {
     ///
     /// # Errors
     /// A step or a set call fails.
-    fn run(&self, experiment: &Experiment, h: f64) -> anyhow::Result<Record>;
+    fn run(&self, experiment: &Experiment, h: f64) -> Result<Record, fmu_import::Error>;
 }
 
 #[cfg(test)]

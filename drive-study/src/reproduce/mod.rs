@@ -7,7 +7,7 @@ pub mod plots;
 mod report;
 
 use crate::output::Folder;
-use anyhow::{Context, Result};
+use drive_tools::error::{Result, WithContext};
 use drive_tools::queue;
 use experiment::{ALL, ClosedLoop, Record};
 use packed::Packed;

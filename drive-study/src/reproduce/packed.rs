@@ -1,8 +1,7 @@
 //! The closed loop of the two packed FMUs, run by our own importer through the standard interface.
 
 use super::experiment::{ClosedLoop, Experiment, Point, RPM, Record, at, samples_apart};
-use anyhow::Result;
-use fmu_import::{Fmu, Instance};
+use fmu_import::{Error, Fmu, Instance};
 use std::path::Path;
 
 /// The archives of plant and controller, opened.
@@ -16,14 +15,14 @@ impl Packed {
     ///
     /// # Errors
     /// An archive is missing or cannot run here.
-    pub fn open(folder: &Path) -> Result<Self> {
+    pub fn open(folder: &Path) -> Result<Self, Error> {
         let open = |name: &str| Fmu::open(folder.join(name).with_extension("fmu"));
         Ok(Self { plant: open("PmsmPlant")?, controller: open("SensorlessController")? })
     }
 }
 
 /// An instance with its parameters set, ready to step.
-fn start(fmu: &Fmu, name: &str, parameters: &[(&str, f64)], stop: f64) -> Result<Instance> {
+fn start(fmu: &Fmu, name: &str, parameters: &[(&str, f64)], stop: f64) -> Result<Instance, Error> {
     let mut instance = fmu.instantiate(name, false)?;
     for (parameter, value) in parameters {
         instance.set_text(parameter, &value.to_string())?;
@@ -35,7 +34,7 @@ fn start(fmu: &Fmu, name: &str, parameters: &[(&str, f64)], stop: f64) -> Result
 }
 
 /// Value references of real variables.
-fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> Result<[u32; N]> {
+fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> Result<[u32; N], Error> {
     let mut references = [0; N];
     for (reference, name) in references.iter_mut().zip(names) {
         *reference = instance.variable(name)?.value_reference;
@@ -44,7 +43,7 @@ fn references<const N: usize>(instance: &Instance, names: [&str; N]) -> Result<[
 }
 
 impl ClosedLoop for Packed {
-    fn run(&self, experiment: &Experiment, h: f64) -> Result<Record> {
+    fn run(&self, experiment: &Experiment, h: f64) -> Result<Record, Error> {
         // The last step may end up to half a step away from the duration.
         let stop = experiment.duration + h;
         let mut plant = start(&self.plant, "plant", experiment.plant, stop)?;

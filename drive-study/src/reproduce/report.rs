@@ -2,7 +2,7 @@
 
 use super::experiment::{Experiment, Record};
 use super::figures::PaperFigure;
-use anyhow::Result;
+use drive_tools::error::Result;
 use drive_tools::text_table::markdown;
 use fmu_plot::figure::Figure;
 use fmu_plot::page::{self, escape};

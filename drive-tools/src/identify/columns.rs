@@ -1,7 +1,7 @@
 //! Columns of a record: their names, their units, and their headers.
 
 use crate::csv::Columns;
-use anyhow::{Context, Result, bail, ensure};
+use crate::error::{Result, WithContext, bail, ensure};
 use serde::Deserialize;
 use std::f64::consts::PI;
 

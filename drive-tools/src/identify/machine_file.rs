@@ -2,6 +2,7 @@
 
 use super::verdict::Quantity;
 use super::{Identified, Ratings};
+use fmu_core::digits::rounded;
 use std::fmt::{Arguments, Write};
 
 /// Contents of a machine file.
@@ -93,7 +94,5 @@ impl Content<'_> {
 
 /// A number with six digits, as TOML writes a float.
 pub(super) fn number(x: f64) -> String {
-    let text = format!("{x:.5e}");
-    let short: f64 = text.parse().unwrap_or(x);
-    format!("{short:?}")
+    format!("{:?}", rounded(x, 6))
 }

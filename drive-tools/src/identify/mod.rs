@@ -28,7 +28,7 @@ pub mod run;
 pub mod verdict;
 pub mod windows;
 
-use anyhow::{Context, Result, ensure};
+use crate::error::{Result, WithContext, bail, ensure};
 use columns::Signals;
 use electrical::Fit;
 use mechanics::{MechanicalFit, Shown, TorqueWindow};
@@ -131,7 +131,7 @@ const SHIFTED: f64 = 1.3;
 pub fn identify(signals: &Signals, options: &Options) -> Result<Identified> {
     options.check()?;
     let Some(n_p) = options.n_p else {
-        anyhow::bail!("--n-p is missing: give the number of pole pairs; a record does not contain it");
+        bail!("--n-p is missing: give the number of pole pairs; a record does not contain it");
     };
     let record = BenchRecord::new(signals, options)?;
     let motion = Motion::of(&record);

@@ -5,9 +5,10 @@ use super::run::Commissioned;
 use super::verdict::Quantity;
 use super::windows::Window;
 use super::{Identified, Seen};
-use anyhow::Result;
+use crate::error::Result;
 use drive::control::commission::CommissionState;
 use fmu_core::Enumerated;
+use fmu_core::digits::rounded;
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, REFERENCE};
 use fmu_plot::page::{self, escape};
@@ -83,7 +84,7 @@ fn table(values: &[Quantity]) -> String {
         .to_owned();
     for value in values {
         let _ = write!(html, "<tr><th class=\"name\">{}</th>", value.name);
-        let number = format!("{:.4e}", value.value).parse().unwrap_or(value.value).to_string();
+        let number = rounded(value.value, 5).to_string();
         let unit = value.unit;
         let _ = match &value.refused {
             None => writeln!(

@@ -2,7 +2,7 @@
 //! without gaps.
 
 use super::columns::{Naming, Signals};
-use anyhow::{Context, Result, bail, ensure};
+use crate::error::{Result, WithContext, bail, ensure};
 use serde::Deserialize;
 use std::f64::consts::PI;
 use std::ops::Range;

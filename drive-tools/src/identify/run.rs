@@ -6,7 +6,7 @@ use super::machine_file::{Content, number};
 use super::verdict::Quantity;
 use super::{Options, Ratings, SCALE};
 use crate::csv::Columns;
-use anyhow::{Context, Result, bail, ensure};
+use crate::error::{Error, Result, WithContext, bail, ensure};
 use drive::control::commission::{CommissionFault, CommissionState, LIMIT_DEAD, LIMIT_L, LIMIT_R, LIMIT_SATURATION};
 use fmu_core::Enumerated;
 
@@ -144,9 +144,8 @@ pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commiss
         let known = || FILE.iter().map(|(known, ..)| *known).collect::<Vec<_>>().join(", ");
         ensure!(FILE.iter().any(|(k, ..)| k == name), "--given {name}: expected one of {}", known());
     }
-    let values = |name: &str| {
-        Ok::<_, anyhow::Error>(find(name)?.map(|place| table.rows().iter().map(move |(_, row)| row[place])))
-    };
+    let values =
+        |name: &str| Ok::<_, Error>(find(name)?.map(|place| table.rows().iter().map(move |(_, row)| row[place])));
     let mut greatest = 0.0_f64;
     for name in ["i_a", "i_b", "i_c"] {
         greatest = values(name)?.into_iter().flatten().fold(greatest, |most, i| most.max(i.abs()));

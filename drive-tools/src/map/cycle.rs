@@ -1,6 +1,6 @@
 //! A vehicle on a driving cycle: speed and torque at the shaft of its machine in the middle of each second, and the energy.
 
-use anyhow::{Context, Result, bail};
+use crate::error::{Result, WithContext, bail};
 use drive::plant::losses::Losses;
 use serde::Deserialize;
 
@@ -63,7 +63,7 @@ impl Cycle {
     /// # Errors
     /// A key or a number is missing or wrong.
     pub fn new(vehicle: &str, cycle: &str) -> Result<Self> {
-        let vehicle = toml::from_str(vehicle).context("the vehicle")?;
+        let vehicle = toml::from_str(vehicle).with_context(|| "the vehicle".to_owned())?;
         let mut corners: Vec<[f64; 2]> = Vec::new();
         for line in cycle.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
             let corner = line.split_once(',').and_then(|(t, v)| Some([t.trim().parse().ok()?, v.trim().parse().ok()?]));

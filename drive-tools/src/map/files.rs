@@ -2,8 +2,9 @@
 
 use super::Map;
 use super::request::ZERO_CELSIUS;
-use anyhow::Result;
+use crate::error::Result;
 use drive::steady::Point;
+use fmu_core::digits;
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 use zip::write::SimpleFileOptions;
@@ -29,9 +30,8 @@ const COLUMNS: [Column; 11] = [
 
 /// A number with nine digits, as short as they allow.
 fn number(x: f64) -> String {
-    let rounded: f64 = format!("{x:.8e}").parse().unwrap_or(x);
-    let plain = rounded == 0.0 || (1e-4..1e9).contains(&rounded.abs());
-    if plain { format!("{}", rounded + 0.0) } else { format!("{rounded:e}") }
+    // No -0.
+    digits::text(x + 0.0, 9, 1e9)
 }
 
 /// `map.csv`: a line for each point within reach, in SI units.

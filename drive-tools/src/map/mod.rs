@@ -20,15 +20,16 @@ pub mod sheet;
 pub mod table;
 pub mod verify;
 
+use crate::error::{Result, bail};
 use crate::tune::motor::MotorFile;
 use crate::tune::rules;
 use crate::tune::setting::Tuned;
-use anyhow::{Result, bail};
 use cycle::{Cycle, Energy};
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
 use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::steady::{Point, Steady};
+use fmu_core::digits::rounded;
 use fmu_plot::chart;
 use report::Report;
 use request::{Request, ZERO_CELSIUS};
@@ -272,5 +273,5 @@ impl Map {
 
 /// A number with six digits at most.
 pub(crate) fn short(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
+    rounded(x, 6)
 }

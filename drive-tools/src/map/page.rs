@@ -2,8 +2,9 @@
 
 use super::report::Report;
 use super::{Map, picture, short};
-use anyhow::Result;
+use crate::error::Result;
 use drive::plant::losses::Losses;
+use fmu_core::digits::rounded;
 use fmu_plot::chart;
 use fmu_plot::page::{self, escape};
 use serde_json::{Value, json};
@@ -93,5 +94,5 @@ fn data(map: &Map) -> Value {
 
 /// A power with four digits: the rest cannot be read off.
 fn digits(x: f64) -> f64 {
-    format!("{x:.3e}").parse().unwrap_or(x)
+    rounded(x, 4)
 }

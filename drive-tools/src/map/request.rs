@@ -1,6 +1,6 @@
 //! The request for a map: the grid, the voltages, the temperatures, and how many points are verified.
 
-use anyhow::{Context, Result, bail};
+use crate::error::{Result, WithContext, bail};
 
 /// 0 degC in K.
 pub const ZERO_CELSIUS: f64 = 273.15;

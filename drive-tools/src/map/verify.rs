@@ -1,8 +1,8 @@
 //! Points of a map against `PmsmDrive` with a sensor, which runs until it has settled.
 
 use super::sheet::{Axes, Sheet};
+use crate::error::{Error, Result};
 use crate::queue;
-use anyhow::{Result, anyhow};
 use drive::PmsmDrive;
 use drive::plant::losses::Losses;
 use drive::steady::{Point, Steady};
@@ -109,7 +109,7 @@ fn compare(drive: &Steady, sheet: &Sheet, speed: f64, point: &Point) -> Result<D
         format!("at {rpm:.0} rpm, {tau:.4} N.m, {} V, {:.1} degC", sheet.u_dc, sheet.T - super::request::ZERO_CELSIUS)
     };
     let (p_in, losses) = run(drive, sheet, speed, point.tau_ref)
-        .map_err(|e| anyhow!("PmsmDrive {}: {e}; --verify 0 leaves the comparison out", place()))?;
+        .map_err(|e| Error::new(format!("PmsmDrive {}: {e}; --verify 0 leaves the comparison out", place())))?;
     let powers = &point.powers;
     let size = size(point);
     let power = (powers.p_in - p_in).abs() / size;
@@ -153,12 +153,12 @@ fn run(drive: &Steady, sheet: &Sheet, speed: f64, tau_ref: f64) -> Result<(f64, 
     let inputs = &mut block.model.inputs;
     (inputs.speed_shaft, inputs.u_dc, inputs.tau_ref) = (speed, sheet.u_dc, tau_ref);
     block.initialize();
-    block.model.validate().map_err(|e| anyhow!("{e}"))?;
+    block.model.validate().map_err(Error::new)?;
     let (mut now, mut count, mut p_in, mut losses) = (Elapsed::ZERO, 0.0, 0.0, Losses::none());
     while now.seconds() < SETTLE + MEAN {
         block.model.inputs.angle_shaft = speed * now.seconds();
         let step = Step { start: now, h: T_s };
-        block.step(&step).map_err(|e| anyhow!("{e}"))?;
+        block.step(&step).map_err(Error::new)?;
         now = step.end();
         if now.seconds() > SETTLE {
             let powers = &block.out.plant.powers;

@@ -15,6 +15,7 @@
 use super::motor::{Data, Located, torque_constant};
 use super::setting::{LEVELS, Setting, Value};
 use drive::estimator::Kind;
+use fmu_core::digits::rounded;
 use std::f64::consts::{E, TAU};
 
 /// Minimum number of samples per electrical period at the highest speed.
@@ -104,7 +105,7 @@ impl Bandwidths {
         } else {
             "for this dip"
         };
-        let dip: f64 = format!("{:.1e}", DIP * needed / chosen).parse().unwrap_or(DIP);
+        let dip = rounded(DIP * needed / chosen, 2);
         let rule = format!("{why}: with an exact estimate, a step of the rated torque takes {dip} pu off the speed");
         let speed = Chosen::new(given.speed.as_ref(), &rule, || chosen);
         let current = if rasmussen {

@@ -2,7 +2,7 @@
 
 use super::motor::MotorFile;
 use super::setting::{Setting, Value};
-use anyhow::{Result, anyhow, bail};
+use crate::error::{Error, Result, bail};
 use drive::{PmsmPlant, SensorlessController};
 use fmu_core::Description;
 use fmu_core::description::VariableKind;
@@ -12,13 +12,13 @@ use fmu_core::description::VariableKind;
 /// # Errors
 /// Names the variable, and the place in the machine's file from which its value comes.
 pub fn check(plant_settings: &[Setting], controller_settings: &[Setting], motor: &MotorFile) -> Result<()> {
-    let plant = Description::of::<PmsmPlant>().map_err(|e| anyhow!("{e}"))?;
-    let controller = Description::of::<SensorlessController>().map_err(|e| anyhow!("{e}"))?;
+    let plant = Description::of::<PmsmPlant>().map_err(Error::new)?;
+    let controller = Description::of::<SensorlessController>().map_err(Error::new)?;
     for (description, settings) in [(&plant, plant_settings), (&controller, controller_settings)] {
         for setting in settings {
             one(description, setting).map_err(|what| match setting.origin {
-                Some(offset) => anyhow!("{}: {what}", motor.place_at(offset)),
-                None => anyhow!("{what} (by the rule: {})", setting.rule),
+                Some(offset) => Error::new(format!("{}: {what}", motor.place_at(offset))),
+                None => Error::new(format!("{what} (by the rule: {})", setting.rule)),
             })?;
         }
     }

@@ -15,7 +15,7 @@ mod squares;
 use super::motor::{FluxMap as Given, MotorFile};
 use super::setting::{Setting, Value};
 use crate::csv::Columns;
-use anyhow::{Context, Result, bail, ensure};
+use crate::error::{Result, WithContext, bail, ensure};
 use drive::frame::Dq;
 use drive::plant::flux_map::FluxMap;
 use judge::{Errors, check, coverage, judge_magnet, reciprocity, torque};

@@ -7,7 +7,7 @@
 
 use super::motor::MotorFile;
 use super::setting::{Setting, Value};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
 use drive::plant::iron::Iron;
 
 /// The settings `iron.G_e` and `iron.G_h` of the plant; none without `[iron]` in the file.

@@ -20,6 +20,7 @@ use super::setting::Tuned;
 use super::trial::Trial;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
+use fmu_core::digits::rounded;
 use std::fmt;
 
 /// A start or a load that the drive will not hold.
@@ -37,7 +38,7 @@ pub struct Limit {
 
 impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "will not hold {} at {} pu: {}; ", self.what, short(self.level), self.reason)?;
+        write!(f, "will not hold {} at {} pu: {}; ", self.what, rounded(self.level, 3), self.reason)?;
         if self.cures.is_empty() {
             return f.write_str("no remedy was found: use a sensor (estimator Sensored) with a higher rating.current");
         }
@@ -46,11 +47,6 @@ impl fmt::Display for Limit {
         }
         Ok(())
     }
-}
-
-/// A number with three digits.
-fn short(x: f64) -> f64 {
-    format!("{x:.2e}").parse().unwrap_or(x)
 }
 
 /// Failures of the drive in its `trials`, and notes on conditions that it holds by a narrow margin.
@@ -73,7 +69,7 @@ pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Ve
             notes.push(format!(
                 "at {} pu, the drive slips under {} and recovers: the estimate is up to {:.0} deg off, and the speed comes down to \
                  {:.2} pu",
-                short(level),
+                rounded(level, 3),
                 step(trial),
                 trial.error,
                 trial.least
@@ -81,7 +77,7 @@ pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Ve
         } else if trial.least <= 0.0 {
             notes.push(format!(
                 "at {} pu, {} takes the speed to {:.2} pu, through zero, where the estimate depends on R_s",
-                short(level),
+                rounded(level, 3),
                 step(trial),
                 trial.least
             ));

@@ -3,7 +3,7 @@
 
 use super::motor::{Inverter, Located, MotorFile};
 use super::setting::{Setting, Value, given, real};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
 use drive::estimator::Kind;
 
 /// Current below which the dead-time voltage falls to zero where the file gives none, over the maximum current: about the middle of

@@ -29,7 +29,7 @@ pub mod trial;
 mod values;
 pub mod voltage;
 
-use anyhow::Result;
+use crate::error::Result;
 use motor::MotorFile;
 use setting::Tuned;
 use std::path::Path;

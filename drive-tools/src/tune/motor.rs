@@ -1,6 +1,6 @@
 //! The file of a machine: its data, its supply, and the bandwidths of its loops.
 
-use anyhow::{Context, Result, anyhow, bail};
+use crate::error::{Error, Result, WithContext, bail};
 use drive::estimator::Kind;
 use drive::motor::Motor;
 use serde::Deserialize;
@@ -250,7 +250,7 @@ impl MotorFile {
             let offset = error.span().map_or(0, |span| span.start);
             let message = error.message().lines().collect::<Vec<_>>().join(" ");
             let hint = if message.starts_with("missing") { "; motors/reference.toml shows every key" } else { "" };
-            anyhow!("{}: {message}{hint}", place(path, text, offset))
+            Error::new(format!("{}: {message}{hint}", place(path, text, offset)))
         })
     }
 

@@ -7,7 +7,8 @@
 //! highest speed against the rated speed.
 
 use super::motor::{Data, Located, MotorFile};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
+use fmu_core::digits::rounded;
 
 /// A value, its plausible range, and other units in which it may have been written, with their size in the expected unit.
 struct Check<'a> {
@@ -42,18 +43,13 @@ fn one(motor: &MotorFile, check: &Check<'_>) -> Result<()> {
     let fits = |x: f64| (usual.0..=usual.1).contains(&(x * per_unit));
     let suggestion = units.iter().find(|(_, size)| fits(x * size)).map_or_else(
         || remedy.clone(),
-        |(other, size)| format!("{x} {other} would fit: write {} {unit}", short(x * size)),
+        |(other, size)| format!("{x} {other} would fit: write {} {unit}", rounded(x * size, 4)),
     );
     bail!(
         "{}: {name} = {x} {unit} makes {what} {}, expected {low} to {high}: {suggestion}",
         motor.place(value),
-        short(x * per_unit)
+        rounded(x * per_unit, 4)
     )
-}
-
-/// A number with four digits.
-fn short(x: f64) -> f64 {
-    format!("{x:.3e}").parse().unwrap_or(x)
 }
 
 const SPEED: &[(&str, f64)] = &[("rpm", std::f64::consts::PI / 30.0), ("deg/s", std::f64::consts::PI / 180.0)];
@@ -71,16 +67,16 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
     let of_kv = format!(
         "it is the peak value of a phase: from KV in rpm/V, 60 / (2 pi sqrt(3) n_p KV) with n_p = {n_p} pole pairs; for the EMF \
          to reach u_dc / sqrt(3) at rating.speed, psi_M is {} Wb",
-        short(u_dc / (3.0_f64.sqrt() * n_p * speed))
+        rounded(u_dc / (3.0_f64.sqrt() * n_p * speed), 4)
     );
     let (R_s, highest) = (of(&machine.R_s), u_dc / 3.0_f64.sqrt());
     let of_current = if i * R_s > highest {
         format!(
             "rating.current = {i} A takes {} V of R_s, and a phase has u_dc / sqrt(3) = {} V at most: lower rating.current, a peak \
              value, below {} A, or correct R_s, which is that of one phase",
-            short(i * R_s),
-            short(highest),
-            short(0.6 * u_dc / R_s)
+            rounded(i * R_s, 4),
+            rounded(highest, 4),
+            rounded(0.6 * u_dc / R_s, 4)
         )
     } else {
         CORRECT.into()

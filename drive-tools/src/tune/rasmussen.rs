@@ -19,7 +19,7 @@
 use super::bandwidth::{Bandwidths, least_observer};
 use super::motor::{Data, MotorFile, swing, torque_constant};
 use super::setting::{LEVELS, Setting, real};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
 use drive::control::tables::ControllerParameters;
 
 /// Maximum share of the EMF at 0.1 pu for (R - R^) i at the rated torque.

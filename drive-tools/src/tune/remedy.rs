@@ -5,6 +5,7 @@ use super::pace::Pace;
 use super::rules;
 use super::setting::{Tuned, Value};
 use super::trial::{self, Task, Trial};
+use fmu_core::digits::rounded;
 use std::fmt;
 use toml::Spanned;
 
@@ -177,5 +178,5 @@ fn helps(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], (trial, what): (&Tr
 /// A number with two digits, rounded up.
 fn short(x: f64) -> f64 {
     let scale = 10.0_f64.powf(x.log10().floor() - 1.0);
-    format!("{:.1e}", (x / scale).ceil() * scale).parse().unwrap_or(x)
+    rounded((x / scale).ceil() * scale, 2)
 }

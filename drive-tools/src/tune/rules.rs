@@ -19,9 +19,10 @@ use super::motor::{Data, Located, MotorFile, RULED, swing};
 use super::setting::{Setting, Tuned, Value, given, real, set};
 use super::voltage::{self, Voltage};
 use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, saturation};
-use anyhow::{Result, anyhow, bail};
+use crate::error::{Error, Result, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
+use fmu_core::digits::rounded;
 use std::f64::consts::TAU;
 
 /// Derives the values.
@@ -92,7 +93,10 @@ pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
         top_torque,
         rest,
     };
-    tuned.pair().start().map_err(|e| anyhow!("{}: these values do not fit together: {e}", motor.place_at(0)))?;
+    tuned
+        .pair()
+        .start()
+        .map_err(|e| Error::new(format!("{}: these values do not fit together: {e}", motor.place_at(0))))?;
     Ok(tuned)
 }
 
@@ -108,7 +112,7 @@ fn estimator(motor: &MotorFile) -> Result<Kind> {
     let known = RULED.into_iter().find(|kind| kind.name() == given.get_ref());
     known.ok_or_else(|| {
         let (place, name) = (motor.place(given), given.get_ref());
-        anyhow!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out")
+        Error::new(format!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out"))
     })
 }
 
@@ -175,12 +179,7 @@ fn lock(data: &Data) -> Setting {
     let emf = f64::from(*machine.n_p.get_ref()) * rating.speed.get_ref() * machine.psi_M.get_ref();
     let resistive = 0.2 * machine.R_s.get_ref() * rating.current.get_ref();
     let rule = "0.035 of the EMF at rated speed, at least 0.2 R_s times the maximum current";
-    real("lock.u", short((SHARE * emf).max(resistive)), rule)
-}
-
-/// A number with three digits.
-fn short(x: f64) -> f64 {
-    format!("{x:.2e}").parse().unwrap_or(x)
+    real("lock.u", rounded((SHARE * emf).max(resistive), 3), rule)
 }
 
 /// Checks that the ratings are positive.

@@ -6,7 +6,7 @@
 
 use super::flux_map::Fitted;
 use super::motor::{Data, Located, MotorFile, electrical};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
 use drive::frame::Dq;
 use drive::motor::Motor;
 use drive::plant::machine::{self, Magnetics};

@@ -3,7 +3,7 @@
 use super::motor::MotorFile;
 use super::rules;
 use super::setting::{Setting, Tuned, Value};
-use anyhow::{Result, anyhow};
+use crate::error::{Error, Result};
 use drive::{PmsmPlant, SensorlessController};
 use fmu_core::description::{self, Variable, VariableKind};
 use fmu_core::{Description, Model};
@@ -72,7 +72,7 @@ pub fn joined(plant: &[Setting], controller: &[Setting]) -> Vec<(String, Value)>
 }
 
 fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
-    let description = Description::of::<M>().map_err(|e| anyhow!("{e}"))?;
+    let description = Description::of::<M>().map_err(Error::new)?;
     let one = |setting: &Setting| {
         let variable = description.variable(setting.name);
         let number = variable.and_then(|v| item_value(v, &setting.value)).map(Value::Integer);

@@ -5,7 +5,7 @@
 
 use super::motor::{Data, MotorFile, electrical};
 use super::setting::{Setting, Value, set};
-use anyhow::{Result, bail};
+use crate::error::{Result, bail};
 use drive::control::envelope::Envelope;
 use drive::control::reference::max_torque_per_ampere;
 use drive::control::weakening::WeakeningParameters;

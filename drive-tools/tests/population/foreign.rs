@@ -3,33 +3,8 @@
 //! offset, an encoder of 4096 steps with an offset and a delay. The population covers 12 V to 700 V and 20 W to 100 kW.
 
 use drive_tools::identify::Complex;
+use fmu_core::draw::Draw;
 use std::f64::consts::{PI, TAU};
-
-/// Numbers of a seed (SplitMix64).
-pub(crate) struct Dice(u64);
-
-impl Dice {
-    fn share(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / 9_007_199_254_740_992.0
-    }
-
-    fn between(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.share()
-    }
-
-    fn scaled(&mut self, a: f64, b: f64) -> f64 {
-        a * (b / a).powf(self.share())
-    }
-
-    fn normal(&mut self) -> f64 {
-        let (u, v) = (self.share() + 1e-300, self.share());
-        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
-    }
-}
 
 /// A machine with its inverter and sensors.
 #[derive(Clone, Debug, Default)]
@@ -68,28 +43,28 @@ pub(crate) struct Machine {
 impl Machine {
     /// Number `index` of the population of a seed.
     pub(crate) fn drawn(seed: u64, index: u64) -> Self {
-        let mut dice = Dice(seed.wrapping_mul(1_000_003).wrapping_add(index));
+        let mut draw = Draw(seed.wrapping_mul(1_000_003).wrapping_add(index));
         loop {
-            let mut m = Self { u_dc: dice.scaled(12.0, 700.0), ..Self::default() };
+            let mut m = Self { u_dc: draw.scaled(12.0, 700.0), ..Self::default() };
             let U = m.u_dc / 3.0_f64.sqrt();
-            m.i_max = 2.0 * dice.scaled(20.0, 100e3) / (1.5 * 0.8 * U);
-            m.n_p = 2.0 + (20.0 * dice.share()).floor();
-            let f = dice.scaled(20.0, 800.0);
+            m.i_max = 2.0 * draw.scaled(20.0, 100e3) / (1.5 * 0.8 * U);
+            m.n_p = 2.0 + (20.0 * draw.share()).floor();
+            let f = draw.scaled(20.0, 800.0);
             let w = TAU * f;
             m.speed = w / m.n_p;
-            m.psi_M = dice.between(0.45, 0.85) * U / w;
+            m.psi_M = draw.between(0.45, 0.85) * U / w;
             let i = 0.5 * m.i_max;
-            m.R = dice.scaled(0.008, 0.25) * U / i;
-            m.L[0] = dice.scaled(0.04, 0.5) * U / i / w;
-            let round = dice.share() < 0.35;
-            m.L[1] = m.L[0] * if round { dice.between(1.0, 1.05) } else { dice.scaled(1.05, 6.0) };
+            m.R = draw.scaled(0.008, 0.25) * U / i;
+            m.L[0] = draw.scaled(0.04, 0.5) * U / i / w;
+            let round = draw.share() < 0.35;
+            m.L[1] = m.L[0] * if round { draw.between(1.0, 1.05) } else { draw.scaled(1.05, 6.0) };
             m.torque = 1.5 * m.n_p * m.psi_M * i;
-            m.J = dice.scaled(0.005, 20.0) * m.torque / m.speed;
-            m.tau_coulomb = dice.scaled(0.002, 0.05) * m.torque;
-            m.B = dice.scaled(0.002, 0.05) * m.torque / m.speed;
+            m.J = draw.scaled(0.005, 20.0) * m.torque / m.speed;
+            m.tau_coulomb = draw.scaled(0.002, 0.05) * m.torque;
+            m.B = draw.scaled(0.002, 0.05) * m.torque / m.speed;
             m.w_coulomb = 0.001 * m.speed;
-            m.cogging = dice.between(0.0, 0.01) * m.torque;
-            let (k_d, k_q, k_x) = (dice.between(0.0, 0.15), dice.between(0.0, 0.15), dice.between(0.0, 0.1));
+            m.cogging = draw.between(0.0, 0.01) * m.torque;
+            let (k_d, k_q, k_x) = (draw.between(0.0, 0.15), draw.between(0.0, 0.15), draw.between(0.0, 0.1));
             let (x, x_q) = (m.psi_M + m.L[0] * m.i_max, m.L[1] * m.i_max);
             m.d[1] = k_d / x.powi(4) / m.L[0];
             m.d[0] = 1.0 / m.L[0] - 5.0 * m.d[1] * m.psi_M.powi(4);
@@ -101,14 +76,14 @@ impl Machine {
             while m.T_s * f * 12.0 > 1.000_000_1 && m.T_s > 1.3e-5 {
                 m.T_s *= 0.5;
             }
-            m.u_dead = dice.between(0.005, 0.03) * m.u_dc;
-            m.bend = dice.between(0.005, 0.04) * i;
-            m.threshold = if m.u_dc > 100.0 { dice.between(0.4, 1.0) } else { 0.0 };
-            m.knee = dice.between(0.005, 0.02) * i;
+            m.u_dead = draw.between(0.005, 0.03) * m.u_dc;
+            m.bend = draw.between(0.005, 0.04) * i;
+            m.threshold = if m.u_dc > 100.0 { draw.between(0.4, 1.0) } else { 0.0 };
+            m.knee = draw.between(0.005, 0.02) * i;
             m.range = 1.5 * m.i_max;
-            m.sigma = dice.between(0.0005, 0.002) * m.range;
-            m.offset = std::array::from_fn(|_| dice.between(-0.005, 0.005) * m.range);
-            m.theta = dice.between(0.0, TAU);
+            m.sigma = draw.between(0.0005, 0.002) * m.range;
+            m.offset = std::array::from_fn(|_| draw.between(-0.005, 0.005) * m.range);
+            m.theta = draw.between(0.0, TAU);
             let [L_d, L_q] = m.L;
             if (5e-3..=20.0).contains(&m.R) && L_d >= 20e-6 && L_q <= 0.2 && L_q * i * w / U <= 1.2 {
                 return m;
@@ -160,11 +135,11 @@ impl Machine {
     }
 
     /// The sensor readings of a current vector: the phases.
-    fn measured(&self, i: Complex, dice: &mut Dice) -> [f64; 3] {
+    fn measured(&self, i: Complex, draw: &mut Draw) -> [f64; 3] {
         let step = 2.0 * self.range / 4096.0;
         let i = phases(i);
         std::array::from_fn(|k| {
-            let x = i[k] + self.offset[k] + self.sigma * dice.normal();
+            let x = i[k] + self.offset[k] + self.sigma * draw.normal();
             ((x / step).round() * step).clamp(-self.range, self.range)
         })
     }
@@ -231,9 +206,9 @@ pub(crate) fn record(
     const PRE: f64 = 0.05;
     let names = ["t", "u_alpha", "u_beta", "i_a", "i_b", "i_c", "theta", "tau_load", "u_dc"];
     let mut columns = names.map(|name| (name.to_owned(), Vec::new()));
-    let mut noise = Dice(seed.wrapping_mul(31337).wrapping_add(index));
-    let mut dice = Dice(seed.wrapping_mul(555).wrapping_add(index));
-    let (theta_0, tau) = (dice.between(-0.2, 0.2), dice.share() * m.T_s);
+    let mut noise = Draw(seed.wrapping_mul(31337).wrapping_add(index));
+    let mut draw = Draw(seed.wrapping_mul(555).wrapping_add(index));
+    let (theta_0, tau) = (draw.between(-0.2, 0.2), draw.share() * m.T_s);
     let K = 1.5 * m.n_p * m.psi_M;
     let w_c = (0.12 / m.T_s).min(4000.0);
     let bandwidth = (0.05 * w_c).min(20.0);

@@ -6,7 +6,7 @@
 
 mod draw;
 
-use draw::{Dice, machine};
+use draw::machine;
 use drive::PmsmDrive;
 use drive::estimator::Kind;
 use drive::math::wrap;
@@ -17,6 +17,7 @@ use drive_tools::tune::remedy::What;
 use drive_tools::tune::rules;
 use drive_tools::tune::setting::{Tuned, Value};
 use drive_tools::tune::trial::{self, Task, Trial};
+use fmu_core::draw::Draw;
 use fmu_core::{Block, Elapsed, Model, Step};
 use std::f64::consts::{E, TAU};
 use std::path::Path;
@@ -36,10 +37,10 @@ fn read(text: &str) -> MotorFile {
 
 /// The first `n` machines that the rules do not refuse.
 fn drawn(n: usize) -> Vec<MotorFile> {
-    let mut dice = Dice(SEED);
+    let mut draw = Draw(SEED);
     let mut all = Vec::new();
     while all.len() < n {
-        let motor = read(&machine(&mut dice, &format!("drawn-{}", all.len() + 1)));
+        let motor = read(&machine(&mut draw, &format!("drawn-{}", all.len() + 1)));
         if rules::tune(&motor).is_ok() {
             all.push(motor);
         }

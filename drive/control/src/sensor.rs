@@ -9,6 +9,7 @@
 
 use drive_base::frame::Phases;
 use drive_base::math::{ln, sin_cos};
+use fmu_core::draw::{GOLDEN, mix};
 use fmu_core::unit::{AMPERE, ONE};
 use fmu_core::{Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -58,7 +59,7 @@ impl Sensor {
 
     /// Three standard normal numbers for sample `k`.
     fn normal(&self, k: u64) -> [f64; 3] {
-        let seed = mix(u64::from(self.seed.cast_unsigned()));
+        let seed = mix(u64::from(self.seed.cast_unsigned()).wrapping_mul(GOLDEN));
         let uniform = |of: u64| uniform(seed.wrapping_add(k.wrapping_mul(4)).wrapping_add(of));
         let radius = |u: f64| (-2.0 * ln(u)).sqrt();
         let ((sin, cos), first) = (sin_cos(TAU * uniform(0)), radius(uniform(1)));
@@ -66,17 +67,9 @@ impl Sensor {
     }
 }
 
-/// The output function of SplitMix64.
-const fn mix(counter: u64) -> u64 {
-    let z = counter.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 /// A number in (0, 1) from 32 bits of the generator.
 fn uniform(counter: u64) -> f64 {
-    let [.., a, b, c, d] = mix(counter).to_le_bytes();
+    let [.., a, b, c, d] = mix(counter.wrapping_mul(GOLDEN)).to_le_bytes();
     (f64::from(u32::from_le_bytes([a, b, c, d])) + 0.5) / 4_294_967_296.0
 }
 

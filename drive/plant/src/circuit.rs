@@ -129,19 +129,14 @@ mod tests {
     use crate::tables::PlantParameters;
     use drive_base::frame::{AlphaBeta, Dq};
     use drive_base::motor::Motor;
-
-    /// A pseudorandom number in 0..1 from the seed `k`.
-    fn share(k: &mut u64) -> f64 {
-        *k = k.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        f64::from(u32::try_from(*k >> 40).unwrap()) / f64::from(1_u32 << 24)
-    }
+    use fmu_core::draw::Draw;
 
     #[test]
     fn what_the_compiler_leaves_out_would_add_nothing() {
         // Linear machine, ideal legs and full Coulomb torque, as types and as parameters, over random machines.
-        let mut k = 1;
+        let mut numbers = Draw(1);
         for _ in 0..1000 {
-            let mut draw = |low: f64, high: f64| low * (high / low).powf(share(&mut k));
+            let mut draw = |low: f64, high: f64| numbers.scaled(low, high);
             let motor = Motor {
                 n_p: 4,
                 R_s: draw(1e-3, 10.0),

@@ -1,7 +1,7 @@
 //! Random calls, right and wrong, of two instances that share saved states, against a state table written down once more by hand
 //! from FMI 3.0.2, 2.2.8, 2.3.5 and 5. 2e4 calls; `FMU_CALLS=1000000` for more, `FMU_SEED` for others.
 
-use super::draw::Draw;
+use super::draw::{Choices as _, Draw};
 use super::*;
 use std::fmt::Write;
 
@@ -76,11 +76,9 @@ impl Twin {
     }
 }
 
-impl Draw {
-    /// A clock that the importer ticks; rarely the other one, a variable or no reference.
-    fn clock(&mut self) -> u32 {
-        if self.rarely() { self.of(&[TRIP, X, 99]) } else { self.of(&CLOCKS[..7]) }
-    }
+/// A clock that the importer ticks; rarely the other one, a variable or no reference.
+fn clock(draw: &mut Draw) -> u32 {
+    if draw.rarely() { draw.of(&[TRIP, X, 99]) } else { draw.of(&CLOCKS[..7]) }
 }
 
 const CALLS: [&str; 18] = [
@@ -175,7 +173,7 @@ impl World {
                 host.exit()
             }
             "set_clock" => {
-                let (vr, active) = (draw.clock(), !draw.rarely());
+                let (vr, active) = (clock(draw), !draw.rarely());
                 let _ = write!(self.trace, " {vr} {active}");
                 may = twin.is("v")
                     && number(vr).is_some_and(|n| if active { n >= 4 || !twin.done[n] } else { !twin.active[n] });
@@ -200,7 +198,7 @@ impl World {
                 if seen.is_some() { OK } else { ERROR }
             }
             "interval" => {
-                let vr = draw.clock();
+                let vr = clock(draw);
                 let _ = write!(self.trace, " {vr}");
                 may = match vr {
                     CONSTANT | FRACTION | FIXED => twin.is("n"),
@@ -238,7 +236,7 @@ impl World {
                 host.set_interval(vr, x)
             }
             "shift" => {
-                let vr = draw.clock();
+                let vr = clock(draw);
                 may = twin.is("n") && vr <= TUNABLE;
                 let mut shift = -7.0;
                 let status = unsafe { fmi3GetShiftDecimal(it, &vr, 1, &mut shift) };
@@ -282,7 +280,7 @@ impl World {
                 unsafe { fmi3EnterEventMode(it) }
             }
             "activate" => {
-                let vr = draw.clock();
+                let vr = clock(draw);
                 let t = number(vr).map_or(1.0, |n| twin.last[n].max(0.0)) + if draw.rarely() { 0.0 } else { 0.125 };
                 let _ = write!(self.trace, " {vr} at {t}");
                 may = twin.is("a") && number(vr).is_some_and(|n| t > twin.last[n]);

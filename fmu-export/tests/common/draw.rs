@@ -1,20 +1,31 @@
-//! Pseudorandom choices, the same for the same seed.
+//! Choices of calls, the same for the same seed.
 
-pub struct Draw(pub u64);
+#![allow(dead_code, reason = "each test program uses a part")]
 
-impl Draw {
-    /// A number below `n`.
-    pub fn below(&mut self, n: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.0 >> 33).unwrap() % n
-    }
+pub use fmu_core::draw::Draw;
 
-    pub fn of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-
+pub trait Choices {
     /// True once in twenty draws.
-    pub fn rarely(&mut self) -> bool {
+    fn rarely(&mut self) -> bool;
+
+    /// A number of values, rarely one more or less.
+    fn count(&mut self, right: usize) -> usize;
+
+    /// One of a list.
+    fn of_mut<'a, T>(&mut self, list: &'a mut [T]) -> &'a mut T;
+}
+
+impl Choices for Draw {
+    fn rarely(&mut self) -> bool {
         self.below(20) == 0
+    }
+
+    fn count(&mut self, right: usize) -> usize {
+        if self.rarely() { self.of(&[right + 1, right.saturating_sub(1)]) } else { right }
+    }
+
+    fn of_mut<'a, T>(&mut self, list: &'a mut [T]) -> &'a mut T {
+        let place = self.below(list.len());
+        &mut list[place]
     }
 }

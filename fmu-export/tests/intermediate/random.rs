@@ -1,7 +1,7 @@
 //! Random calls, right and wrong, between steps and inside them, of two instances that share saved states, against a state table
 //! written down once more by hand from FMI 3.0.2, 2.3 and 4.2.2. 2e4 calls; `FMU_CALLS=1000000` for more, `FMU_SEED` for others.
 
-use super::draw::Draw;
+use super::draw::{Choices as _, Draw};
 use super::*;
 use std::fmt::Write;
 

@@ -1,7 +1,7 @@
 //! Random calls, right and wrong, of two instances that share saved states, with texts, lists and bytes, against a state table
 //! written down once more by hand from FMI 3.0.2, 2.2.7, 2.3 and 4.2. 2e4 calls; `FMU_CALLS=1000000` for more, `FMU_SEED` for others.
 
-use super::draw::Draw;
+use super::draw::{Choices as _, Draw};
 use super::*;
 use std::fmt::Write;
 
@@ -78,18 +78,6 @@ impl Twin {
             NAMES => Some(self.model.names.to_vec()),
             _ => None,
         }
-    }
-}
-
-impl Draw {
-    /// A number of values, rarely one more or less.
-    fn count(&mut self, right: usize) -> usize {
-        if self.rarely() { self.of(&[right + 1, right.saturating_sub(1)]) } else { right }
-    }
-
-    fn of_mut<'a, T>(&mut self, list: &'a mut [T]) -> &'a mut T {
-        let place = self.below(list.len());
-        &mut list[place]
     }
 }
 

@@ -1,7 +1,7 @@
 //! Random calls, right and wrong, of two instances that share saved states, against a state table written down once more by hand
 //! from FMI 3.0.2, 2.3, 3.2 and 4.2, which runs the model natively. 2e4 calls; `FMU_CALLS=1000000` for more, `FMU_SEED` for others.
 
-use super::draw::Draw;
+use super::draw::{Choices as _, Draw};
 use super::*;
 use std::fmt::Write;
 
@@ -110,13 +110,6 @@ impl Twin {
         }
         self.set |= self.is("i") && !references.is_empty();
         OK
-    }
-}
-
-impl Draw {
-    /// A number of values, rarely one more or less.
-    fn count(&mut self, right: usize) -> usize {
-        if self.rarely() { self.of(&[right + 1, right.saturating_sub(1)]) } else { right }
     }
 }
 
@@ -415,13 +408,6 @@ impl World {
             let values = it.values(reference, expected.len());
             assert_eq!(bits(&values), bits(&expected), "{who}: {reference} in {} {}", twin.state, self.trace);
         }
-    }
-}
-
-impl Draw {
-    fn of_mut<'a, T>(&mut self, list: &'a mut [T]) -> &'a mut T {
-        let place = self.below(list.len());
-        &mut list[place]
     }
 }
 

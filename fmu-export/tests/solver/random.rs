@@ -9,33 +9,13 @@ mod reads;
 mod turn;
 mod twin;
 
+use super::draw::{Choices as _, Draw};
 use super::*;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use turn::Turn;
 use twin::Snapshot;
 pub use twin::Twin;
-
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        u32::try_from(self.0 >> 32).unwrap()
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        usize::try_from(self.next()).unwrap() % n
-    }
-
-    fn of<T: Copy>(&mut self, list: &[T]) -> T {
-        list[self.below(list.len())]
-    }
-
-    fn rarely(&mut self) -> bool {
-        self.below(20) == 0
-    }
-}
 
 /// The calls, each with its number in the tally.
 const CALLS: [&str; 22] = [

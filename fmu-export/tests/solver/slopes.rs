@@ -1,6 +1,7 @@
 //! Derivatives through the C interface, for a model with a tangent and for one without.
 
 use super::ball::*;
+use super::draw::Draw;
 use super::*;
 
 /// Their accuracy.
@@ -18,16 +19,6 @@ type Wrong = (&'static str, fn(&Fmu) -> c_int);
 const KNOWNS: [u32; 3] = [U, H, V];
 const UNKNOWNS: [u32; 6] = [DER_H, DER_V, H, E, A, V_MEAN];
 
-/// A deterministic stream of numbers in -1 to 1.
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        f64::from(u32::try_from(self.0 >> 32).unwrap()) / f64::from(u32::MAX / 2) - 1.0
-    }
-}
-
 /// In Continuous-Time Mode at 100 points: standstill and a ball that lies on the ground among them.
 fn points(kind: Kind, mut at: impl FnMut(&Fmu, [f64; 3], &mut Draw)) {
     let mut draw = Draw(7);
@@ -39,8 +30,8 @@ fn points(kind: Kind, mut at: impl FnMut(&Fmu, [f64; 3], &mut Draw)) {
             fmu.settle();
             assert_eq!((fmu.leave(), fmu.indicators()), (OK, [1.0]));
         }
-        let v = if i % 10 == 5 { 0.0 } else { 20.0 * draw.next() };
-        let x = [50.0 * draw.next(), 50.0 + 49.0 * draw.next(), v];
+        let v = if i % 10 == 5 { 0.0 } else { draw.around(20.0) };
+        let x = [draw.around(50.0), 50.0 + draw.around(49.0), v];
         assert_eq!((fmu.set_time(0.1), fmu.set(&KNOWNS, &x)), (OK, OK));
         at(&fmu, x, &mut draw);
     }
@@ -64,7 +55,7 @@ pub fn directional_derivatives_are_those_of_set_and_get(exactness: Exactness) {
             let before = fmu.bytes();
             for i in 0..5 {
                 let seed: [f64; 3] =
-                    std::array::from_fn(|k| if i < 3 { f64::from(u8::from(i == k)) } else { draw.next() });
+                    std::array::from_fn(|k| if i < 3 { f64::from(u8::from(i == k)) } else { draw.around(1.0) });
                 let exact = along(fmu, &seed);
                 let side = |eps: f64| {
                     let moved: [f64; 3] = std::array::from_fn(|k| x[k] + eps * seed[k]);
@@ -90,7 +81,7 @@ pub fn directional_derivatives_are_those_of_set_and_get(exactness: Exactness) {
 pub fn superposition_and_adjoint(exactness: Exactness) {
     points(Kind::Me3, |fmu, _, draw| {
         let before = fmu.bytes();
-        let mut vector = || -> [f64; 3] { std::array::from_fn(|_| draw.next()) };
+        let mut vector = || -> [f64; 3] { std::array::from_fn(|_| draw.around(1.0)) };
         let (a, b) = (vector(), vector());
         let (ja, jb) = (along(fmu, &a), along(fmu, &b));
         let sum = along(fmu, &[2.0 * a[0] - b[0], 2.0 * a[1] - b[1], 2.0 * a[2] - b[2]]);
@@ -99,7 +90,7 @@ pub fn superposition_and_adjoint(exactness: Exactness) {
             let error = (sum[k] - (2.0 * ja[k] - jb[k])).abs();
             assert!(error <= exactness.linear * scale(&sum), "{error}");
         }
-        let w: [f64; 6] = std::array::from_fn(|_| draw.next());
+        let w: [f64; 6] = std::array::from_fn(|_| draw.around(1.0));
         let mut back = [f64::NAN; 3];
         assert_eq!(fmu.adjoint(&UNKNOWNS, &KNOWNS, &w, &mut back), OK);
         let left: f64 = w.iter().zip(ja).map(|(w, y)| w * y).sum();

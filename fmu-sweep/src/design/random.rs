@@ -1,15 +1,6 @@
 //! Random numbers as a function of row and column: no generator, no order.
 
-/// 2^64 divided by the golden ratio, odd.
-const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// The finalizer of SplitMix64 (Steele, Lea, Flood, *Fast splittable pseudorandom number generators*, OOPSLA 2014; variant 13
-/// of Stafford): a bijection that changes about half of the bits when one changes.
-fn mix(x: u64) -> u64 {
-    let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    x ^ (x >> 31)
-}
+use fmu_core::draw::{GOLDEN, mix};
 
 /// Random bits of a cell.
 pub(super) fn bits(seed: u64, column: u64, row: u64) -> u64 {

@@ -1,5 +1,6 @@
 //! Recordings: sampled variables.
 
+use fmu_core::digits;
 use fmu_import::csv::Writer;
 use fmu_import::{Number, printable};
 use model_description::DisplayUnit;
@@ -140,9 +141,7 @@ pub fn item(items: &[(i64, String)], x: f64) -> Option<&str> {
 
 /// A number with six digits.
 fn six(x: f64) -> String {
-    let rounded: f64 = format!("{x:.5e}").parse().unwrap_or(x);
-    let plain = rounded == 0.0 || (1e-4..1e7).contains(&rounded.abs()) || !x.is_finite();
-    if plain { rounded.to_string() } else { format!("{rounded:e}") }
+    digits::text(x, 6, 1e7)
 }
 
 #[cfg(test)]

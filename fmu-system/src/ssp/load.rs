@@ -132,15 +132,17 @@ impl Loaded {
             fmus.push((component.name.clone(), fmu));
         }
         let system = system(&fmus);
-        let (other, remedy) = match system.method() {
-            Method::CoSimulation { .. } => ("ModelExchange", "is not Co-Simulation: simulate it with --me"),
-            Method::ModelExchange(_) => ("CoSimulation", "is not Model Exchange: simulate it without --me"),
-        };
-        let is_other = |component: &&Component| component.implementation.as_deref() == Some(other);
-        if let Some(component) = structure.components.iter().find(is_other) {
-            return Err(in_description(format!("line {}: implementation=\"{other}\" {remedy}", component.line)));
-        }
+        let exchange = matches!(system.method(), Method::ModelExchange(_));
+        let other = if exchange { "CoSimulation" } else { "ModelExchange" };
         let mut loaded = Self { system, ..Self::default() };
+        let is_other = |component: &&Component| component.implementation.as_deref() == Some(other);
+        if let Some(Component { line, .. }) = structure.components.iter().find(is_other) {
+            let what = format!("line {line}: implementation=\"{other}\"");
+            if !exchange {
+                return Err(in_description(format!("{what} is not Co-Simulation: simulate it with --me")));
+            }
+            loaded.notes.push(format!("{}: {description}: {what}, and it is integrated, as requested", of()));
+        }
         loaded.experiments.push(Experiment { start: structure.start, stop: structure.stop, ..Experiment::default() });
         for (name, fmu) in &fmus {
             let experiment = fmu.description().default_experiment;

@@ -1,6 +1,7 @@
 //! The default plot of a run: speed, torque, currents, angle error and power of any drive with these names.
 
 use drive::math::wrap;
+use fmu_core::digits;
 use fmu_plot::figure::{Curve, Figure};
 use fmu_system::cosimulation::{Column, Recording};
 use std::fmt::Write as _;
@@ -62,9 +63,7 @@ pub(super) fn at_the_end(figure: &Figure, alone: Option<&str>) -> String {
 
 /// A number with four digits.
 fn four(x: f64) -> String {
-    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
-    let plain = rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) || !x.is_finite();
-    if plain { rounded.to_string() } else { format!("{rounded:e}") }
+    digits::text(x, 4, 1e6)
 }
 
 /// The name of a variable without the name of its instance.

@@ -3,7 +3,7 @@
 
 use super::super::motor::MotorFile;
 use super::Point;
-use anyhow::{Context, Result, bail, ensure};
+use crate::error::{Result, WithContext, bail, ensure};
 use drive::frame::Dq;
 use drive::plant::flux_map::FluxMap;
 use std::f64::consts::SQRT_2;
@@ -57,7 +57,8 @@ pub(super) fn check(map: &FluxMap, errors: &Errors, points: &[Point], file: &str
     let Some(x) = map.flaw() else { return Ok(()) };
     let psi = x + Dq::new(psi_M, 0.0);
     let distance = |p: &&Point| (Dq::new(p.psi.d(), p.psi.q().abs()) - psi).magnitude();
-    let nearest = points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).context("no points")?;
+    let nearest =
+        points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).with_context(|| "no points".to_owned())?;
     bail!(
         "{file}: more flux takes less current at psi = ({:.4}, {:.4}) Wb, near i = ({:.2}, {:.2}) A: no machine does that; add or \
          correct points there; {CAUSES}",

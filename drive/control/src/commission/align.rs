@@ -8,6 +8,7 @@
 //! ```
 
 use super::bench::{Bench, Sample};
+use super::status::CommissionFault as Fault;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::within;
 use serde::{Deserialize, Serialize};
@@ -29,6 +30,11 @@ pub(super) struct Dc {
 }
 
 impl Dc {
+    /// No current yet, along the angle `phi` (rad).
+    pub(super) fn at(phi: f64) -> Self {
+        Self { axis: Axis::at(phi), u: 0.0 }
+    }
+
     /// Turns to the angle `phi` (rad); the integral stays.
     pub(super) fn turn(&mut self, phi: f64) {
         self.axis = Axis::at(phi);
@@ -80,5 +86,52 @@ impl Rest {
             (self.sum, self.samples) = (0.0, 0.0);
         }
         self.quiet >= 40.0
+    }
+}
+
+/// An alignment of the rotor.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Align {
+    pub(super) dc: Dc,
+    rest: Rest,
+    /// Samples since its beginning.
+    pub(super) k: f64,
+}
+
+impl Align {
+    pub(super) fn new(dc: Dc) -> Self {
+        Self { dc, rest: Rest::default(), k: 0.0 }
+    }
+
+    /// Begins anew with the direct current as it is.
+    pub(super) fn restart(&mut self) {
+        (self.rest, self.k) = (Rest::default(), 0.0);
+    }
+
+    /// Time in s since the beginning.
+    pub(super) fn time(&self, bench: &Bench) -> f64 {
+        self.k * bench.T
+    }
+
+    /// The current of the alignment after a ramp of `rise` (s): the command in V, and whether the rotor rests.
+    ///
+    /// # Errors
+    /// It does not come to rest.
+    pub(super) fn update(&mut self, bench: &Bench, sample: &Sample, rise: f64) -> Result<(AlphaBeta, bool), Fault> {
+        self.k += 1.0;
+        let t = self.time(bench);
+        let u = self.dc.command(bench, sample, bench.aligned() * (t / rise).min(1.0));
+        let rests = t > rise && self.rest.update(bench, self.dc.axis.from_stator(sample.i).q());
+        if !rests && t > LONGEST {
+            return Err(Fault::NotFollowing);
+        }
+        Ok((u, rests))
+    }
+
+    /// The whole current at once: the command in V, and whether the rotor rests.
+    pub(super) fn hold(&mut self, bench: &Bench, sample: &Sample) -> (AlphaBeta, bool) {
+        self.k += 1.0;
+        let u = self.dc.command(bench, sample, bench.aligned());
+        (u, self.rest.update(bench, self.dc.axis.from_stator(sample.i).q()))
     }
 }

@@ -20,6 +20,14 @@ pub(super) struct Sample {
     pub(super) u_dc: f64,
 }
 
+/// Result of a sample of a part of the sequence.
+pub(super) enum Part<T> {
+    /// The voltage of this sample in V.
+    Voltage(AlphaBeta),
+    /// The part is over, with 0 V and what the next part needs.
+    Over(T),
+}
+
 /// Conditions and findings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Bench {

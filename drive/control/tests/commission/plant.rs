@@ -3,35 +3,8 @@
 //! later. It shares no formula with `drive-plant`.
 
 use drive_base::frame::{AlphaBeta, Phases, SQRT_3};
+use fmu_core::draw::Draw;
 use std::f64::consts::{PI, TAU};
-
-/// SplitMix64.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        let digits = (z ^ (z >> 31)) >> 11;
-        let (high, low) = (u32::try_from(digits >> 32).unwrap(), u32::try_from(digits & 0xFFFF_FFFF).unwrap());
-        (f64::from(high) * 4_294_967_296.0 + f64::from(low)) / 9_007_199_254_740_992.0
-    }
-
-    pub(crate) fn within(&mut self, a: f64, b: f64) -> f64 {
-        a + (b - a) * self.next()
-    }
-
-    fn logarithmic(&mut self, a: f64, b: f64) -> f64 {
-        a * (b / a).powf(self.next())
-    }
-
-    fn normal(&mut self) -> f64 {
-        let (u, v) = (self.next() + 1e-300, self.next());
-        (-2.0 * u.ln()).sqrt() * (TAU * v).cos()
-    }
-}
 
 /// A machine, its inverter and its sensors.
 #[derive(Clone, Debug, Default)]
@@ -98,45 +71,45 @@ impl Motor {
 
     /// The machine `index` of the population `seed` of a class.
     pub(crate) fn of(class: Class, seed: u64, index: u64) -> Self {
-        let mut r = Random(seed * 1_000_003 + index);
+        let mut r = Draw(seed * 1_000_003 + index);
         loop {
-            let mut m = Self { u_dc: r.logarithmic(12.0, 700.0), ..Self::default() };
+            let mut m = Self { u_dc: r.scaled(12.0, 700.0), ..Self::default() };
             let U = m.u_dc / SQRT_3;
-            let P = r.logarithmic(20.0, 100e3);
+            let P = r.scaled(20.0, 100e3);
             m.I = 2.0 * P / (1.5 * 0.8 * U);
-            m.n_p = 2.0 + (20.0 * r.next()).floor();
-            let f = r.logarithmic(20.0, 800.0);
+            m.n_p = 2.0 + (20.0 * r.share()).floor();
+            let f = r.scaled(20.0, 800.0);
             let w = TAU * f;
             let speed = w / m.n_p;
             m.w_rated = w;
-            m.psi = if class == Class::Assisted { r.within(0.03, 0.45) } else { r.within(0.45, 0.85) } * U / w;
+            m.psi = if class == Class::Assisted { r.between(0.03, 0.45) } else { r.between(0.45, 0.85) } * U / w;
             let rated = 0.5 * m.I;
             let Z = U / rated;
-            m.R = r.logarithmic(0.008, 0.25) * Z;
-            m.L_d = r.logarithmic(0.04, 0.5) * Z / w;
+            m.R = r.scaled(0.008, 0.25) * Z;
+            m.L_d = r.scaled(0.04, 0.5) * Z / w;
             let ratio = match class {
-                Class::Assisted => r.logarithmic(2.0, 8.0),
-                Class::Inverse => r.logarithmic(0.3, 0.95),
-                _ if r.next() < 0.35 => r.within(1.0, 1.05),
-                _ => r.logarithmic(1.05, 6.0),
+                Class::Assisted => r.scaled(2.0, 8.0),
+                Class::Inverse => r.scaled(0.3, 0.95),
+                _ if r.share() < 0.35 => r.between(1.0, 1.05),
+                _ => r.scaled(1.05, 6.0),
             };
             m.L_q = m.L_d * ratio;
             // At 45 degrees, the reluctance adds its torque.
             let reluctance = if class == Class::Assisted { 0.5 * (m.L_q - m.L_d) * rated } else { 0.0 };
             let tau = 1.5 * m.n_p * (m.psi + reluctance) * rated;
             m.J = match class {
-                Class::Extreme if r.next() < 0.5 => r.logarithmic(0.0005, 0.005),
-                Class::Extreme => r.logarithmic(20.0, 200.0),
-                _ => r.logarithmic(0.005, 20.0),
+                Class::Extreme if r.share() < 0.5 => r.scaled(0.0005, 0.005),
+                Class::Extreme => r.scaled(20.0, 200.0),
+                _ => r.scaled(0.005, 20.0),
             } * tau
                 / speed;
             let rough = class == Class::Rough;
-            m.tau_coulomb = if rough { r.logarithmic(0.02, 0.2) } else { r.logarithmic(0.002, 0.05) } * tau;
-            m.B = r.logarithmic(0.002, 0.05) * tau / speed;
+            m.tau_coulomb = if rough { r.scaled(0.02, 0.2) } else { r.scaled(0.002, 0.05) } * tau;
+            m.B = r.scaled(0.002, 0.05) * tau / speed;
             m.w_coulomb = 0.001 * speed;
-            m.cogging = r.within(0.0, if rough { 0.2 } else { 0.01 }) * tau;
+            m.cogging = r.between(0.0, if rough { 0.2 } else { 0.01 }) * tau;
             let most = if class == Class::Saturated { 0.6 } else { 0.15 };
-            let (k_d, k_q, k_x) = (r.within(0.0, most), r.within(0.0, most), r.within(0.0, 0.1));
+            let (k_d, k_q, k_x) = (r.between(0.0, most), r.between(0.0, most), r.between(0.0, 0.1));
             // At the magnet alone, the differential inductance is still positive.
             let monotonic = 0.18 * (1.0 + m.L_d * m.I / m.psi).powi(4);
             m.saturate(if most > 0.15 { k_d.min(monotonic) } else { k_d }, k_q, k_x);
@@ -144,14 +117,14 @@ impl Motor {
             while m.T * f * 12.0 > 1.000_000_1 && m.T > 1.3e-5 {
                 m.T *= 0.5;
             }
-            m.u_dead = r.within(0.005, 0.03) * m.u_dc;
-            m.i_x = r.within(0.005, 0.04) * rated;
-            m.u_th = if m.u_dc > 100.0 { r.within(0.4, 1.0) } else { 0.0 };
-            m.i_y = r.within(0.005, 0.02) * rated;
+            m.u_dead = r.between(0.005, 0.03) * m.u_dc;
+            m.i_x = r.between(0.005, 0.04) * rated;
+            m.u_th = if m.u_dc > 100.0 { r.between(0.4, 1.0) } else { 0.0 };
+            m.i_y = r.between(0.005, 0.02) * rated;
             m.range = 1.5 * m.I;
-            m.sigma = r.within(0.0005, 0.002) * m.range;
-            m.offset = [0; 3].map(|_| r.within(-0.005, 0.005) * m.range);
-            m.theta_0 = r.within(0.0, TAU);
+            m.sigma = r.between(0.0005, 0.002) * m.range;
+            m.offset = [0; 3].map(|_| r.between(-0.005, 0.005) * m.range);
+            m.theta_0 = r.between(0.0, TAU);
             if m.R < 5e-3 || m.R > 20.0 || m.L_d < 20e-6 || m.L_q > 0.2 || m.L_q * rated * w / U > 1.2 {
                 continue;
             }
@@ -271,7 +244,7 @@ fn bisect(f: &dyn Fn(f64) -> f64, i: f64, most: f64) -> f64 {
 /// A machine that runs.
 pub(crate) struct Bench {
     pub(crate) motor: Motor,
-    random: Random,
+    random: Draw,
     psi: AlphaBeta,
     pub(crate) w: f64,
     theta: f64,
@@ -304,7 +277,7 @@ impl Bench {
         let steps = (1..60_u32).find(|&n| f64::from(n) * h >= motor.T).unwrap_or(60);
         let (psi, theta) = (AlphaBeta::new(cos, sin) * motor.psi, motor.theta_0 / motor.n_p);
         let (commands, gates) = ([AlphaBeta::ZERO; 3], false);
-        let random = Random(seed);
+        let random = Draw(seed);
         Self {
             motor,
             random,

@@ -4,35 +4,20 @@
 
 use super::machines::Machine;
 use drive_base::motor::Motor;
-
-/// Numbers of a linear congruential generator.
-struct Random(u64);
-
-impl Random {
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        #[expect(clippy::cast_precision_loss, reason = "53 bits")]
-        let share = (self.0 >> 11) as f64 / (1_u64 << 53) as f64;
-        low + share * (high - low)
-    }
-
-    fn log(&mut self, low: f64, high: f64) -> f64 {
-        self.between(low.ln(), high.ln()).exp()
-    }
-}
+use fmu_core::draw::Draw;
 
 /// 200 machines: R i/u from 0 to 0.6, psi_M/(L_d I) from 0.3 to 40, L_q/L_d from 0.8 to 4.
 pub(crate) fn all() -> Vec<Machine> {
-    let mut random = Random(45);
+    let mut random = Draw(45);
     (0..200).map(|_| one(&mut random)).collect()
 }
 
-fn one(random: &mut Random) -> Machine {
-    let (u_dc, i) = (random.log(12.0, 800.0), random.log(1.0, 500.0));
+fn one(random: &mut Draw) -> Machine {
+    let (u_dc, i) = (random.scaled(12.0, 800.0), random.scaled(1.0, 500.0));
     let U = u_dc / 3.0_f64.sqrt();
-    let (psi_M, share) = (U / random.log(200.0, 4000.0), random.between(0.0, 0.6));
-    let L_d = psi_M / (i * random.log(0.3, 40.0));
-    let saliency = random.log(0.8, 4.0);
+    let (psi_M, share) = (U / random.scaled(200.0, 4000.0), random.between(0.0, 0.6));
+    let L_d = psi_M / (i * random.scaled(0.3, 40.0));
+    let saliency = random.scaled(0.8, 4.0);
     let saliency = if random.between(0.0, 1.0) < 0.3 { 1.0 } else { saliency };
     // L_q < L_d: the torque of i_q must not vanish within the current limit.
     let L_q = (L_d * saliency).max(L_d - 0.8 * psi_M / i);

@@ -4,13 +4,21 @@ use super::super::*;
 use super::bits;
 use super::turn::{Call, Turn, extent, is_element};
 use super::twin::Twin;
+use crate::solver::draw::Choices;
 use std::fmt::Write;
 
 impl<M: Twin> Turn<'_, M> {
     pub fn get(&mut self) -> Call {
-        let references: Vec<u32> = (0..self.draw.below(4))
-            .map(|_| if self.draw.rarely() { self.draw.next() % 30 } else { self.draw.of(M::REALS) })
-            .collect();
+        let references: Vec<u32> =
+            (0..self.draw.below(4))
+                .map(|_| {
+                    if self.draw.rarely() {
+                        u32::try_from(self.draw.below(30)).unwrap()
+                    } else {
+                        self.draw.of(M::REALS)
+                    }
+                })
+                .collect();
         let _ = write!(self.trace, " {references:?}");
         let version = self.now.kind.version();
         let may = version == 3 || self.is("nvcste");

@@ -1,7 +1,7 @@
 //! One call of one instance with arguments that are right or wrong, and the status that the standard requires.
 
 use super::super::*;
-use super::Draw;
+use super::draw::{Choices as _, Draw};
 use super::twin::{Snapshot, Twin};
 use fmu_core::Elapsed;
 use std::fmt::Write;
@@ -176,7 +176,9 @@ impl<M: Twin> Turn<'_, M> {
     pub fn set(&mut self) -> Call {
         let version = self.now.kind.version();
         let references: Vec<u32> = (0..self.draw.below(4))
-            .map(|_| if self.draw.rarely() { self.draw.next() % 30 } else { self.draw.of(M::SET) })
+            .map(
+                |_| if self.draw.rarely() { u32::try_from(self.draw.below(30)).unwrap() } else { self.draw.of(M::SET) },
+            )
             .filter(|&r| version == 2 || !is_element::<M>(r))
             .collect();
         let sizes = references.iter().map(|&r| extent::<M>(r, version));
