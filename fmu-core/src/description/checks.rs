@@ -83,3 +83,29 @@ fn check_rates(variables: &[Variable]) -> Result<(), Fault> {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::variable;
+    use crate::row::Row;
+    use crate::unit::{METER, METER_PER_S, METER_PER_S2, ONE, Quantity, Unit};
+
+    #[test]
+    fn a_derivative_has_the_unit_of_its_state_per_second() {
+        const KM_PER_S: Unit = Unit { name: "km/s", factor: 1000.0, ..METER_PER_S.unit };
+        const FAST: Quantity = Quantity::new("Fast", KM_PER_S);
+        let why = |rate: &'static Quantity| {
+            let of = |name: &str, quantity, reference| {
+                variable(name.into(), Row::<f64>::state("", quantity, "", |m| m).meta(), reference, None)
+            };
+            let rate = Variable { derivative: Some(1), ..of("der(x)", rate, 2) };
+            check_types(&[of("x", &METER, 1), rate]).err().map(|fault| fault.to_string())
+        };
+        assert_eq!((why(&METER_PER_S), why(&ONE)), (None, None));
+        for (wrong, unit) in [(&METER_PER_S2, "m/s2"), (&METER, "m"), (&FAST, "km/s")] {
+            let start = format!("der(x) has the unit {unit}, which is not the unit m of x per second");
+            assert!(why(wrong).is_some_and(|why| why.starts_with(&start)), "{unit}");
+        }
+    }
+}
