@@ -1,5 +1,9 @@
 //! Finds dependencies by running the model itself: each known is varied alone, at several operating points; every unknown that
 //! changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
+//!
+//! A missing dependency misleads an importer; one too many costs it little. So parameters are varied together: an unknown that
+//! depends on one of them depends on all. Inputs, states and time are found one by one. Every second operating point varies an
+//! earlier one that showed something new, as a fuzzer does: what acts only behind several options is reached step by step.
 
 use crate::capability::Capabilities;
 use crate::model::{Block, Model};
@@ -7,9 +11,11 @@ use crate::row::Slot;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault};
 
-/// Number of operating points, the start values included. A dependency behind three switches and a threshold appears in about 1
-/// of 40 samples.
-const POINTS: u32 = 192;
+/// Minimum and maximum number of operating points, the start values included.
+const POINTS: (usize, usize) = (192, 3000);
+
+/// Runs of the model that the maximum number of points may take.
+const RUNS: usize = 60_000;
 
 /// The index used for `time`.
 pub(crate) const NOW: usize = usize::MAX;
@@ -48,17 +54,17 @@ pub(crate) fn initial_dependencies<M: Model>(
     let metas = metas::<M>();
     let knowns: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
     let mut found = Found::new(metas.len() + states.len());
-    let mut draw = Draw(1);
-    for point in 0..POINTS {
-        let base = operating_point(can, states, fresh, point, &knowns, &mut draw);
+    let varied = varied(&metas, &knowns);
+    let mut points = Points::new(fresh, &knowns, varied.len(), 1);
+    while let Some(base) = points.next(can, states, &found) {
         let start = |mut block: Block<M>| {
             block.initialize();
             values(can, block, Elapsed::ZERO)
         };
         let before = start(base.clone());
-        for &known in &knowns {
+        for known in &varied {
             let mut changed = base.clone();
-            change(can, &mut changed, states, known, &mut draw);
+            vary(can, &mut changed, states, known, &mut points.draw);
             found.compare(known, &before, &start(changed));
         }
     }
@@ -79,15 +85,19 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     let metas = metas::<M>();
     let known = |meta: &Meta| meta.causality == Causality::Input || meta.variability == Variability::Tunable;
     let mut found = Found::new(metas.len() + states.len());
-    let mut draw = Draw(2);
     let settable: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
-    let points = if can.model_exchange() { POINTS } else { 0 };
-    for point in 0..points {
-        let mut base = operating_point(can, states, fresh, point, &settable, &mut draw);
+    let knowns: Vec<usize> = (0..metas.len()).filter(|&i| known(metas[i])).collect();
+    let varied = varied(&metas, &knowns);
+    let mut points = Points::new(fresh, &settable, varied.len() + states.len() + 1, 2);
+    while can.model_exchange()
+        && let Some(mut base) = points.next(can, states, &found)
+    {
+        let draw = &mut points.draw;
         base.initialize();
         // At every second point, the states are moved before the event, so that the switches match them.
-        let moved = |first: bool| (0..states.len()).filter(move |_| first == (point % 2 == 1));
-        moved(true).for_each(|i| shift(can, &mut base, states, i, &mut draw));
+        let first = draw.below(2) == 0;
+        let moved = |now: bool| (0..states.len()).filter(move |_| first == now);
+        moved(true).for_each(|i| shift(can, &mut base, states, i, draw));
         let mut now = Elapsed::ZERO.plus(draw.between(0.0, 1.0));
         if let Some(events) = &can.events {
             (events.begin)(&mut base.model, now);
@@ -96,23 +106,23 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
                 continue;
             }
         }
-        moved(false).for_each(|i| shift(can, &mut base, states, i, &mut draw));
+        moved(false).for_each(|i| shift(can, &mut base, states, i, draw));
         let before = observed(can, base.clone(), now);
-        for known in (0..metas.len()).filter(|&i| known(metas[i])) {
+        for known in &varied {
             let mut changed = base.clone();
-            change(can, &mut changed, states, known, &mut draw);
-            if metas[known].causality == Causality::Parameter {
+            vary(can, &mut changed, states, known, draw);
+            if metas[known[0]].causality == Causality::Parameter {
                 changed.model.derive();
             }
             found.compare(known, &before, &observed(can, changed, now));
         }
         for (i, &known) in states.iter().enumerate() {
             let mut changed = base.clone();
-            shift(can, &mut changed, states, i, &mut draw);
-            found.compare(known, &before, &observed(can, changed, now));
+            shift(can, &mut changed, states, i, draw);
+            found.compare(&[known], &before, &observed(can, changed, now));
         }
         now = now.plus(draw.between(0.1, 1.0));
-        found.compare(NOW, &before, &observed(can, base, now));
+        found.compare(&[NOW], &before, &observed(can, base, now));
     }
     if can.model_exchange() {
         for input in settable.into_iter().filter(|&i| metas[i].causality == Causality::Input).filter(is_opaque::<M>) {
@@ -130,22 +140,68 @@ fn is_opaque<M: Model>(&known: &usize) -> bool {
         .is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
 }
 
-/// The start values first; then other values for about half of the inputs and parameters.
-fn operating_point<M: Model>(
-    can: &Capabilities<M>,
-    states: &[usize],
-    fresh: &Block<M>,
-    point: u32,
-    settable: &[usize],
-    draw: &mut Draw,
-) -> Block<M> {
-    let mut block = fresh.clone();
-    for &i in settable {
-        if point > 0 && draw.below(2) == 0 {
-            change(can, &mut block, states, i, draw);
-        }
+/// What is varied at once: each known alone, and all parameters together.
+fn varied(metas: &[&Meta], knowns: &[usize]) -> Vec<Vec<usize>> {
+    let (parameters, others): (Vec<usize>, Vec<usize>) =
+        knowns.iter().partition(|&&i| metas[i].causality == Causality::Parameter);
+    let together = (!parameters.is_empty()).then_some(parameters);
+    others.into_iter().map(|known| vec![known]).chain(together).collect()
+}
+
+/// Operating points: the start values; then, in turn, other values for about half of the inputs and parameters, and an earlier
+/// point that showed a new dependency with one to four values changed.
+struct Points<'a, M: Model> {
+    fresh: &'a Block<M>,
+    settable: &'a [usize],
+    draw: Draw,
+    fruitful: Vec<Block<M>>,
+    last: Option<Block<M>>,
+    count: usize,
+    most: usize,
+    /// Dependencies known before the last point.
+    known: usize,
+}
+
+impl<'a, M: Model> Points<'a, M> {
+    /// Points of a model that runs `runs` times at each.
+    fn new(fresh: &'a Block<M>, settable: &'a [usize], runs: usize, seed: u64) -> Self {
+        let most = (RUNS / runs.max(1)).clamp(POINTS.0, POINTS.1);
+        Self { fresh, settable, draw: Draw(seed), fruitful: Vec::new(), last: None, count: 0, most, known: 0 }
     }
-    block
+
+    fn next(&mut self, can: &Capabilities<M>, states: &[usize], found: &Found) -> Option<Block<M>> {
+        let known = found.0.iter().map(Vec::len).sum();
+        if known > self.known {
+            self.fruitful.extend(self.last.take());
+            self.known = known;
+        }
+        if self.count >= self.most || self.settable.is_empty() && self.count >= POINTS.0 {
+            return None;
+        }
+        let draw = &mut self.draw;
+        let block = match self.fruitful.len() {
+            n if n > 0 && self.count.is_multiple_of(2) => {
+                let mut block = self.fruitful[draw.below(u32::try_from(n).unwrap_or(u32::MAX))].clone();
+                for _ in 0..=draw.below(4) {
+                    let i = draw.below(u32::try_from(self.settable.len()).unwrap_or(u32::MAX));
+                    change(can, &mut block, states, self.settable[i], draw);
+                }
+                block
+            }
+            _ => {
+                let mut block = self.fresh.clone();
+                for &i in self.settable {
+                    if self.count > 0 && draw.below(2) == 0 {
+                        change(can, &mut block, states, i, draw);
+                    }
+                }
+                block
+            }
+        };
+        self.count += 1;
+        self.last = Some(block.clone());
+        Some(block)
+    }
 }
 
 /// Maximum relative change of a real number that counts as rounding: a torque, computed in stator axes, changes by about 1e-16
@@ -168,10 +224,10 @@ impl Found {
         Self(vec![Vec::new(); unknowns])
     }
 
-    fn compare(&mut self, known: usize, before: &[u64], after: &[u64]) {
+    fn compare(&mut self, knowns: &[usize], before: &[u64], after: &[u64]) {
         for (list, (before, after)) in self.0.iter_mut().zip(before.iter().zip(after)) {
-            if differ(*before, *after) && !list.contains(&known) {
-                list.push(known);
+            if differ(*before, *after) && !list.contains(&knowns[0]) {
+                list.extend(knowns);
             }
         }
     }
@@ -265,6 +321,15 @@ fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize]
     *x += nominal * draw.between(0.3, 1.0) * if draw.below(2) == 0 { 1.0 } else { -1.0 };
     if let Some(continuous) = &can.continuous {
         (continuous.settle)(&mut block.model);
+    }
+}
+
+/// Sets knowns to other allowed values: one alone, or about half of several.
+fn vary<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], knowns: &[usize], draw: &mut Draw) {
+    for &known in knowns {
+        if knowns.len() == 1 || draw.below(2) == 0 {
+            change(can, block, states, known, draw);
+        }
     }
 }
 

@@ -148,21 +148,22 @@ fn between_events() {
     }
 }
 
+/// An unknown that depends on one parameter is listed with all: one too many does no harm.
 #[test]
 fn at_the_start() {
     let description = Description::exported::<This>().unwrap();
     let known = [
-        ("x", Some("x_start")),
+        ("x", Some("fixed tunable x_start")),
         ("y", Some("")),
-        ("twice", Some("tunable")),
+        ("twice", Some("fixed tunable x_start")),
         ("through", Some("u")),
-        ("gated", Some("u on x_start")),
+        ("gated", Some("u on fixed tunable x_start")),
         ("tuned", Some("")),
         ("clock", Some("")),
         ("held", Some("u")),
-        ("sum", Some("k fixed x_start")),
+        ("sum", Some("k fixed tunable x_start")),
         ("der(y)", Some("")),
-        ("der(x)", Some("u k fixed x_start")),
+        ("der(x)", Some("u k fixed tunable x_start")),
         ("tunable", None),
     ];
     for (name, wanted) in known {
@@ -187,4 +188,62 @@ fn states_and_references() {
     let der = description.variable("der(x)").unwrap();
     assert_eq!((der.value_reference, der.derivative, der.causality), (19, Some(9), Causality::Local));
     assert_ne!(description.token, Description::of::<Known>().unwrap().token, "another interface is another token");
+}
+
+/// Each output adds an option to those that let the input act; the last one also needs a level in a narrow band.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Deep {
+    options: [bool; 8],
+    level: f64,
+    u: f64,
+    idle: f64,
+}
+
+type D = Row<Block<Deep>>;
+
+impl Model for Deep {
+    type Outputs = [f64; 8];
+    const INFO: Info = Info { name: "Deep", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        D::boolean_parameter("o0", "", |m| &mut m.model.options[0]),
+        D::boolean_parameter("o1", "", |m| &mut m.model.options[1]),
+        D::boolean_parameter("o2", "", |m| &mut m.model.options[2]),
+        D::boolean_parameter("o3", "", |m| &mut m.model.options[3]),
+        D::boolean_parameter("o4", "", |m| &mut m.model.options[4]),
+        D::boolean_parameter("o5", "", |m| &mut m.model.options[5]),
+        D::boolean_parameter("o6", "", |m| &mut m.model.options[6]),
+        D::boolean_parameter("o7", "", |m| &mut m.model.options[7]),
+        D::input("level", &ONE, "", |m| &mut m.model.level),
+        D::input("u", &ONE, "", |m| &mut m.model.u),
+        D::input("idle", &ONE, "", |m| &mut m.model.idle),
+        D::output("y0", &ONE, "", |m| &mut m.out[0]),
+        D::output("y1", &ONE, "", |m| &mut m.out[1]),
+        D::output("y2", &ONE, "", |m| &mut m.out[2]),
+        D::output("y3", &ONE, "", |m| &mut m.out[3]),
+        D::output("y4", &ONE, "", |m| &mut m.out[4]),
+        D::output("y5", &ONE, "", |m| &mut m.out[5]),
+        D::output("y6", &ONE, "", |m| &mut m.out[6]),
+        D::output("y7", &ONE, "", |m| &mut m.out[7]),
+    ];
+
+    fn initialize(&mut self) {}
+
+    fn output(&self, _: Elapsed, out: &mut [f64; 8]) {
+        for (k, y) in out.iter_mut().enumerate() {
+            let band = k < 7 || (30.0..50.0).contains(&self.level);
+            *y = if self.options[..=k].iter().all(|on| *on) && band { self.u } else { 0.0 };
+        }
+    }
+
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+#[test]
+fn behind_eight_options() {
+    let description = Description::of::<Deep>().unwrap();
+    let y = description.variable("y7").unwrap();
+    let found = names(&description, y.initial_dependencies.as_ref()).unwrap();
+    assert!(found.contains("level u") && !found.contains("idle"), "{found}");
 }

@@ -136,7 +136,7 @@ fn their_references_follow_all_others() {
     );
     let values = d.variable("map.values").unwrap();
     assert_eq!((values.shape.clone(), values.start.as_ref().unwrap().len()), (vec![SIDE, SIDE], SIZE));
-    assert_eq!(d.variable("sum").unwrap().initial_dependencies, Some(vec![SCALE, VALUES]));
+    assert_eq!(d.variable("sum").unwrap().initial_dependencies, Some(vec![SCALE, VALUES, MARKS]));
     assert_eq!(d.variable("der(x)").unwrap().dependencies, Some(vec![]), "the map is fixed");
     let alias = &d.variable("x").unwrap().aliases[0];
     assert_eq!((alias.name.as_str(), alias.display.as_ref().unwrap().0.as_str()), ("x_ft", "ft"));

@@ -12,6 +12,10 @@ use std::collections::{BTreeMap, BTreeSet};
 /// An entry: the number of the variable and those of its dependencies, `None` if they are unknown.
 type Unknown = (u32, Option<Vec<u32>>);
 
+/// A longer list of dependencies is omitted, which means that everything counts: a large table would repeat its parameters in
+/// thousands of lists.
+const LONGEST: usize = 1000;
+
 /// The model structure: outputs, derivatives of the states, initial unknowns, event indicators.
 pub(super) fn structure(description: &Description, version: FmiVersion) -> Element {
     let numbering = Numbering::of(description, version);
@@ -59,12 +63,9 @@ pub(super) fn structure(description: &Description, version: FmiVersion) -> Eleme
 
 fn unknown(element: &str, attribute: &str, (number, dependencies): &Unknown) -> Element {
     let list = |d: &Vec<u32>| d.iter().map(u32::to_string).collect::<Vec<_>>().join(" ");
-    // The only kind that is valid for every function of a parameter in initialization mode.
-    let kinds = |d: &Vec<u32>| vec!["dependent"; d.len()].join(" ");
-    Element::new(element)
-        .with(attribute, number.to_string())
-        .with_some("dependencies", dependencies.as_ref().map(list))
-        .with_some("dependenciesKind", dependencies.as_ref().filter(|d| !d.is_empty()).map(kinds))
+    // Without `dependenciesKind`, each of them is "dependent".
+    let listed = dependencies.as_ref().filter(|d| d.len() <= LONGEST);
+    Element::new(element).with(attribute, number.to_string()).with_some("dependencies", listed.map(list))
 }
 
 /// How the model structure numbers the variables.
