@@ -62,6 +62,10 @@ fn the_models_name_what_has_no_effect() {
         first::<PmsmDriveMean>(|_| ()),
         first::<SensorlessControllerClocked>(|_| ()),
         first::<PmsmDrive>(|m| (m.inputs.tau_load, m.inputs.speed_ref, m.inputs.u_dc) = (1.0, 30.0, 300.0)),
+        // What is set to 0 asks for nothing.
+        first::<SensorlessController>(|m| {
+            (m.parameters.estimator, m.parameters.zero_speed.i_0) = (Kind::EmfObserver, 0.0);
+        }),
     ] {
         assert!(quiet.is_empty(), "{quiet}");
     }

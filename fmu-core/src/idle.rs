@@ -2,7 +2,8 @@
 //! name.
 //!
 //! A model lists in [`Acts`] when its parameters and inputs act, and [`Model::idle`] evaluates the lists. A value that differs
-//! from the start value counts as set. [`Watch`] looks at the parameters once and at an input until it is set.
+//! from the start value counts as set, except a parameter set to 0 or false, which asks for nothing. [`Watch`] looks at the
+//! parameters once and at an input until it is set.
 
 use crate::row::Slot;
 use crate::table::Table;
@@ -75,8 +76,14 @@ fn find<M: Model>(
     (index, at_start): (usize, f64),
     found: &mut Vec<(&'static str, Vec<String>)>,
 ) -> bool {
-    let value = M::TABLE.entry(block, index).and_then(|(_, slot)| number(&slot));
-    if value.is_none_or(|value| value.to_bits() == at_start.to_bits()) {
+    let Some((meta, slot)) = M::TABLE.entry(block, index) else { return false };
+    let off = meta.causality == Causality::Parameter
+        && match &slot {
+            Slot::Real(x) => **x == 0.0,
+            Slot::Boolean(x) => !**x,
+            _ => false,
+        };
+    if off || number(&slot).is_none_or(|value| value.to_bits() == at_start.to_bits()) {
         return false;
     }
     let name = M::TABLE.locate(index).map(|(name, ..)| name).unwrap_or_default();
