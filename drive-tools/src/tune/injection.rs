@@ -33,7 +33,7 @@ const REVIEW: f64 = 0.17;
 const FACTOR: (f64, f64) = (0.25, 4.0);
 /// Minimum saliency: the noise of the sensors, 1 / 1500 of the maximum current, is then a tenth of the answer of the largest carrier.
 const LEAST_SALIENCY: f64 = 0.03;
-/// Carrier current as a share of the maximum current: sinusoidal and square wave.
+/// Injected current as a share of the maximum current: sinusoidal and square wave.
 const CURRENT: (f64, f64) = (0.02, 0.014);
 /// Maximum carrier voltage as a share of u_dc / sqrt(3).
 const VOLTAGE: (f64, f64) = (0.25, 0.5);
@@ -46,7 +46,7 @@ const PULSE: (f64, f64) = (0.22, 0.5);
 const DIFFERENCE: f64 = 0.1;
 
 /// A carrier: its settings and its voltage in V.
-pub type Carrier = (Vec<Setting>, f64);
+pub type Injected = (Vec<Setting>, f64);
 
 /// The machine as a carrier sees it.
 pub struct View {
@@ -88,7 +88,7 @@ impl View {
     }
 }
 
-fn carrier(view: &View) -> Carrier {
+fn carrier(view: &View) -> Injected {
     let w_h = TAU / (SAMPLES * view.T_s);
     let V = (CURRENT.0 * view.factor * view.i * w_h * view.L()).min(VOLTAGE.0 * view.U);
     let voltage =
@@ -96,28 +96,28 @@ fn carrier(view: &View) -> Carrier {
     (vec![voltage, real("carrier.frequency", w_h, "10 samples per period")], V)
 }
 
-fn square(name: &'static str, view: &View) -> Carrier {
+fn square(name: &'static str, view: &View) -> Injected {
     let V = (2.0 * CURRENT.1 * view.factor * view.i * view.L() / view.T_s).min(VOLTAGE.1 * view.U);
     (vec![real(name, V, "0.014 of the maximum current for a saliency of 0.17, at most u_dc / (2 sqrt(3))")], V)
 }
 
 /// Rotating injection.
-pub fn rotating(view: &View) -> Carrier {
+pub fn rotating(view: &View) -> Injected {
     carrier(view)
 }
 
 /// Pulsating injection.
-pub fn pulsating(view: &View) -> Carrier {
+pub fn pulsating(view: &View) -> Injected {
     carrier(view)
 }
 
 /// Square-wave injection.
-pub fn square_wave(view: &View) -> Carrier {
+pub fn square_wave(view: &View) -> Injected {
     square("square_wave.voltage", view)
 }
 
 /// Injection near the PWM frequency.
-pub fn near_pwm(view: &View) -> Carrier {
+pub fn near_pwm(view: &View) -> Injected {
     square("near_pwm.voltage", view)
 }
 
@@ -147,7 +147,7 @@ fn reach(motor: &MotorFile, view: &View, V: f64, most: f64) -> f64 {
 pub fn settings(
     motor: &MotorFile,
     bandwidths: &Bandwidths,
-    carrier: impl Fn(&View) -> Carrier,
+    carrier: impl Fn(&View) -> Injected,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Setting>> {
     let view = View::of(motor, bandwidths)?;
@@ -184,7 +184,7 @@ fn reached(motor: &MotorFile, view: &View, V: f64) -> Result<f64> {
 ///
 /// # Errors
 /// As [`settings`].
-pub fn highest(motor: &MotorFile, bandwidths: &Bandwidths, carrier: impl Fn(&View) -> Carrier) -> Result<f64> {
+pub fn highest(motor: &MotorFile, bandwidths: &Bandwidths, carrier: impl Fn(&View) -> Injected) -> Result<f64> {
     let view = View::of(motor, bandwidths)?;
     reached(motor, &view, carrier(&view).1)
 }

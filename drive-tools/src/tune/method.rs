@@ -116,7 +116,7 @@ fn handed_over(data: &Data) -> (f64, &'static str) {
 /// Those of [`settings`].
 pub fn highest(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths) -> Result<Option<f64>> {
     let of =
-        |carrier: fn(&injection::View) -> injection::Carrier| injection::highest(motor, bandwidths, carrier).map(Some);
+        |carrier: fn(&injection::View) -> injection::Injected| injection::highest(motor, bandwidths, carrier).map(Some);
     match estimator {
         Kind::RotatingInjection => of(injection::rotating),
         Kind::PulsatingInjection => of(injection::pulsating),

@@ -15,7 +15,7 @@
 use super::bandwidth::Bandwidths;
 use super::check::check;
 use super::motor::{Data, Located, MotorFile, estimators, swing};
-use super::setting::{LEVELS, Refusal, Setting, Suited, Tuned, Value, given, real, set};
+use super::setting::{LEVELS, Setting, Suited, Tuned, Unsuited, Value, given, real, set};
 use super::voltage::{self, Voltage};
 use super::{adaptation, flux_map, iron, losses, method, plausible, rasmussen, saturation};
 use crate::error::{Error, Result, bail};
@@ -37,7 +37,7 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
 /// # Errors
 /// Those of [`tune`].
 pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
-    of(motor, estimator(motor)?)?.map_err(|Refusal { reason, .. }| Error::new(reason))
+    of(motor, estimator(motor)?)?.map_err(|Unsuited { reason, .. }| Error::new(reason))
 }
 
 /// The values for an `estimator` instead of that of the file, or why the machine does not suit it.
@@ -67,7 +67,7 @@ fn tried(data: &Data, fixed: Tuned) -> Tuned {
 }
 
 /// The values for this estimator; the outer error is that of the file, the inner one of the estimator.
-fn of(motor: &MotorFile, estimator: Kind) -> Result<Result<Tuned, Refusal>> {
+fn of(motor: &MotorFile, estimator: Kind) -> Result<Result<Tuned, Unsuited>> {
     let data = &motor.data;
     let plant = plant(data);
     let bandwidths = Bandwidths::of(data, estimator);
@@ -77,7 +77,7 @@ fn of(motor: &MotorFile, estimator: Kind) -> Result<Result<Tuned, Refusal>> {
     ratings(motor)?;
     plausible::check(motor)?;
     saturation::check(motor)?;
-    let refused = |error: Error| Refusal { estimator, reason: error.to_string() };
+    let refused = |error: Error| Unsuited { estimator, reason: error.to_string() };
     Ok(suits(motor, estimator, &bandwidths, (plant, controller)).map_err(refused))
 }
 

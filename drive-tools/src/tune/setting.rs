@@ -40,12 +40,12 @@ pub enum Suited {
     /// The values.
     Tuned(Box<Tuned>),
     /// The machine does not suit the estimator.
-    Refused(Refusal),
+    Refused(Unsuited),
 }
 
 /// Why a machine does not suit an estimator.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Refusal {
+pub struct Unsuited {
     /// The estimator.
     pub estimator: Kind,
     /// The reason with its numbers, what was expected, and the remedy.
