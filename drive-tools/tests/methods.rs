@@ -97,9 +97,8 @@ fn every_method_on_every_machine() {
 #[test]
 fn methods_of_every_family_hold_their_machines() {
     for (name, kinds) in [
-        ("reference", &[Kind::FluxObserver, Kind::VoltageModel, Kind::Sensored][..]),
-        ("ipmsm-2.2kw", &[Kind::KalmanFilter, Kind::SquareWaveInjection, Kind::Hybrid]),
-        ("traction-60kw", &[Kind::GradientObserver, Kind::SlidingMode]),
+        ("reference", &[Kind::VoltageModel, Kind::EmfObserver][..]),
+        ("ipmsm-2.2kw", &[Kind::SlidingMode, Kind::PulsatingInjection, Kind::Hybrid, Kind::Sensored]),
     ] {
         for &kind in kinds {
             match cell(&read(name), kind, 2) {
