@@ -245,7 +245,7 @@ fn the_estimator_of_the_command_line_counts() {
         let said = String::from_utf8(refused.stderr).unwrap();
         assert_eq!(refused.status.code(), Some(2), "{said}");
         assert!(
-            said.contains("estimator Luenberger: fmu tune has no rules for it; choose Rasmussen or ExtendedEmf"),
+            said.contains("estimator Luenberger: is not an estimator; choose one of Rasmussen, DirectEmf, EmfObserver"),
             "{said}"
         );
         assert!(!out.exists() && refused.stdout.is_empty());

@@ -5,7 +5,7 @@ use crate::ssv;
 use anyhow::{Result, anyhow};
 use clap::Args;
 use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
-use drive_tools::tune::motor::{MotorFile, torque_constant};
+use drive_tools::tune::motor::{MotorFile, estimators, torque_constant};
 use drive_tools::tune::setting::{Setting, Tuned, Value};
 use drive_tools::tune::trial::{self, Trial};
 use drive_tools::tune::{self, limits, remedy, rules};
@@ -58,12 +58,17 @@ pub struct Tune {
     /// Print the values as JSON, a dictionary for each FMU, and nothing else; enumerations are integers, as FMPy expects
     #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
     pub json: bool,
-    /// Estimator to tune for, instead of that of the motor file: Rasmussen or ExtendedEmf
-    #[arg(long, value_name = "NAME")]
+    /// Estimator to tune for, instead of that of the motor file
+    #[arg(long, value_name = "NAME", long_help = estimator_help())]
     pub estimator: Option<String>,
     /// Print the trial: starts from 24 angles at each speed, loads carried, minimum speed, maximum angle error
     #[arg(long)]
     pub check: bool,
+}
+
+/// The help of --estimator: the names of all.
+fn estimator_help() -> String {
+    format!("Estimator to tune for, instead of that of the motor file: {}", estimators())
 }
 
 /// The motor file of --example.

@@ -3,18 +3,18 @@
 //! - T_s: the longest of 100, 50, 25 and 12.5 us that gives at least 12 samples per electrical period at the highest speed. A
 //!   voltage that is held for a sample turns by 30 deg there against the rotor, a loss of 1.1 %, and the command,
 //!   which acts 1.5 samples later on average, is turned ahead by 45 deg. The poles of the EMF observer get as many samples.
-//! - Observer: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2 = 0.35 rad at
-//!   most. Rasmussen's observer: that of the maximum current, and 300 rad/s at least; the tracker of the extended EMF: that
+//! - Observer, the target of every method: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2
+//!   = 0.35 rad at most. Flux observers: that of the maximum current, and 300 rad/s at least; all others: that
 //!   of 1.6 times the rated torque, the limit, and 2 pi 20 rad/s at least.
 //! - Speed: a step of the torque T makes the speed dip by 2/e T / (J w_s), with a double pole at w_s / 2. The dip should be at
-//!   most 0.05 pu; w_s is at least 40 rad/s (Rasmussen) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up
-//!   to a limit; with the extended EMF, less where the gain through the change of i_q would be high
+//!   most 0.05 pu; w_s is at least 40 rad/s (flux observers) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up
+//!   to a limit, or a fifth of the current loop (Sensored); with a back EMF, less where the gain through the change of i_q would be high
 //!   ([`limits`](super::limits)).
-//! - Current: 2 pi 250 rad/s (Rasmussen); 2 pi 200 rad/s with the I-f start, and 2/3 of the stable limit at most.
+//! - Current: 2 pi 250 rad/s (flux observers); 2 pi 200 rad/s for all others, and 2/3 of the stable limit at most.
 
 use super::motor::{Data, Located, torque_constant};
 use super::setting::{LEVELS, Setting, Value};
-use drive::estimator::Kind;
+use drive::estimator::{Class, Kind};
 use fmu_core::digits::rounded;
 use std::f64::consts::{E, TAU};
 
@@ -29,6 +29,9 @@ const DIP: f64 = 0.05;
 
 /// Gain of the speed loop through the EMF caused by a change of i_q, see [`limits`](super::limits): the limit of the rules.
 const CALM: f64 = 0.6 * GREATEST_GAIN;
+
+/// Minimum ratio of the current loop's bandwidth to that of the speed loop, with a sensor.
+const CURRENT_PER_SPEED: f64 = 5.0;
 
 /// A value and its origin.
 #[derive(Clone, Debug)]
@@ -68,23 +71,26 @@ pub struct Bandwidths {
 }
 
 impl Bandwidths {
-    /// The given ones, or those of the rules for this estimator, Rasmussen's or the extended EMF.
+    /// The given ones, or those of the rules for this estimator.
     pub fn of(data: &Data, estimator: Kind) -> Self {
-        let rasmussen = estimator == Kind::Rasmussen;
+        let class = estimator.class();
+        let (flux, sensored) = (class == Class::FluxObserver, class == Class::Sensored);
+        let emf = matches!(class, Class::BackEmf | Class::Hybrid);
         let (given, machine) = (&data.bandwidth, &data.machine);
         let n_p = f64::from(*machine.n_p.get_ref());
         let needed = DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref());
-        let wanted = needed.max(if rasmussen { 40.0 } else { TAU * 5.0 });
+        let wanted = needed.max(if flux { 40.0 } else { TAU * 5.0 });
         let tracker = || {
             Chosen::new(given.observer.as_ref(), "follows the greatest torque, at least 2 pi 20 rad/s", || {
                 let least = 1.1 * (n_p * GREATEST_TORQUE * acceleration(data) / 0.35).sqrt();
                 // With w_s = rho / 3, this bounds the gain.
-                let calm = (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt();
+                let calm = if emf { (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt() } else { f64::INFINITY };
                 least.max(TAU * 20.0).max((3.0 * wanted).min(TAU * 40.0).min(calm))
             })
         };
-        let tracker = (!rasmussen).then(tracker);
-        let fastest = tracker.as_ref().map_or(0.0, |rho| EMF_PER_TRACKER * rho.value).max(n_p * data.rating.top());
+        let tracker = (!flux).then(tracker);
+        let observed = tracker.as_ref().filter(|_| !sensored).map_or(0.0, |rho| EMF_PER_TRACKER * rho.value);
+        let fastest = observed.max(n_p * data.rating.top());
         let rule = "12 samples or more per electrical period and per period of the EMF observer";
         let T_s = Chosen::new(data.control.T_s.as_ref(), rule, || {
             PERIODS.into_iter().find(|T_s| TAU / (fastest * T_s) >= SAMPLES).unwrap_or(PERIODS[3])
@@ -94,12 +100,22 @@ impl Bandwidths {
                 (1.05 * least_observer(data)).max(300.0).max((3.0 * wanted).min(600.0 * PERIODS[0] / T_s.value))
             })
         });
-        let calm = if rasmussen { f64::INFINITY } else { CALM / gain_per_bandwidth(data, observer.value) };
-        let chosen = wanted.min(observer.value / 3.0).min(calm);
-        let why = if chosen < wanted.min(observer.value / 3.0) {
+        let current = if flux {
+            Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
+        } else {
+            Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {
+                let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
+                let stable = (0.5 * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
+                if sensored { TAU * 200.0 } else { (TAU * 200.0).min(stable / 1.5) }
+            })
+        };
+        let calm = if emf { CALM / gain_per_bandwidth(data, observer.value) } else { f64::INFINITY };
+        let most = if sensored { current.value / CURRENT_PER_SPEED } else { observer.value / 3.0 };
+        let chosen = wanted.min(most).min(calm);
+        let why = if chosen < wanted.min(most) {
             "what the gain through the change of i_q allows"
         } else if chosen < wanted {
-            "a third of the observer"
+            if sensored { "a fifth of the current loop" } else { "a third of the observer" }
         } else if chosen > needed {
             "the minimum"
         } else {
@@ -108,15 +124,6 @@ impl Bandwidths {
         let dip = rounded(DIP * needed / chosen, 2);
         let rule = format!("{why}: with an exact estimate, a step of the rated torque takes {dip} pu off the speed");
         let speed = Chosen::new(given.speed.as_ref(), &rule, || chosen);
-        let current = if rasmussen {
-            Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
-        } else {
-            Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {
-                let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
-                let stable = (0.5 * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
-                (TAU * 200.0).min(stable / 1.5)
-            })
-        };
         Self { T_s, current, speed, observer }
     }
 }

@@ -18,8 +18,9 @@ use super::rasmussen::{LEAST_MARGIN, resistance_margin};
 use super::remedy::{self, Cure, What};
 use super::setting::Tuned;
 use super::trial::Trial;
+use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
-use drive::estimator::Kind;
+use drive::estimator::{Class, Kind};
 use fmu_core::digits::rounded;
 use std::fmt;
 
@@ -138,8 +139,13 @@ fn of_start(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
         );
     }
     let gain = gain_per_bandwidth(data, par.estimators.tracker.bandwidth) * par.speed_loop.bandwidth;
-    if gain <= GREATEST_GAIN {
-        return format!("{from}the speed does not settle at its reference after the I-f start");
+    if par.estimator.class() != Class::BackEmf || gain <= GREATEST_GAIN {
+        let after = match par.start.mode {
+            StartMode::Direct => "",
+            StartMode::CurrentFrequency => " after the I-f start",
+            StartMode::Injection => " after the start by injection",
+        };
+        return format!("{from}the speed does not settle at its reference{after}");
     }
     format!(
         "{from}the speed loop acts on the estimate through (L_q - L_d) p i_q with the gain J w_s (L_q - L_d) rho^2 / (K n_p w \

@@ -1,21 +1,26 @@
 //! From a machine and bandwidths to parameter values of the FMUs.
 //!
 //! - [`motor`]: the TOML file of a machine. [`plausible`] checks its values, [`saturation`] its saturation.
-//! - [`rules`]: how values ([`setting`]) follow from the file: [`bandwidth`] for the loops, [`rasmussen`] and [`extended_emf`] for
-//!   the estimators, [`adaptation`] for the resistance, [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag
-//!   test, [`flux_map`] for a map from a table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
+//! - [`rules`]: how values ([`setting`]) follow from the file: [`bandwidth`] and [`loops`] for the loops, [`method`] for the
+//!   estimators ([`rasmussen`], [`flux_observer`], [`back_emf`], [`injection`]), [`adaptation`] for the resistance,
+//!   [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test,
+//!   [`flux_map`] for a map from a table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
 //!   compares them with the variables of the models; [`Tuned::pair`] is the native drive with these values.
 //! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: the conditions
 //!   that it cannot hold, and why. [`remedy`]: what helps.
 
 pub mod adaptation;
+pub mod back_emf;
 pub mod bandwidth;
 pub mod check;
-pub mod extended_emf;
 pub mod flux_map;
+pub mod flux_observer;
+pub mod injection;
 pub mod iron;
 pub mod limits;
+pub mod loops;
 pub mod losses;
+pub mod method;
 pub mod motor;
 mod native;
 pub mod pace;

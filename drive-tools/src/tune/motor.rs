@@ -7,9 +7,6 @@ use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use toml::Spanned;
 
-/// Estimators that the rules tune.
-pub const RULED: [Kind; 2] = [Kind::Rasmussen, Kind::ExtendedEmf];
-
 /// A number of the file with its position.
 pub type Located = Spanned<f64>;
 
@@ -211,10 +208,15 @@ pub struct Temperature {
 #[serde(deny_unknown_fields)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
 pub struct Control {
-    /// Estimator: Rasmussen or ExtendedEmf.
+    /// Estimator, by its name.
     pub estimator: Option<Spanned<String>>,
     /// Sample period in s.
     pub T_s: Option<Located>,
+}
+
+/// The names of all estimators.
+pub fn estimators() -> String {
+    Kind::ALL.iter().map(|kind| kind.name()).collect::<Vec<_>>().join(", ")
 }
 
 /// Torque constant K = 1.5 n_p psi_M in N.m/A.
@@ -266,11 +268,10 @@ impl MotorFile {
     /// Tunes for this estimator instead of the file's.
     ///
     /// # Errors
-    /// There are no rules for it.
+    /// There is none of this name.
     pub fn choose(&mut self, estimator: &str) -> Result<()> {
-        if !RULED.iter().any(|kind| kind.name() == estimator) {
-            let known = RULED.map(Kind::name).join(" or ");
-            bail!("estimator {estimator}: fmu tune has no rules for it; choose {known}");
+        if !Kind::ALL.iter().any(|kind| kind.name() == estimator) {
+            bail!("estimator {estimator}: is not an estimator; choose one of {}", estimators());
         }
         self.data.control.estimator = Some(Spanned::new(0..0, estimator.to_owned()));
         Ok(())

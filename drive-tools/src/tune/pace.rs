@@ -2,8 +2,8 @@
 //!
 //! - **Speed loop.** s^2 + w_s s + w_s^2 / t_is = 0; with t_is = 4, a double pole at w_s / 2.
 //! - **Observer.** Rasmussen's flux poles at the electrical speed w: s^2 + c_1 s + w^2 = 0, so 2 / c_1 above w = c_1 / 2 and
-//!   about c_1 / w^2 below, where the back EMF carries little information; its speed adaptation: a double pole at w_n. The
-//!   tracker of the extended EMF: a double pole at rho.
+//!   about c_1 / w^2 below, where the back EMF carries little information; its speed adaptation: a double pole at w_n. A
+//!   tracker: a double pole at rho.
 //! - **Mechanics.** J w / T, the time in which the rated torque accelerates the rotor to its speed. A load tau_L moves the
 //!   rotor of a lost drive by the rated speed in either direction: J w / T with the rated speed. The torque in excess of the
 //!   load recovers the dip 2/e tau_L / (J w_s) in 2/e tau_L / (w_s (tau_max - tau_L)).
@@ -34,11 +34,16 @@ impl Pace {
         let par = &pair.controller.model.parameters;
         let (speed_loop, estimators) = (&par.speed_loop, &par.estimators);
         let w = f64::from(par.motor.n_p) * level * tuned.speed;
-        let observer = if par.estimator == Kind::Rasmussen {
-            let rasmussen = &estimators.rasmussen;
-            slowest(rasmussen.c_1, w * w).max(1.0 / rasmussen.w_n)
-        } else {
-            1.0 / estimators.tracker.bandwidth
+        let observer = match par.estimator {
+            Kind::Rasmussen => {
+                let rasmussen = &estimators.rasmussen;
+                slowest(rasmussen.c_1, w * w).max(1.0 / rasmussen.w_n)
+            }
+            // Both poles of the angle are at half of the gain.
+            Kind::VoltageModel | Kind::CurrentModel => 2.0 / estimators.matsui.bandwidth,
+            Kind::KalmanFilter => 1.0 / tuned.observer,
+            Kind::Sensored => 0.0,
+            _ => 1.0 / estimators.tracker.bandwidth,
         };
         let spare = (pair.controller.out.tau_max - load).max(LEAST_SPARE * load);
         let back = if load > 0.0 { DIP_OF_A_STEP * load / (speed_loop.bandwidth * spare) } else { 0.0 };

@@ -107,7 +107,7 @@ impl Cure {
 /// kind. With them, the drive still holds everything that it held in `trials`.
 pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, what: What) -> Vec<Cure> {
     let speed = tuned.real("speed_loop.bandwidth").unwrap_or_default();
-    let observer = tuned.real("rasmussen.w_n").or_else(|| tuned.real("tracker.bandwidth")).unwrap_or_default();
+    let observer = tuned.observer;
     let J = *motor.data.mechanics.J.get_ref();
     let first = |cures: &[Cure]| cures.iter().copied().find(|cure| helps(motor, tuned, trials, (trial, what), cure));
     let each = |factors: &[f64], cure: &dyn Fn(f64) -> Cure| factors.iter().map(|&x| cure(x)).collect::<Vec<_>>();
@@ -139,8 +139,7 @@ pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, 
 
 /// A lower bandwidth of the speed loop that ends the swings of a drive without a load, with no loss of what it held before.
 pub fn calm(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> Option<Cure> {
-    let (speed, observer) = (tuned.real("speed_loop.bandwidth")?, tuned.real("rasmussen.w_n"));
-    let observer = observer.or_else(|| tuned.real("tracker.bandwidth"))?;
+    let (speed, observer) = (tuned.real("speed_loop.bandwidth")?, tuned.observer);
     let each = [0.7, 0.5, 0.35, 0.25].map(|x| Cure::Bandwidths { speed: short(x * speed), observer: short(observer) });
     each.into_iter().find(|cure| {
         let holds = |(tuned, task): (Tuned, Task), old: &Trial| {

@@ -1,8 +1,8 @@
 //! The rules that derive parameter values from machine data and bandwidths.
 //!
-//! The rules choose Rasmussen's observer ([`rasmussen`]), which holds standstill, for a machine without saliency (L_q
-//! within a tenth of L_d), and the extended EMF with an I-f start ([`extended_emf`]) for a salient one. T_s and the bandwidths:
-//! [`bandwidth`](super::bandwidth); field weakening: [`voltage`].
+//! Without an estimator in the file, they choose Rasmussen's observer ([`rasmussen`]), which holds standstill, for a machine without
+//! saliency (L_q within a tenth of L_d), and the extended EMF with an I-f start for a salient one. What each estimator gets:
+//! [`method`]. T_s and the bandwidths: [`bandwidth`](super::bandwidth); field weakening: [`voltage`].
 //!
 //! Throughout, K = 1.5 n_p psi_M is the torque constant (torque per ampere of i_q), and currents are peak values.
 //!
@@ -14,31 +14,22 @@
 
 use super::bandwidth::Bandwidths;
 use super::check::check;
-use super::iron;
-use super::motor::{Data, Located, MotorFile, RULED, swing};
-use super::setting::{Setting, Tuned, Value, given, real, set};
+use super::motor::{Data, Located, MotorFile, estimators, swing};
+use super::setting::{LEVELS, Setting, Suited, Tuned, Unsuited, Value, given, real, set};
 use super::voltage::{self, Voltage};
-use super::{adaptation, extended_emf, flux_map, losses, plausible, rasmussen, saturation};
+use super::{adaptation, flux_map, iron, losses, method, plausible, rasmussen, saturation};
 use crate::error::{Error, Result, bail};
 use drive::control::tables::ControllerParameters;
-use drive::estimator::Kind;
+use drive::estimator::{Class, Kind};
 use fmu_core::digits::rounded;
 use std::f64::consts::TAU;
 
 /// Derives the values.
 ///
 /// # Errors
-/// Inconsistent values, with their position and a remedy.
+/// Inconsistent values, with their position and a remedy; or the machine does not suit the estimator.
 pub fn tune(motor: &MotorFile) -> Result<Tuned> {
-    let mut tuned = adaptation::chosen(&motor.data, fixed(motor)?);
-    let waits = tuned.pair().controller.model.parameters.estimators.adaptation.resistance;
-    if tuned.rest > REST && !waits {
-        tuned.notes.push(format!(
-            "keep speed_ref at 0 for the first {:.2} s: the rotor turns to the current that holds standstill",
-            tuned.rest
-        ));
-    }
-    Ok(tuned)
+    Ok(tried(&motor.data, fixed(motor)?))
 }
 
 /// Derives the values of a drive that does not adapt the resistance.
@@ -46,18 +37,59 @@ pub fn tune(motor: &MotorFile) -> Result<Tuned> {
 /// # Errors
 /// Those of [`tune`].
 pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
+    of(motor, estimator(motor)?)?.map_err(|Unsuited { reason, .. }| Error::new(reason))
+}
+
+/// The values for an `estimator` instead of that of the file, or why the machine does not suit it.
+///
+/// # Errors
+/// The file is wrong for every estimator.
+pub fn suited(motor: &MotorFile, estimator: Kind) -> Result<Suited> {
+    let mut motor = motor.clone();
+    motor.choose(estimator.name())?;
+    Ok(match of(&motor, estimator)? {
+        Ok(fixed) => Suited::Tuned(Box::new(tried(&motor.data, fixed))),
+        Err(refusal) => Suited::Refused(refusal),
+    })
+}
+
+/// The drive with what trials decide, and the notes of its start.
+fn tried(data: &Data, fixed: Tuned) -> Tuned {
+    let mut tuned = adaptation::chosen(data, fixed);
+    let waits = tuned.pair().controller.model.parameters.estimators.adaptation.resistance;
+    if tuned.rest > REST && !waits {
+        tuned.notes.push(format!(
+            "keep speed_ref at 0 for the first {:.2} s: the rotor turns to the current that holds standstill",
+            tuned.rest
+        ));
+    }
+    tuned
+}
+
+/// The values for this estimator; the outer error is that of the file, the inner one of the estimator.
+fn of(motor: &MotorFile, estimator: Kind) -> Result<Result<Tuned, Unsuited>> {
     let data = &motor.data;
-    let mut plant = plant(data);
-    let estimator = estimator(motor)?;
-    let mut notes = Vec::new();
+    let plant = plant(data);
     let bandwidths = Bandwidths::of(data, estimator);
-    let mut controller = common(data, &bandwidths, estimator);
+    let controller = common(data, &bandwidths, estimator);
     // Check the given values before computing anything from them.
     check(&plant, &controller, motor)?;
     ratings(motor)?;
     plausible::check(motor)?;
     saturation::check(motor)?;
-    fits(motor, &bandwidths, &mut notes)?;
+    let refused = |error: Error| Unsuited { estimator, reason: error.to_string() };
+    Ok(suits(motor, estimator, &bandwidths, (plant, controller)).map_err(refused))
+}
+
+/// The values for this estimator, given those of the plant and those of every estimator.
+fn suits(
+    motor: &MotorFile,
+    estimator: Kind,
+    bandwidths: &Bandwidths,
+    (mut plant, mut controller): (Vec<Setting>, Vec<Setting>),
+) -> Result<Tuned> {
+    let (data, mut notes) = (&motor.data, Vec::new());
+    fits(motor, estimator, bandwidths, &mut notes)?;
     plant.extend(iron::fit(motor)?);
     plant.extend(losses::settings(motor, bandwidths.T_s.value)?);
     controller.extend(losses::compensation(motor, estimator));
@@ -67,30 +99,40 @@ pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
         plant.extend(fitted.settings.iter().cloned());
         notes.extend(fitted.notes.iter().cloned());
     }
-    let rasmussen = estimator == Kind::Rasmussen;
-    if rasmussen {
-        controller.extend(rasmussen::settings(motor, &bandwidths, &mut notes)?);
-    } else {
-        controller.extend(extended_emf::settings(data, &bandwidths, &mut notes));
+    controller.extend(method::settings(motor, estimator, bandwidths, &mut notes)?);
+    let class = estimator.class();
+    let Voltage { settings, top_torque } =
+        voltage::of(motor, estimator != Kind::Rasmussen, method::voltage_share(estimator), &mut notes)?;
+    if class != Class::Injection && !settings.is_empty() {
+        controller.extend(settings);
+        method::weaken(motor, estimator, &mut controller, &mut notes)?;
     }
-    let Voltage { settings, top_torque } = voltage::of(motor, !rasmussen, &mut notes)?;
-    controller.extend(settings);
     let least = |i| saturation::least_inductance(data, fitted.as_ref(), i);
-    cap_current_loop(data, &bandwidths, least, &mut controller, &mut notes);
+    cap_current_loop(data, bandwidths, least, &mut controller, &mut notes);
     check(&plant, &controller, motor)?;
     // 5 / w_0: five periods of the swing, which the observer damps, over 2 pi.
-    let rest = if rasmussen { (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST) } else { 0.0 };
+    let rest = match class {
+        Class::FluxObserver => (5.0 / swing(data, rasmussen::zero_speed_current(data))).max(REST),
+        _ => 0.0,
+    };
     let (speed, torque) = (*data.rating.speed.get_ref(), *data.rating.torque.get_ref());
+    let (levels, top) = match method::highest(motor, estimator, bandwidths)? {
+        Some(highest) => (vec![highest], highest * speed),
+        None => (LEVELS.to_vec(), data.rating.top()),
+    };
     let tuned = Tuned {
         name: data.name.clone(),
+        estimator,
         source: data.source.clone(),
         plant,
         controller,
         notes,
         speed,
         torque,
-        top: data.rating.top(),
+        top,
         top_torque,
+        levels,
+        observer: bandwidths.observer.value,
         rest,
     };
     tuned
@@ -109,10 +151,10 @@ fn estimator(motor: &MotorFile) -> Result<Kind> {
     let Some(given) = &motor.data.control.estimator else {
         return Ok(if salient { Kind::ExtendedEmf } else { Kind::Rasmussen });
     };
-    let known = RULED.into_iter().find(|kind| kind.name() == given.get_ref());
+    let known = Kind::ALL.iter().copied().find(|kind| kind.name() == given.get_ref());
     known.ok_or_else(|| {
         let (place, name) = (motor.place(given), given.get_ref());
-        Error::new(format!("{place}: there are no rules for {name}: choose Rasmussen or ExtendedEmf, or leave it out"))
+        Error::new(format!("{place}: {name} is not an estimator: choose one of {}, or leave it out", estimators()))
     })
 }
 
@@ -197,10 +239,10 @@ fn ratings(motor: &MotorFile) -> Result<()> {
 const LEAST_SAMPLES: f64 = 10.0;
 
 /// Checks bandwidths and sample period, for every estimator.
-fn fits(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
+fn fits(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<()> {
     let Data { machine, rating, .. } = &motor.data;
     let (w_s, w_o) = (bandwidths.speed.value, bandwidths.observer.value);
-    if w_s > w_o / 3.0 * (1.0 + 1e-9) {
+    if estimator != Kind::Sensored && w_s > w_o / 3.0 * (1.0 + 1e-9) {
         let place = motor.place_at(bandwidths.speed.origin.or(bandwidths.observer.origin).unwrap_or_default());
         bail!(
             "{place}: bandwidth.speed = {w_s} rad/s is more than a third of bandwidth.observer = {w_o} rad/s: lower the former or raise the latter"

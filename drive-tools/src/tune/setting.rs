@@ -1,8 +1,9 @@
 //! The values of both FMUs, each with its rule, and the machine data for a trial.
 
 use super::motor::Located;
+use drive::estimator::Kind;
 
-/// Speeds in pu at which every drive is tried, in addition to its highest speed.
+/// Speeds in pu at which every drive is tried that reaches them, in addition to its highest speed.
 pub const LEVELS: [f64; 3] = [0.1, 0.5, 1.0];
 
 /// A value for a variable.
@@ -33,11 +34,31 @@ pub struct Setting {
     pub origin: Option<usize>,
 }
 
+/// What the rules give for a machine and an estimator.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Suited {
+    /// The values.
+    Tuned(Box<Tuned>),
+    /// The machine does not suit the estimator.
+    Refused(Unsuited),
+}
+
+/// Why a machine does not suit an estimator.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unsuited {
+    /// The estimator.
+    pub estimator: Kind,
+    /// The reason with its numbers, what was expected, and the remedy.
+    pub reason: String,
+}
+
 /// Values of both FMUs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tuned {
     /// Name of the machine.
     pub name: String,
+    /// The estimator.
+    pub estimator: Kind,
     /// Source of its data.
     pub source: String,
     /// Values of `PmsmPlant`.
@@ -54,6 +75,10 @@ pub struct Tuned {
     pub top: f64,
     /// Load in N.m at the highest speed.
     pub top_torque: f64,
+    /// Speeds in pu at which a trial applies the rated torque as a step.
+    pub levels: Vec<f64>,
+    /// Target of the observer or tracker in rad/s.
+    pub observer: f64,
     /// Time in s at rest before the first speed reference, in which the rotor aligns itself.
     pub rest: f64,
 }

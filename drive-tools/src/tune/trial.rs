@@ -10,7 +10,7 @@
 //! may persist on the way down. [`at_temperature`] runs the drive with a colder or hotter machine than its values assume.
 
 use super::pace::{Begin, Pace};
-use super::setting::{LEVELS, Setting, Tuned, Value, real};
+use super::setting::{Setting, Tuned, Value, real};
 use crate::queue;
 use drive::Pair;
 use drive::math::wrap;
@@ -55,7 +55,7 @@ impl Tuned {
         let task = |level, torque| Task { level, torque, rise: 0.0 };
         let top = self.top / self.speed;
         let highest = (top > 1.0).then(|| task(top, self.top_torque));
-        LEVELS.map(|level| task(level, self.torque)).into_iter().chain(highest).collect()
+        self.levels.iter().map(|&level| task(level, self.torque)).chain(highest).collect()
     }
 }
 
@@ -76,6 +76,8 @@ pub struct Trial {
     pub error: f64,
     /// Maximum torque in N.m that the controller allows at this speed.
     pub most: f64,
+    /// Number of the runs that failed while `lock_lost` stayed below 1.
+    pub silent: u32,
 }
 
 impl Trial {
@@ -104,6 +106,8 @@ struct Run {
     least: f64,
     error: f64,
     most: f64,
+    /// Maximum `lock_lost`.
+    lock: f64,
 }
 
 /// Speed and angle error in a part of the window.
@@ -161,6 +165,8 @@ struct Bench<'a> {
     T_s: f64,
     /// Samples so far.
     k: u32,
+    /// Maximum `lock_lost` so far.
+    lock: f64,
 }
 
 impl Bench<'_> {
@@ -174,6 +180,7 @@ impl Bench<'_> {
         self.pair.set_inputs(level * self.tuned.speed, torque, self.u_dc);
         self.pair.step(self.T_s).ok()?;
         self.k += 1;
+        self.lock = self.lock.max(self.pair.controller.out.lock_lost);
         let ahead = wrap(self.pair.plant.out.theta_e - self.pair.controller.out.theta_est);
         Some((self.pair.plant.out.speed / self.tuned.speed, ahead.to_degrees()))
     }
@@ -229,17 +236,17 @@ impl Bench<'_> {
 
 /// One run from the electrical angle `theta` (rad).
 fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
-    let mut run = Run { started: false, held: false, least: f64::INFINITY, error: 0.0, most: f64::INFINITY };
+    let mut run = Run { started: false, held: false, least: f64::INFINITY, error: 0.0, most: f64::INFINITY, lock: 0.0 };
     let mut pair = tuned.pair();
     pair.plant.model.parameters.initial.theta_e = theta;
     if pair.start().is_err() {
         return run;
     }
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
-    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0 };
+    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 };
     run.started = bench.starts(task.level);
     if !run.started {
-        return run;
+        return Run { lock: bench.lock, ..run };
     }
     let most = bench.pair.controller.out.tau_max;
     let load = |t: f64| if t < task.rise { task.torque * t / task.rise } else { task.torque };
@@ -248,7 +255,7 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
         least = least.min(speed);
         error = error.max(angle.abs());
     });
-    Run { least, error, most, ..run }
+    Run { least, error, most, lock: bench.lock, ..run }
 }
 
 /// Number of speeds between 0 and the rated one at which a drive without a load is tried for swings.
@@ -310,11 +317,11 @@ pub fn swings(tuned: &Tuned) -> Vec<Swing> {
     if pair.start().is_err() {
         return all;
     }
-    let first = 1.0 / f64::from(STAIRS);
+    let first = tuned.levels.iter().fold(0.0, |a: f64, &b| a.max(b)) / f64::from(STAIRS);
     let par = &pair.controller.model.parameters;
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, par.T_s);
     let least = [SWING[0], SWING[1] * par.limit.i, SWING[2] * tuned.torque * tuned.speed];
-    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0 };
+    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 };
     if !bench.starts(first) {
         return all;
     }
@@ -369,11 +376,20 @@ pub fn all(tuned: &Tuned, angles: u32) -> Vec<Trial> {
 pub fn at(tuned: &Tuned, task: &Task, angles: u32) -> Trial {
     let starts: Vec<f64> = (0..angles).map(|k| f64::from(k) * TAU / f64::from(angles)).collect();
     let runs = queue::map(&starts, |theta| one(tuned, task, *theta));
-    let mut trial =
-        Trial { task: *task, angles, started: 0, held: 0, least: f64::INFINITY, error: 0.0, most: f64::INFINITY };
-    for Run { started, held, least, error, most } in runs {
+    let mut trial = Trial {
+        task: *task,
+        angles,
+        started: 0,
+        held: 0,
+        least: f64::INFINITY,
+        error: 0.0,
+        most: f64::INFINITY,
+        silent: 0,
+    };
+    for Run { started, held, least, error, most, lock } in runs {
         trial.started += u32::from(started);
         trial.held += u32::from(held);
+        trial.silent += u32::from(!held && lock < 1.0);
         trial.least = trial.least.min(least);
         trial.most = trial.most.min(most);
         if held {

@@ -13,7 +13,7 @@ use std::path::Path;
 /// Name, source and notes of a machine, and for each FMU the start values by their names, in SI units, enumerations as integers.
 ///
 /// # Errors
-/// Those of [`tune`](super::tune), or the estimator has no rules.
+/// Those of [`tune`](super::tune), or there is no such estimator.
 pub fn values(path: &Path, estimator: Option<&str>) -> Result<Json> {
     let mut motor = MotorFile::read(path)?;
     if let Some(estimator) = estimator {

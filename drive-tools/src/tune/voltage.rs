@@ -8,7 +8,6 @@ use super::setting::{Setting, Value, set};
 use crate::error::{Result, bail};
 use drive::control::envelope::Envelope;
 use drive::control::reference::max_torque_per_ampere;
-use drive::control::weakening::WeakeningParameters;
 use drive::frame::DqHat;
 
 /// Maximum load at the highest speed as a share of the maximum torque: the rest is for the speed loop.
@@ -22,24 +21,21 @@ pub struct Voltage {
     pub top_torque: f64,
 }
 
-/// Whether field weakening is needed, and the load at the highest speed; maximum torque per ampere if `salient`.
+/// Whether field weakening is needed, and the load at the highest speed; maximum torque per ampere if `mtpa`. The references may use
+/// the share `k_u` of the voltage.
 ///
 /// # Errors
 /// The rated torque at the rated speed, or any torque at the highest speed, is out of reach.
-pub fn of(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<Voltage> {
+pub fn of(motor: &MotorFile, mtpa: bool, k_u: f64, notes: &mut Vec<String>) -> Result<Voltage> {
     let Data { rating, dc_link, mechanics, .. } = &motor.data;
     let machine = electrical(&motor.data);
     let (speed, torque, current) = (*rating.speed.get_ref(), *rating.torque.get_ref(), *rating.current.get_ref());
     let (top, u_dc) = (rating.top(), *dc_link.u_dc.get_ref());
     let (n_p, highest) = (f64::from(machine.n_p), u_dc / 3.0_f64.sqrt());
-    let (envelope, U) = (Envelope::new(&machine, current), WeakeningParameters::default().k_u * highest);
+    let (envelope, U) = (Envelope::new(&machine, current), k_u * highest);
     // Without field weakening.
     let currents = |torque: f64| {
-        if salient {
-            max_torque_per_ampere(&machine, torque)
-        } else {
-            DqHat::new(0.0, torque / machine.torque_constant())
-        }
+        if mtpa { max_torque_per_ampere(&machine, torque) } else { DqHat::new(0.0, torque / machine.torque_constant()) }
     };
     let least = currents(torque).magnitude();
     if least > current {
@@ -82,10 +78,7 @@ pub fn of(motor: &MotorFile, salient: bool, notes: &mut Vec<String>) -> Result<V
              link through the diodes; {key} is {top:.0} rad/s"
         ));
     }
-    let rule = if rated_fits {
-        "the highest speed needs more than 0.95 u_dc / sqrt(3)"
-    } else {
-        "rated torque at rated speed needs more than 0.95 u_dc / sqrt(3)"
-    };
-    Ok(Voltage { settings: vec![set("weakening.use", Value::Boolean(true), rule)], top_torque })
+    let what = if rated_fits { "the highest speed" } else { "rated torque at rated speed" };
+    let rule = format!("{what} needs more than {k_u} u_dc / sqrt(3)");
+    Ok(Voltage { settings: vec![set("weakening.use", Value::Boolean(true), &rule)], top_torque })
 }

@@ -42,11 +42,11 @@ def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
     Args:
         motor: a motor file, or the name of one of `machines`
         fmu: "PmsmDrive", "PmsmDriveMean", "PmsmPlant" or "SensorlessController"
-        estimator: instead of that of the file: "Rasmussen" or "ExtendedEmf"
+        estimator: instead of that of the file, such as "Rasmussen", "Hybrid" or "Sensored"
         fmi: 2 or 3: in FMI 2.0 each element of an array has its own name
 
     Raises:
-        FmuError: the file cannot be read or is invalid; the message names file, line and value
+        FmuError: the file cannot be read or is invalid, or the machine does not suit the estimator; the message names file, line and value
         ValueError: an argument is none of those
 
     >>> values = tune("ipmsm-2.2kw")
