@@ -58,6 +58,42 @@ fn jaxonomy() {
     pytest_with("jaxonomy.txt", "importers", "jaxonomy", &["test_jaxonomy.py"], &[("FMU_REFERENCE", &file)]);
 }
 
+/// fmucontainer makes one FMU of the system of `fmu ssp`. In FMI 2.0 it has the bits of the system; in FMI 3.0 its inputs act one step
+/// later.
+#[test]
+fn fmucontainer_reads_an_ssp_file() {
+    let python = environment(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/importers/requirements.txt"));
+    let folder = tempfile::tempdir().unwrap();
+    let output = |command: &mut Command| {
+        let output = command.current_dir(folder.path()).output().unwrap();
+        assert!(output.status.success(), "{command:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let simulate = |file: &str| {
+        let inputs = ["--input", "speed_ref=0:0,0.02:50", "--input", "tau_load=0:0,0.15:1"];
+        let time = ["--stop", "0.3", "--step", "1e-4", "--csv", "-", "--record", "speed,i_q_est"];
+        let csv = output(Command::new(env!("CARGO_BIN_EXE_fmu")).args(["simulate", file]).args(inputs).args(time));
+        [column(&csv, "speed"), column(&csv, "i_q_est")]
+    };
+    for standard in ["2", "3"] {
+        let (ssp, container) = (format!("x{standard}.ssp"), format!("x{standard}.fmu"));
+        let mut write = Command::new(env!("CARGO_BIN_EXE_fmu"));
+        output(write.args(["ssp", "--fmi", standard, "--out", &ssp, "--fmus"]).arg(common::archives()));
+        let mut pack = Command::new(&python);
+        pack.args(["-m", "fmu_manipulation_toolbox.cli.fmucontainer", "-fmi", standard, "-container"]);
+        output(pack.arg(format!("{ssp}:1e-4")));
+        for (ours, theirs) in simulate(&ssp).iter().zip(simulate(&container)) {
+            assert!(ours.iter().any(|x| x.abs() > 0.5) && ours.len() == 3001, "it moves");
+            let late = usize::from(standard == "3");
+            let differs = ours
+                .iter()
+                .zip(&theirs[late..])
+                .any(|(x, y)| if late == 0 { x.to_bits() != y.to_bits() } else { (x - y).abs() > 1e-9 });
+            assert!(!differs, "FMI {standard}");
+        }
+    }
+}
+
 /// OMSimulator runs the systems of `fmu ssp` as they are: no warning, and the values of `fmu simulate` to the 12 digits that it prints.
 #[test]
 #[ignore = "needs OMSimulator in PATH: half a minute"]

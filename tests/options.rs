@@ -31,7 +31,7 @@ struct Mode {
     same: &'static [(&'static str, &'static str)],
 }
 
-const SPEED: &str = "changes the time that the command takes alone";
+const SPEED: &str = "changes only the run time of the command";
 const LIMIT: &str = "a limit that this run does not reach";
 const CERTAIN: &str = "the only finding is certain";
 const ACCURATE: &str = "the models have no tolerance";

@@ -418,7 +418,16 @@ const SMALL: &[(&str, &[&str])] = &[
     ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
     ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
     ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs", "commands/simulate/worker.rs"]),
-    ("fmu-core", &["description.rs", "description/checks.rs", "description/sizes.rs", "description/terminals.rs"]),
+    (
+        "fmu-core",
+        &[
+            "description.rs",
+            "description/checks.rs",
+            "description/clocks.rs",
+            "description/sizes.rs",
+            "description/terminals.rs",
+        ],
+    ),
     ("fmu-core", &["integrate.rs", "integrate/euler.rs"]),
     ("fmu-export", &["abi/fault.rs", "abi/gate.rs", "abi/mod.rs", "abi/types.rs"]),
     ("fmu-import", &["instance.rs", "instance/clocks.rs"]),

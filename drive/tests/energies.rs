@@ -239,7 +239,7 @@ fn inputs_between_completed_steps_are_straight_lines() {
         let off = apart(10_000, u);
         assert!(off < 1e-6, "{off}");
     }
-    // Curves: of second order in the step for the power of the chord, of third for the current that it drives.
+    // With curved inputs, the error of the power is of second order in the step, that of the current of third order.
     let [coarse, fine] = [20, 10].map(|reported| apart(reported, &turning));
     println!("curved inputs: {coarse} at 40 us, {fine} at 20 us");
     assert!((3.9..8.1).contains(&(coarse / fine)), "{coarse}, {fine}");

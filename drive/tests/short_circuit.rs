@@ -80,7 +80,7 @@ fn it_brakes_the_most_at_this_speed() {
     }
 }
 
-/// From full torque, with the sensor and field weakening; and the short circuit ends.
+/// Begins at full torque, with the sensor and field weakening, and ends again.
 #[test]
 fn the_first_swing_is_that_of_the_flux_linkage_before() {
     for (machine, rpm, swing) in [(c(240.0), 6000.0, -468.0), (a(), 1500.0, -22.5)] {

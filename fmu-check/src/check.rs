@@ -111,7 +111,7 @@ pub(super) struct Conclusion {
     pub(super) fatal: bool,
     /// The calls that led to the finding, with what they returned.
     pub(super) calls: Vec<String>,
-    /// All of them, one by one, if scripts are asked for.
+    /// All of them, one by one, if scripts were requested.
     pub(super) script: Vec<String>,
 }
 

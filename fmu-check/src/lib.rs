@@ -11,6 +11,7 @@ mod check;
 mod checks;
 pub mod command;
 mod confidence;
+mod deviation;
 mod encoding;
 mod error;
 mod evidence;

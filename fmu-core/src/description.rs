@@ -1,6 +1,7 @@
 //! The neutral description of a model, from which the XML, documentation and tools are generated.
 
 mod checks;
+mod clocks;
 mod sizes;
 mod terminals;
 
@@ -10,7 +11,6 @@ use crate::Fault;
 use crate::capability::{Capabilities, Exported};
 use crate::clock::Timing;
 use crate::integer::IntegerType;
-use crate::kinds::Kinds;
 use crate::model::{Block, Experiment, Model};
 use crate::need::Need;
 use crate::probe;
@@ -18,6 +18,7 @@ use crate::row::{Constant, Row, Slot};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
 use checks::{check_names, check_start, check_types};
+use clocks::put_on_clocks;
 use serde::{Deserialize, Serialize};
 use sizes::{check_sizes, exchange, size};
 
@@ -358,52 +359,6 @@ impl Description {
     pub fn variable(&self, name: &str) -> Option<&Variable> {
         self.variables.iter().find(|v| v.name == name)
     }
-}
-
-/// The clocks of every variable. A clocked variable has no value before its first tick, and between events it depends on the
-/// ticks.
-fn put_on_clocks<M: Model>(variables: &mut [Variable], feedthrough: bool) -> Result<(), Fault> {
-    if const { !M::TABLE.kinds().meets(Kinds::CLOCK) } {
-        return Ok(());
-    }
-    let clocks: Vec<(String, u32, Causality)> = variables
-        .iter()
-        .filter(|v| matches!(v.kind, VariableKind::Clock(_)))
-        .map(|v| (v.name.clone(), v.value_reference, v.causality))
-        .collect();
-    for v in variables.iter_mut() {
-        let Some(index) = v.value_reference.checked_sub(1) else { continue };
-        for name in M::TABLE.clocks_of(index as usize).split_whitespace() {
-            let found = clocks.iter().find(|(clock, ..)| clock == name);
-            let none = || Fault::new(format!("{} is on the clock {name}, which does not exist", v.name));
-            v.clocks.push(found.ok_or_else(none)?.1);
-        }
-        if !v.clocks.is_empty() && v.variability == Variability::Continuous {
-            v.variability = Variability::Discrete;
-        }
-    }
-    let inputs: Vec<(u32, Vec<u32>)> = variables
-        .iter()
-        .filter(|v| v.causality == Causality::Input && !v.clocks.is_empty() && feedthrough)
-        .filter(|v| !matches!(v.kind, VariableKind::Clock(_)))
-        .map(|v| (v.value_reference, v.clocks.clone()))
-        .collect();
-    let ticked = || clocks.iter().filter(|(.., causality)| *causality == Causality::Input).map(|(_, of, _)| *of);
-    for v in variables.iter_mut() {
-        let clock = matches!(v.kind, VariableKind::Clock(_));
-        if !clock && v.clocks.is_empty() {
-            continue;
-        }
-        v.initial_dependencies = None;
-        if v.causality == Causality::Output {
-            let mut on = if v.clocks.is_empty() { ticked().collect() } else { v.clocks.clone() };
-            let read = inputs.iter().filter(|(_, clocks)| clocks.iter().any(|clock| on.contains(clock)));
-            let read: Vec<u32> = read.map(|(input, _)| *input).collect();
-            on.extend(read);
-            v.dependencies = Some(on);
-        }
-    }
-    Ok(())
 }
 
 /// A variable of a table that several models share, as seen by this model.

@@ -2,11 +2,15 @@
 #![allow(missing_docs)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
+#[path = "common/oracle.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod oracle;
+mod random;
 mod solver;
 
 use fmu_core::{Capabilities, Elapsed, Exported, Model, Step};
+use random::{Twin, random_calls};
 use solver::ball::*;
-use solver::random::{Twin, random_calls};
 use solver::{Kind, ball::Ball};
 
 fmu_export::export!(Ball: ContinuousTime + Events);

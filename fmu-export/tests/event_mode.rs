@@ -404,7 +404,7 @@ fn a_fault_of_a_sample_is_an_error() {
     }
 }
 
-/// A step of a year returns at the next instant, and without that permission is refused: it would never end.
+/// A step of a year returns at the next sample; if it may not return early, it is refused, because it would never end.
 #[test]
 fn a_step_of_a_year() {
     let year = 3.15e7;

@@ -2,10 +2,14 @@
 #![allow(missing_docs)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
+#[path = "common/oracle.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod oracle;
+mod random;
 mod solver;
 
 use fmu_core::{Capabilities, Exported};
-use solver::random::{Twin, random_calls};
+use random::{Twin, random_calls};
 use solver::sampler::*;
 use solver::{Kind, sampler::Sampler};
 

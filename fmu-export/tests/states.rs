@@ -209,7 +209,7 @@ fn seal(bytes: &mut [u8]) {
     bytes[body..].copy_from_slice(&checksum.to_le_bytes());
 }
 
-/// CRC-32 by its definition as a polynomial division, bit by bit from the other end than the library's.
+/// CRC-32 by its definition as a polynomial division, bit by bit from the opposite end.
 fn reference_crc(bytes: &[u8]) -> u32 {
     let mut remainder = 0xffff_ffff_u32;
     for byte in bytes {

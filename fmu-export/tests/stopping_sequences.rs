@@ -3,6 +3,10 @@
 #![allow(missing_docs)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
+#[path = "common/oracle.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod oracle;
+mod random;
 mod solver;
 
 use fmu_core::unit::{METER, METER_PER_S, METER_PER_S2, ONE};
@@ -10,9 +14,9 @@ use fmu_core::{
     Block, Capabilities, ContinuousTime, Elapsed, EventMode, Events, Exported, Fault, Indicator, Info, Model, Next,
     Outcome, Row, State, Step, Stop, Table, integrate, table,
 };
+use random::{Twin, random_calls};
 use serde::{Deserialize, Serialize};
 use solver::Kind;
-use solver::random::{Twin, random_calls};
 
 /// A ball that bounces on the points of a grid of 1 ms, and takes a sample of its lift every 50 ms.
 #[derive(Clone, PartialEq, Serialize, Deserialize)]

@@ -31,7 +31,7 @@ pub enum Error {
         function: &'static str,
         /// Its status, in words.
         status: String,
-        /// The last message that the FMU logged during the call.
+        /// The last message that the FMU logged during the call, without the names of instance and function before it.
         message: Option<String>,
     },
 }
@@ -45,6 +45,20 @@ impl Error {
     /// An impossible use of an instance; the cause becomes one line.
     pub fn usage(instance: &str, cause: impl std::fmt::Display) -> Self {
         Self::Usage { instance: instance.into(), cause: one_line(&cause.to_string()) }
+    }
+
+    /// A refused call. Many FMUs begin a message with the function or the instance, which the error already names.
+    pub(crate) fn call(instance: String, function: &'static str, status: String, message: Option<String>) -> Self {
+        let message = message.map(|text| {
+            let mut rest = text.as_str();
+            while let Some(short) =
+                [function, &instance].iter().find_map(|name| rest.strip_prefix(name)?.strip_prefix(':'))
+            {
+                rest = short.trim_start();
+            }
+            rest.to_owned()
+        });
+        Self::Call { instance, function, status, message: message.filter(|text| !text.is_empty()) }
     }
 
     /// Adds the attempted action to the error.
@@ -101,5 +115,21 @@ mod tests {
         };
         assert_eq!(error.to_string(), "plant: fmi2DoStep returned Error: the step is negative");
         assert_eq!(Error::file(Path::new("a.fmu"), "no\nthing").to_string(), "a.fmu: no thing");
+    }
+
+    #[test]
+    fn an_error_names_instance_and_function_once() {
+        for (logged, shown) in [
+            ("fmi3DoStep: h = -1", ": h = -1"),
+            ("plant: fmi3DoStep: h = -1", ": h = -1"),
+            ("fmi3DoStep:", ""),
+            ("fmi3DoStepping: h = -1", ": fmi3DoStepping: h = -1"),
+            ("plants: h = -1", ": plants: h = -1"),
+        ] {
+            let error = Error::call("plant".into(), "fmi3DoStep", "Error".into(), Some(logged.into()));
+            assert_eq!(error.to_string(), format!("plant: fmi3DoStep returned Error{shown}"));
+            let during = error.during("the step at 1 s").to_string();
+            assert_eq!(during, format!("plant: fmi3DoStep returned Error: the step at 1 s{shown}"));
+        }
     }
 }

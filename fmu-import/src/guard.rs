@@ -245,7 +245,7 @@ pub fn end_with_parent() {
     let _ = rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::KILL));
 }
 
-/// The processes that this one has started and not waited for, with number and name; empty except on Linux.
+/// The child processes that this process has not reaped, with number and name; empty except on Linux.
 pub fn children() -> Vec<String> {
     #[cfg(unix)]
     return unix::children();
@@ -441,7 +441,7 @@ mod unix {
     pub(super) fn children() -> Vec<String> {
         let me = rustix::process::getpid().as_raw_pid();
         let named = |p: Process| {
-            let state = if p.alive { "" } else { ", which has ended and is not waited for" };
+            let state = if p.alive { "" } else { ", which has ended and was not reaped" };
             format!("{} ({}){state}", p.id.as_raw_pid(), p.name)
         };
         processes().filter(|p| p.parent == me).map(named).collect()

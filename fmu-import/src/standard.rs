@@ -117,8 +117,8 @@ pub(super) fn misfit(base: BaseType, values: &Values) -> Refusal {
 pub(super) fn explain(instance: &str, refusal: Refusal, message: Option<String>) -> Error {
     let instance = instance.to_owned();
     match refusal {
-        Refusal::Status(function, status) => Error::Call { instance, function, status: status.to_string(), message },
-        Refusal::Null(function) => Error::Call { instance, function, status: "no instance".into(), message },
+        Refusal::Status(function, status) => Error::call(instance, function, status.to_string(), message),
+        Refusal::Null(function) => Error::call(instance, function, "no instance".into(), message),
         Refusal::Impossible(cause) => Error::Usage { instance, cause },
     }
 }

@@ -161,7 +161,7 @@ impl Output {
             let line = line?;
             let expected = rows.next().map(|row| row.to_string());
             if expected.as_deref() != line.split(',').next() {
-                return Err(io::Error::other("has other rows than the part of this number: remove this part"));
+                return Err(io::Error::other("has rows of another part: remove this part"));
             }
             failures.add(&line);
             writeln!(out, "{line}")?;

@@ -3,6 +3,7 @@
 use crate::cache::{self, Opened};
 use crate::error::{gate, raise, usage};
 use crate::lane::{Common, Lane, Ports, renew};
+use fmu_import::threads;
 use numpy::ndarray::Array2;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -45,13 +46,7 @@ impl Lanes {
             let Some((k, (lanes, out))) = next else { return };
             one(lanes, actions.get(k * size * a..).unwrap_or_default(), out);
         };
-        std::thread::scope(|scope| {
-            // This thread works too, because a busy system may be unable to start another.
-            for _ in 1..self.threads {
-                let _ = std::thread::Builder::new().spawn_scoped(scope, work);
-            }
-            work();
-        });
+        threads::share(self.threads, |_| work());
     }
 
     fn observe(&mut self) -> Vec<f64> {

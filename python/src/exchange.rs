@@ -6,7 +6,10 @@ use crate::record::Record;
 use crate::stepping::update;
 use fmu_import::{Error, Instance};
 use fmu_system::cosimulation::{Equations, Feed, Inputs, Integration, Solver};
-use fmu_system::integration::{Driver, StopReason, TrialError};
+use fmu_system::integration::{Driver, StopReason, TrialError, advice};
+use pyo3::exceptions::PyRuntimeWarning;
+use pyo3::prelude::*;
+use std::ffi::CString;
 use std::slice;
 
 /// FMPy's forward Euler: one step from point to point; events are not located.
@@ -138,6 +141,8 @@ pub(crate) struct Integrating {
 
 /// Sets the inputs, and records at events.
 struct Signals<'a> {
+    /// End of the run (s).
+    stop: f64,
     input: &'a Input,
     record: &'a mut Record,
     since: &'a mut f64,
@@ -160,6 +165,14 @@ impl Feed for Signals<'_> {
     fn next_point(&self, t: f64) -> Option<f64> {
         Some(self.input.next_event(t)).filter(|event| event.is_finite())
     }
+
+    fn limited(&mut self, t: f64, h: f64) {
+        let text = advice(t, h, self.stop).and_then(|text| CString::new(text).ok());
+        if let Some(text) = text {
+            // Where warnings are errors, this one cannot interrupt the integration.
+            Python::attach(|py| PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &text, 1).unwrap_or_default());
+        }
+    }
 }
 
 impl Integrating {
@@ -172,7 +185,7 @@ impl Integrating {
     pub(crate) fn begin(&mut self, course: &mut Course, instance: &mut Instance) -> Result<(), Error> {
         self.regular = course.start;
         let Course { input, record, .. } = course;
-        let mut signals = Signals { input, record, since: &mut self.since, records: false };
+        let mut signals = Signals { stop: course.stop, input, record, since: &mut self.since, records: false };
         let mut equations = Equations::new(slice::from_mut(instance), &self.integration)?;
         let mut fmus = equations.of(slice::from_mut(instance), &mut signals);
         let (driver, flow) = Driver::start(&mut fmus, self.integration.solver, self.step, course.start)?;
@@ -189,7 +202,7 @@ impl Integrating {
         let (records, over, next) = (self.record_events, course.is_over(), cut(course.regular(), course.stop));
         let sampled = records || is_close(course.time, self.regular);
         let Course { input, record, .. } = course;
-        let mut signals = Signals { input, record, since: &mut self.since, records };
+        let mut signals = Signals { stop: course.stop, input, record, since: &mut self.since, records };
         let mut fmus = equations.of(slice::from_mut(instance), &mut signals);
         let (t, x) = driver.point();
         fmus.place(t, x).map_err(TrialError::into_error)?;

@@ -231,6 +231,16 @@ def test_cvode_warns_once(reference):
     assert len(set(results)) == 1
 
 
+def test_stiff_equations_are_reported(reference):
+    """Van der Pol's equations with mu = 1000: beyond the transient, steps of 1 ms."""
+    for stop, expected in ((20.0, []), (300.0, ["the equations are stiff"])):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            simulate_fmu(reference / "fmi3" / "VanDerPol.fmu", fmi_type="ModelExchange", start_values={"mu": 1000.0},
+                         stop_time=stop, output_interval=stop / 2)  # fmt: skip
+        assert [str(w.message)[:23] for w in caught if w.category is RuntimeWarning] == expected
+
+
 def test_the_drive_in_model_exchange_is_fast(standard):
     archive = standard / "PmsmDrive.fmu"
     arguments = {"fmi_type": "ModelExchange", "stop_time": 0.6 if LONG else 0.1, "output_interval": 1e-3, "output": ["speed"],

@@ -229,7 +229,10 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
         bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
     }
-    let system = |fmus: &[_]| System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
+    let system = |fmus: &[_]| {
+        let system = System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
+        system.with_listener(|note| message::note(&printable(note)))
+    };
     let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
     let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
     if steps && (args.solver.is_some() || args.rtol.is_some()) {

@@ -10,12 +10,14 @@ mod case;
 #[path = "../common/mod.rs"]
 mod common;
 mod importer;
+mod instance;
 mod order;
 mod packed;
 
 use case::{Case, OURS, REFERENCE};
 use fmu_system::cosimulation::Method;
-use importer::{Loaded, run, stepped, strict};
+use importer::{run, stepped, strict};
+use instance::Loaded;
 use order::{Completes, ORDERS, Order, STRICT, Starts};
 use std::ops::Range;
 use std::path::PathBuf;

@@ -50,3 +50,24 @@ fn a_stiff_solver_of_fmpy_runs_it() {
         }
     }
 }
+
+/// Our solvers are explicit: of a long run, they say so while it lasts.
+#[test]
+fn a_long_run_says_that_the_equations_are_stiff() {
+    static HEARD: Mutex<Vec<String>> = Mutex::new(Vec::new());
+    let notes = |stop: f64, listens: bool| {
+        let mut system = System::new(Method::ModelExchange(Integration::default()));
+        if listens {
+            system = system.with_listener(|note| HEARD.lock().unwrap().push(note.into()));
+        }
+        system.add("it", &Fmu::open(archive("roberts", V3)).unwrap(), false).unwrap();
+        let settings = Settings { start: 0.0, stop, step: stop, sequential: false };
+        system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+        system.take_notes()
+    };
+    assert_eq!(notes(40.0, false), [""; 0], "some seconds at most");
+    let after = notes(400.0, false);
+    assert!(after.len() == 1 && after[0].starts_with("the equations are stiff: stability limits "), "{after:?}");
+    assert_eq!(notes(400.0, true), [""; 0]);
+    assert_eq!(*HEARD.lock().unwrap(), after);
+}

@@ -184,7 +184,7 @@ fn a_run_costs_microseconds() {
     );
     let plan = Plan::new(&Definition::parse(&text).unwrap(), Path::new("")).unwrap();
     let variables = plan.bind(["d.plant.motor.R_s", "d.tau_load"]).unwrap();
-    // Rounds shorter than a time slice: the best of many has the machine to itself.
+    // Rounds are shorter than a time slice: nothing else runs during the fastest of many.
     let columns: [&[f64]; 2] = [&[3.0; 50], &[0.5; 50]];
     let once = || {
         let begun = Instant::now();

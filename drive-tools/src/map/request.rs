@@ -5,7 +5,7 @@ use crate::error::{Result, WithContext, bail};
 /// 0 degC in K.
 pub const ZERO_CELSIUS: f64 = 273.15;
 
-/// What a map is asked for.
+/// The request for a map.
 #[derive(Clone, Debug, PartialEq)]
 #[expect(non_snake_case, reason = "the symbol of the temperature")]
 pub struct Request {

@@ -42,7 +42,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     all
 }
 
-/// The machines asked for.
+/// The machines of this run.
 fn machines() -> Vec<PathBuf> {
     let mut all = files(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors"));
     if let Ok(more) = std::env::var("HOLD_MACHINES") {

@@ -107,7 +107,7 @@ fn long(motor: &MotorFile, tuned: &Tuned, task: &Task, theta_e: f64) -> (bool, b
     if !run.run(measures + ready + 20.0 * slowest, 2.0 * slowest, reference, tuned.speed, |_| 0.0) {
         return (false, false);
     }
-    // What the load leaves of the torque makes the dip good.
+    // The torque that the load does not need brings the speed back.
     let spare = (run.drive.out.controller.tau_max - task.torque).max(0.02 * task.torque);
     let back = 2.0 / E * task.torque / (par.speed_loop.bandwidth * spare);
     let slowest = slowest.max(back);

@@ -218,7 +218,7 @@ mod tests {
         }
     }
 
-    /// The command is looked at from half of the limit on, and where the current changes by a sixth in a sample.
+    /// The command is checked from half of the limit on, and where the current changes by a sixth in a sample.
     #[test]
     fn a_small_current_is_left_alone() {
         let at = |i: f64, i_last: f64| Sample {

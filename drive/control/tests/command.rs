@@ -1,6 +1,6 @@
 //! The command leads the angle by the rotation of the rotor until the middle of the interval in which it acts: half a
 //! sample and the delay (Rasmussen 2006, Fig. 2, sampled). In the closed loop the integrators hide a
-//! wrong lead, so the first command is looked at.
+//! wrong lead, so the test checks the first command.
 #![allow(missing_docs)]
 #![allow(non_snake_case, reason = "the papers' symbols")]
 

@@ -53,7 +53,7 @@ fn each_hang_is_found_by_its_check() {
     }
 }
 
-/// A hang of one case is enough: the others of the probe are not waited for.
+/// One case that hangs is enough: the probe does not wait for the others.
 #[test]
 fn a_second_hang_is_not_waited_for() {
     let _alone = alone();

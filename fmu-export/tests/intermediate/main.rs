@@ -3,12 +3,12 @@
 #![allow(missing_docs, clippy::float_cmp, clippy::borrow_as_ptr, clippy::type_complexity)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
-#[path = "../common/draw.rs"]
-#[allow(unreachable_pub, reason = "a module of several test programs")]
-mod draw;
 #[path = "../common/journal.rs"]
 #[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
 mod journal;
+#[path = "../common/oracle.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod oracle;
 mod random;
 
 use fmu_core::unit::{METER, METER_PER_S, ONE};

@@ -8,9 +8,9 @@
 
 #[path = "../counting/mod.rs"]
 mod counting;
-#[path = "../common/draw.rs"]
-#[allow(unreachable_pub, reason = "a module of several test programs")]
-mod draw;
+#[path = "../common/oracle.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod oracle;
 mod random;
 
 use fmi::*;

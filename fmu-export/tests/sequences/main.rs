@@ -14,6 +14,9 @@ mod common;
 mod operation;
 mod perform;
 mod reference;
+#[path = "../common/state.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod state;
 mod world;
 
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};

@@ -4,26 +4,39 @@
 use crate::common::model::*;
 use crate::common::{DISCARD, ERROR, OK};
 use crate::operation::{Arrays, Categories, Kind, Mixed, Point};
+use crate::state::State;
 use fmu_core::{Block, Elapsed, Model, Slot, Step};
 use std::ffi::c_int;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// States that allow a call, by their letters as in `lifecycle.rs`; first FMI 2.0, then FMI 3.0.
-pub(crate) const GET: [&str; 2] = ["nste", "inste"];
-pub(crate) const SET: [&str; 2] = ["ins", "ins"];
-pub(crate) const SETUP: [&str; 2] = ["i", ""];
-pub(crate) const ENTER: [&str; 2] = ["i", "i"];
-pub(crate) const EXIT: [&str; 2] = ["n", "n"];
-pub(crate) const STEP: [&str; 2] = ["s", "s"];
-pub(crate) const TERMINATE: [&str; 2] = ["s", "s"];
-pub(crate) const SAVE: [&str; 2] = ["inst", "inst"];
-pub(crate) const STATUS: [&str; 2] = ["st", ""];
-pub(crate) const ANY: [&str; 2] = ["inste", "inste"];
+/// States that allow a call: first FMI 2.0, then FMI 3.0.
+pub(crate) const GET: [&[State]; 2] = [
+    &[State::Initialization, State::Step, State::Terminated, State::Error],
+    &[State::Instantiated, State::Initialization, State::Step, State::Terminated, State::Error],
+];
+pub(crate) const SET: [&[State]; 2] = [
+    &[State::Instantiated, State::Initialization, State::Step],
+    &[State::Instantiated, State::Initialization, State::Step],
+];
+pub(crate) const SETUP: [&[State]; 2] = [&[State::Instantiated], &[]];
+pub(crate) const ENTER: [&[State]; 2] = [&[State::Instantiated], &[State::Instantiated]];
+pub(crate) const EXIT: [&[State]; 2] = [&[State::Initialization], &[State::Initialization]];
+pub(crate) const STEP: [&[State]; 2] = [&[State::Step], &[State::Step]];
+pub(crate) const TERMINATE: [&[State]; 2] = [&[State::Step], &[State::Step]];
+pub(crate) const SAVE: [&[State]; 2] = [
+    &[State::Instantiated, State::Initialization, State::Step, State::Terminated],
+    &[State::Instantiated, State::Initialization, State::Step, State::Terminated],
+];
+pub(crate) const STATUS: [&[State]; 2] = [&[State::Step, State::Terminated], &[]];
+pub(crate) const ANY: [&[State]; 2] = [
+    &[State::Instantiated, State::Initialization, State::Step, State::Terminated, State::Error],
+    &[State::Instantiated, State::Initialization, State::Step, State::Terminated, State::Error],
+];
 
 /// The values that a saved state must restore.
 #[derive(Clone)]
 pub(crate) struct Snapshot {
-    pub(crate) state: char,
+    pub(crate) state: State,
     experiment: Option<(f64, Option<f64>)>,
     elapsed: Elapsed,
     end: f64,
@@ -34,7 +47,14 @@ pub(crate) struct Snapshot {
 
 impl Snapshot {
     pub(crate) fn new() -> Self {
-        Self { state: 'i', experiment: None, elapsed: Elapsed::ZERO, end: 0.0, fresh: true, block: Block::default() }
+        Self {
+            state: State::Instantiated,
+            experiment: None,
+            elapsed: Elapsed::ZERO,
+            end: 0.0,
+            fresh: true,
+            block: Block::default(),
+        }
     }
 
     /// Bytes of a state with a NaN output are refused.
@@ -103,7 +123,7 @@ impl Snapshot {
 
     /// Before the start, outputs and calculated parameters match the values set.
     pub(crate) fn refresh(&mut self) -> Result<(), ()> {
-        if self.fresh && "in".contains(self.state) {
+        if self.fresh && [State::Instantiated, State::Initialization].contains(&self.state) {
             self.guarded(|it| {
                 it.block.initialize();
                 it.fresh = false;
@@ -141,9 +161,9 @@ pub(crate) fn elements(version: u8, reference: u32) -> Option<usize> {
 }
 
 /// Whether the value may be set to a variable in a state.
-fn settable(version: u8, kind: Kind, state: char, reference: u32, value: Mixed) -> bool {
+fn settable(version: u8, kind: Kind, state: State, reference: u32, value: Mixed) -> bool {
     let (x, n) = (value.real, value.integer);
-    let early = state != 's';
+    let early = state != State::Step;
     match (kind, reference) {
         (Kind::Real, U) => x.is_finite(),
         (Kind::Real, K) => (-5.0..=5.0).contains(&x),
@@ -183,11 +203,11 @@ impl Reference {
     }
 
     /// The status of a call that needs one of these states, and the state afterwards if it failed.
-    pub(crate) fn call(&mut self, states: [&str; 2], work: impl FnOnce(&mut Self) -> Result<c_int, ()>) -> c_int {
+    pub(crate) fn call(&mut self, states: [&[State]; 2], work: impl FnOnce(&mut Self) -> Result<c_int, ()>) -> c_int {
         let states = states[usize::from(self.version - 2)];
-        let status = if states.contains(self.now.state) { work(self).unwrap_or(ERROR) } else { ERROR };
+        let status = if states.contains(&self.now.state) { work(self).unwrap_or(ERROR) } else { ERROR };
         if status == ERROR {
-            self.now.state = 'e';
+            self.now.state = State::Error;
         }
         status
     }
@@ -232,7 +252,7 @@ impl Reference {
                 it.experiment(start, stop)?;
             }
             it.now.experiment.ok_or(())?;
-            it.now.state = 'n';
+            it.now.state = State::Initialization;
             Ok(OK)
         })
     }
@@ -244,14 +264,14 @@ impl Reference {
             }
             it.now.guarded(|now| now.block.initialize())?;
             it.now.fresh = false;
-            it.now.state = 's';
+            it.now.state = State::Step;
             Ok(OK)
         })
     }
 
     pub(crate) fn terminate(&mut self) -> c_int {
         self.call(TERMINATE, |it| {
-            it.now.state = 't';
+            it.now.state = State::Terminated;
             Ok(OK)
         })
     }
@@ -308,7 +328,7 @@ impl Reference {
                 for offset in 0..elements(it.version, reference).unwrap_or(1) {
                     let reference = reference.wrapping_add(u32::try_from(offset).unwrap());
                     let value = *values.next().unwrap();
-                    if it.now.state == 's' && it.now.is_kept(it.version, kind, reference, value) {
+                    if it.now.state == State::Step && it.now.is_kept(it.version, kind, reference, value) {
                         kept = true;
                         continue;
                     }
@@ -316,7 +336,7 @@ impl Reference {
                         return Err(());
                     }
                     after.put(reference, value);
-                    after.fresh |= it.now.state != 's' || reference == GAIN;
+                    after.fresh |= it.now.state != State::Step || reference == GAIN;
                 }
             }
             it.now = after;

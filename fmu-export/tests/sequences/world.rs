@@ -5,6 +5,7 @@ use crate::common::*;
 use crate::operation::{Arrays, Call, Damage, Door, Kind, Mixed, Operation, PLACES, Slot};
 use crate::perform::{self, Done};
 use crate::reference::{ANY, GET, Reference, SAVE, Snapshot, elements};
+use crate::state::State;
 use fmu_export::abi::types::*;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -94,7 +95,7 @@ impl World {
                     let (version, it) = if operation.door == Door::Other { (5 - own, it) } else { (own, null_mut()) };
                     let (status, name) = self.attempt(&call, version, it);
                     if operation.door == Door::Other {
-                        expected.now.state = 'e';
+                        expected.now.state = State::Error;
                     }
                     (status, ERROR, name)
                 }
@@ -108,7 +109,7 @@ impl World {
         }
         assert!(self.fmus[1 - who].journal.0.borrow().is_empty(), "a message of the other instance");
         assert_eq!(self.fingerprint(1 - who), self.prints[1 - who], "the other instance noticed {operation:?}");
-        if operation.look || self.references[who].now.state == 'e' {
+        if operation.look || self.references[who].now.state == State::Error {
             self.look(who, operation);
         }
         self.prints[who] = self.fingerprint(who);
@@ -121,10 +122,12 @@ impl World {
         let kind_of = |kind: Kind| if version == 2 && kind == Kind::Enumeration { Kind::Integer } else { kind };
         match call.clone() {
             Call::Onward => match reference.now.state {
-                'i' if version == 2 && reference.now.is_without_experiment() => Call::SetUp(0.0, None),
-                'i' => Call::Enter(0.0, None),
-                'n' => Call::Exit,
-                's' => Call::Step { at: crate::operation::Point::Continues(0.0), h: 0.01, free: false, null: 4 },
+                State::Instantiated if version == 2 && reference.now.is_without_experiment() => Call::SetUp(0.0, None),
+                State::Instantiated => Call::Enter(0.0, None),
+                State::Initialization => Call::Exit,
+                State::Step => {
+                    Call::Step { at: crate::operation::Point::Continues(0.0), h: 0.01, free: false, null: 4 }
+                }
                 _ => Call::Reset,
             },
             Call::SetUp(start, stop) if version == 3 => Call::Enter(start, stop),
@@ -221,7 +224,7 @@ impl World {
                 expected.call(ANY, |_| if fits { Ok(OK) } else { Err(()) })
             }
             Call::Status { function, kind, null } => expected.status(*function, *kind, *null),
-            Call::Unsupported(_) => expected.call(["", ""], |_| unreachable!()),
+            Call::Unsupported(_) => expected.call([&[], &[]], |_| unreachable!()),
             Call::Onward | Call::New { .. } => unreachable!("resolved before"),
         };
         let who = usize::from(self.fmus[1].it == it);
@@ -384,7 +387,7 @@ impl World {
             let done = perform::serialize(version, it, self.glass, bytes.as_mut_ptr(), self.size);
             assert_eq!(done.0, OK);
         } else {
-            assert_eq!(self.references[who].now.state, 'e');
+            assert_eq!(self.references[who].now.state, State::Error);
             bytes = self.values(who).iter().flat_map(|bits| bits.to_ne_bytes()).collect();
         }
         self.fmus[who].journal.0.borrow_mut().clear();
@@ -407,8 +410,8 @@ impl World {
         let mut now = self.references[who].now.clone();
         let (version, it) = (self.fmus[who].version, self.fmus[who].it);
         let saved = perform::save(version, it, &raw mut self.glass).0;
-        assert_eq!(saved == ERROR, now.state == 'e', "after {operation:?}");
-        if GET[usize::from(version - 2)].contains(now.state) && !now.is_unlucky() {
+        assert_eq!(saved == ERROR, now.state == State::Error, "after {operation:?}");
+        if GET[usize::from(version - 2)].contains(&now.state) && !now.is_unlucky() {
             now.refresh().expect("no panic");
             let wanted: Vec<u64> = lists(version)
                 .into_iter()
@@ -428,17 +431,17 @@ impl World {
     }
 
     /// The state of the life cycle, determined by the calls that it allows; changes it.
-    fn state(&self, who: usize) -> char {
+    fn state(&self, who: usize) -> State {
         let (fmu, version) = (&self.fmus[who], self.fmus[who].version);
         let restore = || assert_eq!(perform::restore(version, fmu.it, self.glass).0, OK);
         if fmu.set(&[U], &[1.0]) == ERROR {
-            return 't';
+            return State::Terminated;
         }
         if perform::terminate(version, fmu.it).0 == OK {
-            return 's';
+            return State::Step;
         }
         restore();
-        if fmu.enter(0.0, None) == OK { 'i' } else { 'n' }
+        if fmu.enter(0.0, None) == OK { State::Instantiated } else { State::Initialization }
     }
 }
 

@@ -11,11 +11,8 @@ macro_rules! either {
 }
 
 pub mod ball;
-#[path = "../common/draw.rs"]
-pub mod draw;
 #[path = "../common/journal.rs"]
 pub mod journal;
-pub mod random;
 pub mod rk4;
 pub mod sampler;
 mod saved;

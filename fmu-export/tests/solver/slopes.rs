@@ -1,8 +1,8 @@
 //! Derivatives through the C interface, for a model with a tangent and for one without.
 
 use super::ball::*;
-use super::draw::Draw;
 use super::*;
+use fmu_core::draw::Draw;
 
 /// Their accuracy.
 #[derive(Clone, Copy)]

@@ -9,7 +9,7 @@ use super::exchange::{Exchange, Inputs};
 use super::grid::Grid;
 use super::method::Integration;
 use super::point::{CommunicationPoint, Ended, end};
-use crate::integration::{Driver, TrialError};
+use crate::integration::{Driver, TrialError, advice};
 use fmu_import::{Error, Instance, Kind, Number};
 use std::ops::ControlFlow;
 
@@ -26,6 +26,12 @@ impl Feed for Exchange {
     fn next_point(&self, t: f64) -> Option<f64> {
         Self::next_point(self, t)
     }
+
+    fn limited(&mut self, t: f64, h: f64) {
+        if let Some(advice) = advice(t, h, self.stop) {
+            self.note(advice);
+        }
+    }
 }
 
 /// Simulates instances that are initialized and in event mode; [`simulate`](super::run::simulate) begins and ends the run.
@@ -41,6 +47,7 @@ pub(super) fn run(
     let mut ended = Ended { time: start, by: None };
     let steppers: Vec<usize> = (0..instances.len()).filter(|&i| instances[i].kind() != Kind::ModelExchange).collect();
     let mut equations = Equations::new(instances, integration)?;
+    exchange.stop = grid.settings().stop;
     steppers.iter().try_for_each(|&i| exchange.read(i, &mut instances[i]))?;
     let mut ended_by = None;
     let (mut driver, mut flow) =

@@ -28,6 +28,9 @@ pub trait Feed {
 
     /// Time (s) of the first event of the inputs after `t`.
     fn next_point(&self, t: f64) -> Option<f64>;
+
+    /// Stability limits the steps of the solver, see [`HybridSystem::limited`].
+    fn limited(&mut self, _t: f64, _h: f64) {}
 }
 
 /// State of the FMUs between two steps, for any number of successive runs.
@@ -268,5 +271,9 @@ impl<F: Feed> HybridSystem for Fmus<'_, F> {
         }
         equations.finite(instances, "", x, t)?;
         Ok(Update { next_event_time: self.next_event(t), ..Update::default() })
+    }
+
+    fn limited(&mut self, t: f64, h: f64) {
+        self.feed.limited(t, h);
     }
 }

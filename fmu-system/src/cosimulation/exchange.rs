@@ -64,6 +64,12 @@ pub(super) struct Exchange {
     fed: usize,
     /// Time (s) since which step schedules are held; `None` if they are read at every exchange.
     pub(super) since: Option<f64>,
+    /// Time (s) at which the run ends.
+    pub(super) stop: f64,
+    /// Receives notes during the run.
+    pub(super) listener: Option<fn(&str)>,
+    /// Notes of the run.
+    pub(super) notes: Vec<String>,
 }
 
 /// An input changed by a pass.
@@ -166,7 +172,16 @@ impl Exchange {
         let mut jumps: Vec<f64> = wiring.jumps().flat_map(|(_, times)| times).collect();
         jumps.sort_unstable_by(f64::total_cmp);
         jumps.dedup_by(|b, a| *b - *a <= SAME);
-        Self { traffic, row, jumps, fed: wiring.feeds.len(), since: None }
+        let fed = wiring.feeds.len();
+        Self { traffic, row, jumps, fed, since: None, stop: f64::INFINITY, listener: None, notes: Vec::new() }
+    }
+
+    /// Passes a note on during the run or, without a listener, after it.
+    pub(super) fn note(&mut self, text: String) {
+        match self.listener {
+            Some(listener) => listener(&text),
+            None => self.notes.push(text),
+        }
     }
 
     /// A run begins: no value is held or has been written.

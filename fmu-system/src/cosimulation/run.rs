@@ -171,6 +171,7 @@ impl System {
         };
         let mut exchange =
             Exchange::new(self.instances.len(), &self.wiring, &self.records, self.texts.iter().map(|(port, _)| port));
+        exchange.listener = self.listener;
         let mut ended = self.attempt(&grid, &mut exchange, &mut recording, &mut hook);
         // A discarded step needs the state before it, which is not saved without need. The run is the same until there.
         let steps = matches!(self.method, Method::CoSimulation { event_mode: false, early_return: false });
@@ -184,6 +185,7 @@ impl System {
             }
             ended = retried;
         }
+        self.notes.append(&mut exchange.notes);
         let outcome = ended.map(|ended| recording.ended_by = ended.by);
         (recording, outcome)
     }

@@ -31,6 +31,7 @@ pub struct System {
     pub(super) units: Units,
     tolerance: Option<f64>,
     pub(super) notes: Vec<String>,
+    pub(super) listener: Option<fn(&str)>,
 }
 
 impl System {
@@ -50,6 +51,13 @@ impl System {
     #[must_use]
     pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
         Self { tolerance, ..self }
+    }
+
+    /// The system with a listener to notes that matter while a run lasts: they are then not among those of
+    /// [`take_notes`](Self::take_notes).
+    #[must_use]
+    pub fn with_listener(self, listener: fn(&str)) -> Self {
+        Self { listener: Some(listener), ..self }
     }
 
     /// The effect of connections between different units.

@@ -2,6 +2,7 @@
 
 use super::hybrid::{HybridSystem, TrialError};
 use super::locate::{crossed, first_crossing};
+use super::stability::Stability;
 use super::steps::Step;
 use super::{dopri, rk4};
 use fmu_import::Error;
@@ -76,6 +77,7 @@ pub struct Driver {
     /// Number of events at the time of the last one.
     events: u32,
     last_event: f64,
+    stability: Stability,
 }
 
 impl Driver {
@@ -101,6 +103,7 @@ impl Driver {
             next_event: None,
             events: 0,
             last_event: f64::NEG_INFINITY,
+            stability: Stability::default(),
         };
         driver.step.t = t;
         let flow = driver.event(system)?;
@@ -194,6 +197,9 @@ impl Driver {
             self.known = true;
         }
         self.accepted_step(system, target)?;
+        if self.solver != Solver::Rk4 && self.stability.limits(&self.step, system.nominals()) {
+            system.limited(self.step.t, self.step.t_end - self.step.t);
+        }
         let mut event = false;
         if !self.z.is_empty() {
             system.indicators(self.step.t_end, &self.step.x_end, &mut self.z_end).map_err(TrialError::into_error)?;

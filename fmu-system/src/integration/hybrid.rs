@@ -53,4 +53,7 @@ pub trait HybridSystem {
     /// # Errors
     /// The system cannot compute it.
     fn event(&mut self, t: f64, x: &mut [f64]) -> Result<Update, Error>;
+
+    /// At the time `t` (s), stability limits the steps to `h` (s): [`advice`](super::advice). Called once in a run.
+    fn limited(&mut self, _t: f64, _h: f64) {}
 }

@@ -6,16 +6,18 @@
 //!
 //! The integrators are our own: event location needs their stages and interpolants, every trial step may be discarded by an FMU,
 //! and together they are shorter than the adapters that a crate of integrators would need. Both are explicit: a stiff FMU runs
-//! with many steps.
+//! with many steps, and [`HybridSystem::limited`] learns of it.
 
 mod dopri;
 mod driver;
 mod hybrid;
 mod locate;
 mod rk4;
+mod stability;
 mod steps;
 #[cfg(test)]
 mod tests;
 
 pub use driver::{Driver, Solver, StopReason};
 pub use hybrid::{HybridSystem, TrialError};
+pub use stability::advice;

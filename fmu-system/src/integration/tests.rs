@@ -353,3 +353,68 @@ fn events_without_end_are_an_error() {
     let error = driver.run_to(&mut system, 1.0).unwrap_err().to_string();
     assert_eq!(error, "plain: more than 100 events at t = 0.5 s; the next event time is 0.5 s");
 }
+
+/// An oscillator with a third state that follows a cosine as fast as `fast` (1/s), and its calls of [`HybridSystem::limited`].
+struct Following {
+    fast: f64,
+    limited: Vec<(f64, f64)>,
+}
+
+impl HybridSystem for Following {
+    fn nominals(&self) -> &[f64] {
+        &[1.0, 1.0, 1e-3]
+    }
+
+    fn name(&self, _: f64) -> String {
+        "following".into()
+    }
+
+    fn indicator_count(&self) -> usize {
+        0
+    }
+
+    fn derivatives(&mut self, t: f64, x: &[f64], dx: &mut [f64]) -> Result<(), TrialError> {
+        dx.copy_from_slice(&[x[1], -x[0], self.fast * (1e-3 * t.cos() - x[2])]);
+        Ok(())
+    }
+
+    fn indicators(&mut self, _: f64, _: &[f64], _: &mut [f64]) -> Result<(), TrialError> {
+        Ok(())
+    }
+
+    fn completed_step(&mut self, _: f64, _: &[f64]) -> Result<CompletedStep, Error> {
+        Ok(CompletedStep::default())
+    }
+
+    fn event(&mut self, _: f64, x: &mut [f64]) -> Result<Update, Error> {
+        x.copy_from_slice(&[1.0, 0.0, 0.0]);
+        Ok(Update::default())
+    }
+
+    fn limited(&mut self, t: f64, h: f64) {
+        self.limited.push((t, h));
+    }
+}
+
+#[test]
+fn stability_that_limits_the_steps_is_reported_once_and_early() {
+    // The eigenvalue of the fast state, the tolerance, and whether the error or stability limits the steps.
+    for (fast, rtol, is_stiff) in [(1e4, 1e-6, true), (1e4, 1e-4, true), (1.0, 1e-6, false), (1.0, 1e-12, false)] {
+        let mut system = Following { fast, limited: Vec::new() };
+        let mut driver = Driver::start(&mut system, Solver::Dopri { rtol }, f64::NAN, 0.0).unwrap().0;
+        let until = if is_stiff { 1.0 } else { 100.0 };
+        assert!(driver.run_to(&mut system, until).unwrap().is_continue());
+        assert_eq!(system.limited.len(), usize::from(is_stiff), "{fast} {rtol}");
+        for (t, h) in system.limited {
+            // The steps vary around the boundary of stability, 3.31 on the negative real axis.
+            assert!(t < 0.8 && (2.5..5.0).contains(&(h * fast)), "{t} {h}");
+        }
+    }
+}
+
+#[test]
+fn a_run_with_many_steps_left_gets_advice() {
+    assert_eq!(advice(0.5, 1e-3, 10.5), None);
+    let advice = advice(0.5, 1e-3, 1e8).unwrap();
+    assert!(advice.contains("to 1.0e-3 s") && advice.contains("to 100000000 s needs about 1e11"), "{advice}");
+}

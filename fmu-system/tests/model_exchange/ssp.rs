@@ -441,9 +441,18 @@ fn the_rest_is_refused_or_noted() {
             ),
             "has no v.ssv",
         ),
+        (
+            changed("source='plant.fmu'", "source='other.ssp' type='application/x-ssp-package'", ""),
+            "line 1: type=\"application/x-ssp-package\" is not supported, expected application/x-fmu-sharedlibrary or \
+             application/x-ssp-definition",
+        ),
     ] {
         assert!(said.contains(cause), "{said:?}: {cause}");
     }
+    // Information for people, of any content and without a file.
+    let information =
+        "<s:MetaData kind='general' type='text/plain' source='no.txt'><s:Content><a b='1'/></s:Content></s:MetaData>";
+    assert_eq!(changed("<s:Elements>", &format!("{information}<s:Elements>"), ""), changed("", "", ""));
     let binding = "<s:ParameterBindings><s:ParameterBinding source='v.ssv'/></s:ParameterBindings><s:Elements>";
     let text = description("", "", "").replacen("<s:Elements>", binding, 1);
     let given = values("<v:Parameter nam='x' name='a.nothing'><v:Real value='3'/></v:Parameter>");

@@ -73,7 +73,7 @@ impl Loops {
     /// The axes, of an `inverse` machine with L_d > L_q.
     ///
     /// # Errors
-    /// They are not separable, an inductance is negative, or the magnet lies along the other axis than before.
+    /// They are not separable, an inductance is negative, or the magnet has changed its axis.
     pub(super) fn axes(&self, blocked: bool, inverse: bool) -> Result<Axes, Fault> {
         let [aa, ab, bb] = self.normal.solve(0.0).ok_or(Fault::Inductance)?.x;
         let (g_0, g_c, g_s) = (0.5 * (aa + bb), 0.5 * (aa - bb), ab);

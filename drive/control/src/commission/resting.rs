@@ -1,4 +1,4 @@
-//! The rotor rests along a direct current: at 120 degrees, where a salient rotor is looked at and the first staircase runs, and
+//! The rotor rests along a direct current: at 120 degrees, where a salient rotor is checked and the first staircase runs, and
 //! after its swing at 0, where the second one runs.
 
 use super::align::{Align, Dc, LONGEST};
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 /// Angle in rad of the first alignment; the second one is at 0.
 const FIRST: f64 = 2.0 * std::f64::consts::FRAC_PI_3;
-/// Ratio of the probe's inductances above which the rest of the rotor is looked at.
+/// Ratio of the probe's inductances above which the position of the rotor at rest is checked.
 const SALIENT: f64 = 1.6;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]

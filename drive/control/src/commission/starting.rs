@@ -68,7 +68,7 @@ pub(super) enum Started {
     Voltage(AlphaBeta),
     /// Gates off.
     Off,
-    /// The rotor follows; its load needs this current in A.
+    /// The rotor follows, with the current (A) that its load needs.
     Done(f64),
 }
 

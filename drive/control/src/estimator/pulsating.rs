@@ -106,7 +106,7 @@ type P = Row<PulsatingParameters>;
 /// The variables; their owner adds the prefix `pulsating.`.
 pub const PULSATING: &Table<PulsatingParameters> = table![P::enumeration_parameter(
     "demodulation",
-    "Demodulation of the carrier current; the second is refused with other estimators than PulsatingInjection",
+    "Demodulation of the carrier current; the second is refused with estimators other than PulsatingInjection",
     &Field(|p| &mut p.demodulation),
 )];
 

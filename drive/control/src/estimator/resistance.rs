@@ -187,7 +187,7 @@ impl Resistance {
         let ContextOf { motor, T_s, .. } = *context;
         let (par, n_p) = (context.of::<ResistanceParameters>(), f64::from(motor.n_p));
         self.w_f += T_s * FILTER * (w - self.w_f);
-        // Whether nothing is asked for, the sign of what is, and the least speed at which c_1 is full.
+        // Whether the reference is zero, its sign, and the minimum speed at which c_1 is full.
         let (rest, asked, least) = match sample.speed_ref {
             Some(speed_ref) => (speed_ref.abs() < STANDSTILL, speed_ref, n_p * speed_ref.abs()),
             None => (sample.i_ref.q().abs() < NO_TORQUE * par.i, 0.0, LEAST_C_1 * c_1),

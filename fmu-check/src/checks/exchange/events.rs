@@ -245,7 +245,7 @@ fn renewed(session: &Session) -> Result<(), NotDetermined> {
             if lost && !event.jumped() && !event.terminates() {
                 let kept = kept.map_or_else(|| "there is none".into(), |kept| format!("it is at {kept:?}"));
                 session.violated(format!(
-                    "the next event was at {next:?}; after an event at {now:?} that nothing asked for, {kept}"
+                    "the next event was at {next:?}; after an event at {now:?} that nothing requested, {kept}"
                 ));
                 return Ok(());
             }

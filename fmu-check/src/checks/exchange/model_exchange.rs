@@ -9,7 +9,8 @@ use crate::checks::exchange::shared::evaluation::{
 use crate::checks::life::shared::calls::attempt;
 use crate::checks::life::shared::kept::set_all;
 use crate::checks::life::state::in_initialization;
-use crate::exchange::{Importer, UNSTABLE, UNTOUCHED, deviation, differ};
+use crate::deviation::{deviation, differ};
+use crate::exchange::{Importer, UNSTABLE, UNTOUCHED};
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::lines::Line;

@@ -2,7 +2,7 @@
 
 use crate::check::{Check, Levels, Run};
 use crate::checks::life::shared::calls::attempt;
-use crate::exchange::deviation;
+use crate::deviation::deviation;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};

@@ -1,7 +1,7 @@
 //! Intermediate updates: callbacks of an FMU inside a step (FMI 3.0.2, 4.2.2).
 
 use crate::check::{Check, Levels, Run};
-use crate::exchange::deviation;
+use crate::deviation::deviation;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};

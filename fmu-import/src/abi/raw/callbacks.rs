@@ -64,7 +64,7 @@ pub(super) unsafe fn optional(text: *const c_char) -> Option<String> {
     unsafe { bytes(text) }.and_then(|text| String::from_utf8(text).ok())
 }
 
-/// A text that is UTF-8, or what can be read of one that is not.
+/// The text if it is UTF-8; otherwise its readable part.
 fn readable(text: Option<Vec<u8>>) -> (Option<String>, Option<String>) {
     match text.map(String::from_utf8) {
         None => (None, None),

@@ -2,8 +2,9 @@
 
 use crate::checks::life::shared::kept::set_all;
 use crate::checks::process::instances::DISTURBED;
+use crate::deviation::differ;
 use crate::encoding::show;
-use crate::exchange::{Importer, differ};
+use crate::exchange::Importer;
 use crate::session::{NotDetermined, Session};
 use crate::settable::settable;
 use fmu_import::raw::Simple;

@@ -2,8 +2,9 @@
 
 use crate::checks::life::shared::values::is_rounded;
 use crate::checks::process::instances::only_once;
+use crate::deviation::deviation;
 use crate::encoding::{same, show};
-use crate::exchange::{Importer, deviation};
+use crate::exchange::Importer;
 use crate::instance::Instance;
 use crate::level::Level;
 use crate::session::{NotDetermined, Session};

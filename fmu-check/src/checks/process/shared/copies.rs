@@ -39,7 +39,7 @@ pub(crate) fn failed(e: &std::io::Error) -> NotDetermined {
 /// Copies a folder with its contents, but not what has these names in it.
 pub(crate) fn copy(from: &Path, to: &Path, but: &[&str]) -> std::io::Result<()> {
     if list(from).is_none() {
-        return Err(std::io::Error::other("not tried: the checker does not copy so many or so large files"));
+        return Err(std::io::Error::other("not tried: the folder has too many files, or too large ones, for a copy"));
     }
     copy_all(from, to, but)
 }

@@ -1,6 +1,9 @@
 //! The state machine of FMI, written down once more by hand, with the model run natively.
 
-use super::super::*;
+use super::{DISCARD, ERROR, OK, c_int};
+use crate::oracle::State;
+use crate::solver::{Kind, Stepped, Update};
+use State::{Continuous, Event, Initialization, Instantiated};
 use fmu_core::{
     Block, Capabilities, Causality, Elapsed, Meta, Model, Next, SampleGrid, Slot, Step, Variability,
     capability::ToEvent,
@@ -27,7 +30,7 @@ pub trait Twin: Model + PartialEq {
 #[expect(clippy::struct_excessive_bools, reason = "independent facts")]
 pub struct Snapshot<M: Twin> {
     pub kind: Kind,
-    pub state: char,
+    pub state: State,
     pub start: Option<f64>,
     pub elapsed: Elapsed,
     pub end: f64,
@@ -45,11 +48,15 @@ pub struct Snapshot<M: Twin> {
 }
 
 impl<M: Twin> Snapshot<M> {
+    pub fn is(&self, states: &[State]) -> bool {
+        states.contains(&self.state)
+    }
+
     pub fn new(kind: Kind) -> Self {
         let start = M::INFO.experiment.start;
         Self {
             kind,
-            state: 'i',
+            state: Instantiated,
             start: None,
             elapsed: Elapsed::ZERO,
             end: start,
@@ -65,10 +72,12 @@ impl<M: Twin> Snapshot<M> {
 
     /// The value of a getter.
     pub fn show(&mut self) {
-        if "in".contains(self.state) && self.fresh {
+        if self.is(&[Instantiated, Initialization]) && self.fresh {
             self.initialize();
         }
-        if std::mem::take(&mut self.old) || !"in".contains(self.state) && self.kind.exchanges() && self.running {
+        if std::mem::take(&mut self.old)
+            || !self.is(&[Instantiated, Initialization]) && self.kind.exchanges() && self.running
+        {
             self.observe();
         }
     }
@@ -274,30 +283,37 @@ impl<M: Twin> Snapshot<M> {
     /// The status of setting one value, without setting it.
     fn judge(&mut self, index: usize, value: f64) -> c_int {
         let (state, exchanges) = (self.state, self.kind.exchanges());
+        let is = |states: &[State]| states.contains(&state);
         let row = M::CAN.rows().unwrap().contains(&index);
         let Some((meta, Slot::Real(x))) = M::TABLE.entry(&mut self.block, index) else { return ERROR };
         let Meta { causality, variability, range, exact, .. } = *meta;
         let may = match (causality, variability) {
-            _ if exact && "in".contains(state) => true,
-            (Causality::Input, Variability::Continuous) => "invcs".contains(state),
-            (Causality::Input, _) => "invs".contains(state) || (exchanges && state == 'c' && *x == value),
-            (Causality::Parameter, Variability::Tunable) => "invs".contains(state),
-            (Causality::Parameter, _) => "in".contains(state),
-            _ => exchanges && row && "vc".contains(state),
+            _ if exact && is(&[Instantiated, Initialization]) => true,
+            (Causality::Input, Variability::Continuous) => {
+                is(&[Instantiated, Initialization, Event, Continuous, State::Step])
+            }
+            (Causality::Input, _) => {
+                is(&[Instantiated, Initialization, Event, State::Step])
+                    || (exchanges && state == Continuous && *x == value)
+            }
+            (Causality::Parameter, Variability::Tunable) => is(&[Instantiated, Initialization, Event, State::Step]),
+            (Causality::Parameter, _) => is(&[Instantiated, Initialization]),
+            _ => exchanges && row && is(&[Event, Continuous]),
         };
         // Habits of importers: a parameter is set to its own value when it is too late.
-        let stays = "vcs".contains(state) && (causality == Causality::Parameter || exact) && *x == value;
+        let stays =
+            is(&[Event, Continuous, State::Step]) && (causality == Causality::Parameter || exact) && *x == value;
         match (may || stays, range.contains(value)) {
             (true, true) => OK,
-            (true, false) if may && state == 'c' => DISCARD,
-            _ if exchanges && state == 'c' && causality == Causality::Input => DISCARD,
+            (true, false) if may && state == Continuous => DISCARD,
+            _ if exchanges && state == Continuous && causality == Causality::Input => DISCARD,
             _ => ERROR,
         }
     }
 
     /// The value equals that of the variable, which cannot change now.
     fn is_held(&mut self, index: usize, value: f64) -> bool {
-        let tunes = self.state != 'c';
+        let tunes = self.state != Continuous;
         match M::TABLE.entry(&mut self.block, index) {
             Some((meta, Slot::Real(x))) if meta.causality == Causality::Parameter => {
                 !(meta.variability == Variability::Tunable && tunes) && *x == value
@@ -324,10 +340,10 @@ impl<M: Twin> Snapshot<M> {
         }
         let rows = M::CAN.rows().unwrap();
         for (index, value) in places {
-            if "vcs".contains(self.state) && self.is_held(index, value) {
+            if self.is(&[Event, Continuous, State::Step]) && self.is_held(index, value) {
                 continue;
             }
-            self.fresh |= "in".contains(self.state);
+            self.fresh |= self.is(&[Instantiated, Initialization]);
             if let Some(i) = rows.iter().position(|row| *row == index) {
                 *M::CAN.states()[i].at(&mut self.block.model) = value;
             } else if let Some((meta, Slot::Real(x))) = M::TABLE.entry(&mut self.block, index) {
