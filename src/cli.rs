@@ -1,8 +1,8 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{
-    atlas, build, compare, identify, info, map, merge, modelica, new, page, preset, prove, reproduce, simulate, ssp,
-    sweep, tune,
+    atlas, bode, build, compare, identify, info, map, merge, modelica, new, page, preset, prove, reproduce, simulate,
+    ssp, sweep, tune,
 };
 use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -29,6 +29,7 @@ enum Command {
     Info(info::Info),
     Simulate(simulate::Simulate),
     Sweep(sweep::Sweep),
+    Bode(bode::Bode),
     Check(check::CheckArguments),
     Reproduce(reproduce::Reproduce),
     Compare(compare::Compare),
@@ -115,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args).map(|holds| ExitCode::from(u8::from(!holds))).map_err(Into::into),
         Command::Probe(args) => probe::run(&args).map(|()| ExitCode::SUCCESS).map_err(Into::into),
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
+        Command::Bode(args) => bode::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Map(args) => map::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),

@@ -223,6 +223,7 @@ pub fn envelope(measured: &[f64]) -> Result<Plane> {
         curves: vec![curve("motoring", CURVES[0], 1.0), curve("generating", CURVES[1], -1.0)],
         dots,
         marks: vec![(base, format!("base speed {base:.0} rpm"))],
+        ..Panel::default()
     };
     Ok(Plane { base, end, panel })
 }
@@ -275,6 +276,7 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         curves: (0..5).rev().map(stack).collect(),
         dots: points.iter().flat_map(|[_, run]| sums(run).map(|sum| (run.rpm, sum))).collect(),
         marks: vec![(onset, "field weakening".into()), (end, format!("{limit} A"))],
+        ..Panel::default()
     };
     let percent = |p: &OperatingPoint| (p.rpm, 100.0 * p.efficiency);
     let efficiency = Panel {
@@ -284,6 +286,7 @@ pub fn losses(torque: f64, highest: f64, measured: &[f64]) -> Result<Split> {
         curves: vec![Curve::through("p_mech / p_in", CURVES[0], curves.iter().map(percent))],
         dots: points.iter().map(|[_, run]| percent(run)).collect(),
         marks: stacked.marks.clone(),
+        ..Panel::default()
     };
     Ok(Split { onset, end, panels: [stacked, efficiency], points })
 }

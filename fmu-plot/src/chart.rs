@@ -81,7 +81,8 @@ pub fn draw(chart: &Chart) -> Result<String, Error> {
     }
     let (width, height) = SIZE;
     let (window, (low, high)) = (chart.window, chart.range);
-    let area = Area { left: 66.0, top: 34.0, right: width - BESIDE, bottom: height - 44.0, window, low, high };
+    let (right, bottom) = (width - BESIDE, height - 44.0);
+    let area = Area { left: 66.0, top: 34.0, right, bottom, window, log: false, low, high };
     let Area { left, top, right, bottom, .. } = area;
     let mut svg = format!(
         "<svg class=\"plot chart\" xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" \

@@ -25,6 +25,8 @@ pub struct Panel {
     pub unit: String,
     /// Range of the horizontal axis.
     pub window: (f64, f64),
+    /// Whether horizontal coordinates are decimal logarithms: the axis then shows the numbers themselves.
+    pub log: bool,
     /// The curves, in the order in which they are drawn.
     pub curves: Vec<Curve>,
     /// Single points.
@@ -91,9 +93,43 @@ pub(crate) fn ticks(low: f64, high: f64, most: f64) -> (Vec<f64>, usize) {
     (places, decimals as usize)
 }
 
+/// Positions of the grid lines of a logarithmic axis between the logarithms `low` and `high`, each with its label; those between
+/// powers of ten have none, unless the axis is short.
+pub(crate) fn decades(low: f64, high: f64) -> Vec<(f64, String)> {
+    #[expect(clippy::cast_possible_truncation, reason = "exponents of doubles")]
+    let (first, last) = (low.floor() as i32, high.ceil() as i32);
+    let short = high - low < 1.5;
+    let inside = |x: &f64| (low - 1e-9..=high + 1e-9).contains(x);
+    let lines = (first..=last.min(first + 30)).flat_map(|power| (1..10).map(move |digit| (power, digit)));
+    let label = |power: i32, digit: i32| {
+        let shown = digit == 1 || (short && [2, 5].contains(&digit));
+        if shown { digits(f64::from(digit) * 10.0_f64.powi(power)) } else { String::new() }
+    };
+    lines.map(|(p, d)| (f64::from(p) + f64::from(d).log10(), label(p, d))).filter(|(x, _)| inside(x)).collect()
+}
+
+/// A number of one digit.
+fn digits(x: f64) -> String {
+    if !(9e-4..5e4).contains(&x) {
+        return format!("{x:.0e}");
+    }
+    if x > 0.95 { format!("{x:.0}") } else { format!("{x:.3}").trim_end_matches('0').to_owned() }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::ticks;
+    use super::{decades, ticks};
+
+    #[test]
+    fn decades_are_labeled() {
+        let labels = |low: f64, high: f64| {
+            let all = decades(low.log10(), high.log10());
+            (all.len(), all.into_iter().map(|(_, label)| label).filter(|x| !x.is_empty()).collect::<Vec<_>>().join(" "))
+        };
+        assert_eq!(labels(0.1, 1000.0), (37, "0.1 1 10 100 1000".into()));
+        assert_eq!(labels(30.0, 600.0), (13, "50 100 200 500".into()));
+        assert_eq!(labels(1e-5, 1e6).1, "1e-5 1e-4 0.001 0.01 0.1 1 10 100 1000 10000 1e5 1e6");
+    }
 
     #[test]
     fn ticks_are_round() {

@@ -1,7 +1,7 @@
 //! Draws a [`Figure`] as SVG, on light or dark paper as the reader's system prefers.
 
 use crate::error::Error;
-use crate::figure::{Curve, Figure, Panel, ticks};
+use crate::figure::{Curve, Figure, Panel, decades, ticks};
 use crate::ink::REFERENCE;
 use std::fmt::Write as _;
 
@@ -89,6 +89,7 @@ pub(crate) struct Area {
     pub(crate) right: f64,
     pub(crate) bottom: f64,
     pub(crate) window: (f64, f64),
+    pub(crate) log: bool,
     pub(crate) low: f64,
     pub(crate) high: f64,
 }
@@ -107,7 +108,8 @@ impl Area {
         }
         let flat = 1e-3 * high.abs().max(low.abs());
         let margin = (0.06 * (high - low)).max(if flat > 0.0 { flat } else { 1.0 });
-        Self { left, top, right, bottom, window: panel.window, low: low - margin, high: high + margin }
+        let (low, high) = (low - margin, high + margin);
+        Self { left, top, right, bottom, window: panel.window, log: panel.log, low, high }
     }
 
     pub(crate) fn x(&self, x: f64) -> f64 {
@@ -128,11 +130,18 @@ impl Area {
             let _ = writeln!(svg, "<path class=\"grid\" d=\"M{left:.1} {y:.1}H{right:.1}\" stroke=\"#e1e1e1\"/>");
             text(svg, (left - 8.0, y + 4.0), "end", &number(place, decimals));
         }
-        let (places, decimals) = ticks(self.window.0, self.window.1, (right - left) / 75.0);
-        for place in places {
+        let lines = if self.log {
+            decades(self.window.0, self.window.1)
+        } else {
+            let (places, decimals) = ticks(self.window.0, self.window.1, (right - left) / 75.0);
+            places.into_iter().map(|place| (place, number(place, decimals))).collect()
+        };
+        for (place, label) in lines {
             let x = self.x(place);
             let _ = writeln!(svg, "<path class=\"grid\" d=\"M{x:.1} {top:.1}V{bottom:.1}\" stroke=\"#e1e1e1\"/>");
-            text(svg, (x, bottom + 16.0), "middle", &number(place, decimals));
+            if !label.is_empty() {
+                text(svg, (x, bottom + 16.0), "middle", &label);
+            }
         }
         text(svg, (0.5 * (left + right), bottom + 32.0), "middle", label);
         let (x, y) = (left - 52.0, 0.5 * (top + bottom));

@@ -2,6 +2,7 @@
 //!
 //! - [`Definition`]: the definition of a sweep, from a TOML file or from a program.
 //! - [`Plan`]: the system with its measures; runs rows on threads. [`DesignRows`]: the rows of a design.
+//! - [`frequency`]: frequency responses by a swept sine, with the margins of loops.
 //! - [`Sweep`]: both, from a file. [`run`]: a sweep into a folder; [`isolate`]: in separate processes.
 //!
 //! A row is a function of the definition, the seed and its number, and its results have the same bits on every thread, process
@@ -27,6 +28,7 @@ pub mod definition;
 mod design;
 mod error;
 mod files;
+pub mod frequency;
 pub mod isolate;
 mod measure;
 mod output;

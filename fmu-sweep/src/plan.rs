@@ -201,6 +201,16 @@ impl Plan {
         &self.0.system
     }
 
+    /// The inputs of FMUs that an input is: several of an SSP's system.
+    pub(crate) fn ports(&self, name: &str) -> Result<Vec<String>, Error> {
+        Ok(self.0.connectors.ports(name)?)
+    }
+
+    /// The variable denoted by a name to record.
+    pub(crate) fn outlet(&self, name: &str) -> Result<cosimulation::Outlet, Error> {
+        Ok(self.0.connectors.outlet(name)?)
+    }
+
     /// Whether the instances of a run are reset for the next; otherwise each run has new ones.
     pub(crate) fn reuses(&self) -> bool {
         self.0.reuse
@@ -287,8 +297,7 @@ impl Plan {
     /// The variable does not exist, or an FMU refuses.
     pub fn simulate(&self, values: &[(RunVariable, Number)], outputs: Option<&[String]>) -> Result<Recording, Error> {
         let outputs = outputs.unwrap_or(&self.0.outputs);
-        let outlet = |name: &String| Ok(self.0.connectors.outlet(name)?);
-        let variables = outputs.iter().map(outlet).collect::<Result<Vec<_>, Error>>()?;
+        let variables = outputs.iter().map(|name| self.outlet(name)).collect::<Result<Vec<_>, Error>>()?;
         let mut worker = Arc::new(self.0.system.recording(&variables)?).worker()?;
         Ok(worker.record(values.iter().flat_map(|(v, x)| v.targets.iter().map(|target| (target, *x))))?)
     }

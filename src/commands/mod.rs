@@ -1,6 +1,7 @@
 //! The commands of the command line, a module for each.
 
 pub mod atlas;
+pub mod bode;
 pub mod build;
 pub mod compare;
 pub mod identify;

@@ -19,6 +19,22 @@ function ticks(low, high, most) {
   return [places, Math.min(12, Math.max(0, -Math.floor(Math.log10(step * 1.001))))];
 }
 
+// Places of a logarithmic axis and their texts, some of them empty; between close numbers, those of a linear axis.
+function decades(low, high, most) {
+  const places = [], texts = [], short = high - low < 1.5;
+  for (let power = Math.floor(low); power <= high; power++) {
+    for (let digit = 1; digit < 10; digit++) {
+      const x = power + Math.log10(digit);
+      if (x < low - 1e-9 || x > high + 1e-9) continue;
+      places.push(x);
+      texts.push(digit === 1 || (short && (digit === 2 || digit === 5)) ? shown(digit * 10 ** power) : "");
+    }
+  }
+  if (texts.filter((text) => text).length > 1) return [places, texts];
+  const [numbers, decimals] = ticks(10 ** low, 10 ** high, most);
+  return [numbers.map(Math.log10), numbers.map((x) => onAxis(x, decimals))];
+}
+
 const minus = (text) => text.replace(/-/g, "\u2212");
 const onAxis = (x, decimals) => minus(Math.abs(x) >= 1e6 || (decimals > 6 && x) ? x.toExponential(2) : (x + 0).toFixed(decimals));
 const shown = (x) => {

@@ -86,7 +86,11 @@ struct Data {
 impl Data {
     fn panel(&mut self, panel: &Panel) -> Value {
         let curves: Vec<Value> = panel.curves.iter().map(|curve| self.curve(curve)).collect();
-        json!({ "title": panel.title, "unit": panel.unit, "window": [panel.window.0, panel.window.1], "curves": curves })
+        let mut json = json!({ "title": panel.title, "unit": panel.unit, "window": [panel.window.0, panel.window.1], "curves": curves });
+        if panel.log {
+            json["log"] = true.into();
+        }
+        json
     }
 
     fn curve(&mut self, curve: &Curve) -> Value {

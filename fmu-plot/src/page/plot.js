@@ -157,11 +157,12 @@ class Panel {
       make(this.axes, "path", { class: "grid", d: `M${this.left} ${this.y(v)}H${right}` });
       make(this.axes, "text", { x: this.left - 7, y: this.y(v) + 4, "text-anchor": "end" }, this.labels[k]);
     });
-    const [times, digits] = ticks(this.view.from, this.view.to, Math.max(3, this.across / 70));
-    for (const t of times) {
+    const most = Math.max(3, this.across / 70);
+    const [times, texts] = this.data.log ? decades(this.view.from, this.view.to, most) : ticks(this.view.from, this.view.to, most);
+    times.forEach((t, k) => {
       make(this.axes, "path", { class: "grid", d: `M${this.x(t)} ${this.top}V${this.bottom}` });
-      make(this.axes, "text", { x: this.x(t), y: this.bottom + 16, "text-anchor": "middle" }, onAxis(t, digits));
-    }
+      make(this.axes, "text", { x: this.x(t), y: this.bottom + 16, "text-anchor": "middle" }, this.data.log ? texts[k] : onAxis(t, texts));
+    });
     make(this.axes, "text", { x: (this.left + right) / 2, y: this.height - 4, "text-anchor": "middle" }, this.data.label);
     for (const curve of this.data.curves) {
       curve.path.setAttribute("d", curve.hidden ? "" : this.line(curve));
@@ -277,7 +278,9 @@ async function show(place) {
   }
   const changed = () => {
     const pointed = [...views.values()].find((each) => each.at !== null);
-    at.textContent = pointed ? `t = ${shown(pointed.at)} s` : "";
+    const [quantity, unit] = data.label.split(" in ");
+    const value = () => shown(pointed.panels[0].data.log ? 10 ** pointed.at : pointed.at);
+    at.textContent = pointed ? `${quantity === "time" ? "t" : quantity} = ${value()} ${unit ?? ""}` : "";
     reset.disabled = ![...views.values()].some((each) => each.zoomed);
     readings.forEach((read) => read());
   };

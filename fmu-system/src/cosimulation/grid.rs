@@ -16,6 +16,15 @@ pub struct Settings {
     pub sequential: bool,
 }
 
+/// Steps of another length before those of the settings.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CoarseSteps {
+    /// Their number.
+    pub steps: u32,
+    /// Length in s.
+    pub step: f64,
+}
+
 /// What happens so short before a communication point, as a share of the step, counts as at that point.
 pub(super) const EARLY: f64 = 0.01;
 
@@ -24,6 +33,8 @@ pub(super) const EARLY: f64 = 0.01;
 pub(super) struct Grid {
     settings: Settings,
     steps: u32,
+    /// Longer steps at the beginning.
+    approach: CoarseSteps,
     /// Relative tolerance for the solvers inside the FMUs; otherwise that of the default experiment of each.
     pub(super) tolerance: Option<f64>,
     /// Steps end where inputs jump.
@@ -62,7 +73,14 @@ impl Settings {
             reason = "an integer in the range, see above"
         )]
         let steps = whole as u32;
-        Ok(Grid { settings: *self, steps, tolerance: None, meets: false, careful: false })
+        Ok(Grid {
+            settings: *self,
+            steps,
+            approach: CoarseSteps::default(),
+            tolerance: None,
+            meets: false,
+            careful: false,
+        })
     }
 }
 
@@ -75,10 +93,22 @@ impl Grid {
         self.steps
     }
 
+    /// The grid after steps of another length, from `start` (s) on.
+    pub(super) fn after_approach(self, approach: CoarseSteps, start: f64) -> Self {
+        let Self { settings, steps, .. } = self;
+        Self { settings: Settings { start, ..settings }, steps: steps + approach.steps, approach, ..self }
+    }
+
     /// Time of point `k`; never summed up.
     pub(super) fn time(&self, k: u32) -> f64 {
-        let Settings { start, stop, step, .. } = self.settings;
-        if k == self.steps { stop } else { start + f64::from(k) * step }
+        let (Settings { start, stop, step, .. }, before) = (self.settings, self.approach);
+        if k == self.steps {
+            stop
+        } else if k <= before.steps {
+            start + f64::from(k) * if before.steps > 0 { before.step } else { step }
+        } else {
+            start + (f64::from(before.steps) * before.step + f64::from(k - before.steps) * step)
+        }
     }
 
     /// The communication point after the time `t` (s), if `t` lies within the simulation and is not a communication point.
@@ -98,6 +128,9 @@ impl Grid {
 
     /// Size of the step from point `k`: `step` itself, not the difference of two rounded times, except for a short last one.
     pub(super) fn size(&self, k: u32) -> f64 {
+        if k < self.approach.steps {
+            return self.approach.step;
+        }
         let rest = self.settings.stop - self.time(k);
         if k + 1 == self.steps && (rest - self.settings.step).abs() > 1e-3 * self.settings.step {
             rest
@@ -121,6 +154,14 @@ mod tests {
         let g = grid(0.0, 1.0, 1e-4).unwrap();
         assert_eq!((g.steps(), g.time(3), g.time(10_000)), (10_000, 3.0 * 1e-4, 1.0));
         assert!((0..g.steps()).all(|k| g.size(k) == 1e-4));
+    }
+
+    #[test]
+    fn long_steps_come_first() {
+        let fine = grid(0.5, 0.6, 0.01).unwrap().after_approach(CoarseSteps { steps: 5, step: 0.1 }, 0.0);
+        assert_eq!(fine.steps(), 15);
+        assert_eq!([0, 1, 5, 6, 15].map(|k| fine.time(k)), [0.0, 0.1, 0.5, 0.51, 0.6]);
+        assert_eq!([0, 4, 5, 14].map(|k| fine.size(k)), [0.1, 0.1, 0.01, 0.01]);
     }
 
     #[test]

@@ -22,16 +22,17 @@
 //! ```
 
 use super::exchange::Exchange;
-use super::grid::{Grid, Settings};
+use super::grid::{CoarseSteps, Grid, Settings};
 use super::method::Method;
 use super::parts::{Part, Parts, Port};
 use super::point::Ended;
 use super::recording::{Column, Recording};
 use super::run::simulate;
+use super::schedule::{Schedule, Sine};
 use super::system::System;
-use super::wiring::{Change, Outlet, Record, Wiring};
+use super::wiring::{Change, Outlet, Record, Source, Wiring};
 use fmu_import::{Error, Fmu, Instance, Kind, Logging, Number, Values};
-use model_description::{BaseType, Conversion, Interface, parse_number};
+use model_description::{BaseType, Causality, Conversion, Interface, Variability, parse_number};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -177,6 +178,84 @@ impl SystemPlan {
             records,
             grid: self.grid,
             columns,
+        })
+    }
+
+    /// This plan with other times, and with a sine added to the value of an input, written `instance.variable`, that no connection
+    /// feeds, or of a tunable parameter. The run begins with the steps of the `approach`; `settings` has those after it.
+    ///
+    /// # Errors
+    /// The settings are invalid; the variable does not exist, is not a real number, is not an input, or is connected.
+    pub fn excited(
+        &self,
+        written: &str,
+        sine: Sine,
+        settings: &Settings,
+        approach: CoarseSteps,
+    ) -> Result<Self, Error> {
+        let wrong = |cause: String| Error::usage(written, cause);
+        let target = self.parts.scalar(written)?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let tunable = variable.causality == Causality::Parameter && variable.variability == Variability::Tunable;
+        if !target.base.is_float() || !(variable.causality == Causality::Input || tunable) {
+            return Err(wrong("cannot follow a sine: it is not a real input or tunable parameter".into()));
+        }
+        let mut wiring = self.wiring.clone();
+        if let Some(feed) = wiring.feeds.iter_mut().find(|feed| feed.target == target) {
+            let Source::Schedule(schedule) = &feed.source else {
+                return Err(wrong("is connected: only an input that no output feeds can follow a sine".into()));
+            };
+            feed.source = Source::Schedule(schedule.clone().with_sine(sine));
+        } else {
+            let set = self.set.iter().rev().find(|(port, _)| *port == target).map(|(_, values)| values.one(0).real());
+            let start = || Values::start(variable, self.parts.0[target.instance].description());
+            let value = set.map_or_else(|| start().map(|values| values.one(0).real()), Ok).map_err(wrong)?;
+            let continuous = variable.variability == Variability::Continuous;
+            let schedule = Schedule::steps(vec![(settings.start, value)]).map_err(wrong)?.with_sine(sine);
+            wiring.add(target, Source::Schedule(schedule), continuous);
+        }
+        let mut grid = settings.grid().map_err(|cause| Error::usage("settings", cause))?;
+        (grid.tolerance, grid.meets) = (self.grid.tolerance, self.grid.meets);
+        let start = settings.start - f64::from(approach.steps) * approach.step;
+        Ok(Self {
+            method: self.method.clone(),
+            parts: self.parts.clone(),
+            live: self.live.clone(),
+            set: self.set.clone(),
+            exchange: Exchange::new(self.parts.0.len(), &wiring, &self.records, [].iter()),
+            wiring,
+            records: self.records.clone(),
+            grid: if approach.steps > 0 { grid.after_approach(approach, start) } else { grid },
+            columns: self.columns.clone(),
+        })
+    }
+
+    /// Size of the values of an input, written `instance.variable`: the largest of its nominal value, 1 without one, and of the
+    /// values set or fed over time.
+    ///
+    /// # Errors
+    /// The variable does not exist or is not a number.
+    pub fn magnitude(&self, written: &str) -> Result<f64, Error> {
+        let target = self.parts.scalar(written)?;
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let set = self.set.iter().rev().find(|(port, _)| *port == target).map(|(_, values)| values.one(0).real());
+        let start = Values::start(variable, self.parts.0[target.instance].description()).map(|x| x.one(0).real());
+        let fed = self.wiring.feeds.iter().find_map(|feed| match &feed.source {
+            Source::Schedule(schedule) if feed.target == target => Some(schedule.magnitude()),
+            _ => None,
+        });
+        let value = fed.or(set).or(start.ok()).filter(|x| x.is_finite());
+        Ok(value.map_or(0.0, f64::abs).max(variable.nominal.unwrap_or(1.0)))
+    }
+
+    /// Whether every FMU follows a change of the communication step during a run, and whether it takes any step: none has a
+    /// `fixedInternalStepSize`.
+    pub fn varies_steps(&self) -> (bool, bool) {
+        let stepping = self.parts.0.iter().filter(|part| part.kind != Kind::ModelExchange);
+        let interfaces = stepping.filter_map(|part| part.description().co_simulation.clone());
+        interfaces.fold((true, true), |(varies, any), of| {
+            let fixed = of.attribute("fixedInternalStepSize").is_some();
+            (varies && of.flag("canHandleVariableCommunicationStepSize"), any && !fixed)
         })
     }
 

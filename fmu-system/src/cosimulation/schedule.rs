@@ -11,6 +11,25 @@ pub struct Schedule {
     linear: bool,
     /// Unit of each value, if any has a unit; empty means that of the variable.
     units: Vec<String>,
+    /// Added to the values.
+    sine: Option<Sine>,
+}
+
+/// The sine `amplitude sin(2 pi frequency (t - zero))`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sine {
+    /// In the unit of the variable.
+    pub amplitude: f64,
+    /// In Hz.
+    pub frequency: f64,
+    /// Time (s) of a rising zero crossing.
+    pub zero: f64,
+}
+
+impl Sine {
+    fn at(&self, t: f64) -> f64 {
+        self.amplitude * (std::f64::consts::TAU * self.frequency * (t - self.zero)).sin()
+    }
 }
 
 /// Instants closer than this (s) are the same: communication points are `start + k h`, rounded.
@@ -43,7 +62,17 @@ impl Schedule {
         if let Some(pair) = points.windows(2).find(|pair| pair[1].0 <= pair[0].0) {
             return Err(format!("the time {} does not follow {}", pair[1].0, pair[0].0));
         }
-        Ok(Self { points, linear, units: Vec::new() })
+        Ok(Self { points, linear, units: Vec::new(), sine: None })
+    }
+
+    /// The largest magnitude of its points.
+    pub(super) fn magnitude(&self) -> f64 {
+        self.points.iter().map(|(_, x)| x.abs()).fold(0.0, f64::max)
+    }
+
+    /// With a sine added.
+    pub(super) fn with_sine(self, sine: Sine) -> Self {
+        Self { sine: Some(sine), ..self }
     }
 
     /// Lines whose value jumps where two points have the same time; the times do not decrease.
@@ -52,7 +81,7 @@ impl Schedule {
             return Err(format!("{t}:{x} is not finite"));
         }
         let units = vec![unit.to_owned(); points.len()];
-        Ok(Self { points, linear: true, units: Vec::new() }.with_units(units))
+        Ok(Self { points, linear: true, units: Vec::new(), sine: None }.with_units(units))
     }
 
     /// Converts the values to the unit of the `variable`.
@@ -111,6 +140,11 @@ impl Schedule {
 
     /// Value at time `t` (s).
     pub fn at(&self, t: f64) -> f64 {
+        self.base(t) + self.sine.map_or(0.0, |sine| sine.at(t))
+    }
+
+    /// Value at time `t` (s) without the sine.
+    fn base(&self, t: f64) -> f64 {
         let after = last_before(&self.points, t);
         let (Some(&(t0, x0)), next) = (self.points.get(after.saturating_sub(1)), self.points.get(after)) else {
             return 0.0;
@@ -126,7 +160,7 @@ impl Schedule {
     /// Value at time `t` (s) of a run whose last event was at `since`: every point is an event, so a step keeps its value until
     /// the next one.
     pub(super) fn held(&self, since: f64, t: f64) -> f64 {
-        self.at(if self.linear { t } else { since })
+        self.base(if self.linear { t } else { since }) + self.sine.map_or(0.0, |sine| sine.at(t))
     }
 
     /// Times (s) at which the value jumps.
@@ -178,6 +212,18 @@ mod tests {
         assert_eq!([-1.0, 0.0, 0.1 - 1e-12, 0.2].map(|t| steps.next_point(t)), [Some(0.0), Some(0.1), None, None]);
         let lines = Schedule::parse("0:1~0.1:2").unwrap();
         assert_eq!((lines.held(0.0, 0.05), lines.held(0.0, 0.1)), (1.5, 2.0));
+    }
+
+    #[test]
+    fn a_sine_is_added_at_every_time() {
+        let sine = Sine { amplitude: 2.0, frequency: 10.0, zero: 1.0 };
+        let steps = Schedule::parse("0:1, 0.5:3").unwrap().with_sine(sine);
+        for (t, base) in [(0.025, 1.0), (0.525, 3.0), (1.025, 3.0)] {
+            assert!((steps.at(t) - base - 2.0).abs() < 1e-12, "{}", steps.at(t));
+        }
+        // A step holds until its event; the sine goes on.
+        assert!((steps.held(0.0, 0.525) - 3.0).abs() < 1e-12);
+        assert_eq!(steps.jumps().collect::<Vec<_>>(), [0.5]);
     }
 
     #[test]

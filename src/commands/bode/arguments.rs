@@ -1,0 +1,99 @@
+//! The options of `fmu bode`.
+
+use super::coupling::Train;
+use super::loops::Loop;
+use clap::Args;
+use std::path::PathBuf;
+
+/// Measures frequency responses of running FMUs by a swept sine, with the sampled controller in them.
+///
+/// A sine is added to the input --from. At each frequency a run reaches the operating point of --set and --input within --settle,
+/// then whole periods are measured until two agree; the response is --to over the sine, or over the variable --over. A second run at
+/// half the amplitude and a third one at half the communication step check and correct the value: warnings name the frequencies at
+/// which the system is not linear, has not settled or needs a shorter --step.
+///
+/// --closed and --open say that the response is a closed loop T or an open loop L; T / (1 - T) = L. The command prints bandwidth,
+/// peak, crossover, gain and phase margin, and the largest sensitivity, between the frequencies measured.
+///
+/// --loop selects input and outputs of PmsmDrive and of FMUs with its variables, in steps of the controller's sample period.
+///
+/// The speed loop of the drive at 1000 rpm, with margins, on a page:
+///   fmu bode target/fmu/fmi3/PmsmDrive.fmu --loop speed --input speed_ref=0:0,0.1:1000rpm --settle 2 --html speed.html
+/// The response of any FMU, at 20 frequencies between 1 Hz and 1 kHz:
+///   fmu bode RcCircuit.fmu --from u --to u_c --frequencies 1:1000:20 --step 1e-4 --csv rc.csv
+/// What --loop current measures:
+///   fmu bode PmsmDrive.fmu --from speed_ref --to i_q_est --over i_q_ref --closed --step 1e-4 --set controller.estimator=Sensored
+#[derive(Debug, Args)]
+#[command(verbatim_doc_comment)]
+#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
+pub struct Bode {
+    /// FMUs, each optionally with a name; or one SSP file
+    #[arg(value_name = "[NAME=]FILE", required = true)]
+    pub fmus: Vec<String>,
+    /// A response of a drive
+    #[arg(long = "loop", value_enum, required_unless_present_all = ["from", "to"], conflicts_with_all = ["from", "to", "over", "closed", "open"])]
+    pub which: Option<Loop>,
+    /// The input, or tunable parameter, that gets the sine
+    #[arg(long, value_name = "INPUT", requires = "to")]
+    pub from: Option<String>,
+    /// The variable that responds
+    #[arg(long, value_name = "VARIABLE", requires = "from")]
+    pub to: Option<String>,
+    /// The variable whose response is the reference, instead of the input
+    #[arg(long, value_name = "VARIABLE")]
+    pub over: Option<String>,
+    /// The response is a closed loop: report the open one, T / (1 - T), with its margins
+    #[arg(long, conflicts_with = "open")]
+    pub closed: bool,
+    /// The response is an open loop, with the feedback -L: report its margins
+    #[arg(long)]
+    pub open: bool,
+    /// With --loop impedance: a load behind a spring, its stiffness in N.m/rad, damping in N.m.s/rad and inertia in kg.m2; prints the
+    /// longest communication step for a compliant shaft
+    #[arg(long, value_name = "C,D,J", requires = "which")]
+    pub spring: Option<Train>,
+    /// Frequencies in Hz: a list, or FIRST:LAST:COUNT, evenly in the logarithm [default: 10 a decade, from 2e-4 / step to 0.2 / step,
+    /// and more where the response bends]
+    #[arg(long, value_name = "HZ,...|HZ:HZ:N", allow_hyphen_values = true)]
+    pub frequencies: Option<String>,
+    /// Amplitude of the sine in the unit of the input [default: a hundredth of the input's size, reduced until the FMU is linear]
+    #[arg(long, value_name = "A", allow_negative_numbers = true)]
+    pub amplitude: Option<f64>,
+    /// Time in s from the start to the operating point [default: the duration of the FMUs' default experiment, else 1]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub settle: Option<f64>,
+    /// Communication step in s, best the sample period of a controller; high frequencies take fractions of it [default: with --loop
+    /// controller.T_s, else the shortest of the FMUs, else a thousandth of the settling time]
+    #[arg(long, value_name = "H", allow_negative_numbers = true)]
+    pub step: Option<f64>,
+    /// Set a parameter or an unconnected input (repeatable)
+    #[arg(long, value_name = "VARIABLE=VALUE")]
+    pub set: Vec<String>,
+    /// Feed an input over time until the operating point (repeatable), as for fmu simulate
+    #[arg(long, value_name = "VARIABLE=POINTS")]
+    pub input: Vec<String>,
+    /// Connect an output to an input (repeatable)
+    #[arg(long, value_name = "OUTPUT=INPUT")]
+    pub connect: Vec<String>,
+    /// Connect every unconnected input to the output of the same name of another FMU
+    #[arg(long)]
+    pub auto_connect: bool,
+    /// Integrate the FMUs (Model Exchange) instead of letting them step themselves (Co-Simulation)
+    #[arg(long)]
+    pub me: bool,
+    /// Relative tolerance of the integrator of --me [default: 1e-6]
+    #[arg(long, value_name = "TOLERANCE", requires = "me", allow_negative_numbers = true)]
+    pub rtol: Option<f64>,
+    /// Threads [default: as many as the machine runs at once]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Write the responses as CSV; - for standard output
+    #[arg(long, value_name = "FILE|-")]
+    pub csv: Option<PathBuf>,
+    /// Write the Bode plot; the extension selects the format
+    #[arg(long, value_name = "FILE.svg|FILE.png")]
+    pub plot: Option<PathBuf>,
+    /// Write the plot as an offline page with zoom and values at the cursor
+    #[arg(long, value_name = "FILE.html")]
+    pub html: Option<PathBuf>,
+}

@@ -1,0 +1,181 @@
+//! `fmu bode`: frequency responses of running FMUs.
+
+mod arguments;
+mod coupling;
+mod loops;
+mod output;
+
+pub use arguments::Bode;
+
+use crate::Failed;
+use crate::message;
+use anyhow::{Context, Result, anyhow, bail};
+use fmu_import::{Fmu, printable};
+use fmu_sweep::definition::{Definition, Interface, Ordered, SetValue};
+use fmu_sweep::frequency::{Excitation, FrequencyOutcome};
+use fmu_sweep::{Plan, threads_here};
+use fmu_system::ssp::load::name_and_path;
+use indicatif::{ProgressBar, ProgressStyle};
+use loops::{Loop, Meaning, Probe};
+use model_description::{ModelDescription, parse_number};
+use output::Response;
+use std::io::{IsTerminal, stderr};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// Maximum number of frequencies.
+const MOST: usize = 10_000;
+
+/// The frequencies (Hz) of the option.
+fn frequencies(text: &str) -> Result<Vec<f64>> {
+    let wrong = || {
+        anyhow!(
+            "--frequencies {text}: expected numbers above 0 such as 1,10,100, or FIRST:LAST:COUNT such as 1:1000:30"
+        )
+    };
+    let number = |part: &str| part.trim().parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0).ok_or_else(wrong);
+    let parts: Vec<&str> = text.split(':').collect();
+    match parts[..] {
+        [list] => list.split(',').map(number).collect(),
+        [first, last, count] => {
+            let (first, last, count) =
+                (number(first)?, number(last)?, count.trim().parse::<u32>().map_err(|_| wrong())?);
+            if count < 2 || count as usize > MOST || last <= first {
+                return Err(wrong());
+            }
+            let share = |k: u32| f64::from(k) / f64::from(count - 1);
+            Ok((0..count).map(|k| first * (last / first).powf(share(k))).collect())
+        }
+        _ => Err(wrong()),
+    }
+}
+
+/// The two sides of `NAME=VALUE`.
+fn halves(text: &str, form: &str) -> Result<(String, String)> {
+    let (name, value) = text.split_once('=').ok_or_else(|| anyhow!("{text}: is not {form}"))?;
+    Ok((name.trim().into(), value.trim().into()))
+}
+
+/// The number that a variable starts with: set, or of the description.
+fn value(description: &ModelDescription, instance: &str, set: &[(String, String)], name: &str) -> Option<f64> {
+    let full = format!("{instance}.{name}");
+    let given = set.iter().rev().find(|(other, _)| other == name || *other == full).map(|(_, text)| text.as_str());
+    let text = given.or(description.variable(name)?.start.as_deref())?;
+    match text {
+        "true" => Some(1.0),
+        "false" => Some(0.0),
+        other => parse_number(other),
+    }
+}
+
+/// What the options ask for.
+fn probe(args: &Bode, set: &[(String, String)]) -> Result<Probe> {
+    if let Some(which) = args.which {
+        let [file] = &args.fmus[..] else {
+            bail!("--loop is for one FMU; --from, --to and --over name variables of several")
+        };
+        let (name, path) = name_and_path(file)?;
+        let fmu = Fmu::open(path)?;
+        let of = |variable: &str| value(fmu.description(), &name, set, variable);
+        let probe = which.probe(fmu.description(), of)?;
+        // In Model Exchange, outputs are those of the instant.
+        return Ok(if args.me { Probe { mean: 0.0, ..probe } } else { probe });
+    }
+    let meaning = match (args.closed, args.open) {
+        (true, _) => Meaning::Closed,
+        (_, true) => Meaning::Open,
+        _ => Meaning::Plain,
+    };
+    Ok(Probe {
+        from: args.from.clone().unwrap_or_default(),
+        to: args.to.clone().unwrap_or_default(),
+        over: args.over.clone(),
+        meaning,
+        mean: 0.0,
+        watch: Vec::new(),
+        sample: None,
+        rotor: None,
+    })
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A file is not an FMU that runs here, a name or a number is wrong, or a run fails.
+pub fn run(args: &Bode) -> Result<()> {
+    output::check(args)?;
+    if args.spring.is_some() && args.which != Some(Loop::Impedance) {
+        bail!("--spring is for --loop impedance");
+    }
+    let set = args.set.iter().map(|text| halves(text, "--set VARIABLE=VALUE")).collect::<Result<Vec<_>>>()?;
+    let probe = probe(args, &set)?;
+    let pair = |text: &String| halves(text, "--connect OUTPUT=INPUT").map(|(from, to)| [from, to]);
+    let input = args.input.iter().map(|text| halves(text, "--input VARIABLE=POINTS")).collect::<Result<_>>()?;
+    let definition = Definition {
+        fmus: args.fmus.clone(),
+        auto_connect: args.auto_connect,
+        connect: args.connect.iter().map(pair).collect::<Result<_>>()?,
+        interface: args.me.then_some(Interface::ModelExchange),
+        rtol: args.rtol,
+        step: args.step.or(probe.sample),
+        set: Ordered(set.into_iter().map(|(name, text)| (name, SetValue::Text(text))).collect()),
+        input: Ordered(input),
+        ..Definition::default()
+    };
+    let plan = Plan::new(&definition, Path::new(""))?;
+    plan.notes().iter().for_each(|text| message::note(&printable(text)));
+    let excitation = Excitation {
+        input: probe.from.clone(),
+        outputs: vec![probe.to.clone()],
+        over: probe.over.clone(),
+        watch: probe.watch.clone(),
+        frequencies: args.frequencies.as_deref().map(frequencies).transpose()?.unwrap_or_default(),
+        amplitude: args.amplitude,
+        settle: args.settle,
+    };
+    let bar = if stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
+    let style = ProgressStyle::with_template("{wide_bar} {pos} frequencies  {elapsed}");
+    let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let progress = |done: u64| {
+        bar.set_position(done);
+        ControlFlow::Continue(())
+    };
+    let jobs = args.jobs.map_or_else(threads_here, usize::from);
+    let outcomes: Vec<FrequencyOutcome> = plan.frequency_response(&excitation, jobs, &progress)?;
+    bar.finish_and_clear();
+    let mut failed = Vec::new();
+    let mut responses = Vec::new();
+    for (frequency, outcome) in outcomes {
+        match outcome {
+            Ok(point) => responses.push(Response::new(point, &probe)),
+            Err(cause) => failed.push(format!("{} Hz: {cause}", output::four(frequency))),
+        }
+    }
+    if let (true, Some(first)) = (responses.is_empty(), failed.first()) {
+        return Err(Failed(first.clone()).into());
+    }
+    for text in &failed {
+        message::warning(&printable(text));
+    }
+    output::warn(&responses, &probe);
+    output::write(args, &probe, &responses).context("output")?;
+    match failed.len() {
+        0 => Ok(()),
+        count => Err(Failed(format!("{count} frequencies failed")).into()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frequencies_are_a_list_or_a_range() {
+        assert_eq!(frequencies("1, 10,100").unwrap(), [1.0, 10.0, 100.0]);
+        let range = frequencies("1:1000:4").unwrap();
+        assert!(range.iter().zip([1.0, 10.0, 100.0, 1000.0]).all(|(a, b)| (a / b - 1.0).abs() < 1e-12), "{range:?}");
+        for wrong in ["", "0", "-1,2", "1:10", "1:10:1", "10:1:5", "a", "1:10:99999", "nan"] {
+            assert!(frequencies(wrong).unwrap_err().to_string().contains("FIRST:LAST:COUNT"), "{wrong}");
+        }
+    }
+}
