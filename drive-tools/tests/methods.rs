@@ -98,7 +98,10 @@ fn every_method_on_every_machine() {
 fn methods_of_every_family_hold_their_machines() {
     for (name, kinds) in [
         ("reference", &[Kind::VoltageModel, Kind::EmfObserver][..]),
-        ("ipmsm-2.2kw", &[Kind::SlidingMode, Kind::PulsatingInjection, Kind::Hybrid, Kind::Sensored]),
+        (
+            "ipmsm-2.2kw",
+            &[Kind::KalmanFilter, Kind::SlidingMode, Kind::SquareWaveInjection, Kind::Hybrid, Kind::Sensored],
+        ),
     ] {
         for &kind in kinds {
             match cell(&read(name), kind, 2) {

@@ -10,7 +10,7 @@
 //! | VoltageFeedback | tracker 0.75 rho, EMF 20 times that; decoupling by the references, K_i = 0.2 w_c^2 L |
 //! | VoltageModel, CurrentModel | angle 0.75 rho, speed filter 2.5 rho |
 //! | KalmanFilter | densities of the voltage: (EMF / 257)^2 1 ms 2 pi 20 / rho, 1000 times that on q; of the acceleration: w_0 = rho at 0.05 pu |
-//! | GradientObserver | tracker rho, rate to the circle 0.1 of the rated electrical speed |
+//! | GradientObserver | tracker rho, rate to the circle 0.04 of the rated electrical speed |
 //!
 //! A load step at low speed drives the rotor through zero: `emf.hold_reversal` holds it there, below 0.08 of the rated speed.
 
@@ -28,8 +28,9 @@ const FILTER: f64 = 2.5;
 const SMOOTHING: f64 = 20.0;
 /// Rated EMF in V of the review's machine, and its target in rad/s.
 const REVIEW: (f64, f64) = (257.0, TAU * 20.0);
-/// Standard deviation of the current sensors as a share of the maximum current: 10 mA of 15 A.
-pub const NOISE: f64 = 0.01 / 15.0;
+/// Error of the predicted current as a share of the maximum current: that of the inductances counts, not only the 10 mA of 15 A of the
+/// review's sensors. With the latter, saturation turns the filter away at the hand-over from 8 A on the d-axis.
+const CURRENT: f64 = 0.02;
 
 /// Rated electrical speed in rad/s.
 fn rated(data: &Data) -> f64 {
@@ -129,7 +130,7 @@ pub fn kalman(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
     let (psi_M, rho) = (*data.machine.psi_M.get_ref(), bandwidths.observer.value);
     let share = rated(data) * psi_M / REVIEW.0;
     let scale = share * share * REVIEW.1 / rho;
-    let sigma = NOISE * data.rating.current.get_ref();
+    let sigma = CURRENT * data.rating.current.get_ref();
     // The densities of the review's voltage; all but that of the current are in proportion.
     let own = KalmanParameters::new(psi_M, rho, 0.05 * rated(data), sigma, bandwidths.T_s.value);
     vec![
@@ -140,7 +141,7 @@ pub fn kalman(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
         ),
         real("kalman.voltage_q", scale * own.voltage_q, "1000 times that"),
         real("kalman.acceleration", scale * own.acceleration, "w_0 = bandwidth.observer at 0.05 of the rated speed"),
-        real("kalman.current", own.current, "(rating.current / 1500)^2 T_s"),
+        real("kalman.current", own.current, "(0.02 rating.current)^2 T_s: noise, and the error of the inductances"),
     ]
 }
 
@@ -148,6 +149,10 @@ pub fn kalman(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
 pub fn gradient(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
     vec![
         real("tracker.bandwidth", bandwidths.observer.value, "bandwidth.observer"),
-        real("gradient.bandwidth", 0.1 * rated(data), "0.1 of the rated electrical speed: slow poles below 0.05 of it"),
+        real(
+            "gradient.bandwidth",
+            0.04 * rated(data),
+            "0.04 of the rated electrical speed: slow poles below 0.02 of it",
+        ),
     ]
 }

@@ -160,9 +160,15 @@ pub fn settings(
     let mut all = loops::settings(&motor.data, true);
     all.push(loops::limit(&motor.data));
     all.push(real("tracker.bandwidth", bandwidths.observer.value, "bandwidth.observer"));
+    all.push(observed());
     all.extend(own);
     all.extend(start(motor, &view, bandwidths, (0.5 * reach * speed, "half of the highest speed"), notes));
     Ok(all)
+}
+
+/// The tracker with the torque: the angle shows up to 45 deg only, which a load step exceeds without it.
+fn observed() -> Setting {
+    set("tracker.kind", Value::Item("MechanicalObserver".into()), "knows the torque: the saliency shows 45 deg at most")
 }
 
 fn reached(motor: &MotorFile, view: &View, V: f64) -> Result<f64> {
@@ -204,6 +210,7 @@ pub fn hybrid(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String
     all.extend(own);
     all.extend([
         real("tracker.bandwidth", rho, "bandwidth.observer"),
+        observed(),
         real("hybrid.bandwidth", rho, "bandwidth.observer"),
         real("hybrid.w_high", w_high, "0.2 of the rated speed, less where the carrier leaves no voltage"),
         real("hybrid.w_low", 0.5 * w_high, "half of hybrid.w_high"),
