@@ -27,7 +27,7 @@ fn methods_are_compared_on_a_machine() {
     let on = compared("ipmsm-2.2kw.toml", &methods);
     assert!(on.refused.is_empty() && on.runs.len() == methods.len() * TRIALS.len());
     for kind in methods {
-        assert_eq!(values(&on, kind, "start")[1], 0.0, "{} starts", kind.name());
+        assert!(values(&on, kind, "start")[1] < 0.5, "{} starts", kind.name());
         let load = values(&on, kind, "load");
         assert!(load[0] < 30.0 && load[2] > 0.01 && load[2] < 0.5, "{}: {load:?}", kind.name());
     }

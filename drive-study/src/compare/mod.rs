@@ -40,7 +40,7 @@ pub use run::{Run, Selection, run};
 pub fn write(cells: &[Run], out: &Path) -> Result<()> {
     let plots = plots::all(cells);
     let texts = [table::csv(cells), table::text(cells), table::markdown(cells), html::page(cells, &plots)?];
-    files(texts, &plots, out)
+    files(&texts, &plots, out)
 }
 
 /// Writes table, CSV, plots and page of a machine to `out`.
@@ -61,7 +61,7 @@ pub fn write_machine(compared: &OnMachine, out: &Path) -> Result<()> {
         table::markdown_under("Estimators compared on one machine", &words, cells),
         html::machine_page(compared, &plots)?,
     ];
-    files(texts, &plots, out)
+    files(&texts, &plots, out)
 }
 
 /// The tables of a machine in plain text, and the methods that it does not suit.
@@ -72,11 +72,11 @@ pub fn machine_text(compared: &OnMachine) -> String {
         + &compared.refused.iter().map(refused).collect::<String>()
 }
 
-fn files(texts: [String; 4], plots: &[Plot], out: &Path) -> Result<()> {
+fn files(texts: &[String; 4], plots: &[Plot], out: &Path) -> Result<()> {
     let out = Folder::create(out)?;
     for Plot { name, figure } in plots {
         out.write(&format!("{name}.svg"), &fmu_plot::svg::draw(figure)?)?;
     }
     let names = ["compare.csv", "compare.txt", "compare.md", "compare.html"];
-    names.iter().zip(&texts).try_for_each(|(name, text)| out.write(name, text))
+    names.iter().zip(texts).try_for_each(|(name, text)| out.write(name, text))
 }

@@ -223,7 +223,9 @@ fn course(
         measures.push(Measure::new("dip", "pu", follow.dip));
     }
     if !held {
-        measures.iter_mut().for_each(|m| m.value = f64::INFINITY);
+        for m in &mut measures {
+            m.value = f64::INFINITY;
+        }
     }
     Ok(Outcome::Measured(measures, Some(follow.into_trace(held))))
 }
