@@ -8,6 +8,7 @@
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};
+use crate::switched::Pwm;
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -23,11 +24,13 @@ pub struct Inverter {
     pub i_zero: f64,
     /// Losses of transistors and diodes.
     pub devices: Devices,
+    /// The modulator of the switched inverter.
+    pub pwm: Pwm,
 }
 
 impl Default for Inverter {
     fn default() -> Self {
-        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1, devices: Devices::default() }
+        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1, devices: Devices::default(), pwm: Pwm::default() }
     }
 }
 

@@ -32,6 +32,7 @@ pub mod saturation;
 pub mod signals;
 mod state;
 mod step;
+pub mod switched;
 pub mod tables;
 pub mod terminals;
 pub mod thermal;

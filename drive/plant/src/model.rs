@@ -10,6 +10,7 @@ use crate::power::{Energy, Powers};
 use crate::rules;
 use crate::signals::{PlantInputs, PlantOutputs};
 use crate::state::{Accepted, Instant, State};
+use crate::switched::Bridge;
 use crate::tables::{FLUX, OUTPUTS, PARAMETERS, PlantParameters};
 use crate::thermal::warm::Warm;
 use crate::thermal::{THERMAL_INPUTS, Temperatures, ThermalMode};
@@ -48,6 +49,8 @@ pub struct PmsmPlant {
     pub(super) warm: Warm,
     /// Current (A) at the terminals minus that of the flux linkage, at the end of a step.
     pub(super) by_iron: Dq,
+    /// Carrier and legs of the switched inverter.
+    pub(super) bridge: Bridge,
 }
 
 impl PmsmPlant {
@@ -194,7 +197,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 13;
+    const STATE_VERSION: u16 = 14;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
@@ -222,6 +225,10 @@ impl Model for PmsmPlant {
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        if interface == Interface::ModelExchange && self.parameters.is_switched() {
+            let allowed = "1 (Average) in Model Exchange; use Co-Simulation";
+            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.inverter.pwm.mode, allowed));
+        }
         self.validate_network(interface)
     }
 
@@ -239,6 +246,7 @@ impl Model for PmsmPlant {
         self.state = State::new(motor, psi, speed, angle);
         (self.energy, self.point, self.kept) = (Energy::default(), Accepted::default(), Kept::default());
         self.blocked = self.blocks(&self.inputs);
+        self.bridge = Bridge::default();
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
@@ -260,9 +268,9 @@ impl Model for PmsmPlant {
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         if self.parameters.thermal.mode == ThermalMode::Constant {
-            self.advance_at_temperature(step.h)
+            self.advance_at_temperature(step)
         } else {
-            self.advance_with_temperatures(step.h)
+            self.advance_with_temperatures(step)
         }
     }
 }

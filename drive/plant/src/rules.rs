@@ -13,7 +13,28 @@ use fmu_core::Fault;
 /// Names the parameter, its value, and what is allowed.
 pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
     check_map(parameters)?;
+    check_switched(parameters)?;
     check_network(parameters)
+}
+
+/// Refuses what the switched inverter does not model.
+fn check_switched(par: &PlantParameters) -> Result<(), Fault> {
+    if !par.is_switched() {
+        return Ok(());
+    }
+    let refused =
+        |with: String| Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.mode, format!("1 (Average) with {with}")));
+    if !par.iron.is_none() {
+        return refused(format!(
+            "iron loss ({}, {}): under switched voltages, the conductance would draw the PWM frequency",
+            PARAMETERS.tell(par, |p| &mut p.iron.G_e),
+            PARAMETERS.tell(par, |p| &mut p.iron.G_h)
+        ));
+    }
+    if !par.inverter.devices.is_none() {
+        return refused("losses of the devices (inverter.u_transistor ... inverter.E_sw)".into());
+    }
+    Ok(())
 }
 
 /// Refuses a map that is in use but describes no machine: a limit of the grid with the wrong sign, saturation parameters besides

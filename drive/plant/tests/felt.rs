@@ -30,7 +30,8 @@ const MOVED: &[(&str, f64)] = &[
 
 /// Parameters of the network, which Model Exchange refuses and `temperature.rs` tests, and switches.
 fn is_elsewhere(name: &str) -> bool {
-    name.starts_with("thermal.") && !matches!(name, "thermal.T_ref")
+    let switched = ["inverter.mode", "inverter.update", "inverter.zero_sequence", "inverter.pulse_min"];
+    switched.contains(&name) || name.starts_with("thermal.") && !matches!(name, "thermal.T_ref")
         // flux_map.rs tests the map.
         || name.starts_with("flux_map.")
         || name == "mechanics.imposed"
