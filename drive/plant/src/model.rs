@@ -59,6 +59,14 @@ impl PmsmPlant {
     pub(super) fn legs<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Legs<S> {
         let (inverter, u_dc) = (&self.parameters.inverter, inputs.u_dc);
         match inputs.gates() {
+            Gates::Switch if inverter.i_zero == 0.0 && inverter.dead_time > 0.0 => {
+                let by_L = if self.parameters.flux_map.used {
+                    1.0 / self.warm.least_inductance
+                } else {
+                    0.5 * (1.0 / self.parameters.motor.L_d + 1.0 / self.parameters.motor.L_q)
+                };
+                Legs::rippled(inverter, inputs.u, u_dc, by_L)
+            }
             Gates::Switch => Legs::switching(inverter, u_dc),
             Gates::Short => Legs::shorted(inverter),
             Gates::Off => Legs::off(inverter, self.warm.least_inductance, u_dc),

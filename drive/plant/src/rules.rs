@@ -22,17 +22,17 @@ fn check_switched(par: &PlantParameters) -> Result<(), Fault> {
     if !par.is_switched() {
         return Ok(());
     }
-    let refused =
-        |with: String| Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.mode, format!("1 (Average) with {with}")));
+    if 2.0 * par.inverter.pwm.pulse_min > par.inverter.T_pwm {
+        let allowed = format!("at most half of {}", PARAMETERS.tell(par, |p| &mut p.inverter.T_pwm));
+        return Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.pulse_min, allowed));
+    }
     if !par.iron.is_none() {
-        return refused(format!(
-            "iron loss ({}, {}): under switched voltages, the conductance would draw the PWM frequency",
+        let allowed = format!(
+            "1 (Average) with iron loss ({}, {}): under switched voltages, its conductance would also draw the PWM frequency",
             PARAMETERS.tell(par, |p| &mut p.iron.G_e),
             PARAMETERS.tell(par, |p| &mut p.iron.G_h)
-        ));
-    }
-    if !par.inverter.devices.is_none() {
-        return refused("losses of the devices (inverter.u_transistor ... inverter.E_sw)".into());
+        );
+        return Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.mode, allowed));
     }
     Ok(())
 }

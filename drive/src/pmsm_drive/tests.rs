@@ -58,7 +58,7 @@ fn steps_are_the_pair(mode: InverterMode) {
         let out = drive(h, steps, events, mode).out;
         assert_eq!((&out.plant, &out.controller), (&pair.plant.out, &pair.controller.out), "h = {h}, {mode:?}");
     }
-    assert!((pair.plant.out.speed - 500.0 * RPM).abs() < 15.0 * RPM, "{}", pair.plant.out.speed / RPM);
+    assert!((pair.plant.out.speed - 500.0 * RPM).abs() < 20.0 * RPM, "{}", pair.plant.out.speed / RPM);
 }
 
 #[test]

@@ -245,7 +245,8 @@ impl Model for PmsmDriveMean {
             let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
             return !name.starts_with("limit.i_dc_") && EFFECTIVE.iter().any(listed);
         }
-        let elsewhere = ["dead_time", "i_zero", "mode", "update", "zero_sequence", "pulse_min"];
+        let elsewhere =
+            ["dead_time", "i_zero", "mode", "update", "zero_sequence", "pulse_min", "open_switch", "open_phase"];
         let elsewhere = parameter.strip_prefix("plant.inverter.").is_some_and(|name| elsewhere.contains(&name));
         !elsewhere && !parameter.starts_with("dc_link.") && !parameter.starts_with("chopper.")
     }

@@ -8,12 +8,19 @@
 //! | lower switch | 0 (lower diode) | 0 (lower transistor) |
 //! | none | 0 (lower diode) | u_dc (upper diode) |
 //!
+//! A device that conducts subtracts its threshold and its resistance times the current in the direction of the current, so
+//! `low` falls and `high` rises by it. A switch that is open (`inverter.open_switch`) leaves its leg to the diodes, and a phase
+//! that is open (`inverter.open_phase`) has no limit to its voltage: its current ends at once.
+//!
 //! After a command, both switches of a leg are off for the dead time; a command that does not last as long vanishes. Where
 //! the voltage depends on the sign of the current, a current that reaches zero stays zero as long as the voltage that keeps
 //! it there lies between `low` and `high`; beyond, a diode conducts again. So each leg of zero current has one of three
 //! states, and the laws of the three legs have exactly one solution: a linear complementarity problem with a positive
 //! definite matrix. u in V, i in A, times in s.
 
+use super::OpenSwitch;
+use crate::inverter::Inverter;
+use crate::losses::conduction::Devices;
 use drive_base::frame::{AlphaBeta, Phases, SQRT_3};
 use serde::{Deserialize, Serialize};
 
@@ -63,16 +70,95 @@ impl Leg {
     pub(super) fn on(&self) -> Command {
         if self.wait > 0.0 { Command::Off } else { self.command }
     }
+}
 
-    /// Its voltage (V) with a positive and with a negative current, on a link of `u_dc` (V).
-    #[inline]
-    pub(super) fn bounds(&self, u_dc: f64) -> [f64; 2] {
-        match self.on() {
-            Command::Off => [0.0, u_dc],
-            Command::Lower => [0.0, 0.0],
-            Command::Upper => [u_dc, u_dc],
+/// How the legs conduct, for each of their states, over a communication step.
+pub(super) struct Ways {
+    of: [[[Way; 2]; 3]; 3],
+    /// A current of the other sign takes another way.
+    depends: [[bool; 3]; 3],
+}
+
+impl Ways {
+    /// On a link of `u_dc` (V).
+    pub(super) fn new(Inverter { devices, pwm, .. }: &Inverter, u_dc: f64) -> Self {
+        let &Devices { u_transistor, r_transistor, u_diode, r_diode, .. } = devices;
+        let through = |rail: f64, is_diode: bool, sign: f64| {
+            let (threshold, r) = if is_diode { (u_diode, r_diode) } else { (u_transistor, r_transistor) };
+            Way { rail, u: rail - sign * threshold, r }
+        };
+        let plain = [Command::Off, Command::Lower, Command::Upper].map(|on| {
+            let (upper, lower) = (on == Command::Upper, on == Command::Lower);
+            let positive = through(if upper { u_dc } else { 0.0 }, !upper, 1.0);
+            [positive, through(if lower { 0.0 } else { u_dc }, !lower, -1.0)]
+        });
+        let mut of = [plain; 3];
+        let fault = pwm.open_switch as usize;
+        if fault >= OpenSwitch::UpperA as usize {
+            let (x, lower) = ((fault - OpenSwitch::UpperA as usize) / 2, fault % 2 == OpenSwitch::LowerA as usize % 2);
+            of[x][if lower { Command::Lower } else { Command::Upper } as usize] = plain[Command::Off as usize];
         }
+        if let Some(x) = pwm.open_phase.leg() {
+            let open = |u| Way { rail: 0.0, u, r: 0.0 };
+            of[x] = [[open(f64::NEG_INFINITY), open(f64::INFINITY)]; 3];
+        }
+        Self { of, depends: of.map(|leg| leg.map(|[positive, negative]| positive != negative)) }
     }
+
+    /// Those of the `legs` in their states.
+    pub(super) fn at(&self, legs: &[Leg; 3]) -> [[Way; 2]; 3] {
+        [0, 1, 2].map(|x| self.of[x][legs[x].on() as usize])
+    }
+
+    /// The ways that the legs take with the current `i` (A), which changes by at most `reach` (A), as a number: 8 bits for each leg,
+    /// the same ones for the same way. `None` if a sign may change.
+    #[inline]
+    pub(super) fn numbers(&self, legs: &[Leg; 3], i: AlphaBeta, reach: f64) -> Option<u32> {
+        let mut numbers = 0;
+        for (x, n) in DIRECTIONS.into_iter().enumerate() {
+            let on = legs[x].on();
+            let depends = &self.depends[x];
+            let number = if depends[on as usize] {
+                let i = n.dot(i);
+                // An open phase carries none.
+                if i.abs() <= reach || self.of[x][on as usize][1].u == f64::INFINITY {
+                    return None;
+                }
+                let negative = i < 0.0;
+                let rail = match (on, negative) {
+                    (Command::Off, true) => Command::Upper,
+                    (Command::Off, false) => Command::Lower,
+                    (on, _) => on,
+                };
+                2 * rail as u32 + u32::from(negative && depends[rail as usize])
+            } else {
+                2 * on as u32
+            };
+            numbers = numbers << 8 | number;
+        }
+        Some(numbers)
+    }
+
+    /// The ways of these `numbers`.
+    #[inline]
+    pub(super) fn numbered(&self, numbers: u32) -> [Way; 3] {
+        let way = |x: usize| {
+            let number = (numbers >> (16 - 8 * x) & 7) as usize;
+            self.of[x][number / 2 % 3][number % 2]
+        };
+        [way(0), way(1), way(2)]
+    }
+}
+
+/// How a leg conducts a current of one sign.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Way {
+    /// Voltage of the rail in V.
+    pub(super) rail: f64,
+    /// Voltage of the leg without current in V.
+    pub(super) u: f64,
+    /// Resistance in Ohm.
+    pub(super) r: f64,
 }
 
 /// Stator voltage (V) of these voltages of the legs.
@@ -147,13 +233,13 @@ impl Response {
     }
 
     /// The sides of legs with these `bounds` (V): the signs of their currents, or for a current of at most `tiny` (A) those of the
-    /// solution of the laws. Legs whose voltage does not depend on the current have the side 1.
-    pub(super) fn sides(&self, bounds: [[f64; 2]; 3], tiny: f64) -> [i8; 3] {
+    /// solution of the laws. Legs that do not depend on the sign have the side 1.
+    pub(super) fn sides(&self, bounds: [[f64; 2]; 3], depends: [bool; 3], tiny: f64) -> [i8; 3] {
         let (mut sides, mut zero) = ([1_i8; 3], [false; 3]);
         for x in 0..3 {
             let i = DIRECTIONS[x].dot(self.i);
-            if bounds[x][0] < bounds[x][1] {
-                (sides[x], zero[x]) = (if i < 0.0 { -1 } else { 1 }, i.abs() <= tiny);
+            if depends[x] {
+                (sides[x], zero[x]) = (if i < 0.0 { -1 } else { 1 }, i.abs() <= tiny || bounds[x][1] == f64::INFINITY);
             }
         }
         if zero == [false; 3] {

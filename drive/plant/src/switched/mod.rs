@@ -49,6 +49,43 @@ enumeration! {
     }
 }
 
+enumeration! {
+    /// A switch that never conducts; its diode does. Values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum OpenSwitch("OpenSwitch", "Switch that no longer conducts, unlike its diode") {
+        1 None "All switches work";
+        2 UpperA "Upper switch of phase a";
+        3 LowerA "Lower switch of phase a";
+        4 UpperB "Upper switch of phase b";
+        5 LowerB "Lower switch of phase b";
+        6 UpperC "Upper switch of phase c";
+        7 LowerC "Lower switch of phase c";
+    }
+}
+
+enumeration! {
+    /// A phase of the machine that carries no current; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum OpenPhase("OpenPhase", "Phase that carries no current") {
+        1 None "All phases are connected";
+        2 A "Phase a";
+        3 B "Phase b";
+        4 C "Phase c";
+    }
+}
+
+impl OpenPhase {
+    /// Number of the leg.
+    pub(crate) fn leg(self) -> Option<usize> {
+        match self {
+            Self::None => None,
+            Self::A => Some(0),
+            Self::B => Some(1),
+            Self::C => Some(2),
+        }
+    }
+}
+
 /// Parameters of the modulator, for `inverter.mode` = Switched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pwm {
@@ -60,12 +97,17 @@ pub struct Pwm {
     pub zero_sequence: ZeroSequence,
     /// Minimum width of a pulse in s, >= 0.
     pub pulse_min: f64,
+    /// A switch that no longer conducts.
+    pub open_switch: OpenSwitch,
+    /// A phase that carries no current.
+    pub open_phase: OpenPhase,
 }
 
 impl Default for Pwm {
     fn default() -> Self {
         let (mode, update, zero_sequence) = (InverterMode::Average, PwmUpdate::Single, ZeroSequence::MinMax);
-        Self { mode, update, zero_sequence, pulse_min: 0.0 }
+        let (open_switch, open_phase) = (OpenSwitch::None, OpenPhase::None);
+        Self { mode, update, zero_sequence, pulse_min: 0.0, open_switch, open_phase }
     }
 }
 
@@ -87,4 +129,16 @@ pub const PWM: &Table<Pwm> = table![
         |p| { &mut p.pulse_min }
     )
     .at_least(0.0),
+    P::enumeration_parameter(
+        "inverter.open_switch",
+        "Fault: a switch that no longer conducts, unlike its diode",
+        &Field(|p| { &mut p.open_switch })
+    )
+    .tunable(),
+    P::enumeration_parameter(
+        "inverter.open_phase",
+        "Fault: a phase that carries no current",
+        &Field(|p| &mut p.open_phase)
+    )
+    .tunable(),
 ];

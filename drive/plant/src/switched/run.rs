@@ -1,10 +1,12 @@
 //! A communication step of the switched inverter: from instant to instant.
 
-use super::bridge::{Command, Leg};
+use super::bridge::{Command, DIRECTIONS, Leg, Way, Ways};
 use super::carrier::Carrier;
 use super::segment::{Point, Voltages};
 use crate::inverter::{Gates, Inverter};
+use crate::losses::switching;
 use crate::model::PmsmPlant;
+use drive_base::frame::AlphaBeta;
 use fmu_core::{Fault, Step};
 use serde::{Deserialize, Serialize};
 
@@ -19,53 +21,81 @@ const TINY: f64 = 1e-12;
 pub struct Bridge {
     carrier: Carrier,
     legs: [Leg; 3],
+    /// The current of a leg flows from or to the upper rail.
+    upper: [bool; 3],
 }
 
 impl Bridge {
-    /// Commands the legs at the time `at` (s) since the carrier's last extreme; returns the time (s) until the next command.
+    /// Commands the legs whose command is due, at the time `at` (s) since the carrier's last extreme; `due` has the times (s) until
+    /// the command of each leg is due. Returns the time (s) until a leg changes its state.
     #[inline]
-    fn command(&mut self, inverter: &Inverter, gates: Gates, at: f64) -> f64 {
+    fn command(&mut self, inverter: &Inverter, gates: Gates, at: f64, due: &mut [f64; 3]) -> f64 {
         let mut next = f64::INFINITY;
-        for x in 0..3 {
-            let command = match gates {
-                Gates::Switch => {
-                    let (on, left) = self.carrier.command(x, at, 0.5 * inverter.T_pwm);
-                    next = next.min(left);
-                    if on { Command::Upper } else { Command::Lower }
-                }
-                Gates::Short => Command::Lower,
-                Gates::Off => Command::Off,
-            };
-            self.legs[x].command(command, inverter.dead_time);
-            if self.legs[x].wait > 0.0 {
-                next = next.min(self.legs[x].wait);
+        for (x, due) in due.iter_mut().enumerate() {
+            if *due <= 0.0 {
+                let (command, left) = match gates {
+                    Gates::Switch => {
+                        let (on, left) = self.carrier.command(x, at, 0.5 * inverter.T_pwm);
+                        (if on { Command::Upper } else { Command::Lower }, left)
+                    }
+                    Gates::Short => (Command::Lower, f64::INFINITY),
+                    Gates::Off => (Command::Off, f64::INFINITY),
+                };
+                self.legs[x].command(command, inverter.dead_time);
+                *due = left;
             }
+            let wait = self.legs[x].wait;
+            let first = if wait > 0.0 && wait < *due { wait } else { *due };
+            next = if first < next { first } else { next };
         }
         next
     }
 
+    /// The sum of the currents' magnitudes (A) that change their rail under the `voltages`, with the current `i` (A).
+    #[inline]
+    fn commutated(&mut self, voltages: &Voltages, i: AlphaBeta) -> f64 {
+        let mut sum = 0.0;
+        for (x, n) in DIRECTIONS.into_iter().enumerate() {
+            if let Some(upper) = voltages.at_upper_rail(x)
+                && std::mem::replace(&mut self.upper[x], upper) != upper
+            {
+                sum += n.dot(i).abs();
+            }
+        }
+        sum
+    }
+
     /// Passes `t` (s).
     #[inline]
-    fn pass(&mut self, t: f64, same: f64) {
-        for leg in &mut self.legs {
-            let left = leg.wait - t;
-            leg.wait = if left > same { left } else { 0.0 };
+    fn pass(&mut self, t: f64, same: f64, due: &mut [f64; 3]) {
+        let after = |time: f64| if time - t > same { time - t } else { 0.0 };
+        for (leg, due) in self.legs.iter_mut().zip(due) {
+            (leg.wait, *due) = (after(leg.wait), after(*due));
         }
     }
 }
 
 impl PmsmPlant {
-    /// The voltages of the legs at a point.
-    fn voltages(&self, legs: &[Leg; 3], at: &Point, tiny: f64) -> Voltages {
-        let bounds = [0, 1, 2].map(|x| legs[x].bounds(self.inputs.u_dc));
-        let mut voltages = Voltages { bounds, sides: [1; 3] };
-        if voltages.any_depends() {
-            voltages.sides = self.response_at(at).sides(bounds, tiny);
-        }
-        voltages
+    /// The maximum derivative (A/s) of a current.
+    fn steepest(&self, at: &Point, i: AlphaBeta) -> f64 {
+        let machine = self.machine::<false>();
+        let (w, sum) = (machine.electrical(at.speed).abs(), |v: AlphaBeta| v.alpha().abs() + v.beta().abs());
+        (self.inputs.u_dc + machine.resistance() * sum(i) + w * sum(at.psi)) / self.warm.least_inductance + w * sum(i)
     }
 
-    /// A communication step with the switched inverter.
+    /// The voltages of the legs at a point, where some depend on the current.
+    #[inline(never)]
+    fn dependent(&self, ways: [[Way; 2]; 3], at: &Point, tiny: f64) -> Voltages {
+        // The drop of the other legs, as the signs of their currents have it.
+        let i = self.current_at(at);
+        let signs = DIRECTIONS.map(|n| if n.dot(i) < 0.0 { -1 } else { 1 });
+        let response = self.response_at(at, Some(&Voltages::watched(ways, signs).drop()));
+        let (bounds, depends) = (ways.map(|ways| ways.map(|way| way.u)), ways.map(|[a, b]| a != b));
+        Voltages::watched(ways, response.sides(bounds, depends, tiny))
+    }
+
+    /// A communication step with the switched inverter. An instant at which no leg changes its voltage does not interrupt the
+    /// integration: with a dead time, half of them.
     #[inline(never)]
     pub(crate) fn advance_switched(&mut self, step: &Step) -> Result<(), Fault> {
         let (state, mut passed) = self.at_the_shaft();
@@ -74,18 +104,60 @@ impl PmsmPlant {
         self.count(step.h, 0.25 * half, state.speed)?;
         let (mut bridge, mut at) = (self.bridge.clone(), self.point(&state));
         let (same, tiny) = (SAME * half, TINY * u_dc * inverter.T_pwm / self.warm.least_inductance);
+        if let Some(x) = inverter.pwm.open_phase.leg() {
+            let lost = self.end_current(&mut at, x);
+            passed.energy.loss += lost;
+            passed.losses.cu += lost;
+        }
+        // Energy in J per ampere that a leg loses when its current changes the rail.
+        let commutation = half * switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc);
         let (mut time, mut left) = (bridge.carrier.place(inverter, step.start, u, u_dc), step.h);
-        while left > 1e-9 * step.h {
-            time = bridge.carrier.pass(inverter, time, u, u_dc);
-            let next = bridge.command(inverter, gates, time).min(half - time);
-            let voltages = self.voltages(&bridge.legs, &at, tiny);
+        let mut i = self.current_at(&at);
+        let mut steepest = self.steepest(&at, i);
+        let ways = Ways::new(inverter, u_dc);
+        // Not yet integrated, in s, and the voltages of that time.
+        let (mut pending, mut numbers, mut due) = (0.0, None, [0.0; 3]);
+        let mut voltages = Voltages::fixed([Way { rail: 0.0, u: 0.0, r: 0.0 }; 3]);
+        loop {
+            let over = left <= 1e-9 * step.h || self.is_too_fast(at.speed);
+            if time >= half - same && !over {
+                time = bridge.carrier.pass(inverter, time, u, u_dc);
+                due = [0.0; 3];
+            }
+            let next = if over { 0.0 } else { bridge.command(inverter, gates, time, &mut due).min(half - time) };
             let h = if next > left - same { left } else { next };
-            let (h, energy) = self.travel(&mut at, h, &voltages, tiny);
-            if self.is_too_fast(at.speed) {
+            let mut found = ways.numbers(&bridge.legs, i, steepest * (pending + h));
+            if pending > 0.0 && (over || found != numbers) {
+                passed.add(&self.travel(&mut at, pending, &voltages, tiny).1);
+                (pending, i) = (0.0, self.current_at(&at));
+                steepest = self.steepest(&at, i);
+                found = ways.numbers(&bridge.legs, i, steepest * h);
+            }
+            if over {
                 break;
             }
-            passed.add(&energy);
-            bridge.pass(h, same);
+            if found.is_none() || found != numbers {
+                voltages = match found {
+                    Some(numbers) => Voltages::fixed(ways.numbered(numbers)),
+                    None => self.dependent(ways.at(&bridge.legs), &at, tiny),
+                };
+                numbers = found;
+                let lost = commutation * bridge.commutated(&voltages, i);
+                passed.energy.r#in += lost;
+                passed.energy.loss += lost;
+                passed.losses.sw += lost;
+            }
+            let h = if numbers.is_some() {
+                pending += h;
+                h
+            } else {
+                let (h, energy) = self.travel(&mut at, h, &voltages, tiny);
+                passed.add(&energy);
+                i = self.current_at(&at);
+                steepest = self.steepest(&at, i);
+                h
+            };
+            bridge.pass(h, same, &mut due);
             (time, left) = (time + h, left - h);
         }
         self.bridge = bridge;

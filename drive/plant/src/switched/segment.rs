@@ -12,20 +12,21 @@
 //! fourth order, over a fourth of it this one is as exact. A segment ends early where a current whose sign determines a
 //! voltage reaches zero, or where a blocked leg begins to conduct.
 
-use super::bridge::{DIRECTIONS, Response, stator};
+use super::bridge::{DIRECTIONS, Response, Way, stator};
 use crate::circuit::{Circuit, Passed, Rates, blocked_rates};
-use crate::losses::flow::{Dissipation, Ideal, Path};
-use crate::machine::slope;
+use crate::losses::conduction::{Affine, symmetric};
+use crate::losses::flow::{Dissipation, Drops, Ideal, Path};
+use crate::machine::{magnetic_energy, slope};
 use crate::mechanics::{Coulomb, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
 use crate::state::{State, axis_at};
-use drive_base::frame::{AlphaBeta, Axis, Dq, Rotor, Turn};
+use drive_base::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Turn};
 
 /// Longest integration step in s.
-const LONGEST: f64 = 25e-6;
+const LONGEST: f64 = 50e-6;
 
 /// Largest electrical angle in rad that the rotor turns in an integration step.
-const LARGEST_TURN: f64 = 0.05;
+const LARGEST_TURN: f64 = 0.1;
 
 /// Maximum number of steps of the search for the end of a segment.
 const MOST_SEARCHES: u32 = 60;
@@ -42,13 +43,17 @@ pub(super) struct Point {
     pub(super) axis: Axis<Rotor>,
 }
 
-/// Voltages of the legs over a segment.
-#[derive(Clone, Copy)]
+/// Legs over a segment.
+#[derive(Clone, Copy, PartialEq)]
 pub(super) struct Voltages {
-    /// Of each leg in V, with a positive and with a negative current.
-    pub(super) bounds: [[f64; 2]; 3],
-    /// Signs of the currents; 0: the leg blocks, if its voltage depends on the sign.
-    pub(super) sides: [i8; 3],
+    /// How each leg conducts; one that blocks has no voltage.
+    ways: [Way; 3],
+    /// Voltages of each leg in V with a positive and with a negative current.
+    bounds: [[f64; 2]; 3],
+    /// Signs of the currents; 0: the leg blocks.
+    sides: [i8; 3],
+    /// The leg conducts in another way as soon as its current changes its sign.
+    watched: [bool; 3],
 }
 
 /// Legs without current.
@@ -60,36 +65,75 @@ enum Blocked {
 }
 
 impl Voltages {
-    /// Whether the voltage of the leg `x` depends on the sign of its current.
+    /// Of legs that conduct in these `ways` as long as the voltages last.
     #[inline]
-    fn depends(&self, x: usize) -> bool {
-        self.bounds[x][0] < self.bounds[x][1]
+    pub(super) fn fixed(ways: [Way; 3]) -> Self {
+        Self { ways, bounds: [[0.0; 2]; 3], sides: [1; 3], watched: [false; 3] }
     }
 
-    /// Whether that of any leg does.
-    #[inline]
-    pub(super) fn any_depends(&self) -> bool {
-        self.depends(0) || self.depends(1) || self.depends(2)
+    /// Of legs that conduct in the `ways` of their `sides`, or block, while these last.
+    pub(super) fn watched(ways: [[Way; 2]; 3], sides: [i8; 3]) -> Self {
+        let none = Way { rail: 0.0, u: 0.0, r: 0.0 };
+        let watched = ways.map(|[a, b]| a != b);
+        let way = |x: usize| if watched[x] && sides[x] == 0 { none } else { ways[x][usize::from(sides[x] < 0)] };
+        Self { ways: [way(0), way(1), way(2)], bounds: ways.map(|ways| ways.map(|way| way.u)), sides, watched }
     }
 
+    /// The legs that block.
+    #[inline]
     fn blocked(&self) -> Blocked {
         let mut found = Blocked::None;
         for x in 0..3 {
-            if self.depends(x) && self.sides[x] == 0 {
+            if self.watched[x] && self.sides[x] == 0 {
                 found = if found == Blocked::None { Blocked::One(x) } else { Blocked::All };
             }
         }
         found
     }
 
-    /// Stator voltage (V); a blocked leg counts as 0 V.
+    /// Whether the current of the leg `x` flows from or to the upper rail; `None` if it blocks.
+    pub(super) fn at_upper_rail(&self, x: usize) -> Option<bool> {
+        (!self.watched[x] || self.sides[x] != 0).then(|| self.ways[x].rail > 0.0)
+    }
+
+    /// Stator voltage (V) of the rails.
+    #[inline]
+    fn rails(&self) -> AlphaBeta {
+        let [a, b, c] = &self.ways;
+        stator([a.rail, b.rail, c.rail])
+    }
+
+    /// Stator voltage (V) of the legs without current.
     #[inline]
     fn stator(&self) -> AlphaBeta {
-        let leg = |x: usize| match self.sides[x] {
-            0 if self.depends(x) => 0.0,
-            side => self.bounds[x][usize::from(side < 0)],
-        };
-        stator([leg(0), leg(1), leg(2)])
+        stator(self.ways.map(|way| way.u))
+    }
+
+    /// Drop of the devices.
+    pub(super) fn drop(&self) -> Affine {
+        let [a, b, c] = self.ways.map(|way| way.r);
+        Affine { at_0: stator(self.ways.map(|way| way.rail - way.u)), by: symmetric(Phases { a, b, c }) }
+    }
+}
+
+/// Devices that each carry a current of one sign.
+#[derive(Clone, Copy)]
+struct OneWay(Option<Affine>);
+
+impl Drops<f64> for OneWay {
+    #[inline]
+    fn legs(&self, u: AlphaBeta, _steady: impl FnOnce() -> AlphaBeta) -> AlphaBeta {
+        u
+    }
+
+    #[inline]
+    fn devices(&self, _u: AlphaBeta, i: AlphaBeta) -> Option<AlphaBeta> {
+        self.0.map(|drop| drop.at(i))
+    }
+
+    #[inline]
+    fn switching(&self, _i: AlphaBeta) -> Option<f64> {
+        None
     }
 }
 
@@ -134,18 +178,34 @@ impl PmsmPlant {
         Response { i, at_0, by }
     }
 
-    /// The response of the currents at a point.
-    pub(super) fn response_at(&self, at: &Point) -> Response {
+    /// The response of the currents at a point, with the `drop` of the devices.
+    pub(super) fn response_at(&self, at: &Point, drop: Option<&Affine>) -> Response {
         let machine = self.machine::<false>();
         let R = self.parameters.dissipation(machine.resistance(), machine.electrical(at.speed)).R;
-        self.response(at, self.current_at(at) * -R)
+        let i = self.current_at(at);
+        // The thresholds belong to the voltages of the legs.
+        let by_devices = drop.map_or(AlphaBeta::ZERO, |drop| drop.at(i) - drop.at_0);
+        self.response(at, i * -R - by_devices)
     }
 
-    /// Ends the current of the leg `x`, a rounding error.
-    pub(super) fn end_current(&self, at: &mut Point, x: usize) {
-        let (n, by) = (DIRECTIONS[x], self.by_voltage(at));
-        let i = n.dot(self.current_at(at));
-        at.psi += n * (-i / n.dot(by[0] * n.alpha() + by[1] * n.beta()));
+    /// Ends the current of the leg `x`; returns the energy (J) that it had.
+    pub(super) fn end_current(&self, at: &mut Point, x: usize) -> f64 {
+        let (n, before) = (DIRECTIONS[x], self.stored(at));
+        for _ in 0..3 {
+            let by = self.by_voltage(at);
+            let i = n.dot(self.current_at(at));
+            at.psi += n * (-i / n.dot(by[0] * n.alpha() + by[1] * n.beta()));
+            if self.parameters.is_linear() {
+                break;
+            }
+        }
+        before - self.stored(at)
+    }
+
+    /// Magnetic energy (J) at a point.
+    fn stored(&self, at: &Point) -> f64 {
+        let psi = self.machine::<false>().from_stator(at.axis, at.psi);
+        magnetic_energy(&self.warm.motor, self.parameters.magnetics(), psi)
     }
 
     /// By how much the `voltages` remain those of the point: below 0, a leg has another side.
@@ -153,7 +213,7 @@ impl PmsmPlant {
         let i = self.current_at(at);
         let mut least = f64::INFINITY;
         for (x, n) in DIRECTIONS.into_iter().enumerate() {
-            if voltages.depends(x) && voltages.sides[x] != 0 {
+            if voltages.watched[x] && voltages.sides[x] != 0 {
                 least = least.min(f64::from(voltages.sides[x]) * n.dot(i));
             }
         }
@@ -161,10 +221,13 @@ impl PmsmPlant {
         match voltages.blocked() {
             Blocked::None => {}
             Blocked::One(x) => {
-                least = least.min(within(voltages.bounds[x], self.response_at(at).floating(x, voltages.stator())));
+                least = least.min(within(
+                    voltages.bounds[x],
+                    self.response_at(at, Some(&voltages.drop())).floating(x, voltages.stator()),
+                ));
             }
             Blocked::All => {
-                let (rest, bounds) = (self.response_at(at).resting(), voltages.bounds);
+                let (rest, bounds) = (self.response_at(at, None).resting(), voltages.bounds);
                 let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
                 for (bounds, rest) in bounds.into_iter().zip(rest) {
                     (low, high) = (low.max(bounds[0] - rest), high.min(bounds[1] - rest));
@@ -179,8 +242,16 @@ impl PmsmPlant {
     /// (s) and what passed. Currents of at most `tiny` (A) are zero.
     pub(super) fn travel(&self, at: &mut Point, h: f64, voltages: &Voltages, tiny: f64) -> (f64, Passed) {
         let mut left = h;
+        let watched = voltages.watched.contains(&true);
+        let w = f64::from(self.warm.motor.n_p) * at.speed;
+        if !watched && h <= LONGEST && w.abs() * h <= LARGEST_TURN {
+            let (next, passed) = self.segment(at, h, voltages);
+            if self.parameters.mechanics.shorter(h, at.speed, next.speed).is_none() {
+                *at = next;
+                return (h, passed);
+            }
+        }
         let (mut passed, mut limit) = (Passed::default(), f64::INFINITY);
-        let watched = voltages.any_depends();
         loop {
             let longest = LONGEST.min(LARGEST_TURN / (f64::from(self.warm.motor.n_p) * at.speed).abs());
             let step = if left <= longest { left } else { left / (left / longest - 1e-9).ceil() }.min(limit);
@@ -255,33 +326,37 @@ impl PmsmPlant {
         coulomb: C,
     ) -> (Point, Passed) {
         let shaft = Shaft::new(&self.parameters.mechanics, self.inputs.tau_load, coulomb);
-        let (machine, u) = (self.machine::<true>(), voltages.stator());
-        if self.parameters.is_linear() && voltages.blocked() == Blocked::None && self.parameters.winding.k_ac == 0.0 {
-            let path = Path { u, dissipation: Dissipation { R: machine.resistance(), G: None }, drops: Ideal };
-            let circuit = Circuit { machine, path, shaft };
-            return self.third_order(from, h, &circuit.shaft, |axis, psi, speed| circuit.rates(axis, psi, speed));
+        let (machine, blocked) = (self.machine::<true>(), voltages.blocked());
+        let lossless = self.parameters.inverter.devices.is_none();
+        if lossless && blocked == Blocked::None && self.parameters.is_linear() && self.parameters.winding.k_ac == 0.0 {
+            let dissipation = Dissipation { R: machine.resistance(), G: None };
+            let circuit = Circuit { machine, path: Path { u: voltages.rails(), dissipation, drops: Ideal }, shaft };
+            return self.third_order::<Ideal, _>(from, h, &shaft, |axis, psi, speed| circuit.rates(axis, psi, speed));
         }
         let machine = self.machine::<false>();
         let dissipation = self.parameters.dissipation(machine.resistance(), machine.electrical(from.speed));
+        let (u, drop) = (voltages.rails(), (!lossless).then(|| voltages.drop()));
         let under = |u, axis, psi, speed| {
-            Circuit { machine, path: Path { u, dissipation, drops: Ideal }, shaft }.rates(axis, psi, speed)
+            Circuit { machine, path: Path { u, dissipation, drops: OneWay(drop) }, shaft }.rates(axis, psi, speed)
         };
-        match voltages.blocked() {
-            Blocked::None => self.third_order(from, h, &shaft, |axis, psi, speed| under(u, axis, psi, speed)),
+        match blocked {
+            Blocked::None => {
+                self.third_order::<OneWay, _>(from, h, &shaft, |axis, psi, speed| under(u, axis, psi, speed))
+            }
             Blocked::One(x) => {
                 let stage = |axis, psi, speed| {
                     let at = Point { psi, speed, angle: 0.0, axis };
-                    let response = self.response(&at, under(AlphaBeta::ZERO, axis, psi, speed).d_psi);
-                    under(u + DIRECTIONS[x] * (2.0 / 3.0 * response.floating(x, u)), axis, psi, speed)
+                    let floating = self.response_at(&at, drop.as_ref()).floating(x, voltages.stator());
+                    under(u + DIRECTIONS[x] * (2.0 / 3.0 * floating), axis, psi, speed)
                 };
-                let (mut next, passed) = self.third_order(from, h, &shaft, stage);
+                let (mut next, passed) = self.third_order::<OneWay, _>(from, h, &shaft, stage);
                 self.end_current(&mut next, x);
                 (next, passed)
             }
             Blocked::All => {
                 let none = Dq::new(self.warm.motor.psi_M, 0.0);
                 let stage = |_, _, speed| blocked_rates(&machine, &shaft, none, Dq::ZERO, speed);
-                let (next, passed) = self.third_order(from, h, &shaft, stage);
+                let (next, passed) = self.third_order::<OneWay, _>(from, h, &shaft, stage);
                 (Point { psi: machine.to_stator(next.axis, none), ..next }, passed)
             }
         }
@@ -290,7 +365,7 @@ impl PmsmPlant {
     /// Kutta's step of `h` (s) with these rates.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
-    fn third_order<C: Coulomb<f64>>(
+    fn third_order<D: Drops<f64>, C: Coulomb<f64>>(
         &self,
         from: &Point,
         h: f64,
@@ -313,6 +388,6 @@ impl PmsmPlant {
             angle: angle + turned,
             axis: end,
         };
-        (next, Passed::over::<Ideal, C>(h, turned, [&k_1, &k_2, &k_2, &k_3], shaft))
+        (next, Passed::over::<D, C>(h, turned, [&k_1, &k_2, &k_2, &k_3], shaft))
     }
 }
