@@ -171,7 +171,7 @@ fn the_closed_loop_with_dead_time() {
     }
 }
 
-/// A plant of its own, without salience: between the instants of a period steps of 1 us, with dead time of 20 ns, in which the
+/// An independent plant without saliency: between the instants of a period steps of 1 us, with dead time of 20 ns, in which the
 /// legs' voltages are those that end the step with no current, limited to the rails.
 struct Witness {
     i: [f64; 2],

@@ -56,7 +56,7 @@ fn duties(Inverter { T_pwm, pwm, .. }: &Inverter, u: Phases, u_dc: f64) -> [f64;
 
 impl Carrier {
     /// Time since the last extreme in s, at the time `now`. A carrier of another period takes `u` (V) over at once.
-    pub(super) fn place(&mut self, inverter: &Inverter, now: Elapsed, u: Phases, u_dc: f64) -> f64 {
+    pub(super) fn locate(&mut self, inverter: &Inverter, now: Elapsed, u: Phases, u_dc: f64) -> f64 {
         let grid = SampleGrid { period: 0.5 * inverter.T_pwm };
         let at = grid.period + now.minus_periods(self.extremes, grid.period);
         // At an extreme, the time is exact: the rounding of the communication steps has no effect.
@@ -149,7 +149,7 @@ mod tests {
         let (inverter, half) = (Inverter::default(), 5e-5);
         let mut carrier = Carrier::default();
         let u = Phases { a: 0.0, b: 90.0, c: -90.0 };
-        let at = carrier.place(&inverter, Elapsed::ZERO, u, 300.0);
+        let at = carrier.locate(&inverter, Elapsed::ZERO, u, 300.0);
         let at = carrier.pass(&inverter, at, u, 300.0);
         assert!(at == 0.0);
         let switches = |carrier: &Carrier| [0, 1, 2].map(|x| carrier.command(x, 0.0, half));

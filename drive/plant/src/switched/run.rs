@@ -13,6 +13,9 @@ use serde::{Deserialize, Serialize};
 /// Instants closer than this share of a carrier period are the same instant.
 const SAME: f64 = 1e-9;
 
+/// Maximum number of zero crossings between two instants; then the legs keep their sides: it bounds the work of a step.
+const MOST_SEARCHES: u32 = 32;
+
 /// Current that counts as zero, as a share of what the link drives through the machine in a carrier period.
 const TINY: f64 = 1e-12;
 
@@ -111,12 +114,13 @@ impl PmsmPlant {
         }
         // Energy in J per ampere that a leg loses when its current changes the rail.
         let commutation = half * switching::per_ampere(&inverter.devices, inverter.T_pwm, u_dc);
-        let (mut time, mut left) = (bridge.carrier.place(inverter, step.start, u, u_dc), step.h);
+        let (mut time, mut left) = (bridge.carrier.locate(inverter, step.start, u, u_dc), step.h);
         let mut i = self.current_at(&at);
         let mut steepest = self.steepest(&at, i);
         let ways = Ways::new(inverter, u_dc);
         // Not yet integrated, in s, and the voltages of that time.
         let (mut pending, mut numbers, mut due) = (0.0, None, [0.0; 3]);
+        let mut searches = MOST_SEARCHES;
         let mut voltages = Voltages::fixed([Way { rail: 0.0, u: 0.0, r: 0.0 }; 3]);
         loop {
             let over = left <= 1e-9 * step.h || self.is_too_fast(at.speed);
@@ -128,7 +132,7 @@ impl PmsmPlant {
             let h = if next > left - same { left } else { next };
             let mut found = ways.numbers(&bridge.legs, i, steepest * (pending + h));
             if pending > 0.0 && (over || found != numbers) {
-                passed.add(&self.travel(&mut at, pending, &voltages, tiny).1);
+                passed.add(&self.travel(&mut at, pending, &voltages, (tiny, true)).1);
                 (pending, i) = (0.0, self.current_at(&at));
                 steepest = self.steepest(&at, i);
                 found = ways.numbers(&bridge.legs, i, steepest * h);
@@ -151,7 +155,9 @@ impl PmsmPlant {
                 pending += h;
                 h
             } else {
-                let (h, energy) = self.travel(&mut at, h, &voltages, tiny);
+                let (done, energy) = self.travel(&mut at, h, &voltages, (tiny, searches > 0));
+                searches = if done < h { searches - 1 } else { MOST_SEARCHES };
+                let h = done;
                 passed.add(&energy);
                 i = self.current_at(&at);
                 steepest = self.steepest(&at, i);

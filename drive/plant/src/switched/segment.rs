@@ -239,10 +239,16 @@ impl PmsmPlant {
     }
 
     /// Advances `at` by `h` (s) under the `voltages`, or up to the instant at which a leg has another side; returns the time
-    /// (s) and what passed. Currents of at most `tiny` (A) are zero.
-    pub(super) fn travel(&self, at: &mut Point, h: f64, voltages: &Voltages, tiny: f64) -> (f64, Passed) {
+    /// (s) and what passed. Currents of at most `tiny` (A) are zero. Without `search`, the legs keep their sides.
+    pub(super) fn travel(
+        &self,
+        at: &mut Point,
+        h: f64,
+        voltages: &Voltages,
+        (tiny, search): (f64, bool),
+    ) -> (f64, Passed) {
         let mut left = h;
-        let watched = voltages.watched.contains(&true);
+        let watched = search && voltages.watched.contains(&true);
         let w = f64::from(self.warm.motor.n_p) * at.speed;
         if !watched && h <= LONGEST && w.abs() * h <= LARGEST_TURN {
             let (next, passed) = self.segment(at, h, voltages);
