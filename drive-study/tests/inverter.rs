@@ -4,7 +4,7 @@
 use drive::frame::{AlphaBeta, Phases};
 use drive::plant::PmsmPlant;
 use drive::plant::inverter::Inverter;
-use drive::plant::switched::InverterMode;
+use drive::plant::pwm::InverterMode;
 use fmu_core::{Block, Elapsed, Step};
 use fmu_plot::figure::{Curve, Figure, Panel};
 use fmu_plot::ink::{CURVES, REFERENCE};

@@ -6,7 +6,7 @@ use drive::frame::{AlphaBeta, Phases, SQRT_3};
 use drive::math::wrap;
 use drive::plant::PmsmPlant;
 use drive::plant::inverter::Inverter;
-use drive::plant::switched::{InverterMode, OpenPhase, OpenSwitch, PwmUpdate, ZeroSequence};
+use drive::plant::pwm::{InverterMode, OpenPhase, OpenSwitch, PwmUpdate, ZeroSequence};
 use fmu_core::{Block, Elapsed, Interface, Model, Step};
 use std::f64::consts::{PI, TAU};
 

@@ -9,7 +9,7 @@
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};
-use crate::switched::Pwm;
+use crate::pwm::Pwm;
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};

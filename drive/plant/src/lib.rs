@@ -27,6 +27,7 @@ pub mod machine;
 pub mod mechanics;
 pub mod model;
 pub mod power;
+pub mod pwm;
 pub mod rules;
 pub mod saturation;
 pub mod signals;

@@ -10,7 +10,7 @@ use crate::power::{Energy, Powers};
 use crate::rules;
 use crate::signals::{PlantInputs, PlantOutputs};
 use crate::state::{Accepted, Instant, State};
-use crate::switched::Bridge;
+use crate::switched::state::Bridge;
 use crate::tables::{FLUX, OUTPUTS, PARAMETERS, PlantParameters};
 use crate::thermal::warm::Warm;
 use crate::thermal::{THERMAL_INPUTS, Temperatures, ThermalMode};

@@ -1,7 +1,7 @@
 //! Steps of every size.
 
 use super::*;
-use drive_plant::switched::InverterMode;
+use drive_plant::pwm::InverterMode;
 
 const RPM: f64 = std::f64::consts::PI / 30.0;
 

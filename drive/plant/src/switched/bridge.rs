@@ -18,9 +18,9 @@
 //! states, and the laws of the three legs have exactly one solution: a linear complementarity problem with a positive
 //! definite matrix. u in V, i in A, times in s.
 
-use super::OpenSwitch;
 use crate::inverter::Inverter;
 use crate::losses::conduction::Devices;
+use crate::pwm::OpenSwitch;
 use drive_base::frame::{AlphaBeta, Phases, SQRT_3};
 use serde::{Deserialize, Serialize};
 

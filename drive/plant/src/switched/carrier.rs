@@ -9,8 +9,8 @@
 //! all upper ones on. The duty cycles of the references are taken over at the first, or at both. The extremes are counted
 //! from the start of the simulation on. u in V, times in s.
 
-use super::{PwmUpdate, ZeroSequence};
 use crate::inverter::Inverter;
+use crate::pwm::{PwmUpdate, ZeroSequence};
 use drive_base::frame::Phases;
 use fmu_core::{Elapsed, SampleGrid};
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ const SAME: f64 = 1e-9;
 
 /// State of the carrier.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Carrier {
+pub(super) struct Carrier {
     /// Number of extremes up to now: the last one was number `extremes - 1`.
     extremes: u64,
     /// Duty cycles of the legs.

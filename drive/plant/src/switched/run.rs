@@ -1,14 +1,11 @@
 //! A communication step of the switched inverter: from instant to instant.
 
-use super::bridge::{Command, DIRECTIONS, Leg, Way, Ways};
-use super::carrier::Carrier;
+use super::bridge::{DIRECTIONS, Way, Ways};
 use super::segment::{Point, Voltages};
-use crate::inverter::{Gates, Inverter};
 use crate::losses::switching;
 use crate::model::PmsmPlant;
 use drive_base::frame::AlphaBeta;
 use fmu_core::{Fault, Step};
-use serde::{Deserialize, Serialize};
 
 /// Instants closer than this share of a carrier period are the same instant.
 const SAME: f64 = 1e-9;
@@ -18,65 +15,6 @@ const MOST_SEARCHES: u32 = 32;
 
 /// Current that counts as zero, as a share of what the link drives through the machine in a carrier period.
 const TINY: f64 = 1e-12;
-
-/// State of carrier and legs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Bridge {
-    carrier: Carrier,
-    legs: [Leg; 3],
-    /// The current of a leg flows from or to the upper rail.
-    upper: [bool; 3],
-}
-
-impl Bridge {
-    /// Commands the legs whose command is due, at the time `at` (s) since the carrier's last extreme; `due` has the times (s) until
-    /// the command of each leg is due. Returns the time (s) until a leg changes its state.
-    #[inline]
-    fn command(&mut self, inverter: &Inverter, gates: Gates, at: f64, due: &mut [f64; 3]) -> f64 {
-        let mut next = f64::INFINITY;
-        for (x, due) in due.iter_mut().enumerate() {
-            if *due <= 0.0 {
-                let (command, left) = match gates {
-                    Gates::Switch => {
-                        let (on, left) = self.carrier.command(x, at, 0.5 * inverter.T_pwm);
-                        (if on { Command::Upper } else { Command::Lower }, left)
-                    }
-                    Gates::Short => (Command::Lower, f64::INFINITY),
-                    Gates::Off => (Command::Off, f64::INFINITY),
-                };
-                self.legs[x].command(command, inverter.dead_time);
-                *due = left;
-            }
-            let wait = self.legs[x].wait;
-            let first = if wait > 0.0 && wait < *due { wait } else { *due };
-            next = if first < next { first } else { next };
-        }
-        next
-    }
-
-    /// The sum of the currents' magnitudes (A) that change their rail under the `voltages`, with the current `i` (A).
-    #[inline]
-    fn commutated(&mut self, voltages: &Voltages, i: AlphaBeta) -> f64 {
-        let mut sum = 0.0;
-        for (x, n) in DIRECTIONS.into_iter().enumerate() {
-            if let Some(upper) = voltages.at_upper_rail(x)
-                && std::mem::replace(&mut self.upper[x], upper) != upper
-            {
-                sum += n.dot(i).abs();
-            }
-        }
-        sum
-    }
-
-    /// Passes `t` (s).
-    #[inline]
-    fn pass(&mut self, t: f64, same: f64, due: &mut [f64; 3]) {
-        let after = |time: f64| if time - t > same { time - t } else { 0.0 };
-        for (leg, due) in self.legs.iter_mut().zip(due) {
-            (leg.wait, *due) = (after(leg.wait), after(*due));
-        }
-    }
-}
 
 impl PmsmPlant {
     /// The maximum derivative (A/s) of a current.
@@ -146,7 +84,7 @@ impl PmsmPlant {
                     None => self.dependent(ways.at(&bridge.legs), &at, tiny),
                 };
                 numbers = found;
-                let lost = commutation * bridge.commutated(&voltages, i);
+                let lost = commutation * bridge.commutated(voltages.at_upper_rails(), i);
                 passed.energy.r#in += lost;
                 passed.energy.loss += lost;
                 passed.losses.sw += lost;

@@ -91,9 +91,10 @@ impl Voltages {
         found
     }
 
-    /// Whether the current of the leg `x` flows from or to the upper rail; `None` if it blocks.
-    pub(super) fn at_upper_rail(&self, x: usize) -> Option<bool> {
-        (!self.watched[x] || self.sides[x] != 0).then(|| self.ways[x].rail > 0.0)
+    /// Whether the current of each leg flows from or to the upper rail; `None` if it blocks.
+    pub(super) fn at_upper_rails(&self) -> [Option<bool>; 3] {
+        let rail = |x: usize| (!self.watched[x] || self.sides[x] != 0).then(|| self.ways[x].rail > 0.0);
+        [rail(0), rail(1), rail(2)]
     }
 
     /// Stator voltage (V) of the rails.
