@@ -72,6 +72,7 @@ fn the_package() {
         "exchange",
         "arrays",
         "linearize",
+        "frequency",
         "drives",
         "plot",
         "fmpy",
