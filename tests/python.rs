@@ -73,6 +73,7 @@ fn the_package() {
         "exchange",
         "arrays",
         "linearize",
+        "frequency",
         "drives",
         "plot",
         "fmpy",
