@@ -325,10 +325,10 @@ fn cost(tuned: &Tuned) -> Result<Outcome, Fault> {
     }
     let R_s = rig.pair.plant.model.parameters.motor.R_s;
     let measures = vec![
-        Measure::new("carrier current, rms", "A", rms),
+        Measure::new("carrier current (rms)", "A", rms),
         Measure::new("copper loss", "W", 1.5 * R_s * rms * rms),
         Measure::new("voltage taken", "%", 100.0 * share),
-        Measure::new("torque ripple, std", "pu", if held { ripple.std() } else { f64::INFINITY }),
+        Measure::new("torque ripple (std)", "pu", if held { ripple.std() } else { f64::INFINITY }),
     ];
     Ok(Outcome::Measured(measures, None))
 }
