@@ -4,13 +4,14 @@ use super::candidate::Entry;
 use super::measure::{Effort, Outcome};
 use super::run::Run;
 use super::scenario::{Scenario, Task};
+use super::trials::running;
 use drive::estimator::Kind;
 use drive_tools::error::Result;
 use drive_tools::queue;
 use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
 use drive_tools::tune::setting::{Suited, Tuned, Unsuited};
-use fmu_core::{Elapsed, Model, Step};
+use fmu_core::{Elapsed, Step};
 use std::time::Instant;
 
 /// The estimators on a machine.
@@ -55,23 +56,21 @@ pub fn on_machine(
     Ok(OnMachine { machine: sentence(motor), runs, refused, nanoseconds })
 }
 
-/// Time in ns of a sample of the controller: the shortest of five rounds.
+/// Time in ns of a sample of the turning drive's controller: the shortest of five rounds.
 fn sample_time(tuned: &Tuned) -> Option<f64> {
-    const SAMPLES: u32 = 2000;
-    let mut controller = tuned.pair().controller;
-    let h = controller.model.parameters.T_s;
-    controller.model.inputs.u_dc = tuned.pair().plant.model.inputs.u_dc;
-    controller.model.derive();
-    controller.initialize();
-    let (mut now, mut shortest) = (Elapsed::ZERO, f64::INFINITY);
+    const SAMPLES: u32 = 1000;
+    let (turning, begin) = running(tuned)?;
+    let h = turning.controller.model.parameters.T_s;
+    let mut shortest = f64::INFINITY;
     for _ in 0..5 {
-        let begin = Instant::now();
+        let (mut controller, mut now) = (turning.controller.clone(), Elapsed::ZERO.plus(begin));
+        let clock = Instant::now();
         for _ in 0..SAMPLES {
             let step = Step { start: now, h };
             controller.step(&step).ok()?;
             now = step.end();
         }
-        shortest = shortest.min(1e9 * begin.elapsed().as_secs_f64() / f64::from(SAMPLES));
+        shortest = shortest.min(1e9 * clock.elapsed().as_secs_f64() / f64::from(SAMPLES));
     }
     Some(shortest)
 }

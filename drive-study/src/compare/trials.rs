@@ -171,6 +171,14 @@ impl<'a> Rig<'a> {
     }
 }
 
+/// The drive turning at the speed of the scenarios, if it gets there, and the time in s.
+pub(super) fn running(tuned: &Tuned) -> Option<(Pair, f64)> {
+    let mut rig = Rig::new(tuned, |_| ()).ok()?;
+    let held = rig.start(level(tuned)).holds();
+    let now = rig.now();
+    held.then_some((rig.pair, now))
+}
+
 fn start(tuned: &Tuned, effort: Effort) -> Result<Outcome, Fault> {
     let count = if effort == Effort::Full { 12_u32 } else { 4 };
     let (mut failed, mut peak) = (0.0, 0.0_f64);
