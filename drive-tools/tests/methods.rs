@@ -3,14 +3,11 @@
 //! `METHODS_MACHINES=hub-36v,reference` and `METHODS_KINDS=Hybrid` select some; `METHODS_FOLDER=DIR` adds the machines of a folder.
 #![allow(missing_docs)]
 
-use drive::control::start::StartState;
 use drive::estimator::Kind;
-use drive::math::wrap;
 use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
 use drive_tools::tune::setting::{Suited, Tuned};
 use drive_tools::tune::trial::{self, Trial};
-use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 /// A machine with a method.
@@ -127,62 +124,4 @@ fn a_refusal_has_numbers() {
         };
         assert!(parts.iter().all(|part| refusal.reason.contains(part)), "{}", refusal.reason);
     }
-}
-
-/// 11 kW with L_q = 4.8 L_d, whose magnet alone carries 12 N.m of the 70 N.m at the psi_M / (2 dL) of the plain start.
-const RELUCTANT: &str = r#"
-name = "reluctant"
-source = "a PM-assisted synchronous reluctance machine"
-machine = { n_p = 2, R_s = 0.42, L_d = 10e-3, L_q = 48e-3, psi_M = 0.25 }
-mechanics = { J = 0.03 }
-rating = { speed = 157.08, torque = 70.0, current = 50.0 }
-dc_link = { u_dc = 540.0 }
-"#;
-
-/// The start counts the reluctance torque, and `start_state` shows its stages: from every angle, the estimator leads within 1.5 s and
-/// knows the pole.
-#[test]
-fn a_machine_with_much_reluctance_starts_by_it() {
-    let motor = MotorFile::parse(RELUCTANT, Path::new("m.toml")).unwrap();
-    let Suited::Tuned(tuned) = rules::suited(&motor, Kind::ExtendedEmf).unwrap() else { panic!("refused") };
-    assert!((tuned.real("start.i").unwrap() - 36.95).abs() < 0.01);
-    assert!((tuned.real("current.bandwidth").unwrap() / TAU - 200.0).abs() < 1e-6);
-    for k in 0..6 {
-        let mut pair = tuned.pair();
-        pair.plant.model.parameters.initial.theta_e = f64::from(k) * TAU / 6.0;
-        pair.start().unwrap();
-        let mut states = vec![pair.controller.out.start_state];
-        for _ in 0..15_000 {
-            pair.set_inputs(0.5 * tuned.speed, 0.0, 540.0);
-            pair.step(1e-4).unwrap();
-            let state = pair.controller.out.start_state;
-            if states.last() != Some(&state) {
-                states.push(state);
-            }
-        }
-        assert_eq!(states, [StartState::Idle, StartState::Aligning, StartState::Ramping, StartState::Running], "{k}");
-        let off = wrap(pair.plant.out.theta_e - pair.controller.out.theta_est);
-        assert!(off.abs() < 0.05, "{k}: {off} rad");
-    }
-}
-
-/// A drive that measures its resistance is still starting; one without a sequence runs at once; one that is off is idle.
-#[test]
-fn the_state_of_the_start_is_shown_for_every_method() {
-    let state = |tuned: &Tuned, enable: bool| {
-        let mut pair = tuned.pair();
-        pair.controller.model.inputs.enable = enable;
-        pair.start().unwrap();
-        for _ in 0..5 {
-            pair.step(pair.controller.model.parameters.T_s).unwrap();
-        }
-        pair.controller.out.start_state
-    };
-    let of = |kind| match rules::suited(&read("reference"), kind).unwrap() {
-        Suited::Tuned(tuned) => *tuned,
-        Suited::Refused(refusal) => panic!("{}", refusal.reason),
-    };
-    assert_eq!(state(&of(Kind::Rasmussen), true), StartState::Aligning);
-    let sensored = of(Kind::Sensored);
-    assert_eq!((state(&sensored, true), state(&sensored, false)), (StartState::Running, StartState::Idle));
 }

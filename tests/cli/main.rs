@@ -156,8 +156,8 @@ fn an_atlas_is_written_or_refused() {
         (&["--estimator", "Luenberger"], &["--estimator Luenberger: unknown estimator; available: Rasmussen"]),
         (&["--set", "R=1"], &["--set R: is not a parameter of SensorlessController"]),
         (
-            &["--estimator", "ExtendedEmf", "--set", "start.mode=Injection"],
-            &["start.mode = 3 (Injection) is not allowed with estimator = 4 (ExtendedEmf)"],
+            &["--estimator", "ExtendedEmf", "--set", "adaptation.resistance=true"],
+            &["adaptation.resistance = true is not allowed with estimator = 4 (ExtendedEmf)"],
         ),
         (&["none.toml"], &["reading none.toml"]),
     ] {

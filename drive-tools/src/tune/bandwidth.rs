@@ -14,7 +14,6 @@
 
 use super::motor::{Data, Located, torque_constant};
 use super::setting::{LEVELS, Setting, Value};
-use super::start_current::Lead;
 use drive::estimator::{Class, Kind};
 use fmu_core::digits::rounded;
 use std::f64::consts::{E, TAU};
@@ -106,10 +105,7 @@ impl Bandwidths {
         } else {
             Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {
                 let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
-                // With much reluctance, the loop of the start has the gains of the lower inductance on both axes.
-                let reluctant = !class.injects() && Lead::of(data).reluctant;
-                let greatest = if reluctant { L_d.min(L_q) } else { L_d.max(L_q) };
-                let stable = (0.5 * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * greatest);
+                let stable = (0.5 * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
                 if sensored { TAU * 200.0 } else { (TAU * 200.0).min(stable / 1.5) }
             })
         };

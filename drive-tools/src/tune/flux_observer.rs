@@ -3,10 +3,9 @@
 //!
 //! i_0 holds the rotor like a compass while the EMF shows nothing: with 1.35 times the rated torque, as Rasmussen's, on a machine
 //! without saliency. On a salient one, i_0 > 0 takes reluctance torque from i_q (psi_M - (L_q - L_d) i_0), so it is 0.3 psi_M / (L_q -
-//! L_d) at most, and maximum torque per ampere carries the rest. That is too weak to turn the rotor from any angle: an I-f start does.
+//! L_d) at most, and maximum torque per ampere carries the rest.
 
 use super::bandwidth::{Bandwidths, GREATEST_TORQUE};
-use super::loops;
 use super::motor::{MotorFile, electrical, torque_constant};
 use super::rasmussen::zero_speed_current;
 use super::setting::{Setting, Value, real, set};
@@ -16,16 +15,11 @@ use drive::control::reference::max_torque_per_ampere;
 /// Maximum i_0 as a share of psi_M / (L_q - L_d).
 const LEAST_RELUCTANCE: f64 = 0.3;
 
-/// Values of the controller; an I-f start takes the rotor to `speed` (rad/s, with its rule).
+/// Values of the controller.
 ///
 /// # Errors
 /// The maximum current does not give the rated torque.
-pub fn settings(
-    motor: &MotorFile,
-    bandwidths: &Bandwidths,
-    speed: (f64, &str),
-    notes: &mut Vec<String>,
-) -> Result<Vec<Setting>> {
+pub fn settings(motor: &MotorFile, bandwidths: &Bandwidths) -> Result<Vec<Setting>> {
     let data = &motor.data;
     let (machine, rating) = (electrical(data), &data.rating);
     let (n_p, limit, torque) = (f64::from(machine.n_p), *rating.current.get_ref(), *rating.torque.get_ref());
@@ -44,7 +38,7 @@ pub fn settings(
         );
     }
     let rho = bandwidths.observer.value;
-    let mut all = vec![
+    Ok(vec![
         set("current.mtpa", Value::Boolean(true), "salient: minimum current for a torque"),
         real("speed_loop.b", 0.5, "set-point weight of Rasmussen's drive"),
         real("limit.i_q", limit, "the maximum current"),
@@ -52,10 +46,5 @@ pub fn settings(
         real("tracker.bandwidth", rho, "bandwidth.observer"),
         real("zero_speed.i_0", i_0, "1.35 times the rated torque / K, at most 0.3 psi_M / (L_q - L_d)"),
         real("zero_speed.w_0", (30.0 / n_p).clamp(5.0, 40.0), "30 rad/s electrical, 5 to 40 mechanical"),
-    ];
-    if most < wanted {
-        // The compass is too weak to turn the rotor to any first estimate.
-        all.extend(loops::start(data, speed, notes));
-    }
-    Ok(all)
+    ])
 }

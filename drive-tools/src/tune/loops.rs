@@ -1,13 +1,12 @@
 //! The loops and limits of the methods with a tracker or a sensor, and the I-f start of those that need an EMF.
 //!
 //! The start: the rotor swings on the current vector with w_0 = sqrt(n_p K I / J), damped by 0.5, and the reluctance reduces
-//! stiffness and damping by the share (L_q - L_d) I / psi_M, or holds the rotor itself ([`start_current`](super::start_current)). The
-//! alignments take 3 of its time constants each, the speed before the hand-over 4.
+//! stiffness and damping by the share (L_q - L_d) I / psi_M. The alignments take 3 of its time constants each, the speed before
+//! the hand-over 4.
 
 use super::bandwidth::GREATEST_TORQUE;
-use super::motor::{Data, electrical};
+use super::motor::{Data, electrical, swing, torque_constant};
 use super::setting::{Setting, Value, real, set};
-use super::start_current::Lead;
 use drive::control::limits::Limits;
 use drive::control::reference::max_torque;
 
@@ -40,20 +39,30 @@ pub fn sensored(data: &Data) -> Vec<Setting> {
 
 /// The I-f start up to `speed` (rad/s).
 pub fn start(data: &Data, (speed, rule): (f64, &str), notes: &mut Vec<String>) -> Vec<Setting> {
-    let lead = Lead::of(data);
-    if lead.torque < *data.rating.torque.get_ref() {
+    let (limit, torque) = (*data.rating.current.get_ref(), *data.rating.torque.get_ref());
+    // A d-axis current holds the rotor only while magnet torque exceeds reluctance torque: |L_q - L_d| i
+    // < psi_M.
+    let k = torque_constant(data);
+    let saliency = (data.machine.L_q.get_ref() - data.machine.L_d.get_ref()).abs();
+    let (wanted, stable) = ((1.4 * torque / k).min(limit), 0.5 * data.machine.psi_M.get_ref() / saliency);
+    let lead = wanted.min(stable);
+    if stable < wanted {
         notes.push(format!(
-            "the I-f start has {:.2} A, by its rule {}: it carries up to {:.2} N.m",
-            lead.i, lead.rule, lead.torque
+            "the saliency leaves {stable:.2} A for the I-f start: it carries up to {:.2} N.m",
+            k * stable
         ));
     }
     // Of the swing on the current vector, in 1/s.
-    let decay = 0.5 * lead.swing * lead.damped;
+    let decay = 0.5 * swing(data, lead) * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
     vec![
         set("start.mode", Value::Item("CurrentFrequency".into()), "no EMF at standstill"),
-        real("start.i", lead.i, lead.rule),
+        real(
+            "start.i",
+            lead,
+            "1.4 times the rated torque / K, at most the maximum current and psi_M / (2 |L_q - L_d|)",
+        ),
         real("start.speed", speed, rule),
-        real("start.acceleration", 0.3 * lead.torque / data.mechanics.J.get_ref(), "0.3 of the start's torque"),
+        real("start.acceleration", 0.3 * k * lead / data.mechanics.J.get_ref(), "0.3 of the start's torque"),
         real(
             "start.t_align",
             (3.0 / decay).max(0.25),

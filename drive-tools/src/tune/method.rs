@@ -30,7 +30,7 @@ pub fn settings(
     };
     match estimator {
         Kind::Rasmussen => rasmussen::settings(motor, bandwidths, notes),
-        Kind::FluxObserver => flux_observer::settings(motor, bandwidths, handed_over(data), notes),
+        Kind::FluxObserver => flux_observer::settings(motor, bandwidths),
         Kind::DirectEmf | Kind::EmfObserver | Kind::ExtendedEmf => {
             by_emf(true, back_emf::observer(data, bandwidths), notes)
         }

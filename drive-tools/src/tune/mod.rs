@@ -1,7 +1,7 @@
 //! From a machine and bandwidths to parameter values of the FMUs.
 //!
 //! - [`motor`]: the TOML file of a machine. [`plausible`] checks its values, [`saturation`] its saturation.
-//! - [`rules`]: how values ([`setting`]) follow from the file: [`bandwidth`], [`loops`], [`start_current`] for loops and start, [`method`] for the
+//! - [`rules`]: how values ([`setting`]) follow from the file: [`bandwidth`] and [`loops`] for the loops, [`method`] for the
 //!   estimators ([`rasmussen`], [`flux_observer`], [`back_emf`], [`injection`]), [`adaptation`] for the resistance,
 //!   [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test,
 //!   [`flux_map`] for a map from a table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
@@ -30,7 +30,6 @@ pub mod remedy;
 pub mod rules;
 pub mod saturation;
 pub mod setting;
-pub mod start_current;
 pub mod trial;
 mod values;
 pub mod voltage;

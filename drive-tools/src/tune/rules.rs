@@ -16,7 +16,6 @@ use super::bandwidth::Bandwidths;
 use super::check::check;
 use super::motor::{Data, Located, MotorFile, estimators, swing};
 use super::setting::{LEVELS, Setting, Suited, Tuned, Unsuited, Value, given, real, set};
-use super::start_current::Lead;
 use super::voltage::{self, Voltage};
 use super::{adaptation, flux_map, iron, losses, method, plausible, rasmussen, saturation};
 use crate::error::{Error, Result, bail};
@@ -293,14 +292,9 @@ fn cap_current_loop(
     let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
     let Data { machine, rating, .. } = data;
     // During a start, the current may be on one axis and the same damping on the other.
-    let starts = value("start.mode") == Some(&Value::Item("CurrentFrequency".into()));
-    let i = if starts { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
+    let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
     let least = least_inductance(i);
-    let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
-    // With much reluctance, both axes have the gains of the lower inductance until the frame is at the rotor; with a sensor, it always is.
-    let sensored = value("estimator") == Some(&Value::Item(Kind::Sensored.name().into()));
-    let own = sensored || starts && Lead::of(data).reluctant;
-    let greatest = if own { L_d.min(L_q) } else { L_d.max(L_q) };
+    let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
     let gain = MAX_GAIN * least / number("T_s");
     let most = match value("current.active_resistance") {
         Some(Value::Boolean(true)) => (gain + number("motor.R_s")) / (2.0 * greatest),

@@ -79,7 +79,7 @@ pub(crate) fn polarity(par: &ControllerParameters) -> Result<(), Fault> {
 /// States which parameters do not fit together, and what to do.
 pub(crate) fn weakening(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
-    if !par.weakens() {
+    if !own.used {
         return Ok(());
     }
     let table = PARAMETERS;
@@ -181,7 +181,7 @@ pub(crate) fn dc_limits(par: &ControllerParameters) -> Result<(), Fault> {
 /// The reluctance torque cancels most of the magnet's torque.
 pub(crate) fn zero_speed(par: &ControllerParameters) -> Result<(), Fault> {
     let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, .. } = par;
-    let by_torque = current.mtpa || par.weakens() || speed_loop.torque_mode;
+    let by_torque = current.mtpa || weakening.used || speed_loop.torque_mode;
     let share = (motor.L_q - motor.L_d) / motor.psi_M;
     if estimator.class() != Class::FluxObserver || !by_torque || zero_speed.i_0 * share <= 1.0 - LEAST_TORQUE {
         return Ok(());

@@ -7,7 +7,7 @@ use crate::estimator::{Estimate, Estimating, Estimator, EstimatorParameters, Inj
 use crate::lock::Lock;
 use crate::model::SensorlessController;
 use crate::signals::{ControllerInputs, ControllerOutputs};
-use crate::start::{StartMode, StartState};
+use crate::start::StartMode;
 use crate::state::{Command, Leader, Mode, References, context};
 use crate::tables::{Compensation, ControllerParameters};
 use crate::trip::Cause;
@@ -78,14 +78,10 @@ impl SensorlessController {
     fn any_cycle(&mut self) {
         let ControllerInputs { speed_ref, tau_ref, .. } = self.inputs;
         let release = self.parameters.zero_speed.release;
-        let measures = self.measures_resistance();
-        if measures {
+        if self.measures_resistance() {
             (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
         }
         self.state.computed = self.cycle(false);
-        if measures {
-            self.state.computed.start_state = StartState::Aligning;
-        }
         (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) =
             (speed_ref, tau_ref, release);
     }
@@ -134,7 +130,6 @@ impl SensorlessController {
             u_share,
             weakens,
             R_s_est,
-            start_state: if steady { StartState::Running } else { self.state.leader.start_state() },
             ..ControllerOutputs::default()
         }
     }
@@ -231,18 +226,14 @@ impl SensorlessController {
         if tuned && mode != Mode::AfterSearch {
             state.current.retune(&last_gains.current, &gains.current, i_ref, frame.i);
         }
-        let reluctant = matches!(mode, Mode::Current(_) | Mode::AfterStart)
-            && par.start.mode == StartMode::CurrentFrequency
-            && par.start.is_reluctant(motor);
-        if reluctant && mode == Mode::AfterStart {
-            state.current.retune(&gains.start, &gains.current, i_ref, frame.i);
-        }
-        let loops = if reluctant && mode != Mode::AfterStart { &gains.start } else { &gains.current };
-        let requested =
-            if let Mode::Voltage(u) = mode { u } else { state.current.command(loops, motor, i_ref, frame.i, frame.w) };
+        let requested = if let Mode::Voltage(u) = mode {
+            u
+        } else {
+            state.current.command(&gains.current, motor, i_ref, frame.i, frame.w)
+        };
         let magnitude = requested.magnitude();
         let u_share = share(magnitude, inputs.u_dc);
-        if gains.weakens && matches!(mode, Mode::ClosedLoop) {
+        if par.weakening.used && matches!(mode, Mode::ClosedLoop) {
             state.weakening.integrate(&par.weakening, magnitude, inputs.u_dc, T_s);
         }
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
@@ -272,7 +263,7 @@ impl SensorlessController {
         let injected = injected.unwrap_or_default();
         let (mut command, limited) = within_hexagon(whole, inputs.u_dc);
         let limitation = (limited || cut).then(|| acting.from_stator(command - injected) - requested);
-        state.current.integrate(loops, i_ref - frame.i, limitation, T_s);
+        state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
         let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
         let (mut output, mut beyond) = (command, false);
         if par.compensation.u_dead > 0.0 {

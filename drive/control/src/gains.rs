@@ -10,7 +10,6 @@ use crate::tables::ControllerParameters;
 use crate::weakening::WeakeningGains;
 use drive_base::frame::DqHat;
 use drive_base::math::{at_least, at_most};
-use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
 /// Gains computed from the parameters.
@@ -29,10 +28,6 @@ pub(crate) struct Gains {
     pub(crate) observes_flux: bool,
     pub(crate) lock: LockGains,
     pub(crate) weakening: WeakeningGains,
-    /// Field weakening acts with this estimator.
-    pub(crate) weakens: bool,
-    /// Current loop of an I-f start whose current lies far from the rotor's axes: both axes for the lower inductance.
-    pub(crate) start: CurrentGains,
 }
 
 impl Gains {
@@ -52,7 +47,6 @@ impl Gains {
         let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
         let weakening = WeakeningGains::new(motor, limit, tau, current.mtpa, par.least_tracker());
         let speed = SpeedGains::new(speed_loop, *J, k);
-        let least = motor.L_d.min(motor.L_q);
         let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
         let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p / J, lag: speed_loop.lag() };
         Self {
@@ -64,8 +58,6 @@ impl Gains {
             observes_flux,
             lock: LockGains::new(lock, motor, *T_s, reach),
             weakening,
-            weakens: par.weakening.used && estimator.class() != Class::Injection,
-            start: CurrentGains::new(current, &Motor { L_d: least, L_q: least, ..motor.clone() }),
         }
     }
 

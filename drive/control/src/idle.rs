@@ -1,8 +1,7 @@
 //! When the controller's parameters and inputs act: a value that is set without effect is reported by name.
 //!
-//! Every parameter and every input is here once; `no_variable_is_forgotten` looks. Options of other estimators are among them, so that the
-//! values tuned for one estimator can be tried with another. Only a start that the estimator cannot make is refused
-//! ([`options`](crate::estimator::options)).
+//! Every parameter and every input is here once; `no_variable_is_forgotten` looks. Options that an estimator does not support are
+//! refused ([`options`](crate::estimator)), and count as acting.
 
 use crate::commissioning::CommissionMode;
 use crate::estimator::{Class, Kind};
@@ -19,20 +18,6 @@ fn is(par: &Par, kinds: &[Kind]) -> bool {
     reads(par, |kind| kinds.contains(&kind))
 }
 
-/// Estimators that adapt the resistance; that have the frame-speed term; that take the direction from the sign of the EMF.
-const ADAPTING: &[Kind] = &[Kind::Rasmussen, Kind::FluxObserver];
-const FRAME_TERM: &[Kind] = &[
-    Kind::DirectEmf,
-    Kind::EmfObserver,
-    Kind::ExtendedEmf,
-    Kind::VoltageFeedback,
-    Kind::Hybrid,
-    Kind::VoltageModel,
-    Kind::CurrentModel,
-];
-pub(crate) const SIGN_OF_EMF: &[Kind] =
-    &[Kind::DirectEmf, Kind::EmfObserver, Kind::ExtendedEmf, Kind::VoltageFeedback, Kind::SlidingMode];
-
 /// The controller's.
 #[rustfmt::skip]
 pub const ACTS: &[Acts<Par>] = &[
@@ -40,9 +25,11 @@ pub const ACTS: &[Acts<Par>] = &[
         "T_s", "timing.delay", "estimator", "motor.n_p", "motor.R_s", "motor.L_d", "motor.L_q", "motor.psi_M", "mechanics.J",
         "initial.theta_est", "initial.speed_est", "limit.i_q", "limit.i", "limit.tau", "limit.i_dc_use", "speed_loop.torque_mode",
         "current.bandwidth", "current.active_resistance", "current.integral", "current.reference_feed_forward", "current.mtpa",
-        "start.mode", "lock.u", "lock.angle", "lock.time", "trip.use", "sensor.gain_a", "sensor.gain_b",
+        "weakening.use", "start.mode", "lock.u", "lock.angle", "lock.time", "trip.use", "sensor.gain_a", "sensor.gain_b",
         "sensor.gain_c", "sensor.offset_a", "sensor.offset_b", "sensor.offset_c", "sensor.noise", "sensor.resolution",
-        "compensation.u_dead", "compensation.calibrate", "commission.mode",
+        "compensation.u_dead", "compensation.calibrate", "commission.mode", "adaptation.k_a",
+        "adaptation.tracking", "flux_observer.magnet", "tracker.kind", "emf.frame_term", "emf.hold_reversal", "matsui.integral",
+        "pulsating.demodulation", "gradient.clamped",
         "enable", "asc", "i_a", "i_b", "i_c", "u_dc",
     ], when: |_| true, why: "" },
     Acts { names: &["tau_ref"], when: |p| p.speed_loop.torque_mode, why: "no effect without speed_loop.torque_mode" },
@@ -53,9 +40,7 @@ pub const ACTS: &[Acts<Par>] = &[
         why: "no effect with this estimator; Rasmussen and FluxObserver have the low-speed law" },
     Acts { names: &["zero_speed.release"], when: |p| p.speed_loop.torque_mode && reads(p, |kind| kind.class() == Class::FluxObserver),
         why: "no effect without speed_loop.torque_mode and an estimator with the low-speed law, Rasmussen or FluxObserver" },
-    Acts { names: &["weakening.use"], when: |p| reads(p, |kind| kind.class() != Class::Injection),
-        why: "no effect with this estimator: its injection leaves no voltage for field weakening" },
-    Acts { names: &["weakening.k_u", "weakening.k_t", "weakening.bandwidth"], when: Par::weakens,
+    Acts { names: &["weakening.k_u", "weakening.k_t", "weakening.bandwidth"], when: |p| p.weakening.used,
         why: "no effect without weakening.use" },
     Acts { names: &["start.i", "start.t_align", "start.acceleration", "start.speed", "start.settle"],
         when: |p| p.start.mode == StartMode::CurrentFrequency, why: "no effect unless start.mode = CurrentFrequency" },
@@ -72,37 +57,27 @@ pub const ACTS: &[Acts<Par>] = &[
         when: |p| p.commission.mode != CommissionMode::Off, why: "no effect with commission.mode = Off" },
     Acts { names: &["rasmussen.c_1", "rasmussen.c_2", "rasmussen.w_n", "rasmussen.zeta"], when: |p| is(p, &[Kind::Rasmussen]),
         why: "no effect unless estimator = Rasmussen" },
-    Acts { names: &["adaptation.resistance"], when: |p| is(p, ADAPTING),
-        why: "no effect with this estimator; Rasmussen and FluxObserver adapt the resistance" },
-    Acts { names: &["adaptation.k_a", "adaptation.tracking"], when: |p| is(p, &[Kind::Rasmussen]),
-        why: "no effect unless estimator = Rasmussen" },
+    Acts { names: &["adaptation.resistance"], when: |p| reads(p, |kind| kind != Kind::Sensored), why: "no effect with a sensor" },
     Acts { names: &["adaptation.bandwidth", "adaptation.i", "adaptation.start", "adaptation.min", "adaptation.max", "adaptation.k_c",
-        "adaptation.flux"], when: |p| p.estimators.adaptation.resistance && is(p, ADAPTING),
-        why: "no effect without adaptation.resistance and an estimator that adapts it, Rasmussen or FluxObserver" },
-    Acts { names: &["flux_observer.k_w", "flux_observer.magnet"], when: |p| is(p, &[Kind::FluxObserver]), why: "no effect unless estimator = FluxObserver" },
-    Acts { names: &["tracker.bandwidth", "tracker.kind"],
+        "adaptation.flux"], when: |p| p.estimators.adaptation.resistance, why: "no effect without adaptation.resistance" },
+    Acts { names: &["flux_observer.k_w"], when: |p| is(p, &[Kind::FluxObserver]), why: "no effect unless estimator = FluxObserver" },
+    Acts { names: &["tracker.bandwidth"],
         when: |p| reads(p, |kind| !matches!(kind, Kind::Rasmussen | Kind::VoltageModel | Kind::CurrentModel | Kind::Sensored | Kind::KalmanFilter)),
         why: "no effect with this estimator, which has no tracker" },
     Acts { names: &["emf.bandwidth", "emf.w_sign"],
         when: |p| reads(p, |kind| !matches!(kind, Kind::Rasmussen | Kind::FluxObserver | Kind::Sensored | Kind::KalmanFilter)),
         why: "no effect with this estimator, which does not read the back EMF" },
-    Acts { names: &["emf.frame_term"], when: |p| is(p, FRAME_TERM), why: "no effect with this estimator, which has no such term" },
-    Acts { names: &["emf.hold_reversal"], when: |p| is(p, SIGN_OF_EMF),
-        why: "no effect with this estimator, which does not take the direction of rotation from the sign of the EMF" },
-    Acts { names: &["emf.w_hold"], when: |p| p.estimators.emf.hold_reversal && is(p, SIGN_OF_EMF), why: "no effect without emf.hold_reversal" },
-    Acts { names: &["matsui.bandwidth", "matsui.filter", "matsui.integral"], when: |p| is(p, &[Kind::VoltageModel, Kind::CurrentModel]),
+    Acts { names: &["emf.w_hold"], when: |p| p.estimators.emf.hold_reversal, why: "no effect without emf.hold_reversal" },
+    Acts { names: &["matsui.bandwidth", "matsui.filter"], when: |p| is(p, &[Kind::VoltageModel, Kind::CurrentModel]),
         why: "no effect unless estimator = VoltageModel or CurrentModel" },
     Acts { names: &["kalman.voltage_d", "kalman.voltage_q", "kalman.acceleration", "kalman.current"],
         when: |p| is(p, &[Kind::KalmanFilter]), why: "no effect unless estimator = KalmanFilter" },
-    Acts { names: &["gradient.bandwidth", "gradient.clamped"], when: |p| is(p, &[Kind::GradientObserver]),
-        why: "no effect unless estimator = GradientObserver" },
+    Acts { names: &["gradient.bandwidth"], when: |p| is(p, &[Kind::GradientObserver]), why: "no effect unless estimator = GradientObserver" },
     Acts { names: &["sliding_mode.gain", "sliding_mode.bandwidth"], when: |p| is(p, &[Kind::SlidingMode]),
         why: "no effect unless estimator = SlidingMode" },
     Acts { names: &["carrier.voltage", "carrier.frequency", "carrier.zeta"],
         when: |p| is(p, &[Kind::RotatingInjection, Kind::PulsatingInjection]),
         why: "no effect unless estimator = RotatingInjection or PulsatingInjection" },
-    Acts { names: &["pulsating.demodulation"], when: |p| is(p, &[Kind::PulsatingInjection]),
-        why: "no effect unless estimator = PulsatingInjection" },
     Acts { names: &["square_wave.voltage", "square_wave.samples"], when: |p| is(p, &[Kind::SquareWaveInjection, Kind::Hybrid]),
         why: "no effect unless estimator = SquareWaveInjection or Hybrid" },
     Acts { names: &["near_pwm.voltage"], when: |p| is(p, &[Kind::NearPwmInjection]), why: "no effect unless estimator = NearPwmInjection" },

@@ -234,7 +234,7 @@ impl SensorlessController {
             reference_feed_forward: par.current.reference_feed_forward,
             active_resistance: par.current.active_resistance,
             starts_by_injection: start.mode == StartMode::Injection,
-            weakens: par.weakening.used && par.estimator != self.parameters.estimator,
+            weakens: par.weakening.used,
             tell: &tell,
         };
         tracker::validate(&setup)?;
@@ -285,7 +285,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 19;
+    const STATE_VERSION: u16 = 18;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {

@@ -37,7 +37,7 @@ impl Settled {
     pub fn at<'a>(&'a self, par: &'a ControllerParameters, speed: f64, u_dc: f64, trim: f64) -> SettledAt<'a> {
         let gains = &self.gains;
         let (law, w) = (gains.law(par, par.zero_speed.i_0, speed), f64::from(par.motor.n_p) * speed);
-        let (weakening, (low, high)) = if gains.weakens {
+        let (weakening, (low, high)) = if par.weakening.used {
             Weakening::settled(&gains.weakening, &par.weakening, (w, u_dc), law.limit, trim)
         } else {
             (Weakening::default(), (law.limit, law.limit))
@@ -74,7 +74,7 @@ impl SettledAt<'_> {
         let released = par.speed_loop.torque_mode && par.zero_speed.releases(asked);
         let law = if released { law.released() } else { *law };
         let plain = || gains.currents(par, &law, tau / gains.k);
-        if !gains.weakens {
+        if !par.weakening.used {
             return (plain(), false);
         }
         let mut state = *weakening;

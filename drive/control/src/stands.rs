@@ -16,7 +16,6 @@
 //! Derived here. tau in N.m, w in rad/s (electrical), w_s in rad/s (mechanical).
 
 use crate::estimator::Class;
-use crate::idle::SIGN_OF_EMF;
 use crate::tables::ControllerParameters;
 use drive_base::frame::DqHat;
 use serde::{Deserialize, Serialize};
@@ -55,7 +54,7 @@ impl Stands {
         let motor = &par.motor;
         let tau = motor.torque(i.d(), i.q()).abs();
         let emf = &par.estimators.emf;
-        let faded = if emf.hold_reversal && SIGN_OF_EMF.contains(&par.estimator) { FADED * emf.w_hold } else { 0.0 };
+        let faded = if par.estimator.class() == Class::BackEmf && emf.hold_reversal { FADED * emf.w_hold } else { 0.0 };
         let hidden = (RESISTANCE * motor.R_s * i.magnitude() / motor.psi_M).max(faded) / f64::from(motor.n_p);
         let speed = self.speed + (speed - self.speed) * (par.T_s / (par.T_s + SMOOTH));
         let time = if works && tau > LITTLE * most && speed.abs() < hidden { self.time + par.T_s } else { 0.0 };

@@ -14,20 +14,7 @@
 //! speed, so i_q = -2 zeta w_0 J / (n_p K) (e_q / psi_M - w_f), limited to I, produces a damping torque, even at
 //! standstill.
 //!
-//! **Much reluctance**, L_q - L_d = dL > psi_M / (2 I): the torque 1.5 n_p (psi_M - dL I cos delta) I sin delta of a rotor delta behind
-//! the current is that of maximum torque per ampere at most. Beyond dL I = psi_M, a rotor without a load lies at cos delta = psi_M / (dL
-//! I) on either side, where the active flux linkage psi_a = psi_M - dL i_d, and with it the EMF of the hand-over, is zero. So
-//!
-//! - both axes of the current loop have the gains of the lower inductance, whatever axis of the rotor the current sees;
-//! - the damping takes the change of the flux linkage, e_q without its mean: i_q = -2 zeta w_0 J / (1.5 n_p^2 k^2) (e_q - mean e_q), with
-//!   the stiffness k = |dL I - psi_M^2 / (dL I)| of the unloaded rotor and w_0^2 = 1.5 n_p^2 I k / J, at most I / 2;
-//! - after `settle`, I falls within the same time to psi_M / (2 dL), and the hand-over comes where psi_a reaches 0.6 psi_M: at once
-//!   under load;
-//! - the extended EMF v - R i - j w_f L_q i = j w_f psi_a e^{j theta~} gives the angle, with half a turn more if psi_a + dL i_d < 0, which
-//!   is psi_M with its sign.
-//!
-//! Limits: the load must stay below K I (with much reluctance: below the maximum torque of I); at standstill, e_q contains the voltage
-//! errors of the inverter. A load that acts before the rotor has aligned may turn it back first.
+//! Limits: the load must stay below K I; at standstill, e_q contains the voltage errors of the inverter.
 //!
 //! Neither paper uses this start: the sequence and the damping are derived here for the back-EMF methods (Kim & Sul
 //! 2011, section II), which have no signal at standstill. Angles in rad (electrical), w_0 and w_f in rad/s
@@ -35,13 +22,12 @@
 
 use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Sample};
-use drive_base::frame::{Axis, DqHat, Estimated};
+use drive_base::frame::DqHat;
 use drive_base::math::{atan2, exp};
-use drive_base::motor::Motor;
 use fmu_core::unit::{AMPERE, Exponents, Quantity, SECOND, SPEED, Unit};
 use fmu_core::{Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Mechanical acceleration.
 pub(crate) const RAD_PER_S2: Quantity =
@@ -51,12 +37,6 @@ pub(crate) const RAD_PER_S2: Quantity =
 const ZETA: f64 = 0.5;
 /// Bandwidth of the back-EMF filter in rad/s.
 const FILTER: f64 = TAU * 60.0;
-/// Reluctance (L_q - L_d) I as a share of psi_M beyond which the rotor may lie far from the current.
-const MUCH: f64 = 0.5;
-/// Active flux linkage of the hand-over as a share of psi_M.
-const ACTIVE: f64 = 0.6;
-/// Bandwidth of the mean of e_q as a share of the swing, and the maximum damping as a share of I.
-const SLOW: (f64, f64) = (0.2, 0.5);
 
 enumeration! {
     /// The start sequences; the assigned values never change.
@@ -65,18 +45,6 @@ enumeration! {
         1 Direct "No sequence: the estimator starts at once";
         2 CurrentFrequency "I-f start: a rotating current vector takes the rotor to start.speed";
         3 Injection "At standstill: injection finds the d axis, voltage pulses find the north pole";
-    }
-}
-
-enumeration! {
-    /// What the start of a drive does; the assigned values never change.
-    #[derive(Default, Serialize, Deserialize)]
-    pub enum StartState("StartState", "What the start of the drive does") {
-        #[default]
-        1 Idle "The controller is not enabled, has tripped or measures the machine";
-        2 Aligning "At rest: a current aligns the rotor, injection finds it, or the resistance is measured";
-        3 Ramping "A rotating current takes the rotor to start.speed";
-        5 Running "The estimator leads: speed or torque follow the reference";
     }
 }
 
@@ -103,13 +71,6 @@ impl Default for StartParameters {
     }
 }
 
-impl StartParameters {
-    /// Whether the reluctance is so large that the rotor may lie far from the current.
-    pub fn is_reluctant(&self, motor: &Motor) -> bool {
-        (motor.L_q - motor.L_d) * self.i > MUCH * motor.psi_M
-    }
-}
-
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Stage {
     #[default]
@@ -131,8 +92,6 @@ pub struct CurrentFrequencyStart {
     w: f64,
     /// Back EMF in the frame in V, low-passed.
     e: DqHat,
-    /// Mean of e_q in V, with much reluctance.
-    mean: f64,
 }
 
 /// Requests of the start at a sample; angles in rad and speeds in rad/s, electrical.
@@ -159,14 +118,6 @@ pub enum StartStep {
 }
 
 impl CurrentFrequencyStart {
-    /// What it does.
-    pub fn state(&self) -> StartState {
-        match self.stage {
-            Stage::Behind | Stage::On => StartState::Aligning,
-            Stage::Ramp | Stage::Hold => StartState::Ramping,
-        }
-    }
-
     /// One sample. The second alignment brings the rotor to `theta_est` (rad); the sign of `reference` sets the
     /// direction of rotation.
     pub fn update(
@@ -207,11 +158,6 @@ impl CurrentFrequencyStart {
                     self.enter(Stage::Hold);
                 }
             }
-            Stage::Hold if par.is_reluctant(motor) => {
-                if let Some(theta) = self.found(motor, sample, t >= 2.0 * par.settle).filter(|_| t >= par.settle) {
-                    return StartStep::HandOver { theta, w: self.w, theta_frame: self.theta };
-                }
-            }
             Stage::Hold if t >= par.settle => {
                 let s = self.w.signum();
                 let theta = self.theta + atan2(-s * self.e.d(), s * self.e.q());
@@ -220,48 +166,10 @@ impl CurrentFrequencyStart {
             _ => {}
         }
         let grown = if self.stage == Stage::Behind { (3.0 * t / par.t_align).min(1.0) } else { 1.0 };
-        if par.is_reluctant(motor) {
-            let I = grown * self.current(par, motor, T_s);
-            return StartStep::Current { theta: self.theta, w: self.w, i_ref: self.steadied(motor, J, I, T_s) };
-        }
         let K = motor.torque_constant();
         let w_0 = (n_p * K * par.i / J).sqrt();
         let i_q = damping(w_0, J, n_p * K, self.e.q() / motor.psi_M - self.w, par.i);
         StartStep::Current { theta: self.theta, w: self.w, i_ref: DqHat::new(par.i * grown, i_q * grown) }
-    }
-
-    /// Current in A of this sample with much reluctance: it falls after `settle`.
-    fn current(&self, par: &StartParameters, motor: &Motor, T_s: f64) -> f64 {
-        let beyond = self.n * T_s - par.settle;
-        if self.stage != Stage::Hold || beyond <= 0.0 {
-            return par.i;
-        }
-        let end = MUCH * motor.psi_M / (motor.L_q - motor.L_d);
-        par.i + (end - par.i) * (beyond / par.settle).min(1.0)
-    }
-
-    /// Reference of the current `I` (A) with the damping for much reluctance.
-    fn steadied(&mut self, motor: &Motor, J: f64, I: f64, T_s: f64) -> DqHat {
-        let (n_p, reluctance) = (f64::from(motor.n_p), (motor.L_q - motor.L_d) * I);
-        let k = (reluctance - motor.psi_M * motor.psi_M / reluctance).abs().max(MUCH * motor.psi_M);
-        let w_0 = (1.5 * n_p * n_p * I * k / J).sqrt();
-        self.mean += (self.e.q() - self.mean) * (1.0 - exp(-SLOW.0 * w_0 * T_s));
-        let gain = 2.0 * ZETA * w_0 * J / (1.5 * n_p * n_p * k * k);
-        DqHat::new(I, (-gain * (self.e.q() - self.mean)).clamp(-SLOW.1 * I, SLOW.1 * I))
-    }
-
-    /// The rotor's angle in rad with much reluctance, once its active flux linkage shows it, or `anyway`.
-    fn found(&self, motor: &Motor, sample: &Sample, anyway: bool) -> Option<f64> {
-        let dL = motor.L_q - motor.L_d;
-        let i = Axis::<Estimated>::at(self.theta).from_stator(sample.i);
-        // psi_a e^{j theta~} in the frame.
-        let active = DqHat::new(self.e.q() / self.w - dL * i.d(), -self.e.d() / self.w);
-        let psi_a = active.magnitude();
-        if psi_a < ACTIVE * motor.psi_M && !anyway {
-            return None;
-        }
-        let turned = if psi_a + dL * active.dot(i) / psi_a < 0.0 { PI } else { 0.0 };
-        Some(self.theta + atan2(active.q(), active.d()) + turned)
     }
 
     fn enter(&mut self, stage: Stage) {

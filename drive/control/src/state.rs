@@ -11,7 +11,7 @@ use crate::sensor::Offset;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::{SpeedController, SpeedGains};
 use crate::stands::Stands;
-use crate::start::{CurrentFrequencyStart, StartMode, StartState, StartStep};
+use crate::start::{CurrentFrequencyStart, StartMode, StartStep};
 use crate::tables::ControllerParameters;
 use crate::trip::Trip;
 use crate::weakening::Weakening;
@@ -62,17 +62,6 @@ impl Leader {
             StartMode::CurrentFrequency => Self::Start(CurrentFrequencyStart::default()),
             StartMode::Injection => Self::Search(PolaritySearch::default()),
             StartMode::Direct => Self::Estimator,
-        }
-    }
-}
-
-impl Leader {
-    /// What the start does.
-    pub(super) fn start_state(&self) -> StartState {
-        match self {
-            Self::Estimator => StartState::Running,
-            Self::Start(start) => start.state(),
-            Self::Search(_) => StartState::Aligning,
         }
     }
 }
@@ -267,7 +256,7 @@ impl State {
             law = law.released();
         }
         let limit = law.limit;
-        if gains.weakens || par.dc.used {
+        if par.weakening.used || par.dc.used {
             return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
@@ -294,7 +283,7 @@ impl State {
     ) -> References {
         let w = f64::from(par.motor.n_p) * speed;
         let at = (w, inputs.u_dc, injection.magnitude());
-        let (mut low, mut high) = if gains.weakens {
+        let (mut low, mut high) = if par.weakening.used {
             self.weakening.limits(&gains.weakening, &par.weakening, at, law.limit, self.k)
         } else {
             (law.limit, law.limit)
@@ -315,7 +304,7 @@ impl State {
         self.limited_for = if limited { self.limited_for + par.T_s } else { 0.0 };
         let tau = gains.k * i_q_ref;
         let plain = || gains.currents(par, law, i_q_ref);
-        if !gains.weakens {
+        if !par.weakening.used {
             return References { i: plain(), limited, tau: (gains.k * low, gains.k * high), weakens: false };
         }
         let i = self.weakening.currents(&gains.weakening, tau, w, par.limit.i_q, par.current.mtpa, plain);

@@ -4,8 +4,8 @@ use crate::battery::{DC_LIMITS, DcLimits};
 use crate::commission::CommissionSetup;
 use crate::commissioning::{COMMISSION, CommissionParameters};
 use crate::current::{CURRENT_LOOP, CurrentLoop};
+use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
-use crate::estimator::{Class, Kind};
 use crate::limits::Limits;
 use crate::lock::{LOCK, LockParameters};
 use crate::polarity::{POLARITY, PolarityParameters};
@@ -188,12 +188,6 @@ impl ControllerParameters {
         }
     }
 
-    /// Whether field weakening acts: an injection leaves it no voltage.
-    #[inline]
-    pub fn weakens(&self) -> bool {
-        self.weakening.used && self.estimator.class() != Class::Injection
-    }
-
     /// Whether a fallback estimator exists for the shaft sensor.
     #[inline]
     pub(crate) fn has_fallback(&self) -> bool {
@@ -345,11 +339,6 @@ pub const STATUS: &Table<ControllerOutputs> = table![
         "commission_fault",
         "Why the self-commissioning was refused",
         &Field(|o| &mut o.commission_fault),
-    ),
-    O::enumeration_output(
-        "start_state",
-        "What the start of the drive does; with Running, speed or torque follow the reference",
-        &Field(|o| &mut o.start_state),
     ),
 ];
 

@@ -310,7 +310,7 @@ type P = Row<WeakeningParameters>;
 pub const WEAKENING: &Table<WeakeningParameters> = table![
     P::boolean_parameter(
         "use",
-        "Field weakening: i_d and the torque limits follow the voltage of u_dc, no effect with injection methods; false: no i_d beyond current.mtpa",
+        "Field weakening: i_d and the torque limits follow the voltage of u_dc, injection methods refuse it; false: no i_d beyond current.mtpa",
         |p| &mut p.used,
     ),
     P::parameter(

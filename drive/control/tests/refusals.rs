@@ -131,11 +131,7 @@ fn field_weakening_with_an_estimator_that_cannot() {
     let weaken = |p: &mut ControllerParameters| p.weakening.used = true;
     let name = |kind: Kind| format!("estimator = {} ({})", kind as i32, kind.name());
     for &kind in Kind::ALL.iter().filter(|kind| kind.class() == Class::Injection) {
-        let mut controller = controller(kind);
-        weaken(&mut controller.parameters);
-        controller.validate().unwrap();
-        assert!(controller.idle("weakening.use").unwrap().contains("injection leaves no voltage"));
-        assert!(controller.idle("weakening.k_u").is_some() && !controller.parameters.weakens());
+        refused(kind, weaken, &["weakening.use = true", &name(kind), "Hybrid"]);
     }
     refused(Kind::VoltageModel, weaken, &["limit.i = 15 A", &name(Kind::VoltageModel), "10.597"]);
     let fed_back = Kind::VoltageFeedback;

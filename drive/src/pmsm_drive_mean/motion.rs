@@ -79,7 +79,7 @@ impl PmsmDriveMean {
             let cut = wanted - within(wanted, point.limits);
             let [_, k_i] = gains.slopes();
             let share = if cut * error > 0.0 { (1.0 - cut.abs() / (BAND * highest.max(1e-9))).max(0.0) } else { 1.0 };
-            let follow = if controller.weakens() { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
+            let follow = if controller.weakening.used { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
             (wanted, share * k_i * error - follow, cut != 0.0)
         };
         let tau = lag * (within(wanted, point.limits) - state.tau);

@@ -26,7 +26,7 @@ impl At<'_> {
 
     fn trims(&self) -> bool {
         let weakening = &self.drive.controller.weakening;
-        self.drive.controller.weakens() && weakening.bandwidth > 0.0
+        weakening.used && weakening.bandwidth > 0.0
     }
 
     /// The point of the torque reference `tau` (N.m) within the voltage of the link; `at_once` is that regardless of it.

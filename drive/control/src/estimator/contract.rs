@@ -204,7 +204,7 @@ pub struct SetupOf<'a, All> {
     pub active_resistance: bool,
     /// The start finds the rotor by injection.
     pub starts_by_injection: bool,
-    /// Field weakening is in use, and this estimator is to take over from another.
+    /// Field weakening is in use.
     pub weakens: bool,
     /// Name, value and unit of the controller's variable with this name.
     pub tell: &'a dyn Fn(&str) -> String,

@@ -191,8 +191,8 @@ pub const EMF: &Table<EmfParameters> = table![
     ),
     P::boolean_parameter(
         "hold_reversal",
-        "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; no effect with \
-                 estimators other than the EMF methods",
+        "Near standstill, the direction of rotation comes from the EMF: a reversal at light load is held; estimators \
+                 other than the EMF methods refuse it",
         |p| &mut p.hold_reversal,
     ),
     P::parameter(

@@ -186,7 +186,7 @@ pub const FLUX_OBSERVER: &Table<FluxObserverParameters> = table![
     P::parameter(
         "magnet",
         &PER_SECOND,
-        "Rate at which FluxObserver adapts psi_M; no effect with others; 0: motor.psi_M",
+        "Rate at which FluxObserver adapts psi_M, the others refuse it; 0: motor.psi_M",
         |p| &mut p.magnet,
     )
     .at_least(0.0),

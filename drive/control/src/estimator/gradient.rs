@@ -105,7 +105,7 @@ pub const GRADIENT: &Table<GradientParameters> = table![
     .tunable(),
     P::boolean_parameter(
         "clamped",
-        "GradientObserver, no effect with others: both components of the flux limited to the magnet's, as in open motor controllers",
+        "GradientObserver, the others refuse it: both components of the flux limited to the magnet's, as in open motor controllers",
         |p| &mut p.clamped,
     ),
 ];

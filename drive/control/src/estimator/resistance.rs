@@ -267,14 +267,14 @@ pub const ADAPTATION: &Table<ResistanceParameters> = table![
             P::boolean_parameter(
                 "resistance",
                 "Rasmussen (while the reference is standstill, and after a start at rest, before any reference acts, for at \
-                 most 20 / adaptation.bandwidth) and FluxObserver adapt the resistance, no effect with others; false: \
+                 most 20 / adaptation.bandwidth) and FluxObserver adapt the resistance, Sensored ignores it, the others refuse it; false: \
                  motor.R_s",
                 |p| &mut p.resistance,
             ),
             P::parameter(
                 "k_a",
                 &ONE,
-                "Rasmussen: voltage on the q axis near standstill as a share of R_s i_q, lets the d-axis current carry the load; no effect with others",
+                "Rasmussen: voltage on the q axis near standstill as a share of R_s i_q, lets the d-axis current carry the load; others refuse it",
                 |p| &mut p.k_a,
             )
             .at_least(0.0)
@@ -308,7 +308,7 @@ pub const ADAPTATION: &Table<ResistanceParameters> = table![
                 "tracking",
                 &ONE,
                 "Rasmussen: rate at which the resistance is followed at creeping speed divided by the electrical speed, \
-                 no effect with others; 0: it stays constant there",
+                 others refuse it; 0: it stays constant there",
                 |p| &mut p.tracking,
             )
             .at_least(0.0)

@@ -127,7 +127,7 @@ type P = Row<TrackerParameters>;
 pub const TRACKER: &Table<TrackerParameters> = table![
     P::enumeration_parameter(
         "kind",
-        "Tracker of angle and speed from the angle error; no effect with estimators without a tracker",
+        "Tracker of angle and speed from the angle error; estimators without a tracker refuse the second",
         &Field(|p| &mut p.kind),
     ),
     P::parameter(
