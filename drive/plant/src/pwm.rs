@@ -118,12 +118,10 @@ pub const PWM: &Table<Pwm> = table![
         "inverter.open_switch",
         "Fault: a switch that no longer conducts, unlike its diode",
         &Field(|p| { &mut p.open_switch })
-    )
-    .tunable(),
+    ),
     P::enumeration_parameter(
         "inverter.open_phase",
         "Fault: a phase that carries no current",
         &Field(|p| &mut p.open_phase)
-    )
-    .tunable(),
+    ),
 ];
