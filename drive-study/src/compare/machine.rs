@@ -3,7 +3,7 @@
 use super::candidate::Entry;
 use super::measure::{Effort, Outcome};
 use super::run::Run;
-use super::scenario::{Scenario, Task};
+use super::scenario::{Scenario, ScenarioRun};
 use super::trials::running;
 use drive::estimator::Kind;
 use drive_tools::error::Result;
@@ -47,7 +47,7 @@ pub fn on_machine(
     }
     let jobs: Vec<_> = tuned.iter().flat_map(|one| scenarios.iter().map(move |&s| (one, s))).collect();
     let runs = queue::map(&jobs, |&(one, scenario)| {
-        let Task::Machine(run) = scenario.run else { unreachable!("a scenario of the review") };
+        let ScenarioRun::Machine(run) = scenario.run else { unreachable!("a scenario of the review") };
         let outcome = run(one, effort).unwrap_or_else(|fault| Outcome::Refused(fault.message().into()));
         done();
         Run { entry: Entry::on_machine(one.estimator), scenario, outcome }

@@ -18,12 +18,12 @@ pub struct Scenario {
     /// What happens, in one sentence.
     pub title: &'static str,
     /// Runs it.
-    pub run: Task,
+    pub run: ScenarioRun,
 }
 
 /// What a scenario runs.
 #[derive(Clone, Copy, Debug)]
-pub enum Task {
+pub enum ScenarioRun {
     /// An estimator with the gains of the review's figures.
     Review(fn(&Candidate, Effort) -> Result<Outcome, Fault>),
     /// An estimator tuned for the user's machine.
@@ -47,7 +47,7 @@ const fn row(
     title: &'static str,
     run: fn(&Candidate, Effort) -> Result<Outcome, Fault>,
 ) -> Scenario {
-    Scenario { id, group, title, run: Task::Review(run) }
+    Scenario { id, group, title, run: ScenarioRun::Review(run) }
 }
 
 /// All scenarios, in the order of the tables.

@@ -5,7 +5,7 @@
 //! method that does not reach it, at its highest speed.
 
 use super::measure::{Effort, Follow, Measure, Outcome};
-use super::scenario::{Scenario, Task};
+use super::scenario::{Scenario, ScenarioRun};
 use crate::runner::{self, Moment, Statistics, line};
 use drive::Pair;
 use drive::math::wrap;
@@ -30,7 +30,7 @@ const fn row(
     title: &'static str,
     run: fn(&Tuned, Effort) -> Result<Outcome, Fault>,
 ) -> Scenario {
-    Scenario { id, group, title, run: Task::Machine(run) }
+    Scenario { id, group, title, run: ScenarioRun::Machine(run) }
 }
 
 /// All scenarios, in the order of the tables.

@@ -65,13 +65,13 @@ enum Blocked {
 }
 
 impl Voltages {
-    /// Of legs that conduct in these `ways` as long as the voltages last.
+    /// Legs that conduct in these `ways` for the duration of the voltages.
     #[inline]
     pub(super) fn fixed(ways: [Way; 3]) -> Self {
         Self { ways, bounds: [[0.0; 2]; 3], sides: [1; 3], watched: [false; 3] }
     }
 
-    /// Of legs that conduct in the `ways` of their `sides`, or block, while these last.
+    /// Legs that conduct in the `ways` of their `sides`, or block, while these last.
     pub(super) fn watched(ways: [[Way; 2]; 3], sides: [i8; 3]) -> Self {
         let none = Way { rail: 0.0, u: 0.0, r: 0.0 };
         let watched = ways.map(|[a, b]| a != b);
