@@ -45,6 +45,27 @@ const ELSEWHERE: &[(&str, &str, &str)] = &[
     ("build", "target", "tests/targets.rs"),
     ("build", "package", "tests/own_fmu.rs"),
     ("build", "release_dir", "tests/targets.rs"),
+    ("bode", "from", "tests/bode.rs"),
+    ("bode", "to", "tests/bode.rs"),
+    ("bode", "over", "tests/bode.rs"),
+    ("bode", "closed", "tests/bode.rs"),
+    ("bode", "open", "tests/bode.rs"),
+    ("bode", "which", "tests/bode.rs"),
+    ("bode", "spring", "tests/bode.rs"),
+    ("bode", "frequencies", "tests/bode.rs"),
+    ("bode", "amplitude", "tests/bode.rs"),
+    ("bode", "settle", "tests/bode.rs"),
+    ("bode", "step", "tests/bode.rs"),
+    ("bode", "set", "tests/bode.rs"),
+    ("bode", "input", "tests/bode.rs"),
+    ("bode", "connect", "tests/bode.rs"),
+    ("bode", "auto_connect", "tests/bode.rs"),
+    ("bode", "me", "tests/bode.rs"),
+    ("bode", "rtol", "tests/bode.rs"),
+    ("bode", "jobs", "tests/bode.rs"),
+    ("bode", "csv", "tests/bode.rs"),
+    ("bode", "plot", "tests/bode.rs"),
+    ("bode", "html", "tests/bode.rs"),
     ("page", "package", "tests/page.rs"),
     ("page", "site", "tests/page.rs"),
     ("prove", "python", "tests/prove.rs"),
@@ -52,6 +73,7 @@ const ELSEWHERE: &[(&str, &str, &str)] = &[
 ];
 
 const COMMANDS: &[Options] = &[
+    Options { command: "bode", values: &[], modes: &[] },
     Options {
         command: "build",
         values: &[

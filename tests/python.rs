@@ -23,7 +23,8 @@ fn installed() -> PathBuf {
     pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation"]);
     // maturin is in the environment; it builds in this workspace's target folder.
     pip.arg("--target").arg(&folder).arg(package()).env("PATH", path.expect("a search path"));
-    pip.env("FMURUN_ARCHIVES", common::archives());
+    // In the profile of the tests: the crates below are compiled already.
+    pip.env("FMURUN_ARCHIVES", common::archives()).env("MATURIN_PEP517_ARGS", "--profile dev");
     run(&mut pip, "package fmurun").unwrap_or_else(|why| panic!("{why}"));
     folder
 }
@@ -72,6 +73,7 @@ fn the_package() {
         "exchange",
         "arrays",
         "linearize",
+        "frequency",
         "drives",
         "plot",
         "fmpy",

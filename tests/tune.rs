@@ -220,7 +220,11 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     );
     refused("observer = 300.0", "observer = 100.0", &["bandwidth"]);
     refused("speed = 314.159265", "speed = 3141.59", &["rating.speed", "u_dc"]);
-    refused("[bandwidth]", "[control]\nestimator = \"Luenberger\"\n[bandwidth]", &["Luenberger", "choose Rasmussen"]);
+    refused(
+        "[bandwidth]",
+        "[control]\nestimator = \"Luenberger\"\n[bandwidth]",
+        &["Luenberger", "choose one of Rasmussen, DirectEmf"],
+    );
     refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
 }
 

@@ -4,6 +4,7 @@
 - `Plan`: a system of FMUs for many runs on all processors, and on clusters by `fmurun.dask.sweep`.
 - `identify`: a machine's data from a record of its running drive.
 - `linearize`: matrices A, B, C and D of an FMU for Model Exchange.
+- `frequency_response`: gain and phase of running FMUs, sampled controllers included, with the margins of loops.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
 - `plot`: a result, with matplotlib; notebooks show results by themselves.
 - `fmurun.drives`: the drives of this wheel, and start values for machines.
@@ -15,10 +16,12 @@ Every error of an FMU is an `FmuError`.
 from . import drives
 from ._batch import Batch
 from ._error import FmuError
+from ._frequency import FrequencyResponse, frequency_response
 from ._identify import identify
 from ._linearize import Linearization, linearize
 from ._plan import Plan
 from ._plot import plot
 from ._simulate import simulate_fmu
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "identify", "linearize", "plot", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "FrequencyResponse", "Linearization", "Plan", "drives", "frequency_response", "identify", "linearize",
+           "plot", "simulate_fmu"]  # fmt: skip

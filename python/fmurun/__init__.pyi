@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import drives as drives
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "Linearization", "Plan", "drives", "identify", "linearize", "plot", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "FrequencyResponse", "Linearization", "Plan", "drives", "frequency_response", "identify", "linearize", "plot", "simulate_fmu"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
@@ -113,6 +113,41 @@ class Linearization:
     y: NDArray[np.float64]
     dx: NDArray[np.float64]
     method: str
+    left_out: list[str]
+
+class FrequencyResponse:
+    frequency: NDArray[np.float64]
+    value: NDArray[np.complex128]
+    amplitude: NDArray[np.float64]
+    nonlinear: NDArray[np.float64]
+    unsettled: NDArray[np.float64]
+    stepped: NDArray[np.float64]
+    doubts: list[str]
+    @property
+    def decibels(self) -> NDArray[np.float64]: ...
+    @property
+    def phase(self) -> NDArray[np.float64]: ...
+    def band(self) -> dict[str, float | None]: ...
+    def open_loop(self) -> FrequencyResponse: ...
+    def margins(self) -> dict[str, float | None]: ...
+
+def frequency_response(
+    fmus: _Path | Mapping[str, _Path] | Sequence[_Path],
+    input: str,
+    output: str,
+    *,
+    over: str | None = None,
+    frequencies: ArrayLike | None = None,
+    amplitude: float | None = None,
+    settle_time: float | None = None,
+    step_size: float | None = None,
+    start_values: Mapping[str, _Value] | None = None,
+    inputs: Mapping[str, float | str | Sequence[tuple[float, float]]] | None = None,
+    connections: Literal["by_name"] | Sequence[tuple[str, str]] = "by_name",
+    fmi_type: _Interface | Mapping[str, _Interface] | None = None,
+    relative_tolerance: float | None = None,
+    threads: int | None = None,
+) -> FrequencyResponse: ...
 
 def identify(
     frame: Any,

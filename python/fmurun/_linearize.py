@@ -1,5 +1,6 @@
 """Linear models of FMUs for Model Exchange."""
 
+import warnings
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +23,7 @@ class Linearization:
         x, u, y: states, inputs and outputs at the point
         dx: derivatives of the states there
         method: "derivatives" of the FMU, or "differences"
+        left_out: a sentence for each part of the FMU that is not in the matrices: what it does at events, such as a sampled controller
     """
 
     A: np.ndarray
@@ -36,10 +38,14 @@ class Linearization:
     y: np.ndarray = field(repr=False)
     dx: np.ndarray = field(repr=False)
     method: str = "derivatives"
+    left_out: list = field(default_factory=list, repr=False)
 
 
 def linearize(fmu, point=None, *, time=0.0, inputs=None, outputs=None, method=None):
-    """The linear model of an FMU for Model Exchange at a point.
+    """The linear model of an FMU for Model Exchange at a point: of its continuous states, between its events.
+
+    Discrete states, such as those of a sampled controller, hold: they are not in the model, and a warning says so. Of such an FMU
+    `frequency_response` measures the closed loop.
 
     Args:
         fmu: an .fmu file
@@ -89,12 +95,26 @@ def linearize(fmu, point=None, *, time=0.0, inputs=None, outputs=None, method=No
         instance._enter()
         _apply(instance, during)
         instance.exitInitializationMode()
-        while instance._update()[0]:
-            pass
+        again = True
+        while again:
+            again, *_, sampled, next_time = instance._update()
         instance._enter_continuous()
-        return _at(instance, states, rates, at, chosen["inputs"], chosen["outputs"], method)
+        linear = _at(instance, states, rates, at, chosen["inputs"], chosen["outputs"], method)
     finally:
         instance.freeInstance()
+    held = [v.name for v in description.modelVariables if v.causality == "output" and v.variability == "discrete" and v.type in _FLOATS]
+    if sampled:
+        linear.left_out.append(f"its time events, the next at {next_time:.6g} s: what it samples and computes there holds")
+    if held:
+        names = ", ".join(held[:5]) + (", ..." if held[5:] else "")
+        linear.left_out.append(f"its {len(held)} discrete outputs, which hold between events: {names}")
+    if not states and linear.left_out:
+        linear.left_out.append("it has no continuous state: the matrices are empty or a direct gain")
+    if linear.left_out:
+        left_out = "; ".join(linear.left_out)
+        text = f"{description.modelName}: the linear model leaves out {left_out}"
+        warnings.warn(f"{text}. frequency_response measures the running FMU", stacklevel=2)
+    return linear
 
 
 def _at(instance, states, rates, at, inputs, outputs, method):

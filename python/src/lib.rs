@@ -10,6 +10,7 @@ mod course;
 mod describe;
 mod error;
 mod exchange;
+mod frequency;
 mod identify;
 mod input;
 mod instance;
@@ -32,6 +33,8 @@ mod _core {
     use super::cache::{Fmu, open};
     #[pymodule_export]
     use super::error::panic;
+    #[pymodule_export]
+    use super::frequency::{frequency_response, loop_properties, phases};
     #[pymodule_export]
     use super::identify::identify;
     #[pymodule_export]

@@ -212,6 +212,11 @@ impl Plan {
 }
 
 impl Plan {
+    /// The system with its measures.
+    pub(crate) fn plan(&self) -> &fmu_sweep::Plan {
+        &self.plan
+    }
+
     fn sweep(&self) -> PyResult<&Sweep> {
         let none =
             || plain("the plan has no design: Plan.from_toml reads a file that has one; or give rows as a table");
@@ -268,13 +273,13 @@ fn integers<'py>(py: Python<'py>, numbers: &[Number]) -> PyResult<Bound<'py, PyA
 }
 
 /// Called with the number of rows done; returns whether to continue.
-type GoOn<'a> = dyn Fn(u64) -> ControlFlow<()> + Sync + 'a;
+pub(crate) type GoOn<'a> = dyn Fn(u64) -> ControlFlow<()> + Sync + 'a;
 
 /// Runs on other threads, while this one checks Python's signals: Ctrl-C ends the run.
-fn attended(
-    run: impl Fn(&GoOn<'_>) -> Result<RunResults, fmu_sweep::Error> + Sync,
+pub(crate) fn attended<T: Send>(
+    run: impl Fn(&GoOn<'_>) -> Result<T, fmu_sweep::Error> + Sync,
     progress: Option<&Py<PyAny>>,
-) -> PyResult<RunResults> {
+) -> PyResult<T> {
     let stop = AtomicBool::new(false);
     let done_rows = AtomicU64::new(0);
     let tell = |py: Python<'_>| match progress {

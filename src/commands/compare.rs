@@ -1,25 +1,36 @@
-//! `fmu compare`: every estimator through every scenario.
+//! `fmu compare`: every estimator through every scenario, on the machines of the review or on the user's.
 
 use super::bar_of_cells;
 use anyhow::{Result, anyhow};
 use clap::Args;
+use drive::estimator::Kind;
 use drive_study::compare::candidate::Entry;
-use drive_study::compare::scenario::{self, Effort, SCENARIOS};
+use drive_study::compare::scenario::{self, Effort, SCENARIOS, Scenario};
+use drive_study::compare::trials::TRIALS;
 use drive_study::compare::{self, Run, Selection, table};
+use drive_tools::tune::motor::{MotorFile, estimators};
 use fmu_pack::workspace::output_folder;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Runs every estimator through start-up, load steps, wrong parameters and more, and compares the figures.
 ///
 /// Runs natively on all cores. Writes compare.html, compare.md, compare.txt, compare.csv and plots to `compare` in Cargo's
 /// target folder. Exits with status 1 if a figure is outside its tolerance.
 ///
+/// With MOTOR.toml, the estimators run on that machine, each with the values of `fmu tune`: start, load step, reversal, top speed,
+/// the lowest speed under rated load with wrong parameters, dead time, noise and offset, and the cost of an injection. A method that
+/// the machine does not suit is listed with the reason.
+///
 ///   fmu compare --out target/compare
+///   fmu compare motors/servo-750w.toml --only Rasmussen,ExtendedEmf
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Compare {
+    /// Motor file, as for `fmu tune` [default: the machines of the review]
+    #[arg(value_name = "MOTOR.toml")]
+    pub motor: Option<PathBuf>,
     /// Run only these estimators
-    #[arg(long, value_name = "ESTIMATOR,...", value_delimiter = ',')]
+    #[arg(long, visible_alias = "estimator", value_name = "ESTIMATOR,...", value_delimiter = ',')]
     pub only: Vec<String>,
     /// Run only these scenarios
     #[arg(long, value_name = "SCENARIO,...", value_delimiter = ',')]
@@ -32,6 +43,34 @@ pub struct Compare {
     pub out: Option<PathBuf>,
 }
 
+/// The comparison on the user's machine.
+fn on_machine(args: &Compare, path: &Path) -> Result<bool> {
+    let motor = MotorFile::read(path)?;
+    let kind = |name: &String| {
+        let known = Kind::ALL.iter().copied().find(|kind| kind.name().eq_ignore_ascii_case(name));
+        known.ok_or_else(|| anyhow!("--only {name}: unknown estimator; available: {}", estimators()))
+    };
+    let kinds: Vec<Kind> = args.only.iter().map(kind).collect::<Result<_>>()?;
+    let kinds = if kinds.is_empty() { Kind::ALL.to_vec() } else { kinds };
+    let trial = |id: &String| {
+        let known = || names(TRIALS.iter().map(|s| s.id));
+        let found = TRIALS.iter().find(|s| s.id == id);
+        found.ok_or_else(|| anyhow!("--scenario {id}: unknown scenario on a machine; available: {}", known()))
+    };
+    let trials: Vec<&Scenario> = args.scenario.iter().map(trial).collect::<Result<_>>()?;
+    let trials = if trials.is_empty() { TRIALS.iter().collect() } else { trials };
+    let out = args.out.clone().map_or_else(|| output_folder("compare"), Ok)?;
+
+    let bar = bar_of_cells(kinds.len() * trials.len());
+    let compared = compare::on_machine(&motor, &kinds, &trials, Effort::Full, || bar.inc(1))?;
+    bar.finish_and_clear();
+
+    compare::write_machine(&compared, &out)?;
+    println!("{}", compare::machine_text(&compared));
+    println!("{}", out.join("compare.html").display());
+    Ok(true)
+}
+
 /// Runs the command; returns whether every figure is within its tolerance.
 ///
 /// # Errors
@@ -42,7 +81,14 @@ pub fn run(args: &Compare) -> Result<bool> {
         for s in SCENARIOS {
             println!("{:18}{}: {}", s.id, s.group, s.title);
         }
+        println!("with MOTOR.toml:");
+        for s in TRIALS {
+            println!("{:18}{}: {}", s.id, s.group, s.title);
+        }
         return Ok(true);
+    }
+    if let Some(path) = &args.motor {
+        return on_machine(args, path);
     }
     let selection = selection(args)?;
     let out = args.out.clone().map_or_else(|| output_folder("compare"), Ok)?;

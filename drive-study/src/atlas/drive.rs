@@ -39,7 +39,7 @@ impl Drive {
         }
         Self {
             name: entry.name.into(),
-            machine: entry.machine().into(),
+            machine: entry.machine.into(),
             bench,
             approach: if rest { Approach::Rest } else { Approach::Turning },
         }

@@ -24,18 +24,25 @@ pub struct Entry {
     pub kind: Kind,
     /// Name of the estimator or variant.
     pub name: &'static str,
+    /// The machine it runs on, which also sets 1 pu of torque; empty on the user's machine.
+    pub machine: &'static str,
     set: fn(&mut ControllerParameters),
 }
+
+/// The machine of most.
+const IPMSM: &str = "2.2 kW machine, 14 N.m";
 
 const VARIANTS: &[Entry] = &[
     Entry {
         kind: Kind::PulsatingInjection,
         name: "PulsatingInjection-45deg",
+        machine: IPMSM,
         set: |p| p.estimators.pulsating.demodulation = Demodulation::MeasurementAxes,
     },
     Entry {
         kind: Kind::SquareWaveInjection,
         name: "SquareWaveInjection-4",
+        machine: IPMSM,
         set: |p| {
             p.estimators.square_wave.samples = 4;
             p.speed_loop.bandwidth = TAU * 8.0;
@@ -44,35 +51,35 @@ const VARIANTS: &[Entry] = &[
     Entry {
         kind: Kind::FluxObserver,
         name: "FluxObserver-adapting",
+        machine: IPMSM,
         set: |p| (p.estimators.adaptation.resistance, p.estimators.flux_observer.magnet) = (true, 5.0),
     },
     Entry {
         kind: Kind::GradientObserver,
         name: "GradientObserver-clamped",
+        machine: IPMSM,
         set: |p| p.estimators.gradient.clamped = true,
     },
 ];
 
 impl Entry {
-    /// The machine it runs on, which also sets 1 pu of torque.
-    pub fn machine(&self) -> &'static str {
-        match self.kind {
-            Kind::Rasmussen => "reference motor, 2 N.m",
-            _ => "2.2 kW machine, 14 N.m",
-        }
-    }
-
     /// Its name in a table, with the machine if the others have a different one.
     pub fn label(&self) -> String {
-        match self.kind {
-            Kind::Rasmussen => format!("{} ({})", self.name, self.machine()),
-            _ => self.name.into(),
+        match self.machine {
+            "" | IPMSM => self.name.into(),
+            machine => format!("{} ({machine})", self.name),
         }
     }
 
     /// The row of an estimator.
     pub fn of(kind: Kind) -> Self {
-        Self { kind, name: kind.name(), set: |_| () }
+        let machine = if kind == Kind::Rasmussen { "reference motor, 2 N.m" } else { IPMSM };
+        Self { kind, name: kind.name(), machine, set: |_| () }
+    }
+
+    /// The row of an estimator on the user's machine.
+    pub fn on_machine(kind: Kind) -> Self {
+        Self { machine: "", ..Self::of(kind) }
     }
 
     /// The estimator or variant of this name, in capitals or not.

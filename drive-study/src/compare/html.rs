@@ -1,6 +1,7 @@
 //! The comparison as one self-contained page.
 
 use super::candidate::Entry;
+use super::machine::OnMachine;
 use super::measure::Outcome;
 use super::plots::Plot;
 use super::run::Run;
@@ -8,6 +9,7 @@ use super::table;
 use super::table::{Block, mark, number};
 use crate::ink;
 use drive_tools::error::Result;
+use drive_tools::tune::setting::Unsuited;
 use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;
 
@@ -35,6 +37,12 @@ pub fn page(cells: &[Run], plots: &[Plot]) -> Result<String> {
         let _ = writeln!(html, "<a href=\"#{}\">Plots</a>", plot.name);
     }
     html.push_str("</nav>\n");
+    Ok(page::page("Estimators of the rotor angle, compared", &(html + &body(&blocks, plots)?)))
+}
+
+/// Tables and plots.
+fn body(blocks: &[Block<'_>], plots: &[Plot]) -> Result<String> {
+    let mut html = String::new();
     for (k, block) in blocks.iter().enumerate() {
         let _ =
             write!(html, "<h2 id=\"table-{k}\">{}</h2>\n{}<ul class=\"notes\">\n", escape(block.title), grid(block));
@@ -49,7 +57,34 @@ pub fn page(cells: &[Run], plots: &[Plot]) -> Result<String> {
         let title = escape(&figure.title);
         let _ = write!(html, "<h2 id=\"{name}\">Plot {name} <small>{svg}</small></h2>\n<p>{title}</p>\n{drawn}");
     }
-    Ok(page::page("Estimators of the rotor angle, compared", &html))
+    Ok(html)
+}
+
+/// The page of one machine.
+///
+/// # Errors
+/// Those of [`page::figure`].
+pub fn machine_page(compared: &OnMachine, plots: &[Plot]) -> Result<String> {
+    let mut html = format!(
+        "<p>{}</p>\n<p>{}</p>\n<p>Every number: <a href=\"compare.csv\">compare.csv</a>; the tables as text: <a \
+         href=\"compare.md\">compare.md</a>.</p>\n",
+        escape(&compared.machine),
+        escape(&table::starts(&compared.runs))
+    );
+    if !compared.refused.is_empty() {
+        html.push_str("<h2>Methods that the machine does not suit</h2>\n<ul class=\"notes\">\n");
+        for Unsuited { estimator, reason } in &compared.refused {
+            let _ = writeln!(html, "<li>{}: {}</li>", estimator.name(), escape(reason));
+        }
+        html.push_str("</ul>\n");
+    }
+    html += &body(&table::blocks(&compared.runs), plots)?;
+    html.push_str("<h2>Processor time of a sample</h2>\n<ul class=\"notes\">\n");
+    for (kind, nanoseconds) in &compared.nanoseconds {
+        let _ = writeln!(html, "<li>{}: {nanoseconds:.0} ns on this machine</li>", kind.name());
+    }
+    html.push_str("</ul>\n");
+    Ok(page::page("Estimators compared on one machine", &html))
 }
 
 /// A table with a column for each quantity of each scenario.

@@ -5,11 +5,13 @@
 //!   [`scenario`]: the test it runs through;
 //! - [`running`]: the courses of a running drive; [`measure`]: the numbers measured in a run; [`figures`]: the figures that the review's
 //!   list expects;
+//! - [`on_machine`]: the same question on the user's machine, with tuned values; [`trials`]: its scenarios;
 //! - [`table`], [`html`], [`plots`]: the output for an engineer.
 
 pub mod candidate;
 pub mod figures;
 pub mod html;
+pub mod machine;
 pub mod measure;
 mod parameters;
 pub mod plots;
@@ -18,13 +20,16 @@ pub mod running;
 pub mod scenario;
 mod signal;
 pub mod table;
+pub mod trials;
 mod weakening;
 
 use crate::output::Folder;
 use drive_tools::error::Result;
+use drive_tools::tune::setting::Unsuited;
 use plots::Plot;
 use std::path::Path;
 
+pub use machine::{OnMachine, on_machine};
 pub use measure::Outcome;
 pub use run::{Run, Selection, run};
 
@@ -33,13 +38,45 @@ pub use run::{Run, Selection, run};
 /// # Errors
 /// A file cannot be written.
 pub fn write(cells: &[Run], out: &Path) -> Result<()> {
-    let out = Folder::create(out)?;
     let plots = plots::all(cells);
-    for Plot { name, figure } in &plots {
+    let texts = [table::csv(cells), table::text(cells), table::markdown(cells), html::page(cells, &plots)?];
+    files(&texts, &plots, out)
+}
+
+/// Writes table, CSV, plots and page of a machine to `out`.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn write_machine(compared: &OnMachine, out: &Path) -> Result<()> {
+    let (cells, plots) = (&compared.runs, plots::all(&compared.runs));
+    let reasons = |each: fn(&Unsuited) -> String| compared.refused.iter().map(each).collect::<String>();
+    let csv = table::csv(cells)
+        + &reasons(|u| format!("{},,,,,,\"refused: {}\",\n", u.estimator.name(), u.reason.replace('"', "'")));
+    let refused = reasons(|u| format!("- {}: {}\n", u.estimator.name(), u.reason));
+    let heading = if refused.is_empty() { "" } else { "Methods that the machine does not suit:" };
+    let words = [&compared.machine, &table::starts(cells), heading, &refused];
+    let texts = [
+        csv,
+        machine_text(compared),
+        table::markdown_under("Estimators compared on one machine", &words, cells),
+        html::machine_page(compared, &plots)?,
+    ];
+    files(&texts, &plots, out)
+}
+
+/// The tables of a machine in plain text, and the methods that it does not suit.
+pub fn machine_text(compared: &OnMachine) -> String {
+    let refused = |u: &Unsuited| format!("does not suit {}: {}\n", u.estimator.name(), u.reason);
+    table::tables(&compared.runs)
+        + &table::refusals(&compared.runs)
+        + &compared.refused.iter().map(refused).collect::<String>()
+}
+
+fn files(texts: &[String; 4], plots: &[Plot], out: &Path) -> Result<()> {
+    let out = Folder::create(out)?;
+    for Plot { name, figure } in plots {
         out.write(&format!("{name}.svg"), &fmu_plot::svg::draw(figure)?)?;
     }
-    out.write("compare.csv", &table::csv(cells))?;
-    out.write("compare.txt", &table::text(cells))?;
-    out.write("compare.md", &table::markdown(cells))?;
-    out.write("compare.html", &html::page(cells, &plots)?)
+    let names = ["compare.csv", "compare.txt", "compare.md", "compare.html"];
+    names.iter().zip(texts).try_for_each(|(name, text)| out.write(name, text))
 }

@@ -19,7 +19,7 @@ pub struct Plot {
 /// All plots of the runs.
 pub fn all(cells: &[Run]) -> Vec<Plot> {
     let mut plots = Vec::new();
-    for id in ["ramp", "reversal", "load-0", "load-0.1", "load-0.5", "load-1", "weakening"] {
+    for id in ["ramp", "reversal", "load", "load-0", "load-0.1", "load-0.5", "load-1", "weakening"] {
         let with_trace: Vec<&Run> = cells.iter().filter(|c| c.scenario.id == id && c.trace().is_some()).collect();
         if !with_trace.is_empty() {
             plots.push(together(id, &with_trace));

@@ -3,7 +3,7 @@
 use super::candidate::{Candidate, Entry};
 use super::figures;
 use super::measure::{Effort, Measure, Outcome, Trace};
-use super::scenario::{SCENARIOS, Scenario};
+use super::scenario::{SCENARIOS, Scenario, ScenarioRun};
 use drive_tools::queue;
 
 /// One estimator in one scenario, with the result.
@@ -68,11 +68,9 @@ pub fn run(selection: &Selection, done: impl Fn() + Sync) -> Vec<Run> {
     let Selection { entries, scenarios, effort } = selection;
     let jobs: Vec<_> = entries.iter().flat_map(|&entry| scenarios.iter().map(move |&s| (entry, s))).collect();
     queue::map(&jobs, |&(entry, scenario)| {
-        let candidate = Candidate::new(entry);
-        let mut outcome = match (scenario.run)(&candidate, *effort) {
-            Ok(outcome) => outcome,
-            Err(fault) => Outcome::Refused(fault.message().into()),
-        };
+        let ScenarioRun::Review(run) = scenario.run else { unreachable!("a scenario of one machine") };
+        let ran = run(&Candidate::new(entry), *effort);
+        let mut outcome = ran.unwrap_or_else(|fault| Outcome::Refused(fault.message().into()));
         if let Outcome::Measured(measures, _) = &mut outcome {
             for m in measures {
                 m.expected = figures::of(entry.name, scenario.id, m.name);

@@ -3,6 +3,7 @@
 use super::candidate::Candidate;
 use super::measure::Outcome;
 use super::{parameters, running, signal, weakening};
+use drive_tools::tune::setting::Tuned;
 use fmu_core::Fault;
 
 pub use super::measure::Effort;
@@ -17,7 +18,16 @@ pub struct Scenario {
     /// What happens, in one sentence.
     pub title: &'static str,
     /// Runs it.
-    pub run: fn(&Candidate, Effort) -> Result<Outcome, Fault>,
+    pub run: ScenarioRun,
+}
+
+/// What a scenario runs.
+#[derive(Clone, Copy, Debug)]
+pub enum ScenarioRun {
+    /// An estimator with the gains of the review's figures.
+    Review(fn(&Candidate, Effort) -> Result<Outcome, Fault>),
+    /// An estimator tuned for the user's machine.
+    Machine(fn(&Tuned, Effort) -> Result<Outcome, Fault>),
 }
 
 const START: &str = "Start, ramp, reversal";
@@ -37,7 +47,7 @@ const fn row(
     title: &'static str,
     run: fn(&Candidate, Effort) -> Result<Outcome, Fault>,
 ) -> Scenario {
-    Scenario { id, group, title, run }
+    Scenario { id, group, title, run: ScenarioRun::Review(run) }
 }
 
 /// All scenarios, in the order of the tables.

@@ -126,6 +126,11 @@ fn block<'a>(group: &'static str, cells: &'a [Run]) -> Block<'a> {
 
 /// The tables in plain text, with a list of the numbers outside their tolerances.
 pub fn text(cells: &[Run]) -> String {
+    tables(cells) + &verdict(cells)
+}
+
+/// The tables in plain text.
+pub fn tables(cells: &[Run]) -> String {
     let mut text = String::new();
     for block in blocks(cells) {
         let heads = block.headings.iter().map(|h| h.0.into());
@@ -138,7 +143,6 @@ pub fn text(cells: &[Run]) -> String {
         }
         text.push('\n');
     }
-    let _ = write!(text, "{}", verdict(cells));
     text
 }
 
@@ -159,6 +163,12 @@ pub fn verdict(cells: &[Run]) -> String {
             m.unit
         );
     }
+    text + &refusals(cells)
+}
+
+/// The runs that could not be started, with the reason.
+pub fn refusals(cells: &[Run]) -> String {
+    let mut text = String::new();
     for cell in cells {
         if let Outcome::Refused(message) = &cell.outcome {
             let _ = writeln!(text, "REFUSED: {}, {}: {message}", cell.entry.name, cell.scenario.id);
@@ -169,7 +179,7 @@ pub fn verdict(cells: &[Run]) -> String {
 
 /// The machine of each estimator, in one sentence each.
 pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3.6 ohm, L_d 36 mH, L_q 51 mH, psi 0.545 Wb, \
-     1 pu = 1500 rpm and 14 N.m), 10 kHz, 10 mA of current noise, 12 bit; Rasmussen, which is for machines without saliency, \
+     1 pu = 1500 rpm and 14 N.m), 10 kHz, 10 mA of current noise, 12 bit, I-f starts to 0.15 pu; Rasmussen, which is for machines without saliency, \
      on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
      Angle errors are theta - theta^: positive where the rotor is ahead of the estimate.";
 
@@ -179,7 +189,7 @@ pub fn starts(cells: &[Run]) -> String {
     for cell in cells {
         let way = match cell.entry.kind.class() {
             Class::FluxObserver => "by itself, from any angle",
-            Class::BackEmf => "I-f start to 0.15 pu",
+            Class::BackEmf => "I-f start",
             Class::Injection | Class::Hybrid => "initial position by injection, polarity by voltage pulses",
             Class::Sensored => "by its sensor",
         };
@@ -196,8 +206,14 @@ pub fn starts(cells: &[Run]) -> String {
 
 /// The tables in Markdown.
 pub fn markdown(cells: &[Run]) -> String {
-    let mut text = format!("# Estimators compared\n\n{MACHINES}\n\n{}\n\n", starts(cells));
-    text.push_str("✓: inside the tolerance of its expected figure; ✗: outside; no mark: no expected figure.\n\n");
+    let marks = "✓: inside the tolerance of its expected figure; ✗: outside; no mark: no expected figure.";
+    let words = [MACHINES, &starts(cells), marks];
+    format!("{}## Verdict\n\n{}\n", markdown_under("Estimators compared", &words, cells), verdict(cells))
+}
+
+/// The tables in Markdown, under a title and some paragraphs.
+pub fn markdown_under(title: &str, words: &[&str], cells: &[Run]) -> String {
+    let mut text = format!("# {title}\n\n{}\n\n", words.join("\n\n"));
     for block in blocks(cells) {
         let _ = writeln!(text, "## {}\n", block.title);
         let heading = |(id, measures): &(&str, &[Measure])| match measures {
@@ -214,7 +230,6 @@ pub fn markdown(cells: &[Run]) -> String {
         });
         text.push('\n');
     }
-    let _ = writeln!(text, "## Verdict\n\n{}", verdict(cells));
     text
 }
 
@@ -222,7 +237,7 @@ pub fn markdown(cells: &[Run]) -> String {
 pub fn csv(cells: &[Run]) -> String {
     let mut text = String::from("estimator,scenario,measure,unit,value,expected,verdict,machine\n");
     for cell in cells {
-        let (name, id, machine) = (cell.entry.name, cell.scenario.id, cell.entry.machine());
+        let (name, id, machine) = (cell.entry.name, cell.scenario.id, cell.entry.machine);
         match &cell.outcome {
             Outcome::NotApplicable(why) => {
                 let _ = writeln!(text, "{name},{id},,,,,\"not applicable: {why}\",\"{machine}\"");

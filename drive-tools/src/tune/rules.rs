@@ -101,6 +101,10 @@ fn suits(
     }
     controller.extend(method::settings(motor, estimator, bandwidths, &mut notes)?);
     let class = estimator.class();
+    if class != Class::FluxObserver {
+        controller.push(real("zero_speed.i_0", 0.0, "not used"));
+        controller.push(set("adaptation.resistance", Value::Boolean(false), "this estimator does not adapt it"));
+    }
     let Voltage { settings, top_torque } =
         voltage::of(motor, estimator != Kind::Rasmussen, method::voltage_share(estimator), &mut notes)?;
     if class != Class::Injection && !settings.is_empty() {

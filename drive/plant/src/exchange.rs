@@ -169,7 +169,7 @@ impl PmsmPlant {
 
     /// Whether the gates are off and the diodes block the current of the flux linkage.
     pub(super) fn blocks(&self, inputs: &PlantInputs) -> bool {
-        inputs.is_off() && self.diodes(inputs).0
+        inputs.is_off() && !self.parameters.is_switched() && self.diodes(inputs).0
     }
 
     /// Whether diodes block the current of the flux linkage, and by how much the limits are exceeded.

@@ -2,12 +2,14 @@
 //!
 //! While both switches are off, the current direction selects the diode: averaged over a PWM period, the leg voltage
 //! has an error of -u_dead sign(i) with u_dead = dead_time u_dc / T_pwm. Below i_zero, the current crosses zero within
-//! the dead time (ripple, switch capacitances) and the error falls linearly: -u_dead i / i_zero.
+//! the dead time (ripple, switch capacitances) and the error falls linearly: -u_dead i / i_zero. With i_zero = 0 the
+//! zone follows from the ripple ([`legs`](crate::legs)).
 //!
 //! [`modulation`](drive_base::modulation) computes the voltages. This is the usual mean-value model of the dead time;
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};
+use crate::pwm::Pwm;
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -19,15 +21,17 @@ pub struct Inverter {
     pub dead_time: f64,
     /// PWM period in s, > 0.
     pub T_pwm: f64,
-    /// Current in A below which the error falls linearly, > 0.
+    /// Current in A below which the error falls linearly; 0: by the ripple of the current.
     pub i_zero: f64,
     /// Losses of transistors and diodes.
     pub devices: Devices,
+    /// The modulator of the switched inverter.
+    pub pwm: Pwm,
 }
 
 impl Default for Inverter {
     fn default() -> Self {
-        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1, devices: Devices::default() }
+        Self { dead_time: 0.0, T_pwm: 1e-4, i_zero: 0.1, devices: Devices::default(), pwm: Pwm::default() }
     }
 }
 
@@ -59,10 +63,13 @@ pub const INVERTER: &Table<Inverter> = table![
     })
     .at_least(0.0),
     P::parameter("T_pwm", &SECOND, "PWM period", |p| &mut p.T_pwm).above(0.0),
-    P::parameter("i_zero", &AMPERE, "Current below which the dead-time voltage falls linearly to zero", |p| {
-        &mut p.i_zero
-    })
-    .above(0.0),
+    P::parameter(
+        "i_zero",
+        &AMPERE,
+        "Current below which the dead-time voltage falls linearly to zero; 0: by the ripple",
+        |p| { &mut p.i_zero }
+    )
+    .at_least(0.0),
     P::part("", &Part { table: DEVICES, lens: |p| &mut p.devices }),
 ];
 

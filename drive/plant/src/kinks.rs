@@ -177,7 +177,7 @@ impl PmsmPlant {
             let path = Path { u, dissipation, drops: *switches };
             let circuit = Circuit { machine, path, shaft };
             if damped {
-                let small = DIFFERENCE * parameters.inverter.i_zero * self.warm.least_inductance;
+                let small = DIFFERENCE * switches.legs.i_zone() * self.warm.least_inductance;
                 self.integrate_damped(start, h, &circuit, small)
             } else {
                 self.integrate(start, h, &circuit)

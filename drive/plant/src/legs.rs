@@ -8,11 +8,25 @@
 //! stay zero. The energy of the remaining current, 0.75 L i_zone^2, is lost at once. i_zone is `inverter.i_zero`, or
 //! larger if the machine would leave that zone faster than the minimum substep resolves.
 //!
+//! Dead time with `inverter.i_zero` = 0: the zone follows from the ripple. A leg switches on at a current `i - r` and off at
+//! `i + r`, if i is its mean over the period; a current that changes its sign in between loses nothing, because at both instants
+//! the diode has the voltage that the switch then takes over. At each of the two instants the loss grows linearly over
+//! `W = 2 u_dc dead_time / (3 L)`: the currents that reach zero and are blocked within the dead time.
+//!
+//! ```text
+//! loss / (share u_dc) = c((i - on) / W) - c((off - i) / W), c(x) = x limited to 0..1, on = r - (1 - b) W, off = b W - r
+//! r = u_dc T_pwm / (2 L) (sum of max(d_y - d, 0) / 3 + (d - mean) (1 - d))          b = n / 2 + 3/2 (d - mean), 0..1
+//! ```
+//!
+//! d are the duty cycles with the min-max zero sequence, b u_dc is the voltage of a blocked leg, and n counts the other legs that
+//! are on when it switches; legs that switch within a dead time of each other count in part. L is the mean of both axes.
+//!
 //! Derived here from the ideal diode bridge; `drive-study/tests/gates_off.rs` compares it with such a bridge in stator axes.
 //! u in V, i in A.
 
 use crate::inverter::Inverter;
 use drive_base::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Stator, Vector};
+use drive_base::math::abs;
 use drive_base::modulation::{clamp_unit, dead_time_loss};
 use drive_base::motor::Motor;
 use fmu_core::Scalar;
@@ -31,6 +45,31 @@ pub struct Legs<S = f64> {
     i_zone: S,
     /// Threshold voltage of the diode in V, which the back EMF must exceed in addition to the link.
     u_diode: f64,
+    /// Instead of a linear zone.
+    ripple: Option<Ripple<S>>,
+}
+
+/// Zone of the dead time by the ripple, of each leg.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Ripple<S> {
+    /// Currents in A at which the loss of switching on begins, and at which that of switching off ends.
+    on: Phases<S>,
+    off: Phases<S>,
+    /// Current in A over which they grow.
+    width: S,
+}
+
+/// Zone in A without ripple, where `inverter.i_zero` = 0 gives none.
+const PLAIN_ZONE: f64 = 0.1;
+
+/// The zone (A) of legs that do not switch.
+fn plain(inverter: &Inverter) -> f64 {
+    if inverter.i_zero > 0.0 { inverter.i_zero } else { PLAIN_ZONE }
+}
+
+/// `x`, limited to 0..1.
+fn share<S: Scalar>(x: S) -> S {
+    x.chain(x.value().clamp(0.0, 1.0), f64::from(u8::from((0.0..=1.0).contains(&x.value()))))
 }
 
 impl<S: Scalar> Legs<S> {
@@ -38,20 +77,62 @@ impl<S: Scalar> Legs<S> {
     #[inline]
     pub fn switching(inverter: &Inverter, u_dc: S) -> Self {
         let share = if inverter.dead_time > 0.0 { inverter.dead_time / inverter.T_pwm } else { 0.0 };
-        Self { share, u: u_dc * share, i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
+        let i_zone = plain(inverter).into();
+        Self { share, u: u_dc * share, i_zone, u_diode: inverter.devices.u_diode, ripple: None }
+    }
+
+    /// For switching legs with the references `u` (V) of a machine of the mean inductance 1/`by_L` (H), whose ripple determines the
+    /// zone.
+    #[inline(never)]
+    pub fn rippled(inverter: &Inverter, u: Phases<S>, u_dc: S, by_L: f64) -> Self {
+        let legs = Self::switching(inverter, u_dc);
+        let &Inverter { T_pwm, dead_time, .. } = inverter;
+        if u_dc.value() <= 0.0 {
+            return legs;
+        }
+        // Within the hexagon, without a common part: d - 1/2 = (u - middle) / u_dc.
+        let span = u.span();
+        let full = if span.value() > u_dc.value() { span } else { u_dc };
+        let all = [u.a, u.b, u.c].map(|u| u / full);
+        let extreme =
+            |sign: f64| all.into_iter().fold(all[0], |a, b| if sign * (b.value() - a.value()) > 0.0 { b } else { a });
+        let middle = (extreme(1.0) + extreme(-1.0)) * 0.5;
+        let d = all.map(|u| u - middle + 0.5.into());
+        let mean = (d[0] + d[1] + d[2]) * (1.0 / 3.0);
+        let (scale, width) = (u_dc * (0.5 * T_pwm * by_L), u_dc * (2.0 / 3.0 * dead_time * by_L));
+        let leg = |x: usize| {
+            let (mut before, mut n) = (S::from(0.0), S::from(0.0));
+            for y in (0..3).filter(|&y| y != x) {
+                let earlier = d[y] - d[x];
+                before += if earlier.value() > 0.0 { earlier } else { 0.0.into() };
+                n += share(earlier * (T_pwm / (4.0 * dead_time)) + 0.5.into());
+            }
+            let above = d[x] - mean;
+            let r = scale * (before * (1.0 / 3.0) + above * (S::from(1.0) - d[x]));
+            let b = share(n * 0.5 + above * 1.5);
+            (r - (S::from(1.0) - b) * width, b * width - r)
+        };
+        let legs_of = [leg(0), leg(1), leg(2)];
+        let [(a, a_off), (b, b_off), (c, c_off)] = legs_of;
+        let ripple = Ripple { on: Phases { a, b, c }, off: Phases { a: a_off, b: b_off, c: c_off }, width };
+        let edges = legs_of.into_iter().flat_map(|(on, off)| [on, on + width, off, off - width]);
+        let i_zone = edges.map(abs).fold(width, |most, edge| if edge.value() > most.value() { edge } else { most });
+        Self { i_zone, ripple: Some(ripple), ..legs }
     }
 
     /// For legs that short-circuit the machine: nothing switches, so dead time costs no voltage.
     #[inline]
     pub fn shorted(inverter: &Inverter) -> Self {
-        Self { share: 0.0, u: 0.0.into(), i_zone: inverter.i_zero.into(), u_diode: inverter.devices.u_diode }
+        let i_zone = plain(inverter).into();
+        Self { share: 0.0, u: 0.0.into(), i_zone, u_diode: inverter.devices.u_diode, ripple: None }
     }
 
     /// For legs with the gates off, with the smallest inductance (H) of the machine.
     pub fn off(inverter: &Inverter, least_inductance: f64, u_dc: S) -> Self {
         let narrowest = u_dc * SHORTEST_SUBSTEP / S::from(least_inductance);
-        let i_zone = if narrowest.value() > inverter.i_zero { narrowest } else { inverter.i_zero.into() };
-        Self { share: 0.5, u: u_dc * 0.5, i_zone, u_diode: inverter.devices.u_diode }
+        let zone = plain(inverter);
+        let i_zone = if narrowest.value() > zone { narrowest } else { zone.into() };
+        Self { share: 0.5, u: u_dc * 0.5, i_zone, u_diode: inverter.devices.u_diode, ripple: None }
     }
 
     /// Current in A below which the drop falls linearly.
@@ -69,7 +150,10 @@ impl<S: Scalar> Legs<S> {
     /// Voltage (V) lost at the stator with the current `i` (A).
     #[inline(never)]
     pub fn loss(&self, i: Vector<Stator, S>) -> Vector<Stator, S> {
-        dead_time_loss(self.u, self.i_zone, Phases::from_stator(i))
+        let i = Phases::from_stator(i);
+        let Some(Ripple { on, off, width }) = self.ripple else { return dead_time_loss(self.u, self.i_zone, i) };
+        let leg = |i: S, on: S, off: S| self.u * (share((i - on) / width) - share((off - i) / width));
+        Phases { a: leg(i.a, on.a, off.a), b: leg(i.b, on.b, off.b), c: leg(i.c, on.c, off.c) }.to_stator()
     }
 
     /// Current (A) that legs with the currents `i` (A) feed into the DC link through this voltage drop.
@@ -93,7 +177,8 @@ impl Legs {
     /// `threshold` (V) in their devices, act as resistances there. Infinite without a voltage.
     #[inline]
     pub fn time(&self, least_inductance: f64, threshold: f64) -> f64 {
-        self.i_zone * least_inductance / (self.u + threshold)
+        let zone = self.ripple.map_or(self.i_zone, |ripple| ripple.width);
+        zone * least_inductance / (self.u + threshold)
     }
 
     /// Line-to-line back EMF in V above which diodes conduct.

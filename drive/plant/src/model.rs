@@ -10,6 +10,7 @@ use crate::power::{Energy, Powers};
 use crate::rules;
 use crate::signals::{PlantInputs, PlantOutputs};
 use crate::state::{Accepted, Instant, State};
+use crate::switched::state::Bridge;
 use crate::tables::{FLUX, OUTPUTS, PARAMETERS, PlantParameters};
 use crate::thermal::warm::Warm;
 use crate::thermal::{THERMAL_INPUTS, Temperatures, ThermalMode};
@@ -48,6 +49,8 @@ pub struct PmsmPlant {
     pub(super) warm: Warm,
     /// Current (A) at the terminals minus that of the flux linkage, at the end of a step.
     pub(super) by_iron: Dq,
+    /// Carrier and legs of the switched inverter.
+    pub(super) bridge: Bridge,
 }
 
 impl PmsmPlant {
@@ -56,6 +59,14 @@ impl PmsmPlant {
     pub(super) fn legs<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Legs<S> {
         let (inverter, u_dc) = (&self.parameters.inverter, inputs.u_dc);
         match inputs.gates() {
+            Gates::Switch if inverter.i_zero == 0.0 && inverter.dead_time > 0.0 => {
+                let by_L = if self.parameters.flux_map.used {
+                    1.0 / self.warm.least_inductance
+                } else {
+                    0.5 * (1.0 / self.parameters.motor.L_d + 1.0 / self.parameters.motor.L_q)
+                };
+                Legs::rippled(inverter, inputs.u, u_dc, by_L)
+            }
             Gates::Switch => Legs::switching(inverter, u_dc),
             Gates::Short => Legs::shorted(inverter),
             Gates::Off => Legs::off(inverter, self.warm.least_inductance, u_dc),
@@ -194,7 +205,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 13;
+    const STATE_VERSION: u16 = 14;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
@@ -222,6 +233,10 @@ impl Model for PmsmPlant {
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
+        if interface == Interface::ModelExchange && self.parameters.is_switched() {
+            let allowed = "1 (Average) in Model Exchange; use Co-Simulation";
+            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.inverter.pwm.mode, allowed));
+        }
         self.validate_network(interface)
     }
 
@@ -239,6 +254,7 @@ impl Model for PmsmPlant {
         self.state = State::new(motor, psi, speed, angle);
         (self.energy, self.point, self.kept) = (Energy::default(), Accepted::default(), Kept::default());
         self.blocked = self.blocks(&self.inputs);
+        self.bridge = Bridge::default();
         self.by_iron = self.current_by_iron();
         // No current yet: only the shaft has a power.
         let friction = mechanics.friction(speed);
@@ -260,9 +276,9 @@ impl Model for PmsmPlant {
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         if self.parameters.thermal.mode == ThermalMode::Constant {
-            self.advance_at_temperature(step.h)
+            self.advance_at_temperature(step)
         } else {
-            self.advance_with_temperatures(step.h)
+            self.advance_with_temperatures(step)
         }
     }
 }

@@ -13,7 +13,28 @@ use fmu_core::Fault;
 /// Names the parameter, its value, and what is allowed.
 pub fn validate(parameters: &PlantParameters) -> Result<(), Fault> {
     check_map(parameters)?;
+    check_switched(parameters)?;
     check_network(parameters)
+}
+
+/// Refuses what the switched inverter does not model.
+fn check_switched(par: &PlantParameters) -> Result<(), Fault> {
+    if !par.is_switched() {
+        return Ok(());
+    }
+    if 2.0 * par.inverter.pwm.pulse_min > par.inverter.T_pwm {
+        let allowed = format!("at most half of {}", PARAMETERS.tell(par, |p| &mut p.inverter.T_pwm));
+        return Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.pulse_min, allowed));
+    }
+    if !par.iron.is_none() {
+        let allowed = format!(
+            "1 (Average) with iron loss ({}, {}): under switched voltages, its conductance would also draw the PWM frequency",
+            PARAMETERS.tell(par, |p| &mut p.iron.G_e),
+            PARAMETERS.tell(par, |p| &mut p.iron.G_h)
+        );
+        return Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.mode, allowed));
+    }
+    Ok(())
 }
 
 /// Refuses a map that is in use but describes no machine: a limit of the grid with the wrong sign, saturation parameters besides

@@ -15,7 +15,7 @@ use crate::thermal::ThermalMode;
 use drive_base::frame::{AlphaBeta, Dq};
 use drive_base::integrate::rk4;
 use drive_base::math::all_finite;
-use fmu_core::Fault;
+use fmu_core::{Fault, Step};
 use nalgebra::SVector;
 
 /// Maximum number of substeps in one communication step: 1000 s of simulated time.
@@ -32,7 +32,7 @@ impl PmsmPlant {
     /// linkage, which cannot jump; the magnetic field then does work on the shaft.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
-    fn at_the_shaft(&self) -> (State, Passed) {
+    pub(super) fn at_the_shaft(&self) -> (State, Passed) {
         let mechanics = &self.parameters.mechanics;
         let PlantInputs { speed_shaft, angle_shaft, .. } = self.inputs;
         if !mechanics.imposed {
@@ -190,7 +190,11 @@ impl PmsmPlant {
 
     /// A communication step of `h` (s) with the gates off, with dead time or with losses.
     #[inline(never)]
-    fn advance_general(&mut self, h: f64) -> Result<(), Fault> {
+    fn advance_general(&mut self, step: &Step) -> Result<(), Fault> {
+        if self.parameters.is_switched() {
+            return self.advance_switched(step);
+        }
+        let h = step.h;
         let conducts = !self.inputs.is_off();
         let legs = self.legs(&self.inputs);
         let switches = self.switches(&self.inputs, legs);
@@ -226,10 +230,11 @@ impl PmsmPlant {
     /// A communication step of `h` (s) at constant temperatures.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
-    pub(super) fn advance_at_temperature(&mut self, h: f64) -> Result<(), Fault> {
+    pub(super) fn advance_at_temperature(&mut self, step: &Step) -> Result<(), Fault> {
         if !self.warm.ideal || self.inputs.is_off() {
-            return self.advance_general(h);
+            return self.advance_general(step);
         }
+        let h = step.h;
         let (state, passed) = self.pass_ideal(h)?;
         let legs = Legs::switching(&self.parameters.inverter, self.inputs.u_dc);
         self.conclude(h, state, &passed, false, &legs)
@@ -237,14 +242,14 @@ impl PmsmPlant {
 
     /// A communication step of `h` (s) with changing temperatures.
     #[inline(never)]
-    pub(super) fn advance_with_temperatures(&mut self, h: f64) -> Result<(), Fault> {
+    pub(super) fn advance_with_temperatures(&mut self, step: &Step) -> Result<(), Fault> {
         let mode = self.parameters.thermal.mode;
         if mode == ThermalMode::Imposed {
             self.impose()?;
         }
-        self.advance_at_temperature(h)?;
+        self.advance_at_temperature(step)?;
         if mode == ThermalMode::Network {
-            self.warm_up(h)?;
+            self.warm_up(step.h)?;
         }
         Ok(())
     }

@@ -7,6 +7,7 @@ use crate::losses::flow::{Dissipation, Winding};
 use crate::machine::Magnetics;
 use crate::mechanics::{MECHANICS, Mechanics};
 use crate::power::{ENERGY, POWERS};
+use crate::pwm::{InverterMode, PWM};
 use crate::saturation::{SATURATION, Saturation};
 use crate::signals::PlantOutputs;
 use crate::thermal::{THERMAL, Thermal};
@@ -58,7 +59,7 @@ impl PlantParameters {
         self.saturation.is_none() && !self.flux_map.used
     }
 
-    /// Whether the legs are ideal and the constant resistance of the winding is the only loss of the machine, which allows the
+    /// Whether the inverter is the average one, its legs are ideal and the constant resistance of the winding is the only loss of the machine, which allows the
     /// fastest step. Every parameter is named, so a new one does not compile until it is considered here.
     pub fn is_ideal(&self) -> bool {
         let Self {
@@ -72,9 +73,15 @@ impl PlantParameters {
             winding,
             thermal: _,
         } = self;
-        let Inverter { dead_time, T_pwm: _, i_zero: _, devices } = inverter;
+        let Inverter { dead_time, T_pwm: _, i_zero: _, devices, pwm } = inverter;
         let Winding { k_ac } = winding;
-        *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
+        pwm.mode == InverterMode::Average && *dead_time == 0.0 && devices.is_none() && iron.is_none() && *k_ac == 0.0
+    }
+
+    /// Whether the inverter is switched by its carrier.
+    #[inline]
+    pub fn is_switched(&self) -> bool {
+        self.inverter.pwm.mode == InverterMode::Switched
     }
 
     /// Resistance and conductance with the stator resistance `R_s` (Ohm) at standstill, at the electrical speed `w` (rad/s).
@@ -204,6 +211,7 @@ pub const PARAMETERS: &Table<PlantParameters> = table![
     )
     .nominal(1e-3),
     P::part("thermal.", &Part { table: THERMAL, lens: |p| &mut p.thermal }),
+    P::part("", &Part { table: PWM, lens: |p| &mut p.inverter.pwm }),
 ];
 
 type S = Row<Dq>;

@@ -34,6 +34,7 @@ use drive_control::signals::ControllerOutputs;
 use drive_control::tables as control;
 use drive_plant::PmsmPlant;
 use drive_plant::power::{Energy, Powers};
+use drive_plant::pwm::Pwm;
 use drive_plant::rules::check_temperatures;
 use drive_plant::tables as plant;
 use drive_plant::thermal::{Temperatures, ThermalMode};
@@ -190,6 +191,8 @@ impl PmsmDriveMean {
     fn plant(&self) -> PmsmPlant {
         let mut plant = PmsmPlant::default();
         plant.parameters.clone_from(&self.drive.plant);
+        // Means are those of the average inverter.
+        plant.parameters.inverter.pwm = Pwm::default();
         plant.inputs.thermal = self.inputs.thermal;
         plant
     }
@@ -242,7 +245,9 @@ impl Model for PmsmDriveMean {
             let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
             return !name.starts_with("limit.i_dc_") && EFFECTIVE.iter().any(listed);
         }
-        let elsewhere = ["plant.inverter.dead_time", "plant.inverter.i_zero"].contains(&parameter);
+        let elsewhere =
+            ["dead_time", "i_zero", "mode", "update", "zero_sequence", "pulse_min", "open_switch", "open_phase"];
+        let elsewhere = parameter.strip_prefix("plant.inverter.").is_some_and(|name| elsewhere.contains(&name));
         !elsewhere && !parameter.starts_with("dc_link.") && !parameter.starts_with("chopper.")
     }
 

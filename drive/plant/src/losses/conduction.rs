@@ -117,7 +117,7 @@ impl Affine {
 
 /// The matrix of resistances of the legs (Ohm) in stator axes: alpha alpha, alpha beta, beta beta.
 #[inline]
-fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
+pub(crate) fn symmetric(Phases { a, b, c }: Phases) -> [f64; 3] {
     [(4.0 * a + b + c) * (1.0 / 6.0), (c - b) * (0.5 / SQRT_3), 0.5 * (b + c)]
 }
 

@@ -105,7 +105,7 @@ impl<S> Drops<S> for Ideal {
 /// Legs whose voltage depends on the current: dead time or the diodes with the gates off, devices, switching.
 #[derive(Clone, Copy, Debug)]
 pub struct Switches<S = f64> {
-    pub(super) legs: Legs<S>,
+    pub(crate) legs: Legs<S>,
     pub(super) conduction: Option<Conduction<S>>,
     /// Switching loss in W per ampere.
     pub(super) sw: S,
