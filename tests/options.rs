@@ -66,8 +66,8 @@ const COMMANDS: &[Options] = &[
             ("step", "5e-5"),
             ("set", "tau_load=0.5"),
             ("input", "tau_load=0:0.5"),
-            ("connect", "PmsmPlant.speed=PmsmPlant.speed_shaft"),
-            ("rtol", "1e-3"),
+            ("connect", "PmsmPlant.i_a=PmsmPlant.u_a"),
+            ("rtol", "1e-14"),
             ("jobs", "1"),
             ("csv", "other.csv"),
             ("plot", "bode.svg"),
@@ -75,11 +75,11 @@ const COMMANDS: &[Options] = &[
         ],
         modes: &[
             Mode {
-                line: "in/PmsmPlant.fmu --from tau_load --to speed --frequencies 100 --settle 0.01 --step 1e-4 --csv out.csv",
+                line: "in/PmsmPlant.fmu --from tau_load --to speed --frequencies 100 --settle 0.01 --step 2e-4 --csv out.csv",
                 same: &[("jobs", SPEED), ("auto_connect", "one FMU has no inputs that another one feeds")],
             },
             Mode {
-                line: "in/PmsmPlant.fmu --from tau_load --to speed --frequencies 100 --settle 0.01 --step 1e-4 --me --csv out.csv",
+                line: "in/PmsmPlant.fmu --from tau_load --to speed --frequencies 100 --settle 0.01 --step 2e-4 --me --csv out.csv",
                 same: &[("jobs", SPEED), ("auto_connect", "one FMU has no inputs that another one feeds")],
             },
             Mode {
