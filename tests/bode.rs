@@ -244,9 +244,9 @@ fn a_doubtful_response_is_announced() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stderr).unwrap()
     };
-    // Beyond the limit of the torque.
+    // 0.12 N.m is the limit of the torque: half the amplitude stays within it.
     let said = warnings(
-        "--loop disturbance --settle 0.1 --frequencies 20 --amplitude 1 --set controller.limit.i=3 --set controller.limit.i_q=3",
+        "--loop disturbance --settle 0.1 --frequencies 20 --amplitude 0.2 --set controller.limit.i=3 --set controller.limit.i_q=3",
     );
     assert!(said.contains("half the amplitude") && said.contains("current_limited is 1"), "{said}");
     // Stiction holds a small torque; the amplitude is not reduced into it without a word.

@@ -121,12 +121,12 @@ impl Candidate {
         Self { entry, class, bench: Bench { pair, speed: RATED_SPEED, torque } }
     }
 
-    /// Why the estimator cannot be judged at standstill.
+    /// Why the scenarios at standstill leave the estimator out.
     pub fn no_standstill(&self) -> Option<&'static str> {
         (!self.entry.kind.holds_standstill()).then_some("no EMF at standstill")
     }
 
-    /// Why the estimator cannot be judged at `speed` (pu).
+    /// Why the scenarios at `speed` (pu) leave the estimator out.
     pub fn no_speed(&self, speed: f64) -> Option<&'static str> {
         (self.class == Class::Injection && speed > 0.2)
             .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")

@@ -1,8 +1,8 @@
 //! The scenarios on the user's machine: each runs a tuned drive ([`fmu tune`](drive_tools::tune)) and measures it.
 //!
 //! Speeds are in pu of the rated speed, loads in pu of the rated torque. Times follow from the drive's time constants
-//! ([`Pace`]), so that a whoop motor and a traction machine are judged alike. Most scenarios run at half the rated speed or, for a
-//! method that does not reach it, at its highest speed.
+//! ([`Pace`]): the results of a drone motor and of a traction machine are comparable. The scenarios run at half the rated speed
+//! or, for a method that does not reach it, at its highest speed.
 
 use super::measure::{Effort, Follow, Measure, Outcome};
 use super::scenario::{Scenario, ScenarioRun};

@@ -1,6 +1,6 @@
 //! Random calls of a model with clocks, against FMI 3.0.2, 2.2.8, 2.3.5 and 5, written down once more by hand.
 
-use super::oracle::{Call, Importer, Judged, Oracle, State, Turn, random_calls, verdict};
+use super::oracle::{Call, Importer, Oracle, State, Statuses, Turn, random_calls, verdict};
 use super::*;
 use State::{Activation, Continuous, Event, Initialization, Instantiated, Step, Terminated};
 use fmu_core::draw::Draw;
@@ -70,21 +70,21 @@ impl Twin {
         }
     }
 
-    fn enter(&mut self, host: &Host) -> Judged {
+    fn enter(&mut self, host: &Host) -> Statuses {
         let wanted = verdict(self.is(&[Instantiated]));
         self.state = Initialization;
         let no = Fmi3Boolean(0);
         [unsafe { fmi3EnterInitializationMode(host.it.get(), no, 0.0, 0.0, no, 0.0) }, wanted]
     }
 
-    fn exit(&mut self, host: &Host) -> Judged {
+    fn exit(&mut self, host: &Host) -> Statuses {
         let wanted = verdict(self.is(&[Initialization]));
         self.state = if self.kind == Kind::Se { Activation } else { Event };
         self.model.initialize();
         [host.exit(), wanted]
     }
 
-    fn set_clock(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_clock(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let (vr, active) = (clock(turn), !turn.rarely());
         turn.note((vr, active));
         let changes = |n: usize| if active { n >= 4 || !self.done[n] } else { !self.active[n] };
@@ -98,7 +98,7 @@ impl Twin {
         [turn.importer.set_clock(vr, active), verdict(fits)]
     }
 
-    fn get_clock(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn get_clock(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let vr = turn.draw.of(&CLOCKS);
         let fits = self.is(&[Event, Activation]);
         let expected = match number(vr) {
@@ -111,7 +111,7 @@ impl Twin {
         [verdict(seen.is_some()), verdict(fits)]
     }
 
-    fn interval(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn interval(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let vr = clock(turn);
         turn.note(vr);
         let fits = match vr {
@@ -133,7 +133,7 @@ impl Twin {
         [verdict(seen.is_some()), verdict(fits)]
     }
 
-    fn set_interval(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_interval(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let vr = turn.draw.of(&[FIXED, TUNABLE, TUNABLE, CONSTANT, TRIGGERED]);
         let x = turn.draw.of(&[0.4, 0.2, 0.5, 0.0, f64::NAN]);
         turn.note((vr, x));
@@ -143,7 +143,7 @@ impl Twin {
         [turn.importer.set_interval(vr, x), verdict(open && x > 0.0)]
     }
 
-    fn shift(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn shift(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let vr = clock(turn);
         let fits = self.is(&[Initialization]) && vr <= TUNABLE;
         let mut shift = -7.0;
@@ -152,14 +152,14 @@ impl Twin {
         [status, verdict(fits)]
     }
 
-    fn update(&mut self, host: &Host) -> Judged {
+    fn update(&mut self, host: &Host) -> Statuses {
         let wanted = verdict(self.is(&[Event]));
         self.tick_all();
         [host.update(), wanted]
     }
 
     /// Active clocks tick, whether the importer updates or not.
-    fn leave(&mut self, host: &Host) -> Judged {
+    fn leave(&mut self, host: &Host) -> Statuses {
         let wanted = verdict(self.is(&[Event]));
         self.tick_all();
         self.state = if self.kind == Kind::Me { Continuous } else { Step };
@@ -167,7 +167,7 @@ impl Twin {
     }
 
     /// FMI 3.0 does not allow `SetTime` in Event Mode; importers call it.
-    fn advance(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn advance(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let h = f64::from(u8::try_from(turn.draw.below(5) + 1).unwrap()) * 0.0625;
         let it = turn.importer.it.get();
         let (from, to) = (self.time, self.time + h);
@@ -181,7 +181,7 @@ impl Twin {
     }
 
     /// Nor `EnterEventMode`, which does nothing where no time has passed.
-    fn event(&mut self, host: &Host) -> Judged {
+    fn event(&mut self, host: &Host) -> Statuses {
         let again = self.is(&[Event]) && self.kind == Kind::Me;
         let wanted = verdict(self.is(&[Step, Continuous]) || again);
         if !again || self.time > self.event {
@@ -191,7 +191,7 @@ impl Twin {
         [unsafe { fmi3EnterEventMode(host.it.get()) }, wanted]
     }
 
-    fn activate(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn activate(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let vr = clock(turn);
         let t = number(vr).map_or(1.0, |n| self.last[n].max(0.0)) + turn.mostly(&[0.125], &[0.0]);
         turn.note((vr, t));
@@ -208,7 +208,7 @@ impl Twin {
         [turn.importer.activate(vr, t), verdict(fits)]
     }
 
-    fn set(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let (vr, x) = (turn.draw.of(&[U, X, X, Y]), turn.mostly(&[1.0, -2.0, 0.5], &[f64::INFINITY]));
         turn.note((vr, x));
         let fits = self.open(vr, true) && vr != Y && x.is_finite();
@@ -219,7 +219,7 @@ impl Twin {
         [status, if tried { DISCARD } else { verdict(fits) }]
     }
 
-    fn get(&self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn get(&self, turn: &mut Turn<'_, Self>) -> Statuses {
         let vr = turn.draw.of(&[U, X, Y, FREE]);
         turn.note(vr);
         let fits = self.open(vr, false);
@@ -304,7 +304,7 @@ impl Oracle for Twin {
         }
     }
 
-    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged {
+    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses {
         let host = turn.importer.clone();
         match call {
             Call::Enter => self.enter(&host),

@@ -62,7 +62,7 @@ pub enum Call {
 }
 
 /// The status of a call, and the expected one.
-pub type Judged = [c_int; 2];
+pub type Statuses = [c_int; 2];
 
 /// The status of a call that may be wrong in one way only.
 pub fn verdict(fits: bool) -> c_int {
@@ -104,7 +104,7 @@ pub trait Oracle: Clone {
     fn next(&self) -> &'static [Call];
 
     /// Makes a call. If it fails, [`failed`](Self::failed) undoes the changes.
-    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged;
+    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses;
 
     /// Compares what can be read.
     fn look(&mut self, importer: &Self::Importer, trace: &str);
@@ -171,7 +171,7 @@ impl<O: Oracle> Turn<'_, O> {
     }
 
     /// `GetFMUState` in one of these states.
-    fn save(&mut self, oracle: &mut O) -> Judged {
+    fn save(&mut self, oracle: &mut O) -> Statuses {
         let (state, of) = &mut self.saved[self.draw.below(3)];
         let status = get_state(self.importer, state);
         if status == OK {
@@ -182,7 +182,7 @@ impl<O: Oracle> Turn<'_, O> {
     }
 
     /// `SetFMUState`, half of the times with a copy of the state that went through bytes.
-    fn restore(&mut self, oracle: &mut O) -> Judged {
+    fn restore(&mut self, oracle: &mut O) -> Statuses {
         let fits = |(_, of): &(FmuState, Option<O>)| of.as_ref().is_some_and(|saved| oracle.accepts(saved));
         let good = self.saved.iter().position(fits);
         let any = self.draw.below(3);

@@ -1,6 +1,6 @@
 //! Random calls between steps and inside them, against FMI 3.0.2, 2.3 and 4.2.2, written down once more by hand.
 
-use super::oracle::{self, Call, Judged, Oracle, State, Turn, random_calls, verdict};
+use super::oracle::{self, Call, Oracle, State, Statuses, Turn, random_calls, verdict};
 use super::*;
 use State::{Initialization, Instantiated, Step, Terminated};
 use fmu_core::draw::Draw;
@@ -63,7 +63,7 @@ impl Twin {
     }
 
     /// A step, with the actions of the callback inside it.
-    fn step(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn step(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let h = turn.mostly(&[0.1, 0.07, 0.005, 0.013, 1e-4], &[0.0, -0.1, f64::NAN]);
         let t = self.end + turn.mostly(&[0.0], &[h, -h]);
         turn.note((t, h));
@@ -91,7 +91,7 @@ impl Twin {
         [stepped.status, verdict(self.is(&[Step]))]
     }
 
-    fn set(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let (vr, x) = (turn.mostly(&[U], &[X, TWICE, 77]), turn.mostly(&[0.5, 1.0, -3.0], &[f64::NAN, 2e6]));
         turn.note((vr, x));
         self.model.u = x;
@@ -105,7 +105,7 @@ impl Twin {
     }
 
     /// A call without arguments in one state, and the state that it leads to.
-    fn plain(&mut self, from: State, to: State, status: c_int) -> Judged {
+    fn plain(&mut self, from: State, to: State, status: c_int) -> Statuses {
         let wanted = verdict(self.state == from);
         self.state = to;
         [status, wanted]
@@ -295,7 +295,7 @@ impl Oracle for Twin {
         }
     }
 
-    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged {
+    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses {
         let (it, no) = (turn.importer.it.get(), Fmi3Boolean(0));
         match call {
             Call::Enter => {

@@ -1,6 +1,6 @@
 //! Random calls of a model with texts, lists and bytes, against FMI 3.0.2, 2.2.7, 2.3 and 4.2, written down once more by hand.
 
-use super::oracle::{Call, Importer, Judged, Oracle, State, Turn, random_calls, verdict};
+use super::oracle::{Call, Importer, Oracle, State, Statuses, Turn, random_calls, verdict};
 use super::*;
 use State::{Initialization, Instantiated, Terminated};
 use fmu_core::draw::Draw;
@@ -68,7 +68,7 @@ impl Twin {
         }
     }
 
-    fn step(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn step(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let wrong = turn.mostly(&[0.0], &[1.0]);
         let status = step(turn.importer.0, self.time + wrong);
         self.compute();
@@ -77,7 +77,7 @@ impl Twin {
     }
 
     /// Up to three values of bytes in one call: all are set, or none.
-    fn set_bytes(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_bytes(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let values: Vec<_> = (0..turn.draw.below(4)).map(|_| some_bytes(turn)).collect();
         let n = turn.count(values.len()).min(values.len());
         let (references, sizes): (Vec<_>, Vec<_>) = values.iter().map(|(of, size, _)| (*of, *size)).unzip();
@@ -104,7 +104,7 @@ impl Twin {
         [status, verdict(fits)]
     }
 
-    fn set_texts(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_texts(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let reference = turn.mostly(&[TITLE, NAMES], &[TITLE_OUT, RX, NOBODY]);
         let right = if reference == NAMES { 2 } else { 1 };
         let n = turn.count(right);
@@ -129,7 +129,7 @@ impl Twin {
     }
 
     /// A list of one of the types: rarely an element is out of range, is not an item, or is missing.
-    fn set_numbers(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_numbers(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let (wrong, kind) = (turn.rarely(), turn.draw.below(6));
         let right = if kind == 0 { 3 } else { 2 };
         let n = turn.count(right);
@@ -174,7 +174,7 @@ impl Twin {
     }
 
     /// Bytes of two variables in one call.
-    fn get_bytes(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn get_bytes(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         self.show();
         let last = turn.mostly(&[RX, KEY, TX], &[TITLE, NOBODY]);
         let last = if self.is_vague() && last == TX { RX } else { last };
@@ -193,7 +193,7 @@ impl Twin {
         [status, verdict(fits)]
     }
 
-    fn get_texts(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn get_texts(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         self.show();
         let reference = turn.mostly(&[TITLE, TITLE_OUT, NAMES], &[RX, NOBODY]);
         let expected = self.texts(reference);
@@ -205,7 +205,7 @@ impl Twin {
     }
 
     /// A call without arguments in one state, and the state that it leads to.
-    fn plain(&mut self, from: State, to: State, status: c_int) -> Judged {
+    fn plain(&mut self, from: State, to: State, status: c_int) -> Statuses {
         let wanted = verdict(self.state == from);
         self.state = to;
         [status, wanted]
@@ -294,7 +294,7 @@ impl Oracle for Twin {
         }
     }
 
-    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged {
+    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses {
         let it = turn.importer.0;
         match call {
             Call::Enter => {

@@ -7,7 +7,7 @@ mod reads;
 mod turn;
 mod twin;
 
-use crate::oracle::{self, Call, Importer, Judged, Oracle, State, Turn, bits};
+use crate::oracle::{self, Call, Importer, Oracle, State, Statuses, Turn, bits};
 use crate::solver::{DISCARD, ERROR, Fmu, Kind, OK, has_logger};
 use State::{Continuous, Event, Initialization, Instantiated, Step, Terminated};
 use fmu_core::draw::Draw;
@@ -114,7 +114,7 @@ impl<M: Twin> Oracle for Snapshot<M> {
         }
     }
 
-    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged {
+    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses {
         let mut attempt = Attempt { now: self, turn };
         match call {
             Call::Enter => attempt.enter(),

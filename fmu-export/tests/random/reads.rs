@@ -3,11 +3,11 @@
 use super::turn::{Attempt, extent, is_element};
 use super::twin::Twin;
 use super::{ERROR, OK};
-use crate::oracle::{Call, Judged, State, bits};
+use crate::oracle::{Call, State, Statuses, bits};
 use State::{Continuous, Event, Initialization, Instantiated, Terminated};
 
 impl<M: Twin> Attempt<'_, '_, M> {
-    pub fn get(&mut self) -> Judged {
+    pub fn get(&mut self) -> Statuses {
         let references: Vec<u32> = (0..self.turn.draw.below(4))
             .map(|_| {
                 if self.turn.rarely() {
@@ -45,7 +45,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
     }
 
     /// States, derivatives, indicators or nominal values.
-    pub fn values(&mut self, call: Call) -> Judged {
+    pub fn values(&mut self, call: Call) -> Statuses {
         let right = if call == Call::Indicators { M::CAN.indicators().len() } else { M::CAN.states().len() };
         let n = self.turn.count(right);
         let mut values = vec![f64::NAN; n];
@@ -93,7 +93,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [status, wanted]
     }
 
-    pub fn directional(&mut self) -> Judged {
+    pub fn directional(&mut self) -> Statuses {
         let nx = M::CAN.states().len();
         let last = u32::try_from(M::TABLE.len() + nx).unwrap();
         let (unknown, known) = (if nx > 0 { last } else { 1 }, M::SET[0]);

@@ -2,7 +2,7 @@
 
 use super::twin::{Snapshot, Twin};
 use super::{DISCARD, ERROR, OK};
-use crate::oracle::{Judged, State, Turn, verdict};
+use crate::oracle::{State, Statuses, Turn, verdict};
 use State::{Continuous, Event, Initialization, Instantiated, Terminated};
 use fmu_core::Elapsed;
 
@@ -23,7 +23,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         self.now.kind.exchanges() && self.is(if self.now.kind.version() == 2 { two } else { three })
     }
 
-    pub fn enter(&mut self) -> Judged {
+    pub fn enter(&mut self) -> Statuses {
         let start = self.turn.mostly(&[0.0, 1e4], &[f64::NAN]);
         let fits = self.is(&[Instantiated]) && start.is_finite();
         let wanted = verdict(fits);
@@ -34,7 +34,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [self.turn.importer.enter(start, None), wanted]
     }
 
-    pub fn exit(&mut self) -> Judged {
+    pub fn exit(&mut self) -> Statuses {
         let wanted = verdict(self.is(&[Initialization]) && self.now.block.model.fits() && self.now.is_storable());
         if wanted == OK {
             if self.now.fresh || !self.now.stated {
@@ -49,18 +49,18 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [self.turn.importer.exit(), wanted]
     }
 
-    pub fn terminate(&mut self) -> Judged {
+    pub fn terminate(&mut self) -> Statuses {
         let wanted = verdict(self.is(&[Event, Continuous, State::Step]));
         self.now.state = Terminated;
         [self.turn.importer.terminate(), wanted]
     }
 
-    pub fn reset(&mut self) -> Judged {
+    pub fn reset(&mut self) -> Statuses {
         *self.now = Snapshot::new(self.now.kind);
         [self.turn.importer.reset(), OK]
     }
 
-    pub fn event(&mut self) -> Judged {
+    pub fn event(&mut self) -> Statuses {
         let may = if self.now.kind.exchanges() {
             self.is(&[Event, Continuous])
         } else {
@@ -76,7 +76,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [self.turn.importer.event(), wanted]
     }
 
-    pub fn update(&mut self) -> Judged {
+    pub fn update(&mut self) -> Statuses {
         let expected = if self.is(&[Event]) { self.now.update() } else { Err(ERROR) };
         let (status, update) = self.turn.importer.try_update();
         let wanted = expected.map_or_else(|status| status, |_| OK);
@@ -86,7 +86,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [status, wanted]
     }
 
-    pub fn leave(&mut self) -> Judged {
+    pub fn leave(&mut self) -> Statuses {
         let mut done = if self.is(&[Event]) { Ok(()) } else { Err(ERROR) };
         if done.is_ok() && self.now.kind.exchanges() {
             while done.is_ok() && (self.now.pending || self.now.fresh) {
@@ -98,7 +98,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [self.turn.importer.leave(), wanted]
     }
 
-    pub fn set_time(&mut self) -> Judged {
+    pub fn set_time(&mut self) -> Statuses {
         let wrong = self.turn.rarely();
         let t = self.now.end
             + self.turn.draw.of(if wrong {
@@ -116,12 +116,12 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [self.turn.importer.set_time(t), wanted]
     }
 
-    pub fn completed(&mut self) -> Judged {
+    pub fn completed(&mut self) -> Statuses {
         let wanted = verdict(self.in_exchange(&[Continuous], &[Continuous]));
         [self.turn.importer.completed(), wanted]
     }
 
-    pub fn step(&mut self) -> Judged {
+    pub fn step(&mut self) -> Statuses {
         let wrong = self.turn.rarely();
         let h = self.turn.draw.of(if wrong { &[0.0, -0.01, f64::NAN] } else { &[0.01, 0.003, 0.007, 0.025, 0.073] });
         let t = self.now.end + if self.turn.rarely() { self.turn.draw.of(&[h, 0.005 * h, -h, f64::NAN]) } else { 0.0 };
@@ -134,7 +134,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [status, wanted]
     }
 
-    pub fn set_states(&mut self) -> Judged {
+    pub fn set_states(&mut self) -> Statuses {
         let nx = M::CAN.states().len();
         let x: Vec<f64> = (0..self.turn.count(nx))
             .map(|_| {
@@ -169,7 +169,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         [self.turn.importer.set_states(&x), wanted]
     }
 
-    pub fn set(&mut self) -> Judged {
+    pub fn set(&mut self) -> Statuses {
         let version = self.now.kind.version();
         let references: Vec<u32> = (0..self.turn.draw.below(4))
             .map(|_| {

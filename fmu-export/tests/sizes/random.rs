@@ -1,6 +1,6 @@
 //! Random calls of a model whose arrays change their sizes, against FMI 3.0.2, 2.3, 3.2 and 4.2, written down once more by hand.
 
-use super::oracle::{Call, Importer, Judged, Oracle, State, Turn, bits, random_calls, verdict};
+use super::oracle::{Call, Importer, Oracle, State, Statuses, Turn, bits, random_calls, verdict};
 use super::*;
 use State::{Configuration, Continuous, Event, Initialization, Instantiated, Reconfiguration, Step, Terminated};
 use fmu_core::draw::Draw;
@@ -95,7 +95,7 @@ impl Twin {
         OK
     }
 
-    fn exit(&mut self, it: &It) -> Judged {
+    fn exit(&mut self, it: &It) -> Statuses {
         let wanted = verdict(self.is(&[Initialization]));
         if wanted == OK {
             self.block.initialize();
@@ -104,20 +104,20 @@ impl Twin {
         [unsafe { fmi3ExitInitializationMode(it.0) }, wanted]
     }
 
-    fn configure(&mut self, it: &It) -> Judged {
+    fn configure(&mut self, it: &It) -> Statuses {
         let wanted = verdict(self.is(&[Instantiated, self.running()]));
         self.show();
         self.state = if self.is(&[Instantiated]) { Configuration } else { Reconfiguration };
         [it.enter(), wanted]
     }
 
-    fn configured(&mut self, it: &It) -> Judged {
+    fn configured(&mut self, it: &It) -> Statuses {
         let wanted = if self.is(&[Configuration, Reconfiguration]) { self.resize() } else { ERROR };
         self.state = if self.is(&[Configuration]) { Instantiated } else { self.running() };
         [it.exit(), wanted]
     }
 
-    fn set_sizes(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_sizes(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let references = [N, K, ROWS, turn.mostly(&[N], &[GAINS])];
         let first = turn.draw.below(3);
         let references = &references[first..][..=turn.draw.below(2)];
@@ -143,7 +143,7 @@ impl Twin {
     }
 
     /// A tunable array, or a fixed one (the map).
-    fn set_array(&mut self, reference: u32, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_array(&mut self, reference: u32, turn: &mut Turn<'_, Self>) -> Statuses {
         let before = self.values(reference);
         let n = turn.count(before.len());
         let mut value = || if turn.draw.below(60) == 0 { f64::NAN } else { turn.draw.of(&[1.0, -2.0, 0.5]) };
@@ -162,7 +162,7 @@ impl Twin {
         [turn.importer.set(reference, &values), verdict((open || kept) && fits || none)]
     }
 
-    fn set_marks(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_marks(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let right = self.block.model.marks.len();
         let n = turn.count(right);
         let marks: Vec<i32> = (1..).take(n).collect();
@@ -175,7 +175,7 @@ impl Twin {
         [status, verdict(n == right && (open || kept || none))]
     }
 
-    fn get(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn get(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let reference = turn.draw.of(&[GAINS, X, Z, Y, VALUES, DER_X, DER_Z]);
         self.show();
         let expected = self.values(reference);
@@ -189,7 +189,7 @@ impl Twin {
         [status, verdict(fits)]
     }
 
-    fn step(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn step(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let (wrong, h) = (turn.mostly(&[0.0], &[1.0]), turn.draw.of(&[0.01, 0.1]));
         let wanted = verdict(self.is(&[Step]) && wrong == 0.0);
         let t = self.time;
@@ -201,7 +201,7 @@ impl Twin {
         [turn.importer.step(t + wrong, h), wanted]
     }
 
-    fn set_states(&mut self, turn: &mut Turn<'_, Self>) -> Judged {
+    fn set_states(&mut self, turn: &mut Turn<'_, Self>) -> Statuses {
         let n = turn.count(self.number() + 1);
         let x: Vec<f64> = (0..n).map(|_| turn.draw.of(&[0.0, 1.0, -3.0, 0.1, 7.0, -2e3])).collect();
         let wild = x.iter().take(self.number()).any(|x| *x < -1e3);
@@ -219,7 +219,7 @@ impl Twin {
     }
 
     /// States, derivatives or nominal values.
-    fn vector(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged {
+    fn vector(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses {
         if call != Call::Nominals {
             self.show();
         }
@@ -245,7 +245,7 @@ impl Twin {
     }
 
     /// A call without arguments: its states, and the state that it leads to.
-    fn plain(&mut self, allowed: bool, next: State, status: c_int) -> Judged {
+    fn plain(&mut self, allowed: bool, next: State, status: c_int) -> Statuses {
         self.state = next;
         [status, verdict(allowed)]
     }
@@ -308,7 +308,7 @@ impl Oracle for Twin {
         }
     }
 
-    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Judged {
+    fn call(&mut self, call: Call, turn: &mut Turn<'_, Self>) -> Statuses {
         let it = turn.importer.0;
         match call {
             Call::Enter => {

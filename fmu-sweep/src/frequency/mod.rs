@@ -1,7 +1,7 @@
 //! Frequency responses by a swept sine: the running system, with its sampled parts, is excited at one frequency after another.
 //!
 //! Each frequency is a run of its own. The system reaches its operating point under the sine, then windows of whole periods are
-//! measured ([`fit`]) until two agree. Frequencies are moved to the grid of the communication steps, so that a window also has whole
+//! measured (file `fit.rs`) until two agree. Frequencies are moved to the grid of the communication steps, so that a window also has whole
 //! sample periods of a part that samples on this grid.
 //!
 //! An FMU holds an input over a communication step h, and an importer reads outputs at its end: a continuous part sees the sine h/2

@@ -78,7 +78,7 @@ fn population() {
         swings.push(swing);
         speeds.push(turning);
     }
-    let judged = n == 300 && seed == 1 && !blocked;
+    let limited = n == 300 && seed == 1 && !blocked;
     let mut beyond = vec![];
     for (e, (name, at_95, at_99, refused, inside)) in errors.iter().zip(limits) {
         let all = e.all.len();
@@ -94,16 +94,16 @@ fn population() {
     }
     for (name, x) in [
         ("time in s", &mut times),
-        ("greatest current over I", &mut peaks),
-        ("greatest speed of a swing over the rated one", &mut swings),
-        ("greatest speed of the turning machine", &mut speeds),
+        ("maximum current over I", &mut peaks),
+        ("maximum speed of a swing over the rated one", &mut swings),
+        ("maximum speed of the turning machine", &mut speeds),
     ] {
         x.sort_by(f64::total_cmp);
         let at = |percent: usize| x[(x.len() * percent).div_ceil(100) - 1];
         println!("{name}: median {:.2}, 95 % {:.2}, 99 % {:.2}, worst {:.2}", at(50), at(95), at(99), at(100));
     }
     println!("faults: {faults:?}");
-    assert!(!judged || beyond.is_empty(), "beyond the limits: {beyond:?}");
+    assert!(!limited || beyond.is_empty(), "beyond the limits: {beyond:?}");
 }
 
 /// A machine of a class; prints what is wrong, and counts accepted values, those inside their intervals, and swaps.

@@ -4,9 +4,9 @@
 //! |---|---|
 //! | [`carrier`] | duty cycles, zero sequences, and the instants at which a leg is commanded |
 //! | [`bridge`] | legs with dead time and diodes: which of them conduct, and which block |
-//! | [`segment`] | the machine between two instants |
+//! | `segment` | the machine between two instants |
 //! | [`state`] | the state of carrier and legs |
-//! | [`run`] | a communication step: from instant to instant |
+//! | `run` | a communication step: from instant to instant |
 //!
 //! `inverter.mode` = Average replaces all this by the mean over a PWM period ([`inverter`](crate::inverter)).
 
