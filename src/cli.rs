@@ -2,7 +2,7 @@
 
 use crate::commands::{
     atlas, bode, build, compare, identify, info, map, merge, modelica, new, page, preset, prove, reproduce, simulate,
-    ssp, sweep, tune,
+    simulink, ssp, sweep, tune,
 };
 use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -39,6 +39,7 @@ enum Command {
     Map(map::Map),
     Ssp(ssp::Ssp),
     Modelica(modelica::Modelica),
+    Simulink(simulink::Simulink),
     Preset(preset::Preset),
     Page(page::Page),
     Prove(prove::Prove),
@@ -126,6 +127,10 @@ pub fn main() -> ExitCode {
             ExitCode::SUCCESS
         }),
         Command::Modelica(args) => modelica::run(&args).map(|text| {
+            print!("{text}");
+            ExitCode::SUCCESS
+        }),
+        Command::Simulink(args) => simulink::run(&args).map(|text| {
             print!("{text}");
             ExitCode::SUCCESS
         }),

@@ -2,7 +2,7 @@
 //!
 //! - [`cli`]: the command line; [`commands`]: one module for each command; [`vendor`]: the crates that `fmu new` writes.
 //! - [`message`]: errors, warnings and notes on standard error.
-//! - [`ssp`], [`ssv`]: write systems and parameter values; [`modelica`]: a Modelica package around an FMU.
+//! - [`ssp`], [`ssv`]: write systems and parameter values; [`modelica`]: a Modelica package around an FMU; [`simulink`]: a Simulink model around one.
 //!
 //! [`fmu_pack`] builds FMUs, [`fmu_import`] runs them, [`fmu_check`] checks them, [`drive_tools`] tunes and identifies drives, [`drive_study`] reproduces the
 //! papers and compares estimators, and [`fmu_plot`] draws.
@@ -13,6 +13,7 @@ pub mod cli;
 pub mod commands;
 pub mod message;
 pub mod modelica;
+pub mod simulink;
 pub mod ssp;
 pub mod ssv;
 pub mod vendor;

@@ -341,6 +341,11 @@ const COMMANDS: &[Options] = &[
         modes: &[Mode { line: "in/PmsmPlant2.fmu --out out", same: &[] }],
     },
     Options {
+        command: "simulink",
+        values: &[("step", "0.0005"), ("out", "other")],
+        modes: &[Mode { line: "in/PmsmPlant2.fmu --out out", same: &[] }],
+    },
+    Options {
         command: "preset",
         values: &[
             ("set", "tau_load=1"),

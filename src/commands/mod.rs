@@ -15,6 +15,7 @@ pub mod preset;
 pub mod prove;
 pub mod reproduce;
 pub mod simulate;
+pub mod simulink;
 pub mod ssp;
 pub mod sweep;
 pub mod tune;
