@@ -390,7 +390,6 @@ const STAYING: &[(&str, &[&str])] = &[
             "rules.rs",
             "sizes.rs",
             "table.rs",
-            "terminal.rs",
             "token.rs",
             "variable.rs",
         ],
