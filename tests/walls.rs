@@ -446,7 +446,7 @@ fn the_circles_of_files_are_those_listed() {
             found.extend(circles::circles(&src, root).into_iter().map(|files| (name.clone(), files)));
         }
     }
-    let owned = |(name, files): &(&str, &[&str])| (name.to_string(), files.iter().map(|f| f.to_string()).collect());
+    let owned = |(name, files): &(&str, &[&str])| (name.to_string(), files.iter().map(ToString::to_string).collect());
     let listed: BTreeSet<(String, Vec<String>)> = STAYING.iter().chain(SMALL).map(owned).collect();
     let new: Vec<_> = found.difference(&listed).collect();
     assert!(new.is_empty(), "files that name each other in a circle: {new:#?}");
