@@ -4,7 +4,8 @@
 use drive::estimator::Kind;
 use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
-use drive_study::atlas::{self, Atlas, map, report};
+use drive_study::atlas::run::Atlas;
+use drive_study::atlas::{self, map, report};
 use drive_study::compare::candidate::Entry;
 use std::path::Path;
 

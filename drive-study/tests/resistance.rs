@@ -5,7 +5,7 @@
 use drive::Pair;
 use drive_study::atlas::cell::{Cell, Course, Grid};
 use drive_study::atlas::drive::Drive;
-use drive_study::atlas::{self, Atlas};
+use drive_study::atlas::{self, run::Atlas};
 use drive_study::compare::candidate::Entry;
 use drive_study::runner;
 

@@ -368,7 +368,7 @@ fn a_machine_with_a_flux_map() {
         "{report}"
     );
     assert!(
-        map::files(&map, &report::of(&map, &Cycle::example().unwrap(), true))
+        files::all(&map, &report::of(&map, &Cycle::example().unwrap(), true))
             .unwrap()
             .iter()
             .any(|f| f.0 == "flux_map.csv")

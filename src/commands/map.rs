@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use clap::Args;
 use drive_tools::map::cycle::{CYCLE, Cycle, VEHICLE};
 use drive_tools::map::request::{self, Request};
-use drive_tools::map::{self, report};
+use drive_tools::map::{self, files, report};
 use drive_tools::tune::motor::MotorFile;
 use fmu_pack::archive;
 use fmu_pack::workspace::output_folder;
@@ -91,7 +91,7 @@ pub fn run(args: &Map) -> Result<()> {
     let map = map::make(&MotorFile::read(&args.motor)?, &request)?;
     let report = report::of(&map, &cycle, args.cycle.is_some() || args.vehicle.is_some());
     // All files are ready before the first is written.
-    let files = map::files(&map, &report)?;
+    let files = files::all(&map, &report)?;
     let out = args.out.clone().map_or_else(|| output_folder("map"), Ok)?;
     for (name, bytes) in &files {
         archive::write(&out.join(name), bytes)?;

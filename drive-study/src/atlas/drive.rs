@@ -1,6 +1,5 @@
 //! A drive of the atlas: a drive of `fmu compare`, or one tuned for a machine's file, with settings of the user.
 
-use super::run::Approach;
 use crate::compare::candidate::{Candidate, Class, Entry};
 use crate::runner::{Bench, REFERENCE_SPEED};
 use drive::SensorlessController;
@@ -14,6 +13,15 @@ use fmu_core::variable::Causality;
 use fmu_core::{Description, Model, Slot};
 use std::path::Path;
 use toml::Spanned;
+
+/// How the drive reaches its speed; this also determines when it counts as lost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Approach {
+    /// From rest, in steps.
+    Rest,
+    /// From 0.2 of the rated speed, by ramps.
+    Turning,
+}
 
 /// A drive at rest, and what 1 means on the axes of the atlas.
 #[derive(Clone)]

@@ -1,8 +1,8 @@
 //! The map of a drive: a panel per scenario, start angle, speed and load; R^/R to the right, psi^/psi upwards; red where
 //! the drive is lost, a dot where `lock_lost` is wrong. A legend explains this.
 
-use super::Atlas;
 use super::cell::{Cell, Course};
+use super::run::Atlas;
 use std::fmt::Write as _;
 
 /// Side of a cell in pixels.

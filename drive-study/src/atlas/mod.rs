@@ -16,24 +16,8 @@ use cell::Cell;
 use drive::Drive;
 use drive_tools::error::{Error, Result};
 use drive_tools::queue;
-use run::Verdict;
+use run::{Atlas, Verdict};
 use std::path::Path;
-
-/// The runs of a drive.
-#[derive(Clone)]
-pub struct Atlas {
-    /// The drive.
-    pub drive: Drive,
-    /// Cells and verdicts, in the order of the grid.
-    pub runs: Vec<(Cell, Verdict)>,
-}
-
-impl Atlas {
-    /// The cells that are lost, or held.
-    pub fn that_are(&self, lost: bool) -> impl Iterator<Item = &(Cell, Verdict)> {
-        self.runs.iter().filter(move |(_, verdict)| verdict.lost.is_some() == lost)
-    }
-}
 
 /// Runs every cell with every drive on this many threads; calls `done` after each run. The result does not depend on the
 /// number of threads.

@@ -1,9 +1,9 @@
 //! The atlas as CSV, as Markdown and as one self-contained page.
 
-use super::Atlas;
 use super::cell::{Cell, Course};
+use super::drive::Approach;
 use super::map::{self, percent};
-use super::run::{Approach, Loss, Verdict};
+use super::run::{Atlas, Loss, Verdict};
 use crate::ink;
 use fmu_plot::page::{self, escape};
 use std::fmt::Write as _;

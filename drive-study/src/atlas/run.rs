@@ -17,22 +17,13 @@
 //! first 0.05 s, and the course begins after that.
 
 use super::cell::{Cell, Course};
-use super::drive::Drive;
+use super::drive::{Approach, Drive};
 use super::outside::Outside;
 use crate::runner::{Bench, step};
 use drive::Pair;
 use drive::frame::Phases;
 use drive::math::wrap;
 use fmu_core::{Fault, Model};
-
-/// How the drive reaches its speed; this also determines when it counts as lost.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Approach {
-    /// From rest, in steps.
-    Rest,
-    /// From 0.2 of the rated speed, by ramps.
-    Turning,
-}
 
 /// Rise of the resistance in `heating`, as a share.
 const HEATING: f64 = 0.4;
@@ -114,6 +105,22 @@ impl Verdict {
     /// held in the end may have been lost before: in `heating`, R rises to an R^ that was greater.
     pub fn lock_lost_is_right(&self) -> bool {
         if self.lost.is_some() { self.lock_lost >= 1.0 } else { self.while_held < 1.0 }
+    }
+}
+
+/// The runs of a drive.
+#[derive(Clone)]
+pub struct Atlas {
+    /// The drive.
+    pub drive: Drive,
+    /// Cells and verdicts, in the order of the grid.
+    pub runs: Vec<(Cell, Verdict)>,
+}
+
+impl Atlas {
+    /// The cells that are lost, or held.
+    pub fn that_are(&self, lost: bool) -> impl Iterator<Item = &(Cell, Verdict)> {
+        self.runs.iter().filter(move |(_, verdict)| verdict.lost.is_some() == lost)
     }
 }
 

@@ -1,10 +1,12 @@
-//! The files of a map that programs read: CSV in long form, and NumPy's npz.
+//! The files of a map; those that programs read are here: CSV in long form, and NumPy's npz.
 
-use super::Map;
+use super::report::Report;
 use super::request::ZERO_CELSIUS;
+use super::{Map, page, picture};
 use crate::error::Result;
 use drive::steady::Point;
 use fmu_core::digits;
+use fmu_plot::chart;
 use std::fmt::Write as _;
 use std::io::{Cursor, Write as _};
 use zip::write::SimpleFileOptions;
@@ -27,6 +29,24 @@ const COLUMNS: [Column; 11] = [
     ("p_friction", |p| p.powers.losses.friction),
     ("efficiency", |p| p.efficiency),
 ];
+
+/// Names and contents of the files of a map.
+///
+/// # Errors
+/// A sheet has no point.
+pub fn all(map: &Map, report: &Report) -> Result<Vec<(&'static str, Vec<u8>)>> {
+    let mut files = vec![
+        ("map.csv", map_csv(map).into()),
+        ("envelope.csv", envelope_csv(map).into()),
+        ("map.npz", npz(map)?),
+        ("map.svg", chart::draw(&picture::chart(map, map.shown))?.into()),
+        ("map.html", page::page(map, report)?.into()),
+    ];
+    if map.drive.plant.flux_map.used {
+        files.push(("flux_map.csv", flux_map_csv(map).into()));
+    }
+    Ok(files)
+}
 
 /// A number with nine digits, as short as they allow.
 fn number(x: f64) -> String {

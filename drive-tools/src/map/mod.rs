@@ -30,8 +30,6 @@ use drive::estimator::Kind;
 use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::steady::{Point, Steady};
 use fmu_core::digits::rounded;
-use fmu_plot::chart;
-use report::Report;
 use request::{Request, ZERO_CELSIUS};
 use sheet::{Axes, Sheet};
 use std::f64::consts::TAU;
@@ -197,24 +195,6 @@ fn missing(drive: &Steady) -> impl Iterator<Item = (&'static str, &'static str)>
     let tables =
         [("[iron]", "iron", plant.iron.is_none()), ("[inverter]", "inverter", plant.inverter.devices.is_none())];
     tables.into_iter().filter(|(.., none)| *none).map(|(table, loss, _)| (table, loss))
-}
-
-/// Names and contents of the files of a map.
-///
-/// # Errors
-/// A sheet has no point.
-pub fn files(map: &Map, report: &Report) -> Result<Vec<(&'static str, Vec<u8>)>> {
-    let mut all = vec![
-        ("map.csv", files::map_csv(map).into()),
-        ("envelope.csv", files::envelope_csv(map).into()),
-        ("map.npz", files::npz(map)?),
-        ("map.svg", chart::draw(&picture::chart(map, map.shown))?.into()),
-        ("map.html", page::page(map, report)?.into()),
-    ];
-    if map.drive.plant.flux_map.used {
-        all.push(("flux_map.csv", files::flux_map_csv(map).into()));
-    }
-    Ok(all)
 }
 
 impl Map {

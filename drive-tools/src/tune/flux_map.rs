@@ -19,18 +19,11 @@ use crate::error::{Result, WithContext, bail, ensure};
 use drive::frame::Dq;
 use drive::plant::flux_map::FluxMap;
 use judge::{Errors, check, coverage, judge_magnet, reciprocity, torque};
-use squares::solve;
+use squares::{Point, solve};
 use std::f64::consts::SQRT_2;
 
 /// Minimum number of points: two for three coefficients.
 const LEAST_POINTS: usize = 72;
-
-/// A point of the table: current (A) and flux linkage (Wb).
-#[derive(Clone, Copy, Debug)]
-struct Point {
-    i: Dq,
-    psi: Dq,
-}
 
 /// A fitted map.
 #[derive(Clone, Debug)]

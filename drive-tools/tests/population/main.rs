@@ -8,7 +8,9 @@
     reason = "the symbols of the models; counts of samples"
 )]
 
+#[path = "../../../drive/control/tests/foreign/mod.rs"]
 mod foreign;
+mod record;
 
 use drive_tools::csv::Columns;
 use drive_tools::identify::columns::{Naming, Signals};
@@ -18,7 +20,8 @@ use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
 use drive_tools::tune::setting::Tuned;
 use drive_tools::tune::trial::{self, Task};
-use foreign::{Machine, PLAIN, Part, THOROUGH};
+use foreign::Motor;
+use record::{PLAIN, Part, THOROUGH, record};
 use std::path::Path;
 
 /// A number from the environment.
@@ -26,13 +29,13 @@ fn from(variable: &str, default: u64) -> u64 {
     std::env::var(variable).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
-fn found(m: &Machine, seed: u64, index: u64, time: f64, parts: &[Part], every: usize) -> Result<Identified, String> {
-    let columns = foreign::record(m, seed, index, time, parts, every);
+fn found(m: &Motor, seed: u64, index: u64, time: f64, parts: &[Part], every: usize) -> Result<Identified, String> {
+    let columns = record(m, seed, index, time, parts, every);
     let options = Options {
-        n_p: Some(m.n_p as i32),
-        current: Some(m.i_max),
-        speed: Some(m.speed),
-        torque: Some(m.torque),
+        n_p: Some(m.pole_pairs()),
+        current: Some(m.I),
+        speed: Some(m.speed()),
+        torque: Some(m.torque()),
         delay: Some(0.0),
         every: Some(every as u32),
         ..Options::default()
@@ -63,9 +66,9 @@ fn course(index: u64) -> (Vec<Part>, usize) {
 const NAMES: [&str; 9] = ["R_s", "L_d", "L_q", "psi_M", "J", "B", "tau_coulomb", "u_dead", "i_zero"];
 
 /// The true values; thresholds of the devices add to the dead time, and no single value represents the sum.
-fn truth(m: &Machine) -> [f64; 9] {
-    let (u_dead, i_zero) = if m.threshold > 0.0 { (f64::NAN, f64::NAN) } else { (m.u_dead, 2.0 * m.bend) };
-    [m.R, m.L[0], m.L[1], m.psi_M, m.J, m.B, m.tau_coulomb, u_dead, i_zero]
+fn truth(m: &Motor) -> [f64; 9] {
+    let (u_dead, i_zero) = if m.u_th > 0.0 { (f64::NAN, f64::NAN) } else { (m.u_dead, 2.0 * m.i_x) };
+    [m.R, m.L_d, m.L_q, m.psi, m.J, m.B, m.tau_coulomb, u_dead, i_zero]
 }
 
 fn value<'a>(found: &'a Identified, name: &str) -> &'a Quantity {
@@ -81,7 +84,7 @@ fn figures() {
     let mut errors: [Vec<(f64, u64)>; 9] = Default::default();
     let mut inside = [0_usize; 9];
     for index in 0..records {
-        let m = Machine::drawn(seed, index);
+        let m = Motor::draw(seed, index);
         let (parts, every) = course(index);
         let found = found(&m, seed, index, 6.0, &parts, every).unwrap_or_else(|e| panic!("{index}: {e}"));
         for (k, truth) in truth(&m).into_iter().enumerate() {
@@ -117,14 +120,15 @@ fn figures() {
 
 /// The machine's file with its true values; the inverter's are what a leg loses at large currents, thresholds of the devices
 /// included, and a line of the same slope at zero.
-fn true_file(m: &Machine) -> String {
-    let Machine { n_p, R, L: [L_d, L_q], psi_M, J, B, tau_coulomb, u_dc, i_max, speed, torque, .. } = m;
-    let u_dead = m.u_dead + m.threshold;
-    let i_zero = u_dead / (0.5 * m.u_dead / m.bend + m.threshold / m.knee);
+fn true_file(m: &Motor) -> String {
+    let Motor { n_p, R, L_d, L_q, psi, J, B, tau_coulomb, u_dc, I, .. } = m;
+    let (speed, torque) = (m.speed(), m.torque());
+    let u_dead = m.u_dead + m.u_th;
+    let i_zero = u_dead / (0.5 * m.u_dead / m.i_x + m.u_th / m.i_y);
     format!(
-        "name = \"truth\"\nsource = \"drawn\"\n[machine]\nn_p = {n_p}\nR_s = {R:e}\nL_d = {L_d:e}\nL_q = {L_q:e}\npsi_M = {psi_M:e}\n\
+        "name = \"truth\"\nsource = \"drawn\"\n[machine]\nn_p = {n_p}\nR_s = {R:e}\nL_d = {L_d:e}\nL_q = {L_q:e}\npsi_M = {psi:e}\n\
          [mechanics]\nJ = {J:e}\nB = {B:e}\ntau_coulomb = {tau_coulomb:e}\n[rating]\nspeed = {speed:e}\ntorque = {torque:e}\n\
-         current = {i_max:e}\n[dc_link]\nu_dc = {u_dc:e}\n[inverter]\nu_dead = {u_dead:e}\ni_zero = {i_zero:e}\n"
+         current = {I:e}\n[dc_link]\nu_dc = {u_dc:e}\n[inverter]\nu_dead = {u_dead:e}\ni_zero = {i_zero:e}\n"
     )
 }
 
@@ -152,10 +156,10 @@ fn chain() {
     let (seed, machines) = (from("FMU_SEED", 1), from("FMU_RECORDS", 40));
     let (mut with_truth, mut with_found, mut tried, mut refused) = (0, 0, 0, 0);
     for index in 0..machines {
-        let m = Machine::drawn(seed, index);
+        let m = Motor::draw(seed, index);
         let truth = tuned(&true_file(&m));
         // Three times the same course: no single stretch of the record determines a value. A heavy rotor needs the time to change its speed.
-        let time = (24.0 + 8.0 * m.J * m.speed / m.torque).min(600e3 * m.T_s);
+        let time = (24.0 + 8.0 * m.J * m.speed() / m.torque()).min(600e3 * m.T);
         let found = found(&m, seed, index, time, &[THOROUGH; 3].concat(), 1).unwrap_or_else(|e| panic!("{index}: {e}"));
         let missing: Vec<String> = ["R_s", "L_d", "L_q", "psi_M", "J"]
             .iter()

@@ -2,7 +2,7 @@
 //! currents.
 
 use super::super::motor::MotorFile;
-use super::Point;
+use super::squares::Point;
 use crate::error::{Result, WithContext, bail, ensure};
 use drive::frame::Dq;
 use drive::plant::flux_map::FluxMap;

@@ -1,9 +1,15 @@
 //! The coefficients of a flux map by weighted least squares.
 
-use super::Point;
 use drive::frame::Dq;
 use drive::plant::flux_map::{D, FluxMap, Q, contributions};
 use nalgebra::{DMatrix, DVector};
+
+/// A point of the table: current (A) and flux linkage (Wb).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Point {
+    pub(super) i: Dq,
+    pub(super) psi: Dq,
+}
 
 /// Weight of the third differences, as a share of the mean weight of the table's points in a coefficient.
 const SMOOTHNESS: f64 = 1e-5;

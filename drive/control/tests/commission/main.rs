@@ -1,15 +1,16 @@
-//! Self-commissioning, judged by a foreign plant over a population of machines.
+//! Self-commissioning, on a population of machines of an independent plant.
 #![allow(missing_docs, non_snake_case)]
 
+#[path = "../foreign/mod.rs"]
+mod foreign;
 mod many;
-mod plant;
 
 use drive_base::frame::Phases;
 use drive_control::commission::{
     Commission, CommissionFault as Fault, CommissionMode, CommissionSetup, CommissionState as State, Identified,
     Results,
 };
-use plant::{Bench, Class, Motor, between_axes};
+use foreign::{Bench, Class, Motor, between_axes};
 use std::fmt::Write as _;
 
 fn setup(motor: &Motor) -> CommissionSetup {
