@@ -79,6 +79,11 @@ fn the_drive_has_buses_a_flange_and_a_step_that_divides() {
         "'FixedStep', '0.001'",
         "set_param(fmu, 'FMUSampleTime', '0.001');",
         "bus_out(model, 'PmsmDrive', 'torque_request_out', 'PmsmDrive_torque_request_out', ",
+        // MathWorks: the torque acts from C to R of the source, the sensor measures w_R - w_C. A swapped port is a wrong sign.
+        "simscape.addConnection([block '/torque_source'], 'C', [block '/housing'], 'W');",
+        "simscape.addConnection([block '/torque_source'], 'R', [block '/motion_sensor'], 'R');",
+        "simscape.addConnection([block '/motion_sensor'], 'C', [block '/housing'], 'W');",
+        "simscape.addConnection([block '/torque_source'], 'R', [block '/flange'], 'port');",
         "simscape.addConnection([block '/torque_source'], 'R', [block '/rotor'], 'I');",
         "set_param([block '/rotor'], 'inertia', 'p.plant_mechanics_J');",
         "'LocalSolverSampleTime', '0.001'",
