@@ -36,7 +36,9 @@ pub(super) fn figure(runs: &[(&str, &Recording)]) -> Figure {
             keys.push((run, column.name.as_str()));
         }
     }
-    panels.iter_mut().for_each(|(panel, keys)| color(&mut panel.curves, keys));
+    for (panel, keys) in &mut panels {
+        color(&mut panel.curves, keys);
+    }
     let panels = panels.into_iter().map(|(panel, _)| panel).collect();
     Figure { title: String::new(), x: "time in s", columns: 1, panels }
 }

@@ -76,7 +76,9 @@ impl Overlay {
             match &of.display {
                 _ if heading.unit.is_empty() || heading.unit == of.unit => {}
                 Some(display) if heading.unit == display.name => {
-                    values.iter_mut().for_each(|x| *x = display.unshow(*x))
+                    for x in &mut values {
+                        *x = display.unshow(*x);
+                    }
                 }
                 display => {
                     let shown = display.as_ref().map(|d| format!(" or {}", d.name)).unwrap_or_default();
