@@ -125,6 +125,7 @@ const COMMANDS: &[Options] = &[
             ("stop", "0.02"),
             ("step", "0.0005"),
             ("record", "speed"),
+            ("overlay", "in/earlier.csv"),
             ("csv", "out.csv"),
             ("plot", "out.svg"),
             ("html", "out.html"),
@@ -459,6 +460,7 @@ fn inputs(folder: &Path) {
     };
     write("plant.ssv", &ssv("motor.R_s"));
     write("drive.ssv", &ssv("plant.motor.R_s"));
+    write("earlier.csv", "time,speed\n0,0\n0.01,5\n");
     write(
         "sweep.toml",
         "fmus = [\"d=PmsmDrive.fmu\"]\nstop = 0.002\nstep = 1e-3\n[design]\nkind = \"random\"\nruns = 4\nseed = 1\npart = 1\n[vary]\n\

@@ -3,7 +3,9 @@
 mod curves;
 mod log;
 mod output;
+mod overlay;
 mod overview;
+mod record;
 mod worker;
 
 use crate::Failed;
@@ -28,7 +30,7 @@ use std::time::{Duration, Instant};
 /// Co-simulates FMUs of FMI 2.0 and FMI 3.0, from this project or any other tool.
 ///
 /// An instance is named after its file; NAME=FILE gives another name. Write variables as INSTANCE.VARIABLE, or as VARIABLE if there
-/// is one FMU.
+/// is one FMU; recordings and plots of one FMU have names without an instance, unless NAME=FILE gives it.
 ///
 /// At every communication point the command reads all outputs, sets all inputs, then steps all FMUs: an output reaches other
 /// FMUs one step later. With --sequential, the FMUs step in the order given, and each receives the new outputs of those before
@@ -65,6 +67,9 @@ use std::time::{Duration, Instant};
 ///   fmu simulate p=PmsmPlant.fmu c=SensorlessController.fmu --connect c.u_a=p.u_a --connect c.u_b=p.u_b \
 ///     --connect c.u_c=p.u_c --connect p.i_a=c.i_a --connect p.i_b=c.i_b --connect p.i_c=c.i_c \
 ///     --set p.motor.R_s=3.3 --input c.speed_ref=0:0,0.1:104.7 --stop 1 --record p.speed,c.speed_est --csv -
+/// Two estimators in one plot, with a measurement of the speed:
+///   fmu simulate PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --set controller.estimator=FluxObserver --csv flux.csv
+///   fmu simulate PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --overlay flux.csv --overlay bench=speed.csv --html both.html
 /// A bouncing ball for Model Exchange, integrated with a relative tolerance of 1e-8 and recorded every 10 ms:
 ///   fmu simulate BouncingBall.fmu --me --rtol 1e-8 --step 0.01 --stop 3 --csv ball.csv
 #[derive(Debug, Default, Args)]
@@ -107,7 +112,8 @@ pub struct Simulate {
     /// Communication step in s [default: the shortest of the FMUs, else a thousandth of the duration]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: all outputs]
+    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: the outputs,
+    /// see --all]
     #[arg(long, value_name = "VARIABLE,...")]
     pub record: Vec<String>,
     /// Write the recording as CSV; - for standard output
@@ -120,7 +126,12 @@ pub struct Simulate {
     /// Write the same plot as an offline page with zoom, legend switches and values at the cursor
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
-    /// Plot all outputs, with --plot or --html; with --record, all recorded variables are plotted anyway
+    /// Add the columns of a CSV file to the plot (repeatable): a measurement, or an earlier run's --csv. The first column is time;
+    /// the headings of the others name variables, optionally with a unit: `time [ms]`, `speed [rpm]`. LABEL names its curves
+    #[arg(long, value_name = "[LABEL=]FILE.csv")]
+    pub overlay: Vec<String>,
+    /// Record, show and plot all outputs; without it, the recording omits large groups of outputs in which nothing changes
+    /// in this run
     #[arg(long, conflicts_with = "record")]
     pub all: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it
@@ -211,8 +222,8 @@ pub fn run(args: &Simulate) -> Result<()> {
     if let Some(path) = args.html.as_deref().filter(|path| !has_ending(path, &["html", "htm"])) {
         bail!("--html {}: pages are written as .html; --plot FILE.svg or FILE.png writes a picture", path.display());
     }
-    if args.all && args.plot.is_none() && args.html.is_none() {
-        bail!("--all is for --plot or --html: add one of them");
+    if !args.overlay.is_empty() && args.plot.is_none() && args.html.is_none() {
+        bail!("--overlay {} is for --plot or --html: add one of them", args.overlay[0]);
     }
     worker::catch_interrupts()?;
     if args.in_process {
@@ -225,6 +236,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     // An FMU may change the working directory; file names of the command are relative to this one.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
+    let overlays = overlay::read(&args.overlay)?;
     let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
     if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
         bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
@@ -244,7 +256,12 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     std::env::set_current_dir(&home)?;
     loaded.notes.iter().for_each(|note| message::note(&printable(note)));
     let (settings, for_plot) = prepare(&mut loaded, args)?;
-    let Loaded { mut system, .. } = loaded;
+    let Loaded { mut system, connectors, .. } = loaded;
+    for overlay in &overlays {
+        overlay.like(system.columns()).map_err(|cause| anyhow!("--overlay {cause}"))?;
+    }
+    // The names of an SSP's system are its own.
+    let of_system = !(connectors.inputs.is_empty() && connectors.outputs.is_empty());
     let settings = system.feasible(&settings)?;
     let before = system.take_notes();
     for note in &before {
@@ -285,8 +302,11 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     std::env::set_current_dir(&home)?;
     let bad = recording.columns.iter().find(|c| matches!(c.last(), Number::Real(x) if !x.is_finite()));
     let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
-    let alone = if let [instance] = system.instances() { Some(instance.name()) } else { None };
-    let written = output::write(recording, for_plot, alone, args, &mut out);
+    let instances: Vec<&str> = system.instances().iter().map(Instance::name).collect();
+    let named = |name: &&str| args.fmus[0].strip_prefix(*name).is_some_and(|rest| rest.starts_with('='));
+    let plain = !of_system && instances.len() == 1 && !instances.iter().any(named);
+    let naming = output::Naming { instances: &instances, plain, for_plot };
+    let written = output::write(recording, &naming, &overlays, args, &mut out);
     for text in warnings(&system, &settings) {
         message::warning(&printable(&text));
     }

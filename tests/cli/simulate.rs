@@ -346,21 +346,26 @@ fn a_first_plot_has_five_panels() {
         let output = fmu(&[&arguments[..], &["--csv", &csv, "--plot", &svg], more].concat());
         assert!(output.status.success(), "{}", text(&output.stderr));
         let header = std::fs::read_to_string(&csv).unwrap().lines().next().unwrap().to_owned();
-        assert!(header.contains("PmsmDrive.i_a,") && !header.contains("speed_ref"), "{header}");
+        assert!(
+            header.starts_with("time,speed,") && header.contains(",i_a,") && !header.contains("speed_ref"),
+            "{header}"
+        );
         std::fs::read_to_string(&svg).unwrap()
     };
     let first = run(&[]);
     for part in [
         "height=\"1200\"",
-        "PmsmDrive.speed_ref",
+        ">speed_ref</text>",
         "theta_est - theta_e",
-        "PmsmDrive.i_q_ref",
+        ">i_q_ref</text>",
+        ">Speed</text>",
+        ">Torque</text>",
         ">rpm</text>",
         ">W</text>",
     ] {
         assert!(first.contains(part), "{part}");
     }
-    assert!(!first.contains("PmsmDrive.i_a") && run(&["--all"]).contains("PmsmDrive.i_a"));
+    assert!(!first.contains(">i_a<") && run(&["--all"]).contains(">i_a<"));
 }
 
 /// The page of a run: the panels of the plot with all their points, and no external content; also for a foreign FMU.
@@ -384,12 +389,14 @@ fn a_run_is_written_as_a_page() {
     let panels = figure["panels"].as_array().unwrap();
     let units: Vec<&str> = panels.iter().map(|panel| panel["unit"].as_str().unwrap()).collect();
     assert_eq!(units, ["rpm", "N.m", "A", "W", "deg"]);
+    let titles: Vec<&str> = panels.iter().map(|panel| panel["title"].as_str().unwrap()).collect();
+    assert_eq!(titles, ["Speed", "Torque", "Current", "Power", "Angle"]);
     let names: Vec<&str> = panels
         .iter()
         .flat_map(|panel| panel["curves"].as_array().unwrap())
         .map(|curve| curve["name"].as_str().unwrap())
         .collect();
-    assert!(names.contains(&"PmsmDrive.speed_ref") && names.contains(&"theta_est - theta_e"), "{names:?}");
+    assert!(names.contains(&"speed_ref") && names.contains(&"theta_est - theta_e"), "{names:?}");
     // The time in two parts, then every curve.
     let lengths = figure["lengths"].as_array().unwrap();
     assert!(lengths.len() == names.len() + 2 && lengths.iter().all(|n| n == 21), "{lengths:?}");
@@ -397,11 +404,84 @@ fn a_run_is_written_as_a_page() {
     assert!(common::pages::figures(&long)[0]["lengths"][0] == 100_001);
     assert!(long.len() < 5_000_000, "100001 points of every output take {} bytes", long.len());
     for (option, file, remedy) in
-        [("--html", "run.svg", "pages are written as .html"), ("--all", "", "--html: add one")]
+        [("--html", "run.svg", "pages are written as .html"), ("--overlay", "run.csv", "--html: add one")]
     {
         let arguments: Vec<&str> = ["simulate", drive, option, file].into_iter().filter(|a| !a.is_empty()).collect();
         fails(&arguments, 2, &[file, remedy]);
     }
+}
+
+/// An earlier run and a measurement in the plot of a run, with their own times and units.
+#[test]
+fn runs_and_measurements_are_overlaid() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let (csv, bench, html) = (file("first.csv"), file("bench.csv"), file("both.html"));
+    std::fs::write(&bench, "t [ms];speed [rpm];torque\n0;0,0;1\n10;5,5;2\n30;6;3\n").unwrap();
+    for standard in ["fmi2", "fmi3"] {
+        let drive = archive(standard, "PmsmDrive");
+        let run = |more: &[&str]| {
+            let arguments = ["simulate", drive.to_str().unwrap(), "--stop", "0.02", "--input", "speed_ref=1000rpm"];
+            let output = fmu(&[&arguments[..], more].concat());
+            assert!(output.status.success(), "{}", text(&output.stderr));
+            (text(&output.stdout), text(&output.stderr))
+        };
+        let (said, _) = run(&["--set", "controller.estimator=Sensored", "--csv", &csv]);
+        let header = std::fs::read_to_string(&csv).unwrap().lines().next().unwrap().to_owned();
+        assert!(!header.contains("identified_") && header.contains(",energy_loss,"), "{header}");
+        assert!(
+            said.contains("not recorded, because nothing changes there in this run: identified_* (")
+                && said.contains("--all"),
+            "{said}"
+        );
+        assert!(said.contains("outputs without a change are not shown; --all shows all"), "{said}");
+        let named = format!("bench={bench}");
+        run(&["--overlay", &csv, "--overlay", &named, "--html", &html]);
+        let figures = common::pages::figures(&std::fs::read_to_string(&html).unwrap());
+        let curves: Vec<&serde_json::Value> = figures[0]["panels"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .flat_map(|panel| panel["curves"].as_array().unwrap())
+            .collect();
+        let names: Vec<&str> = curves.iter().map(|curve| curve["name"].as_str().unwrap()).collect();
+        for name in
+            ["speed", "speed_ref", "speed (first)", "speed (bench)", "i_q (first)", "theta_est - theta_e (first)"]
+        {
+            assert!(names.contains(&name), "{name}: {names:?}");
+        }
+        assert!(!names.iter().any(|name| name.contains("torque") || *name == "i_a (first)"), "{names:?}");
+        let (_, warned) = run(&["--overlay", &named, "--record", "i_a", "--html", &html]);
+        assert!(warned.contains("--overlay bench: no column is drawn; it has speed, torque, the plot i_a"), "{warned}");
+        let (_, all) = run(&["--all", "--csv", &csv]);
+        assert!(
+            std::fs::read_to_string(&csv).unwrap().contains(",identified_R_s,") && !all.contains("not recorded"),
+            "{all}"
+        );
+        // A name stays as it is written.
+        run(&["--record", "PmsmDrive.speed,tau_e", "--csv", &csv]);
+        assert!(std::fs::read_to_string(&csv).unwrap().starts_with("time,PmsmDrive.speed,tau_e\n"));
+        // The name that the user gives an instance stays, and is read back.
+        let d = format!("d={}", drive.display());
+        let output = fmu(&["simulate", &d, "--stop", "0.01", "--csv", &csv, "--overlay", &bench, "--html", &html]);
+        assert!(output.status.success(), "{}", text(&output.stderr));
+        assert!(std::fs::read_to_string(&csv).unwrap().starts_with("time,d.speed,"));
+        run(&["--overlay", &csv, "--html", &html]);
+        assert!(
+            common::pages::figures(&std::fs::read_to_string(&html).unwrap())[0].to_string().contains("speed (first)")
+        );
+    }
+    let drive = archive("fmi3", "PmsmDrive");
+    let refused = |file: &str, part: &str| {
+        fails(
+            &["simulate", drive.to_str().unwrap(), "--stop", "0.01", "--overlay", file, "--html", &html],
+            2,
+            &["--overlay", part],
+        );
+    };
+    refused("missing.csv", "missing.csv");
+    std::fs::write(&bench, "t,speed [krpm]\n0,1\n").unwrap();
+    refused(&bench, "speed [krpm]: expected the unit rad/s or rpm");
 }
 
 /// Ctrl-C keeps the results so far.

@@ -108,7 +108,7 @@ fn names_are_escaped() {
         assert_eq!(ended.status, 2);
         // In the header of a recording too.
         let ended = place.runs("simulate", &["--csv", "-"]);
-        let header = "time,x.y\\u{1b}[2J\\u{1b}]0;title\\u{7}\\u{202e}\n0,1\n";
+        let header = "time,y\\u{1b}[2J\\u{1b}]0;title\\u{7}\\u{202e}\n0,1\n";
         assert!(ended.status == 0 && ended.out.starts_with(header), "{ended:?}");
         // A name from the command line, on standard error.
         let named = format!("\u{1b}[2J={}", place.fmu().display());

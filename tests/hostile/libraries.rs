@@ -81,7 +81,7 @@ fn standard_output_is_the_recording() {
         return;
     }
     let plain = described(XML).run("simulate", &["--csv", "-"], "");
-    assert!(plain.status == 0 && plain.out.starts_with("time,x.y\n0,1\n"), "{plain:?}");
+    assert!(plain.status == 0 && plain.out.starts_with("time,y\n0,1\n"), "{plain:?}");
     let acts: Vec<String> =
         ["scribble", "print"].iter().flat_map(|act| PLACES.map(|(place, _)| format!("{place} {act}"))).collect();
     each(&acts, |how| {

@@ -39,6 +39,7 @@ mod method;
 mod parts;
 mod plan;
 mod point;
+mod quantity;
 mod recording;
 mod run;
 mod schedule;

@@ -1,6 +1,7 @@
 //! The FMUs of a system with their names, and their variables, written `instance.variable`.
 
 use super::Column;
+use super::quantity::quantity;
 use fmu_core::variable::position;
 use fmu_import::quantity::suggest;
 use fmu_import::{Error, Fmu, Instance, Kind, Logging, Values};
@@ -210,8 +211,9 @@ impl Parts {
         let display = variable.and_then(|v| description.display_unit(v, None));
         let definition = variable.and_then(|v| description.type_definition(v.declared_type.as_ref()?));
         let items = definition.map(|d| d.items.iter().map(|i| (i.value, i.name.clone())).collect());
+        let quantity = variable.map(|v| quantity(description, v)).unwrap_or_default();
         let (unit, items) = (unit.unwrap_or_default(), items.unwrap_or_default());
-        Column { name: name.into(), unit, display, items, ..Column::default() }
+        Column { name: name.into(), quantity, unit, display, items, ..Column::default() }
     }
 }
 

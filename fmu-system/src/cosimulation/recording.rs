@@ -11,6 +11,8 @@ use std::io::{self, Write};
 pub struct Column {
     /// `instance.variable`.
     pub name: String,
+    /// Physical quantity in words, such as `Angular velocity`; empty if the description does not give it.
+    pub quantity: String,
     /// Unit, empty for none.
     pub unit: String,
     /// Display unit.
@@ -48,6 +50,11 @@ impl Column {
     /// The unit to show the values in.
     pub fn shown_unit(&self) -> &str {
         self.display.as_ref().map_or(&self.unit, |display| &display.name)
+    }
+
+    /// Whether the value changes between the first and the last communication point.
+    pub fn moves(&self) -> bool {
+        self.values.iter().any(|x| x.to_bits() != self.values[0].to_bits())
     }
 
     /// The name of the enumeration's value `x`.

@@ -74,6 +74,14 @@ impl Sequence {
         headings.zip(columns).map(column).collect()
     }
 
+    /// The unit in s of a first column: `time`, `t [ms]`.
+    ///
+    /// # Errors
+    /// The unit is not one of time.
+    pub fn seconds(heading: &Heading) -> Result<f64, String> {
+        seconds(heading)
+    }
+
     fn new(points: Vec<(f64, String, String)>, unit: String) -> Result<Self, String> {
         if points.is_empty() {
             return Err("has no point".into());

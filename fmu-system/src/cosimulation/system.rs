@@ -262,6 +262,11 @@ impl System {
         self.feed(target, port, Source::Schedule(schedule))
     }
 
+    /// The columns of a recording, in the order of the requests, without values.
+    pub fn columns(&self) -> &[Column] {
+        &self.columns
+    }
+
     /// Records a variable at every communication point. A connected input is recorded as its source.
     ///
     /// # Errors

@@ -1,30 +1,55 @@
 //! The output of a run: its files, and the last lines that the command prints.
 
-use super::{Simulate, curves, overview};
-use anyhow::{Context, Result};
+use super::overlay::Overlay;
+use super::{Simulate, curves, overview, record};
+use crate::message;
+use anyhow::{Context, Result, anyhow};
+use fmu_import::printable;
 use fmu_pack::{archive, picture};
+use fmu_plot::figure::Figure;
 use fmu_plot::{page, svg};
 use fmu_system::cosimulation::Recording;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
-/// Writes the files that the arguments request. Returns the text for the user: the last values, and the files. `alone` is the
-/// name of the only instance.
+/// How a run is written.
+pub(super) struct Naming<'a> {
+    /// The instances.
+    pub(super) instances: &'a [&'a str],
+    /// Whether variables are written without their instance: there is one, and the user has not named it.
+    pub(super) plain: bool,
+    /// How many of the last columns are only for the plot.
+    pub(super) for_plot: usize,
+}
+
+/// Writes the files that the arguments request. Returns the text for the user: the last values, and the files.
 pub(super) fn write(
     mut recording: Recording,
-    for_plot: usize,
-    alone: Option<&str>,
+    naming: &Naming<'_>,
+    overlays: &[Overlay],
     args: &Simulate,
     mut out: impl Write,
 ) -> Result<String> {
-    let first_plot = (args.plot.is_some() || args.html.is_some()) && args.record.is_empty() && !args.all;
-    let plotted = (args.plot.is_some() || args.html.is_some())
-        .then(|| if first_plot { curves::figure(&overview::overview(&recording)) } else { curves::figure(&recording) });
-    recording.columns.truncate(recording.columns.len() - for_plot);
-    let mut lines = vec![match &plotted {
-        Some(figure) if first_plot => overview::at_the_end(figure, alone),
-        _ => recording.last_values(),
-    }];
+    if let (true, [instance]) = (naming.plain, naming.instances) {
+        let names =
+            recording.columns.iter_mut().map(|c| &mut c.name).chain(recording.texts.iter_mut().map(|c| &mut c.name));
+        for name in names {
+            // A name stays as the user has written it.
+            let written = args.record.iter().any(|text| text.contains(name.as_str()));
+            if let Some(plain) =
+                name.strip_prefix(*instance).and_then(|rest| rest.strip_prefix('.')).filter(|_| !written)
+            {
+                *name = plain.to_owned();
+            }
+        }
+    }
+    let all_outputs = args.record.is_empty() && !args.all;
+    let draws = args.plot.is_some() || args.html.is_some();
+    let first_plot = draws && all_outputs;
+    let plotted = if draws { Some(plotted(&recording, overlays, first_plot)?) } else { None };
+    recording.columns.truncate(recording.columns.len() - naming.for_plot);
+    let left_out = if all_outputs { record::leave_out(&mut recording, naming.instances) } else { None };
+    let mut lines = Vec::new();
     match args.csv.as_deref() {
         Some(path) if path == Path::new("-") => {
             match recording.write_csv(&mut BufWriter::new(&mut out)) {
@@ -41,6 +66,7 @@ pub(super) fn write(
         }
         None => {}
     }
+    lines.extend(left_out.filter(|_| args.csv.is_some()));
     if let (Some(path), Some(plotted)) = (&args.plot, &plotted) {
         let svg = svg::draw(plotted)?;
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
@@ -63,10 +89,43 @@ pub(super) fn write(
         archive::write(path, page::page(&names.join(", "), &body).as_bytes())?;
         lines.push(format!("page: {}\n{}", path.display(), how_to_open(&std::path::absolute(path)?)));
     }
+    let last = match &plotted {
+        Some(figure) if first_plot => overview::at_the_end(figure),
+        _ => {
+            let still = if all_outputs { record::still(&mut recording) } else { None };
+            [Some(recording.last_values()), still].into_iter().flatten().collect::<Vec<_>>().join("\n")
+        }
+    };
+    lines.insert(0, last);
     if let Some(name) = &recording.ended_by {
         lines.insert(0, format!("{name} asked to end the simulation"));
     }
     Ok(lines.join("\n"))
+}
+
+/// The figure of a run with its overlays. A warning names one of which nothing is drawn.
+fn plotted(run: &Recording, overlays: &[Overlay], first_plot: bool) -> Result<Figure> {
+    let selected = |recording: &Recording| if first_plot { overview::overview(recording) } else { recording.clone() };
+    let shown = selected(run);
+    let mut others = Vec::new();
+    for overlay in overlays {
+        let mut other = selected(&overlay.like(&run.columns).map_err(|cause| anyhow!("--overlay {cause}"))?);
+        other.columns.retain(|column| shown.column(&column.name).is_some());
+        if other.columns.is_empty() {
+            let names = |names: Vec<&str>| names.into_iter().take(12).collect::<Vec<_>>().join(", ");
+            let drawn = names(shown.columns.iter().map(|c| c.name.as_str()).collect());
+            let text = format!(
+                "--overlay {}: no column is drawn; it has {}, the plot {drawn}",
+                overlay.label,
+                names(overlay.names())
+            );
+            message::warning(&printable(&text));
+        }
+        others.push(other);
+    }
+    let labels = overlays.iter().map(|overlay| overlay.label.as_str());
+    let runs: Vec<_> = std::iter::once(("", &shown)).chain(labels.zip(&others)).collect();
+    Ok(curves::figure(&runs))
 }
 
 /// Instructions to open a page: with the command of this system, and in any browser.
