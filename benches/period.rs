@@ -55,7 +55,7 @@ impl Candidate {
     }
 }
 
-/// The loop in C as a library, or the reason why there is none.
+/// The loop in C as a library, or the reason why it could not be built.
 fn c_loop() -> Result<Library, String> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
     let (source, library) =

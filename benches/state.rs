@@ -19,7 +19,7 @@ fmu_export::export!(SensorlessController);
 fn main() {
     let (no, h) = (Fmi2Boolean(0), 1e-4);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
-    // An importer calls through pointers that the compiler does not know.
+    // An importer calls through pointers unknown to the compiler.
     let save: unsafe extern "C" fn(InstancePointer, *mut FmuState) -> c_int = black_box(fmi::fmi2GetFMUstate);
     let restore: unsafe extern "C" fn(InstancePointer, FmuState) -> c_int = black_box(fmi::fmi2SetFMUstate);
     let step: unsafe extern "C" fn(InstancePointer, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);

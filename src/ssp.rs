@@ -191,7 +191,7 @@ fn outputs<'a>(descriptions: &'a [(&'static str, ModelDescription)]) -> Vec<Outs
     descriptions.iter().flat_map(|(component, md)| outputs(md).map(|v| one(component, v))).collect()
 }
 
-/// Start values of the system's inputs: those given for the components, or those of the FMUs.
+/// Start values of the system's inputs: those given for the components, or the FMUs' own.
 fn starts(inputs: &[Outside<'_>], given: &[(&str, Parameter)]) -> Vec<(String, Value)> {
     let start = |o: &Outside<'_>| {
         let of_inner =
@@ -328,8 +328,8 @@ fn binding(name: &str) -> Element {
     Element::new("ssd:ParameterBindings").children([one])
 }
 
-/// Whether a connector can express the type of the variable. OMSimulator stops at a connector without one, and an enumeration
-/// needs its items in a file besides.
+/// Whether a connector can express the type of the variable. OMSimulator stops at a connector without a start value, and an
+/// enumeration also needs its items in a file.
 fn has_type(variable: &ModelVariable) -> bool {
     !matches!(variable.base, BaseType::Enumeration | BaseType::String | BaseType::Binary | BaseType::Clock)
 }

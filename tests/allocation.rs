@@ -1,5 +1,5 @@
 //! A step of plant and controller does not allocate, regardless of the estimator, nor does saving and restoring the FMU state
-//! with a handle that is used again. A separate test program: it replaces the allocator.
+//! with a reused handle. A separate test program: it replaces the allocator.
 #![allow(missing_docs)]
 
 #[path = "../fmu-export/tests/counting/mod.rs"]

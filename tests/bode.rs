@@ -72,7 +72,7 @@ fn servo(standard: &str, options: &str) -> Vec<Line> {
     text.lines().skip(1).map(line).collect()
 }
 
-/// The response is that of theory within a twentieth of a decibel and 0.3 degrees.
+/// The response agrees with theory within a twentieth of a decibel and 0.3 degrees.
 fn agree(what: &str, lines: &[Line], theory: impl Fn(f64) -> C) {
     assert_eq!(lines.len(), 13, "{what}");
     agree_within(what, lines, (0.05, 0.3), theory);
@@ -93,7 +93,7 @@ fn one() -> C {
     C::new(1.0, 0.0)
 }
 
-/// `z`, and the gain of a voltage that is held over a sample.
+/// `z`, and the gain of a voltage held over a sample.
 fn sampling(f: f64) -> (C, C) {
     let jw = C::new(0.0, TAU * f);
     let z = (jw * T_S).exp();
@@ -187,7 +187,7 @@ fn speed_loop(f: f64, reference: f64, load: f64) -> (C, C, C) {
 fn the_current_loop_is_the_sampled_one() {
     let locked = "--set controller.speed_loop.torque_mode=true --set plant.mechanics.imposed=true --step 1e-4";
     agree("tau_e / tau_ref", &servo("fmi3", &format!("--from tau_ref --to tau_e {locked}")), torque);
-    // Turning, the axes are decoupled but for the delay.
+    // When turning, the axes are decoupled except for the delay.
     let lines = servo("fmi2", &format!("--loop current {locked}"));
     let closed = |f: f64| current_loop(f) / (one() + current_loop(f));
     agree("--loop current", &lines, closed);
@@ -207,7 +207,7 @@ fn the_speed_loop_its_margins_and_the_impedance_of_the_shaft() {
     agree("--loop disturbance in Model Exchange", &servo("fmi3", "--loop disturbance --me"), |f| {
         speed_loop(f, 0.0, 1.0).1
     });
-    // A sensor is read at the samples; the estimate appears a sample later and holds.
+    // A sensor is read at the samples; the estimate appears a sample later and is held.
     let sensor = |f: f64| {
         let (_, w, sampled) = speed_loop(f, 0.0, 1.0);
         sampled / w / sampling(f).0 * sampling(f).1
@@ -223,7 +223,7 @@ fn both_standards_measure_the_same_bits() {
 
 #[test]
 fn the_dc_link_sees_a_constant_power() {
-    // A drive that holds speed and torque takes a constant power: Y = -P / u_dc^2, the DC link sees a negative resistance.
+    // A drive at constant speed and torque draws constant power: Y = -P / u_dc^2, a negative resistance at the DC link.
     let (load, w) = (0.05, 100.0);
     let point = format!("--input speed_ref=0:{w} --input tau_load=0:{load} --settle 0.3");
     let lines = servo("fmi3", &format!("--loop admittance {point}"));
@@ -232,7 +232,7 @@ fn the_dc_link_sees_a_constant_power() {
     agree("--loop admittance", &lines, |_| C::new(-power / (24.0 * 24.0), 0.0));
 }
 
-/// What is not linear, not settled or without effect is announced.
+/// Nonlinear, unsettled or ineffective responses are reported.
 #[test]
 fn a_doubtful_response_is_announced() {
     let drive = drive("fmi3");
@@ -249,7 +249,7 @@ fn a_doubtful_response_is_announced() {
         "--loop disturbance --settle 0.1 --frequencies 20 --amplitude 0.2 --set controller.limit.i=3 --set controller.limit.i_q=3",
     );
     assert!(said.contains("half the amplitude") && said.contains("current_limited is 1"), "{said}");
-    // Stiction holds a small torque; the amplitude is not reduced into it without a word.
+    // Stiction resists a small torque; a reduction of the amplitude into it is reported.
     let said = warnings(
         "--loop disturbance --settle 0.1 --frequencies 20 --amplitude 0.02 --set plant.mechanics.tau_coulomb=0.01",
     );
@@ -307,7 +307,7 @@ fn bad_input_is_one_line_that_names_it() {
     }
 }
 
-/// Controller and plant as two connected FMUs have the response of the drive in one.
+/// Controller and plant as two connected FMUs have the same response as the whole drive.
 #[test]
 fn the_pair_has_the_response_of_the_drive() {
     let of = |name: &str| common::archives().join("fmi3").join(name).display().to_string();
@@ -332,7 +332,7 @@ fn the_pair_has_the_response_of_the_drive() {
     agree_within("the pair", &pair, (0.05, 0.3), |f| speed_loop(f, 0.0, 1.0).1);
 }
 
-/// A load behind a spring, integrated between the communication points while the rotor goes on at its speed.
+/// A load behind a spring, integrated between the communication points while the rotor is extrapolated at its speed.
 #[derive(Clone, Default)]
 struct Train {
     c: f64,

@@ -17,7 +17,7 @@ struct Citation {
     clause: String,
 }
 
-/// The numbers with dots and their positions, except those of names, ranges and requirements (`v1.2`, `==1.2`).
+/// The numbers with dots and their positions, except in names, ranges and requirements (`v1.2`, `==1.2`).
 fn numbers(text: &str) -> Vec<(usize, &str)> {
     let (mut found, mut end) = (Vec::new(), 0);
     while let Some(digit) = text[end..].find(|c: char| c.is_ascii_digit()) {

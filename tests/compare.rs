@@ -238,7 +238,7 @@ fn the_command_writes_table_plots_and_page() {
     {
         assert!(html.contains(part), "{part}");
     }
-    // A wide table shades the edges beyond which there is more, and has the keyboard's focus to scroll.
+    // A wide table shades the edges with hidden content, and takes the keyboard focus for scrolling.
     let boxes = html.matches("<div class=\"scroll\"").count();
     assert!(boxes > 0 && html.contains(" local, linear-gradient("), "{html}");
     assert_eq!(html.matches("<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"").count(), boxes);

@@ -58,7 +58,7 @@ fn main() {}
     Wrong { name, source: RIGHT.replacen(change.0, change.1, 1), why, line }
 }
 
-/// An enumeration and what follows it.
+/// An enumeration and the code after it.
 fn enumeration(name: &'static str, derive: &str, rest: &str, why: &'static str, line: usize) -> Wrong {
     let body = "enum Fan(\"FanMode\", \"\") {\n1 Off \"Stands\";\n2 On \"Turns\";\n}";
     let source = format!("fmu_core::enumeration! {{\n{derive}\n{body}\n}}\n{rest}\n");

@@ -24,7 +24,8 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// The plots in the models' `docs`, shown by the README and by the pages, are those of a run today. `UPDATE_GOLDEN=1 cargo test
+/// The plots in the models' `docs`, shown by the README and by the pages, match a run of the present code. `UPDATE_GOLDEN=1
+/// cargo test
 /// --test documentation` accepts others.
 #[test]
 fn the_plots_are_those_of_a_run() {
@@ -35,7 +36,7 @@ fn the_plots_are_those_of_a_run() {
     keep("figure-5.svg", &svg::draw(&figure_5).unwrap());
 }
 
-/// Torque over speed on the pages: every number and every dot is that of a run, and on the curves.
+/// Torque over speed on the pages: every number and every dot comes from a run and lies on the curves.
 #[test]
 fn the_envelope_is_that_of_the_running_drive() {
     let plane = plane::envelope(&[1000.0, 2000.0, 3000.0, 3500.0, 4000.0, 4500.0, 5000.0, 5300.0]).unwrap();
@@ -60,9 +61,9 @@ fn the_envelope_is_that_of_the_running_drive() {
     keep("envelope.svg", &svg::draw(&plane::figure(vec![plane.panel])).unwrap());
 }
 
-/// Losses over speed on the page of the drive: every row and every dot is that of a run, and on the curves within 0.3 % of
-/// each loss, the torque and the efficiency. The equations have no harmonics: those of the conduction drop (p_cond, p_sw at low speed)
-/// and of the voltage held over T_s (p_iron at high speed) take up to 0.2 %.
+/// Losses over speed on the page of the drive: every row and every dot comes from a run and lies on the curves within 0.3 % of
+/// each loss, the torque and the efficiency. The equations neglect harmonics: those of the conduction drop (p_cond, p_sw at low
+/// speed) and of the voltage held over T_s (p_iron at high speed) take up to 0.2 %.
 #[test]
 fn the_losses_are_those_of_the_running_drive() {
     let text = include_str!("../drive/docs/losses.html");
@@ -174,8 +175,8 @@ fn one_floor_of_glibc() {
     }
 }
 
-/// The head of every estimator's file has the numbers of the table in `limits.html`, which `fmu compare` prints and whose test
-/// runs the cells; the text about all methods without the frame-speed term has them too.
+/// The head of every estimator's file states the numbers of the table in `limits.html`, which `fmu compare` prints and whose
+/// cells a test runs; so does the text about all methods without the frame-speed term.
 #[test]
 fn the_heads_of_the_estimators_have_the_numbers_of_the_table() {
     let read = |path: &str| std::fs::read_to_string(root().join(path)).unwrap();

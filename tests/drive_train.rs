@@ -149,7 +149,7 @@ fn the_energies_of_a_start_agree() {
     }
 }
 
-/// Only the plant, with commands from the controller's FMU: its events come with those of the controller.
+/// Only the plant, with commands from the controller's FMU: its events coincide with the controller's.
 #[test]
 fn the_plant_of_a_pair_counts_too() {
     let pair = |standard: &str, method: Method, h: f64| {

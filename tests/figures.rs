@@ -1,6 +1,6 @@
-//! The paper's figures and the behavior around them, natively: what must come out, to the tolerance given for it.
+//! The paper's figures and the behavior around them, natively: the expected results, with their tolerances.
 //!
-//! Numbers in the names are those of the project's list of reference figures.
+//! Numbers in the names refer to the project's list of reference figures.
 #![allow(missing_docs)]
 
 mod common;

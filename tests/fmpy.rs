@@ -41,7 +41,7 @@ fn drive_trains() {
     pytest("fmpy", "trains", &["test_drive_train.py"], &[]);
 }
 
-/// The examples of docs/drive-train.md, which make a map, and a flux map from a table.
+/// The examples of docs/drive-train.md, which compute a map, and a flux map from a table.
 #[test]
 fn examples_of_drive_trains_and_flux_maps() {
     let command = Path::new(env!("CARGO_BIN_EXE_fmu"));
@@ -148,7 +148,7 @@ fn the_closed_loop_as_an_ssp() {
     pytest("fmpy", "ssp", &["test_ssp.py"], &[("FMU_SSP", &folder)]);
 }
 
-/// A drive commissions itself at standstill, then turning, natively: the expected bits of the packed one.
+/// A drive commissions itself at standstill, then turning, natively: the bits expected from the packed drive.
 #[test]
 fn self_commissioning() {
     let modes = [CommissionMode::Standstill, CommissionMode::Spin];

@@ -130,7 +130,7 @@ fn controller_with(base: &str) -> Fmu {
     Fmu::open(&file).unwrap()
 }
 
-/// The last speed of the plant, and what of it arrives in the controller.
+/// The last speed of the plant, and the speed received by the controller.
 fn passed(base: &str, units: Units, method: Method) -> Result<([f64; 2], Vec<String>), Error> {
     let mut system = System::new(method).with_units(units);
     system.add("p", &open("fmi2", "PmsmPlant"), false)?;

@@ -1,4 +1,4 @@
-//! The packed FMUs in importers other than FMPy: Ecos, libcosim, an fmucontainer, PathSim, fmuloader, and on demand sofirpy,
+//! The packed FMUs in other importers than FMPy: Ecos, libcosim, an fmucontainer, PathSim, fmuloader, and on demand sofirpy,
 //! gemseo-fmu, jaxonomy, fmi-sim and rust-fmi. Each runs a start-up and a load step, and is compared with the native run of the same exchange order.
 #![allow(missing_docs)]
 
@@ -58,8 +58,8 @@ fn jaxonomy() {
     pytest_with("jaxonomy.txt", "importers", "jaxonomy", &["test_jaxonomy.py"], &[("FMU_REFERENCE", &file)]);
 }
 
-/// fmucontainer makes one FMU of the system of `fmu ssp`. In FMI 2.0 it has the bits of the system; in FMI 3.0 the speed follows its
-/// reference a step later.
+/// fmucontainer turns the system of `fmu ssp` into one FMU. In FMI 2.0 it has the bits of the system; in FMI 3.0 the speed
+/// follows its reference a step later.
 #[test]
 fn fmucontainer_reads_an_ssp_file() {
     let python = environment(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/importers/requirements.txt"));
@@ -91,7 +91,8 @@ fn fmucontainer_reads_an_ssp_file() {
     }
 }
 
-/// OMSimulator runs the systems of `fmu ssp` as they are: no warning, and the values of `fmu simulate` to the 12 digits that it prints.
+/// OMSimulator runs the systems of `fmu ssp` unchanged, without a warning, and gives the values of `fmu simulate` to the 12
+/// printed digits.
 #[test]
 #[ignore = "needs OMSimulator in PATH: half a minute"]
 fn omsimulator() {
@@ -192,7 +193,7 @@ fn fmi_sim() {
         let native = importers::drive_speed(&experiment, 0.0);
         let speed = run_fmi_sim(&program, &fmi3_without_units, &experiment).unwrap();
         assert_same(&speed, &native, "FMI 3.0", &experiment);
-        // If this fails, the copy above is no longer needed: run the archive as it is, and correct docs/import.md.
+        // If this fails, the copy above is no longer needed: run the original archive, and correct docs/import.md.
         let refused = run_fmi_sim(&program, &fmi3, &experiment).expect_err("units of FMI 3.0 are read now");
         assert!(refused.contains("unknown field"), "{refused}");
     }

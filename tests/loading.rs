@@ -1,4 +1,4 @@
-//! A thousand times loaded, run and unloaded, by eight threads with a hundred instances at once: nothing is left behind. A
+//! A thousand times loaded, run and unloaded, by eight threads with a hundred instances at once, without leftovers. A
 //! separate test program: it measures the whole process.
 #![cfg(target_os = "linux")]
 #![allow(missing_docs)]
@@ -15,7 +15,8 @@ const INSTANCES: u32 = 100;
 const CYCLES: u32 = 1000;
 /// Cycles after which the memory of a process is stable: arenas of the threads, tables of the loader.
 const WARM: u32 = 300;
-/// Bytes that may be added afterwards; ten thousands of instances live in this time, so a kilobyte each would be 10 MB.
+/// Allowed growth in bytes afterwards; tens of thousands of instances exist in this time, so a leak of a kilobyte each would be
+/// 10 MB.
 const GROWTH: u64 = 2 << 20;
 
 /// Resident memory in bytes.

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 type Files = BTreeMap<String, Vec<u8>>;
 
 const STANDARDS: [(&str, FmiVersion); 2] = [("fmi2", FmiVersion::V2), ("fmi3", FmiVersion::V3)];
-/// A folder for an unknown platform; there are no rules for its binaries.
+/// A folder for an unknown platform; its binaries are not checked.
 const ELSEWHERE: &str = "binaries/riscv64-linux/PmsmPlant.so";
 
 fn plant(standard: &str) -> PathBuf {
@@ -195,7 +195,7 @@ fn binaries(path: &Path) -> Files {
     contents(path).unwrap().1.into_iter().filter(|(name, _)| name.starts_with("binaries/")).collect()
 }
 
-/// Importers of FMI 2.0 look into darwin64 on either processor: it holds a library for both.
+/// Importers of FMI 2.0 look into darwin64 on either processor, so it contains a library for both.
 #[test]
 fn libraries_for_macos_become_a_universal_one() {
     use Platform::{ArmDarwin, X64Darwin};

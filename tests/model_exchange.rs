@@ -100,14 +100,14 @@ fn pair_and_drive_in_model_exchange() {
     }
 }
 
-/// The order of the updates, an importer that is late at events, and events that another FMU requested change nothing.
+/// Results do not depend on the order of updates, late event handling by the importer, or events requested by another FMU.
 #[test]
 fn events_in_any_order_late_and_between_others() {
     let reference = pair("fmi3", Method::default(), T_S);
     let others: Vec<f64> = (0..500).map(|k| 1.13e-3 * f64::from(k) + 3.7e-5).collect();
     let cases: [(&str, Method); 3] = [
         ("reversed", exchange(|i| i.reversed = true)),
-        // Within the width of an instant, 1e-5 T_s, as rounding makes it.
+        // Within the width of an instant, 1e-5 T_s, as after rounding.
         ("late", exchange(|i| i.late = 0.5e-9)),
         ("events of others", exchange(|i| i.extra_events.clone_from(&others))),
     ];
@@ -127,7 +127,7 @@ fn a_fixed_step_lands_on_events() {
     assert_same("RK4 at 70 us", &fixed, &reference);
 }
 
-/// The controller alone, on ramps that every sample reads at its own instant.
+/// The controller alone, with ramps sampled at their own instants.
 fn controller(method: Method, step: f64) -> Recording {
     let mut system = System::new(method);
     system.add("c", &open("fmi3", "SensorlessController"), false).unwrap();

@@ -53,7 +53,7 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let start = Instant::now();
     let said = succeeds(command("cargo", dir.path()).args(["fmu", "new", "my-model"]));
     assert!(said.contains("my-model: the FMU MyModel"), "{said}");
-    // The versions of the dependencies are those of this workspace, all of them.
+    // All dependencies have the versions of this workspace.
     succeeds(command("cargo", &folder).args(["metadata", "--locked", "--format-version", "1"]));
     let ci = fs::read_to_string(folder.join(".github/workflows/fmu.yml")).unwrap();
     let steps: Vec<&str> = ci.lines().map(|l| l.trim().trim_start_matches("run: ")).collect();
@@ -143,7 +143,7 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
     entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect()
 }
 
-/// Lines other than the model and blank ones: the manifest, imports, derives, the line that exports, the module of tests.
+/// Lines that are neither blank nor part of the model: the manifest, imports, derives, the export line, the module of tests.
 #[test]
 fn at_most_20_lines_are_not_the_model() {
     let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("template");

@@ -1,10 +1,10 @@
 //! Every option of every command, in each of its modes, changes the behavior of the command or is refused with a message that
 //! names it.
 //!
-//! The options come from the command line itself: one without a value here fails the test. A row of [`COMMANDS`] has the values
-//! and the modes of a command. Each option is added to each mode; exit status, text and files are compared with those without it.
-//! An option that is part of a mode is taken away instead. `same` lists what changes nothing in a mode, with the reason, and
-//! [`ELSEWHERE`] the options that another test covers.
+//! The options are read from the command line parser: an option without a value here fails the test. A row of [`COMMANDS`] has
+//! the values and the modes of a command. Each option is added to each mode; exit status, text and files are compared with a
+//! run without it. An option that is part of a mode is taken away instead. `same` lists options without effect in a mode, with
+//! the reason, and [`ELSEWHERE`] the options that another test covers.
 #![allow(missing_docs)]
 
 #[path = "common/mod.rs"]
@@ -27,7 +27,7 @@ struct Options {
 struct Mode {
     /// Arguments, in the folder of a run, which has the inputs in `in/`.
     line: &'static str,
-    /// Options without effect in this mode, and why that is right.
+    /// Options without effect in this mode, and the reason.
     same: &'static [(&'static str, &'static str)],
 }
 
@@ -393,7 +393,7 @@ fn run(inputs: &Path, command: &str, arguments: &[String]) -> Left {
     copy_all(inputs, &copy);
     let mut fmu = Command::new(env!("CARGO_BIN_EXE_fmu"));
     fmu.arg(command).args(arguments).current_dir(dir.path()).env("SOURCE_DATE_EPOCH", "1700000000");
-    // Outside a workspace, a default folder would be an error of Cargo.
+    // Outside a workspace, the default folder would cause a Cargo error.
     let output = fmu.env("CARGO_TARGET_DIR", "target").output().unwrap();
     fs::remove_dir_all(&copy).unwrap();
     // The log of a sweep has the time of day.
@@ -468,7 +468,7 @@ fn inputs(folder: &Path) {
     );
 }
 
-/// The arguments with the option, or without it where they have it.
+/// The arguments with the option added, or removed if already present.
 fn changed(line: &[String], option: &clap::Arg, value: Option<&str>) -> Vec<String> {
     let flag = format!("--{}", option.get_long().unwrap());
     let takes_value = option.get_action().takes_values();

@@ -68,7 +68,7 @@ fn run<M: Model>(run: &PresetRun, names: &[String]) -> Vec<Vec<f64>> {
     rows
 }
 
-/// Every figure in the text of a preset is one of its run.
+/// Every figure in the text of a preset comes from its run.
 #[test]
 fn the_presets_show_what_their_texts_say() {
     let names = ["speed", "theta_e", "theta_est", "i_d", "u_share"].map(String::from);
@@ -103,7 +103,7 @@ fn the_presets_show_what_their_texts_say() {
     near("share of the voltage", rows.last().unwrap()[4], 0.949);
 }
 
-/// A page of this text, or the reason why there is none.
+/// A page of this text, or the reason for the mismatch.
 fn refused(own: &str) -> String {
     judged(&drive(), Some((Path::new("page.toml"), own))).err().map(|e| e.to_string()).unwrap_or_default()
 }
@@ -298,7 +298,7 @@ fn a_csv_of_a_page_is_one_of_ours() {
     assert_eq!(back, numbers.map(f64::to_bits));
 }
 
-/// An address names the items of enumerations, and takes their numbers, too; a number may have the unit of the page.
+/// An address contains the names of enumeration items, or their numbers; a number may have the unit of the page.
 #[test]
 fn an_address_has_names_of_items() {
     let script = "

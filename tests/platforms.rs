@@ -1,5 +1,5 @@
 //! One archive for three platforms, run on all of them from one Linux machine on x86_64: Windows through Wine, 64-bit ARM
-//! through QEMU. Its requirements are in CONTRIBUTING.md; missing ones are printed, a line each.
+//! through QEMU. Its requirements are in CONTRIBUTING.md; missing ones are printed, one per line.
 #![allow(missing_docs)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
@@ -129,7 +129,7 @@ fn reference(md: &ModelDescription, name: &str) -> String {
     variable.unwrap_or_else(|| panic!("no {name}")).value_reference.to_string()
 }
 
-/// Every rule about archive and binaries holds, for each of the platforms.
+/// Every rule about archive and binaries is met for each platform.
 fn checked(archive: &Path) {
     let program = Some(PathBuf::from(env!("CARGO_BIN_EXE_fmu")));
     let options = check::Options { only: vec!["archive".into(), "binary".into()], program, ..Default::default() };

@@ -57,7 +57,7 @@ fn the_reference_results_are_replayed() {
             let times: Vec<f64> = text.lines().skip(1).map(|l| l.split(',').next().unwrap().parse().unwrap()).collect();
             assert!(times.windows(2).all(|t| t[0] < t[1]) && times.last() == Some(&1.0), "{file}: {times:?}");
         }
-        // The result moves: a run of constants proves nothing.
+        // The result varies: a constant run would be no evidence.
         let result = read(&format!("{name}_ref.csv"));
         let rows: Vec<&str> = result.lines().skip(1).map(|line| line.split_once(',').unwrap().1).collect();
         let last = rows.len() - 1;

@@ -133,6 +133,6 @@ fn install() {
     let bytes = fs::metadata(&wheel).unwrap().len();
     println!("G8   {}: {bytes} bytes, {seconds} s of wall time", wheel.file_name().unwrap().display());
     let _ = fs::remove_dir_all(&folder);
-    // The drives of both standards take two thirds of it.
+    // The drives of both standards make up two thirds of it.
     assert!(bytes <= 12_000_000, "{bytes} bytes");
 }

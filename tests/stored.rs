@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 const H: f64 = 1e-4;
 /// Bytes before the content, and the part of them that is the same in every state of a model.
 const HEADER: usize = 32;
-/// Maximum duration of a trial on any machine. A step of our models has at most 1e7 substeps, which take seconds.
+/// Maximum duration of a trial on any machine. A step of our models has at most 1e7 substeps and so takes seconds.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 struct Silent;
@@ -43,7 +43,7 @@ fn asked(name: &str, otherwise: u64) -> u64 {
     number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is no whole number")))
 }
 
-/// Watches the trials and ends the process with a message when one takes too long: a hang is a finding too.
+/// Watches the trials and ends the process with a message when one takes too long: a hang is also a finding.
 fn watch(name: &'static str) -> Arc<AtomicU64> {
     let trial = Arc::new(AtomicU64::new(0));
     let seen = Arc::downgrade(&trial);
@@ -67,7 +67,7 @@ fn instance<M: Model>(current: Snapshot<M>) -> Instance<Plain<M>> {
     Instance::new(Standard::Fmi3, "stored".into(), Log::new(Box::new(Silent), false), current)
 }
 
-/// Sets the variable `name`, if the model has it.
+/// Sets the variable `name`, if it exists.
 fn put<M: Model>(current: &mut Snapshot<M>, name: &str, value: f64) {
     let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name));
     if let Some((_, fmu_core::Slot::Real(x))) = index.and_then(|i| M::TABLE.entry(&mut current.block, i)) {
@@ -128,7 +128,7 @@ fn damaged(seeds: &[Vec<u8>], draw: &mut Draw) -> (Vec<u8>, bool) {
             // The longest integers of the encoding.
             6 => bytes[at..body.min(at + 10)].fill(0xff),
             7 => {
-                // The beginning of one and the rest of another, not always at its offset.
+                // The beginning of one and the remainder of another, not always at its offset.
                 let other = &seeds[draw.below(seeds.len())];
                 let from = HEADER + draw.below(length);
                 let end = body.min(at + (other.len() - 4).saturating_sub(from));
@@ -225,7 +225,7 @@ fn damage<M: Model>(seeds: &[Vec<u8>], trials: u64) {
     }
     println!("{name}: {trials} trials, {taken} taken, the longest step {longest:?}");
     assert!(taken > trials / 100, "{name}: hardly any damage was plausible, so this tests nothing: {taken}");
-    // Damage of a free number gives another valid state, so the content has no share that must be refused.
+    // Damage of an unconstrained number gives another valid state, so no particular share must be refused.
     assert!(longest < PATIENCE / 3, "{name}: a step of {longest:?}");
 }
 

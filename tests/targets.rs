@@ -57,7 +57,7 @@ fn tools_that_are_missing() {
     let mingw = ["x86_64-w64-mingw32-gcc is missing", "apt install gcc-mingw-w64-x86-64-win32"];
     fails("x86_64-pc-windows-gnu", "", &[], &mingw);
     fails("x86_64-pc-windows-msvc", "", &[], &["only on Windows", "use x86_64-pc-windows-gnu"]);
-    // Nothing is compiled for the first when something is missing for the second.
+    // Nothing is compiled for the first target if a tool for the second is missing.
     fails(&format!("{}-unknown-linux-gnu,x86_64-pc-windows-gnu", std::env::consts::ARCH), "", &[], &mingw);
     // A target without a separate linker that could be missing, and hardly ever a standard library here.
     let rare = "aarch64-pc-windows-gnullvm";
@@ -106,7 +106,7 @@ fn a_plain_build_names_its_requirements() {
 
 #[test]
 fn two_targets_of_one_platform() {
-    // Named linkers and a standard library from source: nothing is missing.
+    // With named linkers and a standard library from source, nothing is missing.
     let environment = [
         ("CARGO_TARGET_X86_64_PC_WINDOWS_GNU_LINKER", "ld"),
         ("CARGO_TARGET_X86_64_PC_WINDOWS_MSVC_LINKER", "ld"),

@@ -184,7 +184,7 @@ fn files_have_what_differs_from_the_start_values() {
     assert!(!text.contains("\"motor.n_p\""), "3 pole pairs are the start value");
 }
 
-/// The reference motor with one line of it changed.
+/// The reference motor with one line changed.
 fn changed(from: &str, to: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("motors/reference.toml");
     let text = std::fs::read_to_string(path).unwrap();
@@ -228,7 +228,8 @@ fn a_wrong_file_is_told_with_place_and_remedy() {
     refused("[bandwidth]", "[bandwidth", &["m.toml:26:"]);
 }
 
-/// The estimator of the command line is that of the files, with `--json` too; another name is refused before anything is written.
+/// The estimator of the command line is used in the files, and with `--json`; an unknown name is refused before anything is
+/// written.
 #[test]
 fn the_estimator_of_the_command_line_counts() {
     let motor = Path::new(env!("CARGO_MANIFEST_DIR")).join("motors/reference.toml");
@@ -339,8 +340,8 @@ fn a_motor_file_is_enough_outside_a_checkout() {
     assert!(refused.status.code() == Some(2) && said.lines().count() == 1 && said.contains("none.toml"), "{said}");
 }
 
-/// docs/identify.md: the commands from a record to a running drive, and from a motor on the table, exactly as printed. `fmu build` has
-/// run: its archive is there.
+/// docs/identify.md: the commands from a record to a running drive, and from a motor on the table, exactly as printed. `fmu
+/// build` has run and written its archive.
 #[test]
 fn a_record_and_a_commissioning_become_running_drives() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));

@@ -31,7 +31,7 @@ fn fresh(version: FmiVersion) -> Instance {
     Fmu::open(archive(version)).unwrap().instantiate("it", false).unwrap()
 }
 
-/// In Initialization Mode: FMI 2.0 reads nothing before it.
+/// In Initialization Mode, because FMI 2.0 allows no reads before it.
 fn entered(version: FmiVersion) -> Instance {
     let mut instance = fresh(version);
     instance.setup(0.0, None).unwrap();
@@ -97,7 +97,7 @@ fn what_does_not_fit_says_why() {
         let error = fresh(version).set(name, &integer(value)).unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
     }
-    // FMI 2.0 cannot carry the final value of a 64-bit variable.
+    // FMI 2.0 cannot represent the final value of a 64-bit variable.
     for version in [V2, V3] {
         let mut instance = entered(version);
         instance.set("fixed.uint64", &integer(100_000)).unwrap();
@@ -121,7 +121,7 @@ fn single_precision_rounds_once() {
         assert_eq!(v.start.unwrap(), if version == V2 { "0.10000000149011612" } else { "0.1" });
         instance.set("in.single", &Values::Reals(vec![0.2])).unwrap();
         assert_eq!(instance.get("out.single").unwrap(), Values::Reals(vec![f64::from(0.2_f32)]));
-        // The bound is rounded too, and a value beyond single precision is not a number.
+        // The bound is also rounded, and a value outside single precision is not a number.
         instance.set("in.single", &Values::Reals(vec![0.3])).unwrap();
         for (beyond, said) in [(0.301, "0.301"), (-1e39, "-")] {
             let error = fresh(version).set("in.single", &Values::Reals(vec![beyond])).unwrap_err().to_string();
@@ -291,7 +291,7 @@ fn a_parameter_file_sets_texts() {
     }
 }
 
-/// Names with commas, patterns, truth values and items over time and in files; what is wrong with a file is named.
+/// Names with commas, patterns, truth values and items over time and in files; errors in a file are reported.
 #[test]
 fn the_command_line_reads_names_values_and_tables() {
     let folder = tempfile::tempdir().unwrap();

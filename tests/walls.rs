@@ -123,7 +123,7 @@ fn what_builds_fmus_knows_no_motor_and_no_command_line() {
     }
 }
 
-/// A library has an error type with cases or a text; the command alone collects errors of every kind.
+/// A library has an error type with cases or a text; only the command collects errors of every kind.
 #[test]
 fn the_command_alone_depends_on_anyhow() {
     for (name, (folder, _)) in &crates() {
@@ -144,7 +144,7 @@ fn a_sweep_knows_no_motor_no_thread_pool_and_no_generator() {
     }
 }
 
-/// The release profile saves compile time in the crates of the command alone.
+/// The release profile saves compile time in the crates used only by the command.
 #[test]
 fn what_an_fmu_links_is_fully_optimized() {
     let manifest: toml::Table = std::fs::read_to_string(root().join("Cargo.toml")).unwrap().parse().unwrap();
@@ -190,7 +190,7 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
                 assert_eq!(allows, expected, "{}", file.display());
             }
         } else if *name == "fmurun" {
-            // PyO3's macros expand to unsafe code that allows itself, which `forbid` does not allow.
+            // PyO3's macros expand to `unsafe` with an `allow`, which `forbid` rejects.
             assert!(lib.contains("#![deny(unsafe_code)]"), "{name}");
             let mut files = Vec::new();
             sources(&folder.join("src"), &mut files);
@@ -349,7 +349,7 @@ fn no_two_crates_share_the_name_of_a_public_type() {
     assert!(gone.is_empty(), "remove from SHARED, because one crate alone has the type: {gone:?}");
 }
 
-/// A line of source fits a screen; the rows of a long table are several lines each.
+/// A line of source fits a screen; rows of a long table are split into several lines.
 #[test]
 fn no_line_is_longer_than_160_characters() {
     for (folder, _) in crates().values() {
@@ -433,7 +433,7 @@ const SMALL: &[(&str, &[&str])] = &[
     ("fmu-system", &["cosimulation/exchange.rs", "cosimulation/loops.rs"]),
 ];
 
-/// Dependencies between files go one way, so that a file can be read alone.
+/// Dependencies between files go one way, so a file can be read alone.
 #[test]
 fn the_circles_of_files_are_those_listed() {
     assert!(STAYING.len() <= 2 && STAYING.len() + SMALL.len() <= 10, "too many circles of files");

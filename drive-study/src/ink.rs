@@ -14,7 +14,7 @@ const LIGHT: &[Ink] = &[
 const DARK: &[Ink] =
     &["#0775b9", "#ae520a", "#0d8557", "#a1469c", "#8d6a06", "#695dc8", "#bb3e48", "#a40cf0", "#0c58f0", "#735e7d"];
 
-/// Gray for the sensor, with which all others are compared.
+/// Gray for the sensor, the reference for all others.
 const SENSOR: &[Ink] = &["#7d8489"];
 
 fn tones(kind: Kind) -> &'static [Ink] {
@@ -25,7 +25,7 @@ fn tones(kind: Kind) -> &'static [Ink] {
     }
 }
 
-/// The color of an estimator. A variant has the color of its estimator and a dashed line.
+/// The color of an estimator. A variant is drawn dashed in the color of its estimator.
 pub fn of(kind: Kind) -> Ink {
     let tones = tones(kind);
     let before = Kind::ALL.iter().take_while(|other| **other != kind);

@@ -7,7 +7,7 @@ use std::path::Path;
 pub(crate) struct Folder<'a>(&'a Path);
 
 impl<'a> Folder<'a> {
-    /// The folder at `path`, created where it is missing.
+    /// The folder at `path`, created if missing.
     ///
     /// # Errors
     /// It cannot be created.

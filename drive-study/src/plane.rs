@@ -98,7 +98,7 @@ impl Reference {
         f64::from(self.pair.plant.model.parameters.motor.n_p) * rpm * RPM
     }
 
-    /// The greatest torque of the sign `s`.
+    /// The maximum torque with sign `s`.
     fn limit(&self, rpm: f64, s: f64) -> Limit {
         self.envelope.settled(self.electrical(rpm), s, self.U)
     }
@@ -241,7 +241,7 @@ pub struct Split {
     pub points: Vec<[OperatingPoint; 2]>,
 }
 
-/// The losses of the reference drive with `torque` (N.m) at the shaft, or the greatest torque where this is less, up to
+/// The losses of the reference drive with `torque` (N.m) at the shaft, or the maximum torque if that is less, up to
 /// `highest` (rpm): curves by the equations, dots of the running drive at the speeds of `measured` (rpm).
 ///
 /// # Errors

@@ -45,7 +45,7 @@ pub fn drive(kind: Kind) -> Pair {
     (par.motor, par.J) = (machine(), 15e-3);
     par.current.bandwidth = TAU * 200.0;
     par.current.active_resistance = true;
-    // The figures of the flux observer are those of its low-speed law alone.
+    // The figures of the flux observer use only its low-speed law.
     par.current.mtpa = kind != Kind::FluxObserver;
     (par.speed_loop.bandwidth, par.speed_loop.t_is, par.speed_loop.b) = (TAU * 5.0, 4.0, 1.0);
     (par.limit.i_q, par.limit.i, par.limit.tau) = (15.0, 15.0, 1.6 * RATED_TORQUE);
@@ -63,7 +63,7 @@ pub fn drive(kind: Kind) -> Pair {
         par.estimators.emf.bandwidth = TAU * 300.0;
     }
     if kind == Kind::FluxObserver {
-        // Nothing lags behind the flux; the resistance and the magnet flux come slowly enough to tell them apart.
+        // The flux is not filtered; the resistance and the magnet flux adapt slowly enough to be separable.
         par.estimators.tracker.bandwidth = TAU * 60.0;
         par.estimators.adaptation.bandwidth = 5.0;
     }
@@ -111,7 +111,7 @@ pub fn turning(mut pair: Pair, speed: f64) -> Pair {
     pair
 }
 
-/// A drive at rest, and what 1 pu of its speed and of its load is.
+/// A drive at rest, with the values of 1 pu of speed and load.
 #[derive(Clone)]
 pub struct Bench {
     /// Plant and controller.

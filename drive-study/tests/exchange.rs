@@ -2,10 +2,10 @@
 //! `drive/control/docs/limits.html` and `docs/import.md`.
 //!
 //! The controller takes the currents at its sample k and shows the command of that sample, and theta^ for the instant one
-//! period later, at the end of the step. Jacobi: the currents are those of t_k, the command acts in [t_k + T_s, t_k + 2 T_s],
+//! period later, at the end of the step. Jacobi: the currents were measured at t_k, the command acts in [t_k + T_s, t_k + 2 T_s],
 //! theta^ is recorded at the instant to which it applies. Controller first: the plant receives the command in the same step,
-//! delay 0. Plant first: the currents are already those of t_k + T_s and the command acts from that instant, delay 0, but theta^
-//! applies to t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
+//! delay 0. Plant first: the currents were already measured at t_k + T_s and the command acts from that instant, delay 0, but
+//! theta^ applies to t_k + 2 T_s: recorded at t_k + T_s it leads by w T_s with the right delay.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "common/shows.rs"]
@@ -107,13 +107,13 @@ fn steady(order: Order, delay: i32, load: f64) -> Steady {
     Steady(wrap(p.controller.out.theta_est - plant.theta_e).to_degrees(), plant.i_d, plant.i_q)
 }
 
-/// A number as the pages have it: no zero with a sign.
+/// A number as the pages print it: no negative zero.
 fn number(x: f64, decimals: usize) -> String {
     let half = 0.5 * 0.1_f64.powi(i32::try_from(decimals).unwrap());
     format!("{:.decimals$}", if x.abs() < half { 0.0 } else { x }).replace('-', "−")
 }
 
-/// The pages have the run of every order with every delay, and the current alone shows which is right.
+/// The pages list a run for every order and delay, and only the current shows which is right.
 #[test]
 fn order_and_delay() {
     for order in Order::ALL {

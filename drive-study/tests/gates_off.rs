@@ -19,7 +19,7 @@ use std::f64::consts::FRAC_PI_2;
 fn off(set: impl FnOnce(&mut PlantParameters)) -> SteppedPlant {
     let mut off = SteppedPlant::new(set);
     off.block.model.inputs.enable = false;
-    // What the controller asks for does not matter.
+    // The controller's request has no effect.
     off.block.model.inputs.u.a = 100.0;
     off.block.initialize();
     off
@@ -37,7 +37,7 @@ impl SteppedPlant {
 
 #[test]
 fn no_current_below_the_voltage_of_the_link() {
-    // 395 rad/s: the line-to-line EMF of 308 V stays below 325 V. Friction alone slows the rotor down.
+    // 395 rad/s: the line-to-line EMF of 308 V stays below 325 V. Only friction slows the rotor down.
     let (w_0, t) = (395.0, 0.5);
     let mut off = off(|par| par.initial.speed = w_0);
     for _ in 0..5000 {
@@ -75,7 +75,7 @@ fn a_current_decays_into_the_link_and_stays_away() {
         }
     }
     assert!(h_left > 1e-5 && h_left < 1e-3, "the current was gone after {h_left} s");
-    // What was left when the diodes blocked counts as lost.
+    // Energy left when the diodes block counts as loss.
     let last = off.block.out.energy;
     let balance = last.r#in - first.r#in - (last.mech - first.mech) - (last.loss - first.loss) + before;
     assert!(before > 5e-3 && balance.abs() < 1e-6 * before, "{balance} J of {before} J unaccounted for");
@@ -145,7 +145,7 @@ fn without_a_link_the_diodes_short_the_machine() {
 #[test]
 fn a_narrow_zone_does_not_take_for_ever() {
     let mut off = off(|par| (par.initial.speed, par.inverter.i_zero) = (600.0, 1e-12));
-    // At most a hundred substeps in a period, for any i_zero: else this one would be refused.
+    // At most a hundred substeps per period for any i_zero; otherwise this one would be refused.
     off.step(5.0);
     assert!(off.block.out.i.a == 0.0 && off.block.out.speed < 420.0, "{:?}", off.block.out);
 }

@@ -1,4 +1,4 @@
-//! The figures of the estimators by injection in closed loop: tolerance 10 % or 0.3 deg where none is given.
+//! The figures of the estimators by injection in closed loop: tolerance 10 % or 0.3 deg unless stated otherwise.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "common/rated.rs"]
@@ -13,7 +13,7 @@ use drive_study::runner::{drive as preset, *};
 use rated::{load_step, steady};
 use std::f64::consts::TAU;
 
-/// One row of the table: what is set and what must come out.
+/// One row of the table: the setting and the expected result.
 struct Method {
     name: &'static str,
     kind: Kind,
@@ -85,8 +85,8 @@ fn error_at_standstill_and_low_speed() {
 /// The second way to the standard deviation: the noise of the currents through the demodulation and the PLL.
 ///
 /// Per axis sigma^2 = 2/3 (noise^2 + resolution^2 / 12). The demodulation turns it into an error of the density g sigma /
-/// (2 T_s D U) per sample, with the gain g of its filter at the carrier and U the voltage it works with; the PLL lets
-/// 2 B T_s of it pass, B = 5/8 rho.
+/// (2 T_s D U) per sample, with the gain g of its filter at the carrier and U the voltage it works with; the PLL passes 2 B T_s
+/// of it, B = 5/8 rho.
 #[test]
 fn noise_is_that_of_the_currents() {
     let (noise, resolution, T_s) = (0.01, 40.0 / 4096.0, 1e-4);
@@ -148,7 +148,7 @@ fn current_and_loss_of_the_carrier() {
     }
 }
 
-/// The mechanical observer has no lag of the speed: it also holds and takes the load.
+/// The mechanical observer does not lag behind the speed, so it also withstands the load step.
 #[test]
 fn load_with_the_mechanical_observer() {
     for method in &METHODS {

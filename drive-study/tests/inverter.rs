@@ -1,4 +1,4 @@
-//! The pictures of `docs/inverter.md` are those of a run today.
+//! The pictures of `docs/inverter.md` match a run of the present code.
 #![allow(missing_docs)]
 
 use drive::frame::{AlphaBeta, Phases};
@@ -11,7 +11,7 @@ use fmu_plot::ink::{CURVES, REFERENCE};
 use fmu_plot::svg;
 use std::path::Path;
 
-/// Checks that the picture `name` in `docs/` is this one.
+/// Compares the picture `name` in `docs/` with this one.
 fn keep(name: &str, figure: &Figure) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name);
     let drawn = svg::draw(figure).unwrap();

@@ -1,4 +1,4 @@
-//! The figures of the Kim & Sul review in closed loop: tolerance 10 % or 0.3 deg where none is given.
+//! The figures of the Kim & Sul review in closed loop: tolerance 10 % or 0.3 deg unless stated otherwise.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "common/rated.rs"]
@@ -80,7 +80,7 @@ fn half_a_load_step_at_half_the_speed() {
         (Kind::VoltageModel, 0.070, 1.5),
         (Kind::CurrentModel, 0.070, 1.5),
         (Kind::VoltageFeedback, 0.102, 6.6),
-        // Not in the review: better than ExtendedEmf, as its bandwidth at this speed is three times that of the tracker there.
+        // Not in the review: better than ExtendedEmf, because at this speed its bandwidth is three times the tracker's.
         (Kind::KalmanFilter, 0.073, 0.7),
     ];
     for (kind, dip, peak) in expected {
@@ -95,7 +95,7 @@ fn speed_bandwidths() {
     for kind in ON_THE_EMF.into_iter().chain([Kind::VoltageFeedback]) {
         near("speed bandwidth", kind, speed_bandwidth(&preset(kind), 0.5), 10.6, 1.06);
     }
-    // Where the review's list quotes a bandwidth, it is that of a faster speed loop: 26 and 60 Hz.
+    // The bandwidths in the review's list (26 and 60 Hz) apply to a faster speed loop.
     for kind in MODELS.into_iter().chain([Kind::KalmanFilter]) {
         let fast = with(kind, |p| p.speed_loop.bandwidth = TAU * 26.0);
         near("speed bandwidth", kind, speed_bandwidth(&fast, 0.5), 52.0, 5.2);

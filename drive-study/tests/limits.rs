@@ -1,4 +1,4 @@
-//! The numbers of `drive/control/docs/limits.html`, the limits on every documentation page: each row is that of a run.
+//! The numbers of `drive/control/docs/limits.html`, the limits on every documentation page: each row comes from a run.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "common/rated.rs"]
@@ -26,7 +26,7 @@ fn holds(cells: &[String]) {
     shows("drive/control/docs/limits.html", PAGE, &row);
 }
 
-/// A number as the page has it.
+/// A number as printed on the page.
 fn number(x: f64, decimals: usize) -> String {
     let half = 0.5 * 0.1_f64.powi(i32::try_from(decimals).unwrap());
     let text = format!("{:.decimals$}", if x.abs() < half { 0.0 } else { x });
@@ -48,7 +48,7 @@ fn error(pair: &Pair) -> f64 {
     wrap(pair.controller.out.theta_est - pair.plant.out.theta_e).to_degrees()
 }
 
-/// Runs a pair in steps of `h` (s); `each` sees it before every step with the time, and at the end.
+/// Runs a pair in steps of `h` (s); `each` is called with it and the time before every step and at the end.
 fn run(pair: &mut Pair, h: f64, duration: f64, each: impl FnMut(f64, &mut Pair)) {
     assert!(runner::run_in_steps(pair, h, duration, each).unwrap(), "a step failed");
 }
@@ -164,7 +164,7 @@ fn torque_at_zero_speed() {
     }
 }
 
-/// Speed up to which each injection holds rated load, in tenths of the rated speed.
+/// Speed up to which each injection method holds rated load, in tenths of the rated speed.
 #[test]
 fn injection_at_speed() {
     let up_to = |kind: Kind| {

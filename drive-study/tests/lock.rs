@@ -41,7 +41,7 @@ fn preset(kind: Kind) -> Pair {
     turning(runner::drive(kind), speed)
 }
 
-/// Kinds whose estimate cannot lose the rotor, or finds it back within a sample or two of an overload.
+/// Kinds whose estimate cannot lose the rotor, or recovers within a sample or two after an overload.
 const SURE: [Kind; 6] = [
     Kind::Sensored,
     Kind::Rasmussen,
@@ -155,7 +155,7 @@ fn run_away() {
     assert!(peak > 1.0, "{peak}");
 }
 
-/// Finite inputs beyond all measure: the outputs stay finite, it is said, and afterwards the controller works again.
+/// Absurdly large but finite inputs: the outputs stay finite, the loss is reported, and afterwards the controller works again.
 #[test]
 fn finite_inputs_give_finite_outputs() {
     for &kind in Kind::ALL {

@@ -31,7 +31,7 @@ fn methods_are_compared_on_a_machine() {
         let load = values(&on, kind, "load");
         assert!(load[0] < 30.0 && load[2] > 0.01 && load[2] < 0.5, "{}: {load:?}", kind.name());
     }
-    // What a sensor sees does not depend on parameters; the EMF vanishes with the speed; an injection works at standstill.
+    // A sensor does not depend on parameters; the EMF vanishes at zero speed; injection works at standstill.
     for id in ["lowest", "r-high", "r-low", "l-q", "psi", "dead-time"] {
         assert_eq!(values(&on, Kind::Sensored, id), [0.0], "{id}");
     }

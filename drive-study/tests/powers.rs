@@ -50,12 +50,12 @@ impl SteppedPlant {
     }
 }
 
-/// Energy in J that passed the DC link both ways, and how much of it is not accounted for, over 40 ms in steps of `h` (s) in
-/// which the current is held at `i` (A) and let go in turn.
+/// Energy in J that passed the DC link both ways, and the unaccounted part, over 40 ms in steps of `h` (s) in which the current
+/// is alternately held at `i` (A) and released.
 fn unbalanced(mut plant: SteppedPlant, i: Dq, h: f64, mut input: impl FnMut(&mut SteppedPlant, u32)) -> (f64, f64) {
     let (mut passed, mut sums, start) = (0.0, Energy::default(), plant.accounted());
     for k in 0..whole(0.04 / h) {
-        // A voltage is held for three steps at least: it turns against the rotor.
+        // A voltage is held for at least three steps, so it turns relative to the rotor.
         if k % 3 == 0 {
             plant.hold(if k % 40 < 30 { i } else { Dq::ZERO });
         }
@@ -83,7 +83,7 @@ fn whole(x: f64) -> u32 {
 /// Steps in s below, at and above the sample period; none divides another.
 const STEPS: [f64; 4] = [7e-6, 3.7e-5, T_S, 1e-3];
 
-/// Nothing is missing beyond the error of the integration. The dead time has a kink where a current crosses zero, which a substep
+/// The balance is exact up to the integration error. The dead time has a kink where a current crosses zero, which a substep
 /// of 50 us misses: twice the error.
 fn balanced(case @ (.., dead_time): (f64, Dq, f64), passed: f64, lost: f64) {
     let allowed = if dead_time > 0.0 { 2e-6 } else { 1e-6 };
@@ -121,7 +121,7 @@ fn energy_is_balanced_with_an_imposed_speed() {
     };
     for h in STEPS {
         for i in [Dq::new(-4.0, 3.0), Dq::new(1.0, -5.0)] {
-            // The load of a free shaft is not read; the angle of the drive train jumps by as much as an acceleration makes it.
+            // The load of a free shaft is not read; the angle of the drive train jumps by the effect of an acceleration.
             for dead_time in [0.0, 2e-6] {
                 let (passed, lost) = unbalanced(SteppedPlant::new(|par| imposed(par, dead_time)), i, h, |plant, k| {
                     let inputs = &mut plant.block.model.inputs;
@@ -214,7 +214,7 @@ fn the_drive_shows_the_means_of_its_last_sample_period() {
 
 #[test]
 fn a_steady_state_by_hand() {
-    // i_q = 4 A held at 200 rad/s, nothing else: p_in = copper + torque times speed, regardless of the voltage's turn in the step.
+    // Only i_q = 4 A, held at 200 rad/s: p_in = copper + torque times speed, regardless of the voltage's turn in the step.
     let mut plant = SteppedPlant::new(|par| par.mechanics.imposed = true);
     plant.block.model.inputs.speed_shaft = 200.0;
     for _ in 0..2000 {
@@ -251,7 +251,7 @@ fn accelerated(par: &mut PlantParameters) {
     par.initial.theta_e = 0.9;
 }
 
-/// A voltage that accelerates and brakes, a function of time alone.
+/// A voltage that accelerates and brakes, as a function of time.
 fn excite(plant: &mut SteppedPlant, k: u32, h: f64) {
     let t = f64::from(k) * h;
     let theta = 0.9 + 3.0 * 300.0 * t;
@@ -259,8 +259,8 @@ fn excite(plant: &mut SteppedPlant, k: u32, h: f64) {
     plant.block.model.inputs.u = Phases::from_stator(Axis::<Rotor>::at(theta).to_stator(u));
 }
 
-/// Maximum deviation of a current (A) and of the speed (rad/s) that `tau_shaft` gives, when the free run is imposed, and
-/// the bound of the former: an acceleration turns the true rotor on by half of it times h^2 before the next angle comes.
+/// Maximum deviation of a current (A) and of the speed (rad/s) from `tau_shaft` when the free run is imposed, and the bound of
+/// the former: between two angles, an acceleration a turns the true rotor by a h^2 / 2.
 fn imposed(h: f64, steps: u32) -> (f64, f64, f64) {
     let run = free(h, steps);
     let mut plant = SteppedPlant::new(|par| {

@@ -19,7 +19,7 @@ fn drive(k_a: Option<f64>) -> Drive {
     drive
 }
 
-/// The pair of that drive with this estimate of the resistance, a share of the true one.
+/// That drive as a pair, with its resistance estimate as a share of the true value.
 fn pair(R_hat: f64, k_a: Option<f64>) -> Pair {
     let mut pair = drive(k_a).bench.pair;
     pair.controller.model.parameters.motor.R_s = R_hat * pair.plant.model.parameters.motor.R_s;
@@ -62,7 +62,7 @@ fn adaptation_holds_what_the_wrong_resistance_loses() {
     }
 }
 
-/// A loaded drive at rest, turned to 36 deg by `k_a`, starts to a creeping speed, and R^ is right.
+/// A loaded drive at rest, turned to 36 deg by `k_a`, starts to a creeping speed with the right R^.
 #[test]
 fn leaves_a_loaded_rest() {
     for (R_hat, load, rpm) in [(0.8, -1.0, 10.0), (1.2, 1.0, 20.0)] {
@@ -92,8 +92,8 @@ fn lost_by(cells: &[Cell], drive: Drive) -> Vec<Cell> {
     atlas::run(&[drive], cells, 2, || ()).unwrap()[0].that_are(true).map(|(cell, _)| *cell).collect()
 }
 
-/// Noise, offsets and a compensated dead time: standstill, 15 and 30 rpm under every load. For comparison, the error due to
-/// offsets alone and due to the dead time at a zero crossing.
+/// Noise, offsets and a compensated dead time: standstill, 15 and 30 rpm under every load. For comparison, the errors due to
+/// offsets only and to dead time at a zero crossing.
 #[test]
 fn a_real_inverter_near_standstill() {
     let grid = Grid {
@@ -115,7 +115,7 @@ fn a_real_inverter_near_standstill() {
 }
 
 /// R rises by 40 % at 30 rpm without a load and at 60 rpm generating: lost without the tracking. A start from an angle error of
-/// 120 deg needs none, because the drive waits until R^ is measured.
+/// 120 deg needs no adaptation, because the drive waits until R^ is measured.
 #[test]
 fn tracks_the_resistance_at_creep() {
     let heating = |load| Cell { scenario: Course::Heating, ..cell(1.0, 1.0, load, 60.0) };
@@ -147,7 +147,7 @@ fn nothing_adapts_unless_asked() {
     assert!((end(pair(0.9, Some(0.0))) - 2.0).abs() < 0.01);
 }
 
-/// A new value of `motor.R_s` does not move the adapted one.
+/// A new value of `motor.R_s` does not change the adapted one.
 #[test]
 fn retunes_without_a_bump() {
     let mut pair = pair(0.9, Some(0.02));

@@ -76,7 +76,7 @@ fn the_values_of_the_example_lie_inside_their_intervals() {
     let pair = on_bench::drive();
     for (name, truth) in truth(&pair) {
         let value = value(&found, name);
-        // The d-axis saturates: the inductance is one between those of no current and of 10 A.
+        // The d-axis saturates: the inductance lies between its values at 0 and 10 A.
         let low = if name == "L_d" { chord(&pair, 10.0) } else { truth };
         println!("{name}: {low} to {truth}");
         let (below, above) = (value.value * (1.0 - value.half_width), value.value * (1.0 + value.half_width));

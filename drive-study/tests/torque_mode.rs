@@ -19,7 +19,7 @@ fn torque(tau_ref: f64, set: impl FnOnce(&mut Pair)) -> Pair {
     pair.start().unwrap();
     pair.controller.model.inputs.tau_ref = tau_ref;
     for _ in 0..500 {
-        // The speed reference does nothing.
+        // The speed reference has no effect.
         pair.set_inputs(-1e3, 0.0, 540.0);
         pair.step(T_S).unwrap();
     }
@@ -51,7 +51,7 @@ fn within_the_limits() {
 
 #[test]
 fn beside_the_low_speed_current() {
-    // Rasmussen at standstill with a locked rotor: i_d = 5 A has priority over i_q, and the torque is that of i_q.
+    // Rasmussen at standstill with a locked rotor: i_d = 5 A has priority over i_q, and the torque comes from i_q.
     let mut pair = Pair::default();
     pair.controller.model.parameters.speed_loop.torque_mode = true;
     pair.plant.model.parameters.mechanics.imposed = true;
@@ -169,8 +169,8 @@ fn a_pulsating_shaft() {
     }
 }
 
-/// The reference drive with R^ = `share` R and without a load, 2.7 s after `i_q` (A) of torque: the speed as a share of that of the
-/// whole torque, and whether it was said that nothing moves.
+/// The reference drive with R^ = `share` R and without a load, 2.7 s after `i_q` (A) of torque: the speed as a share of that at
+/// full torque, and whether standstill was reported.
 fn moved(share: f64, i_q: f64, set: impl FnOnce(&mut Pair)) -> (f64, bool) {
     let mut pair = Pair::default();
     let mechanics = &mut pair.plant.model.parameters.mechanics;
@@ -191,8 +191,8 @@ fn moved(share: f64, i_q: f64, set: impl FnOnce(&mut Pair)) -> (f64, bool) {
     (pair.plant.out.speed / (2.7 * tau / 0.05), said)
 }
 
-/// R^ < R swallows a torque below 0.4 of (2 - sqrt 2) i_0 sqrt((R - R^) i_0 / (psi_M c_1)), and says so; above the whole, and with
-/// R^ = R, the rotor turns.
+/// With R^ < R the drive does not produce a torque below 0.4 of (2 - sqrt 2) i_0 sqrt((R - R^) i_0 / (psi_M c_1)), and reports
+/// it; above the full value, and with R^ = R, the rotor turns.
 #[test]
 fn a_small_torque_that_moves_nothing_is_said() {
     let i_0 = 5.0_f64;
@@ -208,7 +208,7 @@ fn a_small_torque_that_moves_nothing_is_said() {
 }
 
 /// With `release`, a zero torque reference means no current, and a new torque reference turns the rotor; without it, i_0 flows,
-/// and holds a small load with R^ < R.
+/// and holds a small load if R^ < R.
 #[test]
 fn no_torque_releases_the_shaft() {
     for release in [false, true] {

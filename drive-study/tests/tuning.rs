@@ -18,14 +18,14 @@ use std::path::Path;
 
 const T_S: f64 = 1e-4;
 
-/// The place of a variable in its model's table.
+/// The index of a variable in its model's table.
 fn place<M: Model>(name: &str) -> usize {
     (0..M::TABLE.len())
         .find(|&i| M::TABLE.locate(i).is_some_and(|(found, ..)| found == name))
         .unwrap_or_else(|| panic!("{name}"))
 }
 
-/// Sets a tunable parameter of the running controller as an importer does.
+/// Sets a tunable parameter of the running controller, like an importer.
 fn tune(pair: &mut Pair, name: &str, change: impl Fn(f64) -> f64) -> Result<(), Fault> {
     let index = place::<SensorlessController>(name);
     let (meta, slot) = SensorlessController::TABLE.entry(&mut pair.controller, index).unwrap();
@@ -57,7 +57,7 @@ fn apart(a: &ControllerOutputs, b: &ControllerOutputs) -> f64 {
     all(a).iter().zip(all(b)).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
 }
 
-/// A drive in the middle of a transient, where no error is zero, and its inputs.
+/// A drive in the middle of a transient, with nonzero errors, and its inputs.
 fn in_a_transient(kind: Kind) -> (Pair, (f64, f64, f64)) {
     if kind == Kind::Rasmussen {
         let mut pair = Pair::default();
@@ -74,8 +74,8 @@ fn in_a_transient(kind: Kind) -> (Pair, (f64, f64, f64)) {
     (pair, inputs)
 }
 
-/// Tunes one parameter of a drive in a transient: the sample at which it takes effect commands what the untuned one does,
-/// later ones do not.
+/// Tunes one parameter of a drive in a transient: the sample at which it takes effect gives the same command as the untuned
+/// drive, later ones do not.
 fn without_a_bump(kind: Kind, name: &str, change: impl Fn(f64) -> f64, set: impl Fn(&mut Pair)) {
     let (mut pair, inputs) = {
         let (mut pair, inputs) = in_a_transient(kind);

@@ -17,7 +17,7 @@ impl Columns {
     /// Reads a file.
     ///
     /// # Errors
-    /// The file cannot be read, or those of [`parse`](Self::parse).
+    /// The file cannot be read, or [`parse`](Self::parse) fails.
     pub fn read(path: &Path) -> Result<Self> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(|| format!("reading {file}"))?;
@@ -97,7 +97,7 @@ impl Columns {
         &self.rows
     }
 
-    /// Place of a column in the rows, if there is one of this name.
+    /// Index of the column with this name, if any.
     pub fn find(&self, name: &str) -> Option<usize> {
         self.names.iter().position(|found| found == name)
     }

@@ -5,7 +5,7 @@ use std::fmt::{Display, Formatter};
 /// A fallible value.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// One line that names the thing, its value and what was expected; its source is the cause. `{:#}` adds the causes to the line.
+/// One line that states the object, its value and the expected one; its source is the cause. `{:#}` adds the causes to the line.
 #[derive(Debug)]
 pub struct Error {
     text: String,

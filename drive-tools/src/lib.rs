@@ -1,4 +1,4 @@
-//! What a user does with a machine.
+//! Tools for a user's machine.
 //!
 //! - [`tune`]: parameter values for a machine, from its motor file.
 //! - [`map`]: efficiency over speed and torque.

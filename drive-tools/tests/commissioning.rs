@@ -32,7 +32,7 @@ fn machine(name: &str, rotor: Rotor, real: bool) -> Pair {
     let plant = &mut pair.plant.model.parameters;
     plant.mechanics.imposed = rotor == Rotor::Blocked;
     plant.initial.theta_e = 0.7;
-    // Devices have thresholds in an inverter without dead time, too.
+    // Devices also have thresholds in an inverter without dead time.
     plant.inverter.i_zero = 0.02 * I;
     if real {
         plant.inverter.dead_time = 0.01 * T_s;
@@ -78,7 +78,7 @@ fn compared(pair: &Pair, r: &Results) -> [(&'static str, Identified, f64, f64); 
     ]
 }
 
-/// Commissions a machine, compares what is accepted with the truth, and returns what is refused.
+/// Commissions a machine, compares the accepted values with the true ones, and returns the refused ones.
 fn judge(name: &str, rotor: Rotor, real: bool) -> Vec<&'static str> {
     let mut pair = machine(name, rotor, real);
     let (r, most) = run(&mut pair);
@@ -104,7 +104,7 @@ fn judge(name: &str, rotor: Rotor, real: bool) -> Vec<&'static str> {
     refused
 }
 
-/// A reluctance machine with a weak magnet and one with much iron loss are lost where they turn.
+/// A reluctance machine with a weak magnet and one with much iron loss are lost when they turn.
 fn loses(name: &str, real: bool) -> bool {
     name == "pmsyrm-5.5kw" || (name == "traction-63kw" && !real)
 }

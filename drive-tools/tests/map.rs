@@ -79,7 +79,8 @@ fn the_energy_of_the_cycle_exactly_and_from_tables() {
     for (got, figure) in [(sum, 1.322_449), (out, 1.497_219), (back, -0.174_770)] {
         assert!((got / figure - 1.0).abs() < 1e-5, "{got} kWh, not {figure} kWh");
     }
-    // 0.014_992 with the machine's voltage for that of the legs, which has the drop of 0.9 to 1.4 V too: 1e-4 of the conduction loss.
+    // 0.014_992 with the machine's voltage in place of the legs' voltage, which includes the drop of 0.9 to 1.4 V: 1e-4 of the
+    // conduction loss.
     for (got, figure) in five(&exact.losses).iter().zip([0.015_373, 0.027_246, 0.014_990, 0.013_319, 0.053_891]) {
         assert!((got * KWH / figure - 1.0).abs() < 1e-4, "{} kWh, not {figure} kWh", got * KWH);
     }
@@ -94,8 +95,8 @@ fn the_energy_of_the_cycle_exactly_and_from_tables() {
     }
 }
 
-/// Without load the table has the losses of the points, where an interpolated efficiency would be 0/0; on the grid it is exact,
-/// and beyond the envelope it has no value.
+/// Without load the table gives the losses of the points, where an interpolated efficiency would be 0/0; it is exact on the
+/// grid, and undefined outside the envelope.
 #[test]
 fn a_table_reads_losses() {
     let (drive, axes) = (traction(), Axes::new((47, 41), 11_500.0 * RPM));
@@ -121,7 +122,7 @@ fn a_table_reads_losses() {
     assert!(table.read(100.0, f64::NAN).is_none());
 }
 
-/// At other voltages and temperatures than those of the table: the losses at the cycle's points, compared with the exact ones.
+/// At voltages and temperatures between the table's: the losses at the cycle's points, compared with the exact ones.
 #[test]
 fn a_table_is_read_at_another_voltage_and_temperature() {
     let (drive, axes) = (traction(), Axes::new((47, 41), 16_000.0 * RPM));
@@ -163,7 +164,7 @@ fn small(name: &str, request: Request) -> Map {
     map::make(&motor(name), &Request { grid: (9, 7), ..request }).unwrap()
 }
 
-/// Every point has the torque of its grid position and balanced powers; the sheets stand in the order of voltage and temperature.
+/// Every point has the torque of its grid position, and its powers balance; the sheets are ordered by voltage and temperature.
 #[test]
 fn the_points_of_a_map() {
     let request = Request { u_dc: vec![300.0, 400.0], T: vec![20.0, 120.0], verify: 1, ..Request::default() };

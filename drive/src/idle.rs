@@ -1,4 +1,4 @@
-//! Conditions under which the variables of the drive have an effect: those of plant, controller and DC link.
+//! Conditions under which the variables of plant, controller and DC link have an effect.
 
 use crate::dc_link::LinkParameters;
 use drive_control::idle as control;

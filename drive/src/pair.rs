@@ -63,7 +63,7 @@ impl Pair {
         controller.model.inputs.measure(plant.out.measured());
     }
 
-    /// Passes the present outputs, where the blocks still contain those of an earlier step.
+    /// Passes the present outputs while the blocks still contain older ones.
     #[inline]
     pub(crate) fn exchange_present(&mut self) {
         let Self { plant, controller, .. } = self;

@@ -156,7 +156,7 @@ impl PmsmDrive {
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
         (controller.tau_ref, controller.asc) = (inputs.tau_ref, inputs.asc);
-        // During the precharge there is no voltage for control.
+        // During the precharge no voltage is available for control.
         controller.enable = inputs.enable && !link.precharges;
         controller.sensor_valid = inputs.sensor_valid;
         controller.commission_start = inputs.commission_start;
@@ -180,7 +180,7 @@ impl PmsmDrive {
         ripple(inputs.voltage(), currents.to_stator(), p_in, inputs.u_dc)
     }
 
-    /// The plant's inputs: those of the drive, and the controller's voltages.
+    /// The plant's inputs: the drive's inputs and the controller's voltages.
     fn plant_inputs(&self) -> PlantInputs {
         let DriveInputs { tau_load, speed_shaft, angle_shaft, thermal, .. } = self.inputs;
         let u_dc = self.link_voltage();

@@ -63,7 +63,7 @@ fn steps(pair: &mut Pair, n: usize) {
     }
 }
 
-/// Runs until it is in this state, for 60 s at most.
+/// Runs until it is in this state, at most 60 s.
 fn until(pair: &mut Pair, state: State) {
     for _ in 0..600_000 {
         if status(pair).0 == state {
@@ -98,7 +98,7 @@ fn it_ends_with_results_that_stay_until_the_next_start() {
     {
         assert!(value.u < 0.05 && (value.value / truth - 1.0).abs() < 0.01, "{value:?} {truth}");
     }
-    // While the request lasts, nothing else happens.
+    // While the request is active, nothing else happens.
     pair.set_inputs(50.0, 0.0, 540.0);
     steps(&mut pair, 2000);
     assert!(gates(&pair) == Gates::Off && !pair.controller.out.enabled);
@@ -159,7 +159,7 @@ fn a_blocked_rotor_keeps_the_values_of_standstill() {
     assert!(r.R_s.u < 0.01 && r.L_q.u < 0.05 && [r.psi_M, r.J, r.tau_friction].iter().all(|x| x.u >= 1.0), "{r:?}");
 }
 
-/// The current of the controller at rest does not count as an offset.
+/// The current of a controller at rest does not count as an offset.
 #[test]
 fn the_current_before_the_start_is_no_offset() {
     let mut pair = pair();

@@ -241,7 +241,7 @@ fn the_energies_are_balanced_in_every_case() {
     }
 }
 
-/// A source with a time constant of 10 ns costs no steps and acts as an ideal one.
+/// A source with a time constant of 10 ns needs no extra steps and acts like an ideal one.
 #[test]
 fn a_stiff_source_is_an_ideal_one() {
     let run = |used: bool| {

@@ -95,7 +95,7 @@ const KINDS: [Kind; 5] = [
     ("gates off", |plant| (plant.inputs.enable, plant.parameters.iron.G_e) = (false, 1.3e-4)),
 ];
 
-/// The voltage of a command that turns with the shaft at the `angle` (rad), 1.7 rad ahead of it.
+/// The voltage of a command that rotates 1.7 rad ahead of the shaft, which is at the `angle` (rad).
 fn voltage(plant: &mut PmsmPlant, angle: f64, speed: f64) {
     let (u, theta) = (0.45 * speed + 8.0, 3.0 * angle + 1.7);
     plant.inputs.u = Phases::from_stator(AlphaBeta::new(u * theta.cos(), u * theta.sin()));
@@ -239,7 +239,7 @@ fn inputs_between_completed_steps_are_straight_lines() {
         let off = apart(10_000, u);
         assert!(off < 1e-6, "{off}");
     }
-    // With curved inputs, the error of the power is of second order in the step, that of the current of third order.
+    // With curved inputs, the error is of second order in the step for the power, of third order for the current.
     let [coarse, fine] = [20, 10].map(|reported| apart(reported, &turning));
     println!("curved inputs: {coarse} at 40 us, {fine} at 20 us");
     assert!((3.9..8.1).contains(&(coarse / fine)), "{coarse}, {fine}");

@@ -62,7 +62,7 @@ fn the_models_name_what_has_no_effect() {
         first::<PmsmDriveMean>(|_| ()),
         first::<SensorlessControllerClocked>(|_| ()),
         first::<PmsmDrive>(|m| (m.inputs.tau_load, m.inputs.speed_ref, m.inputs.u_dc) = (1.0, 30.0, 300.0)),
-        // What is set to 0 asks for nothing.
+        // A parameter set to 0 requests nothing.
         first::<SensorlessController>(|m| {
             (m.parameters.estimator, m.parameters.zero_speed.i_0) = (Kind::EmfObserver, 0.0);
         }),
@@ -117,7 +117,7 @@ fn moved(block: &mut Block<PmsmDrive>, index: usize) {
     }
 }
 
-/// With every estimator and in both modes, a value that is reported as without effect changes no bit.
+/// With every estimator and in both modes, a value reported as having no effect changes no bit.
 #[test]
 fn what_is_reported_has_no_effect() {
     let (mut tried, mut wrong) = (0, Vec::new());

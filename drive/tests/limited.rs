@@ -80,8 +80,8 @@ fn warnings(tau: f64, set: impl FnOnce(&mut PmsmDrive)) -> Vec<(&'static str, St
     logged
 }
 
-/// A load of more than twice the torque of the drive is reported once, by name, in either direction; a smaller one is not, nor
-/// the load of an imposed shaft.
+/// A load of more than twice the torque of the drive is reported once, by name, in either direction; a smaller load or the load
+/// of an imposed shaft is not.
 #[test]
 fn a_load_far_above_the_torque_is_reported_once() {
     for (tau, reported) in [(100.0, true), (-100.0, true), (3.0, false), (-3.0, false)] {
@@ -120,7 +120,7 @@ fn the_current_loop_holds_its_limit_at_the_bound() {
     for active in [false, true] {
         let (bound, beyond) = (greatest(2.4e-4, active), greatest(1e-3, active));
         println!("active resistance {active}: {bound} A at the bound, {beyond} A at 1 ms, limit 7.5 A");
-        // The limit at modulation knows one sample: it keeps the first, and bounds what the second does.
+        // The limit at modulation covers one sample: it maintains the first and bounds the second.
         assert!(bound < 1.01 * 7.5 && beyond > 1.5 * 7.5, "{bound} {beyond} A");
     }
 }

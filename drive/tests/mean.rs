@@ -252,7 +252,8 @@ fn the_speed_loop_is_that_of_the_drive() {
     }
 }
 
-/// The energy from the link equals that of shaft, load and losses at any step and in both modes, and that with small steps.
+/// The energy from the link equals the sum of shaft, load and losses for any step and in both modes, and agrees with a run in
+/// small steps.
 #[test]
 fn the_energy_is_balanced_at_every_step() {
     let (plant, mut controller) = traction();
@@ -287,7 +288,7 @@ fn the_energy_is_balanced_at_every_step() {
     }
 }
 
-/// With the gates off, the shaft coasts under friction and iron loss, and the link supplies nothing.
+/// With the gates off, the shaft coasts under friction and iron loss, and the link supplies no power.
 #[test]
 fn without_enable_the_shaft_coasts() {
     let (mut plant, controller) = (lossy::b().par, machines::b().parameters());
@@ -442,7 +443,7 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let moved = index.and_then(|index| PmsmDriveMean::TABLE.locate(index));
     let map = &mut block.model.drive.plant.flux_map;
     match moved.as_ref().map_or("", |(name, ..)| name) {
-        // A machine with other inductances; one of these values alone would be no valid machine.
+        // A machine with other inductances; one of these values alone would make an invalid machine.
         "plant.flux_map.w" => map.w.iter_mut().flatten().for_each(|w| *w *= 1.2),
         "plant.flux_map.d_min" | "plant.flux_map.d_max" => (map.d_min, map.d_max) = (1.2 * map.d_min, 1.2 * map.d_max),
         _ => (),

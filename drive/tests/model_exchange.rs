@@ -231,7 +231,7 @@ fn indicators_stand_on_the_side_of_the_decision() {
     let before = z(&plant.model);
     assert!(!plant.model.event(Elapsed::ZERO).unwrap().states_changed);
     assert!(before[1].abs() < 2e-9 && z(&plant.model)[1] != 0.0, "{before:?} {:?}", z(&plant.model));
-    // A remaining current is discarded once: a second event changes nothing.
+    // A remaining current is discarded only once; a second event changes nothing.
     *PmsmPlant::STATES[2].at(&mut plant.model) = 10.0;
     *PmsmPlant::STATES[1].at(&mut plant.model) += 1e-4;
     assert!(plant.model.event(Elapsed::ZERO).unwrap().states_changed);
@@ -310,7 +310,7 @@ fn controller() -> Block<SensorlessController> {
     controller
 }
 
-/// Debug text, in which -0 differs from 0, and numbers that differ in a bit.
+/// Debug text, which distinguishes -0 from 0, and numbers that differ in one bit.
 fn shown(controller: &SensorlessController, now: Elapsed) -> String {
     let mut out = <SensorlessController as Model>::Outputs::default();
     controller.output(now, &mut out);

@@ -26,7 +26,7 @@ fn leaves(value: &impl Serialize) -> BTreeMap<String, String> {
     found
 }
 
-/// Changes each variable of `table` in turn and finds the changed field.
+/// Changes each variable of `table` in turn and looks for the changed field.
 fn each_field_has_a_variable<P: Clone + Default + Serialize + 'static>(table: &Table<P>) {
     let start = P::default();
     let before = leaves(&start);

@@ -181,7 +181,7 @@ fn a_trip_that_operation_would_reach_is_refused() {
     assert!(message.contains("trip.u_dc = 300 V") && message.contains("325 V"), "{message}");
     let message = refused(|drive| drive.pair.controller.model.parameters.trip.i = f64::NAN);
     assert!(message.contains("trip.i"), "{message}");
-    // Without trips, nothing is checked.
+    // Without trips, no limit is checked.
     let mut drive = PmsmDrive::default();
     drive.pair.controller.model.parameters.trip.i = -1.0;
     drive.derive();
@@ -216,7 +216,7 @@ fn a_lost_sensor_hands_over_to_the_fallback() {
             let out = &run.drive.out.controller;
             assert!(out.sensor_lost && out.enabled && out.lock_lost < 0.01, "{fallback:?}: {out:?}");
             assert!(torque < 0.01 && speed < 0.05, "{fallback:?}, {exchange}: {torque} N.m, {speed} rad/s");
-            // The sensor's values have no effect any more, and it does not return by itself.
+            // The sensor's values no longer have an effect, and the drive does not switch back automatically.
             run.drive.model.inputs.sensor_valid = true;
             run.run(0.1);
             assert!(run.drive.out.controller.sensor_lost);

@@ -242,7 +242,7 @@ fn compare(steady: &Steady, rpm: f64, u_dc: f64, tau_ref: f64, point: &Point) {
     }
 }
 
-/// At 36 V, the drop of diodes of 0.7 V matters in the legs' voltage: without it, the conduction loss is 2 % too high.
+/// At 36 V, the diode drop of 0.7 V matters in the legs' voltage: without it, the conduction loss is 2 % too high.
 #[test]
 fn the_drop_of_the_devices_is_in_the_legs() {
     let motor = Motor { n_p: 15, R_s: 0.2, L_d: 0.35e-3, L_q: 0.35e-3, psi_M: 0.0155 };

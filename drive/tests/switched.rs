@@ -36,7 +36,7 @@ impl Steady {
         let start = (30.0 * L / (R * T) / count).ceil() * count;
         let mut k = 0.0;
         while k < start + count - 0.5 {
-            // The mean of the held reference is that of the rotating voltage.
+            // The mean of the held reference equals that of the rotating voltage.
             let angle = w * T * (k + 0.5);
             let hold = 0.5 * w * T / (0.5 * w * T).sin();
             let (d, q) = (-w * L * i_q * hold, (R * i_q + w * psi) * hold);
@@ -94,8 +94,8 @@ fn closed([u_dc, f, i_q, T]: [f64; 4]) -> (f64, [f64; 2]) {
     (m, [u_dc * T / (24.0 * L) * distortion.sqrt(), i_q * link.sqrt()])
 }
 
-/// The figures are those of a plant outside the project; the closed forms leave out the resistance and the ripple's part of the
-/// link's current.
+/// The figures come from a plant outside the project; the closed forms neglect the resistance and the ripple's share of the
+/// link current.
 #[test]
 fn steady_states_have_the_figures_of_an_independent_plant() {
     for (point, m, expected, tolerance) in [
@@ -152,7 +152,7 @@ fn the_closed_loop_is_that_of_the_average_inverter() {
     }
 }
 
-/// The lowest speed at 1000 rpm is that of an independent calculation, [`Witness`] in the same loop with steps of 6 ns to 0.1 us:
+/// The lowest speed at 1000 rpm comes from an independent calculation, [`Witness`] in the same loop with steps of 6 ns to 0.1 us:
 /// 839.098 rpm. It depends on small changes: 1e-6 of the inertia change it by 0.2 rpm.
 #[test]
 fn the_closed_loop_with_dead_time() {
@@ -172,14 +172,14 @@ fn the_closed_loop_with_dead_time() {
 }
 
 /// An independent plant without saliency: between the instants of a period steps of 1 us, with dead time of 20 ns, in which the
-/// legs' voltages are those that end the step with no current, limited to the rails.
+/// legs' voltages make the current zero at the end of the step, limited to the rails.
 struct Witness {
     i: [f64; 2],
     w: f64,
     theta: f64,
     /// End in s of a dead time of the last period, from the beginning of the present one.
     until: [f64; 3],
-    /// Number of steps in which a leg blocked.
+    /// Number of steps with a blocking leg.
     blocked: u32,
 }
 
@@ -257,7 +257,7 @@ impl Witness {
     }
 }
 
-/// At a low speed, every phase current passes zero within dead times: the plant blocks where the witness does.
+/// At a low speed, every phase current passes zero within dead times: the plant blocks when the witness does.
 #[test]
 fn dead_time_with_blocking_diodes_is_that_of_a_witness() {
     for (dead, amplitude, f) in [(2e-6, 14.0, 10.0), (5e-6, 22.0, 15.0), (2e-6, 60.0, 50.0), (0.0, 30.0, 20.0)] {
@@ -420,7 +420,7 @@ fn the_sidebands_are_those_of_the_double_fourier_series() {
     }
 }
 
-/// Every zero sequence drives the same currents at the carrier's extremes; beyond u_dc / 2, none is not linear.
+/// Every zero sequence produces the same currents at the carrier's extremes; above u_dc / 2, `None` is not linear.
 #[test]
 fn every_zero_sequence_drives_the_same_machine() {
     for (amplitude, linear) in [(100.0, true), (185.0, false)] {
@@ -461,7 +461,7 @@ fn an_open_phase_carries_no_current_and_an_open_switch_one_sign() {
     assert!(low[2] > -1e-9 && high[2] > 3.0, "{low:?} {high:?}");
 }
 
-/// An opened phase loses the energy of its current at once, and the balance of energies holds.
+/// An opened phase dissipates the energy of its current at once, and the energies balance.
 #[test]
 fn the_energies_are_balanced() {
     let cases: [fn(&mut Inverter); 4] = [
@@ -486,7 +486,7 @@ fn the_energies_are_balanced() {
     }
 }
 
-/// Losses of conduction and switching are those of the average inverter, whose share of the devices is a mean.
+/// Losses of conduction and switching equal the average inverter's, whose device shares are means.
 #[test]
 fn the_losses_are_those_of_the_average_inverter() {
     let losses = |mode: InverterMode| {

@@ -77,7 +77,7 @@ fn unknowns<M: Model>(dx: &[f64], block: &mut Block<M>) -> Vec<f64> {
     values
 }
 
-/// Derivatives and outputs of the model as it is.
+/// Derivatives and outputs of the unchanged model.
 fn evaluate<M: Differentiable>(block: &Block<M>) -> Vec<f64> {
     let (mut block, mut dx) = (block.clone(), vec![0.0; M::STATES.len()]);
     block.model.settle();

@@ -420,7 +420,7 @@ fn what_cannot_be_is_refused() {
     };
     refused(&hot, &["T_magnet_imposed = 1300 K", "magnet.alpha = -0.0011 1/K", "flux linkage", "-0.016", "Wb"]);
 
-    // In a step too, where the refusal changes nothing.
+    // Also in a step, where the refusal changes nothing.
     let (mut block, mut now) = (imposed(20.0, 20.0), Elapsed::ZERO);
     block.initialize();
     run(&mut block, &mut now, 1e-3);

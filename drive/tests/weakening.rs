@@ -1,6 +1,6 @@
 //! Field weakening in the closed loop with a sensor; [`envelope`](drive::control::envelope) has its algebra.
 //!
-//! The figures are those of the algebra's tests, for the same machines, with k_u = 0.95 unless noted.
+//! The figures come from the algebra's tests, for the same machines, with k_u = 0.95 unless noted.
 #![allow(missing_docs, non_snake_case)]
 
 #[path = "../control/tests/machines/mod.rs"]

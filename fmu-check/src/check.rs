@@ -63,7 +63,7 @@ pub(super) enum Run {
     File(fn(&FmuFile) -> Verdict),
     /// Calls the binary in its own process.
     Probe(fn(&Session) -> Result<(), NotDetermined>),
-    /// Like `Probe`, with instances for Model Exchange where there is no co-simulation: no steps.
+    /// Like `Probe`, but with instances for Model Exchange if there is no co-simulation: no steps.
     Any(fn(&Session) -> Result<(), NotDetermined>),
     /// Like `Any`; any output to the console or the working directory is a violation.
     Silent(fn(&Session) -> Result<(), NotDetermined>),
@@ -103,7 +103,7 @@ pub enum Verdict {
 #[derive(Clone, Debug)]
 pub(super) struct Conclusion {
     pub(super) verdict: Verdict,
-    /// The level of the finding, if it is lower than that of the check.
+    /// The level of the finding, if lower than the check's.
     pub(super) lower: Option<Level>,
     /// Confidence of the finding.
     pub(super) confidence: Confidence,
@@ -129,7 +129,7 @@ impl From<Verdict> for Conclusion {
 }
 
 impl Verdict {
-    /// A pass if it holds, otherwise a violation.
+    /// A pass if the condition holds, otherwise a violation.
     pub(super) fn holds(holds: bool, finding: impl FnOnce() -> String) -> Self {
         if holds { Self::Pass(Vec::new()) } else { Self::Violated(vec![finding()]) }
     }
@@ -179,7 +179,8 @@ pub struct Options {
     pub patience: Option<Duration>,
     /// Time limit for everything; checks that have not run by then are not determined.
     pub timeout: Option<Duration>,
-    /// Program with the hidden command `probe` that plays the guard ([`fmu_import::guard::serve`]); `None` for the running one.
+    /// Program with the hidden command `probe` that plays the guard ([`fmu_import::guard::serve`]); `None` for the running
+    /// executable.
     pub program: Option<PathBuf>,
     /// Resource limits of a probe.
     pub allowance: Allowance,

@@ -11,14 +11,15 @@ use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Checks an FMU for Co-Simulation or Model Exchange of FMI 2.0 or FMI 3.0, made by any tool: archive, description, and what its binary does.
+/// Checks an FMU for Co-Simulation or Model Exchange of FMI 2.0 or FMI 3.0, made by any tool: archive, description, and
+/// behavior of its binary.
 ///
 /// Every check has an id, a clause of the standard, and a level: must (the standard requires it), should (the standard
 /// recommends it) or hard (the standard leaves it open, but a robust FMU does it). Each probe of the binary runs in its own
 /// process, with limits, so a crash or a hang is a finding. The code of the FMU runs on this computer with your rights: check
 /// only FMUs that you would run. --sandbox takes the network away from it.
 ///
-/// Each finding is certain, likely or a hint: --confidence certain counts the first kind alone.
+/// Each finding is certain, likely or a hint: --confidence certain counts only the first kind.
 ///
 /// Exit status: 0 if no must is violated, 1 if one is, 2 if a file is not an FMU. With --strict, a violated should or hard
 /// and a check that is not determined count like a must. With --baseline, every violated check that the file does not have
@@ -102,7 +103,7 @@ pub enum Format {
     Sarif,
 }
 
-/// Whether a name is that of a check, or of a group.
+/// Whether a name belongs to a check or a group.
 fn is_check(name: &str) -> bool {
     check::GROUPS.iter().any(|g| g.checks.iter().any(|c| c.id.eq_ignore_ascii_case(name)))
 }

@@ -36,21 +36,21 @@ pub(super) fn is_of_second(call: &str, out: &Path) -> bool {
     case.lines().any(|line| line.strip_prefix(function).is_some_and(|rest| rest.contains(" -> ")))
 }
 
-/// Whether a call makes an instance after this process has freed one.
+/// Whether a call creates an instance after this process has freed one.
 pub(super) fn is_after_free(call: &str, out: &Path) -> bool {
     let log = fs::read_to_string(out.with_extension("log")).unwrap_or_default();
     let freed = || log.rsplit(BEGUN).next().is_some_and(|log| log.lines().any(|line| line.contains("FreeInstance")));
     call.contains("Instantiate") && (call.contains("after FreeInstance") || freed())
 }
 
-/// The calls of the first case with a finding: that with the mark, or the last one.
+/// The calls of the first case with a finding: the marked one, or the last one.
 pub(super) fn calls(log: &str) -> Vec<String> {
     const MOST: usize = 60;
     let cases: Vec<&str> = log.split("# case ").collect();
     let found = cases.iter().find(|case| case.contains(FOUND)).or(cases.last());
     let lines: Vec<_> =
         found.map_or("", |case| case).lines().filter(|l| !l.is_empty() && *l != FOUND && *l != BEGUN).collect();
-    // The number of the case is the first line of all but the first part.
+    // The first line of every part except the first is the number of the case.
     let first = usize::from(cases.len() > 1 && found.is_some_and(|f| !std::ptr::eq(*f, cases[0])));
     let calls: Vec<String> = lines.iter().skip(first).map(|l| (*l).to_owned()).collect();
     if calls.len() <= MOST {
@@ -60,8 +60,8 @@ pub(super) fn calls(log: &str) -> Vec<String> {
     [&calls[..MOST / 2], &[left_out], &calls[calls.len() - MOST / 2..]].concat()
 }
 
-/// All calls before the first finding: those of its case, and those before the first case. `log` is that of a probe that records every
-/// call, and ends with the finding.
+/// All calls before the first finding: the calls of its case and the calls before the first case. `log` comes from a probe that
+/// records every call, and ends with the finding.
 pub(super) fn script(log: &str) -> Vec<String> {
     let cases: Vec<&str> = log.split("# case ").collect();
     let found = cases.iter().position(|case| case.contains(FOUND)).unwrap_or(cases.len() - 1);
@@ -74,7 +74,7 @@ pub(super) fn script(log: &str) -> Vec<String> {
         .collect()
 }
 
-/// What a process has written to the console.
+/// Console output of a process.
 fn console(folder: &Path) -> String {
     let mut console = Vec::new();
     if let Ok(file) = File::open(folder.join("console")) {
@@ -127,7 +127,7 @@ pub(super) fn conclude(id: &str, lines: Vec<Line>, crashes: Vec<(String, String)
             None => not_determined = not_determined.or(Some(format!("{prepared} {how}, before the probe began"))),
         }
     }
-    // The more binding level is the smaller one, and that of the check comes first.
+    // A smaller level is more binding, and the check's own comes first.
     violated.sort_by_key(|(lower, ..)| lower.is_some());
     let lower = violated.iter().map(|(lower, ..)| *lower).min().flatten();
     let decisive = violated.iter().filter(|(of, ..)| *of == lower);

@@ -1,7 +1,7 @@
 //! An instance for Model Exchange under test, and a small importer that integrates it.
 //!
-//! The importer uses Euler's method and handles a state event at the end of the step in which it occurs: that is coarse, but every
-//! call is one that the standard allows.
+//! The importer uses Euler's method and handles a state event at the end of its step, which is coarse but uses only calls
+//! allowed by the standard.
 
 use crate::instance::Instance;
 use crate::session::{NotDetermined, Session};
@@ -57,7 +57,7 @@ impl Session {
         variables.into_iter().flat_map(of).collect()
     }
 
-    /// Names of the values that can be compared: those that [`steady`](Self::steady) keeps.
+    /// Names of the values that can be compared: the ones kept by [`steady`](Self::steady).
     pub(super) fn names_of(&self, variables: &[&ModelVariable]) -> Vec<String> {
         self.element_names(variables.iter().copied().filter(|v| self.is_steady(v)))
     }
@@ -164,7 +164,7 @@ impl Instance<'_> {
         Ok(event)
     }
 
-    /// A vector of Model Exchange, and whether nothing was written past it.
+    /// A vector of Model Exchange, and whether the memory behind it is intact.
     pub(super) fn vector(&self, name: Vector, n: usize) -> Result<(Status, Vec<f64>, bool), NotDetermined> {
         let untouched = UNTOUCHED;
         let mut values = vec![untouched; n + 8];
@@ -183,7 +183,7 @@ impl Instance<'_> {
         }
         let (status, values, _) = self.vector(name, n)?;
         self.must(name.as_str(), status)?;
-        // What the vector was filled with is no value of the FMU.
+        // An element that keeps its fill pattern was not written by the FMU.
         if values.iter().any(|v| v.to_bits() == UNTOUCHED.to_bits()) {
             return Err(NotDetermined(format!(
                 "{} did not write all of the {n} values",
@@ -258,7 +258,7 @@ impl Instance<'_> {
         };
         let call = format!("{}(unknowns {unknowns:?}, knowns {knowns:?}, seed {seed:?})", name.as_str());
         let status = self.call(&call, |raw| raw.sensitivity(name, self.handle, arguments, Some(&mut result), n))?;
-        // What the array was filled with is no value of the FMU.
+        // An element that keeps its fill pattern was not written by the FMU.
         if status.is_ok() && result.iter().any(|x| x.to_bits() == UNTOUCHED.to_bits()) {
             self.session.violated(format!("{call} returned OK and did not write all of the {n} values"));
             return Err(NotDetermined(format!("{} did not write all values", name.as_str())));
@@ -372,7 +372,7 @@ impl<'a, 'b> Importer<'a, 'b> {
         self.leave(see)
     }
 
-    /// One step of the integrator, at most to the next time event, with the event at its end if there is one, which it returns.
+    /// One step of the integrator, at most to the next time event; handles and returns an event at its end.
     pub(super) fn step(&mut self, dt: f64, see: &mut dyn FnMut(&Instance<'_>, &Event)) -> Result<bool, NotDetermined> {
         let i = self.instance;
         let t = i.time.get();

@@ -1,6 +1,6 @@
 //! A first run that fails may fail because of a limit of the checker or because of this computer. It is tried again without the
 //! limits on memory and open files, and from another folder if the binary does not load: where it then succeeds, the FMU is not at
-//! fault. Nor is it where it asks for a license.
+//! fault. This also applies if it requests a license.
 
 use crate::check::{Check, Conclusion, Verdict};
 use crate::checks::GROUPS;
@@ -25,7 +25,7 @@ impl Runner {
             Verdict::NotDetermined(why) => why.clone(),
             Verdict::Pass(_) | Verdict::NotApplicable(_) => return found,
         };
-        // A hang has no such cause, and another one would take as long again.
+        // A hang has no such cause, and another would cost the same time again.
         if why == OUT_OF_TIME || why.contains("did not return") || why.contains("too slow") {
             return found;
         }
@@ -62,7 +62,8 @@ impl Runner {
         })
     }
 
-    /// A license is missing: the FMU says so, or it is one of a tool whose FMUs need a license and is refused without a reason.
+    /// A license is missing: the FMU reports it, or the FMU comes from a tool that requires licenses and refuses without a
+    /// reason.
     fn unlicensed(&self, why: &str) -> Option<String> {
         let text = why.to_lowercase();
         if ["license", "licence", "licensing", "dongle"].iter().any(|word| text.contains(word)) {
@@ -74,7 +75,7 @@ impl Runner {
             .then(|| format!("{why} without a message; FMUs of {tool} may need a license on this computer"))
     }
 
-    /// The temporary folder is the cause if the binary loads from another one.
+    /// The temporary folder is the cause if the binary loads from a different folder.
     fn elsewhere(&self, conditions: &Conditions, why: &str) -> Option<String> {
         let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == "B00")?;
         let temporary = env::temp_dir();

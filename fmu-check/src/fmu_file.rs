@@ -134,7 +134,7 @@ impl FmuFile {
         fs::create_dir(self.dir().join("resources"))?;
         fs::write(self.dir().join(DESCRIPTION), &self.xml)?;
         let mut left = limits::UNPACKED.most;
-        // Of a file and a folder of one name, the folder is what an importer needs.
+        // If a file and a folder share a name, an importer needs the folder.
         let folders = self.zip.files_and_folders();
         for entry in &self.zip.entries {
             let name = entry.name();
@@ -187,15 +187,15 @@ impl FmuFile {
         list.get(*places.get(&(v.line, v.name.clone()))?)
     }
 
-    /// The interface for co-simulation, or another one if there is none.
+    /// The interface for co-simulation if available, otherwise another one.
     pub(super) fn interface(&self) -> Option<&Interface> {
         let description = self.description.as_ref().ok()?;
         let interface = description.co_simulation.as_ref().or(description.model_exchange.as_ref());
         interface.or(description.scheduled_execution.as_ref())
     }
 
-    /// The binary of an interface for this machine, as it is named in the archive: that of the first folder with a library for
-    /// this processor, or that of the first folder.
+    /// The binary of an interface for this machine, by its name in the archive: from the first folder with a library for this
+    /// processor, or else from the first folder.
     pub(super) fn host_binary(&self, interface: &Interface) -> Result<&Binary, String> {
         let host = Platform::host();
         let file = format!("{}.{}", interface.model_identifier, host.extension());
@@ -228,7 +228,7 @@ impl io::Write for Target {
 
 /// The standard, from the text: the XML may be broken.
 fn version(xml: &[u8]) -> Result<FmiVersion, String> {
-    // Null bytes are those of UTF-16 and UTF-32, which X01a reports.
+    // Null bytes indicate UTF-16 or UTF-32, which X01a reports.
     let head: Vec<u8> = xml.iter().copied().filter(|b| *b != 0).take(1 << 16).collect();
     let text = String::from_utf8_lossy(&head);
     let value = text.split_once("fmiVersion").map(|(_, rest)| rest.trim_start_matches([' ', '=', '"', '\'', '\n']));

@@ -260,12 +260,12 @@ impl Instance<'_> {
         if !buffer.intact() {
             return Err(NotDetermined(format!("getting {} wrote past its {n} values", v.name)));
         }
-        // The pattern that the buffer was filled with is no value of the FMU.
+        // A value that keeps the fill pattern was not written by the FMU.
         Ok((status, if not_written { Vec::new() } else { buffer.bits() }))
     }
 
-    /// A variable's values after it was set; `None` where they cannot be read. FMI 2.0 lets an importer read few variables in
-    /// Initialization Mode, so that only FMI 3.0 is at fault then.
+    /// A variable's values after it was set; `None` where they cannot be read. FMI 2.0 allows few variables to be read in
+    /// Initialization Mode, so this is a fault only in FMI 3.0.
     pub(super) fn get_back(&self, v: &ModelVariable) -> Result<Option<Vec<u64>>, NotDetermined> {
         let (status, back) = self.get(v)?;
         if status.is_ok() {

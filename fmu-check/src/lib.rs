@@ -2,7 +2,7 @@
 //!
 //! The checks are data ([`GROUPS`], one file for each group in `checks/`): an id, one sentence, the clause, the level in each
 //! standard, and the function that decides. Checks of the file run in this process. Each check of the binary runs in its own
-//! process ([`probe`]), so that a crash or a hang is a verdict. No check relies on what `fmu build` does.
+//! process ([`probe`]), so that a crash or a hang is a verdict. No check depends on the behavior of `fmu build`.
 
 #![forbid(unsafe_code)]
 

@@ -61,7 +61,7 @@ pub struct ProbeArguments {
     /// Record every call one by one, up to the first finding.
     #[arg(long)]
     pub full: bool,
-    /// Step of the integrator in s, where that of a twentieth of the communication step is too long.
+    /// Step of the integrator in s, if a twentieth of the communication step is too long.
     #[arg(long)]
     pub integrator: Option<f64>,
     /// File with the names of the variables that are not compared, as a list in JSON.

@@ -22,7 +22,7 @@ pub(super) const NOT_WRITTEN: i32 = 74;
 /// Runs one probe, in this process.
 ///
 /// # Errors
-/// There is no such check, or the folder is not readable.
+/// The check is unknown, or the folder is not readable.
 pub fn run(args: &ProbeArguments) -> Result<(), Error> {
     guard::end_with_parent();
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == args.id);
@@ -43,7 +43,7 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
                 });
             }
             session.write(&Line::Done);
-            // The parent reads the findings; a crash while the process ends is a finding too.
+            // The parent reads the findings; a crash while the process ends is also a finding.
             session.record_call("(the process ends)");
             let lost = session.lost.get();
             std::mem::forget(session);
@@ -54,7 +54,7 @@ pub fn run(args: &ProbeArguments) -> Result<(), Error> {
         Err(why) => {
             let line = match why {
                 NotOpened::Load(why) if args.id == "B00" && !needs_tool(&args.dir) => {
-                    // A library or a version of it is missing on this computer: the standards only recommend to avoid that.
+                    // A library or a version of it is missing on this computer, which the standards only recommend avoiding.
                     if [
                         "cannot open shared object file",
                         "not found",

@@ -1,4 +1,4 @@
-//! The order of the checks: those of the file, a minimal and two plain runs, then all other probes on all cores.
+//! The order of the checks: checks of the file, a minimal and two plain runs, then all other probes on all cores.
 
 use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
@@ -70,7 +70,7 @@ pub(super) fn run_all(fmu: &Arc<FmuFile>, checks: &[&Check], options: &Options) 
 }
 
 /// The runs before all other probes: a minimal one of each interface, L00 of co-simulation and E00 of Model Exchange, on which
-/// the other probes depend, and two plain ones, which show the variables that cannot be compared.
+/// the other probes depend, and two plain ones, which reveal the variables that cannot be compared.
 struct FirstRuns {
     found: Vec<(&'static str, Conclusion)>,
     /// The FMU has no co-simulation: checks that make no steps are for Model Exchange.

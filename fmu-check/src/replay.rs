@@ -1,4 +1,4 @@
-//! `--replay`: one probe, or one case of it, once more, with all its calls and what they return.
+//! `--replay`: one probe, or one case of it, once more, with all its calls and their results.
 
 use crate::check::{Options, Verdict};
 use crate::checks::GROUPS;

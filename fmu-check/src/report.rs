@@ -79,7 +79,7 @@ impl Report {
         self.findings.iter().filter(|f| matches!(f.verdict, Verdict::Violated(_)))
     }
 
-    /// Whether a finding counts: it is neither in `--allow` nor in the baseline, and it is certain enough.
+    /// Whether a finding counts: it is neither in `--allow` nor in the baseline, and it is sufficiently certain.
     pub(super) fn counts_for(&self, finding: &Finding) -> bool {
         !finding.known && finding.confidence <= self.confidence
     }
@@ -101,7 +101,7 @@ impl Report {
         }
     }
 
-    /// Whether every requirement that applies holds.
+    /// Whether all applicable requirements are met.
     pub fn is_clean(&self) -> bool {
         let is_clean = |f: &Finding| match f.verdict {
             Verdict::Pass(_) | Verdict::NotApplicable(_) => true,
@@ -280,8 +280,8 @@ pub fn html(reports: &[Report]) -> String {
     reports.iter().map(Report::section).fold(head, |page, section| page + &section) + "</body></html>\n"
 }
 
-/// Text for several files: first the findings that several share, with the files; then those of a single file; then a line for
-/// each.
+/// Text for several files: first the findings shared by several files; then the findings of single files; then a line for each
+/// file.
 pub fn texts(reports: &[Report], verbose: bool) -> String {
     if let [report] = reports {
         return report.text(verbose);

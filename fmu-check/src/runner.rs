@@ -25,9 +25,9 @@ use std::time::{Duration, Instant};
 const TIMEOUT: Duration = Duration::from_secs(10);
 /// The check that compares two plain runs.
 pub(super) const PLAIN_RUNS: &str = "T10";
-/// Checks with `Run::Probe` that make no instance, so that they apply to every interface.
+/// Checks with `Run::Probe` that create no instance, so they apply to every interface.
 const WITHOUT_INSTANCE: [&str; 3] = ["B00", "X02b", "L08n"];
-/// Checks that only make an instance: also for Scheduled Execution alone.
+/// Checks that only create an instance: also for Scheduled Execution alone.
 const INSTANCE_ALONE: [&str; 5] = ["X04", "L01a", "G-L2a", "G-L2b", "G-L3c"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
@@ -45,7 +45,7 @@ pub(super) struct Runner {
     scripts: bool,
     /// The attribute generationTool.
     pub(super) tool: Option<String>,
-    /// The binaries for co-simulation, Model Exchange and Scheduled Execution; mostly the same one.
+    /// The binaries for co-simulation, Model Exchange and Scheduled Execution; usually the same.
     pub(super) simulation: Option<PathBuf>,
     exchange: Option<PathBuf>,
     scheduled: Option<PathBuf>,
@@ -66,7 +66,7 @@ pub(super) struct Runner {
     deadline: Option<Instant>,
 }
 
-/// Whether a check makes instances for Model Exchange alone.
+/// Whether a check creates instances only for Model Exchange.
 pub(super) fn is_exchange(check: &Check) -> bool {
     matches!(check.run, Run::Exchange(_))
 }
@@ -140,7 +140,7 @@ impl Runner {
         let _ = self.wild.set((20 * run).clamp(minimum, self.timeout));
     }
 
-    /// Whether a check runs with instances for Scheduled Execution, of which there is no minimal run.
+    /// Whether a check runs with instances for Scheduled Execution, which has no minimal run.
     pub(super) fn is_scheduled(&self, check: &Check) -> bool {
         let alone = self.simulation.is_none() && self.exchange.is_none();
         matches!(check.run, Run::Scheduled(_))
@@ -177,7 +177,7 @@ impl Runner {
             found = self.excused(check, &conditions, found);
         }
         if self.scripts && matches!(found.verdict, Verdict::Violated(_)) {
-            // What a second run would end or hang in is known from the first.
+            // The first run shows where a second one would end or hang.
             let full = if found.fatal { None } else { self.full(check, &conditions).ok() };
             found.script = full.unwrap_or_else(|| found.calls.clone());
         }
@@ -233,7 +233,7 @@ impl Runner {
                 }
             }
             if matches!(end, Outcome::Hang(_)) {
-                // One hang is enough to know; the other cases would cost as much time again.
+                // One hang is enough; each further case would cost the same time.
                 break;
             }
             let last = lines.iter().rev().find_map(|l| if let Line::Case(n) = l { Some(*n) } else { None });
@@ -292,7 +292,7 @@ impl Runner {
         Ok(command)
     }
 
-    /// Runs a probe, or one case of it, in a process that prints its calls; returns what was found.
+    /// Runs a probe, or one case of it, in a process that prints its calls; returns the findings.
     pub(super) fn replay(&self, check: &Check, case: Option<usize>) -> io::Result<Conclusion> {
         let (exchange, simulation) = (self.exchange.as_deref(), self.simulation.as_deref());
         let Some(binary) = (if is_exchange(check) { exchange } else { simulation.or(exchange) }) else {
@@ -352,7 +352,7 @@ impl Runner {
                 return Ok(Outcome::Hang("stopped the process (as by SIGSTOP), which was not continued"));
             }
             End::Stopped => return Ok(Outcome::Hang("did not return")),
-            // What the checker itself has ended could not clean up.
+            // A process ended by the checker could not clean up.
             End::Ended(status) if status.success() => {
                 let left = report
                     .left
@@ -381,7 +381,7 @@ impl Runner {
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),
-            // A full disk is no fault of the FMU, nor is a probe that could not begin.
+            // A full disk is not a fault of the FMU, and neither is a probe that could not begin.
             Outcome::End(End::Ended(status))
                 if status.code() == Some(NOT_WRITTEN) || (call.is_empty() && status.code() == Some(2)) =>
             {

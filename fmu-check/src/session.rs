@@ -44,20 +44,20 @@ pub(super) struct Session {
     lines: RefCell<File>,
     journal: RefCell<File>,
     preparing: Cell<bool>,
-    /// The level of a crash, if it is lower than that of the check.
+    /// The level of a crash, if lower than the check's.
     lower: Cell<Option<Level>>,
     pub(super) silent: Cell<bool>,
     /// A finding could not be written.
     pub(super) lost: Cell<bool>,
-    /// A getter has returned OK and written nothing.
+    /// A getter has returned OK without writing a value.
     pub(super) unwritten: Cell<bool>,
-    /// The step of the integrator in s, if it is not the usual one.
+    /// The step of the integrator in s, if not the default.
     pub(super) integrator: Cell<Option<f64>>,
     /// Names of the variables in which two plain runs differ.
     pub(super) varying: HashSet<String>,
     log: RefCell<File>,
     trace: bool,
-    /// Every call is recorded, up to the first finding or so many lines: those left.
+    /// Number of lines left: every call is recorded up to the first finding or a maximum number of lines.
     full: Cell<Option<usize>>,
     from: usize,
     one: bool,
@@ -89,7 +89,7 @@ const FULL: usize = 6000;
 /// Maximum number of violations that one probe reports.
 const MAX_VIOLATIONS: usize = 25;
 
-/// A library for another processor or system than this one: the dynamic linker says that there is no such file.
+/// A library for another processor or system than this one: the dynamic linker reports a missing file.
 fn of_other(binary: &Path) -> Option<String> {
     let mut head = Vec::new();
     File::open(binary).ok()?.take(machine::HEAD).read_to_end(&mut head).ok()?;
@@ -126,8 +126,8 @@ impl Session {
         Ok(Self { integrator, varying, full, trace: args.trace, from: args.from, one: args.one, ..session })
     }
 
-    /// A session at its start that runs every case and prints nothing; the paths are those of the binary, of the unpacked folder, of
-    /// the working directory and of the journal, the files are those of the findings, the journal and the log.
+    /// A session at its start that runs every case and prints nothing; the paths are, in this order, the binary, the unpacked
+    /// folder, the working directory and the journal; the files are the findings, the journal and the log.
     fn new(
         raw: Raw,
         description: ModelDescription,
@@ -181,7 +181,7 @@ impl Session {
     /// A session with another loaded binary and another unpacked folder; its findings and calls are discarded.
     pub(super) fn duplicate_at(&self, dir: &Path, raw: Raw, number: usize) -> Result<Self, NotDetermined> {
         let lost = |e: std::io::Error| NotDetermined(e.to_string());
-        // It writes nothing but progress there.
+        // It writes only progress there.
         let journal = File::options().append(true).open(&self.calls).map_err(lost)?;
         let paths = [self.binary.clone(), dir.into(), self.home.clone(), self.calls.clone()];
         let discarded = || tempfile::tempfile().map_err(lost);
@@ -201,7 +201,7 @@ impl Session {
     pub(super) fn write(&self, line: &Line) {
         if let Ok(text) = serde_json::to_string(line) {
             let written = writeln!(self.lines.borrow_mut(), "{text}");
-            // Not where the FMU has closed the file: that is its fault.
+            // Except if the FMU has closed the file, which is the FMU's fault.
             let full = |e: std::io::Error| matches!(e.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded);
             self.lost.set(self.lost.get() || written.is_err_and(full));
         }
@@ -212,7 +212,7 @@ impl Session {
         self.report(None, Confidence::Certain, text);
     }
 
-    /// Reports a violation of this level, or of that of the check.
+    /// Reports a violation at this level, or at the check's own level.
     pub(super) fn report(&self, lower: Option<Level>, confidence: Confidence, text: impl Into<String>) {
         if lower.is_none() {
             self.violations.set(self.violations.get() + 1);
@@ -223,7 +223,7 @@ impl Session {
         self.note_call(&format!("\n{FOUND}\n"));
     }
 
-    /// Reports a violation of a lower level than that of the check.
+    /// Reports a violation at a lower level than the check's.
     pub(super) fn lesser(&self, level: Level, text: impl Into<String>) {
         self.report(Some(level), Confidence::Certain, text);
     }
@@ -457,7 +457,7 @@ impl Session {
         std::fs::read_dir(self.resources()).is_ok_and(|mut files| files.next().is_some())
     }
 
-    /// A capability of co-simulation, or of Model Exchange where there is no co-simulation.
+    /// A capability of co-simulation, or of Model Exchange if there is no co-simulation.
     pub(super) fn flag(&self, name: &str) -> bool {
         let d = &self.description;
         d.co_simulation.as_ref().or(d.model_exchange.as_ref()).is_some_and(|i| i.flag(name))

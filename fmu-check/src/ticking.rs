@@ -23,7 +23,7 @@ pub(super) struct Ticking<'b> {
     interval: f64,
 }
 
-/// The clocks of an FMU: those that the importer ticks if `inputs`, otherwise those that the FMU ticks.
+/// The clocks of an FMU that are ticked by the importer (`inputs`) or by the FMU.
 pub(super) fn clocks(session: &Session, inputs: bool) -> Vec<(&ModelVariable, ClockTiming)> {
     let all = session.description.variables.iter().filter(|v| v.base == BaseType::Clock);
     all.filter(|v| (v.causality == Causality::Input) == inputs).filter_map(|v| Some((v, v.timing?))).collect()
@@ -198,7 +198,7 @@ impl<'b> Served<'b> {
         if self.over { Ok(()) } else { self.instance.perform(Simple::EnterStepMode) }
     }
 
-    /// Steps to the next tick, a communication step at most, and enters Event Mode.
+    /// Steps to the next tick, at most by a communication step, and enters Event Mode.
     pub(super) fn step(&self) -> Result<(), NotDetermined> {
         let (t, whole) = (self.instance.time.get(), self.instance.session.h());
         let next = self.clocks.iter().filter_map(|c| c.due).fold(t + whole, f64::min);

@@ -29,7 +29,7 @@ pub(super) struct Difference {
     pub(super) step: usize,
     /// The deviation there, relative to the scale of the variable; infinite if it is not a floating-point number.
     pub(super) largest: f64,
-    /// Both values there, of an array those of an element.
+    /// Both values there; for an array, the values of an element.
     pub(super) values: [String; 2],
     /// The element of an array, from 1.
     element: Option<usize>,
@@ -173,12 +173,12 @@ impl Session {
         self.deviates(found.largest, &text);
     }
 
-    /// Reports a value that is not the expected one.
+    /// Reports a value that differs from the expected one.
     pub(super) fn value_deviates(&self, v: &ModelVariable, expected: &[u64], found: Vec<u64>, text: &str) {
         self.value_deviates_at(None, v, expected, found, text);
     }
 
-    /// Reports a value that is not the expected one, at this level or at that of the check.
+    /// Reports a value that differs from the expected one, at this level or the check's.
     pub(super) fn value_deviates_at(
         &self,
         lower: Option<Level>,
@@ -200,7 +200,7 @@ impl Session {
         self.deviates_at(None, largest, text);
     }
 
-    /// Reports a deviation at this level, or at that of the check.
+    /// Reports a deviation at this level or the check's.
     pub(super) fn deviates_at(&self, lower: Option<Level>, largest: f64, text: &str) {
         let tolerance = self.tolerance();
         let (level, range) = if largest <= tolerance {
@@ -235,7 +235,7 @@ mod tests {
         assert!(difference(V3, &variables, &first, &first).is_none());
         let found = difference(V3, &variables, &first, &[row(1.0, 3), row(-4.0, 3), row(2.5, 3)]).unwrap();
         assert_eq!((found.step, found.variable, found.largest.to_bits()), (2, 0, 0.125_f64.to_bits()));
-        // The values are those of the point with the largest deviation.
+        // The values are taken at the point with the largest deviation.
         let found = difference(V3, &variables, &first, &[row(1.1, 3), row(-4.0, 3), row(2.5, 3)]).unwrap();
         assert_eq!((found.first, found.step), (0, 2));
         assert_eq!(found.text(), " from step 1 on, most after 3 steps: 2.5, expected 2.0; the largest value is 4.0");

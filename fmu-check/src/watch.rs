@@ -29,7 +29,7 @@ pub(super) struct Watch {
     /// The file with the call that it is in.
     journal: PathBuf,
     limit: Duration,
-    /// Time since the watch began. Time in which this process itself was stopped or got no processor does not count.
+    /// Time since the watch began. Time in which this process itself was stopped or not scheduled does not count.
     watched: Duration,
     /// The call, since when, and the processor time then.
     call: (Vec<u8>, Duration, Option<Duration>),
@@ -74,11 +74,11 @@ impl Watch {
 /// The processor time that a process has used, and the state of all its threads at rest: waiting, or stopped by a signal.
 #[cfg(target_os = "linux")]
 fn processor(pid: u32) -> Option<(Duration, Option<Pace>)> {
-    // The name of the program stands in parentheses and may contain anything.
+    // The program name is in parentheses and may contain any character.
     let fields =
         |text: String| Some(text.rsplit_once(')')?.1.split_whitespace().map(str::to_owned).collect::<Vec<_>>());
     let stat = fields(fs::read_to_string(format!("/proc/{pid}/stat")).ok()?)?;
-    // utime and stime; the kernel reports hundredths of a second on every system that we know.
+    // utime and stime; the kernel reports hundredths of a second on every known system.
     let ticks = stat.get(11)?.parse::<u64>().ok()? + stat.get(12)?.parse::<u64>().ok()?;
     let tasks = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
     let state = |task: fs::DirEntry| fields(fs::read_to_string(task.path().join("stat")).ok()?)?.into_iter().next();

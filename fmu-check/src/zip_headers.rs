@@ -46,7 +46,7 @@ pub(super) struct Archive {
     pub(super) entries: Vec<Entry>,
     /// The end record counts disks.
     pub(super) split: bool,
-    /// There is a ZIP64 end record, or a size that needs one.
+    /// The archive has a ZIP64 end record, or a size that needs one.
     pub(super) zip64: bool,
 }
 

@@ -331,8 +331,8 @@ impl<M: Model> Capabilities<M> {
         if index >= beside && index < beside + M::TABLE.wide() { index - beside + WIDE } else { index }
     }
 
-    /// The variable `index` and the location of its start value; for the row of a state, that is the state itself. `rows` are
-    /// those of [`rows`](Self::rows).
+    /// The variable `index` and the location of its start value; for the row of a state, this is the state itself. `rows` comes
+    /// from [`rows`](Self::rows).
     pub fn place<'a>(
         &self,
         block: &'a mut Block<M>,

@@ -17,7 +17,7 @@ pub enum Ticks {
     Fixed,
     /// With an interval that the importer may also change at events.
     Tunable,
-    /// With an interval that the model gives at each tick for the next one.
+    /// With an interval that the model determines at each tick for the next one.
     Changing,
     /// After a time that the model gives at any event.
     Countdown,
@@ -250,7 +250,7 @@ impl<W: 'static> Row<W> {
 ///     ];
 ///     fn initialize(&mut self) { self.ticks = 0; }
 ///     fn output(&self, _: Elapsed, (): &mut ()) {}
-///     // Nothing happens between the ticks.
+///     // The state does not change between ticks.
 ///     fn advance(&mut self, _: &Step) -> Result<(), Fault> { Ok(()) }
 /// }
 ///

@@ -78,7 +78,7 @@ impl<M: 'static> State<M> {
         }
     }
 
-    /// The values in the model: one, or those of an array.
+    /// The values in the model: one, or all of an array.
     #[inline]
     pub fn all<'a>(&self, model: &'a mut M) -> &'a mut [f64] {
         match self.place {
@@ -121,7 +121,7 @@ pub trait ContinuousTime: Model {
 /// quantity between two points.
 ///
 /// A solver also tries states that it later rejects, and a model without this trait cannot distinguish them from accepted ones.
-/// In Co-Simulation, [`Model::advance`] computes the solution, and nothing here is called.
+/// In Co-Simulation, [`Model::advance`] computes the solution, and this trait is not used.
 pub trait CompletedSteps: ContinuousTime {
     /// The solution passes through the present states, inputs and time: a step of the importer's solver is complete, or Event
     /// Mode begins (before [`Events::begin`](crate::Events::begin)) or ends. Time does not decrease from call to call, unless
@@ -132,13 +132,13 @@ pub trait CompletedSteps: ContinuousTime {
     /// Returns the reason why the model cannot continue.
     fn complete(&mut self, now: Elapsed) -> Result<(), Fault>;
 
-    /// Copies the counts after [`complete`](Self::complete), or restores those of an earlier time: some importers complete
+    /// Copies the counts after [`complete`](Self::complete), or restores earlier ones: some importers complete
     /// steps that their solver then rejects. [`Kept`](crate::Kept) does both.
     fn account(&mut self, account: Account);
 }
 
-/// A continuous model with its own tangent, for example by [`Dual`](crate::Dual) numbers. For a model without one, the exporter
-/// uses central differences.
+/// A continuous model with its own tangent, for example by [`Dual`](crate::Dual) numbers. Without it, the exporter uses central
+/// differences.
 pub trait Differentiable: ContinuousTime {
     /// The directional derivative of the derivatives (to `dx`) and of the continuous outputs (to `outputs`) along `along`,
     /// which has a component for each state and continuous input.

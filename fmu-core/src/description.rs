@@ -30,7 +30,7 @@ pub const TIME: u32 = 0;
 pub struct Description {
     /// Model identifier, and the name that users see unless there is a title.
     pub name: String,
-    /// Name that users see, for example that of a preset.
+    /// Display name, for example of a preset.
     pub title: Option<String>,
     /// One sentence.
     pub description: String,
@@ -449,7 +449,7 @@ fn variable(name: String, meta: &Meta, value_reference: u32, start: Option<Value
     }
 }
 
-/// The sentence that says when `input` is read, with the full name of the parameter: its name in the table, after the prefix of
+/// The sentence stating when `input` is read, with the full name of the parameter: its name in the table, after the prefix of
 /// a part.
 fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, Fault> {
     let Need::With { parameter, value } = need else { return Ok(need.to_string()) };

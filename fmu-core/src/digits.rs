@@ -9,7 +9,7 @@ pub fn rounded(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits - 1).parse().unwrap_or(x)
 }
 
-/// The text of `x` with at most so many significant digits: plain from 1e-4 to below `large`, otherwise with an exponent.
+/// The text of `x` with at most this many significant digits: plain from 1e-4 to below `large`, otherwise with an exponent.
 pub fn text(x: f64, digits: usize, large: f64) -> String {
     let x = rounded(x, digits);
     let plain = x == 0.0 || (1e-4..large).contains(&x.abs()) || !x.is_finite();

@@ -17,7 +17,7 @@ pub trait Scalar:
     + Neg<Output = Self>
     + AddAssign
 {
-    /// The number itself: for comparisons, which choose the branch whose derivative counts.
+    /// The number itself: for comparisons, which select the branch to differentiate.
     fn value(self) -> f64;
 
     /// A function of this number: its `value` here, and its `slope` here, by the chain rule.

@@ -1,6 +1,6 @@
 //! Enumerations: one declaration gives the Rust enum, its type definition and the data of its row.
 //!
-//! The importer sees an integer; the model holds the enum, so a value that does not exist cannot be stored.
+//! The importer reads and writes an integer; the model stores the enum, so an invalid value cannot be stored.
 
 use crate::variable::Enumeration;
 use std::fmt::Debug;
@@ -22,7 +22,7 @@ pub trait Choice: Debug {
     /// The value of the current item.
     fn get(&self) -> i32;
 
-    /// Selects the item with this value; returns false and changes nothing if there is none.
+    /// Selects the item with this value; returns false without changes if no item has it.
     fn set(&mut self, value: i32) -> bool;
 }
 
@@ -41,7 +41,7 @@ impl<E: Enumerated> Choice for E {
 /// Location of an enum `E` in a `W`.
 pub struct Field<W: 'static, E: 'static>(pub fn(&mut W) -> &mut E);
 
-/// The interface of a [`Field`] for a table that does not know its type.
+/// The type-erased interface of a [`Field`] for a table.
 pub(crate) trait Place<W>: Sync {
     fn find<'a>(&self, whole: &'a mut W) -> &'a mut dyn Choice;
 }

@@ -23,7 +23,7 @@ pub enum Next {
 
 impl Next {
     /// Seconds from `now` to this event: 0 if it is due, or if only rounding separates the two. An importer's time counts as
-    /// that of the event if both agree to 1e-9 of the time.
+    /// the event's time if both agree to a relative 1e-9.
     pub fn left(self, now: Elapsed) -> Option<f64> {
         let left = match self {
             Self::Never => return None,
@@ -51,11 +51,11 @@ impl Next {
 /// Effects of an event beyond changed discrete variables.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Outcome {
-    /// Another call of [`Events::event`] follows before time goes on.
+    /// Another call of [`Events::event`] follows before time advances.
     pub again: bool,
     /// A continuous state has changed.
     pub states_changed: bool,
-    /// The simulation is to end.
+    /// The simulation must end.
     pub terminate: bool,
 }
 
@@ -182,7 +182,7 @@ pub trait Events: Model {
     /// as these do not depend on the inputs of this instant.
     fn begin(&mut self, _now: Elapsed) {}
 
-    /// Acts on the inputs of this instant. If nothing is due, it changes nothing.
+    /// Acts on the inputs of this instant. If nothing is due, it has no effect.
     ///
     /// # Errors
     /// Returns the reason why the model cannot continue.
@@ -197,14 +197,14 @@ pub trait Events: Model {
 pub struct Stop {
     /// The instant, not after the end of the step: the model's state is of this instant.
     pub at: Elapsed,
-    /// An event is to be handled at this instant.
+    /// An event must be handled at this instant.
     pub event: bool,
     /// [`Model::advance`] would handle it at once, even at the end of a step; otherwise one at the end belongs to the next step.
     pub settles: bool,
 }
 
 /// A model with states and events whose importer may handle the events in Co-Simulation: Event Mode and early return of FMI 3.0
-/// (3.0.2, 2.3.5, 4.1.3 and 4.2.1). However the importer uses them, the results are those of [`Model::advance`].
+/// (3.0.2, 2.3.5, 4.1.3 and 4.2.1). The results equal those of [`Model::advance`] for any sequence of calls.
 #[diagnostic::on_unimplemented(
     message = "`{Self}` does not stop at its events: it lacks the capability `EventMode`",
     note = "write `impl EventMode for {Self}`, or remove `EventMode` from the line that exports the model"

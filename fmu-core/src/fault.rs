@@ -4,7 +4,7 @@
 use crate::Elapsed;
 use std::fmt::{self, Display};
 
-/// An error of the caller or of the model, with a message for users who do not know the code.
+/// An error of the caller or of the model, with a message for users unfamiliar with the code.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault(
     /// One pointer: a result returns in a register.

@@ -2,7 +2,7 @@
 //! name.
 //!
 //! A model lists in [`Acts`] when its parameters and inputs act, and [`Model::idle`] evaluates the lists. A value that differs
-//! from the start value counts as set, except a parameter set to 0 or false, which asks for nothing. [`Watch`] looks at the
+//! from the start value counts as set, except a parameter set to 0 or false, which requests nothing. [`Watch`] looks at the
 //! parameters once and at an input until it is set.
 
 use crate::row::Slot;

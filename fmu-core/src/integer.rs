@@ -11,7 +11,7 @@ pub trait IntegerField: Debug {
     /// The value.
     fn get(&self) -> i128;
 
-    /// Stores the value; returns false and changes nothing if it does not fit the type.
+    /// Stores the value; returns false without changes if it does not fit the type.
     fn set(&mut self, value: i128) -> bool;
 }
 
@@ -105,7 +105,7 @@ impl IntegerType {
     /// The smallest and the largest value of this type inside a range.
     pub fn within(self, range: &Range) -> (i128, i128) {
         let (min, max) = self.bounds();
-        // A bound that is not an integer is rounded inwards; a strict one excludes itself. Conversion saturates.
+        // A bound that is not an integer is rounded inwards; a strict bound is excluded. Conversion saturates.
         #[expect(clippy::cast_possible_truncation, reason = "bounds are whole here, or infinite")]
         let (mut low, mut high) = (range.min.ceil() as i128, range.max.floor() as i128);
         low = low.saturating_add(i128::from(range.above && range.min.fract() == 0.0));

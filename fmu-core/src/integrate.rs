@@ -10,7 +10,7 @@
 //! | [`sampled`] | nothing | samples |
 //!
 //! The classical Runge-Kutta method with equal substeps; an indicator's change of sign is located by regula
-//! falsi and bisection in turn, each trial being a substep as exact as the integration itself.
+//! falsi and bisection in turn, each trial being a substep as accurate as the integration itself.
 
 mod euler;
 
@@ -55,8 +55,8 @@ pub fn smooth<M: ContinuousTime, const N: usize>(model: &mut M, step: &Step, lon
 }
 
 /// Integrates a model with events, which happen where they are due: time events exactly, others where an indicator
-/// changes its sign. Every step begins with an event, because inputs may have changed; one that is due at the end of the
-/// step belongs to the next one.
+/// changes its sign. Every step begins with an event, because inputs may have changed; an event due at the end of the step
+/// belongs to the next one.
 ///
 /// # Errors
 /// Those of [`smooth`] and of [`Events::event`], including [`Fault::end`]; an unlimited sequence of events.
@@ -135,7 +135,7 @@ const fn check_indicators<M: Events>() {
     assert!(M::INDICATORS.len() <= MAX_INDICATORS, "more event indicators than the integrator has room for");
 }
 
-/// Advances a model that acts only at its sample instants, with the inputs held.
+/// Advances a model that acts only at its sample instants, with constant inputs.
 ///
 /// # Errors
 /// Those of [`Sampled::sample`]; more than 1e7 samples in the step.
@@ -173,7 +173,7 @@ fn crossed(before: &[f64], after: &[f64]) -> bool {
     before.iter().zip(after).any(|(a, b)| (*a > 0.0) != (*b > 0.0))
 }
 
-/// One substep of `h` (s), or a part of it that ends just after an indicator has changed its sign: its length.
+/// One substep of `h` (s), or a part of it that ends just after an indicator changes sign; returns its length.
 fn substep<M: ContinuousTime + Events, const N: usize>(
     model: &mut M,
     now: Elapsed,
@@ -189,7 +189,7 @@ fn substep<M: ContinuousTime + Events, const N: usize>(
     if !crossed(&after) {
         return Ok(None);
     }
-    // The bracket, with the indicators at its ends; the sign at its lower end is that of the start.
+    // The bracket, with the indicators at its ends; the sign at its lower end equals the sign at the start.
     let (mut low, mut high, mut at_low, mut at_high, mut halve) = (0.0, h, before, after, false);
     while high - low > WIDTH * h {
         let line = |i: usize| at_low[i].abs() / (at_low[i].abs() + at_high[i].abs());
@@ -281,7 +281,7 @@ fn rk4<M: ContinuousTime, const N: usize>(model: &mut M, now: Elapsed, h: f64) -
     arrive(model, now, &start, &end)
 }
 
-/// Writes the states at the end of a substep from `now`; back to those of its `start` if one is not finite.
+/// Writes the states at the end of a substep from `now`; restores those at its `start` if one is not finite.
 fn arrive<M: ContinuousTime, const N: usize>(
     model: &mut M,
     now: Elapsed,
@@ -297,7 +297,7 @@ fn arrive<M: ContinuousTime, const N: usize>(
     Ok(())
 }
 
-/// The name of the state to which a scalar belongs.
+/// The name of the state that a scalar belongs to.
 #[cold]
 fn name_of<M: ContinuousTime>(scalar: usize) -> &'static str {
     let mut first = 0;

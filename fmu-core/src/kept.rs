@@ -46,8 +46,8 @@ pub struct Kept<C> {
 }
 
 impl<C: Clone> Kept<C> {
-    /// Keeps a copy of the `counts`, or restores those of the newest point that is not later than a given time. If no kept
-    /// point is early enough, they become those of the event.
+    /// Stores a copy of the `counts`, or restores the counts of the newest point not later than a given time. If no stored
+    /// point is early enough, the counts at the event are restored.
     pub fn follow(&mut self, account: Account, counts: &mut C) {
         match account {
             Account::Event(_) => {

@@ -3,7 +3,7 @@
 use crate::integer::IntegerType;
 use crate::variable::Kind;
 
-/// A set of kinds of variables; each integer type is one.
+/// A set of kinds of variables; each integer type is a kind.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kinds(u16);
 

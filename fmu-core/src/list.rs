@@ -54,7 +54,7 @@ impl<E: Enumerated> Element for E {
 /// Location of a list of elements of the type `T` in a `W`.
 pub struct Items<W: 'static, T: 'static>(pub fn(&mut W) -> &mut [T]);
 
-/// The interface of [`Items`] for a table that does not know their type.
+/// The type-erased interface of [`Items`] for a table.
 pub(crate) trait List<W>: Sync {
     fn find<'a>(&self, whole: &'a mut W, index: usize) -> Option<Slot<'a>>;
     fn count(&self, whole: &mut W) -> usize;

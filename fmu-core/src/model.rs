@@ -21,7 +21,7 @@ pub struct Info {
     pub copyright: &'static str,
     /// Recommended experiment.
     pub experiment: Experiment,
-    /// Log categories of the model, besides those of the standards: names and descriptions. [`Warns`](crate::Warns) logs into
+    /// Log categories of the model, in addition to the standards': names and descriptions. [`Warns`](crate::Warns) logs into
     /// them.
     pub categories: &'static [(&'static str, &'static str)],
     /// Body of the documentation page: an HTML fragment (equations, how to connect); the variables are added to it.
@@ -29,7 +29,7 @@ pub struct Info {
 }
 
 impl Info {
-    /// Defaults for all but the name: `Info { name: "MyModel", description: "...", ..Info::DEFAULT }`.
+    /// Defaults for everything except the name: `Info { name: "MyModel", description: "...", ..Info::DEFAULT }`.
     pub const DEFAULT: Self = Self {
         name: "",
         description: "",
@@ -141,7 +141,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// ```
     ///
     /// # Errors
-    /// Names the file and the reason: there is no instance.
+    /// States the file and the reason; no instance is created.
     fn load(&mut self, _resources: Option<&Path>) -> Result<(), Fault> {
         Ok(())
     }
@@ -151,13 +151,13 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     const CONTINUOUS: bool = false;
 
     /// Whether the parameter of this name has an effect. A model that shares the parameters of another model, so that it can
-    /// replace it, need not read them all; the descriptions of those without effect state this.
+    /// replace it, need not read them all; the descriptions state which have no effect.
     fn has_effect(_parameter: &str) -> bool {
         true
     }
 
-    /// Why the parameter or input of this name has no effect with the values of the others. Of a model with
-    /// [`Warns`](crate::Warns), a value other than the start value is then reported once, after the first step.
+    /// Why the parameter or input of this name has no effect with the values of the others. If the model implements
+    /// [`Warns`](crate::Warns), a changed value is then reported once, after the first step.
     fn idle(&self, _name: &str) -> Option<&'static str> {
         None
     }
@@ -166,7 +166,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     fn derive(&mut self) {}
 
     /// Rules across parameters, checked on leaving initialization and in the first step after a tunable parameter was set,
-    /// both on a copy after [`derive`](Model::derive): a refusal changes nothing.
+    /// both on a copy after [`derive`](Model::derive): a refusal leaves the model unchanged.
     ///
     /// # Errors
     /// Names the inconsistent parameters, their values and the reason.
@@ -185,14 +185,14 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
     /// The state at the start time, from parameters and inputs.
     fn initialize(&mut self);
 
-    /// Computes the outputs from parameters and state at time `now`, and changes nothing else.
+    /// Computes the outputs from parameters and state at time `now`, and leaves everything else unchanged.
     fn output(&self, now: Elapsed, outputs: &mut Self::Outputs);
 
-    /// Advances the state by one step with the inputs held.
+    /// Advances the state by one step with constant inputs.
     ///
     /// # Errors
     /// Gives the reason why the step is impossible, for example a state that is no longer finite. With
-    /// [`Fault::end`] the simulation ends inside the step without an error, and the state is that of its end.
+    /// [`Fault::end`] the simulation ends inside the step without an error, and the state is the final one.
     fn advance(&mut self, step: &Step) -> Result<(), Fault>;
 }
 

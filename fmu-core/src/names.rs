@@ -27,7 +27,7 @@ impl Names {
         Self { heads: [NONE; CHAINS], next: [NONE; MOST_ROWS], texts: [""; MOST_ROWS], len: 0 }
     }
 
-    /// The number of a name; `None` if there is none.
+    /// The number of a name; `None` if absent.
     pub(crate) const fn find(&self, name: &str) -> Option<usize> {
         let mut at = self.heads[chain(name)];
         while at != NONE {
@@ -70,7 +70,7 @@ const fn chain(name: &str) -> usize {
         } else {
             i += 1;
         }
-        // The factor is that of Knuth's multiplicative hash.
+        // The factor comes from Knuth's multiplicative hash.
         let product = (hash ^ word) as u128 * 0x9e37_79b9_7f4a_7c15;
         hash = (product ^ (product >> 64)) as u64;
     }

@@ -1,4 +1,4 @@
-//! The preset of an FMU: start values in a file of its resources, which replace those of the model's `Default`.
+//! The preset of an FMU: start values in a file of its resources, which replace the values of the model's `Default`.
 //!
 //! `fmu preset` writes the file, the exporter applies it when it creates an instance. The first line names the format; each
 //! other line has a scalar, or an element of an array, a tab (here `→`), and its start value:

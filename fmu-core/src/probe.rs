@@ -1,8 +1,8 @@
-//! Finds dependencies by running the model itself: each known is varied alone, at several operating points; every unknown that
-//! changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
+//! Finds dependencies by running the model itself: each known is varied individually at several operating points; every unknown
+//! that changes by more than rounding depends on it (`ModelStructure` of FMI 2.0.5, 2.2.8 and FMI 3.0.2, 2.4.8).
 //!
 //! A missing dependency misleads an importer; one too many costs it little. So parameters are varied together: an unknown that
-//! depends on one of them depends on all. Inputs, states and time are found one by one. Every second operating point varies an
+//! depends on one of them depends on all. Inputs, states and time are varied one by one. Every second operating point varies an
 //! earlier one that showed something new, as a fuzzer does: what acts only behind several options is reached step by step.
 
 use crate::capability::Capabilities;
@@ -140,7 +140,7 @@ fn is_opaque<M: Model>(&known: &usize) -> bool {
         .is_some_and(|(_, meta, _)| matches!(meta.kind, Kind::Text | Kind::Binary { .. }))
 }
 
-/// What is varied at once: each known alone, and all parameters together.
+/// Sets of knowns varied together: each known alone, and all parameters at once.
 fn varied(metas: &[&Meta], knowns: &[usize]) -> Vec<Vec<usize>> {
     let (parameters, others): (Vec<usize>, Vec<usize>) =
         knowns.iter().partition(|&&i| metas[i].causality == Causality::Parameter);
@@ -163,7 +163,7 @@ struct Points<'a, M: Model> {
 }
 
 impl<'a, M: Model> Points<'a, M> {
-    /// Points of a model that runs `runs` times at each.
+    /// Number of points for a model that runs `runs` times at each.
     fn new(fresh: &'a Block<M>, settable: &'a [usize], runs: usize, seed: u64) -> Self {
         let most = (RUNS / runs.max(1)).clamp(POINTS.0, POINTS.1);
         Self { fresh, settable, draw: Draw(seed), fruitful: Vec::new(), last: None, count: 0, most, known: 0 }
@@ -208,7 +208,7 @@ impl<'a, M: Model> Points<'a, M> {
 /// with the rotor angle.
 const ROUNDING: f64 = 1e-11;
 
-/// Whether two values differ by more than rounding. Integers, Booleans and hashes of texts, seen as the bits of a real number,
+/// Whether two values differ by more than rounding. Integers, Booleans and hashes of texts, read as the bits of a real number,
 /// differ by more.
 fn differ(before: u64, after: u64) -> bool {
     let (a, b) = (f64::from_bits(before), f64::from_bits(after));
@@ -324,7 +324,7 @@ fn shift<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize]
     }
 }
 
-/// Sets knowns to other allowed values: one alone, or about half of several.
+/// Sets knowns to other allowed values: a single one, or about half of several.
 fn vary<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[usize], knowns: &[usize], draw: &mut Draw) {
     for &known in knowns {
         if knowns.len() == 1 || draw.below(2) == 0 {

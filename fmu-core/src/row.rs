@@ -23,7 +23,7 @@ use crate::variable::{Causality, Kind, Meta, Range, Variability};
 pub use slot::{Constant, Slot};
 use std::mem::MaybeUninit;
 
-/// The interface of a part for a table that does not know its type.
+/// The type-erased interface of a part for a table.
 pub(crate) trait Node<W>: Sync {
     fn entry<'a>(&self, whole: &'a mut W, index: usize) -> Option<(&'static Meta, Slot<'a>)>;
     fn read(&self, whole: &mut W, list: &[u32], first: u32, out: &mut [MaybeUninit<f64>]) -> usize;
@@ -244,7 +244,7 @@ pub struct Row<W: 'static> {
     pub(crate) start: Start,
 }
 
-/// Numbers of indices: those that count one by one, and those of wide arrays.
+/// Numbers of indices: individual ones, and those of wide arrays.
 #[derive(Clone, Copy)]
 pub(crate) struct Start {
     pub(crate) dense: usize,

@@ -171,7 +171,7 @@ const fn same_dimension(a: Option<usize>, b: Option<usize>) -> bool {
     }
 }
 
-/// Whether a row can hold a continuous state, or an array of that many.
+/// Whether a row can contain a continuous state, or an array of that many.
 pub(crate) const fn can_be_state(meta: &Meta, dimension: Option<usize>) -> bool {
     matches!(meta.variability, Variability::Continuous)
         && same_dimension(meta.dimension, dimension)

@@ -1,7 +1,7 @@
 //! Arrays whose sizes the importer chooses: structural parameters (FMI 3.0.2, 2.3.6, 2.3.7 and 2.4.7.4).
 //!
 //! A [structural parameter](crate::Row::structural) is a size that rows of the table [name](crate::Row::sized). The number of
-//! elements of an array is the length of the model's array, so nothing changes before [`Resizable::resize`] runs, when the
+//! elements of an array is the length of the model's array, so lengths change only when [`Resizable::resize`] runs, when the
 //! importer leaves Configuration Mode.
 
 use crate::capability::Capabilities;
@@ -61,7 +61,7 @@ pub trait Resizable: Model {
     /// Once the simulation runs, only tunable structural parameters change.
     ///
     /// # Errors
-    /// The combination of sizes is impossible; nothing has changed.
+    /// The combination of sizes is impossible; the model is unchanged.
     fn resize(&mut self) -> Result<(), Fault>;
 }
 
@@ -245,7 +245,7 @@ impl<M: Model> Capabilities<M> {
         self.states().iter().map(|state| state.all(model).len().min(state.most())).sum()
     }
 
-    /// The state to which a number belongs, and the number of its first element.
+    /// The state that a number belongs to, and the number of its first element.
     pub fn state_of(&self, number: usize) -> Option<(&'static State<M>, usize)> {
         let mut first = 0;
         self.states().iter().find_map(|state| {

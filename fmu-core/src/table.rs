@@ -28,7 +28,7 @@ pub const DENSE: usize = 128;
 /// Index of the first element of the first wide array.
 pub const WIDE: usize = 1 << 30;
 
-/// The table of `P` seen through `W`, of which `P` is a part.
+/// The table of `P` as a part of `W`.
 pub struct Part<W: 'static, P: 'static> {
     /// Table of the part.
     pub table: &'static Table<P>,
@@ -243,7 +243,7 @@ impl<W: 'static> Table<W> {
         false
     }
 
-    /// Every index: those below [`len`](Self::len), then those of wide arrays from [`WIDE`] on.
+    /// Every index: below [`len`](Self::len), then for wide arrays from [`WIDE`] on.
     pub fn indices(&self) -> impl Iterator<Item = usize> + use<W> {
         (0..self.len).chain(WIDE..WIDE + self.wide)
     }
@@ -305,7 +305,7 @@ impl<W: 'static> Table<W> {
     #[cold]
     fn far_row(&self, index: usize) -> Option<(&'static Row<W>, usize)> {
         let at = self.rows.first()?.start.dense + index;
-        // A row without such indices begins where the next one does.
+        // A row without such indices starts at the same index as the next one.
         let after = self.rows.partition_point(|row| row.start.dense <= at);
         let row = self.rows.get(after.checked_sub(1)?)?;
         (index < self.len).then_some((row, at - row.start.dense))
@@ -376,7 +376,7 @@ impl<W: 'static> Table<W> {
         Some((name, meta, element))
     }
 
-    /// A fault of the variable that `get` finds: its name, value and unit in `whole`, and what is `allowed`.
+    /// A fault about the variable selected by `get`: its name, value and unit in `whole`, and the `allowed` values.
     pub fn fault<T>(&self, whole: &W, get: impl FnOnce(&mut W) -> &mut T, allowed: impl Display) -> Fault
     where
         W: Clone,
@@ -384,7 +384,7 @@ impl<W: 'static> Table<W> {
         Fault::new(format!("{} is not allowed: {allowed}", self.tell(whole, get)))
     }
 
-    /// Name, value and unit of the variable that `get` finds in `whole`: for messages.
+    /// Name, value and unit of the variable selected by `get` in `whole`, for messages.
     pub fn tell<T>(&self, whole: &W, get: impl FnOnce(&mut W) -> &mut T) -> String
     where
         W: Clone,

@@ -2,7 +2,7 @@
 //!
 //! An importer's communication points are rounded, often accumulated, and after 1e7 steps they are off by more than any
 //! sensible tolerance. The instance therefore adds up the step sizes itself, in two doubles (Knuth's two-sum, exact to about
-//! 1e-32 relative), and a sampled model compares that sum with `k T_s`, k an integer.
+//! 1e-32 relative), and a sampled model compares that sum with `k T_s` for an integer k.
 
 use serde::{Deserialize, Serialize};
 

@@ -87,7 +87,7 @@ impl Hash {
             .number(range.max)
             .number(nominal)
             .count(dimension);
-        // Features that older tables do not have add nothing, so their tokens stay.
+        // Features missing in older tables do not enter the hash, so their tokens stay.
         let (mut hash, mut i) = (hash, 0);
         while i < meta.shape.len() {
             hash = hash.count(meta.shape[i]);

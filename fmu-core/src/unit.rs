@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Exponents of the SI base units (FMI 3.0.2, 2.4.3 `BaseUnit`); the radian counts as one.
+/// Exponents of the SI base units (FMI 3.0.2, 2.4.3 `BaseUnit`); the radian counts as a base unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Exponents {
     /// Kilogram.
@@ -178,7 +178,7 @@ pub const S2_PER_RAD2: Quantity =
 pub const RADIAN: Quantity = Quantity::new("Angle", Unit::si("rad", Exponents::NONE.with_rad(1))).shown_in(DEGREE);
 /// Speed of rotation in rad/s, shown in rpm.
 pub const SPEED: Quantity = Quantity::new("Speed", RAD_PER_S_UNIT).shown_in(RPM);
-/// Angular frequency in rad/s: bandwidths and poles, shown as they are.
+/// Angular frequency in rad/s: bandwidths and poles, shown without conversion.
 pub const RAD_PER_S: Quantity = Quantity::new("AngularFrequency", RAD_PER_S_UNIT);
 /// Angular acceleration in rad/s2.
 pub const RAD_PER_S2: Quantity =

@@ -50,7 +50,7 @@ pub enum Variability {
 /// An enumeration: a type with named values.
 #[derive(Debug, PartialEq, Eq)]
 pub struct Enumeration {
-    /// Name of the type definition; no variable may have it.
+    /// Name of the type definition, which no variable may share.
     pub name: &'static str,
     /// Description of the type.
     pub description: &'static str,
@@ -95,7 +95,7 @@ pub enum Kind {
     },
 }
 
-/// The allowed values. A strict bound is not itself allowed.
+/// The allowed values. A strict bound is excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
     /// Lower bound, -infinity for none.
@@ -143,7 +143,7 @@ impl std::fmt::Display for Range {
 /// Another name of a variable (FMI 3.0; FMI 2.0 does not show it).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Alias {
-    /// Name, relative to the part that the variable belongs to; no other variable has it.
+    /// Name, relative to the part that the variable belongs to; unique in its table.
     pub name: &'static str,
     /// One sentence.
     pub description: &'static str,

@@ -70,7 +70,7 @@ impl Model for Known {
         *out = Outputs {
             through: self.u,
             gated: if self.on { self.u * self.x } else { 0.0 },
-            // Never -0, whose bits differ from those of 0.
+            // Never -0, whose bits differ from 0.
             tuned: self.twice * self.y + 0.0,
             clock: now.seconds(),
             held: self.held,
@@ -131,7 +131,7 @@ fn between_events() {
         ("gated", Some("u on x")),
         ("tuned", Some("tunable y")),
         ("clock", Some("time")),
-        // An event changes it, and nothing between events.
+        // Only events change it.
         ("held", Some("")),
         ("constant", Some("")),
         ("sum", Some("k x")),
@@ -170,13 +170,13 @@ fn at_the_start() {
         let variable = description.variable(name).unwrap();
         assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), wanted, "{name}");
     }
-    // With only co-simulation there is nothing between events, and no state is an initial unknown.
+    // With only co-simulation nothing is continuous between events, and no state is an initial unknown.
     let plain = Description::of::<Known>().unwrap();
     assert!(plain.variables.iter().all(|v| v.dependencies.as_ref().is_none_or(Vec::is_empty)));
     assert!(plain.variable("y").unwrap().initial_dependencies.is_none() && plain.variable("der(x)").is_none());
 }
 
-/// The order of the states is that of STATES; their references follow the table.
+/// The states are ordered as in STATES; their references follow the table.
 #[test]
 fn states_and_references() {
     let description = Description::exported::<This>().unwrap();

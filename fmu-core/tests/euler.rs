@@ -98,7 +98,7 @@ fn the_grid_has_the_same_bits_whatever_the_step_is() {
         }
         assert_eq!((ball.h, ball.v), (h, v), "{steps} steps");
     }
-    // The rest of a step is left to the next one.
+    // The remainder of a step is left to the next one.
     let mut ball = ball();
     integrate::euler::<Ball, 2>(&mut ball, &Step { start: Elapsed::ZERO, h: 0.9e-3 }, 1e-3).unwrap();
     assert_eq!(ball.v, 0.0);

@@ -208,7 +208,7 @@ impl Events for Switch {
 
 #[test]
 fn time_events_are_met_exactly() {
-    // Steps that end at an event, between events and far beyond several.
+    // Steps that end at an event, between events and long after several.
     for (h, steps) in [(0.05, 12), (0.1, 6), (0.07, 9), (0.6, 1), (0.0125, 48)] {
         let mut switch = Switch::default();
         let end = run(&mut switch, steps, h, |m, step| integrate::hybrid::<_, 1>(m, step, 3e-3)).unwrap();
@@ -227,7 +227,7 @@ fn events_on_a_grid_are_met_once_each() {
     for (h, steps) in [(1e-3, 100), (0.7e-3, 143), (4.3e-3, 23), (1e-4 / 3.0, 3000)] {
         let mut switch = Switch { period: 1e-3, ..Switch::default() };
         let end = run(&mut switch, steps, h, |m, step| integrate::hybrid::<_, 1>(m, step, 1.0)).unwrap();
-        // One at the end itself belongs to the next step.
+        // An event at the end itself belongs to the next step.
         let due = (1..200).take_while(|&k| SampleGrid { period: 1e-3 }.passed(k, end)).count() + 1;
         assert_eq!(switch.seen.len(), due, "h = {h} s");
         for (k, seen) in switch.seen.iter().enumerate() {

@@ -111,7 +111,7 @@ fn description_says_what_depends_on_what() {
     let expected =
         [("u", 1), ("i", 2), ("load.R", 3), ("load.map", 4), ("load.mode", 7), ("on", 8), ("n", 9), ("gain", 10)];
     assert_eq!(names, expected);
-    // i depends on u and on parameters; the gain on parameters alone. All parameters are listed, also load.mode.
+    // i depends on u and on parameters; the gain only on parameters. All parameters are listed, also load.mode.
     assert_eq!(d.variable("i").unwrap().initial_dependencies, Some(vec![1, 3, 4, 5, 6, 7, 8, 9]));
     assert_eq!(d.variable("gain").unwrap().initial_dependencies, Some(vec![3, 4, 5, 6, 7, 8, 9]));
     assert_eq!(d.variable("load.map").unwrap().start.as_ref().unwrap().len(), 3);

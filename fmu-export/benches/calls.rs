@@ -59,7 +59,7 @@ fmu_export::export!(Empty);
 fn main() {
     let no = Fmi2Boolean(0);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
-    // An importer calls through pointers that the compiler does not know.
+    // An importer calls through pointers unknown to the compiler.
     let set: unsafe extern "C" fn(InstancePointer, References, usize, *const f64) -> c_int =
         black_box(fmi::fmi2SetReal);
     let step: unsafe extern "C" fn(InstancePointer, f64, f64, Fmi2Boolean) -> c_int = black_box(fmi::fmi2DoStep);

@@ -74,7 +74,7 @@ type Write = unsafe extern "C" fn(InstancePointer, *const f64, usize) -> c_int;
 fn main() {
     let no = Fmi2Boolean(0);
     let token = CString::new(fmi::This::TOKEN.as_str()).unwrap_or_default();
-    // An importer calls through pointers that the compiler does not know.
+    // An importer calls through pointers unknown to the compiler.
     let set: unsafe extern "C" fn(InstancePointer, References, usize, *const f64) -> c_int =
         black_box(fmi::fmi2SetReal);
     let time_of: unsafe extern "C" fn(InstancePointer, f64) -> c_int = black_box(fmi::fmi2SetTime);

@@ -17,7 +17,7 @@ pub(crate) fn index<E: Exported>(reference: u32) -> usize {
     E::CAN.index(reference)
 }
 
-/// Whether the reference is that of `time`, which exists only in FMI 3.0 archives.
+/// Whether the reference belongs to `time`, which exists only in FMI 3.0 archives.
 pub(crate) fn is_time(reference: u32, standard: Standard) -> bool {
     reference == TIME && standard == Standard::Fmi3
 }
@@ -70,8 +70,8 @@ pub(crate) const fn has<E: Exported, T: CValue>() -> bool {
 }
 
 impl<E: Exported> Instance<E> {
-    /// The variables' values in sequence. During initialization they match the values set so far; later they are those of the
-    /// last step, and inputs and tunable parameters are those last set.
+    /// The variables' values in sequence. During initialization they match the values set so far; later they come from the last
+    /// step, except inputs and tunable parameters, which return the last value set.
     ///
     /// # Errors
     /// Unknown reference, another type, or a number of values that does not match `out`.
@@ -338,7 +338,7 @@ impl<E: Exported> Instance<E> {
         if tried { Refusal::Discard(fault) } else { Refusal::Error(fault) }
     }
 
-    /// The reason why a reference beyond the table cannot be set, or read as another type.
+    /// The reason why a reference outside the table cannot be set, or read as another type.
     #[cold]
     pub(crate) fn beside_table(&self, reference: u32, carries: &str, set: bool) -> Fault {
         match self.after_table(index::<E>(reference)) {

@@ -7,7 +7,7 @@ use crate::instance::{Instance, Refusal};
 use crate::message;
 use fmu_core::{Block, Exported, Fault, Kind, Kinds, Model, Slot};
 
-/// The type that the functions for bytes carry.
+/// The type used by the functions for bytes.
 const CARRIES: &str = "bytes";
 
 /// Reserves the maximum size of every binary variable, so that no step and no setter allocates.
@@ -48,8 +48,8 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Sets bytes of these sizes, each read by its position: all of them or, on an error, none. Nothing is read before all
-    /// references are known to be bytes that can be set, and all sizes to be allowed.
+    /// Sets bytes of these sizes, each read by its position: all of them or, on an error, none. All references and sizes are
+    /// checked before anything is read.
     ///
     /// # Errors
     /// Unknown reference, another type, not settable in this state, another number of values, a size that is too large, NULL.

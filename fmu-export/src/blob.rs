@@ -115,7 +115,7 @@ fn unable(error: &postcard::Error) -> Fault {
     Fault::new(format!("the state cannot be serialized: {error}"))
 }
 
-/// Size of a payload: twice that of a new model and a reserve for integers that grow from one byte to ten.
+/// Size of a payload: twice the size for a new model, and a reserve for integers that grow from one byte to ten.
 fn unit<M: Model>() -> Result<usize, Fault> {
     Ok((2 * payload_size(&Snapshot::<M>::default())?).next_multiple_of(64) + 64)
 }

@@ -230,8 +230,8 @@ impl<E: Exported> Instance<E> {
     /// Makes clocks active: all of them or, on an error, none.
     ///
     /// # Errors
-    /// A clock that the model ticks; a periodic clock that has ticked in this Event Mode; an active clock that is to be
-    /// deactivated (`canBeDeactivated` is false).
+    /// A clock that the model ticks; a periodic clock that has ticked in this Event Mode; deactivating an active clock
+    /// (`canBeDeactivated` is false).
     pub fn set_clocks(&mut self, references: &[u32], values: &[Fmi3Boolean]) -> Result<(), Fault> {
         for (&reference, value) in references.iter().zip(values) {
             let clock = self.clock(reference)?;

@@ -16,7 +16,7 @@ impl<E: Exported> Instance<E> {
     /// No structural parameter can change once the simulation runs.
     pub fn enter_configuration(&mut self) -> Result<(), Fault> {
         if self.current.life.state() == State::Instantiated || E::Model::TABLE.has_tunable_sizes() {
-            // Nothing is computed while sizes and arrays differ.
+            // No output is computed while sizes and arrays differ.
             self.refresh();
             return Ok(());
         }
@@ -26,7 +26,7 @@ impl<E: Exported> Instance<E> {
     /// Leaves the mode: the arrays get their new sizes.
     ///
     /// # Errors
-    /// The model refuses the sizes, or an array does not have the expected length; nothing has changed.
+    /// The model refuses the sizes, or an array does not have the expected length; the instance is unchanged.
     pub fn exit_configuration(&mut self) -> Result<(), Fault> {
         self.resize(self.current.block.clone())
     }

@@ -16,7 +16,7 @@ pub(crate) const MAX_ITERATIONS: usize = 100;
 pub struct Updated {
     /// What the event did.
     pub outcome: Outcome,
-    /// Time in s of the next time event, if there is one.
+    /// Time in s of the next time event, if any.
     pub next: Option<f64>,
 }
 
@@ -68,7 +68,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Updates the discrete states with the inputs as they are set. Tunable parameters take effect here, all together.
+    /// Updates the discrete states with the present inputs. Tunable parameters take effect here, all together.
     ///
     /// # Errors
     /// Tunable parameters that do not fit together, or an error of the model.
@@ -181,8 +181,8 @@ impl<E: Exported> Instance<E> {
     /// Sets all states.
     ///
     /// # Errors
-    /// The array does not have one element for each state (Error); a state that is out of its range or not finite (Discard): nothing
-    /// has changed.
+    /// The array does not have one element for each state (Error); a state that is out of its range or not finite (Discard):
+    /// the instance is unchanged.
     #[inline]
     pub fn set_states(&mut self, x: &[f64]) -> Result<(), Refusal> {
         count("nContinuousStates", x.len(), self.state_count())?;
@@ -204,7 +204,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// Outside of Continuous-Time Mode: whether the states have these values, so that nothing changes.
+    /// Outside of Continuous-Time Mode: whether the states already have these values.
     #[cold]
     fn keeps_states(&mut self, x: &[f64]) -> bool {
         self.forgive(Habit::States);

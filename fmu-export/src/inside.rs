@@ -31,7 +31,7 @@ pub(crate) struct Parts {
     stepped: StepResult,
 }
 
-/// The importer is to be called.
+/// The importer must be called.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pause {
     /// Time in s.
@@ -40,7 +40,7 @@ pub struct Pause {
     pub can_return: bool,
 }
 
-/// Its answer: the time (s) at which the step is to end, if it requests that.
+/// Its answer: the requested end (s) of the step, if any.
 pub type Reply = Option<f64>;
 
 /// The action after a part of a step.
@@ -167,8 +167,7 @@ impl<E: Exported> Instance<E> {
         Ok(())
     }
 
-    /// The variables' values inside a step: those of this instant if they are intermediate, else of the last communication
-    /// point.
+    /// The variables' values inside a step: at this instant if they are intermediate, else at the last communication point.
     ///
     /// # Errors
     /// As [`get`](Self::get) and [`check_inside`](Self::check_inside).

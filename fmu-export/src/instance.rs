@@ -1,4 +1,4 @@
-//! An instance of a model as seen by an importer, without C: names, times, saved states, messages.
+//! An instance of a model for an importer, without C: names, times, saved states, messages.
 
 use crate::clocks::Clocks;
 use crate::exchange::MAX_ITERATIONS;
@@ -35,7 +35,7 @@ impl From<Fault> for Refusal {
 /// The results of a communication step in addition to its status (FMI 3.0).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StepResult {
-    /// The importer is to enter Event Mode.
+    /// The importer must enter Event Mode.
     pub event: bool,
     /// The step ended before the next communication point.
     pub early: bool,
@@ -224,7 +224,7 @@ impl<E: Exported> Instance<E> {
         Ok(next)
     }
 
-    /// A communication step that has been checked, or a part of it.
+    /// A checked communication step, or a part of it.
     #[inline(always)]
     #[expect(clippy::inline_always, reason = "the way of every communication point, in both standards")]
     pub(crate) fn advance(&mut self, t: f64, h: f64, next: Elapsed) -> Result<StepResult, Fault> {

@@ -9,11 +9,11 @@
 //! };
 //! use serde::{Deserialize, Serialize};
 //!
-//! /// Inputs, parameters and state are plain data: what a saved state holds.
+//! /// Inputs, parameters and state are plain data: the content of a saved state.
 //! #[derive(Clone, Serialize, Deserialize)]
 //! struct Heater { p: f64, t_ambient: f64, c: f64, g: f64, t: f64 }
 //!
-//! /// The start values; they stand nowhere else.
+//! /// The start values, defined only here.
 //! impl Default for Heater {
 //!     fn default() -> Self {
 //!         Self { p: 0.0, t_ambient: 293.15, c: 500.0, g: 2.0, t: 0.0 }

@@ -18,7 +18,7 @@ pub enum Status {
     Error = 3,
 }
 
-/// The bit of [`WARNING`], and those of the model's categories.
+/// The bit of [`WARNING`] and the bits of the model's categories.
 const WARNINGS: u32 = 1 << 1;
 const OWNS: u32 = !0 << CATEGORIES.len();
 const _: () = assert!(matches!(CATEGORIES[1].0.as_bytes(), b"logStatusWarning") && OWN + CATEGORIES.len() == 32);
@@ -31,7 +31,7 @@ pub trait Sink {
     /// Passes one message to the importer.
     fn write(&self, status: Status, category: &str, message: &str);
 
-    /// Whether there is a logger at all.
+    /// Whether the importer passed a logger.
     fn hears(&self) -> bool;
 }
 
@@ -48,7 +48,7 @@ impl Log {
         Self { sink, enabled: if on { !0 } else { 0 } }
     }
 
-    /// Logs why a call failed, even with logging off: the status alone is not enough.
+    /// Logs why a call failed, even with logging off, because the status alone is not enough.
     #[cold]
     pub fn error(&self, message: &str) {
         self.sink.write(Status::Error, ERROR, message);
@@ -69,7 +69,7 @@ impl Log {
         self.enabled & heard != 0 && self.sink.hears()
     }
 
-    /// Whether messages of this category are logged. An unknown category counts as that of warnings.
+    /// Whether messages of this category are logged. An unknown category counts as a warning.
     pub(crate) fn hears(&self, category: &str, own: Categories) -> bool {
         self.enabled & position(category, own).map_or(WARNINGS, |i| 1 << i) != 0
     }

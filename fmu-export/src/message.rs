@@ -202,7 +202,7 @@ pub(crate) fn calculated<E: Exported>(after: usize) -> String {
     }
 }
 
-/// Nominal value of a variable: that of its row, 1 without one.
+/// Nominal value of a variable: from its row, or 1.
 pub(crate) fn nominal<M: Model>(block: &mut Block<M>, index: usize) -> f64 {
     M::TABLE.entry(block, index).and_then(|(meta, _)| meta.nominal).map_or(1.0, f64::abs)
 }

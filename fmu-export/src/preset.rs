@@ -1,4 +1,4 @@
-//! The start values of a new instance: those of the model's `Default`, or of the [preset](fmu_core::preset) that the importer's
+//! The start values of a new instance: from the model's `Default`, or from the [preset](fmu_core::preset) that the importer's
 //! token requires.
 
 use crate::lifecycle::State;
@@ -66,7 +66,7 @@ impl<M: Model> Made<M> {
         Self::of(can, &path, &bytes, found)
     }
 
-    /// The model for its description, with the preset in the folder, if there is one.
+    /// The model for its description, with the preset in the folder, if any.
     ///
     /// # Errors
     /// The preset cannot be read, or has a name or a value that is not allowed.

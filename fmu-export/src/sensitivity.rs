@@ -21,7 +21,7 @@ pub struct Scratch<M: Model> {
     block: Block<M>,
     /// The derivatives there, or along the direction.
     dx: Vec<f64>,
-    /// The direction: the change of the states, and that of inputs and parameters by reference.
+    /// The direction: the change of the states, and of inputs and parameters by reference.
     rates: Vec<f64>,
     others: Vec<(u32, f64)>,
     /// A column of the adjoint derivative.
@@ -73,7 +73,7 @@ impl<E: Exported> Instance<E> {
         })
     }
 
-    /// First derivatives of continuous outputs with respect to time, with the inputs held.
+    /// First derivatives of continuous outputs with respect to time, with constant inputs.
     ///
     /// # Errors
     /// A variable other than a continuous output, or an order other than 1 (Error); derivatives that do not exist (Discard).
@@ -122,7 +122,7 @@ impl<E: Exported> Instance<E> {
         }
     }
 
-    /// Sets first derivatives of continuous inputs; they hold for the next step (FMI 2.0.5, 4.2.1).
+    /// Sets first derivatives of continuous inputs; they apply to the next step (FMI 2.0.5, 4.2.1).
     ///
     /// # Errors
     /// A variable other than a continuous real input, an order other than 1, a value that is not finite: nothing changes.
@@ -194,7 +194,7 @@ impl<E: Exported> Instance<E> {
         done
     }
 
-    /// Expands references of arrays in FMI 3.0 to those of all elements.
+    /// Expands references of arrays in FMI 3.0 to references of all elements.
     fn with_elements(
         &mut self,
         unknowns: &[u32],
@@ -289,7 +289,7 @@ impl<E: Exported> Instance<E> {
         tangent(&current.block.model, current.elapsed, along, &mut dx[..now], change).map_err(Refusal::Discard)?;
         E::CAN.spread(&mut direction.model, dx);
         for (&unknown, out) in unknowns.iter().zip(out.iter_mut()) {
-            // A computed output is discrete: held.
+            // A computed output is discrete, so it is constant.
             if !matches!(E::Model::TABLE.entry(&mut scratch.block, index::<E>(unknown)), Some((_, Slot::Constant(_)))) {
                 *out += pick::<E>(&mut scratch.block, &scratch.dx, index::<E>(unknown));
             }

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 pub struct Experiment {
     /// Start time.
     pub start: f64,
-    /// Stop time, if the importer fixed one.
+    /// Stop time, if set by the importer.
     pub stop: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ pub struct Snapshot<M: Model> {
     pub stated: bool,
     /// Event Mode was entered, and the event has not been done.
     pub pending: bool,
-    /// Derivatives of inputs, by index in the table: they hold for the next step (FMI 2.0).
+    /// Derivatives of inputs, by index in the table: they apply to the next step (FMI 2.0).
     pub slopes: Vec<(u32, f64)>,
     /// A set call awaits processing by the model: before the start for any variable, afterwards for a tunable parameter.
     pub dirty: bool,
@@ -84,7 +84,7 @@ impl<M: Model> Snapshot<M> {
         Self::of(interface, Block::default())
     }
 
-    /// Like [`new`](Self::new), for a model other than its `Default`.
+    /// Like [`new`](Self::new), for a model that differs from its `Default`.
     pub fn of(interface: Interface, mut block: Block<M>) -> Self {
         make_room(&mut block);
         Self {

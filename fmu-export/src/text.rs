@@ -8,7 +8,7 @@ use crate::message;
 use fmu_core::{Causality, Exported, Fault, Kind, Kinds, Model, Slot};
 use std::ffi::{CStr, CString};
 
-/// The type that the functions for texts carry.
+/// The type used by the functions for texts.
 const CARRIES: &str = "a text";
 
 /// Maximum size of a text that is set, in bytes.
@@ -40,8 +40,8 @@ impl<E: Exported> Instance<E> {
         Ok(&self.texts)
     }
 
-    /// Sets `given` texts, each read by its position: all of them or, on an error, none. `None` is NULL. Nothing is read before
-    /// all references are known to be texts that can be set.
+    /// Sets `given` texts, each read by its position: all of them or, on an error, none. `None` is NULL. All references are
+    /// checked before anything is read.
     ///
     /// # Errors
     /// Unknown reference, another type, not settable in this state, another number of values, NULL, not UTF-8, too long.
@@ -95,7 +95,7 @@ impl<E: Exported> Instance<E> {
         Ok(indices)
     }
 
-    /// The table index of a variable of the right type, or the reason why there is none.
+    /// The table index of a variable of the right type, or the reason for the mismatch.
     pub(crate) fn index_of(&mut self, reference: u32, carries: &str, fits: fn(&Kind) -> bool) -> Result<usize, Fault> {
         let index = index::<E>(reference);
         match E::Model::TABLE.entry(&mut self.current.block, index) {

@@ -50,7 +50,7 @@ fn is_zero(slot: &Slot<'_>) -> bool {
     }
 }
 
-/// Whether the model reads an input of this need, with the parameters as they are.
+/// Whether the model reads an input with this need, at the present parameters.
 fn is_read<M: Model>(block: &mut Block<M>, need: Need<'_>) -> bool {
     let Need::With { parameter, value } = need else { return true };
     let named = |index: &usize| {

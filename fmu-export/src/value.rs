@@ -1,4 +1,4 @@
-//! Values as they cross the C interface: the base type of the table that each C type carries.
+//! Values at the C interface: the base type in the table for each C type.
 
 use crate::lifecycle::Standard;
 use fmu_core::{Block, Constant, IntegerType, Kind, Kinds, Meta, Model, RealInputs, Slot};
@@ -6,7 +6,7 @@ use std::ffi::c_int;
 use std::fmt::{self, Display};
 use std::mem::MaybeUninit;
 
-/// The reference of a table's first variable, after that of `time`.
+/// The reference of a table's first variable, which follows `time`.
 const FIRST: u32 = 1;
 
 /// Maximum number of inputs that are set quickly: the size of the buffer for their previous values.
@@ -17,10 +17,10 @@ pub trait CValue: Copy + Display + PartialEq {
     /// Name of the type in messages.
     const CARRIES: &'static str;
 
-    /// The kinds of variables that it carries: a model with none of them has no code for this type.
+    /// The kinds of variables it can transfer: a model without any has no code for this type.
     const KINDS: Kinds;
 
-    /// It carries integers of every type, as far as they fit.
+    /// It transfers integers of every type, if they fit.
     const NARROW: bool = false;
 
     /// The value in `slot`, `None` if the variable has another base type, or a value that this type lacks.
@@ -44,18 +44,18 @@ pub trait CValue: Copy + Display + PartialEq {
         false
     }
 
-    /// A real number as a value, for the one type that carries it.
+    /// A real number as a value, for the only type that can represent it.
     fn from_real(_x: f64) -> Option<Self> {
         None
     }
 
-    /// The real number that it is, for the one type that carries it.
+    /// Its value as a real number, for the only type that can represent it.
     fn real(self) -> Option<f64> {
         None
     }
 }
 
-/// `fmi2Integer`: carries enumerations too (FMI 2.0.5, 2.2.7).
+/// `fmi2Integer`, also for enumerations (FMI 2.0.5, 2.2.7).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(transparent)]
 pub struct Fmi2Integer(pub c_int);
@@ -165,7 +165,7 @@ impl CValue for f32 {
     }
 }
 
-/// The integers of FMI 3.0; each carries the variables of its type.
+/// The integers of FMI 3.0; each for the variables of its type.
 macro_rules! integers {
     ($($type:ident $name:ident $carries:literal;)*) => { $(
         impl CValue for $type {

@@ -35,7 +35,7 @@ fn derivatives(fmu: &Fmu, knowns: [u32; 2]) {
 fn a_solver_does_not_allocate() {
     let _neighbor = neighbor();
     for kind in ME {
-        // Warnings are on, but there is no logger: no text is built.
+        // Warnings are on, but there is no logger, so no text is formatted.
         let fmu = Fmu::with(kind, false, true);
         assert_eq!((fmu.enter(0.0, None), fmu.exit(), fmu.leave()), (OK, OK, OK));
         let mut state = null_mut();

@@ -332,7 +332,7 @@ fn the_model_ends_the_simulation() {
     assert_eq!(fmu.terminate(), OK);
 }
 
-/// Outputs at the multiples of `grid` up to 3 s, with steps of `h`, and the times of the events that the importer saw.
+/// Outputs at the multiples of `grid` up to 3 s, with steps of `h`, and the times of the events seen by the importer.
 fn run(kind: Kind, h: f64, grid: f64) -> (Vec<[u64; 3]>, Vec<f64>) {
     let fmu = Fmu::running(kind, 0.0);
     let (mut rows, mut events) = (vec![bits(&fmu)], Vec::new());

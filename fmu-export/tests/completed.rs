@@ -129,7 +129,7 @@ fn completed_steps_and_events_are_told_and_trials_are_not() {
         assert_eq!((fmu.completed(), counted(&fmu)), (OK, (1.5, 3)), "another iteration at the same time");
         point(&fmu, 2.5, 4.0);
         assert_eq!((fmu.completed(), counted(&fmu)), (OK, (1.0, 3)));
-        // An event inside of the next step: beyond it, then back to it.
+        // An event inside the next step: past it, then back to it.
         point(&fmu, 3.5, 6.0);
         point(&fmu, 3.0, 5.0);
         assert_eq!((fmu.event(), counted(&fmu)), (OK, (3.25, 4)));

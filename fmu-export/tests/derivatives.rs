@@ -1,4 +1,4 @@
-//! Derivatives of a model that knows its tangent: exact to rounding.
+//! Derivatives of a model with a tangent: exact to rounding.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 

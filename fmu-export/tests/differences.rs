@@ -1,4 +1,4 @@
-//! Derivatives of a model that does not know its tangent: central differences.
+//! Derivatives of a model without a tangent: central differences.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 

@@ -52,7 +52,7 @@ const SAMPLER: &[Line] = &[
     ("fmi3GetEventIndicators", "", '.', |f| f.try_indicators(&mut [])),
     ("fmi3GetNominalsOfContinuousStates", "", '.', |f| f.try_nominals(&mut [])),
     ("fmi3GetNumberOfContinuousStates", "", '.', |f| unsafe { fmi3GetNumberOfContinuousStates(f.it, &mut 0) }),
-    // There are no states, so no derivatives.
+    // Without states there are no derivatives.
     ("fmi3GetDirectionalDerivative", "", '.', |f| f.directional(&[], &[], &[], &mut [])),
     ("fmi3GetAdjointDerivative", "", '.', |f| f.adjoint(&[], &[], &[], &mut [])),
     ("fmi3GetOutputDerivatives", "", '.', |f| f.output_derivatives(&[], &[], &mut [])),
@@ -104,7 +104,7 @@ fn reference(start: f64) -> Vec<u64> {
     outputs
 }
 
-/// An event at instant k: the new output is there before the update, and a second update changes nothing.
+/// An event at instant k: the new output is visible before the update, and a second update has no effect.
 fn act(fmu: &Fmu, k: u64, start: f64, seen: &mut [u64]) -> Option<f64> {
     let before = fmu.get(Y).to_bits();
     assert_eq!(fmu.set(&[X, D], &[77.0, 4.0]), OK, "inputs may change any number of times");

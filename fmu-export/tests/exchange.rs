@@ -161,7 +161,7 @@ fn a_state_of_event_mode_keeps_its_event() {
             assert_eq!((other.restore(stored), other.bytes()), (OK, one.bytes()));
             assert_eq!(other.free_state(&mut stored), OK);
         }
-        // The tick at T is due and was not done: leaving Event Mode does it, in the restored instance too.
+        // The tick at T is due but was skipped: leaving Event Mode performs it, also in the restored instance.
         let one = Fmu::running(kind, 0.0);
         assert_eq!((one.set(&[U], &[3.0]), one.set_time(0.3), one.event()), (OK, OK, OK));
         let bytes = one.bytes();
@@ -189,7 +189,7 @@ fn a_state_of_another_interface_is_refused() {
                 error.contains("for Model Exchange") && error.contains("for Co-Simulation without Event Mode"),
                 "{error}"
             );
-            // Nothing else changed: the instance is as after any error, and its saved states lead out.
+            // Nothing else changed: the instance behaves as after any error, and a saved state restores it.
             assert_eq!((before.get(H), before.state()), (1.0, 'e'));
         }
         assert_eq!((to.free_state(&mut state), to.free_state(&mut stored)), (OK, OK));
@@ -337,7 +337,7 @@ fn time_goes_back_to_the_last_event() {
         assert_eq!((fmu.set_time(2.2), fmu.completed(), fmu.set_time(2.25), fmu.set_time(2.2)), (OK, OK, OK, OK));
         assert!(kind == Kind::Me2 || fmu.get(TIME) == 2.2);
         assert_eq!(fmu.set_time(2.2 - 1e-15), OK, "a rounding error");
-        // Not before a completed step, by the standards; importers do it.
+        // The standards forbid going back before a completed step, but importers do it.
         assert_eq!((fmu.set_time(2.1), fmu.set_time(2.0)), (OK, OK));
         assert_eq!(fmu.set_time(1.9), ERROR);
         assert!(fmu.error().contains("time = 1.9 is not allowed: finite and not before 2, the last event"));

@@ -1,4 +1,4 @@
-//! Panics, callbacks that call back, instances side by side, threads, and that nothing is printed.
+//! Panics, callbacks that call back, instances side by side, threads, and absence of console output.
 #![allow(missing_docs, clippy::float_cmp)]
 #![allow(
     clippy::undocumented_unsafe_blocks,

@@ -79,7 +79,7 @@ struct Fmu(u8, InstancePointer);
 
 impl Fmu {
     fn started(version: u8, start: f64, period: f64) -> Self {
-        // The library silences panics; a test wants to see its own.
+        // The library silences panics; a test needs its own.
         fmu_export::abi::quiet();
         drop(std::panic::take_hook());
         let token = CString::new(fmi::This::TOKEN.as_str()).unwrap();

@@ -85,7 +85,7 @@ struct It(InstancePointer);
 
 impl It {
     fn new() -> Self {
-        // The library silences panics; a test wants to see its own.
+        // The library silences panics; a test needs its own.
         static LOUD: Once = Once::new();
         LOUD.call_once(|| {
             fmu_export::abi::quiet();

@@ -51,7 +51,7 @@ fn the_promise_changes_no_result_and_leaves_the_current_point_open() {
         assert_eq!(bound.save(&mut here), OK);
         let ahead = run(&free, 10, 20, false);
         assert_eq!((bound.restore(here), run(&bound, 10, 20, true)), (OK, ahead.clone()));
-        // An importer that breaks its promise gets the same results as without it.
+        // An importer that breaks its promise gets the same results as without the promise.
         assert_eq!((bound.restore(here), run(&bound, 10, 20, false)), (OK, ahead));
         assert_eq!(bound.free_state(&mut here), OK);
     }

@@ -83,7 +83,7 @@ extern "C" fn log(_: *mut c_void, _: c_int, _: Text, message: Text) {
     SAID_TO_THE_LOGGER.set(message);
 }
 
-/// An instance of FMI 3.0 in Initialization Mode, or the reason why there is none.
+/// An instance of FMI 3.0 in Initialization Mode, or the reason for the mismatch.
 fn open(resources: Option<&CStr>) -> Result<InstancePointer, String> {
     let token = CString::new(This::TOKEN.as_str()).unwrap();
     let (no, resources) = (Fmi3Boolean(0), resources.map_or(null(), CStr::as_ptr));

@@ -149,7 +149,7 @@ fn a_vector_is_set_whole_or_not_at_all() {
 fn a_long_vector_is_set_whole_or_not_at_all() {
     for version in [2, 3] {
         for length in 1..20_u32 {
-            // The second variable comes late, beyond the buffer of a short vector.
+            // The second variable comes late, outside the buffer of a short vector.
             let vr: Vec<u32> = (0..length).map(|i| if i < 9 { U } else { K }).collect();
             let good: Vec<f64> = (0..length).map(|i| 2.0 - 0.1 * f64::from(i)).collect();
             for bad in 0..length as usize {
@@ -212,7 +212,7 @@ fn initialization_can_be_iterated_in_any_order() {
         assert_eq!(fmu.get(X), 0.5);
         assert_eq!(fmu.set(&[R, U], &[4.0, 8.0]), OK);
         assert_eq!((fmu.get(X), fmu.get(DOUBLE_GAIN)), (2.0, 2.0));
-        // A single input, set after a get, has its effect too.
+        // A single input set after a get also has an effect.
         assert_eq!((fmu.set(&[U], &[4.0]), fmu.get(X)), (OK, 1.0));
         assert_eq!((fmu.set(&[U], &[8.0]), fmu.get(X)), (OK, 2.0));
         assert_eq!(fmu.set(&[GAIN], &[3.0]), OK);

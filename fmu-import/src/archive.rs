@@ -141,7 +141,7 @@ impl Archive {
         Err(Error::file(&self.path, others.unwrap_or_else(|| self.missing_binary(folders[0], &name))))
     }
 
-    /// The names of its files, and the head of each library below `binaries/`, from which its platform is read.
+    /// The names of its files, and the head of each library below `binaries/`, which states its platform.
     pub(super) fn outline(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
         let mut files = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate().filter(|(_, name)| !name.ends_with('/')) {
@@ -166,7 +166,7 @@ impl Archive {
                 continue;
             }
             let (mut entry, mut bytes) = (entry, Vec::new());
-            // It ends where it holds more than its headers claim, which is within the limits.
+            // Reading stops if it contains more than its headers claim, which is within the limits.
             entry.read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
             if files.insert(name.clone(), bytes).is_some() {
                 return Err(wrong(&"occurs twice in the archive"));
@@ -192,7 +192,7 @@ impl Archive {
                 fs::create_dir_all(parent)?;
             }
             let mut out = io::BufWriter::new(File::create(&target)?);
-            // It ends where it holds more than its headers claim, which is within the limits.
+            // Reading stops if it contains more than its headers claim, which is within the limits.
             io::copy(&mut entry, &mut out).map_err(|e| io::Error::other(format!("{name}: {e}")))?;
             out.flush()?;
             files += 1;
@@ -211,7 +211,7 @@ impl Archive {
     }
 }
 
-/// Why there is no description: it may lie in a folder that was packed as a whole.
+/// Why the description is missing: it may be in a folder that was packed as a whole.
 fn no_description(names: &[String]) -> String {
     let folders = names.iter().filter_map(|name| name.strip_suffix("/modelDescription.xml"));
     match folders.min_by_key(|folder| folder.len()) {
@@ -317,7 +317,7 @@ mod tests {
         assert!(error.contains("has backslashes between its folders"), "{error}");
         let error = refused(&["M/modelDescription.xml", "M/binaries/linux64/M.so"]);
         assert!(error.ends_with("but one in the folder M: pack the contents of the folder, not the folder"), "{error}");
-        // The description is found, and is no XML.
+        // The description was found but is not XML.
         for names in [&["./modelDescription.xml"][..], &["modelDescription.xml", "resources/a:b.txt"]] {
             assert!(cfg!(windows) || refused(names).contains("modelDescription.xml: line 1"), "{names:?}");
         }

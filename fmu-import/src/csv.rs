@@ -81,7 +81,7 @@ impl Table {
     }
 }
 
-/// What is not as it must be in a header of ours.
+/// Defects in the header of one of our own files.
 fn refuse(cells: &[String]) -> Result<(), String> {
     let first = cells.first().map_or("", String::as_str);
     if first.starts_with('#') {

@@ -3,7 +3,7 @@
 use object::read::elf::{Dyn, ElfFile64, FileHeader, SectionHeader};
 use std::fmt;
 
-/// The oldest C library that a Linux binary of ours is meant for: that of 2012, in every system still in use.
+/// The oldest C library supported by our Linux binaries: released in 2012, and older than every system still in use.
 pub const FLOOR: Glibc = Glibc(2, 17);
 
 /// Tag of a needed library in the dynamic section.
@@ -24,7 +24,7 @@ impl fmt::Display for Glibc {
 pub struct Needs {
     /// The newest version of the GNU C library that one of its symbols requires.
     pub glibc: Option<Glibc>,
-    /// Needed libraries that are not part of it.
+    /// Needed libraries outside the C library.
     pub others: Vec<String>,
 }
 
@@ -96,7 +96,7 @@ pub fn strings(file: &ElfFile64<'_>, tag: i64) -> Result<Vec<String>, object::Er
 }
 
 fn object_error() -> object::Error {
-    // The crate has no public constructor; parsing nothing gives one.
+    // The crate has no public constructor; parsing an empty input creates one.
     object::File::parse(&[][..]).err().unwrap_or_else(|| unreachable!("no bytes make an object file"))
 }
 
@@ -118,8 +118,8 @@ pub fn newest_glibc(file: &ElfFile64<'_>) -> Result<Option<Glibc>, object::Error
     Ok(newest)
 }
 
-/// The C library version of a symbol's version: GLIBC_2.2.5 is 2.2 here, GLIBC_PRIVATE is none, relative relocations came with
-/// 2.36.
+/// The C library version of a symbol's version: GLIBC_2.2.5 is 2.2 here, GLIBC_PRIVATE has no version, and relative relocations
+/// came with 2.36.
 fn version_of(name: &str) -> Option<Glibc> {
     let number = name.strip_prefix("GLIBC_")?;
     let mut parts = number.split('.').map(str::parse);

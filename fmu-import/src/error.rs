@@ -81,7 +81,7 @@ impl Error {
         }
     }
 
-    /// Whether the FMU discarded the call: it did nothing, and the instance remains usable.
+    /// Whether the FMU discarded the call, without effect; the instance remains usable.
     pub fn is_discard(&self) -> bool {
         matches!(self, Self::Call { status, .. } if *status == Status::DISCARD.to_string())
     }

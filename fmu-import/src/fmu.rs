@@ -81,7 +81,7 @@ pub struct Fmu {
     co_simulation: Option<Functions>,
     model_exchange: Option<Result<Functions, Error>>,
     archive: Arc<Mutex<Archive>>,
-    /// Path of the unpacked folder `resources`, which is only there if the archive has one.
+    /// Path of the unpacked folder `resources`, which exists only if the archive has one.
     resources: PathBuf,
 }
 
@@ -150,7 +150,7 @@ impl Fmu {
         &self.description
     }
 
-    /// The contents of terminalsAndIcons.xml, if there is one.
+    /// The contents of terminalsAndIcons.xml, if present.
     ///
     /// # Errors
     /// The file cannot be read; the FMU still runs.

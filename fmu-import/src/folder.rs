@@ -1,4 +1,4 @@
-//! The folder of an unpacked archive: the process that made it removes it, or, if that process was killed, a later one.
+//! The folder of an unpacked archive: removed by the process that made it or, if that was killed, by a later process.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
@@ -29,7 +29,7 @@ impl Folder {
             let dir = tempfile::Builder::new().prefix(&format!("{PREFIX}{owner}-")).tempdir()?;
             let name = dir.path().join(LOCK);
             let lock = match File::create_new(&name) {
-                // Another process took the empty folder for an abandoned one.
+                // Another process mistook the empty folder for an abandoned one.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
                 made => made?,
             };
@@ -72,8 +72,8 @@ fn remove(folder: &Path) {
     let _ = fs::remove_dir_all(folder);
 }
 
-/// Removes the folders whose lock no process holds, and the empty ones, whose process was killed before it had made the lock or
-/// after it had removed it. Skips those that this user cannot read or remove.
+/// Removes the folders whose lock no process holds, and the empty ones, whose process was killed before creating the lock or
+/// after removing it. Skips those that this user cannot read or remove.
 fn remove_abandoned() {
     let Ok(entries) = fs::read_dir(std::env::temp_dir()) else { return };
     for entry in entries.flatten().filter(|entry| is_ours(&entry.file_name().to_string_lossy())) {
@@ -89,7 +89,7 @@ fn remove_abandoned() {
     }
 }
 
-/// Whether it is the name of such a folder; others, such as those of the checker's probes, may begin alike.
+/// Whether it is the name of such a folder; other names, such as those of the checker's probes, may begin the same way.
 fn is_ours(name: &str) -> bool {
     let owner = name.strip_prefix(PREFIX).and_then(|rest| rest.split_once('-'));
     owner.is_some_and(|(owner, _)| owner.parse::<u32>().is_ok())

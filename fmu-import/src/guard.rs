@@ -52,11 +52,11 @@ pub struct Guarded {
 /// The end of a guarded process.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum End {
-    /// By itself, or by a signal.
+    /// Normally, or by a signal.
     Ended(ExitStatus),
     /// Its time was up.
     Stopped,
-    /// The guard itself was ended by code in its child.
+    /// Code in its child ended the guard itself.
     Lost,
     /// The guard could not start it, for this reason.
     Refused(String),
@@ -313,7 +313,7 @@ mod unix {
     /// Grace period for the helpers of a process after its end.
     const FAREWELL: Duration = Duration::from_millis(100);
 
-    /// Arguments: memory, file, sandbox or open, then those of the child, which runs the same program.
+    /// Arguments: memory, file, sandbox or open, then the child's arguments, which runs the same program.
     pub(super) fn serve(arguments: &[OsString]) -> ExitCode {
         // This process communicates only over the caller's socket.
         let Ok(channel) = io::stdin().as_fd().try_clone_to_owned().map(UnixStream::from) else {
@@ -360,7 +360,7 @@ mod unix {
             }
         };
         let watch = || {
-            // The caller sends nothing: its end closes when it ends, or when it no longer needs the result.
+            // The caller sends no data: its end closes when it exits or no longer needs the result.
             let _ = (&*channel).read(&mut [0]);
             end();
         };

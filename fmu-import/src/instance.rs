@@ -353,7 +353,7 @@ impl Instance {
         self.dead
     }
 
-    /// Forgets the instance without freeing it: another one of its binary has returned the status Fatal.
+    /// Forgets the instance without freeing it: another instance of its binary has returned the status Fatal.
     pub fn abandon(&mut self) {
         self.live.abandon();
         self.dead = true;

@@ -26,7 +26,7 @@ pub const STATIC_SECONDS: u64 = 12;
 pub const PROCESS_MEMORY: u64 = 4 << 30;
 /// Maximum number of open files of a process that runs FMUs.
 pub const PROCESS_FILES: u64 = 1024;
-/// Maximum number of threads that a process that runs FMUs may add to those of the system.
+/// Maximum number of threads that a process running FMUs may start in addition to the system's.
 pub const PROCESS_THREADS: u64 = 1024;
 /// Maximum size of a file that a probe of the checker writes, in bytes.
 pub const PROBE_FILE: u64 = 1 << 30;

@@ -48,7 +48,7 @@ pub fn platforms(library: &[u8]) -> Vec<Platform> {
     of.into_iter().collect()
 }
 
-/// The images in a library: those of a universal one, or itself.
+/// The images in a library: all images of a universal library, or the library itself.
 ///
 /// # Errors
 /// An image of a universal library lies outside of it.

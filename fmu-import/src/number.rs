@@ -5,7 +5,7 @@ use std::fmt;
 /// One number, in the type of its variable: integers of 64 bits keep all their digits.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Number {
-    /// There is none: the clock of the variable has not ticked.
+    /// No number yet: the clock of the variable has not ticked.
     #[default]
     Missing,
     /// Value of a real variable.
@@ -35,7 +35,7 @@ impl From<f64> for Number {
     }
 }
 
-/// Writes a cell of CSV: digits that read back to the same number, 1 for true, nothing for a missing number.
+/// Writes a cell of CSV: digits that read back to the same number, 1 for true, empty for a missing number.
 impl fmt::Display for Number {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

@@ -12,7 +12,7 @@ pub fn split(text: &str) -> Option<(f64, &str)> {
     (1..=digits).rev().find_map(|end| Some((text.get(..end)?.parse().ok()?, text.get(end..)?.trim())))
 }
 
-/// Converts a number from `unit` to the unit of the variable; `unit` is that of the variable (also if empty), one of its display
+/// Converts a number from `unit` to the unit of the variable; `unit` is the variable's unit (also if empty), one of its display
 /// units, or another unit of the FMU for the same quantity.
 ///
 /// # Errors
@@ -49,7 +49,7 @@ pub fn convert(
     }
 }
 
-/// `; did you mean a or b?` with the names that resemble the input, or nothing.
+/// `; did you mean a or b?` with the names that resemble the input, or empty.
 pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
     let whole = written.to_lowercase();
     let (parent, last) = split_last(&whole);

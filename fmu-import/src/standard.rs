@@ -66,7 +66,7 @@ pub(super) struct Directions<'a> {
 pub struct Stepped {
     /// The FMU requests the end of the simulation.
     pub terminate: bool,
-    /// The FMU is to enter event mode before the next step (FMI 3.0 only).
+    /// The FMU must enter event mode before the next step (FMI 3.0 only).
     pub event: bool,
     /// The step ended before its end (FMI 3.0 only).
     pub early: bool,

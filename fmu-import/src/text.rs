@@ -33,8 +33,8 @@ fn commands(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// A message that names each thing once: `--record x: x: is not there` becomes `--record x: is not there`. A name is what stands
-/// between colons, and is there already if the part before ends with it, or with it and a value.
+/// A message that names each thing once: `--record x: x: is not there` becomes `--record x: is not there`. A name is the text
+/// between colons; it is already present if the part before ends with it, or with it and a value.
 pub fn once(text: &str) -> String {
     let mut kept: Vec<&str> = Vec::new();
     for part in text.split(": ") {
@@ -50,7 +50,7 @@ pub fn once(text: &str) -> String {
     kept.join(": ")
 }
 
-/// `file:///` and the path, other characters than those of RFC 3986 percent-encoded.
+/// `file:///` and the path, with characters outside RFC 3986 percent-encoded.
 pub fn file_uri(path: &Path) -> String {
     let path = path.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/");
     let root = if path.starts_with('/') { "file://" } else { "file:///" };

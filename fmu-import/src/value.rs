@@ -161,7 +161,7 @@ impl Values {
     /// These values for a variable of another type; integers of every width stay integers.
     ///
     /// # Errors
-    /// A text cannot become a number, nor a number a text.
+    /// Texts and numbers cannot be converted into each other.
     pub fn into_base(self, base: BaseType) -> Result<Self, String> {
         let reals = |numbers: Vec<f64>| Self::from_numbers(&numbers, base);
         match (self, base) {

@@ -1,5 +1,5 @@
-//! Names as a user writes them, alone, before an equals sign, in a list, or as a pattern: a name may have commas, equals signs and
-//! blanks, so what is known decides where it ends.
+//! Names as a user writes them, alone, before an equals sign, in a list, or as a pattern: a name may contain commas, equals
+//! signs and blanks, so the known names decide where it ends.
 
 /// `NAME=VALUE`: the name is the shortest known one before an equals sign; else it ends at the first sign outside of quotation
 /// marks.
@@ -49,7 +49,7 @@ pub fn is_pattern(name: &str) -> bool {
 /// Whether a name has the form of a pattern.
 pub fn matches(pattern: &str, name: &str) -> bool {
     let (pattern, name): (Vec<char>, Vec<char>) = (pattern.chars().collect(), name.chars().collect());
-    // The place after the last star, and the text that it covers so far.
+    // The position after the last star, and the text it matches so far.
     let (mut p, mut n, mut back) = (0, 0, None);
     while n < name.len() {
         if p < pattern.len() && pattern[p] == '*' {

@@ -73,7 +73,7 @@ fn instance(raw: &Raw) -> Handle {
     raw.instantiate(&arguments).unwrap().unwrap()
 }
 
-/// The message with which a call is refused.
+/// The message of a refused call.
 fn refused<T>(call: impl FnOnce() -> T) -> String {
     let panic = catch_unwind(AssertUnwindSafe(call)).err().expect("the call is refused");
     panic.downcast_ref::<String>().cloned().or_else(|| panic.downcast_ref::<&str>().map(ToString::to_string)).unwrap()

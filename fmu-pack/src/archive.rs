@@ -110,8 +110,8 @@ pub fn contents(
     Ok(files)
 }
 
-/// Paths of the libraries of a model identifier in an archive. In FMI 2.0 `darwin64` receives those of macOS, both as one
-/// universal library, and `linux64` that of the platform `linux64`.
+/// Paths of the libraries of a model identifier in an archive. In FMI 2.0 `darwin64` receives both macOS binaries as one
+/// universal library, and `linux64` the binary of the platform `linux64`.
 ///
 /// # Errors
 /// A library for macOS is not a Mach-O file.
@@ -151,7 +151,7 @@ pub fn resources(folder: &Path) -> Result<BTreeMap<String, PackedFile>> {
     let mut files = BTreeMap::new();
     let mut folders = vec![(folder.to_owned(), "resources".to_owned(), 0)];
     while let Some((folder, prefix, depth)) = folders.pop() {
-        // A link may lead back to where it is.
+        // A link may point back to its own folder.
         ensure!(depth < 32, "{}: folders are nested more than 32 deep", folder.display());
         for entry in fs::read_dir(&folder).with_context(|| folder.display().to_string())? {
             let path = entry?.path();

@@ -1,20 +1,20 @@
-//! Why an FMU or a part of it is not made.
+//! Why an FMU or a part of it could not be built.
 
 use std::error::Error as Cause;
 
-/// Why an FMU or a part of it is not made. [`source`](Cause::source) is the cause where the text does not have it.
+/// Why an FMU or a part of it could not be built. [`source`](Cause::source) is the cause unless the text already contains it.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A compiler fails; it has printed the reason.
     #[error("{0}")]
     Failed(String),
-    /// Something does not fit: names it, its value, and what is allowed.
+    /// An invalid input: the object, its value, and the allowed values.
     #[error("{0}")]
     Invalid(String),
     /// A file or a program cannot be used: names it.
     #[error("{what}")]
     Of {
-        /// What was used or attempted.
+        /// The file or action concerned.
         what: String,
         /// Why it failed.
         source: Box<dyn Cause + Send + Sync>,
@@ -56,7 +56,7 @@ impl Error {
 /// The result of this crate's functions.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Names what was used when an error occurred, or what is missing.
+/// The file or tool in use when an error occurred, or the missing one.
 pub(crate) trait Context<T> {
     fn with_context<W: Into<String>>(self, what: impl FnOnce() -> W) -> Result<T>;
 

@@ -79,7 +79,7 @@ mod tests {
         files(&Description::of::<M>().unwrap(), version).unwrap().into_keys().collect()
     }
 
-    /// Every picture exists once as PNG and SVG and is not empty: each of ours covers at least a fifth of its square.
+    /// Every picture exists once as PNG and SVG and is not empty: each of our pictures covers at least a fifth of its square.
     #[test]
     fn every_picture_of_the_models_is_drawn() {
         assert_eq!(

@@ -1,8 +1,8 @@
 //! From Rust packages to `.fmu` files.
 //!
 //! - [`workspace`], [`target`], [`compile`]: Cargo's packages, this machine's tools, and the libraries and modules built with them.
-//! - [`documentation`], [`icons`], [`picture`], [`licenses`], [`mod@reference`]: what an archive has besides its binaries and its
-//!   description.
+//! - [`documentation`], [`icons`], [`picture`], [`licenses`], [`mod@reference`]: the contents of an archive other than its
+//!   binaries and its description.
 //! - [`archive`]: all files of an FMU, and a writer that gives equal bytes for equal files; [`merge`]: one archive from several;
 //!   [`release`]: checksums and bill of materials.
 //! - [`preset`]: an FMU with other start values, from its archive; [`page`]: a page that runs an FMU in a browser.

@@ -108,7 +108,7 @@ impl Crate {
     }
 }
 
-/// The texts of licenses and notices in a folder; if MIT is one of the choices and has a file, only that one.
+/// The texts of licenses and notices in a folder; if MIT is a choice and has a file, only that file.
 fn texts_in(folder: &Path, license: &str) -> Vec<String> {
     let is_text =
         |name: &str| ["LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE"].iter().any(|n| name.starts_with(n));

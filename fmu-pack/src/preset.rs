@@ -26,7 +26,7 @@ pub struct NewExperiment {
     pub stimuli: String,
     /// Stop time.
     pub stop: f64,
-    /// Communication step, if it differs from that of the archive.
+    /// Communication step, if it differs from the archive's.
     pub step: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ pub struct NewExperiment {
 pub struct Written {
     /// A line for every start value that differs from the model's.
     pub changes: Vec<String>,
-    /// What the new FMU cannot do, although it is written.
+    /// Limitations of the new FMU, which is written anyway.
     pub notes: Vec<String>,
 }
 
@@ -56,7 +56,7 @@ pub struct PresetFmu {
 }
 
 impl PresetFmu {
-    /// Opens an FMU of this exporter, with the values of its preset, if it is one.
+    /// Opens an FMU of this exporter, with the values of its preset, if it has one.
     ///
     /// # Errors
     /// The file is not an FMU of this exporter with a binary for this computer.
@@ -135,10 +135,10 @@ impl PresetFmu {
         self.earlier.iter().filter_map(|place| self.values.get(place)).map(|(name, _)| name.as_str()).collect()
     }
 
-    /// Sets the start value of a variable, of a whole array, or of an element, from user input, in `unit` if that is given.
+    /// Sets the start value of a variable, of a whole array, or of an element, from user input, in `unit` if given.
     ///
     /// # Errors
-    /// Names the variable and the value, and what is expected.
+    /// States the variable, its value, and the expected one.
     pub fn set(&mut self, name: &str, text: &str, unit: Option<&str>) -> Result<()> {
         let model = &self.own.name;
         let Some((variable, element)) = find(&self.own, &self.reader, name) else {
@@ -171,8 +171,8 @@ impl PresetFmu {
         Ok(())
     }
 
-    /// Writes the FMU with these start values to `out`; nothing is written unless all are allowed. `title` is the name that
-    /// users see; by default, name and experiment are those of the archive.
+    /// Writes the FMU with these start values to `out`; nothing is written unless all are allowed. `title` is the display name;
+    /// by default, name and experiment come from the archive.
     ///
     /// # Errors
     /// The binary does not support presets; a value is not allowed, or the FMU refuses them together; the file cannot be
@@ -230,7 +230,7 @@ impl PresetFmu {
         Ok(description)
     }
 
-    /// Requires that the FMU initializes with the preset if it does so without; for Model Exchange, a note says that it does not.
+    /// Requires that the FMU initializes with the preset if it does so without; for Model Exchange, a note reports a failure.
     fn starts(&self, archive: &Path) -> Result<Option<String>> {
         let (fmu, name) = (Fmu::open(archive)?, self.file.display());
         for (kind, what) in [(Kind::default(), "Co-Simulation"), (Kind::ModelExchange, "Model Exchange")] {

@@ -167,7 +167,7 @@ impl Feed {
 /// Duration of a change of the inputs, as a share of the step; it ends the same time before the communication point.
 const EDGE: f64 = 1e-3;
 
-/// Rows of the inputs as in the run: held over its communication steps. A change ends just before its communication point, so
+/// Rows of the inputs as in the run: constant over its communication steps. A change ends just before its communication point, so
 /// an importer with shorter steps feeds the same values; straight lines connect the rows.
 fn held(fed: &[Feed], experiment: &Experiment) -> String {
     let Experiment { start, stop, step, .. } = *experiment;

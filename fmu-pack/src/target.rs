@@ -41,7 +41,7 @@ pub enum Linker {
 #[derive(Debug)]
 pub struct Tools {
     host: String,
-    /// zig as a linker, or what is missing.
+    /// zig as a linker, or the missing prerequisite.
     zig: Result<(), String>,
 }
 
@@ -93,7 +93,7 @@ impl Tools {
         Ok(Target { triple: triple.into(), platform, is_host: triple == self.host, linker })
     }
 
-    /// The linker of a target, or what is missing.
+    /// The linker of a target, or the missing prerequisite.
     fn linker(&self, triple: &str, platform: Platform, environment: &str) -> Result<Linker, String> {
         let users = format!("CARGO_TARGET_{}_LINKER", triple.to_uppercase().replace(['-', '.'], "_"));
         if env::var_os(users).is_some() {
@@ -142,7 +142,7 @@ pub fn cargo() -> Command {
     Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()))
 }
 
-/// The target of the compiler itself.
+/// The compiler's own target.
 ///
 /// # Errors
 /// rustc cannot be run.
@@ -165,7 +165,7 @@ fn zig() -> Result<(), String> {
     }
 }
 
-/// Checks that there is a standard library for a target, or that Cargo builds one. `printed` is the output of rustc, with the
+/// Checks that a standard library for a target exists or is built by Cargo. `printed` is the output of rustc, with the
 /// folder in one line.
 fn has_std(printed: &str, triple: &str) -> Result<(), String> {
     let libraries = printed.lines().find(|line| Path::new(line).is_absolute()).unwrap_or_default();

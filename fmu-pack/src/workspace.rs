@@ -115,7 +115,7 @@ impl Workspace {
     /// The workspace around the current folder.
     ///
     /// # Errors
-    /// There is none, or Cargo cannot be run.
+    /// There is no package, or Cargo cannot be run.
     pub fn find() -> Result<Self> {
         let here = std::env::current_dir().context("the current folder")?;
         if !has_manifest(&here) {

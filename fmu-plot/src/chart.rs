@@ -270,7 +270,7 @@ mod tests {
             assert_eq!(svg.matches(words).count(), 1, "{words}");
         }
         assert!(svg.contains("data-area=\"66 34 776 576\" data-window=\"0 20 0 20\""));
-        // Nothing is painted where the field has no value: above y = 18.
+        // The area without field values, above y = 18, stays blank.
         let painted = svg.split("<path d=\"M").nth(1).unwrap();
         assert!(painted.starts_with("66.0 "), "{painted}");
         let top = 576.0 - 542.0 * 18.0 / 20.0;

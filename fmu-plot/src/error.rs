@@ -1,6 +1,6 @@
 //! Errors of drawing.
 
-/// The reason why there is no drawing.
+/// The reason why a drawing is impossible.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A figure without a point.

@@ -81,7 +81,7 @@ impl Figure {
     }
 }
 
-/// Round positions for the grid lines of an axis, at most about `most`, and the number of decimals of their labels.
+/// About `most` round positions for the grid lines of an axis, and the number of decimals of their labels.
 pub(crate) fn ticks(low: f64, high: f64, most: f64) -> (Vec<f64>, usize) {
     let rough = (high - low) / most;
     let power = 10_f64.powf(rough.log10().floor());

@@ -1,10 +1,10 @@
-//! Runs at a point and on both sides of it, for derivatives of measures with respect to variables.
+//! Runs at a point and on both sides, for derivatives of measures with respect to variables.
 //!
 //! Two runs that the master integrates (Model Exchange) differ not only by their values: the solver chooses other steps, and
 //! that difference, about its tolerance, is divided by the distance of the two. Here the two runs on both sides of a point form
 //! one system ([`with_copy`](fmu_system::cosimulation::SystemPlan::with_copy)), which is integrated in common steps. Thus the
-//! computed solution is differentiated, and its derivative is as exact as the solution itself, at any tolerance. Each run has its
-//! own events and samples.
+//! computed solution is differentiated, and its derivative is as accurate as the solution itself, at any tolerance. Each run
+//! has its own events and samples.
 //!
 //! Source: H. G. Bock, Numerical treatment of inverse problems in chemical reaction kinetics, in: Modelling of Chemical Reaction
 //! Systems, Springer 1981, 102-125: internal numerical differentiation.
@@ -17,7 +17,7 @@ use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
 impl Plan {
-    /// Runs at a point, then with each variable above it by its step, then with each below it: two rows for each variable, plus
+    /// Runs at a point, then with each variable increased by its step, then with each decreased: two rows per variable, plus
     /// one. `progress` is called with the number of rows done.
     ///
     /// # Errors

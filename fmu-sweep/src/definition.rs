@@ -20,7 +20,7 @@ pub struct Definition {
     pub connect: Vec<[String; 2]>,
     /// Pairs of terminals.
     pub terminal: Vec<[String; 2]>,
-    /// Pass numbers between different units on as they are; otherwise they are converted by the BaseUnits of both FMUs.
+    /// Pass numbers between different units unchanged; otherwise they are converted by the BaseUnits of both FMUs.
     pub no_unit_conversion: bool,
     /// Step the FMUs one after another; each receives the new outputs of those before it.
     pub sequential: bool,
@@ -32,7 +32,7 @@ pub struct Definition {
     pub solver: Option<SolverName>,
     /// Relative tolerance of the adaptive solver; by default 1e-6. If no FMU is integrated, as `tolerance`.
     pub rtol: Option<f64>,
-    /// Relative tolerance of the solvers inside FMUs for Co-Simulation; by default that of the default experiment of each.
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation; default: the tolerance of each default experiment.
     pub tolerance: Option<f64>,
     /// Start time in s; by default from the FMUs.
     pub start: Option<f64>,
@@ -48,7 +48,7 @@ pub struct Definition {
     pub input: Ordered<String>,
     /// How to generate rows.
     pub design: Option<Design>,
-    /// The varied variables; their order is that of the columns.
+    /// The varied variables; in the order of the columns.
     pub vary: Ordered<Vary>,
     /// The measures of each run.
     pub measure: Ordered<MeasureDefinition>,
@@ -175,9 +175,9 @@ pub enum MeasureFunction {
     Rms,
     /// The integral over time, by trapezoids.
     Integral,
-    /// The value at a time: that of the first communication point at or after it.
+    /// The value at the first communication point at or after a time.
     At,
-    /// Time in s from the first crossing of `from` to the next crossing of `to`, interpolated; infinite without them.
+    /// Time in s from the first crossing of `from` to the next crossing of `to`, interpolated; infinite if there are none.
     Rise,
     /// Time in s until it stays within `band` of `target`; infinite if it never does.
     Settling,
@@ -189,7 +189,7 @@ pub enum MeasureFunction {
 pub struct Traces {
     /// Variables to record.
     pub of: Vec<String>,
-    /// Record every n-th communication point; by default each.
+    /// Record every n-th communication point; by default every point.
     pub every: Option<u32>,
     /// Which runs.
     pub runs: Runs,

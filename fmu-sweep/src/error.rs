@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// One line that names the thing, its value and what was expected.
+/// One line that states the object, its value and the expected one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// An FMU, or a feature that it lacks.

@@ -149,7 +149,7 @@ impl Running {
         }
     }
 
-    /// The next line with the mark, without it.
+    /// The next marked line, without the mark.
     fn answer(&mut self) -> Result<String, Died> {
         let mut line = Vec::new();
         loop {

@@ -109,7 +109,7 @@ impl Measure {
         Ok(Self { signal, of: of.clone(), after: if let Kind::At(time) = kind { time } else { after }, kind })
     }
 
-    /// Whether it is one of the values of its signal.
+    /// Whether the measure equals one of the values of its signal.
     pub(crate) fn is_a_value(&self) -> bool {
         matches!(self.kind, Kind::Final | Kind::At(_) | Kind::Min | Kind::Max) && !self.signal.wraps()
     }

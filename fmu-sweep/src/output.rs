@@ -170,7 +170,7 @@ impl Output {
     }
 }
 
-/// Removes the results of a sweep, and nothing else; in a folder without `sweep.json` it removes nothing.
+/// Removes only the results of a sweep; in a folder without `sweep.json` it removes nothing.
 pub(crate) fn restart(folder: &Path) -> Result<(), Error> {
     if !folder.join("sweep.json").exists() {
         return Ok(());

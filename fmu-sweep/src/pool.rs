@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 /// Rows that a thread claims at a time.
 pub(crate) const BLOCK: u64 = 8;
 
-/// Calls `work` for each of `blocks` on up to `threads` threads, each with its own state that `begin` makes. With one
+/// Calls `work` for each of `blocks` on up to `threads` threads, each with its own state from `begin`. With one
 /// thread it is the caller's. Ends at the first error.
 pub(crate) fn run<S>(
     blocks: u64,

@@ -18,7 +18,7 @@ use std::time::{Instant, SystemTime};
 /// How to run.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Threads or processes; by default as many as the machine runs at once.
+    /// Threads or processes; by default the number that the machine can run in parallel.
     pub jobs: Option<usize>,
     /// Only the parts k with k = I mod N.
     pub part: Option<(u64, u64)>,
@@ -131,7 +131,7 @@ pub fn run(sweep: &Sweep, folder: &Path, options: &Options, watch: &dyn Progress
     Ok(Report { rows, missing, results, failures })
 }
 
-/// Numbers of the missing parts and of all parts, and rows of a part; nothing runs and nothing is written.
+/// Numbers of the missing parts and of all parts, and rows of a part; without a run and without output.
 ///
 /// # Errors
 /// The folder belongs to another sweep.
@@ -151,7 +151,7 @@ fn len(parts: &[u64]) -> u64 {
 struct Job {
     part: u64,
     rows: Range<u64>,
-    /// Number of its first block among those of all parts.
+    /// Number of its first block among all blocks.
     first_block: u64,
 }
 

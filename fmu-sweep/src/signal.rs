@@ -4,7 +4,7 @@ use crate::definition::SetValue;
 use fmu_import::Number;
 use std::f64::consts::PI;
 
-/// A sum as it is written.
+/// A sum as written in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Sum {
     /// Factors and names.

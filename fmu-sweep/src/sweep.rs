@@ -182,7 +182,7 @@ impl Sweep {
         csv::line(cells)
     }
 
-    /// The error of a line, if it has one.
+    /// The error of a line, if any.
     pub(crate) fn error_of(line: &str) -> Option<String> {
         // Most rows end with the comma before an empty error.
         if line.trim_end().ends_with(',') { None } else { csv::cells(line).pop() }
@@ -253,7 +253,7 @@ fn value(items: &[(i64, String)], x: Number) -> String {
     item(items, x.real()).map_or_else(|| number(x), str::to_owned)
 }
 
-/// A number in few characters that reads back as the same one; nothing for a missing one.
+/// The shortest text that reads back as the same number; empty for a missing number.
 fn number(number: Number) -> String {
     match number {
         Number::Real(x) if x != 0.0 && x.is_finite() && !(1e-5..1e16).contains(&x.abs()) => format!("{x:e}"),

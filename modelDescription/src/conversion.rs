@@ -33,7 +33,7 @@ pub struct Measured<'a> {
     pub unit: Option<&'a str>,
     /// Its relation to the SI base units.
     pub base: Option<BaseUnit>,
-    /// The number is a difference, for which no offset counts (`relativeQuantity`).
+    /// The number is a difference, so no offset applies (`relativeQuantity`).
     pub relative: bool,
 }
 

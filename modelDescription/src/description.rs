@@ -33,9 +33,9 @@ pub struct ModelDescription {
     pub generation_date_and_time: Option<String>,
     /// Names are structured (`part.name[1]`), not flat.
     pub structured_names: bool,
-    /// The co-simulation interface, if there is one.
+    /// The co-simulation interface, if any.
     pub co_simulation: Option<Interface>,
-    /// The model exchange interface, if there is one.
+    /// The model exchange interface, if any.
     pub model_exchange: Option<Interface>,
     /// The scheduled execution interface, if there is one (FMI 3.0 only).
     pub scheduled_execution: Option<Interface>,
@@ -112,7 +112,7 @@ impl ModelDescription {
         }
     }
 
-    /// The state whose derivative a variable is, if it is one.
+    /// The state of which a variable is the derivative, if any.
     pub fn state_of(&self, derivative: &ModelVariable) -> Option<&ModelVariable> {
         self.referenced(derivative.derivative?)
     }

@@ -1,5 +1,5 @@
-//! Limits on descriptions, each with a message; together with those of `fmu-import` they keep the checks of a file below 512 MB
-//! and 20 s.
+//! Limits on descriptions, each with a message; together with the limits of `fmu-import` they keep the checks of a file below
+//! 512 MB and 20 s.
 
 use std::fmt::Display;
 
@@ -29,7 +29,7 @@ impl Limit {
         if found > self.most { Err(self.exceeded(found)) } else { Ok(()) }
     }
 
-    /// The message for a number beyond the limit; `found` may also state that counting ended there.
+    /// The message for a number above the limit; `found` may also state that counting ended there.
     pub fn exceeded(&self, found: impl Display) -> String {
         let Self { before, unit, most, .. } = self;
         format!("{before} {found} {unit}; the limit is {most}")

@@ -26,7 +26,7 @@ pub fn parse(text: &str) -> Option<f64> {
         "INF" | "+INF" => Some(f64::INFINITY),
         "-INF" => Some(f64::NEG_INFINITY),
         "NaN" => Some(f64::NAN),
-        // Rust also reads "inf", "infinity" and "nan", which XML Schema does not know.
+        // Rust also reads "inf", "infinity" and "nan", which XML Schema does not define.
         other => other.bytes().all(|b| b.is_ascii_digit() || b"+-.eE".contains(&b)).then(|| other.parse().ok())?,
     }
 }

@@ -71,7 +71,7 @@ impl DisplayUnit {
 /// A type definition: the common properties of the variables that refer to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TypeDefinition {
-    /// Name to which `declaredType` refers.
+    /// Name that `declaredType` refers to.
     pub name: String,
     /// Base type.
     pub base: BaseType,

@@ -121,7 +121,7 @@ impl BaseType {
         matches!(self, Self::Float32 | Self::Float64)
     }
 
-    /// Whether values are integers; those of an enumeration are.
+    /// Whether values are integers, including enumerations.
     pub fn is_integer(self) -> bool {
         !self.is_float() && !matches!(self, Self::Boolean | Self::String | Self::Binary | Self::Clock)
     }

@@ -17,7 +17,7 @@ struct Lanes {
     common: Common,
     all: Vec<Lane>,
     threads: usize,
-    /// Start values by variable, one for all lanes or one for each.
+    /// Start values by variable, one for all lanes or one per lane.
     ports: Ports,
     values: Vec<Vec<f64>>,
 }

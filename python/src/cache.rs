@@ -29,7 +29,7 @@ impl Opened {
     }
 }
 
-/// The open FMU with these bytes; it is opened under the lock, so that two threads open it once.
+/// The open FMU with these bytes, opened under the lock so that two threads open it only once.
 pub(crate) fn opened(path: &Path, bytes: Vec<u8>) -> Result<Arc<Opened>, Error> {
     let mut all = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(index) = all.iter().position(|o| *o.bytes == *bytes) {

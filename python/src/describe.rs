@@ -15,7 +15,7 @@ pub(crate) fn type_name(version: FmiVersion, base: BaseType) -> &'static str {
     }
 }
 
-/// Extents of an array; an extent that a structural parameter gives is its start value, or 0 without one.
+/// Extents of an array; an extent given by a structural parameter is its start value, or 0 without one.
 pub(crate) fn shape(description: &ModelDescription, variable: &ModelVariable) -> Vec<usize> {
     let start = |reference| {
         let size = description.variables.iter().find(|v| v.value_reference == reference)?;

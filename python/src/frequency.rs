@@ -7,8 +7,8 @@ use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-/// The response of an output at all frequencies: frequencies (Hz), values, amplitudes, the checks (amplitude, settling, step), and for
-/// each frequency its doubts or error.
+/// The response of an output at all frequencies: frequencies (Hz), values, amplitudes, the checks (amplitude, settling, step),
+/// and the warnings or the error per frequency.
 #[pyfunction]
 #[expect(clippy::type_complexity, clippy::too_many_arguments, reason = "Python's arguments and result")]
 pub(crate) fn frequency_response<'py>(

@@ -22,7 +22,7 @@ pub(crate) struct Input {
     /// Instants at which a step ends, ascending.
     pub(crate) events: Vec<f64>,
     pub(crate) groups: Vec<Group>,
-    /// Their derivatives are set, too (Co-Simulation of FMI 2.0).
+    /// Their derivatives are also set (Co-Simulation of FMI 2.0).
     pub(crate) derivatives: bool,
 }
 
@@ -41,7 +41,7 @@ enum At {
 }
 
 impl Input {
-    /// The first event after `time`, infinity if there is none.
+    /// The first event after `time`, or infinity.
     pub(crate) fn next_event(&self, time: f64) -> f64 {
         self.events.iter().copied().find(|&t| t > time && !is_close(t, time)).unwrap_or(f64::INFINITY)
     }

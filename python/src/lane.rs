@@ -196,7 +196,7 @@ impl Lane {
         }
     }
 
-    /// Whether the library had a fatal error, so that none of its instances can be used.
+    /// Whether the library had a fatal error, so none of its instances can be used.
     pub(crate) fn is_fatal(&self) -> bool {
         matches!(&self.error, Some(Error::Call { status, .. }) if status == "Fatal")
     }

@@ -38,7 +38,7 @@ pub(crate) fn read_definition(path: PathBuf) -> PyResult<String> {
     })
 }
 
-/// Paths of the files of a definition, as written there: those of the FMUs, then that of the design.
+/// Paths of the files of a definition, as written there: first the FMUs, then the design.
 #[pyfunction]
 pub(crate) fn paths(definition: &str) -> PyResult<Vec<String>> {
     gate(|| {
@@ -51,7 +51,7 @@ pub(crate) fn paths(definition: &str) -> PyResult<Vec<String>> {
     })
 }
 
-/// A system with its measures, and its design if it has one.
+/// A system with its measures, and its design, if any.
 #[pyclass(frozen, module = "fmurun._core")]
 pub(crate) struct Plan {
     plan: fmu_sweep::Plan,
@@ -103,7 +103,7 @@ impl Plan {
         })
     }
 
-    /// Run rows: columns of the measures, times reached, errors. 0 threads are as many as the machine has.
+    /// Run rows: columns of the measures, times reached, errors. 0 threads means all cores.
     #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn run_many<'py>(
         &self,

@@ -61,7 +61,7 @@ pub(crate) struct Simulation {
 
 /// Type, value references and sizes of recorded variables.
 type Columns = (String, Vec<u32>, Vec<usize>);
-/// Type, whether continuous, value references, one row of samples for each.
+/// Type, whether continuous, value references, one row of samples per reference.
 type Samples<'py> = (String, bool, Vec<u32>, PyReadonlyArray2<'py, f64>);
 
 fn base(name: &str) -> PyResult<BaseType> {
@@ -183,7 +183,7 @@ impl Simulation {
         self.run().course.record.rows
     }
 
-    /// The rows as bytes; `take` empties those of the simulation.
+    /// The rows as bytes; `take` empties the simulation's.
     fn bytes<'py>(&self, py: Python<'py>, take: bool) -> Bound<'py, PyArray1<u8>> {
         let bytes = &mut self.run().course.record.bytes;
         if take { std::mem::take(bytes) } else { bytes.clone() }.into_pyarray(py)

@@ -1,4 +1,4 @@
-//! `fmu atlas`: at which low speeds a drive with wrong estimates carries its load.
+//! `fmu atlas`: the low speeds at which a drive with wrong estimates carries its load.
 
 use super::{bar_of_cells, numbers};
 use anyhow::{Result, anyhow, bail};
@@ -50,7 +50,7 @@ pub struct Atlas {
     /// Speed as a share of the rated speed [default: 0,0.01,0.02,0.05]
     #[arg(long, value_name = "SHARE,...", allow_hyphen_values = true)]
     pub speed: Option<String>,
-    /// Angle in deg by which the rotor is ahead of the first estimate [default: 0]
+    /// Initial angle in deg of the rotor ahead of the estimate [default: 0]
     #[arg(long, value_name = "DEG,...", allow_hyphen_values = true)]
     pub angle: Option<String>,
     /// Start from the full grid: five scenarios, 7 fluxes, speeds of both signs, 3 angles (40425 cells, about half an hour)
@@ -62,7 +62,7 @@ pub struct Atlas {
     /// Set a parameter of the controller (repeatable)
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Threads [default: as many as the machine runs at once]
+    /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
     /// Output folder [default: atlas in Cargo's target folder]

@@ -121,7 +121,7 @@ const RELEASED: [&str; 5] = [
     "aarch64-apple-darwin",
 ];
 
-/// Packages with programs of a release, in the workspace that has them.
+/// Packages with the programs of a release, if the workspace contains them.
 const PROGRAMS: [(&str, &str); 3] = [("fmu", "fmu"), ("fmu", "cargo-fmu"), ("fmu-check", "fmu-check")];
 
 /// A compiled model, ready to be packed.
@@ -200,7 +200,7 @@ pub fn run(args: &Build) -> Result<Vec<PathBuf>> {
     Ok(written)
 }
 
-/// The reference files for the model's archives. A model that cannot run alone has none; a note gives the reason.
+/// The reference files for the model's archives. A model that cannot run alone has none, and a note gives the reason.
 fn reference(model: &Model, version: FmiVersion, moment: GenerationTime) -> Result<BTreeMap<String, PackedFile>> {
     let Model { description, stimuli, .. } = model;
     let dir = tempfile::tempdir()?;
@@ -393,7 +393,7 @@ fn has_arm(models: &[Model]) -> Result<()> {
     Ok(())
 }
 
-/// Requirements of the Linux binaries beyond glibc 2.17: one line for all binaries with the same requirements.
+/// Requirements of the Linux binaries in addition to glibc 2.17: one line for all binaries with the same requirements.
 fn notes(models: &[Model]) -> Vec<String> {
     let mut by_needs: BTreeMap<String, Vec<&str>> = BTreeMap::new();
     for Model { description, binaries, .. } in models {

@@ -20,7 +20,7 @@ use std::path::PathBuf;
 /// values are the outputs identified_* of its last row.
 ///
 /// Each value has an interval (95 %), or the reason why this record does not determine it. Exit status: 0 if all values are
-/// written, 1 if one is refused, 2 for an invalid record, for which nothing is written.
+/// written, 1 if one is refused, 2 for an invalid record (nothing is written).
 ///
 ///   fmu identify bench.csv --n-p 3 --current 15 --out target/motor.toml
 ///   fmu identify bench.csv --n-p 3 --current 15 --html bench.html
@@ -80,7 +80,7 @@ pub struct Identify {
     /// Page to write: the values, and each fit beside the record
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
-    /// Print the result as JSON and nothing else
+    /// Print only the result, as JSON
     #[arg(long)]
     pub json: bool,
 }
@@ -210,7 +210,7 @@ fn rows<'a>(values: impl Iterator<Item = &'a Quantity>) -> String {
     values.map(row).collect()
 }
 
-/// Results of the fit other than the values.
+/// Results of the fit in addition to the values.
 fn facts(found: &Identified) -> String {
     let Fit { theta_0, tau, rest, noise, .. } = found.fit;
     format!(

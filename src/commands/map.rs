@@ -34,7 +34,7 @@ pub struct Map {
     /// Output folder [default: map in Cargo's target folder]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// DC-link voltages [default: that of the motor file]
+    /// DC-link voltages [default: from the motor file]
     #[arg(long, value_name = "V,...", allow_hyphen_values = true)]
     pub u_dc: Option<String>,
     /// Temperatures of winding and magnet in degC [default: 20]
@@ -46,15 +46,15 @@ pub struct Map {
     /// Number of points compared with PmsmDrive, for each voltage and temperature; 0: none
     #[arg(long, value_name = "N", default_value_t = 5)]
     pub verify: usize,
-    /// Driving cycle: lines of time in s and speed in km/h, with straight lines between them [default: that of examples/vehicle]
+    /// Driving cycle: lines of time in s and speed in km/h, interpolated linearly [default: from examples/vehicle]
     #[arg(long, value_name = "FILE.csv")]
     pub cycle: Option<PathBuf>,
-    /// Vehicle on the cycle [default: that of examples/vehicle]
+    /// Vehicle on the cycle [default: from examples/vehicle]
     #[arg(long, value_name = "FILE.toml")]
     pub vehicle: Option<PathBuf>,
 }
 
-/// The vehicle and the cycle of the options, or those of the examples.
+/// The vehicle and the cycle of the options, or of the examples.
 fn cycle(args: &Map) -> Result<Cycle> {
     let read = |file: &Option<PathBuf>, example: &str| match file {
         Some(file) => std::fs::read_to_string(file).with_context(|| format!("reading {}", file.display())),

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 /// Merges builds of one FMU for different platforms into a single FMU.
 ///
 /// The FMUs must have the same FMI version, token (GUID) and files, except for binaries/ and the generation date; the latest date
-/// is kept. Otherwise the command writes nothing. The order of the FMUs does not change the bytes. In FMI 2.0, the libraries for both
+/// is kept. Otherwise no file is written. The order of the FMUs does not change the bytes. In FMI 2.0, the libraries for both
 /// processors of macOS become one universal library.
 ///
 ///   fmu merge linux/PmsmPlant.fmu windows/PmsmPlant.fmu --out PmsmPlant.fmu

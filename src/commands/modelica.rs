@@ -28,10 +28,10 @@ pub struct Modelica {
     /// FMU with a shaft: PmsmDrive, PmsmDriveMean, PmsmPlant or a preset of one
     #[arg(value_name = "FILE.fmu")]
     pub file: PathBuf,
-    /// Name of the package [default: that of the FMU, with Lib]
+    /// Name of the package [default: the FMU's, with Lib]
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
-    /// Class of the imported block [default: that of OpenModelica's importFMU, such as PmsmDrive_me_FMU]
+    /// Class of the imported block [default: as in OpenModelica's importFMU, for example PmsmDrive_me_FMU]
     #[arg(long, value_name = "CLASS")]
     pub block: Option<String>,
     /// Motor file, as for `fmu tune` (repeatable)

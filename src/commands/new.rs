@@ -42,7 +42,7 @@ const VERSION: &str = "0.1.0";
 /// Runs the command; returns the next steps.
 ///
 /// # Errors
-/// The name is not that of a package, the folder exists, or nothing can be written here.
+/// The name is not a valid package name, the folder exists, or the current folder is not writable.
 pub fn run(args: &New) -> Result<String> {
     let name = args.name.as_str();
     judge(name)?;
@@ -99,7 +99,7 @@ fn files(name: &str) -> Result<BTreeMap<String, String>> {
     Ok(files)
 }
 
-/// Until the command is published, the CI of a project must know its source.
+/// Until the command is published, a project's CI needs its source.
 const CONDITION: &str = "        # The variable of the repository that names the Git repository of the command fmu
         if: vars.FMU_GIT != ''
 ";
@@ -139,7 +139,7 @@ const KEYWORDS: [&str; 50] = [
     "try", "type", "typeof", "unsafe", "unsized", "use", "virtual", "where", "while",
 ];
 
-/// Crates of Rust itself, and names that Cargo uses.
+/// Rust's own crates, and names reserved by Cargo.
 const TAKEN: [&str; 9] = ["alloc", "build", "core", "deps", "examples", "incremental", "proc-macro", "std", "test"];
 
 /// Name of the FMU: the words of the package's name, each with a capital letter.

@@ -21,8 +21,9 @@ use std::path::{Path, PathBuf};
 /// computed again, and documentation/index.html lists the new start values.
 ///
 /// A value is written as for `fmu simulate --set`: a number, with one of the variable's units if needed (1000rpm), true or false, a
-/// name or a number of an enumeration, a text; the elements of an array with commas, or one element as `NAME[2]` or `NAME[1,2]`. The
-/// values of --ssv or --motor are set before those of --set. An FMU that is already a preset keeps its other values.
+/// name or a number of an enumeration, a text; the elements of an array with commas, or one element as `NAME[2]` or
+/// `NAME[1,2]`. The values of --ssv or --motor are set before the values of --set. An FMU that is already a preset keeps its
+/// other values.
 ///
 /// The command writes nothing if a name is wrong, if a value is not allowed, or if the FMU refuses the values together.
 ///
@@ -46,11 +47,11 @@ pub struct Preset {
     /// Motor file, as for `fmu tune`, for `PmsmDrive`, `PmsmPlant` and `SensorlessController`
     #[arg(long, value_name = "MOTOR.toml", conflicts_with = "ssv")]
     pub motor: Option<PathBuf>,
-    /// Name that importers show (modelName) [default: that of FILE.fmu]
+    /// Display name (modelName) [default: from FILE.fmu]
     #[arg(long, value_name = "NAME")]
     pub name: Option<String>,
     /// CSV file with the inputs of the default experiment and, by its last time, its stop time, for the reference result
-    /// [default: that of FILE.fmu; with --motor one that fits the machine]
+    /// [default: from FILE.fmu; with --motor one that fits the machine]
     #[arg(long, value_name = "FILE.csv")]
     pub stimuli: Option<PathBuf>,
     /// File to write [default: NAME.fmu]
@@ -101,7 +102,7 @@ pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
     written(preset, None, Some(&course), out).map(drop)
 }
 
-/// Writes the FMU and shows what it cannot do; returns its changes.
+/// Writes the FMU and shows its limitations; returns its changes.
 fn written(preset: PresetFmu, name: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Vec<String>> {
     let written = preset.write(name, course, out)?;
     written.notes.iter().for_each(|note| message::note(&printable(note)));

@@ -225,7 +225,7 @@ fn cells(recording: &Recording, name: &str) -> Option<Vec<String>> {
 }
 
 /// Largest difference of the numbers of two columns, relative to the largest number of the second. A cell of an array has
-/// several; values other than numbers are equal or infinitely far apart.
+/// several; values that are not numbers are either equal or infinitely far apart.
 fn deviation<'a>(pairs: impl Iterator<Item = (&'a str, &'a str)>) -> f64 {
     let numbers = |text: &str| text.split_whitespace().map(str::parse).collect::<Result<Vec<f64>, _>>().ok();
     let (mut apart, mut size) = (0.0_f64, f64::MIN_POSITIVE);

@@ -43,15 +43,15 @@ use std::time::{Duration, Instant};
 ///
 /// Ctrl-C ends the run at the next communication point and writes the results so far; a second Ctrl-C ends the command at once.
 ///
-/// After the run, warnings on standard error list inputs that kept their start values because nothing feeds or sets them,
-/// unless their descriptions call them optional, and a step that is longer than the DefaultExperiment of an FMU. Finally the
-/// command prints the last values (those of the curves if it draws the default plot, otherwise all recorded ones) and the names
-/// of its files.
+/// After the run, warnings on standard error list inputs that kept their start values because they are neither connected nor
+/// set, unless their descriptions mark them as optional, and a step that is longer than the DefaultExperiment of an FMU.
+/// Finally the command prints the last values (those of the curves if it draws the default plot, otherwise all recorded ones)
+/// and the names of its files.
 ///
 /// The FMUs run in a separate process, with limits on memory, open files and new processes. If an FMU crashes, blocks or ends
 /// that process, the command names the FMU and the call, removes the temporary files and has exit status 2. Their output goes
-/// to standard error. --in-process runs them in the process of the command: it starts some milliseconds sooner, but an FMU that
-/// crashes ends the command too.
+/// to standard error. --in-process runs them in the process of the command: it starts a few milliseconds sooner, but a crashing
+/// FMU also ends the command.
 ///
 /// Start the drive, turn it at 1000 rpm, and load it after 0.5 s:
 ///   fmu simulate target/fmu/fmi3/PmsmDrive.fmu --input speed_ref=0:0,0.1:1000rpm --input tau_load=0:0,0.5:2 --html run.html
@@ -88,7 +88,7 @@ pub struct Simulate {
     /// Connect every unconnected input to the output of the same name of another FMU
     #[arg(long)]
     pub auto_connect: bool,
-    /// Pass numbers between different units on as they are; without it they are converted by the BaseUnits of both FMUs
+    /// Pass numbers between different units unchanged; by default they are converted by the BaseUnits of both FMUs
     #[arg(long)]
     pub no_unit_conversion: bool,
     /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
@@ -99,7 +99,7 @@ pub struct Simulate {
     pub set: Vec<String>,
     /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE for
     /// straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the other columns name
-    /// the inputs. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`. Values other than a real number are held
+    /// the inputs. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`. Values that are not real numbers are held
     /// from point to point: texts, bytes as hexadecimal digits, arrays with spaces between their elements
     #[arg(long, value_name = "[VARIABLE=]POINTS|FILE.csv")]
     pub input: Vec<String>,
@@ -146,7 +146,7 @@ pub struct Simulate {
     /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
-    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: that of the default experiment of each]
+    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: from each default experiment]
     #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true, conflicts_with = "me")]
     pub tolerance: Option<f64>,
     /// Handle events at their time, for FMUs of FMI 3.0 with event mode (Co-Simulation)
@@ -285,7 +285,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     during.for_each(|note| message::note(&printable(&note)));
     log.show(&system.take_messages());
     log.end();
-    // The numbers of closed descriptors would become those of the files of the command.
+    // The numbers of closed descriptors would be reused for files of the command.
     let lost = streams.lost();
     if !lost.is_empty() {
         let names: Vec<&str> = system.instances().iter().map(Instance::name).collect();
@@ -442,7 +442,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
     Ok((loaded.settings(args.start, args.stop, args.step, args.sequential), for_plot))
 }
 
-/// The column of a CSV file that feeds the input `port`: the one of its name, or the only one.
+/// The column of a CSV file that feeds the input `port`: the one with its name, or the only one.
 fn column(port: &str, file: &str) -> Result<Sequence, String> {
     let mut columns = Sequence::read_csv(Path::new(file))?;
     let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();

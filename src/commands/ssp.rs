@@ -13,20 +13,20 @@ use std::path::{Path, PathBuf};
 /// Packs plant and controller, connected and with the values of a motor, into one SSP file (SSP 1.0).
 ///
 /// The system has the inputs (speed_ref, tau_load, u_dc and more) and outputs of PmsmDrive. Values come from a motor file, as with
-/// `fmu tune`, or from SSV files for the components controller and plant; without either, the FMUs keep their start values.
+/// `fmu tune`, or from SSV files for the components controller and plant; otherwise the FMUs keep their start values.
 ///
 ///   fmu ssp --motor motors/ipmsm-2.2kw.toml --out drive.ssp
 ///   fmu simulate drive.ssp --input speed_ref=0:0,0.5:78.5 --stop 3 --plot run.svg
 /// With existing FMUs:
 ///   fmu ssp --fmus target/fmu --fmi 3 --out drive.ssp
 ///
-/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator runs the file as it is, with its
-/// command line and its Python package. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
+/// SSP 1.0 is older than FMI 3.0, and many SSP importers accept only FMUs of FMI 2.0. OMSimulator runs the file unchanged, with
+/// its command line and its Python package. With SOURCE_DATE_EPOCH set, identical sources give identical bytes.
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 #[expect(clippy::struct_excessive_bools, reason = "flags of a command line")]
 pub struct Ssp {
-    /// FMI version of the FMUs: 2 or 3 [default: 2, or that of the FMUs in --fmus]
+    /// FMI version of the FMUs: 2 or 3 [default: 2, or as in --fmus]
     #[arg(long, value_name = "VERSION", value_parser = clap::builder::PossibleValuesParser::new(["2", "3"]))]
     pub fmi: Option<String>,
     /// Folder with PmsmPlant.fmu and SensorlessController.fmu, or with the folders of `fmu build` [default: they are built from

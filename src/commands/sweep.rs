@@ -31,7 +31,7 @@ pub struct Sweep {
     /// Folder for the results
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
-    /// Threads, or processes with --isolate [default: as many as the machine runs at once]
+    /// Threads, or processes with --isolate [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
     /// Run only the parts whose number leaves the remainder I when divided by N

@@ -23,9 +23,9 @@ use std::path::{Path, PathBuf};
 ///
 /// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
 /// a load at rating.speed_max if that is given. A note lists each load and each start at which the drive fails, with remedies
-/// that the command has tried too; the exit status is still 0. Another note names the speed at which the drive without a load swings
-/// most, on the way from 0.1 to 1 pu and back. Rasmussen's observer adapts the resistance, unless the trial holds less with it: a note
-/// says so. --check prints the trial as a table, and that of a machine of -30 and of 130 degC.
+/// that the command has tried too; the exit status is still 0. Another note states the speed at which the drive without a load
+/// swings most, on the way from 0.1 to 1 pu and back. Rasmussen's observer adapts the resistance, unless the trial holds fewer
+/// loads with it, as a note reports. --check prints the trial as a table, also for the machine at -30 and 130 degC.
 ///
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
@@ -55,10 +55,10 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
-    /// Print the values as JSON, a dictionary for each FMU, and nothing else; enumerations are integers, as FMPy expects
+    /// Print the values as JSON, only a dictionary per FMU; enumerations are integers, as FMPy expects
     #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
     pub json: bool,
-    /// Estimator to tune for, instead of that of the motor file
+    /// Estimator to tune for, instead of the motor file's
     #[arg(long, value_name = "NAME", long_help = estimator_help())]
     pub estimator: Option<String>,
     /// Print the trial: starts from 24 angles at each speed, loads carried, minimum speed, maximum angle error

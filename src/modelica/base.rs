@@ -85,7 +85,7 @@ fn unchanged(v: &Variable) -> String {
     )
 }
 
-/// The value of an input that is not connected: its start value, or that of the machine.
+/// The value of an unconnected input: its start value, or the machine's.
 fn constant(v: &Variable, group: &str, disabled_by: &str, machine: &BTreeSet<String>) -> String {
     let value = if machine.contains(&v.fmi) { format!("machine.{}", v.name) } else { v.start() };
     let annotation = format!("Dialog(group=\"{group}\", enable=not use_{disabled_by})");

@@ -31,7 +31,7 @@ pub(super) type Figure = (f64, f64, f64);
 /// Runs the example.
 ///
 /// # Errors
-/// There is no binary for this computer, or the FMU ends the run.
+/// The binary for this computer is missing, or the FMU ends the run.
 pub(super) fn of(file: &Path, interface: &Interface) -> Result<Vec<Figure>> {
     let (shaft, flag, inertia) = interface.imposed.as_ref().context("the FMU has no imposed shaft")?;
     let fmi = |name: &str| {

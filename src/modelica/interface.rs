@@ -98,7 +98,7 @@ pub(super) struct Heat {
     pub(super) area: Option<Area>,
 }
 
-/// The FMU as seen by the wrapper.
+/// The FMU's interface in the wrapper.
 #[derive(Clone, Debug)]
 pub(super) struct Interface {
     pub(super) parameters: Vec<Variable>,
@@ -120,7 +120,7 @@ impl Interface {
     /// Reads description and terminals.
     ///
     /// # Errors
-    /// There is no terminal of a shaft, or the wrapper does not support a variable.
+    /// The FMU has no shaft terminal, or the wrapper does not support a variable.
     pub(super) fn of(md: &ModelDescription, terminals: Option<&TerminalsAndIcons>) -> Result<Self> {
         let terminals = terminals.map(|t| t.terminals.as_slice()).unwrap_or_default();
         let all = |causality| variables(md, causality);
@@ -211,7 +211,7 @@ impl Interface {
     }
 }
 
-/// The variables of a causality, with the elements of an array as one.
+/// The variables of a causality, with an array as one.
 fn variables(md: &ModelDescription, causality: Causality) -> Result<Vec<Variable>> {
     let mut all: Vec<Variable> = Vec::new();
     let mut place: BTreeMap<String, usize> = BTreeMap::new();

@@ -23,9 +23,9 @@ use text::html;
 /// What to write.
 #[derive(Clone, Debug, Default)]
 pub struct Wrapping {
-    /// Name of the package, if it is not that of the FMU with `Lib`.
+    /// Name of the package, if it differs from the FMU's with `Lib`.
     pub name: Option<String>,
-    /// Class of the imported block, if it is not that of OpenModelica.
+    /// Class of the imported block, if it differs from OpenModelica's.
     pub block: Option<String>,
     /// Files of machines.
     pub motors: Vec<PathBuf>,

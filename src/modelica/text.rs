@@ -50,7 +50,7 @@ pub(super) fn html(text: &str) -> String {
     quoted[1..quoted.len() - 1].into()
 }
 
-/// A declaration: what comes before the name, name, modifiers, value, description, annotation.
+/// A declaration: the part before the name, name, modifiers, value, description, annotation.
 pub(super) fn declare(
     head: &str,
     name: &str,

@@ -1,7 +1,7 @@
 //! A Simulink model around an FMU, as two functions of MATLAB: the parameters as a struct, and the script that builds a masked
-//! block with buses, constants around it, and a flange of Simscape where the FMU has one.
+//! block with buses, constants around it, and a flange of Simscape if the FMU has a shaft terminal.
 //!
-//! - `outside`: what the FMU shows to Simulink; `script`: the functions; `text`: MATLAB's names, literals and units.
+//! - `outside`: the FMU's interface in Simulink; `script`: the functions; `text`: MATLAB's names, literals and units.
 
 mod outside;
 mod script;
@@ -13,7 +13,7 @@ use script::Names;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What was written, for the user.
+/// Summary of the output for the user.
 #[derive(Clone, Debug)]
 pub struct Built {
     /// Name of the function that builds the model.

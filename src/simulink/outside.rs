@@ -1,4 +1,4 @@
-//! What an FMU shows to Simulink: its mode and step, ports, buses, parameters and flange.
+//! The interface of an FMU in Simulink: its mode and step, ports, buses, parameters and flange.
 
 use super::text::{Scope, identifier, number, row};
 use anyhow::{Context, Result, bail, ensure};
@@ -102,13 +102,13 @@ pub(super) struct Flange {
     pub(super) inertia: Option<String>,
 }
 
-/// The FMU as seen by the script.
+/// The FMU's interface in the script.
 #[derive(Clone, Debug)]
 pub(super) struct Outside {
     /// Communication step in s; `None` for Model Exchange.
     pub(super) step: Option<f64>,
     pub(super) stop: f64,
-    /// There is Model Exchange besides Co-Simulation.
+    /// Model Exchange is available in addition to Co-Simulation.
     pub(super) both: bool,
     pub(super) inputs: Vec<Port>,
     pub(super) outputs: Vec<Port>,
@@ -116,7 +116,7 @@ pub(super) struct Outside {
     pub(super) buses_out: Vec<Group>,
     pub(super) settings: Vec<Setting>,
     pub(super) flange: Option<Flange>,
-    /// What the script leaves out: names, and why.
+    /// Variables omitted by the script, with reasons.
     pub(super) left: BTreeMap<&'static str, Vec<String>>,
 }
 
@@ -266,7 +266,7 @@ fn step_of(md: &ModelDescription, asked: Option<f64>) -> Result<Option<f64>> {
         return Ok(Some(step));
     }
     let step = default.step.filter(positive).or(inner);
-    // FMI recommends nothing else: a thousandth of the default experiment, or 1 ms.
+    // Without a recommendation in FMI: a thousandth of the default experiment, or 1 ms.
     let step = step.or_else(|| default.stop.filter(positive).map(|stop| stop / 1000.0)).unwrap_or(1e-3);
     Ok(Some(inner.map_or(step, |inner| inner * (step / inner - 1e-9).ceil().max(1.0))))
 }

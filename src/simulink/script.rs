@@ -4,7 +4,7 @@ use super::outside::{Flange, Group, Kind, Outside, Port};
 use super::text::{WIDTH, comment, literal, number, unit};
 use std::fmt::Write as _;
 
-/// A row of a cell array, broken after a comma where the line would be too long.
+/// A row of a cell array, broken after a comma if the line would be too long.
 fn cells(words: &[String]) -> String {
     let mut out = String::from("    ");
     let mut column = 4;
@@ -335,7 +335,7 @@ fn mechanics(flange: &Flange, step: Option<&str>) -> String {
     out
 }
 
-/// Names of the block's dialog differ from those of the FMU in characters that MATLAB forbids: only letters and digits count.
+/// Names in the block's dialog differ from the FMU's in characters that MATLAB forbids: only letters and digits count.
 const LINK: &str = r"
 function link(fmu, rows)
 dialog = fieldnames(get_param(fmu, 'DialogParameters'));

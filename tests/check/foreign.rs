@@ -80,8 +80,8 @@ fn pythonfmu3() {
     assert_eq!(must, ["Z04c"], "{}", listed(&report));
 }
 
-/// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a call has only 20 s. It steps beyond the stop
-/// time (FMI 2.0.5, 2.1.6) and has no Error for a wrong value reference (2.0.5, 2.1.2); the standard leaves its other omissions
+/// It hangs with an infinite step (T02b), and its memory grows meanwhile, so a call has only 20 s. It steps past the stop time
+/// (FMI 2.0.5, 2.1.6) and returns no Error for a wrong value reference (2.0.5, 2.1.2); the standard leaves its other omissions
 /// open.
 #[test]
 fn fmucontainer() {

@@ -60,7 +60,7 @@ const REPEATED: &[(Source, &str, &str, &str)] = &[
     (BOTH3, "E12", "E12", "fmi3Reset -> OK"),
 ];
 
-/// The scripts run in FMPy, and see there what the checker saw; on the FMU without the fault they do not.
+/// The scripts run in FMPy and reproduce the checker's findings there; on the FMU without the fault they find nothing.
 #[test]
 fn the_scripts_of_the_page_repeat_their_findings() {
     let dir = tempfile::tempdir().unwrap();

@@ -32,7 +32,7 @@ fn what_is_no_fmu_is_status_2() {
     assert_eq!(status(&path, &[]).0, Some(2));
 }
 
-/// With any byte changed: a verdict or a message, never a crash.
+/// With any byte changed, the result is a verdict or a message, never a crash.
 #[test]
 fn changed_bytes_are_judged() {
     let dir = tempfile::tempdir().unwrap();

@@ -171,7 +171,7 @@ fn the_pair_runs_alike_in_both_standards() {
     assert_ne!(run("fmi3", &["--sequential"]), three, "one step less on the way from plant to controller");
 }
 
-/// The controller with a clock instead of the one with a grid: the plant moves as before in every interface.
+/// With the clocked controller instead of the sampled one, the plant behaves the same in every interface.
 #[test]
 fn clocks_tick() {
     let run = |controller: &str, more: &[&str]| {
@@ -232,13 +232,14 @@ fn inputs_left_alone_and_long_steps_are_told() {
         assert!(printed.contains(read), "{read}: {printed}");
     }
     assert!(!printed.contains("tau_ref") && !printed.contains("T_coolant"), "{printed}");
-    // An input that is fed or set is not reported, even at its start value; nor is a step up to stepSize.
+    // A connected or set input is not reported, even at its start value, and neither is a step up to stepSize.
     let printed = warned(&["--input", "d.speed_ref=0:0,0.005:10", "--set", "d.tau_load=0", "--step", "0.001"]);
     assert!(printed.lines().count() == 1 && printed.contains("u_dc") && !printed.contains("speed_ref ="), "{printed}");
     assert!(!printed.contains("tau_load"), "{printed}");
 }
 
-/// A warning of an FMU is shown without `--logging`, once, in both standards and interfaces; an instance without one is quiet.
+/// A warning of an FMU is shown without `--logging`, once, in both standards and interfaces; an instance without warnings is
+/// quiet.
 #[test]
 fn warnings_of_the_fmus_are_shown() {
     for standard in ["fmi2", "fmi3"] {

@@ -1,7 +1,7 @@
 //! Circles of files inside a crate: sets of files in which each depends, directly or through others, on every other.
 //!
-//! A file names another one by a path: in a `use`, in an expression or in the body of a macro. A path that a module re-exports
-//! leads to the file that has the item. `mod` names nothing, and tests may name the tested items.
+//! A file refers to another one by a path: in a `use`, in an expression or in the body of a macro. A path that a module
+//! re-exports leads to the file that has the item. `mod` does not count as a reference, and tests may refer to the tested items.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
@@ -150,7 +150,7 @@ impl Modules {
         }
     }
 
-    /// A path of at least two words: a single word is a variable, or was imported.
+    /// A path of at least two words: a single word is a variable or an import.
     fn path(&mut self, tokens: &[TokenTree], mut at: usize, module: usize) -> usize {
         let is_within = at > 0 && [':', '.', '\''].iter().any(|&before| is(tokens.get(at - 1), before));
         let is_rest = is_within && !(is(tokens.get(at - 1), ':') && !(at > 1 && is(tokens.get(at - 2), ':')));
@@ -204,7 +204,7 @@ impl Modules {
         }
     }
 
-    /// The module in which a path begins, and the rest of the path.
+    /// The module in which a path begins, and the remainder of the path.
     fn begin<'a>(&self, module: usize, path: &'a [String]) -> Option<(usize, &'a [String])> {
         let first = path[0].as_str();
         let this = &self.all[module];

@@ -11,7 +11,7 @@ const T_S: f64 = 1e-4;
 /// Samples from one recorded point to the next.
 const EVERY: u32 = 50;
 
-/// Values of an input over time: each holds from its time (s) on.
+/// Values of an input over time: each applies from its time (s) on.
 pub type Schedule = Vec<(f64, f64)>;
 
 struct Experiment {

@@ -61,7 +61,7 @@ pub fn scratch() -> &'static Path {
 
 /// The Python of a virtual environment with the packages of the file of requirements.
 pub fn environment(requirements: &Path) -> PathBuf {
-    // Two tests of one program may need the same environment: the second finds it complete.
+    // Two tests of one program may need the same environment; the second reuses it.
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _guard = ONE_AT_A_TIME.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
     find_or_make(requirements).unwrap_or_else(|why| panic!("{why}"))

@@ -1,4 +1,4 @@
-//! Archives that are damaged, lie, or lead outside.
+//! Archives with damage, false headers, or paths that lead outside.
 
 use crate::zip::{Entry, write};
 use crate::{Place, STATIC, XML, each, entries, library};

@@ -76,7 +76,7 @@ fn numbers_are_not_believed() {
         2,
         "y: has variables of 1000000000 values in all",
     );
-    // The product is beyond 64 bits.
+    // The product exceeds 64 bits.
     described(&three.replace("EXTENT", &dimension.repeat(3))).is_refused("dimensions", 2, "the limit is 10000000");
     let dependencies = format!("<Unknown index=\"1\" dependencies=\"{}\"/>", "1 ".repeat(2_000_001));
     with("<Unknown index=\"1\"/>", &dependencies).is_refused("dependencies", 2, "has 2000001 dependencies in one list");
@@ -106,7 +106,7 @@ fn names_are_escaped() {
         assert!(ended.status == 0 && ended.out.contains("\\u{1b}[2J") && ended.out.contains("\\u{202e}"), "{ended:?}");
         let ended = place.runs("simulate", &["--set", "x.y=1", "--record", "x.y\u{1b}"]);
         assert_eq!(ended.status, 2);
-        // In the header of a recording too.
+        // Also in the header of a recording.
         let ended = place.runs("simulate", &["--csv", "-"]);
         let header = "time,y\\u{1b}[2J\\u{1b}]0;title\\u{7}\\u{202e}\n0,1\n";
         assert!(ended.status == 0 && ended.out.starts_with(header), "{ended:?}");

@@ -37,8 +37,7 @@ struct Importer<'a> {
     since: f64,
 }
 
-/// Runs the case in this order; `draw` decides for every call that the standard forbids whether it is made; a constant `true`
-/// makes them all.
+/// Runs the case in this order; `draw` decides for every forbidden call whether it is made; a constant `true` makes all of them.
 pub fn run(fmu: &Loaded, case: &Case, order: Order, draw: &mut dyn FnMut() -> bool) -> Run {
     take_events();
     let it = Instance::new(fmu, Interface::ModelExchange);
@@ -275,7 +274,7 @@ impl Importer<'_> {
         if error <= 1.0 || h < 1e-11 { Some((y, factor)) } else { None }
     }
 
-    /// The first instant after which an indicator has changed its sign or a time event has passed, if there is one.
+    /// The first instant, if any, after which an indicator has changed sign or a time event has passed.
     fn locate(&mut self, t: f64, x: &[f64], end: f64, x1: &[f64]) -> Option<f64> {
         let late = self.order.late;
         let next = self.next.filter(|next| late > 0.0 && *next > t);
@@ -366,7 +365,7 @@ pub fn stepped(fmu: &Loaded, case: &Case, (delayed, starts): (bool, bool)) -> Ru
     }
     it.simple(Simple::ExitInitializationMode);
     if starts {
-        // Set again with the inputs at the first step, as gemseo-fmu does.
+        // Set again with the inputs at the first step, as in gemseo-fmu.
         it.set_starts();
     }
     let recorded = recorded(d, case);

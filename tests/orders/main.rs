@@ -23,7 +23,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-/// The log of the FMUs is that of the process.
+/// The FMUs share the log of the process.
 static ONE: Mutex<()> = Mutex::new(());
 
 fn ours(case: &Case, standard: usize) -> PathBuf {
@@ -107,7 +107,7 @@ fn fmpy_gives_the_reference() {
     common::python::pytest("fmpy", "orders", &["test_orders.py"], &[("FMU_ORDERS", &path)]);
 }
 
-/// In the order of the standards, there is no warning, and inputs to which a tool feeds 0 are named.
+/// With calls in the order of the standards there is no warning, and inputs fed with 0 by a tool are reported.
 #[test]
 fn inputs_at_zero_are_named_once() {
     const ZERO: &[(f64, f64)] = &[(0.0, 0.0)];
@@ -144,8 +144,8 @@ fn inputs_at_zero_are_named_once() {
     }
 }
 
-/// In Co-Simulation, inputs hold over a step, and Modelica-FMI passes them on a step later; parameters are set before the
-/// initialization and, by some, after it. The bits are those of our importer.
+/// In Co-Simulation, inputs are constant over a step, and Modelica-FMI passes them on a step later; parameters are set before
+/// the initialization and, by some tools, after it. The bits equal our importer's.
 #[test]
 fn the_orders_of_co_simulation() {
     let _one = ONE.lock();
@@ -169,7 +169,7 @@ fn the_orders_of_co_simulation() {
     }
 }
 
-/// Modelica-FMI passes enumerations of FMI 2.0 unconverted where they are tunable: its code then does not compile.
+/// Modelica-FMI passes enumerations of FMI 2.0 unconverted if they are tunable, and its code then does not compile.
 #[test]
 fn no_enumeration_is_tunable() {
     for case in OURS {
@@ -180,7 +180,7 @@ fn no_enumeration_is_tunable() {
     }
 }
 
-/// Random orders: each habit, and each single call of it, by chance.
+/// Random orders: each habit and each of its calls occurs at random.
 fn random(calls: u64) {
     let mut seed = std::env::var("FMU_SEED").map_or(1, |text| text.parse::<u64>().expect("a whole number"));
     let mut next = move || {

@@ -7,7 +7,7 @@ pub enum Starts {
     Never,
     /// In Initialization Mode.
     Before,
-    /// After `ExitInitializationMode`, fixed ones as well.
+    /// After `ExitInitializationMode`, including fixed ones.
     After,
 }
 
@@ -18,7 +18,7 @@ pub enum Completes {
     Never,
     /// At the end of an accepted step.
     Steps,
-    /// At every evaluation, those of rejected steps and of bisections included.
+    /// At every evaluation, including rejected steps and bisections.
     Evaluations,
 }
 
@@ -34,7 +34,7 @@ pub struct Order {
     pub starts: Starts,
     /// It updates the discrete states after the initialization; without, the FMU stays in Event Mode until the first event.
     pub settles: bool,
-    /// It updates the discrete states until that is no longer needed; without, once for each event.
+    /// It updates the discrete states until no longer needed; otherwise once per event.
     pub iterates: bool,
     pub completes: Completes,
     /// It also sets the continuous states in Event Mode.
@@ -43,7 +43,7 @@ pub struct Order {
     pub derivatives_in_event: bool,
     /// It sets discrete inputs at every evaluation outside of Continuous-Time Mode, not only at events.
     pub discrete_inputs: bool,
-    /// It finds time events as roots, this many seconds late; 0: its steps end there.
+    /// It locates time events as roots, this many seconds late; 0: its steps end there.
     pub late: f64,
     /// It reads `nextEventTime` without `nextEventTimeDefined`.
     pub blind: bool,

@@ -7,7 +7,7 @@ use std::fs;
 
 const MOTORS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/");
 
-/// The FMU with the values of `fmu tune` behaves like the FMU to which an importer applies the parameter file of `fmu tune`.
+/// The FMU with the values of `fmu tune` behaves like an FMU whose importer applies the parameter file of `fmu tune`.
 #[test]
 fn a_tuned_fmu_needs_no_parameter_file() {
     let dir = tempfile::tempdir().unwrap();

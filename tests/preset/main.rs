@@ -167,7 +167,7 @@ fn a_preset_is_in_the_description_and_in_every_instance() {
     }
 }
 
-/// The values of a preset stay in a preset of it, except those that it sets again; so does the name.
+/// A preset of a preset keeps its values, except those set again, and its name.
 #[test]
 fn a_preset_of_a_preset_merges() {
     let dir = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Refusals, after which nothing is written.
+//! Refusals, which write nothing.
 
 use super::{built, contents, fmu, preset, text};
 use crate::common;
@@ -53,7 +53,7 @@ fn files_that_are_no_fmus_of_this_program() {
     }
     let said = fmu(&given).unwrap_err();
     assert!(said.contains("--out"), "{said}");
-    // The unit of a parameter file is that of the variable.
+    // The unit in a parameter file must be the variable's.
     let ssv = path("values.ssv");
     let values = "<Parameter name=\"motor.L_d\"><Real value=\"6\" unit=\"mH\"/></Parameter>";
     fs::write(&ssv, format!("<ParameterSet><Parameters>\n{values}</Parameters></ParameterSet>")).unwrap();

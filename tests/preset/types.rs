@@ -90,7 +90,7 @@ fn every_type_has_a_start_value() {
             assert_eq!((start("weights[1,3]"), start("weights[2,3]")), ("-3".into(), "6e-7".into()));
         }
         assert!(files.contains_key("resources/tables/squares.csv"));
-        // A value returns to that of the model.
+        // A value returns to the model's.
         preset(&new, &new, &["label=as built & <tested>"]).unwrap();
         assert_eq!(contents(&new).unwrap().0.variable("label").unwrap().start.as_deref(), Some("as built & <tested>"));
     }

@@ -31,7 +31,8 @@ fn run(connect: impl Fn(&mut System)) -> Recording {
     system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap()
 }
 
-/// Frames arrive at their instants, equal ones too, and are confirmed at the same instant; before the first there is no value.
+/// Frames, including equal ones, arrive at their instants and are confirmed at the same instant; before the first there is no
+/// value.
 #[test]
 fn frames_travel_between_two_nodes() {
     let by_terminal = run(|system| {

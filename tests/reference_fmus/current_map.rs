@@ -84,7 +84,7 @@ fn the_map_can_be_replaced() {
     };
     near(it.get("i_d").unwrap(), 25.0);
     near(it.get("i_q").unwrap(), 15.0);
-    // Between the points, at the last one, and beyond.
+    // Between the points, at the last one, and outside.
     let mut time = 0.0;
     for (flux, current) in [(-0.05, -10.0), (0.0, 0.0), (0.1, 30.0), (0.2, 60.0), (-0.2, -40.0)] {
         it.set("psi_q", &Values::Reals(vec![flux])).unwrap();

@@ -13,7 +13,7 @@ fn has_the_bits_of_the_original() {
     for version in BOTH {
         let fmu = archive("dahlquist", version);
         assert_eq!(column(&run(Method::default(), &fmu, &[], 10.0, 0.1), "x"), wanted, "{version:?}");
-        // The rest of a communication step is left to the next one.
+        // The remainder of a communication step is left to the next one.
         let rows = column(&run(Method::default(), &fmu, &[], 9.0, 0.25), "x");
         assert_eq!(
             rows.iter().step_by(2).copied().collect::<Vec<_>>(),

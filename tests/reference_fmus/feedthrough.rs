@@ -89,7 +89,8 @@ fn the_ends_of_every_integer_arrive_exactly() {
     assert_eq!(instance.get("Int64_output").unwrap(), Values::Integers(vec![i64::MAX.into()]));
 }
 
-/// From one FMU to another, into a recording, a file and a measure, an integer keeps every digit; texts and bytes travel, too.
+/// From one FMU to another, into a recording, a file and a measure, an integer keeps every digit; texts and bytes are also
+/// transferred.
 #[test]
 fn connected_values_keep_their_type() {
     let large = 9_007_199_254_740_993_i128;
@@ -163,7 +164,7 @@ impl fmu_sweep::Progress for Quiet {
     fn progress(&self, _done: u64, _failed: u64, _all: u64) {}
 }
 
-/// Straight lines for continuous values, jumps where a time occurs twice, and texts and bytes that are held.
+/// Straight lines for continuous values, jumps where a time occurs twice, and texts and bytes held constant.
 #[test]
 fn inputs_of_every_kind_come_from_one_file() {
     let recording = run(

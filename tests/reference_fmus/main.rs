@@ -91,7 +91,7 @@ fn exchange() -> Method {
     Method::ModelExchange(Integration { solver: Solver::Rk4, ..Integration::default() })
 }
 
-/// Euler's method: as many steps of `s` as there are, from `x`; a row for every `n`-th point.
+/// Euler's method: all steps of `s`, from `x`; a row for every `n`-th point.
 fn euler<const N: usize>(
     mut x: [f64; N],
     s: f64,

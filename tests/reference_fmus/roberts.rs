@@ -35,7 +35,7 @@ fn its_equations_are_those_of_the_original() {
     }
 }
 
-/// FMPy integrates with CVode; the values at 40 s are those of the literature.
+/// FMPy integrates with CVode; the values at 40 s agree with the literature.
 #[test]
 fn a_stiff_solver_of_fmpy_runs_it() {
     for version in BOTH {

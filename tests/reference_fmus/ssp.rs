@@ -77,8 +77,8 @@ fn feedthrough(path: &Path, connectors: &str, inside: &str, connections: &str) {
     packed(path, &[("SystemStructure.ssd", &text)], &["feedthrough"]);
 }
 
-/// Connections with tables: an item becomes an integer, an integer a truth value. A value without an entry stays as it is, unless
-/// the other type does not have it.
+/// Connections with tables: an item becomes an integer, an integer a truth value. A value without an entry stays unchanged,
+/// unless the other type cannot represent it.
 #[test]
 fn connections_have_tables() {
     let folder = tempfile::tempdir().unwrap();
@@ -207,7 +207,7 @@ fn clocks_connect_with_what_is_on_them() {
             "<s:Component name='{name}' source='can-{name}.fmu'><s:Connectors>{connectors}</s:Connectors></s:Component>"
         )
     };
-    // A clock that asks to be ticked passes a system as an output does.
+    // A clock that requests ticks passes through a system like an output.
     let inner = format!(
         "<s:System name='i'><s:Connectors>{}{}</s:Connectors><s:Elements>{}</s:Elements><s:Connections>{}{}</s:Connections></s:System>",
         connector("clock", "output", &clock("changing")),

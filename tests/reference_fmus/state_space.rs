@@ -183,7 +183,7 @@ fn elements_of_a_resized_array_are_found() {
     let recording = it.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
     let last: Vec<f64> = recording.columns.iter().map(|column| column.values[1]).collect();
     assert_eq!(last, [7.0 + 1e-3 * (7.0 + 2.0), 3.0 + 1e-3 * 3.0, 1e-3 * (0.5 * 3.0 + 2.0) + 2.0, 0.0]);
-    // The sizes of a plan are those of each of its runs.
+    // The sizes of a plan apply to each of its runs.
     let mut it = system();
     it.record("y[5]").unwrap();
     let plan = Arc::new(it.into_plan(&settings).unwrap());
@@ -304,7 +304,7 @@ fn fmpy_gives_the_same() {
     assert_eq!(found, expected().concat());
 }
 
-/// A preset counts an element of a matrix by the sizes of the start, as the description does.
+/// A preset numbers the elements of a matrix by the start sizes, like the description.
 #[test]
 fn a_preset_finds_an_element_of_a_matrix() {
     let folder = tempfile::tempdir().unwrap();

@@ -16,7 +16,7 @@ fn has_the_bits_of_the_original() {
     }
 }
 
-/// Directional derivatives equal those of the original, which are written by hand.
+/// Directional derivatives equal the original's handwritten ones.
 #[test]
 fn its_derivatives_are_exact() {
     for version in BOTH {

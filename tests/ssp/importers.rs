@@ -1,4 +1,4 @@
-//! What other importers take of the files, and what they write.
+//! Support of the files in other importers, and files written by them.
 
 use super::*;
 
@@ -24,7 +24,7 @@ fn what_not_every_importer_takes_is_an_option() {
     assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Integer value=\"4\"/>"));
     done(&["ssp", "--motor", motor, "--integers", "--out", &path("integers.ssp")]);
     assert!(values(&path("integers.ssp")) == values(&plain), "the default");
-    // None of it changes the results.
+    // None of this changes the results.
     let run = |path: &str| {
         let time = ["--input", "speed_ref=0:0,0.02:52.36", "--stop", "0.3", "--csv", "-"];
         done(&[&["simulate", path][..], &time].concat())
@@ -137,7 +137,7 @@ fn refusals(path: &str) -> Vec<String> {
             }
         }
     }
-    // Both annotations are there, one of its type and one with its element.
+    // Both annotations are present, one with its type and one with its element.
     let own = |parent: &'_ Element| {
         let annotation = parent.child("ssd:Annotations")?.child("ssc:Annotation")?.clone();
         let is_own = annotation.get("type") == Some("org.openmodelica");

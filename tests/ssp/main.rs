@@ -38,7 +38,7 @@ fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
     }
 }
 
-/// A folder with `fmi2.ssp` and `fmi3.ssp` without values, and `motor.ssp` of FMI 2.0 with those of a machine.
+/// A folder with `fmi2.ssp` and `fmi3.ssp` without values, and `motor.ssp` of FMI 2.0 with a machine's values.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {

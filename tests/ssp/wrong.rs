@@ -125,7 +125,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     );
 }
 
-/// A thing that a message names twice, as in `--record x: x: is no variable`.
+/// A name repeated in a message, as in `--record x: x: is no variable`.
 fn repeated(message: &str) -> Option<&str> {
     let parts: Vec<&str> = message.split(": ").collect();
     let ends = |before: &str, name: &str| {

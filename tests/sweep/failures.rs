@@ -1,4 +1,4 @@
-//! Bad rows, bad files, crashes, another definition, a full disk: one clear line, and nothing is lost.
+//! Bad rows, bad files, crashes, another definition, a full disk: one clear line, and no results are lost.
 
 use crate::{Folder, STARTS, common, ends};
 use fmu::commands::build::{self, Build};
@@ -155,7 +155,7 @@ fn a_full_disk_names_the_file_and_loses_no_part() {
     ends(&mut folder.sweep(&file, "whole"), 0);
     let sweep =
         |out: &Path| format!("'{}' sweep '{}' --out '{}'", env!("CARGO_BIN_EXE_fmu"), file.display(), out.display());
-    // A disk of 64 KiB, if a process may mount one.
+    // A disk of 64 KiB, if mounting is allowed.
     let (disk, copy) = (folder.path("disk"), folder.path("copy"));
     fs::create_dir(&disk).unwrap();
     fs::create_dir(&copy).unwrap();

@@ -61,7 +61,7 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
     }
     println!("{there} parts at the first kill, {kills} more kills");
     assert_eq!(folder.results("killed"), whole);
-    // A process that is killed while it unpacks an archive leaves it to the next one.
+    // An archive left half unpacked by a killed process is removed by the next one.
     assert_eq!(names(&temporary), [""; 0], "kills leave nothing");
     assert!(
         !names(&folder.path("killed")).iter().any(|name| name.starts_with('.')),

@@ -184,7 +184,7 @@ fn a_run_costs_microseconds() {
     );
     let plan = Plan::new(&Definition::parse(&text).unwrap(), Path::new("")).unwrap();
     let variables = plan.bind(["d.plant.motor.R_s", "d.tau_load"]).unwrap();
-    // Rounds are shorter than a time slice: nothing else runs during the fastest of many.
+    // Rounds are shorter than a time slice: so the fastest of many runs undisturbed.
     let columns: [&[f64]; 2] = [&[3.0; 50], &[0.5; 50]];
     let once = || {
         let begun = Instant::now();

@@ -2,7 +2,7 @@
 
 use drive_tools::error::{Result, bail};
 
-/// What happens in a run; the scenario of a cell.
+/// The course of a run: the scenario of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
     /// The load arrives at the speed.
@@ -84,7 +84,7 @@ pub struct Cell {
     pub load: f64,
     /// Speed reference as a share of the rated speed.
     pub speed: f64,
-    /// Electrical angle in deg by which the rotor is ahead of the first estimate.
+    /// Initial electrical angle (deg) of the rotor ahead of the estimate.
     pub theta: f64,
 }
 

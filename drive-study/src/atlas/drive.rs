@@ -23,7 +23,7 @@ pub enum Approach {
     Turning,
 }
 
-/// A drive at rest, and what 1 means on the axes of the atlas.
+/// A drive at rest, and the units of the axes of the atlas.
 #[derive(Clone)]
 pub struct Drive {
     /// Name of the estimator.
@@ -82,7 +82,7 @@ impl Drive {
     /// Sets a parameter of the controller from the text `name=value`.
     ///
     /// # Errors
-    /// Names what is wrong and what was expected.
+    /// States the error and the expected input.
     pub fn set(&mut self, text: &str) -> Result<()> {
         let (name, value) = text
             .split_once('=')

@@ -1,7 +1,7 @@
 //! The atlas: where a drive with wrong estimates of resistance and magnet flux holds low speeds under load, and whether
 //! `lock_lost` reports the cells that it does not hold.
 //!
-//! - [`cell`]: the grid; [`mod@run`]: a run and what counts as lost; [`drive`]: the drives;
+//! - [`cell`]: the grid; [`mod@run`]: a run and the criteria for loss; [`drive`]: the drives;
 //! - [`map`]: the map of a drive; [`report`]: tables, CSV and page.
 
 pub mod cell;

@@ -2,7 +2,7 @@
 //! 0.5 s,
 //!
 //! - the rotor turns against the estimated frame by a turn or more,
-//! - or over two quarters, `speed_est` is off the rotor's speed by more than 5 % of the rated speed on the average,
+//! - or over two quarters, the mean of `speed_est` deviates from the rotor's speed by more than 5 % of the rated speed,
 //! - or in two quarters, the speeds of rotor and estimate both swing by more than 10 % of the rated speed from peak to peak. An
 //!   accelerating drive does not count as swinging: from quarter to quarter, its mean moves by as much as its peaks differ.
 //!

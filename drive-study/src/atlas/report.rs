@@ -164,7 +164,7 @@ fn by_class(atlases: &[Atlas]) -> Table {
     table
 }
 
-/// The course of the runs, and what counts as lost.
+/// The course of the runs, and the criteria for loss.
 fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
     let has = |approach| atlases.iter().any(|a| a.drive.approach == approach);
     let mut all = Vec::new();

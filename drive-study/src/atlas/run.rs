@@ -31,13 +31,13 @@ const HEATING: f64 = 0.4;
 const NOISE: f64 = 0.01 / 7.5;
 /// Offsets of the current sensors a and b as shares of `limit.i`: 20 mA and -20 mA on the reference motor.
 const OFFSET: f64 = 0.02 / 7.5;
-/// Time in s for which a drive with `compensation.calibrate` is off at first.
+/// Initial time (s) for which a drive with `compensation.calibrate` stays off.
 const OFF: f64 = 0.05;
 /// Dead time as a share of the sample period: 2 us at 10 kHz.
 const DEAD_TIME: f64 = 0.02;
 
-/// Temperatures of `cold` and `hot` above that of the machine's data, -30 and 130 degC above 20 degC, and what copper and magnet
-/// change per K.
+/// Temperatures of `cold` and `hot` relative to the machine's data (-30 and 130 degC relative to 20 degC), and the temperature
+/// coefficients of copper and magnet.
 const COLD: f64 = -50.0;
 const HOT: f64 = 110.0;
 const COPPER: f64 = 3.93e-3;
@@ -50,9 +50,9 @@ pub enum Loss {
     Slips,
     /// Rotor and estimate turn together at a speed that is not the reference.
     Creeps,
-    /// Rotor and estimate turn together, at the reference on the average, and swing.
+    /// Rotor and estimate turn together, on average at the reference speed, and swing.
     Swings,
-    /// The speed holds, the angle is off.
+    /// The speed is right, the angle is wrong.
     Angle,
     /// A step failed.
     Failed,
@@ -118,7 +118,7 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// The cells that are lost, or held.
+    /// The lost cells, or the held ones.
     pub fn that_are(&self, lost: bool) -> impl Iterator<Item = &(Cell, Verdict)> {
         self.runs.iter().filter(move |(_, verdict)| verdict.lost.is_some() == lost)
     }

@@ -63,7 +63,7 @@ const VARIANTS: &[Entry] = &[
 ];
 
 impl Entry {
-    /// Its name in a table, with the machine if the others have a different one.
+    /// Its name in a table, with the machine if it differs from the others.
     pub fn label(&self) -> String {
         match self.machine {
             "" | IPMSM => self.name.into(),
@@ -102,7 +102,7 @@ impl Entry {
 pub struct Candidate {
     /// The row.
     pub entry: Entry,
-    /// The signal from which it finds the rotor.
+    /// The signal used to locate the rotor.
     pub class: Class,
     /// The drive at rest; 1 pu of speed is 1500 rpm.
     pub bench: Bench,
@@ -170,7 +170,7 @@ impl Candidate {
         })
     }
 
-    /// Runs a course of `duration` (s) and follows it: traces all of it, and measures it after the time `from` (s). A step that fails
+    /// Runs for `duration` (s), tracing the whole run and measuring it from the time `from` (s). A step that fails
     /// means that the drive was lost; then the second value is false.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
-//! The expected figures. Those of the Kim & Sul review are derived again for the 2.2 kW machine; those of
-//! Rasmussen's observer hold for its own reference motor. The default tolerance is 10 %, and 0.3 deg for angles.
+//! The expected figures. The figures of the Kim & Sul review are derived again for the 2.2 kW machine; those of Rasmussen's
+//! observer apply to its own reference motor. The default tolerance is 10 %, and 0.3 deg for angles.
 
 use crate::expected::Expected;
 use Expected::{AtLeast, AtMost, Near};
@@ -105,8 +105,8 @@ const FIGURES: &[Row] = &[
     // Steady error at rated load.
     (ON_THE_EMF, &["rated-0.1", "rated-0.5", "rated-1"], MEAN, Near(0.0, 0.1)),
     (FEEDBACK, &["rated-0.1", "rated-0.5", "rated-1"], MEAN, Near(0.0, 0.1)),
-    // Beyond base speed: the envelope within 1 %. Rasmussen's R^ = 0.9 R asks for the currents of 1.0395 times the envelope at
-    // the speed held, at an angle error of (R - R^) i_d / (w psi_M) = -0.34 deg, which leaves 1.0257.
+    // Beyond base speed: the envelope within 1 %. Rasmussen's R^ = 0.9 R requests the currents of 1.0395 times the envelope at
+    // the final speed, at an angle error of (R - R^) i_d / (w psi_M) = -0.34 deg, which leaves 1.0257.
     (BEYOND_BASE_SPEED, &["weakening"], REACHED, Near(2.5, 0.025)),
     (BEYOND_BASE_SPEED, &["weakening"], OVER, Near(1.0, 0.01)),
     (FLUX, &["weakening"], REACHED, Near(1.5, 0.015)),

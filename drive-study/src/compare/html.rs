@@ -89,7 +89,7 @@ pub fn machine_page(compared: &OnMachine, plots: &[Plot]) -> Result<String> {
 
 /// A table with a column for each quantity of each scenario.
 fn grid(block: &Block<'_>) -> String {
-    // The focus lets the arrow keys scroll it.
+    // With the focus, the arrow keys scroll it.
     let mut html = format!(
         "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"{}\"><table>\n\
          <thead><tr><th class=\"name\" rowspan=\"2\">estimator</th>",

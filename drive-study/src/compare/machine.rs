@@ -23,7 +23,7 @@ pub struct OnMachine {
     pub runs: Vec<Run>,
     /// The others.
     pub refused: Vec<Unsuited>,
-    /// Processor time in ns of a sample of each controller that ran. It differs from run to run, so no table has it.
+    /// Processor time in ns of a sample of each controller that ran. It differs from run to run, so it is left out of the tables.
     pub nanoseconds: Vec<(Kind, f64)>,
 }
 

@@ -42,7 +42,7 @@ pub struct Trace {
     pub lost: Option<f64>,
 }
 
-/// Angle error in deg beyond which the rotor counts as lost: the torque vanishes.
+/// Angle error in deg beyond which the rotor counts as lost because the torque vanishes.
 const LOST: f64 = 90.0;
 /// Band in pu within which a speed has settled.
 const BAND: f64 = 0.02;
@@ -96,7 +96,7 @@ impl Follow {
         }
     }
 
-    /// Whether the rotor was lost, or nothing was measured at all.
+    /// Whether the rotor was lost or nothing was measured.
     pub fn lost(&self) -> bool {
         let angle = self.angle.peak;
         self.speed.count() == 0.0 || angle.is_nan() || angle > LOST || !self.speed.rms().is_finite()
@@ -145,7 +145,7 @@ impl Follow {
         }
     }
 
-    /// Returns the run over time; a run in which a step failed is lost there.
+    /// Returns the run over time; from a failed step on, the run counts as lost.
     pub fn into_trace(mut self, survived: bool) -> Trace {
         if !survived {
             self.trace.lost = self.trace.lost.or(self.trace.t.last().copied());

@@ -123,7 +123,7 @@ pub(super) fn rated(candidate: &Candidate, speed: f64) -> Result<Outcome, Fault>
     Ok(Outcome::Measured(vec![follow.mean("mean angle error"), follow.std(), follow.rms()], None))
 }
 
-/// Takes rated load, then goes to `speed` (pu). It takes the load at 0.5 pu, so that the result is the lowest running
+/// Applies rated load, then changes to `speed` (pu). The load is applied at 0.5 pu, so that the result is the lowest running
 /// speed and not the lowest starting speed.
 ///
 /// # Errors
@@ -147,7 +147,7 @@ pub fn loaded(candidate: &Candidate, first: f64, speed: f64, load: f64) -> Resul
     let mut follow = Follow::default();
     let survived = candidate.turning(first).bench.run(arrival + 2.0, course, |moment| {
         if moment.t > arrival + 1.5 {
-            // The end of the ramp is `speed` but for rounding.
+            // The ramp ends at `speed`, apart from rounding.
             follow.add(&Moment { reference: speed, ..*moment });
         }
     })?;

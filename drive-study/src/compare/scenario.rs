@@ -15,7 +15,7 @@ pub struct Scenario {
     pub id: &'static str,
     /// The table that it belongs to.
     pub group: &'static str,
-    /// What happens, in one sentence.
+    /// The scenario in one sentence.
     pub title: &'static str,
     /// Runs it.
     pub run: ScenarioRun,

@@ -10,9 +10,9 @@ use std::fmt::Write as _;
 /// A group of scenarios with its runs.
 #[derive(Debug)]
 pub struct Block<'a> {
-    /// What the scenarios have in common.
+    /// Common settings of the scenarios.
     pub title: &'static str,
-    /// The scenarios, each with its quantities; their values are those of one estimator.
+    /// The scenarios, each with its quantities; their values belong to one estimator.
     pub headings: Vec<(&'static str, &'a [Measure])>,
     /// The estimators with their runs, one for each scenario.
     pub rows: Vec<(&'a Entry, Vec<Option<&'a Run>>)>,

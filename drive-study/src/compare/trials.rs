@@ -136,7 +136,7 @@ impl<'a> Rig<'a> {
         true
     }
 
-    /// The slowest time constant at `reference` under `load` (pu), that of 0.1 pu below it.
+    /// The slowest time constant at `reference` under `load` (pu); below 0.1 pu, the value at 0.1 pu.
     fn slowest(&self, reference: f64, load: f64) -> f64 {
         Pace::of(self.tuned, &self.pair, reference.abs().max(0.1), load * self.tuned.torque).slowest()
     }
@@ -196,7 +196,7 @@ fn start(tuned: &Tuned, effort: Effort) -> Result<Outcome, Fault> {
     Ok(Outcome::Measured(measures, None))
 }
 
-/// Starts to `from` (pu), and follows a course from there; every number is infinite if the drive did not get there.
+/// Starts to `from` (pu), then follows a course; every number is infinite if the drive did not reach `from`.
 fn course(
     tuned: &Tuned,
     from: f64,
@@ -277,7 +277,7 @@ fn top(tuned: &Tuned) -> Result<Outcome, Fault> {
     Ok(Outcome::Measured(measures, None))
 }
 
-/// Takes the rated load, goes down from speed to speed, and ends where it does not hold.
+/// Applies the rated load, lowers the speed in steps, and stops when the load is lost.
 fn lowest(tuned: &Tuned, effort: Effort, change: fn(&mut Pair)) -> Result<Outcome, Fault> {
     let speeds: &[f64] = if effort == Effort::Full {
         &[0.5, 0.3, 0.2, 0.15, 0.1, 0.07, 0.05, 0.03, 0.02, 0.01, 0.0]

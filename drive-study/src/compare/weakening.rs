@@ -1,7 +1,7 @@
 //! Field weakening: acceleration to a multiple of the base speed, and there a load above the capability of the machine.
 //!
-//! The base speed n_b is that of the true machine at its maximum current and 0.95 u_dc / sqrt 3; the envelope is also that of the
-//! true machine, under the limits of each estimator.
+//! The base speed n_b is computed for the true machine at its maximum current and 0.95 u_dc / sqrt 3; so is the envelope, under
+//! the limits of each estimator.
 
 use super::candidate::Candidate;
 use super::measure::{Measure, Outcome};
@@ -19,7 +19,7 @@ fn weakening(candidate: &Candidate) -> Candidate {
         match par.estimator {
             // The gain of this estimator has no bound near the current -psi_M / L_d.
             Kind::VoltageModel => par.limit.i = 0.7 * par.motor.psi_M / par.motor.L_d,
-            // This estimator takes a saturated hexagon for an angle error.
+            // This estimator mistakes a saturated hexagon for an angle error.
             Kind::VoltageFeedback => (par.weakening.k_u, par.weakening.k_t) = (0.9, 0.9),
             _ => {}
         }

@@ -156,7 +156,7 @@ impl Record {
 }
 
 /// Number of communication steps of `h` (s) between recorded points. Between its samples (0.1 ms apart) the controller
-/// holds its estimate while the rotor keeps turning, so only points on the sample grid can be compared.
+/// holds its estimate while the rotor turns on, so only points on the sample grid are comparable.
 pub fn samples_apart(h: f64) -> u32 {
     let mut steps = 1;
     while f64::from(steps) * h < 1e-4 - 1e-9 {

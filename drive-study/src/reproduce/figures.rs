@@ -1,4 +1,4 @@
-//! The expected results of each experiment: what is measured, its expected value, and the verdict.
+//! The expected results of each experiment: the measured value, its expected value, and the verdict.
 //!
 //! Expected values and tolerances were computed with an independent model of the same drive (the paper prints curves,
 //! no numbers, and its motor table is missing); they hold for the reference motor and the start values of the FMUs.
@@ -83,12 +83,12 @@ impl<'a> Window<'a> {
         (self.max(column) - target).max(target - self.min(column))
     }
 
-    /// Overshoot of the greatest value over `target` in percent.
+    /// Overshoot of the maximum over `target` in percent.
     fn overshoot(&self, column: Column, target: f64) -> f64 {
         (self.max(column) / target - 1.0) * 100.0
     }
 
-    /// Time in s from the first passage of 10 % of `target` to that of 90 %, both interpolated.
+    /// Rise time in s: from the first crossing of 10 % of `target` to that of 90 %, both interpolated.
     fn rise(&self, column: Column, target: f64) -> f64 {
         self.passage(column, 0.9 * target) - self.passage(column, 0.1 * target)
     }
@@ -144,14 +144,14 @@ fn loaded(record: &Record) -> Window<'_> {
     window(record, 1.0, 2.0)
 }
 
-/// The estimated speed of the first start: its lowest value, and the greatest one before that.
+/// The estimated speed of the first start: its minimum, and the maximum before that.
 fn swing(record: &Record) -> (f64, f64) {
     let estimate = first(record).of(ESTIMATE);
     let lowest = estimate.iter().enumerate().fold(0, |at, (k, x)| if *x < estimate[at] { k } else { at });
     (estimate[lowest], estimate[..=lowest].iter().copied().fold(f64::NEG_INFINITY, f64::max))
 }
 
-/// A figure: what is measured, what is expected, and how it is measured.
+/// A figure: its quantity, its expected value, and its measurement.
 struct Row {
     experiment: &'static str,
     figure: &'static str,

@@ -101,7 +101,7 @@ pub(super) fn csv(record: &Record) -> String {
     text
 }
 
-/// The verdicts on the figures and on the agreement of the two standards, one sentence each.
+/// One sentence each on the figures and on the agreement of the two standards.
 pub(super) fn verdict(holds: bool, identical: bool) -> String {
     let figures = if holds { "Every figure is inside its tolerance." } else { "Some figures are OFF." };
     let same = if identical { "are equal bit for bit" } else { "DIFFER" };

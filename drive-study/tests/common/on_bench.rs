@@ -56,7 +56,7 @@ pub(crate) fn drive() -> Pair {
     par.compensation.calibrate = true;
     // A soft current loop passes little of the sensors' noise on to the voltages.
     (par.current.bandwidth, par.current.active_resistance) = (TAU * 60.0, false);
-    // The law of low speed at every speed: i_d is what the bench says.
+    // The law of low speed at every speed: the bench sets i_d.
     par.zero_speed.w_0 = 1e6;
     pair
 }

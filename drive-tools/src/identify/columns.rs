@@ -139,7 +139,7 @@ impl Signals {
     /// Reads the known columns of a file's text.
     ///
     /// # Errors
-    /// The table cannot be read, two headers hold one column, a header of `--map` is missing, or a unit does not fit.
+    /// The table cannot be read, two headers name the same column, a header of `--map` is missing, or a unit does not fit.
     pub fn parse(text: &str, file: &str, naming: &Naming) -> Result<Self> {
         Self::of(&Columns::parse_some(text, file, |header| naming.column(header).is_some())?, naming)
     }
@@ -196,7 +196,7 @@ impl Signals {
         self.columns.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ")
     }
 
-    /// Fails at a row: `FILE:ROW:COLUMN: what; remedy`.
+    /// Fails at a row: `FILE:ROW:COLUMN: problem; remedy`.
     ///
     /// # Errors
     /// Always.

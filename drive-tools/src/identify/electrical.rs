@@ -36,7 +36,7 @@ const ROUNDS: usize = 2;
 pub struct Fit {
     /// R in Ohm, L_d and L_q in H at no current, psi_M in Wb, c_j in V, and the terms of the saturation.
     pub p: [f64; SIZE],
-    /// What the equations take into account.
+    /// Effects included in the equations.
     pub form: Form,
     /// Angle of the sensor's zero in rad.
     pub theta_0: f64,
@@ -78,7 +78,7 @@ impl Fit {
         Complex::new(psi_d, (L_q + b_3 * q * q + a_x * d) * q)
     }
 
-    /// Saturation as the plant has it: s_2 in A/Wb2, s_3 in A/Wb3, s_dq in A/Wb2; `None` if the record shows no saturation.
+    /// Saturation as in the plant: s_2 in A/Wb2, s_3 in A/Wb3, s_dq in A/Wb2; `None` if the record shows no saturation.
     pub fn saturation(&self) -> Option<[f64; 3]> {
         let [_, L_d, L_q, _, _, _, _, a_2, a_3, _, a_x] = self.p;
         let s_2 = -a_2 / L_d.powi(3);
@@ -102,7 +102,7 @@ impl Problem<'_> {
     fn direction(&self) -> Option<f64> {
         let mut theta_0 = 0.0;
         for _ in 0..4 {
-            // A second flux on the q-axis, which the d-equation sees as -int(w).
+            // A second flux on the q-axis, which enters the d-equation as -int(w).
             let mut sums = Sums::new(CURVE.end + 1);
             for Window { d, q, u, .. } in self.windows(theta_0, 0.0) {
                 let row = |x: [f64; SIZE], last: f64| [x[0], x[1], x[2], x[3], x[4], x[5], x[6], last];
@@ -130,7 +130,7 @@ impl Problem<'_> {
         let mut fit = fit;
         for _ in 0..ROUNDS {
             let [R, L_d, L_q, ..] = fit.p;
-            // Only over a sample of the controller the voltage is held.
+            // The voltage is held only over a sample of the controller.
             let x = |L: f64| if self.timing.every == 1 && R > 0.0 && L > 0.0 { R * self.record.step / L } else { 0.0 };
             let form = Form { share: [L_d, L_q].map(|L| Form::share_of(x(L).min(MOST_DECAY))), bent };
             if form == fit.form {
@@ -141,8 +141,8 @@ impl Problem<'_> {
         Some(fit)
     }
 
-    /// The terms of the saturation with which the values are known best: a term that explains the record makes the results
-    /// without one stretch of time agree, an unexplained effect makes them differ.
+    /// The terms of the saturation with which the values are known best: if a term describes the record, the results with
+    /// different stretches of time left out agree; if an effect is missing, they differ.
     fn worth(&self, fit: &Fit) -> Option<[bool; 4]> {
         let whole = self.with(Form { bent: [true; 4], ..fit.form }, 0.0);
         let solved = whole.linear(fit.theta_0, fit.tau)?;
@@ -204,7 +204,7 @@ impl Problem<'_> {
             power += u.norm_sqr();
         }
         let mut noiseless = sums.matrix.clone();
-        // An inductance whose current hardly changes is seen through noise alone; all others are still reported.
+        // An inductance whose current hardly changes is determined by noise only; all others are still reported.
         let count = windows.len().max(1) as f64;
         let noise = [1, 2].map(|k| self.noise().min(MOST_NOISE * sums.matrix[(k, k)] / count));
         for k in [1, 2] {
@@ -280,7 +280,7 @@ impl Problem<'_> {
             tau,
             half: std::array::from_fn(|k| half[k]),
             condition: solved.condition,
-            // The noise that was taken off the normal matrix is left, too.
+            // The noise subtracted from the normal matrix remains as well.
             rest: ((solved.squares / windows + taken).max(0.0)).sqrt() / time,
             noise,
             bends: self.bends,

@@ -1,5 +1,5 @@
 //! Uncertainty of a least-squares result: the greater of a sandwich estimate over blocks of rows and a jackknife over stretches
-//! of time. The first covers noise, the second the errors of the model: without it, errors reached 8 half-widths.
+//! of time. The first covers noise, the second model errors: without it, errors reached 8 half-widths.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -10,7 +10,7 @@ use std::fmt::{Arguments, Write};
 pub struct Content<'a> {
     /// Origin of the values.
     pub from: &'static str,
-    /// What the reader should know.
+    /// Notes for the reader.
     pub notes: &'a [String],
     /// Pole pairs.
     pub n_p: i32,

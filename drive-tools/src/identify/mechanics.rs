@@ -42,7 +42,7 @@ pub struct Shown {
     pub rows: Vec<TorqueWindow>,
 }
 
-/// One window: the regressors of inertia and friction and what they explain, integrals over its time.
+/// One window: the regressors of inertia and friction and the quantity to explain, integrated over its time.
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueWindow {
     /// Time in s at its middle.
@@ -56,7 +56,7 @@ pub struct TorqueWindow {
 }
 
 impl Shown {
-    /// Windows of a record. The load is taken as zero where it is unknown.
+    /// Windows of a record. An unknown load is taken as zero.
     pub fn of(record: &BenchRecord, motion: &Motion, fit: &Fit, n_p: f64) -> Self {
         let width = ((WINDOW / record.step).round() as usize).max(4);
         let speed =
@@ -93,7 +93,8 @@ impl Shown {
         Self { speed, torque: greatest, levels, rows }
     }
 
-    /// The fit: least squares with rows that are wrong by 1 % of their torque, and less weight beyond 2.5 standard deviations.
+    /// The fit: least squares assuming an error of 1 % of the torque in each row, with less weight beyond 2.5 standard
+    /// deviations.
     pub fn fit(&self) -> Option<MechanicalFit> {
         let typical = quantile(self.rows.iter().map(|row| row.y.abs()).collect(), 0.9);
         let size = |y: f64| 0.01 * y.abs() + 0.005 * typical;
@@ -130,8 +131,8 @@ impl Shown {
     }
 }
 
-/// Levels in a histogram of the speed with 100 bins: the fullest tenth of the range, without it and its surroundings the next
-/// one, as long as it has 3 % of the windows.
+/// Levels in a histogram of the speed with 100 bins: the fullest tenth of the range, then the next one outside its
+/// surroundings, as long as it contains 3 % of the windows.
 fn levels(mut bins: [usize; 101], windows: usize) -> usize {
     let mut levels = 0;
     loop {

@@ -54,7 +54,7 @@ pub struct Identified {
     pub ratings: Ratings,
     /// Pole pairs.
     pub n_p: i32,
-    /// What the reader should know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
@@ -121,7 +121,7 @@ const SCALE: &str = "values scale with the sensors: 1 % more current makes R_s, 
 /// Delays that are tried.
 const DELAYS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
-/// Minimum factor by which voltages of a wrong row increase the residual of the fit.
+/// Minimum factor by which voltages shifted by a row increase the residual of the fit.
 const SHIFTED: f64 = 1.3;
 
 /// Identifies the machine of a record.

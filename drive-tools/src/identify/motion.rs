@@ -3,7 +3,7 @@
 use super::record::BenchRecord;
 use std::ops::Range;
 
-/// Time in s to each side of a row that its parabola covers, at most: a change of the torque within it bends the parabola.
+/// Maximum half-width in s of the parabola around a row: a torque change inside it bends the parabola.
 const REACH: f64 = 4e-3;
 
 /// Noise of the angle in rad above which it hides that. Noise falls with the root of the time, the error of a bend grows with its
@@ -17,7 +17,7 @@ pub struct Motion {
     pub theta: Vec<f64>,
     /// Electrical speed in rad/s.
     pub w: Vec<f64>,
-    /// Stretches in which both are known.
+    /// Intervals in which both are known.
     pub runs: Vec<Range<usize>>,
 }
 

@@ -77,7 +77,7 @@ fn drawn(file: &str, values: &[Quantity], notes: &[String], figures: &[(Figure, 
     Ok(page::page(&format!("Machine of {file}"), &html))
 }
 
-/// The values with their intervals, or with the reasons why there is none.
+/// The values with their intervals, or the reasons why a value is missing.
 fn table(values: &[Quantity]) -> String {
     let mut html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"values\"><table>\n<thead><tr><th class=\"name\">quantity</th>\
         <th class=\"number\">value</th><th>unit</th><th class=\"number\">interval</th><th>verdict</th></tr></thead>\n<tbody>\n"
@@ -131,7 +131,7 @@ fn figures(found: &Identified) -> [(Figure, &'static str); 4] {
     ]
 }
 
-/// Times of some windows, with a gap where the record has one.
+/// Times of some windows, with the gaps of the record.
 fn over_time<T>(windows: &[T], t: impl Fn(&T) -> f64, length: f64, y: impl Fn(&T) -> f64) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = Vec::with_capacity(windows.len());
     for window in windows {
@@ -197,7 +197,7 @@ fn fluxes(found: &Identified) -> Figure {
     // While a current changes, its inductance hides the flux.
     let steady = |w: &&Window| w.q[3].abs() > 0.1 * top && w.d[1].hypot(w.q[2]) < STEADY * most;
     let turning = || voltage.iter().filter(steady);
-    // What an equation leaves beside all terms but those of the flux that turns with the rotor, over the angle.
+    // Residual of an equation without the terms of the rotor-fixed flux, over the angle.
     let psi_d = turning().map(|w| {
         let flux = L_d * w.q[1] + psi_M * w.q[3];
         (w.d[0] / window, (w.u.im - dot(&w.q, &found.fit.p) + flux) / w.q[3], w.q[3] * w.q[3])
@@ -245,7 +245,7 @@ fn friction(found: &Identified) -> Figure {
     Figure { title: "Friction".into(), x: "speed in rad/s", columns: 1, panels }
 }
 
-/// Weighted means of points (x, y, weight) at some places along x, in ascending order.
+/// Weighted means of points (x, y, weight) at several x, in ascending order.
 fn averaged(points: impl Iterator<Item = (f64, f64, f64)>) -> Vec<(f64, f64)> {
     let points: Vec<_> = points.filter(|(x, y, weight)| x.is_finite() && y.is_finite() && *weight > 0.0).collect();
     let (low, high) =

@@ -74,7 +74,7 @@ pub struct BenchRecord {
     pub runs: Vec<Range<usize>>,
     /// Noise of the current vector in A: standard deviation.
     pub sigma: f64,
-    /// What the reader should know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
@@ -193,8 +193,8 @@ impl BenchRecord {
     }
 }
 
-/// Noise of a current vector, from its third differences, which vanish for a smooth signal. A current that turns with the rotor
-/// is turned back before.
+/// Noise of a current vector, from its third differences, which vanish for a smooth signal. A current that rotates with the
+/// rotor is first transformed to rotor axes.
 fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> f64 {
     /// Rows on each side that determine the slope, and thus the turn, at a row.
     const REACH: usize = 20;
@@ -217,7 +217,7 @@ pub fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }
 
-/// The value below which the share `p` of the values lies.
+/// The `p` quantile of the values.
 pub fn quantile(mut x: Vec<f64>, p: f64) -> f64 {
     if x.is_empty() {
         return 0.0;
@@ -355,7 +355,7 @@ fn current(signals: &Signals, theta: &[f64], clipped: &[bool]) -> Result<Vec<Com
             let sum: Vec<f64> = whole.iter().map(|&k| a[k] + b[k] + c[k]).collect();
             let shift = mean(&sum);
             let count = sum.len().max(1) as f64;
-            // What changes from row to row is noise of the sensors.
+            // Changes from row to row are sensor noise.
             let noise = sum.windows(2).map(|w| (w[1] - w[0]).powi(2)).sum::<f64>() / (2.0 * count);
             let spread = sum.iter().map(|s| (s - shift).powi(2)).sum::<f64>() / count;
             let rest = (spread - noise).max(0.0).sqrt();
@@ -419,7 +419,7 @@ fn split(run: Range<usize>, good: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     parts
 }
 
-/// Rows without current, for the offset: those of `--zero`, or those without voltage at the start.
+/// Rows without current, for the offset: given by `--zero`, or the initial rows without voltage.
 fn zero(t: &[f64], u: &[Complex], closed: Option<&[bool]>, options: &Options) -> Result<Option<Range<usize>>> {
     if let Some((from, to)) = options.zero {
         let row = |time: f64| t.partition_point(|&t| t < time);
@@ -429,6 +429,6 @@ fn zero(t: &[f64], u: &[Complex], closed: Option<&[bool]>, options: &Options) ->
     }
     let rest = |k: usize| u[k].norm() == 0.0 || closed.is_some_and(|closed| !closed[k]);
     let end = (0..t.len()).find(|&k| !rest(k)).unwrap_or(t.len());
-    // The voltage of a row may act a row later, and the one of the row before had its effect by then.
+    // The voltage of a row may act a row later, and the previous row's voltage until then.
     Ok((end >= 20).then_some(0..end))
 }

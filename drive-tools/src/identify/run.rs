@@ -64,7 +64,7 @@ pub struct Commissioned {
     pub ratings: Ratings,
     /// Pole pairs.
     pub n_p: i32,
-    /// What the reader should know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
     /// Times in s, and the signals over them with their names and units.
     pub seen: (Vec<f64>, Vec<Signal>),
@@ -81,7 +81,7 @@ fn about<E: Enumerated>(value: E) -> &'static str {
 /// Reads the run `text` of `file`.
 ///
 /// # Errors
-/// An option is wrong, the file does not hold a commissioning, or the commissioning has not ended in it.
+/// An option is wrong, the file does not contain a commissioning, or not its end.
 pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commissioned> {
     options.check()?;
     let Some(n_p) = options.n_p else {

@@ -7,8 +7,8 @@ use super::record::{BenchRecord, Complex, quantile};
 use super::windows::{Problem, Timing};
 use serde::Serialize;
 
-/// Maximum R T/L of a step, and of a step that is a sample of the controller: the voltage is held there, and the current's course
-/// is known.
+/// Maximum R T/L of a step, and of a step that is a sample of the controller: within a sample the voltage is constant and the
+/// current's course is known.
 const DECAY: (f64, f64) = (0.2, 0.35);
 
 /// A quantity of the machine.
@@ -22,12 +22,12 @@ pub struct Quantity {
     pub value: f64,
     /// Relative half-width of the interval (95 %); NaN: the value is given.
     pub half_width: f64,
-    /// Why it is not written, and what helps.
+    /// Why it is not written, and a remedy.
     pub refused: Option<String>,
 }
 
 impl Quantity {
-    /// Its name, and the rest for other programs.
+    /// Its name, and its fields for other programs.
     pub(super) fn json(&self) -> (String, serde_json::Value) {
         let known = self.refused.is_none();
         let number = |x: f64| (known && x.is_finite()).then_some(x);
@@ -57,7 +57,7 @@ pub struct Facts {
     levels: usize,
     /// The load is unknown.
     unloaded: bool,
-    /// Residual of the fit, relative to that of noise and to the voltage.
+    /// Residual of the fit, relative to the noise residual and to the voltage.
     rest: (f64, f64),
     condition: f64,
 }
@@ -94,7 +94,7 @@ impl Facts {
         }
     }
 
-    /// Whether the residual of the model exceeds that of noise.
+    /// Whether the model's residual exceeds the noise residual.
     pub(super) fn misfit(&self) -> bool {
         self.rest.0 > 3.0 && self.rest.1 > 0.02
     }
@@ -171,7 +171,7 @@ pub(super) fn values(
     let [R, L_d, L_q, psi_M, ..] = fit.p;
     let (m, half) = mechanics.map_or(([f64::NAN; 3], [f64::NAN; 3]), |m| (m.p, m.half));
     let (u_dead, i_zero) = (fit.u_dead(), fit.i_zero());
-    // What the curve's family leaves out of the inverter's loss shows in no residual: wide floors for both.
+    // The part of the inverter's loss that the curve cannot represent does not appear in the residual, so both have wide floors.
     #[rustfmt::skip]
     let rows: [Row<'_>; 9] = [
         ("R_s", "Ohm", R, fit.half[0], 0.003, 0.01, vec![&apart, &fast, &low]),

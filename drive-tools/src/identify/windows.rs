@@ -33,7 +33,7 @@ const BENDS: [f64; 3] = [0.003, 0.01, 0.03];
 /// Points of a sample at which the inverter's loss is taken.
 const POINTS: usize = 8;
 
-/// One window: the regressors of both axes and what they explain, integrals over its time.
+/// One window: the regressors of both axes and the quantity to explain, integrated over its time.
 #[derive(Clone, Copy, Debug)]
 pub struct Window {
     /// Time in s at its middle.
@@ -55,7 +55,7 @@ pub struct Timing {
     pub every: u32,
 }
 
-/// What the equations take into account.
+/// Effects included in the equations.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Form {
     /// Weight of a step's end in the mean of a current: d and q.
@@ -123,7 +123,7 @@ impl<'a> Problem<'a> {
     fn voltage(&self, k: usize, frame: impl Fn(usize, f64) -> f64) -> Complex {
         let (T, w) = (self.record.step, self.motion.w[k]);
         let u = &self.record.u;
-        // The vector `u` that acts from `from` to `to` (parts of the step), seen from rotor axes.
+        // The vector `u` that acts from `from` to `to` (parts of the step), in rotor axes.
         let seen = |row: usize, from: f64, to: f64| {
             let (middle, half) = (0.5 * (from + to) * T, 0.5 * (to - from) * T * w);
             let width = if half.abs() < 1e-4 { 1.0 } else { half.sin() / half };
@@ -147,7 +147,7 @@ impl<'a> Problem<'a> {
                 let width = if half.abs() < 1e-4 { 1.0 } else { half.sin() / half };
                 u[row] * Complex::cis(-frame(row, shift)) * width
             };
-            // Mean over the step of the line through the vectors, which stand `shift` later than the rows.
+            // Mean over the step of the line through the vectors, which are `shift` later than the rows.
             let late = shift / T;
             let back = late.floor() as usize;
             let part = late - late.floor();
@@ -217,7 +217,7 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// All windows, in axes that are turned back by `theta_0` (rad) and late by `tau` (s).
+    /// All windows, in axes rotated back by `theta_0` (rad) and delayed by `tau` (s).
     pub fn windows(&self, theta_0: f64, tau: f64) -> Vec<Window> {
         let mut windows = Vec::new();
         for run in &self.motion.runs {

@@ -43,7 +43,7 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// Taken from the DC link less what comes back.
+    /// Drawn from the DC link, minus the regenerated energy.
     pub fn sum(&self) -> f64 {
         self.link[0] + self.link[1]
     }
@@ -58,7 +58,7 @@ impl Cycle {
         Self::new(VEHICLE, CYCLE)
     }
 
-    /// Reads the text of a vehicle (TOML) and that of a cycle (CSV: time in s, speed in km/h; comments with `#`).
+    /// Reads the texts of a vehicle (TOML) and of a cycle (CSV: time in s, speed in km/h; comments with `#`).
     ///
     /// # Errors
     /// A key or a number is missing or wrong.

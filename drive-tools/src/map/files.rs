@@ -71,7 +71,7 @@ pub fn map_csv(map: &Map) -> String {
     csv
 }
 
-/// `envelope.csv`: minimum and maximum torque at the shaft over the speed; 0 where that sign is out of reach.
+/// `envelope.csv`: minimum and maximum torque at the shaft over the speed; 0 if that sign is out of reach.
 pub fn envelope_csv(map: &Map) -> String {
     let mut csv = String::from("speed,u_dc,T_winding,T_magnet,tau_min,tau_max,region_min,region_max\n");
     for sheet in &map.sheets {
@@ -98,7 +98,7 @@ pub fn flux_map_csv(map: &Map) -> String {
 /// An array as a file of NumPy's format, version 1.0; `descr` is the type of the bytes.
 fn npy(descr: &str, shape: &[usize], data: &[u8]) -> Vec<u8> {
     let extents: Vec<String> = shape.iter().map(usize::to_string).collect();
-    // A tuple of one has its comma, too.
+    // A tuple with one element keeps its comma.
     let head = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({},), }}", extents.join(", "));
     // Magic, version and length of the header take ten bytes; the data start at a multiple of 64.
     let length = (head.len() + 11).next_multiple_of(64) - 10;

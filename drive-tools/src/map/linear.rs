@@ -5,7 +5,7 @@ use drive::frame::Dq;
 use drive::plant::machine::Magnetics;
 use drive::steady::{At, Point, Steady};
 
-/// The rated point of the controller, and the best one.
+/// The rated point of the controller, and the most efficient point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// Electromagnetic torque in N.m for the rated torque as reference.

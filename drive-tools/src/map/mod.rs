@@ -69,7 +69,7 @@ const LEAST_SAMPLES: f64 = 10.0;
 /// Share of the rated torque available there.
 const LEAST_TORQUE: f64 = 0.01;
 
-/// The drive of a map: torque control with a sensor on an imposed shaft, limited by the current alone.
+/// The drive of a map: torque control with a sensor at imposed speed, limited only by the current.
 pub fn drive(tuned: &Tuned) -> Steady {
     let pair = tuned.pair();
     let (mut plant, mut controller) = (pair.plant.model.parameters, pair.controller.model.parameters);
@@ -111,7 +111,7 @@ pub fn make(motor: &MotorFile, request: &Request) -> Result<Map> {
     Ok(Map { name, source, drive, rated, u_dc, T, axes, sheets, shown, verified, notes })
 }
 
-/// The map of a drive that is given with its values: one voltage (V), 20 degC, speeds up to `top` (rad/s), without verification.
+/// The map of a drive given by its values: one voltage (V), 20 degC, speeds up to `top` (rad/s), without verification.
 pub fn of_drive(name: &str, drive: Steady, u_dc: f64, top: f64, rated: [f64; 2]) -> Map {
     let (axes, T) = (Axes::new(Request::default().grid, top), vec![20.0]);
     let sheets = sheet::all(&drive, &axes, &[u_dc], &[20.0 + ZERO_CELSIUS]);
@@ -150,7 +150,7 @@ fn rated(motor: &MotorFile, drive: &Steady, u_dc: f64) -> Result<()> {
     Ok(())
 }
 
-/// The maximum speed (rad/s) of the map: that of the file, or twice the rated speed, limited to speeds with a torque and with
+/// The maximum speed (rad/s) of the map: from the file or twice the rated speed, limited to speeds with available torque and
 /// enough samples per period.
 fn top(motor: &MotorFile, drive: &Steady, u_dc: &[f64], T: &[f64]) -> f64 {
     let rating = &motor.data.rating;
@@ -189,7 +189,7 @@ fn notes(drive: &Steady, T: &[f64]) -> Vec<String> {
     notes
 }
 
-/// The tables that the motor file lacks, and the losses that are not counted without them.
+/// Tables missing in the motor file, and the losses that therefore are not counted.
 fn missing(drive: &Steady) -> impl Iterator<Item = (&'static str, &'static str)> {
     let plant = &drive.plant;
     let tables =
@@ -251,7 +251,7 @@ impl Map {
     }
 }
 
-/// A number with six digits at most.
+/// A number with at most six digits.
 pub(crate) fn short(x: f64) -> f64 {
     rounded(x, 6)
 }

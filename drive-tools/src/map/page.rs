@@ -92,7 +92,7 @@ fn data(map: &Map) -> Value {
     json!({ "speed": all(&map.axes.speed), "x": all(&map.axes.x), "sheets": map.sheets.iter().map(sheet).collect::<Vec<_>>() })
 }
 
-/// A power with four digits: the rest cannot be read off.
+/// A power with four digits: more cannot be read from the plot.
 fn digits(x: f64) -> f64 {
     rounded(x, 4)
 }

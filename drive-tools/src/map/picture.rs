@@ -17,12 +17,12 @@ const RPM: f64 = 30.0 / PI;
 const COUNT: usize = 9;
 /// These efficiencies in % for a machine that reaches at least 95 %.
 const LEVELS: [f64; COUNT] = [70.0, 80.0, 85.0, 90.0, 92.0, 94.0, 95.0, 96.0, 97.0];
-/// Steps in % between those of the others.
+/// Steps in % between the contours for other machines.
 const STEPS: [f64; 6] = [5.0, 2.0, 1.0, 0.5, 0.2, 0.1];
 const INKS: [Ink; 10] =
     ["#440154", "#482878", "#3e4a89", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6dcd59", "#b4de2c", "#fde725"];
 
-/// Speeds and torques of the picture: its contours are those of the drive and do not depend on the map's grid.
+/// Speeds and torques of the picture: its contours are computed from the drive and do not depend on the map's grid.
 const GRID: (usize, usize) = (161, 121);
 
 /// The picture of a sheet.
@@ -92,7 +92,7 @@ fn levels(best: f64) -> [f64; COUNT] {
     if best >= LEVELS[6] {
         return LEVELS;
     }
-    // Fine steps only near 100 %, and where there is not enough efficiency for coarse ones.
+    // Fine steps only near 100 %, and where the efficiency is too low for coarse ones.
     let fits = |step: f64| (best < 90.0 || step <= 2.0) && (best / step).floor() >= 9.0;
     let step = STEPS.into_iter().find(|&step| fits(step)).unwrap_or(STEPS[5]);
     let mut count = (best / step).floor() - 9.0;
@@ -124,7 +124,7 @@ fn isopower(top: f64, [low, high]: [f64; 2], power: f64) -> Vec<Line> {
     for k in (1..=5).take_while(|k| f64::from(*k) * step <= power) {
         for (sign, limit) in [(1.0, high), (-1.0, -low)] {
             let p = f64::from(k) * step;
-            // It enters the picture where the torque is that of the upper edge.
+            // It enters the picture at the torque of the upper edge.
             let from = p * RPM / (1.04 * limit);
             if !(limit > 0.0 && from < 0.9 * end) {
                 continue;
@@ -169,7 +169,7 @@ fn marks(map: &Map, sheet: &Sheet) -> Vec<(f64, String)> {
 mod tests {
     use super::*;
 
-    /// The best color is that of the best points of this machine.
+    /// The best color marks this machine's best points.
     #[test]
     fn the_colors_follow_the_machine() {
         for (best, expected) in [

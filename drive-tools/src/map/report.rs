@@ -15,7 +15,7 @@ const RPM: f64 = 30.0 / PI;
 /// Tables of a map.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Report {
-    /// Title, headings and rows of each.
+    /// Title, headings and rows of each table.
     pub tables: Vec<(&'static str, Vec<Vec<String>>)>,
     /// Results that do not fit into a table.
     pub notes: Vec<String>,
@@ -32,7 +32,7 @@ fn row(cells: impl IntoIterator<Item = impl ToString>) -> Vec<String> {
     cells.into_iter().map(|cell| cell.to_string()).collect()
 }
 
-/// The tables of a map, and of a cycle that the user has `asked` for, or of the example if the drive can follow it.
+/// The tables of a map, and of a requested cycle (`asked`), or of the example if the drive can follow it.
 pub fn of(map: &Map, cycle: &Cycle, asked: bool) -> Report {
     let heads = |first: &[&str]| row(first.iter().chain(&LOSSES.map(|name| name)).copied());
     let mut best = vec![row(["condition", "speed in rpm", "torque in N.m", "p_mech in W", "efficiency in %"])];

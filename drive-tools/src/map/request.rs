@@ -1,4 +1,4 @@
-//! The request for a map: the grid, the voltages, the temperatures, and how many points are verified.
+//! The request for a map: the grid, the voltages, the temperatures, and the number of verified points.
 
 use crate::error::{Result, WithContext, bail};
 
@@ -9,7 +9,7 @@ pub const ZERO_CELSIUS: f64 = 273.15;
 #[derive(Clone, Debug, PartialEq)]
 #[expect(non_snake_case, reason = "the symbol of the temperature")]
 pub struct Request {
-    /// DC-link voltages in V; the one of the motor file if empty.
+    /// DC-link voltages in V; if empty, the motor file's voltage.
     pub u_dc: Vec<f64>,
     /// Temperatures of winding and magnet in degC; 20 if empty.
     pub T: Vec<f64>,
@@ -25,7 +25,7 @@ impl Default for Request {
     }
 }
 
-/// Most points along an axis.
+/// Maximum number of points along an axis.
 const MOST: usize = 1001;
 
 /// The grid of a text like `47x41`.
@@ -48,14 +48,14 @@ pub fn grid(text: &str) -> Result<(usize, usize)> {
     Ok((speeds, torques))
 }
 
-/// Most voltages, temperatures, and verified points.
+/// Maximum number of voltages, of temperatures, and of verified points.
 const MOST_VALUES: usize = 100;
 
 impl Request {
     /// Checks the values.
     ///
     /// # Errors
-    /// The option, its value, and what is allowed.
+    /// The option, its value, and the allowed values.
     pub fn check(&self) -> Result<()> {
         for &u_dc in &self.u_dc {
             if !(u_dc > 0.0 && u_dc <= 1e4) {

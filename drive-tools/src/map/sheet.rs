@@ -1,6 +1,6 @@
 //! The points of a map at one voltage and one temperature, on a grid of speed and relative torque.
 //!
-//! The torque at the shaft is given as a share x of the maximum of its sign at that speed, x = tau / tau_max or tau / |tau_min|,
+//! The shaft torque is given as a share x of the maximum with its sign at that speed, x = tau / tau_max or tau / |tau_min|,
 //! in
 //! -1..1: the grid has no holes, and no cell lies across the envelope.
 
@@ -40,7 +40,7 @@ pub struct Sheet {
     pub u_dc: f64,
     /// Temperature of winding and magnet in K.
     pub T: f64,
-    /// Minimum and maximum torque at the shaft in N.m at each speed; 0 where that sign is out of reach.
+    /// Minimum and maximum torque at the shaft in N.m at each speed; 0 if that sign is out of reach.
     pub limits: Vec<[f64; 2]>,
     /// Positions of the minimum and the maximum torque.
     pub regions: Vec<[Region; 2]>,

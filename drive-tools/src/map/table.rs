@@ -4,13 +4,13 @@
 //! x = tau / tau_lim(n)     p_k = bilinear p_k(n, x)     p_in = tau w_m + sum p_k
 //! ```
 //!
-//! tau_lim is linear in the speed between those of the grid. The efficiency is computed from the losses and never interpolated:
-//! it is 0/0 without load.
+//! tau_lim is interpolated linearly between the speeds of the grid. The efficiency is computed from the losses and never
+//! interpolated: it is 0/0 without load.
 //!
 //! At another voltage the map is read at the speed n u_ref / u_dc, where field weakening is equally deep, with the shaft torque
-//! that corresponds to the same torque of the rotor before friction. p_sw grows with (u_dc / u_ref)^k_sw; p_iron is that of the
-//! speed with this flux linkage, and p_friction that of the speed. At another temperature of the winding, p_cu is in proportion
-//! to R_s(T). `tests/map.rs` has the errors.
+//! that corresponds to the same torque of the rotor before friction. p_sw grows with (u_dc / u_ref)^k_sw; p_iron is taken at
+//! the speed and this flux linkage, p_friction at the speed. At another temperature of the winding, p_cu is in proportion to
+//! R_s(T). `tests/map.rs` has the errors.
 
 use super::sheet::{Axes, Sheet};
 use drive::plant::losses::{Losses, efficiency};
@@ -31,11 +31,11 @@ pub struct Reading {
     pub losses: Losses,
     /// Power from the DC link in W.
     pub p_in: f64,
-    /// Efficiency, 0 where there is none.
+    /// Efficiency, 0 where it is undefined.
     pub efficiency: f64,
 }
 
-/// The interval of an axis in which `x` lies, and the share of it that lies below.
+/// The interval of an axis that contains `x`, and the relative position of `x` in it.
 fn cell(axis: &[f64], x: f64) -> Option<(usize, f64)> {
     let (first, last) = (axis.first()?, axis.last()?);
     let beyond = 1e-9 * (last - first);
@@ -83,7 +83,7 @@ impl<'a> Table<'a> {
         let Self { sheet, plant, .. } = self;
         let (n, forward, scale) = (speed.abs(), if speed < 0.0 { -tau } else { tau }, u_dc / sheet.u_dc);
         let read = n / scale;
-        // The rotor has the same torque: friction takes another part of it at the speed of the reading.
+        // The rotor torque is the same; friction differs at the speed of the lookup.
         let friction = |n: f64| plant.mechanics.friction(n);
         let at_speed = self.losses(read, share(self.limits(read)?, forward + friction(n) - friction(read))?)?;
         let iron = |n: f64| {

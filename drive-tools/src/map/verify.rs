@@ -31,7 +31,7 @@ pub struct Verified {
     pub apart: Vec<String>,
 }
 
-/// Minimum torque limit of a speed that is compared, as a share of the maximum: where the voltage is used up, there is no margin
+/// Minimum torque limit for a speed to be compared, as a share of the maximum: where the voltage is exhausted, there is no margin
 /// for the ripple of a sampled drive.
 const LEAST_LIMIT: f64 = 0.05;
 

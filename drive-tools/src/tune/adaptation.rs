@@ -8,8 +8,8 @@
 //!   mistakes the swing for an error of R^. With half of w_0, R^ of wind-5kw came to 1.36 R from 120 deg beside the rotor,
 //!   which then crept away.
 //!
-//! The rules switch it on, except where the [`trial`] with it holds less than without it, at the temperature of the data, at -30 or
-//! at 130 degC, or swings at more speeds. The loss of a leg due to dead time and thresholds is compensated
+//! The rules switch it on, unless the [`trial`] fails more conditions with it, at the temperature of the data, at -30 or at 130
+//! degC, or swings at more speeds. The loss of a leg due to dead time and thresholds is compensated
 //! ([`losses`](super::losses)), so the loss does not count as resistance.
 
 use super::motor::{Data, swing};
@@ -29,7 +29,7 @@ const BANDWIDTH: (f64, f64) = (20.0, 0.25);
 /// i_0 / 2.
 const REST: f64 = 4.0;
 
-/// The drive with the adaptation unless it does harm, in which case a note is added; `fixed` is the drive without it.
+/// The drive with the adaptation, unless it is harmful; then a note is added; `fixed` is the drive without adaptation.
 pub fn chosen(data: &Data, fixed: Tuned) -> Tuned {
     let par = fixed.pair().controller.model.parameters;
     if par.estimator != Kind::Rasmussen {
@@ -78,7 +78,7 @@ fn adapting(data: &Data, fixed: &Tuned, start: f64) -> Tuned {
     with
 }
 
-/// The conditions that the drive holds with a `fixed` resistance but not `with` the adaptation, if any.
+/// Conditions, if any, that the drive withstands with a `fixed` resistance but not `with` the adaptation.
 fn harm(fixed: &Tuned, with: &Tuned) -> Option<String> {
     let fewer = |own: bool, of: &dyn Fn(&Tuned) -> Tuned| {
         let new = trial::all(&of(with), ANGLES);

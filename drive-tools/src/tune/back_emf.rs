@@ -12,7 +12,7 @@
 //! | KalmanFilter | densities of the voltage: (EMF / 257)^2 1 ms 2 pi 20 / rho, 1000 times that on q; of the acceleration: w_0 = rho at 0.05 pu |
 //! | GradientObserver | tracker rho, rate to the circle 0.04 of the rated electrical speed |
 //!
-//! A load step at low speed drives the rotor through zero: `emf.hold_reversal` holds it there, below 0.08 of the rated speed.
+//! A load step at low speed reverses the rotor: `emf.hold_reversal` keeps the direction below 0.08 of the rated speed.
 
 use super::bandwidth::{Bandwidths, EMF_PER_TRACKER};
 use super::motor::{Data, torque_constant};
@@ -67,7 +67,7 @@ pub fn observer(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
     all
 }
 
-/// The direction of rotation, held through zero.
+/// The direction of rotation, kept through zero.
 fn reversal(data: &Data) -> [Setting; 3] {
     [
         sign(data),

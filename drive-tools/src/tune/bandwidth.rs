@@ -2,10 +2,10 @@
 //!
 //! - T_s: the longest of 100, 50, 25 and 12.5 us that gives at least 12 samples per electrical period at the highest speed. A
 //!   voltage that is held for a sample turns by 30 deg there against the rotor, a loss of 1.1 %, and the command,
-//!   which acts 1.5 samples later on average, is turned ahead by 45 deg. The poles of the EMF observer get as many samples.
-//! - Observer, the target of every method: the acceleration alpha (electrical) that it must follow leaves an angle error of alpha / w_n^2
-//!   = 0.35 rad at most. Flux observers: that of the maximum current, and 300 rad/s at least; all others: that
-//!   of 1.6 times the rated torque, the limit, and 2 pi 20 rad/s at least.
+//!   which acts 1.5 samples later on average, is turned ahead by 45 deg. The EMF observer gets as many samples for its poles.
+//! - Observer, the target of every method: the (electrical) acceleration alpha that it must follow causes an angle error of at
+//!   most alpha / w_n^2 = 0.35 rad. Flux observers follow the acceleration at maximum current, with at least 300 rad/s; all
+//!   others that at 1.6 times the rated torque, the limit, with at least 2 pi 20 rad/s.
 //! - Speed: a step of the torque T makes the speed dip by 2/e T / (J w_s), with a double pole at w_s / 2. The dip should be at
 //!   most 0.05 pu; w_s is at least 40 rad/s (flux observers) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up
 //!   to a limit, or a fifth of the current loop (Sensored); with a back EMF, less where the gain through the change of i_q would be high
@@ -136,7 +136,7 @@ pub fn acceleration(data: &Data) -> f64 {
     data.rating.torque.get_ref() / data.mechanics.J.get_ref()
 }
 
-/// Minimum bandwidth in rad/s of the observer: it follows the greatest acceleration.
+/// Minimum bandwidth in rad/s of the observer: it must follow the maximum acceleration.
 pub fn least_observer(data: &Data) -> f64 {
     let greatest = torque_constant(data) * 0.8 * data.rating.current.get_ref() / data.mechanics.J.get_ref();
     (f64::from(*data.machine.n_p.get_ref()) * greatest / 0.35).sqrt()

@@ -10,7 +10,7 @@ use fmu_core::description::VariableKind;
 /// Checks both lists against the descriptions of the models.
 ///
 /// # Errors
-/// Names the variable, and the place in the machine's file from which its value comes.
+/// States the variable and the position of its value in the machine file.
 pub fn check(plant_settings: &[Setting], controller_settings: &[Setting], motor: &MotorFile) -> Result<()> {
     let plant = Description::of::<PmsmPlant>().map_err(Error::new)?;
     let controller = Description::of::<SensorlessController>().map_err(Error::new)?;

@@ -41,7 +41,7 @@ pub struct Fitted {
 /// The map of a machine's file; `None` without `[flux_map]`.
 ///
 /// # Errors
-/// File and line, and the problem: the table cannot be read, has too few points, or is not that of this machine, with the usual
+/// File and line, and the problem: the table cannot be read, has too few points, or belongs to another machine, with the usual
 /// causes.
 pub fn fit(motor: &MotorFile) -> Result<Option<Fitted>> {
     let Some(given) = &motor.data.flux_map else { return Ok(None) };
@@ -121,7 +121,8 @@ fn grid(points: &[Point], psi_M: f64) -> FluxMap {
     FluxMap { used: true, d_min: least - margin, d_max, q_max: 1.01 * q_max, ..FluxMap::default() }
 }
 
-/// The flux linkage (Wb) on the d-axis, beyond that of the machine's file, at which the map has no current: i_d rises along the axis.
+/// The flux linkage (Wb) on the d-axis, in excess of the machine file's, at which the map's current is zero: i_d rises along
+/// the axis.
 fn without_current(map: &FluxMap) -> f64 {
     let (mut low, mut high) = (map.d_min, map.d_max);
     for _ in 0..200 {
@@ -175,7 +176,7 @@ mod tests {
 
     const MOTOR: &str = include_str!("../../../motors/traction-63kw.toml");
 
-    /// The currents (A) of a machine that saturates, at the flux linkage (Wb) beyond that of its magnet: reciprocal.
+    /// The currents (A) of a machine that saturates, at a flux linkage (Wb) in excess of the magnet's: reciprocal.
     fn current(x: Dq, [L_d, L_q]: [f64; 2]) -> Dq {
         let (d, q) = (x.d(), x.q());
         Dq::new(d / L_d + 2e4 * (d * d * d + d * q * q), q / L_q + 2e4 * (q * q * q + d * d * q))
@@ -234,7 +235,7 @@ mod tests {
         let fitted = bench.fit("i_d,i_q,psi_d,psi_q,torque", torque).unwrap();
         assert!((fitted.psi_M / psi_M - 1.0).abs() < 1e-4, "{} Wb", fitted.psi_M);
         assert!(fitted.map.current(Dq::ZERO).magnitude() < 1e-9);
-        // Between the points of the table, too.
+        // Also between the points of the table.
         for (d, q) in [(-0.1, 0.05), (0.03, -0.11), (0.0, 0.07)] {
             let (got, wanted) = (fitted.map.current(Dq::new(d, q)), current(Dq::new(d, q), inductances));
             assert!((got - wanted).magnitude() < 0.01 * wanted.magnitude(), "{got:?}, {wanted:?}");

@@ -1,9 +1,9 @@
 //! The rules for the flux observer of Hinkkanen et al.: a tracker with the bandwidth of Rasmussen's observer, which follows the
 //! acceleration by the maximum current from rest, and the low-speed law.
 //!
-//! i_0 holds the rotor like a compass while the EMF shows nothing: with 1.35 times the rated torque, as Rasmussen's, on a machine
-//! without saliency. On a salient one, i_0 > 0 takes reluctance torque from i_q (psi_M - (L_q - L_d) i_0), so it is 0.3 psi_M / (L_q -
-//! L_d) at most, and maximum torque per ampere carries the rest.
+//! i_0 aligns the rotor like a compass needle while the EMF carries no information: with 1.35 times the rated torque, as in
+//! Rasmussen's observer, on a machine without saliency. On a salient one, i_0 > 0 takes reluctance torque from i_q (psi_M -
+//! (L_q - L_d) i_0), so it is 0.3 psi_M / (L_q - L_d) at most, and maximum torque per ampere carries the rest.
 
 use super::bandwidth::{Bandwidths, GREATEST_TORQUE};
 use super::motor::{MotorFile, electrical, torque_constant};

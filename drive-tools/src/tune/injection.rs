@@ -10,8 +10,8 @@
 //! | SquareWaveInjection, Hybrid | 2 samples | V T_s / (2 L) = 0.014 i_max 0.17 / s, at most half of u_dc / sqrt(3) |
 //! | NearPwmInjection | 3 samples | the same |
 //!
-//! L is the lower inductance; the factor 0.17 / s is 0.25 to 4. What the carrier leaves of the voltage sets the highest speed: that of the rated torque, by
-//! maximum torque per ampere, at most 0.2 of the rated speed, the bound of the review.
+//! L is the lower inductance; the factor 0.17 / s is 0.25 to 4. The voltage left by the carrier sets the highest speed at rated
+//! torque, by maximum torque per ampere, at most 0.2 of the rated speed, the bound of the review.
 //!
 //! **Start.** With a known saturation (`saturation.s_2`), injection and voltage pulses find the rotor at rest: the pulses reach 0.22 of
 //! the maximum current, and more, up to a half, where their peaks differ by less than 10 %. Otherwise the saliency shows the axis and not
@@ -48,7 +48,7 @@ const DIFFERENCE: f64 = 0.1;
 /// A carrier: its settings and its voltage in V.
 pub type Injected = (Vec<Setting>, f64);
 
-/// The machine as a carrier sees it.
+/// The machine at the carrier frequency.
 pub struct View {
     machine: Motor,
     /// Maximum current in A.
@@ -121,7 +121,7 @@ pub fn near_pwm(view: &View) -> Injected {
     square("near_pwm.voltage", view)
 }
 
-/// The highest speed in pu at which a carrier of `V` (V) leaves the voltage that the rated torque takes, at most `most`.
+/// The highest speed in pu at which a carrier of `V` (V) leaves enough voltage for the rated torque, at most `most`.
 fn reach(motor: &MotorFile, view: &View, V: f64, most: f64) -> f64 {
     let (rating, machine) = (&motor.data.rating, &view.machine);
     let U = WeakeningParameters::default().k_u * view.U - V;

@@ -2,8 +2,8 @@
 //! which is measured with an unmagnetized rotor or estimated, is the iron loss.
 //!
 //! Without current, the flux linkage is psi_M, and the plant loses p = 1.5 psi_M^2 G(w) w^2 with G(w) = G_e + G_h /
-//! sqrt(w^2 + w_0^2). So p / (1.5 psi_M^2) is linear in G_e and G_h: linear least squares. If a coefficient
-//! came out negative, it is 0, and the other one is fitted alone.
+//! sqrt(w^2 + w_0^2). So p / (1.5 psi_M^2) is linear in G_e and G_h: linear least squares. A coefficient that would be negative
+//! is set to 0, and only the other one is fitted.
 
 use super::motor::MotorFile;
 use super::setting::{Setting, Value};
@@ -13,7 +13,7 @@ use drive::plant::iron::Iron;
 /// The settings `iron.G_e` and `iron.G_h` of the plant; none without `[iron]` in the file.
 ///
 /// # Errors
-/// The position of the points, and why nothing can be fitted to them.
+/// The position of the points in the file, and why they cannot be fitted.
 #[expect(non_snake_case, reason = "the symbols of the model")]
 pub fn fit(motor: &MotorFile) -> Result<Vec<Setting>> {
     let Some(iron) = &motor.data.iron else { return Ok(Vec::new()) };
@@ -79,7 +79,7 @@ mod tests {
     fn the_conductances_come_back() {
         let found = fitted("[[52.35988, 11.785], [157.07963, 53.354], [314.15927, 160.170]]").unwrap();
         assert!((found[0] / 2.7e-4 - 1.0).abs() < 1e-4 && (found[1] / 0.127 - 1.0).abs() < 1e-4, "{found:?}");
-        // Less than w^1, more than w^2: one of them alone.
+        // Slower than w^1 or faster than w^2: only one of them.
         let found = fitted("[[100.0, 30.0], [200.0, 50.0]]").unwrap();
         assert!(found[0] == 0.0 && found[1] > 0.0, "{found:?}");
         let found = fitted("[[100.0, 10.0], [200.0, 60.0]]").unwrap();

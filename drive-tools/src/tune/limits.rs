@@ -1,4 +1,4 @@
-//! Predicts failures of the tuned drive: those in its [`trial`](super::trial), their causes, and remedies ([`remedy`]).
+//! Predicts failures of the tuned drive: failures in its [`trial`](super::trial), their causes, and remedies ([`remedy`]).
 //!
 //! - **Load.** A step of the torque T makes the speed loop (double pole at w_s / 2) dip by 2/e T / (J w_s). An EMF-based
 //!   estimator loses the rotor near zero speed; a flux observer may pass it. There, R^ below R turns the estimate by

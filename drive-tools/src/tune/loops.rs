@@ -28,7 +28,7 @@ pub fn limit(data: &Data) -> Setting {
     real("limit.tau", GREATEST_TORQUE * data.rating.torque.get_ref(), "1.6 times the rated torque")
 }
 
-/// The values of a drive with a sensor: nothing but the current limits the torque.
+/// The values of a drive with a sensor: only the current limits the torque.
 pub fn sensored(data: &Data) -> Vec<Setting> {
     let i = *data.rating.current.get_ref();
     let most = max_torque(&electrical(data), &Limits { i_q: i, i, tau: f64::INFINITY }, true);

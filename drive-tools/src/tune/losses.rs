@@ -1,4 +1,4 @@
-//! Losses of the inverter and temperature coefficients: values from the file for the plant alone, and the dead time, which the
+//! Losses of the inverter and temperature coefficients: values from the file, only for the plant, and the dead time, which the
 //! controller compensates.
 
 use super::motor::{Inverter, Located, MotorFile};
@@ -7,10 +7,10 @@ use crate::error::{Result, bail};
 use drive::estimator::Kind;
 
 /// Current below which the dead-time voltage falls to zero where the file gives none, over the maximum current: about the middle of
-/// the 0.5 % to 4 % that the machines of `tests/population` are drawn from; no source outside the project.
+/// the 0.5 % to 4 % from which the machines of `tests/population` are drawn; there is no external source.
 const ZERO: f64 = 0.02;
 
-/// The settings of `[inverter]` and `[temperature]`; none where the file has neither. `T_s` is the sample period in s.
+/// The settings of `[inverter]` and `[temperature]`, if the file has any. `T_s` is the sample period in s.
 ///
 /// # Errors
 /// A switching energy without its current or voltage, or a frequency that is not positive.

@@ -56,10 +56,10 @@ pub fn voltage_share(estimator: Kind) -> f64 {
     }
 }
 
-/// What field weakening changes in the values of an estimator.
+/// Changes to an estimator's values for field weakening.
 ///
 /// # Errors
-/// The estimator does not carry the rated torque then.
+/// The estimator cannot carry the rated torque in that case.
 pub fn weaken(
     motor: &MotorFile,
     estimator: Kind,
@@ -110,7 +110,7 @@ fn handed_over(data: &Data) -> (f64, &'static str) {
     (0.15 * data.rating.speed.get_ref(), "0.15 of the rated speed")
 }
 
-/// The highest speed in pu of a method that does not reach the rated one.
+/// The highest speed in pu of a method that does not reach rated speed.
 ///
 /// # Errors
 /// Those of [`settings`].

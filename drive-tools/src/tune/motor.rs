@@ -48,7 +48,7 @@ pub struct Data {
     pub inverter: Option<Inverter>,
     /// Temperature coefficients of the plant.
     pub temperature: Option<Temperature>,
-    /// Overrides of what the rules choose.
+    /// Overrides of the rules' choices.
     #[serde(default)]
     pub control: Control,
 }
@@ -97,7 +97,7 @@ pub struct Rating {
     pub speed_max: Option<Located>,
     /// Rated torque in N.m.
     pub torque: Located,
-    /// Maximum current in A, peak value of a phase: what inverter and magnets allow for a short time, not the rated current.
+    /// Maximum current in A, peak value of a phase: the short-time limit of inverter and magnets, not the rated current.
     pub current: Located,
 }
 
@@ -203,7 +203,7 @@ pub struct Temperature {
     pub magnet: Option<Located>,
 }
 
-/// Overrides of what the rules choose.
+/// Overrides of the rules' choices.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[expect(non_snake_case, reason = "the symbols of the models")]
@@ -259,7 +259,7 @@ impl MotorFile {
     /// The file at `path`, read.
     ///
     /// # Errors
-    /// The file cannot be read, or those of [`parse`](Self::parse).
+    /// The file cannot be read, or [`parse`](Self::parse) fails.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).with_context(|| format!("reading {}", path.display()))?;
         Self::parse(&text, path)
@@ -268,7 +268,7 @@ impl MotorFile {
     /// Tunes for this estimator instead of the file's.
     ///
     /// # Errors
-    /// There is none of this name.
+    /// No motor has this name.
     pub fn choose(&mut self, estimator: &str) -> Result<()> {
         if !Kind::ALL.iter().any(|kind| kind.name() == estimator) {
             bail!("estimator {estimator}: is not an estimator; choose one of {}", estimators());

@@ -78,7 +78,7 @@ fn slowest(a: f64, b: f64) -> f64 {
 pub struct Begin {
     /// At rest, with 0 as the speed reference.
     pub rest: f64,
-    /// Maximum for which the controller itself then keeps the rotor at rest, and measures the resistance.
+    /// Maximum time for which the controller then keeps the rotor at rest to measure the resistance.
     pub measures: f64,
     /// Until the estimator has found the rotor after that, and a ramp has reached the speed.
     pub ready: f64,

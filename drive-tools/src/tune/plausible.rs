@@ -19,9 +19,9 @@ struct Check<'a> {
     per_unit: f64,
     what: &'static str,
     range: (f64, f64),
-    /// The range of usual machines; a value in another unit must lie in it.
+    /// The usual range; a value converted from another unit must lie within it.
     usual: (f64, f64),
-    /// What to write instead where no other unit fits.
+    /// Advice if no other unit fits.
     remedy: String,
     units: &'static [(&'static str, f64)],
 }
@@ -29,7 +29,7 @@ struct Check<'a> {
 /// Checks all values.
 ///
 /// # Errors
-/// The first value that is out of its range: the value, what was expected, and the unit that would fit.
+/// The first value that is out of its range: the value, the expected range, and a unit that would fit.
 pub fn check(motor: &MotorFile) -> Result<()> {
     checks(&motor.data).iter().try_for_each(|check| one(motor, check))
 }
@@ -144,7 +144,7 @@ mod tests {
         check(&motor).unwrap_err().to_string()
     }
 
-    /// Data of public reports: the flux by a rule other than that of KV, and a current that the voltage cannot drive.
+    /// Data of public reports: the flux from a rule other than KV, and a current that the voltage cannot drive.
     #[test]
     fn a_unit_that_is_far_off_is_not_named() {
         let flux = refused("psi_M = 0.545", "psi_M = 12000.0");

@@ -12,7 +12,7 @@
 //!   (R - R^) i / (w^2 psi_M), less torque remains, the current rises, and the estimate turns further;
 //! - farther from R where the drift would be less than 0.025 w_0: from the opposite angle, the speed loop drives i_q to its
 //!   limit before the rotor has turned around. At an angle near atan(i_q / i_0) from the rotor, the currents produce no torque,
-//!   and only the drift leads away from there.
+//!   and only drift leads away from that angle.
 //!
 //! The shares 0.15 and 0.025 are found by trial on machines from 5 W to 300 kW.
 
@@ -29,10 +29,10 @@ const LOST_EMF: f64 = 0.15;
 /// it.
 const LEAST_DRIFT: (f64, f64) = (0.025, 0.5);
 
-/// Minimum share by which R^ can be kept below R: a smaller share is within the uncertainty of R.
+/// Minimum share by which R^ can be kept below R: a smaller share would be within the uncertainty of R.
 pub const LEAST_MARGIN: f64 = 0.02;
 
-/// Share of R by which R^ should be below R.
+/// Share by which R^ should be below R.
 pub fn resistance_margin(data: &Data) -> f64 {
     let (followed, held) = bounds(data);
     let (share, most) = LEAST_DRIFT;
@@ -72,7 +72,7 @@ pub fn zero_speed_current(data: &Data) -> f64 {
 /// Values of the controller.
 ///
 /// # Errors
-/// The maximum current does not hold the rated torque at standstill, or the observer is too slow for it.
+/// The maximum current cannot hold the rated torque at standstill, or the observer is too slow for it.
 pub fn settings(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<String>) -> Result<Vec<Setting>> {
     let data = &motor.data;
     let Data { machine, rating, .. } = data;

@@ -9,10 +9,10 @@ use fmu_core::digits::rounded;
 use std::fmt;
 use toml::Spanned;
 
-/// Number of start angles of the first try, which sorts out most remedies that do not help.
+/// Number of start angles in the first try, which rules out most ineffective remedies.
 const FEW: u32 = 4;
 
-/// A condition that a drive does not hold.
+/// A condition under which a drive fails.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     /// The start from any angle.
@@ -103,8 +103,8 @@ impl Cure {
     }
 }
 
-/// The remedies if `trial` showed that the drive does not start or does not hold: the shortest rise, the smallest change of each
-/// kind. With them, the drive still holds everything that it held in `trials`.
+/// The remedies if `trial` showed that the drive does not start or does not hold: the shortest rise time, and the smallest
+/// change of each kind. With them, the drive still passes everything it passed in `trials`.
 pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, what: What) -> Vec<Cure> {
     let speed = tuned.real("speed_loop.bandwidth").unwrap_or_default();
     let observer = tuned.observer;
@@ -137,7 +137,7 @@ pub fn found(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], trial: &Trial, 
     cures
 }
 
-/// A lower bandwidth of the speed loop that ends the swings of a drive without a load, with no loss of what it held before.
+/// A lower bandwidth of the speed loop that ends the swings of a drive without a load, without failing anything it passed before.
 pub fn calm(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> Option<Cure> {
     let (speed, observer) = (tuned.real("speed_loop.bandwidth")?, tuned.observer);
     let each = [0.7, 0.5, 0.35, 0.25].map(|x| Cure::Bandwidths { speed: short(x * speed), observer: short(observer) });
@@ -155,7 +155,7 @@ pub fn calm(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> Option<Cure> 
     })
 }
 
-/// Whether the drive holds `what` with the change, and still holds what it held.
+/// Whether the drive passes `what` with the change, and everything it passed before.
 fn helps(motor: &MotorFile, tuned: &Tuned, trials: &[Trial], (trial, what): (&Trial, What), cure: &Cure) -> bool {
     let Some((cured, task)) = cure.applied(motor, tuned, &trial.task) else { return false };
     let does = |angles| {

@@ -1,8 +1,8 @@
 //! The rules that derive parameter values from machine data and bandwidths.
 //!
-//! Without an estimator in the file, they choose Rasmussen's observer ([`rasmussen`]), which holds standstill, for a machine without
-//! saliency (L_q within a tenth of L_d), and the extended EMF with an I-f start for a salient one. What each estimator gets:
-//! [`method`]. T_s and the bandwidths: [`bandwidth`](super::bandwidth); field weakening: [`voltage`].
+//! Without an estimator in the file, they choose Rasmussen's observer ([`rasmussen`]), which works at standstill, for a machine
+//! without saliency (L_q within a tenth of L_d), and the extended EMF with an I-f start for a salient one. Values per
+//! estimator: [`method`]. T_s and the bandwidths: [`bandwidth`](super::bandwidth); field weakening: [`voltage`].
 //!
 //! Throughout, K = 1.5 n_p psi_M is the torque constant (torque per ampere of i_q), and currents are peak values.
 //!
@@ -40,7 +40,7 @@ pub fn fixed(motor: &MotorFile) -> Result<Tuned> {
     of(motor, estimator(motor)?)?.map_err(|Unsuited { reason, .. }| Error::new(reason))
 }
 
-/// The values for an `estimator` instead of that of the file, or why the machine does not suit it.
+/// The values for `estimator` instead of the one in the file, or why it does not suit the machine.
 ///
 /// # Errors
 /// The file is wrong for every estimator.
@@ -53,7 +53,7 @@ pub fn suited(motor: &MotorFile, estimator: Kind) -> Result<Suited> {
     })
 }
 
-/// The drive with what trials decide, and the notes of its start.
+/// The drive with the values decided by trials, and the notes about its start.
 fn tried(data: &Data, fixed: Tuned) -> Tuned {
     let mut tuned = adaptation::chosen(data, fixed);
     let waits = tuned.pair().controller.model.parameters.estimators.adaptation.resistance;
@@ -66,7 +66,7 @@ fn tried(data: &Data, fixed: Tuned) -> Tuned {
     tuned
 }
 
-/// The values for this estimator; the outer error is that of the file, the inner one of the estimator.
+/// The values for this estimator; the outer error concerns the file, the inner one the estimator.
 fn of(motor: &MotorFile, estimator: Kind) -> Result<Result<Tuned, Unsuited>> {
     let data = &motor.data;
     let plant = plant(data);
@@ -81,7 +81,7 @@ fn of(motor: &MotorFile, estimator: Kind) -> Result<Result<Tuned, Unsuited>> {
     Ok(suits(motor, estimator, &bandwidths, (plant, controller)).map_err(refused))
 }
 
-/// The values for this estimator, given those of the plant and those of every estimator.
+/// The values for this estimator, given the values of the plant and those shared by all estimators.
 fn suits(
     motor: &MotorFile,
     estimator: Kind,
@@ -284,7 +284,7 @@ fn fits(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths, notes: &mut
 /// Maximum product of the current loop's gain and T_s / L: half of the value at which the loop oscillates.
 const MAX_GAIN: f64 = 0.5;
 
-/// Lowers the bandwidth of the current loop to what the smallest inductance allows, and reports it.
+/// Lowers the bandwidth of the current loop to the limit set by the smallest inductance, and reports it.
 fn cap_current_loop(
     data: &Data,
     bandwidths: &Bandwidths,

@@ -1,8 +1,8 @@
 //! The saturation of a machine's file over the currents in use: the minimum incremental inductance, and whether the polynomial is
 //! still physical there.
 //!
-//! The current is a polynomial of the flux linkage. It belongs to a machine as long as its derivative, the inverse of the
-//! incremental inductances, is positive definite; beyond that, more flux requires less current, and the plant runs away.
+//! The current is a polynomial of the flux linkage. It describes a real machine as long as its derivative, the inverse of the
+//! incremental inductances, is positive definite; beyond that, more flux would require less current, and the plant diverges.
 
 use super::flux_map::Fitted;
 use super::motor::{Data, Located, MotorFile, electrical};
@@ -101,7 +101,7 @@ mod tests {
     fn the_least_inductance_is_on_the_side_of_the_magnet() {
         let data = ipmsm("s_2 = 40.0", "s_2 = 40.0").data;
         assert!((least_inductance(&data, None, 1e-9) - 36e-3).abs() < 1e-9);
-        // On the d axis, 0.2277 Wb beyond the magnet's flux takes 8.87 A.
+        // On the d-axis, 0.2277 Wb in excess of the magnet's flux takes 8.87 A.
         let found = 1e3 * least_inductance(&data, None, 8.87);
         assert!((found - 19.151).abs() < 0.05, "{found} mH");
     }

@@ -48,7 +48,7 @@ pub enum Suited {
 pub struct Unsuited {
     /// The estimator.
     pub estimator: Kind,
-    /// The reason with its numbers, what was expected, and the remedy.
+    /// The reason with its numbers, the expected values, and the remedy.
     pub reason: String,
 }
 

@@ -1,10 +1,10 @@
 //! Tries a tuned drive: from every start angle it starts, turns at a share of the rated speed, and takes a load as a step.
 //!
 //! Held: in the end the speed is within 0.02 pu of its reference, and the estimate within 30 deg of the rotor. The end is 20
-//! times the slowest time constant ([`pace`](super::pace)) after the reference and again after the load; a run ends earlier
-//! where it has clearly settled, or runs away. Settled: over 4 time constants of the slower loop, the speed stays within 0.005
-//! pu of the reference and the angle error below 25 deg, and they move by less than 0.002 pu and 1 deg. A speed that still moves by
-//! 0.02 pu at the end is not held.
+//! times the slowest time constant ([`pace`](super::pace)) after the reference and again after the load; a run ends earlier if
+//! it has clearly settled or diverges. Settled: over 4 time constants of the slower loop, the speed stays within 0.005 pu of
+//! the reference and the angle error below 25 deg, and they move by less than 0.002 pu and 1 deg. A speed that still varies by
+//! 0.02 pu at the end counts as lost.
 //!
 //! [`swings`] runs without a load through speeds between the levels, up and down again, because a swing that begins on the way up
 //! may persist on the way down. [`at_temperature`] runs the drive with a colder or hotter machine than its values assume.
@@ -35,7 +35,7 @@ const CALM: (f64, f64) = (0.005, 25.0);
 /// Maximum movement in the window of a run that has clearly settled: speed in pu, angle in deg.
 const STILL: (f64, f64) = (0.002, 1.0);
 
-/// Distance from the reference in pu, in addition to its magnitude, from which no drive returns.
+/// Distance from the reference in pu, in addition to its magnitude, from which no drive recovers.
 const AWAY: f64 = 4.0;
 
 /// A task of the drive.
@@ -45,7 +45,7 @@ pub struct Task {
     pub level: f64,
     /// Load in N.m.
     pub torque: f64,
-    /// Time in s in which the load rises; 0: a step.
+    /// Rise time of the load in s; 0: a step.
     pub rise: f64,
 }
 
@@ -68,7 +68,7 @@ pub struct Trial {
     pub angles: u32,
     /// Number of those that started.
     pub started: u32,
-    /// Number of these that held the load.
+    /// Number of these trials that held the load.
     pub held: u32,
     /// Minimum speed after the load step in pu.
     pub least: f64,
@@ -86,12 +86,13 @@ impl Trial {
         self.started == self.angles
     }
 
-    /// Whether the estimate left the rotor on the way to a load that is held in the end: beyond 90 deg, i_q turns the other way.
+    /// Whether the estimate lost the rotor temporarily before a load that is finally held: beyond 90 deg, i_q acts in the
+    /// opposite direction.
     pub fn slips(&self) -> bool {
         self.error > 90.0
     }
 
-    /// Whether it held the load wherever it started.
+    /// Whether it held the load from every start.
     pub fn holds(&self) -> bool {
         self.held == self.started
     }
@@ -196,8 +197,8 @@ impl Bench<'_> {
         self.until_settled(level, ready, |_| 0.0, |_, _| ())
     }
 
-    /// Runs at `level` with `load` (N.m over the time in s since now), which is constant from `from` (s) on, until it has settled
-    /// or the end: whether it then stands at the reference. `see` gets speed and angle error.
+    /// Runs at `level` with `load` (N.m over the time in s since now), which is constant from `from` (s) on, until it settles
+    /// or time is over: whether it then runs at the reference. `see` gets speed and angle error.
     fn until_settled(
         &mut self,
         level: f64,
@@ -349,7 +350,8 @@ pub const TEMPERATURES: [f64; 2] = [-30.0, 130.0];
 /// Temperature coefficients in 1/K of copper and NdFeB, for a machine whose file specifies none.
 const ALPHA: [(&str, f64); 2] = [("winding.alpha", 3.93e-3), ("magnet.alpha", -1.1e-3)];
 
-/// The drive whose machine has `celsius` degC since before the start, with at most the torque that the rated current gives there.
+/// The drive with its machine at `celsius` degC from the beginning, with at most the torque of the rated current at that
+/// temperature.
 pub fn at_temperature(tuned: &Tuned, celsius: f64) -> Tuned {
     let mut other = tuned.clone();
     for (name, alpha) in ALPHA {

@@ -1,4 +1,4 @@
-//! The values of a machine for importers: those that differ from the start values, and one dictionary for each FMU.
+//! The values of a machine for importers: the values that differ from the start values, with one dictionary per FMU.
 
 use super::motor::MotorFile;
 use super::rules;
@@ -13,7 +13,7 @@ use std::path::Path;
 /// Name, source and notes of a machine, and for each FMU the start values by their names, in SI units, enumerations as integers.
 ///
 /// # Errors
-/// Those of [`tune`](super::tune), or there is no such estimator.
+/// As for [`tune`](super::tune), or the estimator is unknown.
 pub fn values(path: &Path, estimator: Option<&str>) -> Result<Json> {
     let mut motor = MotorFile::read(path)?;
     if let Some(estimator) = estimator {
@@ -53,7 +53,7 @@ pub fn needed(tuned: &Tuned, integers: bool) -> Result<(Vec<Setting>, Vec<Settin
     Ok((of_model::<PmsmPlant>(&tuned.plant, integers)?, of_model::<SensorlessController>(&tuned.controller, integers)?))
 }
 
-/// The settings of `PmsmDrive`: those that [`needed`] gives for plant and controller, with the prefixes `plant.` and
+/// The settings of `PmsmDrive`: the values that [`needed`] returns for plant and controller, with the prefixes `plant.` and
 /// `controller.`, and `u_dc` once.
 ///
 /// # Errors
@@ -63,7 +63,7 @@ pub fn of_drive(tuned: &Tuned, integers: bool) -> Result<Vec<(String, Value)>> {
     Ok(joined(&plant, &controller))
 }
 
-/// Settings of plant and controller with the names that they have in `PmsmDrive`.
+/// Settings of plant and controller with their names in `PmsmDrive`.
 pub fn joined(plant: &[Setting], controller: &[Setting]) -> Vec<(String, Value)> {
     let named = |prefix: &str, setting: &Setting| (format!("{prefix}{}", setting.name), setting.value.clone());
     let of_plant = plant.iter().map(|s| named(if s.name == "u_dc" { "" } else { "plant." }, s));

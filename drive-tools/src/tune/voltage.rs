@@ -1,7 +1,7 @@
 //! The limits of the DC link: field weakening if the rated point or the highest speed needs it, and the torque there.
 //!
 //! The references may use U = k_u u_dc / sqrt 3. The rated torque at the rated speed must fit, with field weakening if need be;
-//! at the highest speed, that of the rated power.
+//! at the highest speed, the torque at rated power.
 
 use super::motor::{Data, MotorFile, electrical};
 use super::setting::{Setting, Value, set};
@@ -10,14 +10,14 @@ use drive::control::envelope::Envelope;
 use drive::control::reference::max_torque_per_ampere;
 use drive::frame::DqHat;
 
-/// Maximum load at the highest speed as a share of the maximum torque: the rest is for the speed loop.
+/// Maximum load at the highest speed as a share of the maximum torque: the remainder is left for the speed loop.
 const TOP_SHARE: f64 = 0.8;
 
 /// Field weakening and load at the highest speed.
 pub struct Voltage {
-    /// The setting of field weakening, where it is needed.
+    /// The setting of field weakening, if needed.
     pub settings: Vec<Setting>,
-    /// Load in N.m at the highest speed: that of the rated power, at most 0.8 of the maximum torque, less friction.
+    /// Load in N.m at the highest speed: from the rated power, at most 0.8 of the maximum torque, less friction.
     pub top_torque: f64,
 }
 

@@ -85,7 +85,7 @@ pub(crate) struct End {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Goal {
     end: End,
-    /// Whether it holds the task.
+    /// Whether it can perform the task.
     held: bool,
 }
 
@@ -114,7 +114,7 @@ pub(crate) struct Outcome {
     pub(crate) said: bool,
     /// Whether `lock_lost` reached 1 later than 1 s after the start.
     pub(crate) alarm: bool,
-    /// Whether the drive holds the cell on a sensor.
+    /// Whether the drive holds the cell with a sensor.
     pub(crate) on_sensor: bool,
     end: End,
     goal: End,
@@ -154,7 +154,7 @@ impl fmt::Display for Outcome {
     }
 }
 
-/// The drive of a cell; on a sensor if `sensor`.
+/// The drive of a cell; with a sensor if `sensor`.
 fn prepared(tuned: &Tuned, cell: &Cell, sensor: bool) -> Pair {
     let on_sensor = || {
         tuned
@@ -222,7 +222,7 @@ fn parts(time: f64) -> usize {
     (time / PART).round() as usize
 }
 
-/// Times in s: of the reference, from which the rotor counts, of the load, and of the end.
+/// Times in s: reference applied, monitoring begins, load applied, end.
 fn times(tuned: &Tuned, pair: &Pair, cell: &Cell) -> [f64; 4] {
     let Begin { rest: turn, measures, ready } = Begin::of(tuned, pair, cell.level);
     let ready = turn + measures + ready;
@@ -251,7 +251,7 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
     let (second, last) = (parts(1.0), parts(LAST));
     let mut history = vec![Part::NONE];
     let mut lost: Option<(Loss, f64)> = None;
-    // The angle error, not wrapped, since the rotor counts, and the greatest and the least so far.
+    // The unwrapped angle error since monitoring began, with its maximum and minimum.
     let (mut before, mut slip, mut span) = (0.0, 0.0, (0.0_f64, 0.0_f64));
     // lock_lost in each part.
     let mut locks = vec![0.0_f64];
@@ -327,7 +327,7 @@ fn stands(cell: &Cell, end: &End, goal: &End) -> bool {
     }
 }
 
-/// The run of a cell on a sensor.
+/// The run of a cell with a sensor.
 pub(crate) fn on_sensor(tuned: &Tuned, cell: &Cell) -> Goal {
     let (end, ..) = follow(tuned, cell, true);
     Goal { end, held: stands(cell, &end, &end) }

@@ -1,5 +1,5 @@
-//! Conditions that a tuned drive holds, seen from the plant: every machine of `motors/` with wrong resistances and at wrong
-//! temperatures, in speed and torque mode, at 0.1 to 1 pu, compared with the same drive on a sensor.
+//! Conditions under which a tuned drive works, as measured at the plant: every machine of `motors/` with wrong resistances and
+//! at wrong temperatures, in speed and torque mode, at 0.1 to 1 pu, compared with the same drive with a sensor.
 //!
 //! ```sh
 //! cargo test --release -p drive-tools --test hold -- --ignored --nocapture                 # all machines, a table a machine
@@ -76,7 +76,7 @@ struct Count {
     off_and_said: usize,
     off_and_silent: usize,
     named: usize,
-    /// Cells that the sensor holds, and those of them that the drive holds.
+    /// Cells held with the sensor, and how many of these the drive holds.
     on_sensor: (usize, usize),
     /// Held cells in which `lock_lost` reached 1 after the start.
     false_alarms: usize,
@@ -208,7 +208,7 @@ fn held_or_said() {
     all.print("all");
     println!("refused: {refused:?}");
     assert_eq!(all.lost_and_silent, 0, "a drive that is lost without a word");
-    // A torque or a speed beside that of the sensor, with the right angle.
+    // A torque or speed that differs from the sensor's, with the right angle.
     assert!(100 * all.off_and_silent <= all.on_sensor.0, "{} cells are off without a word", all.off_and_silent);
     #[expect(clippy::cast_precision_loss, reason = "thousands")]
     let share = all.on_sensor.1 as f64 / all.on_sensor.0 as f64;

@@ -171,7 +171,7 @@ fn what_a_record_lacks_is_left_out() {
             .any(|note| note.starts_with("clipped currents: ") && note.ends_with("rows were left out"));
         assert_eq!(noted, what == "clipped", "{:?}", found.notes);
     }
-    // Without rest at the start, the offset stays in the currents: the report says so.
+    // Without rest at the start, the offset remains in the currents, and the report says so.
     let late = of(&file(&rows[600..]), &given()).unwrap();
     assert!(
         late.notes.iter().any(|note| note.starts_with("no row is without voltage at the start")),

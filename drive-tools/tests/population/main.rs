@@ -44,7 +44,7 @@ fn found(m: &Motor, seed: u64, index: u64, time: f64, parts: &[Part], every: usi
     signals.and_then(|signals| identify(&signals, &options)).map_err(|e| format!("{e:#}"))
 }
 
-/// The course of a record and how often it is logged: as in the population that the intervals were set on.
+/// The course of a record and its logging rate, as in the population used to set the intervals.
 fn course(index: u64) -> (Vec<Part>, usize) {
     let mut parts = PLAIN.to_vec();
     let kind = index % 7;
@@ -75,7 +75,7 @@ fn value<'a>(found: &'a Identified, name: &str) -> &'a Quantity {
     found.values.iter().find(|v| v.name == name).expect("a quantity")
 }
 
-/// Accepted values, their errors, and how many lie inside their intervals:
+/// Accepted values, their errors, and the number inside their intervals:
 /// `FMU_SEED=3 FMU_RECORDS=300 cargo test --release -p drive-tools --test population figures -- --ignored --nocapture`.
 #[test]
 #[ignore = "two minutes for 300 records"]
@@ -118,8 +118,8 @@ fn figures() {
     }
 }
 
-/// The machine's file with its true values; the inverter's are what a leg loses at large currents, thresholds of the devices
-/// included, and a line of the same slope at zero.
+/// The machine's file with its true values; for the inverter, the loss of a leg at large currents, including the thresholds of
+/// the devices, and a line of the same slope at zero.
 fn true_file(m: &Motor) -> String {
     let Motor { n_p, R, L_d, L_q, psi, J, B, tau_coulomb, u_dc, I, .. } = m;
     let (speed, torque) = (m.speed(), m.torque());
@@ -136,7 +136,7 @@ fn tuned(text: &str) -> Result<Tuned, String> {
     MotorFile::parse(text, Path::new("m.toml")).and_then(|m| rules::tune(&m)).map_err(|e| format!("{e:#}"))
 }
 
-/// Starts and loads that a drive holds, of 12 tasks from two angles each.
+/// Number of starts and loads, of 12 tasks from two angles each, that a drive holds.
 fn held(tuned: &Tuned) -> u32 {
     let mut held = 0;
     for level in [0.1, 0.3, 0.6, 1.0] {
@@ -147,9 +147,9 @@ fn held(tuned: &Tuned) -> u32 {
     held
 }
 
-/// From a record to a running drive: the machine with its true values runs with the controller that `fmu tune` makes of the
-/// identified ones, and holds as many loads as with the controller made of the true values, less 2 %.
-/// `FMU_RECORDS=40 cargo test --release -p drive-tools --test population chain -- --ignored --nocapture`.
+/// From a record to a running drive: the machine with its true values runs with the controller tuned from the identified ones,
+/// and holds at least 98 % of the loads that it holds with the controller tuned from the true values. `FMU_RECORDS=40 cargo
+/// test --release -p drive-tools --test population chain -- --ignored --nocapture`.
 #[test]
 #[ignore = "minutes for 40 machines"]
 fn chain() {

@@ -1,4 +1,4 @@
-//! Records of an independent plant on a bench: its drive is given steps of speed, of d-axis current and of load, and an encoder of 4096
+//! Records of an independent plant on a bench: its drive receives steps of speed, d-axis current and load, and an encoder of 4096
 //! steps with an offset and a delay measures the angle.
 
 use crate::foreign::{Bench, Motor};

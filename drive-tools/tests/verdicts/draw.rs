@@ -10,7 +10,7 @@ fn one_of<T: Copy>(draw: &mut Draw, all: &[T]) -> T {
     all.iter().copied().zip(0_u32..).find(|&(_, k)| f64::from(k) >= place).expect("one of them").0
 }
 
-/// A number with three digits, as a data sheet has it.
+/// A number with three digits, as in a data sheet.
 fn short(x: f64) -> f64 {
     rounded(x, 3)
 }
@@ -44,7 +44,7 @@ pub(crate) fn machine(draw: &mut Draw, name: &str) -> String {
     let ratio = if salient { draw.scaled(1.25, 3.5) } else { 1.0 };
     let (L_q, R_s) = (x_q * emf / (w * i), resistive * emf / i);
     let L_d = L_q / ratio;
-    // The least current for the torque is less with saliency.
+    // The minimum current for a torque is smaller with saliency.
     let dL = L_q - L_d;
     let least = (1..=400)
         .map(|k| {

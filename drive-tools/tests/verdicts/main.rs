@@ -193,7 +193,7 @@ fn helped(motor: &MotorFile, tuned: &Tuned, limit: &Limit, trial: &Trial) -> u32
     remedies
 }
 
-/// The traction machine and the servo hold all they were said to lose.
+/// The traction machine and the servo hold all loads that they were predicted to lose.
 #[test]
 fn a_verdict_waits_for_the_slowest_time_constant() {
     for text in [TRACTION, SERVO] {
@@ -222,7 +222,8 @@ fn a_small_machine_holds_what_it_lost() {
 }
 
 /// A scooter's hub motor whose diodes drop 0.7 V. Without their compensation it swings without a load on the way down from 0.9 pu,
-/// bistable: +-10 A at 0.5 pu, where the trial from standstill said "24 of 24 holds". With it, or with a slow speed loop, it is quiet.
+/// bistable: +-10 A at 0.5 pu, where the trial from standstill reported 24 of 24. With it, or with a slow speed loop, it is
+/// quiet.
 #[test]
 fn a_swing_between_the_levels_is_found_from_both_sides() {
     let motor = read(include_str!("machines/scooter-36v.toml"));

@@ -200,7 +200,7 @@ impl<F, S: Scalar> Mul<f64> for Vector<F, S> {
     }
 }
 
-/// Direction of the d-axis of the rotating frame `F`, seen from the stator.
+/// Direction of the d-axis of the rotating frame `F`, in stator axes.
 #[derive(Serialize, Deserialize)]
 #[serde(bound(serialize = "S: Serialize", deserialize = "S: Deserialize<'de>"))]
 pub struct Axis<F: Rotating, S = f64> {

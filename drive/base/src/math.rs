@@ -85,7 +85,7 @@ const POWERS_OF_2: [f64; 64] = [
     1.915_206_561_397_147_4, 1.936_061_793_492_294_3, 1.957_144_124_175_400_2, 1.978_456_026_387_951,
 ];
 
-/// e to the power of `x`, with an error below 1.3 units in the last place.
+/// e to the power `x`, with an error below 1.3 units in the last place.
 ///
 /// e^x = 2^(n/64) e^r with |r| <= ln(2) / 128: a power from the table and a series, whose first omitted term is below
 /// 4e-17. Tang 1989, ACM Trans. Math. Softw. 15 (2), without the tail of the table.
@@ -167,7 +167,7 @@ fn large(d: f64) -> (f64, f64) {
     sin_cos(d)
 }
 
-/// Sine and cosine of an angle beyond the range of [`sin_cos`], or of NaN.
+/// Sine and cosine of an angle outside the range of [`sin_cos`], or of NaN.
 #[cold]
 #[inline(never)]
 fn far(x: f64) -> (f64, f64) {

@@ -7,9 +7,9 @@
 //! i_dc_min u_dc <= p(tau) <= i_dc_max u_dc
 //! ```
 //!
-//! i_d is that of the last references; with it, p is a parabola, and each limit of the torque one of its roots. The loss of
+//! i_d is taken from the last references; p is then a parabola, and each torque limit is one of its roots. The loss of
 //! i_d follows the references through a low-pass: with maximum torque per ampere i_d depends on the torque, and the limits
-//! would otherwise alternate between two samples. The controller does not know the losses of iron and inverter.
+//! would otherwise alternate between two samples. The controller neglects the losses of iron and inverter.
 //!
 //! At standstill, i_0 of the low-speed law consumes 1.5 R i_0^2 without producing torque. It is lowered to the current that uses
 //! half of the limit; the other half remains for i_q, so that the drive can start:

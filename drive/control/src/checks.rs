@@ -10,7 +10,7 @@ use drive_base::math::sin_cos;
 use fmu_core::Fault;
 use std::f64::consts::PI;
 
-/// Minimum torque per ampere of i_q, as a share of that of the magnet alone.
+/// Minimum torque per ampere of i_q, as a share of the magnet's.
 const LEAST_TORQUE: f64 = 0.2;
 
 /// Maximum w_c T_s as a share of the gain at which a loop without resistance oscillates: 2 pi 0.06 with one sample of delay.
@@ -76,7 +76,7 @@ pub(crate) fn polarity(par: &ControllerParameters) -> Result<(), Fault> {
 /// Checks that field weakening can work with the other parameters, on a DC link of `u_dc` (V).
 ///
 /// # Errors
-/// States which parameters do not fit together, and what to do.
+/// States the incompatible parameters and a remedy.
 pub(crate) fn weakening(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     let ControllerParameters { weakening: own, motor, limit, estimator, .. } = par;
     if !own.used {

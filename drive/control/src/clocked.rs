@@ -68,7 +68,7 @@ impl Model for SensorlessControllerClocked {
     /// The clock shows them.
     fn output(&self, _now: Elapsed, (): &mut ()) {}
 
-    /// Nothing happens between the ticks.
+    /// The state does not change between ticks.
     fn advance(&mut self, _step: &Step) -> Result<(), Fault> {
         Ok(())
     }
@@ -100,10 +100,10 @@ impl Warns for SensorlessControllerClocked {
 
 type V = Row<Block<SensorlessControllerClocked>>;
 
-/// Inputs and outputs of the controller: all of its rows but the parameters.
+/// Inputs and outputs of the controller: all of its rows except the parameters.
 const SIGNALS: &Table<Block<SensorlessController>> = &Table::new(ROWS.split_at(ROWS.len() - 1).0);
 
-/// The parameters but `T_s`, the first one.
+/// The parameters except `T_s`, the first one.
 const OTHERS: &Table<crate::tables::ControllerParameters> = &Table::new(PARAMETER_ROWS.split_at(1).1);
 
 const TABLE: &Table<Block<SensorlessControllerClocked>> = table![
@@ -120,7 +120,7 @@ const TABLE: &Table<Block<SensorlessControllerClocked>> = table![
 mod tests {
     use super::*;
 
-    /// The signals are those of `SensorlessController`, under the same names, and so are the parameters.
+    /// Signals and parameters have the same names as in `SensorlessController`.
     #[test]
     fn the_rows_are_those_of_the_plain_controller() {
         let names = |len, name: &dyn Fn(usize) -> Option<String>| (0..len).filter_map(name).collect::<Vec<_>>();

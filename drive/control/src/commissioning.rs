@@ -70,7 +70,7 @@ pub(crate) enum Turn {
     Commissions { voltage: Voltage, first: bool },
 }
 
-/// The self-commissioning of a controller that has one.
+/// Self-commissioning inside a controller.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Commissioning {
     /// From the first start on.
@@ -84,13 +84,13 @@ pub struct Commissioning {
 }
 
 impl Commissioning {
-    /// One sample of an enabled controller with `commission_start` = `asked`, currents `i` (A) and link voltage `u_dc` (V); `setup` is
-    /// what a new sequence is given.
+    /// One sample of an enabled controller with `commission_start` = `asked`, currents `i` (A) and link voltage `u_dc` (V);
+    /// `setup` configures a new sequence.
     pub(crate) fn update(&mut self, setup: &CommissionSetup, asked: bool, i: Phases, u_dc: f64) -> Turn {
         let before = std::mem::replace(&mut self.asked, asked);
         let first = asked && !before;
         if !asked {
-            // What has run until now leaves the machine without current for a sample.
+            // The controller leaves the machine without current for a sample.
             return if self.abort() { Turn::Rests } else { Turn::Works };
         }
         if first {
@@ -141,7 +141,7 @@ impl Commissioning {
     }
 }
 
-/// A controller's self-commissioning, if it has one.
+/// A controller's self-commissioning, if available.
 pub type Held = Option<Box<Commissioning>>;
 
 type R = Row<Held>;

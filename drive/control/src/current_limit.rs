@@ -24,7 +24,7 @@
 //! limit, the voltage changes by L di / T_s, which brings the current back to the limit along its own direction, as far as the
 //! hexagon allows; the integrators are corrected as at the hexagon. Otherwise nothing changes.
 //!
-//! Limits: L^ and R^ are estimates, and the EMF of the next interval is that of the last one, turned: an error of 20 % in L^
+//! Limits: L^ and R^ are estimates, and the EMF of the next interval is that of the last one, rotated: an error of 20 % in L^
 //! leaves 20 % of the excess in a sample. A sample that injects is not corrected: its carrier is larger than the excess that the
 //! limit would remove. With a communication step above T_s, several samples see the same currents, which show no EMF: only a
 //! sample whose currents are new, after one whose currents were new, is corrected. Derived here. u and e in V, i in A, psi in Wb,
@@ -78,7 +78,7 @@ impl Fresh {
     }
 }
 
-/// The interval between two samples, seen from the estimated frame.
+/// The interval between two samples, in the estimated frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Predictor<'a> {
     /// Estimates of the machine.
@@ -92,7 +92,7 @@ pub struct Predictor<'a> {
 }
 
 impl Predictor<'_> {
-    /// The change (V) of the newest of the `commands` (V, in the order in which they act from `sample` on) that keeps the current
+    /// The change (V) of the newest of the `commands` (V, in the order of their effect from `sample` on) that keeps the current
     /// at its end within `i_max` (A); `None` if it is within this limit anyway.
     #[cold]
     #[inline(never)]
@@ -148,8 +148,8 @@ mod tests {
         Axis::<Rotor>::at(0.3 + k * W * T_S).along(machine().psi_M)
     }
 
-    /// Magnitude (A) of the current at the end of the interval of the newest of `commands` (V) after the `sample`, and what the
-    /// predictor of an estimate `off` (rad) the rotor at `w` (rad/s) makes of it.
+    /// Magnitude (A) of the current at the end of the interval of the newest of `commands` (V) after the `sample`, and its
+    /// prediction with an estimate that is `off` (rad) at `w` (rad/s).
     fn reached(sample: &Sample, commands: &[AlphaBeta], off: f64, w: f64) -> (f64, f64) {
         let motor = machine();
         let end = |commands: &[AlphaBeta]| {
@@ -205,7 +205,8 @@ mod tests {
         assert!(without > 9.0 && kept < 1.05 * I_MAX, "{without}, {kept} A");
     }
 
-    /// Currents that come every second or third sample under a voltage that turns show no EMF; those that stay with the voltage do.
+    /// Currents updated every second or third sample under a rotating voltage reveal no EMF; currents that change with the
+    /// voltage do.
     #[test]
     fn currents_that_stay_are_old() {
         for (every, turn, expected) in [(1, 0.1, true), (2, 0.1, false), (3, 0.1, false), (100, 0.0, true)] {

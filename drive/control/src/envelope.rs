@@ -12,7 +12,7 @@
 //! Both limits are convex, and log |t| is concave where l > 0 and s i_q > 0, so the gradient decides. Where only the circle
 //! and |u| = U act, s grad t = m i + n grad |u|^2 with m, n >= 0. It follows that i_d is not above that of maximum torque per
 //! ampere, so that the root on the other side of the MTPA end is never the limit. Without R, MTPV needs psi_M < L_d I; with R
-//! it does not: a machine whose R i is above w L i has it at any speed at which R I + w psi_M > U.
+//! it does not: a machine with R i above w L i reaches MTPV at any speed at which R I + w psi_M > U.
 //!
 //! For a torque below the limit, the minimum current on the voltage limit is the greater root of f(i_d) = |u|^2 - U^2 at i_q
 //! = t / l. The cross term is constant and f is convex, so Newton's method from the right does not overshoot, and from
@@ -114,7 +114,7 @@ impl Envelope {
         self.iterated::<false>(w, s, U, warm)
     }
 
-    /// [`limit`](Self::limit) with its iterations run to the end: that of a drive that has settled.
+    /// [`limit`](Self::limit) with its iterations run to the end: the limit of a settled drive.
     pub fn settled(&self, w: f64, s: f64, U: f64) -> Limit {
         self.iterated::<true>(w, s, U, &mut WarmStart::default())
     }
@@ -231,7 +231,7 @@ impl Envelope {
             let l = psi_M - dL * i_d;
             let rise = s * (l * i1_q - dL * i1_d * i_q);
             let bend = s * (l * i2_q - 2.0 * dL * i1_d * i1_q - dL * i2_d * i_q);
-            // Where the torque bends upwards, Newton's method would look for the least.
+            // Where the torque bends upwards, Newton's method would converge to the minimum.
             let h = if bend < 0.0 { (-rise / bend).clamp(-0.3, 0.3) } else { 0.3_f64.copysign(rise) };
             let turned = [u[0] - h * u[1], u[1] + h * u[0]];
             let length = (turned[0] * turned[0] + turned[1] * turned[1]).sqrt();
@@ -253,7 +253,7 @@ impl Envelope {
     }
 
     /// i_d (A) of the minimum current for the torque `tau` (N.m) on the voltage limit: the greater root of f, by at most `steps`
-    /// of Newton's method from `i_d`; none where the slope is not positive.
+    /// of Newton's method from `i_d`; `None` if the slope is not positive.
     #[inline]
     pub fn i_d(&self, tau: f64, w: f64, U: f64, mut i_d: f64, steps: u32) -> Option<f64> {
         let &Self { k, R, L_d, L_q, dL, psi_M, .. } = self;
@@ -277,14 +277,14 @@ impl Envelope {
         Some(i_d)
     }
 
-    /// Change of the torque with the angle of the rotor ahead of the frame that holds the currents `i` (A), in N.m/rad: 0 at
-    /// maximum torque per ampere.
+    /// Derivative of the torque with respect to the angle of the rotor ahead of the frame with the constant currents `i` (A),
+    /// in N.m/rad: 0 at maximum torque per ampere.
     #[inline]
     pub fn slope(&self, i: DqHat) -> f64 {
         -self.k * (i.d() * (self.psi_M - self.dL * i.d()) + self.dL * i.q() * i.q())
     }
 
-    /// Whether i_d is less than that of maximum torque per ampere at the same torque.
+    /// Whether i_d is below its value at maximum torque per ampere for the same torque.
     #[inline]
     pub fn beyond_mtpa(&self, i: DqHat) -> bool {
         self.slope(i) > 0.0

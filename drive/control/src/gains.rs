@@ -39,10 +39,10 @@ impl Gains {
     /// From the parameters, with a different `estimator` in use.
     pub(crate) fn with(par: &ControllerParameters, estimator: Kind) -> Self {
         let ControllerParameters { current, speed_loop, motor, J, limit, lock, T_s, .. } = par;
-        // Finite, so that no current is no torque with any psi_M.
+        // Finite, so that zero current gives zero torque for any psi_M.
         let k = motor.torque_constant().min(f64::MAX);
         let observes_flux = estimator.class() == Class::FluxObserver;
-        // With i_d of the low-speed law, the limits of the currents are those of each sample.
+        // With i_d of the low-speed law, the current limits are computed at each sample.
         let by_law = observes_flux && !current.mtpa;
         let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
         let weakening = WeakeningGains::new(motor, limit, tau, current.mtpa, par.least_tracker());
@@ -82,8 +82,8 @@ impl Gains {
         par.current.mtpa || par.speed_loop.torque_mode
     }
 
-    /// References of the currents (A) without field weakening for the torque of `i_q` (A): i_d of the `law`, and of maximum
-    /// torque per ampere as far as it is not active.
+    /// References of the currents (A) without field weakening for the torque of `i_q` (A): i_d of the `law`, blended into that
+    /// of maximum torque per ampere.
     #[inline]
     pub(crate) fn currents(&self, par: &ControllerParameters, law: &Law, i_q: f64) -> DqHat {
         if par.current.mtpa && !self.observes_flux {
@@ -103,7 +103,7 @@ impl Gains {
 }
 
 impl Law {
-    /// The law without its current; the limit stays that of a nonzero torque reference.
+    /// The law without its current; the limit remains as for a nonzero torque reference.
     pub(crate) fn released(self) -> Self {
         Self { i_d: 0.0, ..self }
     }
@@ -133,7 +133,7 @@ pub(crate) mod tests {
         (controller.gains, controller.parameters)
     }
 
-    /// i_d of the low-speed law fades into that of maximum torque per ampere, and i_q gives the rest of the torque.
+    /// i_d of the low-speed law fades into that of maximum torque per ampere, and i_q supplies the remaining torque.
     #[test]
     fn the_currents_give_the_torque_at_every_speed() {
         let (gains, par) = controller(|p| {

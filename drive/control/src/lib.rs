@@ -1,7 +1,7 @@
 //! Sensorless control of a permanent-magnet synchronous machine: current and speed loops, the low-speed law, field weakening,
 //! the start, every [`estimator`], and the model [`SensorlessController`] built from them.
 //!
-//! Nothing here knows the plant: the machine's values are the controller's estimates. The conventions are those of
+//! This crate is independent of the plant: the machine's values are the controller's estimates. For conventions see
 //! [`drive_base`].
 
 #![forbid(unsafe_code)]

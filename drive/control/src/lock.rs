@@ -5,9 +5,9 @@
 //! measured current. Over the last interval, `epsilon = u - R (i[k-1] + i[k]) / 2 - (psi^[k] - psi^[k-1]) / T_s` is
 //! zero if the estimate and the machine values are correct, with any injection. A rotor at another angle leaves j w
 //! psi_M (e^{j theta} - e^{j theta^}), with magnitude 2 sin(theta~/2) |w| psi_M; a wrong speed leaves the difference of
-//! the two back EMFs. A rotor that slips turns its EMF in the estimated frame: there the mean of epsilon is the EMF of
-//! the frame alone, and only the mean square has both, psi_M^2 (w^2 + w^^2). So epsilon is transformed to the estimated frame,
-//! smoothed, and the quotient is
+//! the two back EMFs. A rotor that slips turns its EMF in the estimated frame: there the mean of epsilon is only the EMF of the
+//! frame, and the mean square contains both, psi_M^2 (w^2 + w^^2). So epsilon is transformed to the estimated frame, smoothed,
+//! and the quotient is
 //!
 //! ```text
 //! min over dR of sqrt(mean |epsilon - dR i|^2) / (lock.u + 2 sin(lock.angle / 2) psi_M mean |w^|),  |dR| <= 0.3 R^
@@ -17,26 +17,26 @@
 //! hides no relevant slip: above that frequency, the EMF of a rotor that turns with the slip still reaches 4 lock.u. A frame that
 //! turns by more than pi / 2 in a sample follows no rotor: the quotient is 10.
 //!
-//! Near standstill the EMF is smaller than (R - R^) i and shows nothing. There, the speed is used instead:
+//! Near standstill the EMF is smaller than (R - R^) i and carries no information. There, the speed is used instead:
 //!
 //! # Speed
-//! A rotor that turns with the estimated frame but not at the reference is lost: the estimate itself shows it. The
-//! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of it, whichever is
-//! nearer. The model lags by (1 - b) t_is / w_s, the share that the set-point weight leaves to the integral part, and changes no
-//! faster than with half of the available torque:
+//! A rotor that turns with the estimated frame but not at the reference is lost, as the estimate itself reveals. The
+//! speed error x, smoothed at 7 Hz, is the distance of the frame's speed from the reference, or from a model of it, whichever
+//! is closer. The model lags by (1 - b) t_is / w_s, the share that the set-point weight leaves to the integral part, and
+//! changes no faster than with half of the available torque:
 //!
 //! ```text
 //! S = (1 / S_0) int |x| dt     while |x| > w_0 + 5 % of the reference + f; otherwise S decays with 8 lock.time
 //! S_0 = 1.6 n_p i_max / K_i,   w_0 = n_p i_max / (K_i 60 lock.time)
 //! ```
 //!
-//! f is the distance of w^ from the frame's speed, at most 20 % of the reference: an estimator that takes the speed from the EMF is
-//! off by the error of psi_M, and the speed loop with it.
+//! f is the distance of w^ from the frame's speed, at most 20 % of the reference: an estimator that takes the speed from the
+//! EMF is off by the error of psi_M, and so is the speed loop.
 //!
-//! n_p i_max / K_i is the error integral that takes the speed loop from zero torque to its limit. No load that the
-//! drive can carry needs more, so no load step reaches S = 1, however it arrives; an error that stays does. S is at most 2,
-//! and 0 while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5; then a speed that is not reached is
-//! that of a drive at its limit.
+//! n_p i_max / K_i is the error integral that takes the speed loop from zero torque to its limit. A load within the drive's
+//! torque needs no more, so no load step, abrupt or gradual, reaches S = 1; a persistent error does. S is at most 2, and 0
+//! while the EMF confirms the angle: psi_M |w^| > 2 lock.u and a quotient below 0.5; then the drive misses the speed because it
+//! is at its limit.
 //!
 //! A drive at its limit does not swing. So half-waves about reference and model of w^, as far as the torque that the limits leave
 //! moves the rotor, count, confirmed or not: W is the sum of their |x| over S_0 while |x| > 1.4 lock.u / psi_M,
@@ -74,7 +74,8 @@ pub const LOST: f64 = 10.0;
 const FILTER: f64 = TAU * 50.0;
 /// Bandwidth in rad/s of the smoothing of the speed error: an injection turns current noise into a noisy speed.
 const SMOOTH: f64 = TAU * 7.0;
-/// Bandwidth of the voltage, at least, in units of lock.u / psi_M: the EMF of a rotor that turns backwards beyond it still counts.
+/// Minimum bandwidth of the voltage, in units of lock.u / psi_M: the EMF of a rotor that turns backwards faster than this still
+/// counts.
 const SLIP: f64 = 4.0;
 /// Bandwidth in rad/s of the powers.
 const MEAN: f64 = TAU * 8.0;
@@ -82,13 +83,13 @@ const MEAN: f64 = TAU * 8.0;
 const FASTEST: f64 = 0.5 * PI;
 /// Half of a swing that counts, in units of lock.u / psi_M.
 const SWING: f64 = 1.4;
-/// Share of R^ by which the resistance may be wrong before the voltage shows it.
+/// Share of R^ by which the resistance may be wrong before the voltage indicates it.
 const RESISTANCE: f64 = 0.3;
 /// S_0 in units of the speed loop's error integral.
 const MARGIN: f64 = 1.6;
 /// Share of the reference by which the speed may be off.
 const SPEED: f64 = 0.05;
-/// Share of the reference that an error of psi_M explains, where the estimated speed is not that of the frame.
+/// Share of the reference explained by an error of psi_M if the estimated speed differs from the frame's.
 const FLUX: f64 = 0.2;
 
 /// The parameters with the prefix `lock.`.
@@ -198,7 +199,7 @@ struct Following {
     w_m: f64,
     /// Estimated speed in rad/s as far as the drive's torque moves the rotor.
     w_r: f64,
-    /// Estimated speed less that of the frame in rad/s, smoothed.
+    /// Estimated speed minus the frame's speed in rad/s, smoothed.
     apart: f64,
     /// Speed of the frame less the reference in rad/s, smoothed.
     off: f64,
@@ -245,7 +246,7 @@ impl Following {
         at_least(self.S, self.W)
     }
 
-    /// Adds half-waves of the speed error `x` (rad/s), each as far as the last one reached.
+    /// Adds half-waves of the speed error `x` (rad/s), each limited to the size of the previous one.
     #[inline]
     fn swings(&mut self, gains: &LockGains, x: f64) {
         self.W -= self.W * gains.forgets;
@@ -298,7 +299,7 @@ impl Lock {
                 *mean += (now - *mean) * gains.mean;
             }
             let [e, ei, ii] = self.powers;
-            // The error of the resistance that explains most; the tiny current keeps 0/0 away.
+            // The resistance error that explains the most; the tiny current avoids 0/0.
             let dR = within(ei / (ii + 1e-12), RESISTANCE * R_s);
             let left = at_least(e - dR * (2.0 * ei - dR * ii), 0.0);
             let quotient = at_most(left.sqrt() / (gains.u + gains.psi * self.w), LOST);

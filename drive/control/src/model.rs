@@ -32,7 +32,7 @@ const MAX_TURN: f64 = 20.0 * std::f64::consts::PI;
 /// Sensorless speed control of a permanent-magnet synchronous machine (Rasmussen, Fig. 2).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SensorlessController {
-    /// Inputs, held over a communication step.
+    /// Inputs, constant over a communication step.
     pub inputs: ControllerInputs,
     /// Parameters; a step never changes them.
     pub parameters: ControllerParameters,
@@ -209,7 +209,7 @@ impl SensorlessController {
     /// Checks that the parameters fit together, with a DC link of `u_dc` (V) at the start.
     ///
     /// # Errors
-    /// States which parameters do not fit together, and what to do.
+    /// States the incompatible parameters and a remedy.
     pub fn validate_on(&self, u_dc: f64) -> Result<(), Fault> {
         let par = &self.parameters;
         self.validate_with(par, u_dc)?;
@@ -370,7 +370,7 @@ impl Sampled for SensorlessController {
 pub const TAU_REF: &str =
     "Torque reference; at 0, zero_speed.i_0 flows near standstill, or no current with zero_speed.release";
 
-/// The warning of a torque reference (N.m) that was beyond these limits (N.m) for a second.
+/// The warning about a torque reference (N.m) outside these limits (N.m) for a second.
 pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {
     format!(
         "tau_ref = {tau_ref} N.m has been clipped for a second: at this speed and u_dc, the drive gives {tau_min} to {tau_max} N.m \
@@ -436,7 +436,7 @@ impl Warns for SensorlessController {
             return;
         }
         let Motor { n_p, R_s, L_d, L_q, psi_M } = self.parameters.motor;
-        // A wrong resistance changes the voltage by at most R_s i, which a back EMF or a mismatch of twice that outweighs.
+        // A wrong resistance changes the voltage by at most R_s i, which is outweighed by a back EMF or a mismatch of twice that.
         let emf = (psi_M * (f64::from(n_p) * out.speed_est).abs()).max(self.state.lock.voltage());
         let matters = emf <= 2.0 * R_s * par.limit.i;
         log.warn("lock_lost", || {

@@ -1,6 +1,6 @@
 //! Start from standstill by injection: finds the magnet axis from any initial angle, then identifies the north pole.
 //!
-//! 1. The estimator injects for `t_find` and finds the magnet axis, but not its polarity; the current reference is
+//! 1. The estimator injects for `t_find` to locate the magnet axis without its polarity; the current reference is
 //!    zero.
 //! 2. No voltage for 4 L/R: the injection currents decay.
 //! 3. +V along the estimated d-axis for `samples`, then -V for as many samples; the peak of i_d is stored; then no voltage for

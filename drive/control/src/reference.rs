@@ -13,7 +13,7 @@ use drive_base::motor::Motor;
 #[inline]
 pub fn max_torque_per_ampere(motor: &Motor, tau: f64) -> DqHat {
     let (k, half, dL) = (1.5 * f64::from(motor.n_p), 0.5 * motor.psi_M, motor.L_q - motor.L_d);
-    // Magnet or reluctance alone would need more current: the smaller value is above the solution by a third at most.
+    // Magnet or reluctance alone would need more current: the smaller value exceeds the solution by at most a third.
     let mut i_q = (tau / (2.0 * k * half)).abs().min((tau / (k * dL)).abs().sqrt()).copysign(tau);
     for _ in 0..STEPS {
         let root = (half * half + dL * dL * i_q * i_q).sqrt();

@@ -78,7 +78,7 @@ fn uniform(counter: u64) -> f64 {
 pub(crate) struct Offset {
     /// Mean in A.
     pub(crate) i: Phases,
-    /// Number of samples in it, at most those of `MEMORY`.
+    /// Number of stored samples, at most `MEMORY`.
     n: f64,
 }
 

@@ -1,8 +1,8 @@
 //! The references of a drive that has settled: the controller's limits and currents at a speed, without its sample grid.
 //!
-//! For maps and for models of the mean: the low-speed law, maximum torque per ampere and field weakening are those of a
+//! For maps and for models of the mean: the low-speed law, maximum torque per ampere and field weakening are computed as in a
 //! sample ([`reference`](crate::reference), [`weakening`](crate::weakening)), with the machine estimates of the parameters, and
-//! their iterations run to the end. The estimates of angle and speed are the true ones, and nothing is injected.
+//! iterated to convergence. The estimates of angle and speed are the true ones, and nothing is injected.
 
 use crate::gains::{Gains, Law};
 use crate::tables::ControllerParameters;
@@ -10,7 +10,7 @@ use crate::weakening::Weakening;
 use drive_base::frame::DqHat;
 use serde::{Deserialize, Serialize};
 
-/// Torque that counts as zero with `zero_speed.release`, as a share of that of i_0.
+/// Torque that counts as zero with `zero_speed.release`, as a share of the torque of i_0.
 const RELEASED: f64 = 1e-3;
 
 /// Computed from the parameters.
@@ -59,7 +59,7 @@ pub struct SettledAt<'a> {
 }
 
 impl SettledAt<'_> {
-    /// Minimum and maximum torque in N.m that the references may ask for: the outputs `tau_min` and `tau_max`.
+    /// Minimum and maximum torque in N.m that the references may request: the outputs `tau_min` and `tau_max`.
     #[inline]
     pub fn limits(&self) -> [f64; 2] {
         self.limits
@@ -69,7 +69,7 @@ impl SettledAt<'_> {
     #[inline]
     pub fn currents(&self, tau: f64) -> (DqHat, bool) {
         let &Self { gains, par, ref law, w, ref weakening, .. } = self;
-        // A torque that decays to 0 comes to rest here.
+        // A torque that decays to 0 ends here.
         let asked = if tau.abs() > RELEASED * gains.k * par.zero_speed.i_0 { tau } else { 0.0 };
         let released = par.speed_loop.torque_mode && par.zero_speed.releases(asked);
         let law = if released { law.released() } else { *law };

@@ -82,7 +82,7 @@ pub struct ControllerOutputs {
     pub lock_lost: f64,
     /// Whether the controller operates.
     pub enabled: bool,
-    /// Whether the inverter is to short-circuit the machine.
+    /// Whether the inverter should short-circuit the machine.
     pub short_circuit: bool,
     /// What has tripped.
     pub tripped: Cause,
@@ -92,9 +92,9 @@ pub struct ControllerOutputs {
     pub voltage_limited: bool,
     /// Whether a current or torque limit limited the current references.
     pub current_limited: bool,
-    /// Maximum torque in N.m that the references may ask for.
+    /// Maximum torque in N.m that the references may request.
     pub tau_max: f64,
-    /// Minimum torque in N.m that the references may ask for.
+    /// Minimum torque in N.m that the references may request.
     pub tau_min: f64,
     /// Voltage that the current loop requests, as a share of u_dc / sqrt(3).
     pub u_share: f64,
@@ -102,7 +102,7 @@ pub struct ControllerOutputs {
     pub weakens: bool,
     /// Resistance in Ohm that the estimator uses: adapted, or the controller's estimate.
     pub R_s_est: f64,
-    /// What the self-commissioning does.
+    /// State of the self-commissioning.
     pub commission_state: CommissionState,
     /// Why the self-commissioning has stopped.
     pub commission_fault: CommissionFault,

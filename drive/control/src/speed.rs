@@ -1,7 +1,7 @@
 //! The speed loop: PI controller with set-point weight and limit; the integrator holds while the output is limited.
 //!
 //! i_q,ref = K_p (b w_ref - w) + I, K_p = J w_s / K, dI/dt = (K_p w_s / t_is)(w_ref - w), with K = 1.5 n_p psi_M and all
-//! speeds mechanical. The integrator holds while i_q is at its limit and the error drives it further in.
+//! speeds mechanical. The integrator holds while i_q is at its limit and the error would increase the excess.
 //!
 //! With `ramp`, the reference approaches the set point at no more than that rate. In torque mode there is no speed
 //! loop: the torque reference divided by K is the set point, within the same limits.
@@ -38,8 +38,8 @@ impl Default for SpeedLoop {
 }
 
 impl SpeedLoop {
-    /// Lag of the speed behind a moving reference in s: the proportional part acts on the share b of it, the integral part
-    /// supplies the rest.
+    /// Lag of the speed behind a moving reference in s: the proportional part acts on the share b, the integral part supplies
+    /// the remainder.
     pub fn lag(&self) -> f64 {
         (1.0 - self.b) * self.t_is / self.bandwidth
     }
@@ -111,7 +111,7 @@ impl SpeedController {
     }
 }
 
-/// Kept out of line, so that the current loop can begin before the limits are known.
+/// Not inlined, so that the current loop can begin before the limits are known.
 #[cold]
 #[inline(never)]
 fn limited(wanted: f64, low: f64, high: f64) -> f64 {

@@ -1,9 +1,9 @@
 //! Torque mode: detects a requested torque without a motion that the estimate can show.
 //!
 //! A resistance that is off by dR hides a rotor whose back EMF is below |dR| i: the estimated frame stands still or creeps while
-//! the rotor moves, the current acts on the wrong axis, and the torque is not that of the references (the heads of
-//! [`rasmussen`](crate::estimator::rasmussen) and [`flux_observer`](crate::estimator::flux_observer) have the threshold). The
-//! controller cannot tell such a rotor from a blocked one. It counts the time t in which
+//! the rotor moves, the current acts on the wrong axis, and the torque differs from the reference (for the threshold see
+//! [`rasmussen`](crate::estimator::rasmussen) and [`flux_observer`](crate::estimator::flux_observer)). The controller cannot
+//! distinguish such a rotor from a blocked one. It counts the time t in which
 //!
 //! ```text
 //! |tau| > 2 % of the limit        psi_M |w^| < 0.3 R^ |i|        w^ smoothed over 0.3 s
@@ -20,7 +20,7 @@ use crate::tables::ControllerParameters;
 use drive_base::frame::DqHat;
 use serde::{Deserialize, Serialize};
 
-/// Share of R^ by which the resistance may be wrong: that of `lock_lost`.
+/// Share of R^ by which the resistance may be wrong, as in `lock_lost`.
 const RESISTANCE: f64 = 0.3;
 /// Speed as a share of `emf.w_hold` below which little of the angle's gain remains.
 const FADED: f64 = 0.25;

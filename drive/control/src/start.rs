@@ -177,8 +177,8 @@ impl CurrentFrequencyStart {
     }
 }
 
-/// Current in A that damps a rotor of the inertia `J` and the torque `n_p_K` (n_p K) per ampere, which oscillates with `w_0`
-/// (rad/s) and turns by `slip` (rad/s) faster than its current vector; at most `most` (A).
+/// Current in A that damps a rotor of the inertia `J` and the torque `n_p_K` (n_p K) per ampere, which oscillates at `w_0`
+/// (rad/s) and turns faster than its current vector by `slip` (rad/s); at most `most` (A).
 pub(crate) fn damping(w_0: f64, J: f64, n_p_K: f64, slip: f64, most: f64) -> f64 {
     let gain = 2.0 * ZETA * w_0 * J / n_p_K;
     (-gain * slip).clamp(-most, most)
@@ -222,7 +222,7 @@ mod tests {
     const T_S: f64 = 1e-4;
 
     /// Runs the start next to a rotor at `rotor(frame, t)` (rad, for the frame's angle and the time in s) that carries the
-    /// requested currents, until it hands over or `seconds` have passed; returns the last step and the rotor's angle.
+    /// requested currents, until hand-over or until `seconds` have passed; returns the last step and the rotor's angle.
     fn beside(reference: f64, seconds: f64, rotor: impl Fn(f64, f64) -> f64) -> (StartStep, f64) {
         let (motor, par, estimators) = (Motor::default(), StartParameters::default(), EstimatorParameters::default());
         let context = Context { par: &estimators, motor: &motor, J: 1.5e-3, T_s: T_S };

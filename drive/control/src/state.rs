@@ -43,7 +43,7 @@ impl InUse {
     }
 }
 
-/// Source of the angle of the frame in which the current is controlled.
+/// Source of the angle used for current control.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) enum Leader {
     /// The estimator.
@@ -130,7 +130,7 @@ pub(super) struct State {
     pub(super) battery: Battery,
     /// Time in s for which a limit has reduced the references, while field weakening or limits of the DC link are in use.
     pub(super) limited_for: f64,
-    /// Time in s for which a torque has been requested and the estimate has shown no speed; [`Stands`](crate::stands).
+    /// Time in s for which a torque has been requested without a speed in the estimate; [`Stands`](crate::stands).
     pub(super) stands: Stands,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,

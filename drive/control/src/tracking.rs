@@ -18,7 +18,7 @@ use crate::estimator::{EstimatorParameters, Kind};
 use crate::speed::SpeedLoop;
 use serde::{Deserialize, Serialize};
 
-/// The least bandwidth of a tracker.
+/// The minimum bandwidth of a tracker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LeastTracker {
     /// Half of the speed loop's part in rad/s.

@@ -1,15 +1,15 @@
 //! Trips: over-current and over-voltage end the operation of the inverter until `enable` falls.
 //!
-//! A sample that measures a phase current beyond `trip.i`, or a DC link beyond `trip.u_dc`, trips: from the next sample
-//! instant on the controller rests, and the gates are off. With `trip.asc` the machine is short-circuited instead where
-//! gates off would feed the link through the diodes, that is where its line-to-line back EMF exceeds u_dc:
+//! A sample with a phase current above `trip.i` or a DC-link voltage above `trip.u_dc` trips the drive: from the next sample
+//! instant the controller is inactive and the gates are off. With `trip.asc` the machine is short-circuited instead where gates
+//! off would feed the link through the diodes, that is where its line-to-line back EMF exceeds u_dc:
 //!
 //! ```text
 //! sqrt 3 psi_M |w| > u_dc         and until sqrt 3 psi_M |w| < 0.9 u_dc
 //! ```
 //!
-//! w is the speed of the sensor if the estimator reads it, otherwise the estimate at the trip. An active short circuit from
-//! full torque swings to currents beyond most limits, so a current does not trip a second time.
+//! w is the speed of the sensor if the estimator reads it, otherwise the estimate at the trip. After an active short circuit at
+//! full torque, the current swings beyond most limits, so a current does not trip a second time.
 
 use drive_base::frame::Phases;
 use drive_base::motor::Motor;
@@ -42,9 +42,9 @@ const END: f64 = 0.9;
 pub struct TripParameters {
     /// Trips are in use.
     pub used: bool,
-    /// Phase current in A beyond which the drive trips.
+    /// Phase current in A above which the drive trips.
     pub i: f64,
-    /// DC-link voltage in V beyond which the drive trips.
+    /// DC-link voltage in V above which the drive trips.
     pub u_dc: f64,
     /// A trip short-circuits the machine where its back EMF exceeds u_dc.
     pub asc: bool,
@@ -98,8 +98,8 @@ impl Trip {
         Self { cause, shorts: false, speed }
     }
 
-    /// At a sample with the link's `u_dc` (V): whether the machine is short-circuited. `measured`: the speed (rad/s) of the sensor, if
-    /// there is one.
+    /// At a sample with the link's `u_dc` (V): whether the machine is short-circuited. `measured`: the sensor's speed (rad/s),
+    /// if available.
     pub fn update(&mut self, par: &TripParameters, motor: &Motor, u_dc: f64, measured: Option<f64>) {
         self.speed = measured.unwrap_or(self.speed);
         let emf = 3.0_f64.sqrt() * motor.psi_M * (f64::from(motor.n_p) * self.speed).abs();
@@ -129,7 +129,7 @@ pub const TRIP: &Table<TripParameters> = table![
 mod tests {
     use super::*;
 
-    /// Any phase in either direction, and the link, beyond the limits alone.
+    /// Any phase in either direction and the link trip, and only beyond their limits.
     #[test]
     fn each_phase_and_the_link_trip() {
         let par = TripParameters { i: 15.0, u_dc: 450.0, ..TripParameters::default() };
@@ -144,8 +144,8 @@ mod tests {
         assert_eq!(par.cause(Phases::default(), 451.0), Cause::OverVoltage);
     }
 
-    /// sqrt 3 psi_M n_p |w| is the line-to-line EMF: beyond u_dc the machine is shorted until 0.9 u_dc, by the measured speed, or
-    /// by that at the trip.
+    /// sqrt 3 psi_M n_p |w| is the line-to-line EMF: beyond u_dc the machine is shorted until 0.9 u_dc, based on the measured
+    /// speed, or on the speed at the trip.
     #[test]
     fn a_short_circuit_begins_and_ends_by_the_emf() {
         let (mut par, motor) = (TripParameters { asc: true, ..TripParameters::default() }, Motor::default());

@@ -5,11 +5,11 @@
 //! the plain reference (maximum torque per ampere, i_d = 0 or the low-speed law) fits the voltage, nothing is changed.
 //!
 //! The trim y corrects wrong estimates: dy/dt = w_t (|u| - k_t u_dc / sqrt 3), 0 <= y <= 0.3 u_dc / sqrt 3, with the voltage
-//! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit
-//! stay right; it also moves while the current error is large, where wrong estimates would otherwise saturate the loop
+//! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit remain
+//! valid; it also changes while the current error is large, where wrong estimates would otherwise saturate the loop
 //! permanently.
 //!
-//! The speed loop's limits are those of the torque. They fall as the speed rises, so while one acts, the integrator
+//! The torque limits also limit the speed loop. They fall as the speed rises, so while one acts, the integrator
 //! follows: dI/dt = w_s (limited - wanted), in addition to the hold of [`speed`](crate::speed).
 //!
 //! A limit is computed at every sample while it acts; otherwise at every eighth sample and whenever the voltage has changed by 1
@@ -41,7 +41,7 @@ pub const GREATEST_TRIM: f64 = 0.3;
 const EVERY: u64 = 8;
 const LEAST_CHANGE: f64 = 0.01;
 
-/// Most steps from the plain reference to the voltage limit.
+/// Maximum number of steps from the plain reference to the voltage limit.
 const COLD: u32 = 40;
 
 /// Minimum electrical speed in rad/s that the limits are computed for.
@@ -74,7 +74,7 @@ pub struct WeakeningGains {
     end: DqHat,
     /// Inverse of the torque constant in A/(N.m).
     per_torque: f64,
-    /// Parts of |u|^2 that bound those of all its currents: constant, by w, by w^2.
+    /// Upper bounds of the parts of |u|^2 for all its currents: constant, in w, in w^2.
     voltage: [f64; 3],
     /// Minimum bandwidth of the tracker.
     pub(super) tracker: LeastTracker,
@@ -145,7 +145,7 @@ pub struct Weakening {
     clipped: bool,
     /// i_d of the last sample in A, read while weakening.
     i_d: f64,
-    /// i_d is below that of the plain reference.
+    /// i_d is below the plain reference's.
     pub weakens: bool,
 }
 
@@ -381,7 +381,7 @@ mod tests {
         );
     }
 
-    /// A torque is the i_q of the magnet alone.
+    /// Torques are expressed as the i_q of the magnet alone.
     #[test]
     fn the_gains_count_the_magnet_along_d() {
         let motor = Motor::IPMSM_2_2_KW;

@@ -5,8 +5,8 @@
 //! With maximum torque per ampere, the share 1 - exp(-|w_r^| / w_0) of its i_d is added, and i_q supplies the rest of the torque;
 //! the current limit sets the maximum torque.
 //!
-//! In torque mode, i_0 also flows while the torque reference is zero, and heats the winding with 1.5 R_s i_0^2. It holds a small
-//! load if R^ < R, for example 0.2 N.m on the reference motor with R^ = 0.9 R; with R^ = R the frame follows the rotor, and the
+//! In torque mode, i_0 also flows while the torque reference is zero, and heats the winding with 1.5 R_s i_0^2. A small load is
+//! held if R^ < R, for example 0.2 N.m on the reference motor with R^ = 0.9 R; with R^ = R the frame follows the rotor, and the
 //! shaft is free. With `release`, tau_ref = 0 requests no current: the shaft is free. Without current, a flux observer cannot
 //! determine the angle at standstill; as soon as a torque is requested, i_0 pulls the rotor along, as at a start.
 
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the law.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ZeroSpeed {
-    /// Current at standstill in A, >= 0; holds a load of up to K i_0.
+    /// Current at standstill in A, >= 0, which holds a load up to K i_0.
     pub i_0: f64,
     /// Mechanical speed in rad/s at which the current has fallen to 1/e, > 0.
     pub w_0: f64,
@@ -90,7 +90,7 @@ mod tests {
         assert!((law.i_d_ref(-10.0) - 5.0 / std::f64::consts::E).abs() < 1e-14);
     }
 
-    /// i_0 holds a load of up to K i_0: the share at a speed is the one of both directions, and w_0 its scale.
+    /// i_0 holds a load of up to K i_0: the share at a speed is the same in both directions, and w_0 is its scale.
     #[test]
     fn the_share_follows_the_speed() {
         let law = ZeroSpeed { i_0: 4.0, w_0: 20.0, ..ZeroSpeed::default() };

@@ -12,7 +12,7 @@ use drive_control::weakening::{Weakening, WeakeningGains};
 use machines::Machine;
 use random_machines::{Brute, all};
 
-/// Share of the maximum torque, and of the current limit, to which both agree.
+/// Agreement of both, as a share of the maximum torque and of the current limit.
 const SMALL: f64 = 1e-6;
 
 fn brute(machine: &Machine, w: f64) -> Brute<'_> {
@@ -46,7 +46,7 @@ fn the_limits() {
     assert!(inside > 500 && none > 100);
 }
 
-/// The least current for a torque within the limits; at the base speed the voltage is used up.
+/// The minimum current for a torque within the limits; at the base speed the voltage is exhausted.
 #[test]
 fn the_currents() {
     let mut weakened = 0;

@@ -17,7 +17,7 @@ const W_H: f64 = 2.0 * std::f64::consts::PI * 1000.0;
 const SUM: f64 = 0.5 * (L_D + L_Q);
 const DIFF: f64 = 0.5 * (L_D - L_Q);
 
-/// Inductance seen from a frame that is `theta` behind the rotor: the rotor's own, turned. No double angle is used.
+/// Inductance in a frame that is `theta` behind the rotor: the rotor's, rotated. No double angle is used.
 fn inductance(theta: f64) -> Matrix2<f64> {
     let turn = Rotation2::new(theta);
     turn * Matrix2::new(L_D, 0.0, 0.0, L_Q) * turn.inverse()

@@ -23,7 +23,7 @@ fn controller(kind: Kind) -> SensorlessController {
     controller
 }
 
-/// A working controller changed by `set` is refused; the message holds all `parts`, and names variables only by
+/// A working controller changed by `set` is refused; the message contains all `parts`, and names variables only by
 /// their names in the table.
 fn refused(kind: Kind, set: impl FnOnce(&mut ControllerParameters), parts: &[&str]) {
     let mut controller = controller(kind);

@@ -84,7 +84,7 @@ pub(super) struct Passed {
 }
 
 impl Passed {
-    /// Adds those of a further step.
+    /// Adds the values of another step.
     #[inline]
     pub(super) fn add(&mut self, step: &Self) {
         self.energy.add(&step.energy);

@@ -3,7 +3,7 @@
 //! The importer passes on the states that its solver accepted, but not the path between them. The plant therefore integrates
 //! each interval once more: from the importer's states, it solves the equations of [`exchange`](crate::exchange), with the
 //! powers as further states, by the classical Runge-Kutta method in stator axes. The steps are those of Co-Simulation, at
-//! most 100 us and 0.25 rad of electrical angle, so the energies are equally accurate, however long the importer's steps are. The
+//! most 100 us and 0.25 rad of electrical angle, so the energies are equally accurate for any step of the importer. The
 //! next interval starts from the importer's states again, so errors do not accumulate. Between two points the inputs
 //! are taken as straight lines: a curved input costs h^2/12 of its second derivative, with h the importer's step. The gates,
 //! and whether the diodes block, change in events only.

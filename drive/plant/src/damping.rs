@@ -106,7 +106,7 @@ pub(super) struct Damped {
 }
 
 impl Damped {
-    /// Over a step of `h` (s) with the `damping` (1/s) of the flux linkage beyond that of the magnet, `psi_M` (Wb). The magnet
+    /// Over a step of `h` (s) with the `damping` (1/s) of the flux linkage in excess of the magnet's, `psi_M` (Wb). The magnet
     /// is on `axis` at the start; the eigenvalues of the damping are real and not negative.
     pub(super) fn new(h: f64, damping: Matrix, psi_M: f64, axis: Axis<Rotor>) -> Self {
         let eigenvalues = damping.eigenvalues();

@@ -5,8 +5,8 @@
 //! the edges of the dead-time zone. With an imposed shaft, speed_shaft and angle_shaft replace the two mechanical states;
 //! the stator flux linkage stays in the rotor frame, so angle_shaft must be the integral of speed_shaft between events.
 //!
-//! The energies are counted over completed steps of the solver ([`counters`](crate::counters)). Beyond the speed of
-//! any machine there are no derivatives: the solver tries a shorter step.
+//! The energies are counted over completed steps of the solver ([`counters`](crate::counters)). Above the speed of any machine
+//! there are no derivatives, so the solver tries a shorter step.
 //!
 //! Whether the diodes block is decided in events only. While they block, the current is zero. Two indicators mark when
 //! blocking begins or ends: the maximum current divided by the zone of [`legs`](crate::legs), and the line-to-line back EMF
@@ -60,7 +60,7 @@ impl PmsmPlant {
         self.instant(inputs, (self.state.psi, self.state.speed, self.state.angle))
     }
 
-    /// The present instant and its change `along` that of `inputs` and of the states.
+    /// The present instant and its change `along` the change of `inputs` and states.
     fn changing(&self, inputs: &PlantInputs<Dual>, along: &Self) -> Instant<Dual> {
         let (x, v) = (&self.state, &along.state);
         let psi = Vector::new(Dual::new(x.psi.d(), v.psi.d()), Dual::new(x.psi.q(), v.psi.q()));
@@ -99,7 +99,7 @@ impl PmsmPlant {
         [d_psi.d(), d_psi.q(), rates.acceleration, at.speed]
     }
 
-    /// The outputs at an instant; their powers are those of the instant.
+    /// The outputs at an instant, with instantaneous powers.
     fn outputs<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> PlantOutputs<S> {
         let Rates { p_in, losses, tau_given, i, .. } = self.rates(inputs, at);
         let tau_shaft = self.parameters.mechanics.tau_shaft(tau_given, inputs.tau_load);

@@ -11,8 +11,9 @@
 //! curvature: the incremental inductances stay those of the edge.
 //!
 //! Limits: the map describes a machine where its Hessian, the inverse of the incremental inductances, is positive definite; this
-//! is checked at all knots. It holds for one temperature: with another psi_M, the map moves along the d-axis. The effect of the
-//! rotor angle (slots, harmonics) is not part of it. `fmu tune` fits the coefficients to a table. Flux linkages in Wb, w in J.
+//! is checked at all knots. It is valid for one temperature: with another psi_M, the map moves along the d-axis. The effect of
+//! the rotor angle (slots, harmonics) is not part of it. `fmu tune` fits the coefficients to a table. Flux linkages in Wb, w in
+//! J.
 
 use drive_base::frame::{Dq, Rotor, Vector};
 use drive_base::motor::Motor;
@@ -34,7 +35,7 @@ const INTERVALS: [usize; 2] = [D - 3, Q - 2];
 pub struct FluxMap {
     /// The map determines the current, instead of inductances and saturation.
     pub used: bool,
-    /// Minimum d-axis flux linkage of the grid in Wb, relative to that of the magnet, < 0.
+    /// Minimum d-axis flux linkage of the grid in Wb, relative to the magnet's, < 0.
     pub d_min: f64,
     /// Maximum in Wb, > 0.
     pub d_max: f64,
@@ -70,7 +71,7 @@ impl<S: Scalar> Splines<S> {
     fn at(s: S, intervals: usize) -> Self {
         let first = s.value().clamp(0.0, (intervals - 1) as f64) as usize;
         let t = s - S::from(first as f64);
-        // Beyond the grid, the second derivatives are those of the edge.
+        // Outside the grid, the second derivatives keep their values at the edge.
         let edge = t.value().clamp(0.0, 1.0);
         let beyond = t - S::from(edge);
         let t = if beyond.value() == 0.0 { t } else { S::from(edge) };
@@ -126,7 +127,7 @@ impl FluxMap {
         sum
     }
 
-    /// The current (A) at the flux linkage `x` (Wb) beyond that of the magnet.
+    /// The current (A) at the flux linkage `x` (Wb) in excess of the magnet's.
     #[inline]
     pub fn current<S: Scalar>(&self, x: Vector<Rotor, S>) -> Vector<Rotor, S> {
         let (splines, sign) = self.splines(x);
@@ -135,7 +136,7 @@ impl FluxMap {
         Vector::new(i_d, self.sum(&splines, &d.value, &q.slope) * (sign / h_q))
     }
 
-    /// The energy (J) at the flux linkage `x` (Wb) beyond that of the magnet: 1.5 times the integral of i d psi from there.
+    /// The energy (J) at the flux linkage `x` (Wb) in excess of the magnet's: 1.5 times the integral of i d psi from there.
     pub fn energy(&self, x: Dq) -> f64 {
         let w = |x| {
             let (splines, _) = self.splines(x);
@@ -144,7 +145,7 @@ impl FluxMap {
         1.5 * (w(x) - w(Dq::ZERO))
     }
 
-    /// d i_d / d psi_d, d i_d / d psi_q and d i_q / d psi_q (1/H) at the flux linkage `x` (Wb) beyond that of the magnet: the
+    /// d i_d / d psi_d, d i_d / d psi_q and d i_q / d psi_q (1/H) at the flux linkage `x` (Wb) in excess of the magnet's: the
     /// inverse of the incremental inductances.
     pub fn hessian(&self, x: Dq) -> [f64; 3] {
         let (splines, sign) = self.splines(x);
@@ -154,7 +155,7 @@ impl FluxMap {
         [dd, dq, self.sum(&splines, &d.value, &q.curvature) / (h_q * h_q)]
     }
 
-    /// Whether the flux linkage `x` (Wb) beyond that of the magnet is on the grid.
+    /// Whether the flux linkage `x` (Wb) in excess of the magnet's is on the grid.
     #[inline]
     pub fn holds(&self, x: Dq) -> bool {
         (self.d_min..=self.d_max).contains(&x.d()) && x.q().abs() <= self.q_max
@@ -173,7 +174,7 @@ impl FluxMap {
         1.0 / self.knots().map(|x| eigenvalues(self.hessian(x))[1]).fold(0.0, f64::max)
     }
 
-    /// The smallest eigenvalue (1/H) of the Hessian at the flux linkage `x` (Wb) beyond that of the magnet: the inverse of the
+    /// The smallest eigenvalue (1/H) of the Hessian at the flux linkage `x` (Wb) in excess of the magnet's: the inverse of the
     /// maximum incremental inductance.
     pub fn least_curvature(&self, x: Dq) -> f64 {
         eigenvalues(self.hessian(x))[0]
@@ -203,7 +204,7 @@ pub struct Contribution {
     pub hessian: [f64; 3],
 }
 
-/// The contributions of all coefficients with an effect at the flux linkage `x` (Wb) beyond that of the magnet.
+/// The contributions of all coefficients with an effect at the flux linkage `x` (Wb) in excess of the magnet's.
 pub fn contributions(map: &FluxMap, x: Dq) -> Vec<Contribution> {
     let (([d, q], sign), [h_d, h_q]) = (map.splines(x), map.interval());
     let mut all = Vec::with_capacity(16);

@@ -145,7 +145,7 @@ impl PmsmPlant {
         longest.clamp(SHORTEST_STEP, LONGEST_STEP_DAMPED)
     }
 
-    /// The current (A) at the terminals less that of the flux linkage.
+    /// The current (A) at the terminals minus the flux linkage's.
     #[inline(never)]
     fn by_iron_at<D: Drops<f64>>(&self, state: &State, path: &Path<D>) -> Dq {
         if path.dissipation.G.is_none() {

@@ -9,9 +9,9 @@
 //! larger if the machine would leave that zone faster than the minimum substep resolves.
 //!
 //! Dead time with `inverter.i_zero` = 0: the zone follows from the ripple. A leg switches on at a current `i - r` and off at
-//! `i + r`, if i is its mean over the period; a current that changes its sign in between loses nothing, because at both instants
-//! the diode has the voltage that the switch then takes over. At each of the two instants the loss grows linearly over
-//! `W = 2 u_dc dead_time / (3 L)`: the currents that reach zero and are blocked within the dead time.
+//! `i + r`, if i is its mean over the period; a current that changes sign in between loses no voltage, because at both instants
+//! the diode already applies the voltage of the next switch. At each of the two instants the loss grows linearly over `W = 2
+//! u_dc dead_time / (3 L)`: the currents that reach zero and are blocked within the dead time.
 //!
 //! ```text
 //! loss / (share u_dc) = c((i - on) / W) - c((off - i) / W), c(x) = x limited to 0..1, on = r - (1 - b) W, off = b W - r
@@ -52,7 +52,7 @@ pub struct Legs<S = f64> {
 /// Zone of the dead time by the ripple, of each leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Ripple<S> {
-    /// Currents in A at which the loss of switching on begins, and at which that of switching off ends.
+    /// Currents in A at which the turn-on loss begins and the turn-off loss ends.
     on: Phases<S>,
     off: Phases<S>,
     /// Current in A over which they grow.
@@ -120,7 +120,7 @@ impl<S: Scalar> Legs<S> {
         Self { i_zone, ripple: Some(ripple), ..legs }
     }
 
-    /// For legs that short-circuit the machine: nothing switches, so dead time costs no voltage.
+    /// For legs that short-circuit the machine: without switching, dead time causes no voltage loss.
     #[inline]
     pub fn shorted(inverter: &Inverter) -> Self {
         let i_zone = plain(inverter).into();
@@ -167,7 +167,7 @@ impl<S: Scalar> Legs<S> {
 }
 
 impl Legs {
-    /// Voltage (V) lost at the stator with currents of these `signs` beyond the zone.
+    /// Voltage (V) lost at the stator for currents with these `signs` outside the zone.
     #[inline]
     pub fn loss_beyond(&self, signs: Phases) -> AlphaBeta {
         signs.to_stator() * self.u

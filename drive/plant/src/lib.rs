@@ -1,6 +1,6 @@
 //! The plant: machine, mechanics and inverter, and the model `PmsmPlant` built from them.
 //!
-//! It does not depend on the controller. The conventions are those of [`drive_base`].
+//! It does not depend on the controller. For conventions see [`drive_base`].
 
 #![forbid(unsafe_code)]
 // The papers' symbols keep their case: psi_M, R_s, L_d, T_s.

@@ -36,7 +36,7 @@ pub fn current(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> Dq {
     Machine::<_>::new(motor, magnetics).current(psi)
 }
 
-/// Magnetic energy in J at the flux linkage `psi` (Wb), excluding that of the magnet: 0 without current.
+/// Magnetic energy in J at the flux linkage `psi` (Wb), without the magnet's: 0 at zero current.
 #[inline]
 pub fn magnetic_energy(motor: &Motor, magnetics: Magnetics<'_>, psi: Dq) -> f64 {
     let (x, q) = (psi.d() - motor.psi_M, psi.q());
@@ -164,8 +164,8 @@ impl<'a, S: Scalar, const LINEAR: bool> Machine<'a, S, LINEAR> {
 }
 
 impl<S: Scalar, const LINEAR: bool> Machine<'_, S, LINEAR> {
-    /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The magnet's part is transformed separately, both ways, so
-    /// that zero current stays zero under a transformation.
+    /// Flux linkage (Wb) in stator axes with the magnet on `axis`. The magnet's part is transformed separately in both
+    /// directions, so that zero current stays zero.
     #[inline]
     pub fn to_stator(&self, axis: Axis<Rotor, S>, psi: Vector<Rotor, S>) -> Vector<Stator, S> {
         axis.to_stator(psi - Vector::new(self.psi_M, 0.0.into())) + axis.along(self.psi_M)

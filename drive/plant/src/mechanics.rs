@@ -5,7 +5,7 @@
 //! With an imposed speed, the external drive train integrates the motion: speed and angle are inputs, tau_e minus
 //! friction is an output, and J belongs to the drive train.
 //!
-//! Rasmussen 2006 gives the torque but not the load; the friction is that of the assumed machine. J in kg.m2, B in
+//! Rasmussen 2006 gives the torque but not the load; the friction belongs to the assumed machine. J in kg.m2, B in
 //! N.m.s/rad, torques in N.m, speeds in rad/s (mechanical).
 
 use drive_base::math::{abs, reciprocal, tanh};
@@ -63,7 +63,7 @@ impl Mechanics {
     }
 }
 
-/// Speed divided by w_coulomb up to which steps resolve the Coulomb torque; above, it is at its full value to 1e-3.
+/// Speed divided by w_coulomb up to which steps resolve the Coulomb torque; above, it is constant within 1e-3.
 const RESOLVED: f64 = 4.0;
 
 /// Minimum step in s, there and at the kinks of the inverter: it bounds the work for any parameters.

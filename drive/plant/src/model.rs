@@ -47,7 +47,7 @@ pub struct PmsmPlant {
     pub(super) kept: Kept<(Energy, Accepted)>,
     /// Temperatures and the machine at them, constant over a step.
     pub(super) warm: Warm,
-    /// Current (A) at the terminals minus that of the flux linkage, at the end of a step.
+    /// Current (A) at the terminals minus the flux linkage's, at the end of a step.
     pub(super) by_iron: Dq,
     /// Carrier and legs of the switched inverter.
     pub(super) bridge: Bridge,
@@ -110,7 +110,7 @@ impl PmsmPlant {
         (at, i)
     }
 
-    /// The current (A) at the terminals minus that of the flux linkage.
+    /// The current (A) at the terminals minus the flux linkage's.
     pub(super) fn current_by_iron(&self) -> Dq {
         let (_, i) = self.reached_with_iron();
         i - self.reached().i
@@ -171,7 +171,7 @@ impl PmsmPlant {
         (speed, 3.0_f64.sqrt() * psi_M * (f64::from(*n_p) * speed).abs())
     }
 
-    /// Measured values for a controller: bit for bit those of the outputs.
+    /// Measured values for a controller: bit for bit equal to the outputs.
     #[inline]
     pub fn measured(&self) -> Measured {
         let Instant { i, speed, angle, axis, .. } = self.reached();

@@ -16,9 +16,9 @@
 //! represent them. The outputs are therefore means over the plant's last step, integrated by the same method as the state;
 //! `energy_in`, `energy_mech` and `energy_loss` are the time integrals of the powers. A drive train that integrates
 //! tau_shaft over the angle of its shaft receives `energy_mech`. Before the first step, the powers are the initial values.
-//! In Model Exchange, where the importer integrates, the powers and tau_shaft are those of the instant, and the energies are
-//! counted over the importer's steps ([`counters`](crate::counters)). i_dc is also defined for u_dc = 0 V, where the link
-//! still carries the current of the legs connected to it: it is then the value at the end of the step.
+//! In Model Exchange, where the importer integrates, the powers and tau_shaft are instantaneous, and the energies are counted
+//! over the importer's steps ([`counters`](crate::counters)). i_dc is also defined for u_dc = 0 V, where the link still carries
+//! the current of the legs connected to it: it is then the value at the end of the step.
 //!
 //! Two events transfer energy instantly and count in the step in which they occur: a jump of the imposed angle, where
 //! the magnetic field does work on the shaft, and blocking diodes, where the energy of the remaining current is lost.

@@ -35,7 +35,7 @@ enumeration! {
 }
 
 enumeration! {
-    /// A switch that never conducts; its diode does. Values never change.
+    /// A switch that never conducts, with a working diode. Values never change.
     #[derive(Serialize, Deserialize)]
     pub enum OpenSwitch("OpenSwitch", "Switch that no longer conducts, unlike its diode") {
         1 None "All switches work";

@@ -37,8 +37,8 @@ fn check_switched(par: &PlantParameters) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Refuses a map that is in use but describes no machine: a limit of the grid with the wrong sign, saturation parameters besides
-/// the map, a current without flux linkage, or a knot at which the Hessian is not positive definite.
+/// Refuses an active map that is physically impossible: a limit of the grid with the wrong sign, saturation parameters in
+/// addition to the map, a current without flux linkage, or a knot at which the Hessian is not positive definite.
 fn check_map(parameters: &PlantParameters) -> Result<(), Fault> {
     let map = &parameters.flux_map;
     if !map.used {
@@ -97,8 +97,7 @@ fn check_network(par: &PlantParameters) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Refuses temperatures at which the machine has no resistance or no magnet; `names` are those of the temperatures of
-/// winding and magnets.
+/// Refuses temperatures at which the machine has no resistance or no magnet; `names`: the temperatures of winding and magnets.
 ///
 /// # Errors
 /// Names the temperature, its effect and the remedy.

@@ -3,9 +3,9 @@
 //! With x = psi_d - psi_M: i_d = x / L_d + s_2 x^2 + s_3 x^3 + s_dq psi_q^2 / 2, i_q = psi_q / L_q + s_dq x psi_q.
 //! Both are derivatives of one energy, so no cycle yields energy: d i_d / d psi_q = d i_q / d psi_d = s_dq psi_q.
 //!
-//! s_2 > 0 distinguishes the magnet's poles: a positive d-axis current (x > 0) sees a smaller inductance than a
-//! negative one.
-//! Limits: the polynomial is usable roughly as long as d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 is positive.
+//! s_2 > 0 distinguishes the magnet's poles: the inductance is smaller for a positive d-axis current (x > 0) than for a
+//! negative one. Limits: the polynomial is usable roughly as long as d i_d / d psi_d = 1 / L_d + 2 s_2 x + 3 s_3 x^2 is
+//! positive.
 //!
 //! Neither paper includes saturation; this polynomial was chosen because it has an energy. Flux linkages in Wb, s_2
 //! and s_dq in A/Wb2, s_3 in A/Wb3.
@@ -34,7 +34,7 @@ impl Saturation {
         s_2 == 0.0 && s_3 == 0.0 && s_dq == 0.0
     }
 
-    /// The current (A) beyond the linear machine's, with the flux linkage `psi` (Wb) beyond that of the magnet.
+    /// The current (A) in excess of the linear machine's, at the flux linkage `psi` (Wb) in excess of the magnet's.
     #[inline]
     pub fn current<S: Scalar>(&self, psi: Vector<Rotor, S>) -> Vector<Rotor, S> {
         let (x, q) = (psi.d(), psi.q());
@@ -49,7 +49,7 @@ impl Saturation {
         [by_d, self.s_dq * q, 1.0 / motor.L_q + self.s_dq * x]
     }
 
-    /// The energy (J) beyond the linear machine's at the flux linkage `psi` (Wb): 1.5 times the integral of i d psi.
+    /// The energy (J) in excess of the linear machine's at the flux linkage `psi` (Wb): 1.5 times the integral of i d psi.
     #[inline]
     pub fn energy(&self, motor: &Motor, psi: Dq) -> f64 {
         let (x, q) = (psi.d() - motor.psi_M, psi.q());

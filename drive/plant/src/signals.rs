@@ -108,7 +108,7 @@ impl PlantInputs {
         self.zip(end, |a, b| a + (b - a) * share)
     }
 
-    /// Each continuous input and that of `other` by `f`.
+    /// Combines each continuous input with the one of `other` by `f`.
     fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> PlantInputs<T> {
         let (u, v) = (&self.u, &other.u);
         PlantInputs {

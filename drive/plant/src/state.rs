@@ -55,7 +55,7 @@ pub(super) struct Instant<S = f64> {
     pub(super) angle: S,
     /// The rotor's d-axis at this angle.
     pub(super) axis: Axis<Rotor, S>,
-    /// The diodes block: there is no current at the terminals.
+    /// The diodes block: no current at the terminals.
     pub(super) idle: bool,
 }
 

@@ -21,7 +21,7 @@ use nalgebra::SVector;
 /// Maximum number of substeps in one communication step: 1000 s of simulated time.
 const MAX_SUBSTEPS: f64 = 1e7;
 
-/// Maximum electrical speed in rad/s, 160 kHz: nine times that of the fastest drives, which turn at a million rpm with one
+/// Maximum electrical speed in rad/s, 160 kHz: nine times the speed of the fastest drives, which turn at a million rpm with one
 /// pole pair. Only a diverging coupling reaches it. It bounds the work of a step for any inputs: at most 4e6 integration
 /// steps per second of its size, and 16e6 with losses.
 const FASTEST: f64 = 1e6;
@@ -280,7 +280,7 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// Whether the mechanical `speed` (rad/s) is beyond [`FASTEST`].
+    /// Whether the mechanical `speed` (rad/s) exceeds [`FASTEST`].
     #[inline]
     pub(super) fn is_too_fast(&self, speed: f64) -> bool {
         (f64::from(self.warm.motor.n_p) * speed).abs() > FASTEST
@@ -325,7 +325,8 @@ mod tests {
     use drive_base::frame::Phases;
     use fmu_core::{Block, Elapsed, Step};
 
-    /// With the gates off, the current flows back through the diodes until these block; the rest is lost in the copper.
+    /// With the gates off, the current flows back through the diodes until these block; the remaining energy is lost in the
+    /// copper.
     #[test]
     fn every_loss_is_in_the_sum() {
         let mut block = Block::<PmsmPlant>::default();

@@ -34,7 +34,7 @@ pub struct PlantParameters {
     pub inverter: Inverter,
     /// Iron loss of the machine.
     pub iron: Iron,
-    /// The winding beyond its resistance.
+    /// Winding parameters other than its resistance.
     pub winding: Winding,
     /// Temperatures and heat.
     pub thermal: Thermal,

@@ -1,8 +1,8 @@
 //! Terminals of the plant: connections to its controller, its load, its DC link and its cooling.
 //!
-//! At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum to zero with those of
-//! the connected component. Heat is positive out of the model. The terminals that the controller
-//! mirrors are in [`connection`](drive_base::connection).
+//! At the shaft and the DC link, where power leaves the model, torque and current are flows: they sum to zero with the
+//! connected component's. Heat is positive out of the model. The terminals that the controller mirrors are in
+//! [`connection`](drive_base::connection).
 
 use drive_base::connection::{PHASES, SENSOR, phases};
 use fmu_core::{Member, Terminal};

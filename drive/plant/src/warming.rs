@@ -1,6 +1,6 @@
 //! Temperatures in [`PmsmPlant`]: constant over a step, with changes at its ends.
 //!
-//! A step begins with the imposed temperatures and ends with those of the network. In Model Exchange, the imposed
+//! A step begins with the imposed temperatures and ends with the network's. In Model Exchange, the imposed
 //! temperatures act at once, and the derivatives depend on them.
 
 use crate::losses::Losses;
@@ -63,7 +63,7 @@ impl PmsmPlant {
         self.warm = Warm { at, motor, inverse, ideal, ..self.warm };
     }
 
-    /// The temperatures (K) given by parameters and `inputs`, and the names of those of winding and magnets.
+    /// The temperatures (K) given by parameters and `inputs`, and the names of the temperatures of winding and magnets.
     fn given(&self, inputs: &PlantInputs) -> (Temperatures, [&'static str; 2]) {
         match self.parameters.thermal.mode {
             ThermalMode::Imposed => (inputs.thermal.imposed, ["T_winding_imposed", "T_magnet_imposed"]),
@@ -99,8 +99,8 @@ impl PmsmPlant {
         Ok(())
     }
 
-    /// Changes the temperatures (K) between two steps. The flux linkage cannot jump, but while the diodes block it is that of
-    /// the magnets.
+    /// Changes the temperatures (K) between two steps. The flux linkage cannot jump, but while the diodes block it equals the
+    /// magnets'.
     fn change(&mut self, at: Temperatures) {
         self.take(at);
         if self.blocked {

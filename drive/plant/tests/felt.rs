@@ -7,7 +7,7 @@ use drive_plant::tables::{PARAMETERS, PlantParameters};
 use drive_plant::thermal::ThermalMode;
 use fmu_core::{Block, CompletedSteps, ContinuousTime, Elapsed, Slot, Step, Table, integrate};
 
-/// Changed values, as a factor of the start value, or as the value itself if the start value has no effect.
+/// Changed values, as factors of the start value, or absolute if the start value has no effect.
 const MOVED: &[(&str, f64)] = &[
     ("saturation.s_2", 20.0),
     ("saturation.s_3", 200.0),

@@ -46,7 +46,7 @@ fn saturating() -> FluxMap {
             *w += 4e4 * (x.powi(4) + q.powi(4) + 2.0 * x * x * q * q);
         }
     }
-    // There is no current at the flux linkage of the magnet.
+    // The current is zero at the magnet's flux linkage.
     let rest = map.current(Dq::ZERO).d();
     map.w.iter_mut().enumerate().for_each(|(m, row)| row.iter_mut().for_each(|w| *w -= rest * (m as f64 - 7.0) / 30.0));
     map
@@ -54,7 +54,7 @@ fn saturating() -> FluxMap {
 
 #[test]
 fn the_map_of_a_linear_machine_is_that_machine() {
-    // The flux linkage leaves the grid, beyond which the inductances continue.
+    // The flux linkage leaves the grid, and the inductances continue outside.
     for exchange in [false, true] {
         let map = run(exchange, |par| par.flux_map = linear(&par.motor, [-0.02, 0.01], 0.01));
         let machine = run(exchange, |_| ());

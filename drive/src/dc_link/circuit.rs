@@ -6,9 +6,9 @@
 //!
 //! u is an exponential with the time constant tau = C / (1/R + 1/R_chopper), so a stiff source requires no shorter
 //! intervals, and the integrals of u and u^2 for the energies are closed forms. The inverter's energy over the interval is
-//! known from the plant; the current for it is the smaller root of a quadratic equation. So no energy is lost between the
+//! known from the plant; the current for it is the smaller root of a quadratic equation. Thus no energy is lost between the
 //! two, and u = (U + sqrt(U^2 - 4 R P)) / 2 holds exactly in steady state. U is the voltage of the source, R its resistance,
-//! including that of the precharge while it is active.
+//! including the precharge resistance while active.
 //!
 //! With x = t / tau and s = du/dt at the start of the interval:
 //!
@@ -51,7 +51,7 @@ pub struct LinkEnergy {
 }
 
 impl LinkEnergy {
-    /// Adds those of an interval.
+    /// Adds the values of an interval.
     pub(super) fn add(&mut self, piece: &Self) {
         self.source += piece.source;
         self.resistor += piece.resistor;

@@ -11,7 +11,7 @@
 //!
 //! In Co-Simulation the link advances with each interval of the plant's steps, from the energy transferred in it (`circuit`);
 //! the plant has the voltage at the start of the interval. In Model Exchange u is a continuous state, the switching of the
-//! chopper is a state event, and the energies are those of the same circuit between two points of the solution.
+//! chopper is a state event, and the energies follow from the same circuit between two points of the solution.
 
 mod circuit;
 mod parameters;
@@ -27,7 +27,7 @@ use serde::{Deserialize, Serialize};
 /// Share of the source's voltage at which the precharge ends.
 const CHARGED: f64 = 0.95;
 
-/// Maximum number of switchings of the chopper in an interval; then it stays as it is until the end.
+/// Maximum number of switching events of the chopper in an interval; then it keeps its state until the end.
 const MAX_SWITCHINGS: u32 = 1000;
 
 /// Shift of the indicator toward the chopper's present state, so that it never stays at 0.
@@ -134,8 +134,8 @@ impl Link {
     }
 
     /// The maximum interval in s, within the remaining `h` (s) of a sample period `T_s` (s), in which the current `i_dc` (A) of
-    /// the inverter changes the voltage by at most a tenth: the inverter has the voltage at its start. A stiff source keeps
-    /// the voltage, however small the capacitor is.
+    /// the inverter changes the voltage by at most a tenth: the inverter has the voltage at its start. A stiff source keeps the
+    /// voltage constant for any capacitor.
     #[inline(never)]
     pub fn longest(&self, par: &LinkParameters, h: f64, T_s: f64, i_dc: f64) -> f64 {
         let parts = (self.circuit(par, 0.0).change(h, i_dc) / (LARGEST_CHANGE * self.u)).ceil();
@@ -180,7 +180,7 @@ impl Link {
     }
 
     /// Model Exchange: a point of the solution, when the inverter has `taken` this energy (J) since the start, on a source of
-    /// `U` (V). The losses since the last point are those of a constant power; with the voltage of the solution, the energy
+    /// `U` (V). The losses since the last point are computed for a constant power; with the voltage of the solution, the energy
     /// of the source follows from the balance, which then holds for any step and any tolerance of the solver.
     pub fn complete(&mut self, par: &LinkParameters, now: Elapsed, U: f64, taken: f64) {
         let h = now.since(self.point.time);
@@ -215,7 +215,7 @@ impl Link {
         LinkOutputs { i_source: (U - u) * source, p_chopper: u * u * chopper, ..self.outputs(u) }
     }
 
-    /// The outputs at the end of a communication step, on a source of `U` (V); before the first those of the instant.
+    /// The outputs at the end of a communication step, on a source of `U` (V); before the first step, at the instant.
     pub fn reached(&self, par: &LinkParameters, U: f64) -> LinkOutputs {
         let Self { h, charge, chopped, .. } = *self;
         if h > 0.0 {

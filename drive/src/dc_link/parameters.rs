@@ -1,4 +1,4 @@
-//! Parameters of the DC link: their table, and what is allowed.
+//! Parameters of the DC link: their table and their limits.
 
 use fmu_core::unit::{FARAD, OHM, VOLT};
 use fmu_core::{Fault, Row, Table, table};
@@ -55,7 +55,7 @@ impl LinkParameters {
     /// Checks the parts in use, on a source of `u_dc` (V) at the start, or 0 later.
     ///
     /// # Errors
-    /// Names the variable, its value and what is allowed.
+    /// States the variable, its value and the allowed range.
     pub fn validate(&self, u_dc: f64) -> Result<(), Fault> {
         let Self { dc_link, chopper } = self;
         let refuse = |get: fn(&mut Self) -> &mut f64, allowed: &str| Err(LINK.fault(self, get, allowed));

@@ -4,7 +4,7 @@
 //! i_cap,rms = I_rms sqrt(2 m (sqrt 3 / (4 pi) + cos^2 phi (sqrt 3 / pi - 9 m / 16))),  m = 2 |u| / u_dc
 //! ```
 //!
-//! I_rms is that of a phase, phi the angle from the current to the voltage: cos phi = p_in / (1.5 |u| |i|). Valid for purely
+//! I_rms is the phase current, phi the angle from the current to the voltage: cos phi = p_in / (1.5 |u| |i|). Valid for purely
 //! sinusoidal currents and a source without ripple (Kolar); it agrees with switched sine waves to 1e-4. u in V, i in A, p_in
 //! in W.
 

@@ -1,8 +1,8 @@
 //! `PmsmDriveMean` for Model Exchange: the rates of its states; the energies are states too.
 //!
-//! The ramp follows the speed reference with the bandwidth of the current loop, limited to its rate. Nothing switches, so the
+//! The ramp follows the speed reference with the bandwidth of the current loop, limited to its rate. Without switching, the
 //! model causes no events, and a solver can take long steps while inputs and limits are smooth. The Boolean outputs of the
-//! controller are those of the importer's last event.
+//! controller change only at the importer's events.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
 use crate::pmsm_drive::Means;
@@ -15,7 +15,7 @@ use fmu_core::{ContinuousTime, Elapsed, Events, Fault, Next, Outcome, State as V
 const NEWTON_METER_PER_S: Quantity = Quantity::new("TorqueRate", Unit::si("N.m/s", Exponents::mechanical(1, 2, -3, 0)));
 
 impl PmsmDriveMean {
-    /// The state with the speed reference of the loop: on the ramp, if there is one.
+    /// The state with the speed reference of the loop, ramped if a ramp is set.
     fn referred(&self) -> State {
         let ramp = self.drive.controller.speed_loop.ramp > 0.0;
         State { speed_ref: if ramp { self.state.speed_ref } else { self.inputs.speed_ref }, ..self.state }

@@ -8,7 +8,7 @@
 //! J d speed/dt = tau_e - friction - tau_load, or with mechanics.imposed speed_shaft
 //! ```
 //!
-//! tau_min and tau_max depend on speed and u_dc. Nothing is sampled, so steps can be of any length: [`advance`] is exact for x
+//! tau_min and tau_max depend on speed and u_dc. Without sampling, steps can be of any length: [`advance`] is exact for x
 //! in torque mode, and stable and of second order for the speed. The energies are the integrals of the powers; all other
 //! outputs are values at the end of the step. The estimates are the true values, the phase currents the sinusoids of i_d and
 //! i_q.
@@ -45,7 +45,7 @@ use fmu_core::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A drive in which only the torque and the shaft have dynamics.
+/// A drive with dynamics only in torque and shaft.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PmsmDriveMean {
     /// Inputs, constant over a communication step.
@@ -70,7 +70,7 @@ pub struct PmsmDriveMean {
     held: ControllerOutputs,
     /// Whether no drive can operate like this.
     impossible: Happened,
-    /// Time in s for which the torque reference has been beyond its limits.
+    /// Time in s for which the torque reference has exceeded its limits.
     clipped_for: f64,
     /// Always `None`: a drive in steady state does not commission itself.
     commissioning: Held,
@@ -124,7 +124,7 @@ struct Passed {
 /// Inputs of a point: the condition, the torque in N.m, and whether the drive is enabled.
 type Question = (Condition, f64, bool);
 
-/// Outputs: those of `PmsmDrive`, and the flux linkage.
+/// Outputs: as in `PmsmDrive`, plus the flux linkage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct MeanOutputs {
     /// Outputs of plant and controller.
@@ -164,7 +164,7 @@ impl PmsmDriveMean {
         (self.condition(state, at), state.tau, self.inputs.enable)
     }
 
-    /// The point in this state at the temperatures `at` (K); that of the last step's end is known.
+    /// The point in this state at the temperatures `at` (K); the point at the end of the last step is cached.
     fn point_at(&self, state: &State, at: Temperatures) -> Point {
         if self.known && self.question(state, at) == self.asked {
             return self.point;
@@ -173,7 +173,7 @@ impl PmsmDriveMean {
         if self.inputs.enable { at.by_reference(state.tau) } else { at.off() }
     }
 
-    /// The powers of a point at the mechanical `speed` (rad/s); the torque of a free shaft is that of the load.
+    /// The powers of a point at the mechanical `speed` (rad/s); the torque of a free shaft equals the load.
     fn powers_of(&self, point: &Point, speed: f64) -> Powers {
         if self.drive.plant.mechanics.imposed {
             return point.powers;
@@ -181,7 +181,7 @@ impl PmsmDriveMean {
         Powers { tau_shaft: self.inputs.tau_load, p_mech: self.inputs.tau_load * speed, ..point.powers }
     }
 
-    /// Whether the torque reference is beyond its limits.
+    /// Whether the torque reference exceeds its limits.
     fn is_clipped(&self) -> bool {
         let (tau_ref, [low, high]) = (self.inputs.tau_ref, self.point.limits);
         self.drive.controller.speed_loop.torque_mode && self.inputs.enable && (tau_ref > high || tau_ref < low)
@@ -191,14 +191,14 @@ impl PmsmDriveMean {
     fn plant(&self) -> PmsmPlant {
         let mut plant = PmsmPlant::default();
         plant.parameters.clone_from(&self.drive.plant);
-        // Means are those of the average inverter.
+        // Means refer to the average inverter.
         plant.parameters.inverter.pwm = Pwm::default();
         plant.inputs.thermal = self.inputs.thermal;
         plant
     }
 }
 
-/// Reason for the parameters without effect.
+/// Reason given for parameters without effect.
 const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no DC link, no limits of its current, no estimator, start, sensor, \
                                  trip, short circuit or commissioning; use PmsmDrive";
 
@@ -362,7 +362,7 @@ impl Warns for PmsmDriveMean {
 
 type S = Row<State>;
 
-/// The states beyond those of `PmsmDrive`.
+/// States that `PmsmDrive` does not have.
 const STATES: &Table<State> = table![
     S::state("tau_lag", &NEWTON_METER, "Torque of the current loop, which follows its reference", |s| { &mut s.tau }),
     S::state("speed_loop_integral", &AMPERE, "Integral part of the speed loop", |s| &mut s.integral),

@@ -1,13 +1,13 @@
 //! Torque and shaft over time: the rates of the states, and a step of any length.
 //!
-//! The speed loop is that of the controller without its samples ([`speed`](drive_control::speed)): wanted i_q = K_p (b w_ref -
-//! w) + I, dI/dt = K_i (w_ref - w). While a limit is active and the error drives I further into it, I is stopped, over a band
+//! The speed loop is the controller's, without sampling ([`speed`](drive_control::speed)): wanted i_q = K_p (b w_ref -
+//! w) + I, dI/dt = K_i (w_ref - w). While a limit is active and the error would increase the excess, I is stopped, over a band
 //! of 1 % above the limit, so that the rates are continuous. With field weakening, I follows the limit at the bandwidth of the
 //! speed loop, as in the controller.
 //!
 //! A step: in torque mode, until a limit is active, x is exactly an exponential, and its mean acts on the shaft. Otherwise x, I
 //! and the speed advance together by the Rosenbrock method of Verwer et al. 1999 (ROS2, DOI 10.1137/S1064827597326651), gamma =
-//! 1 - 1/sqrt 2: second order with any matrix, and stable however fast the lag is. With the matrix M = 1 - gamma h J,
+//! 1 - 1/sqrt 2: second order with any matrix, and stable for any lag. With the matrix M = 1 - gamma h J,
 //!
 //! ```text
 //! M k_1 = f(y),   M k_2 = f(y + h k_1) - 2 k_1,   y + h (3 k_1 + k_2)/2,   error about h (k_1 + k_2)/2
@@ -135,7 +135,7 @@ impl PmsmDriveMean {
         State { speed: speed_shaft, angle: angle_shaft + speed_shaft * h, ..state }
     }
 
-    /// A step of `h` (s) in torque mode, or disabled, on an imposed shaft: nothing is integrated.
+    /// A step of `h` (s) in torque mode, or disabled, on an imposed shaft: no integration.
     fn pass_imposed(&self, h: f64, at: Temperatures) -> Passed {
         let condition = self.condition(&self.state, at);
         let drive = self.drive.at(&condition);
@@ -207,7 +207,7 @@ impl PmsmDriveMean {
             [by * (tau - loops * (k_p * w - i)), i, w]
         };
         let lagging = |rate: f64| if exact { 0.0 } else { rate };
-        // With the gates off, the integral part decays with the lag; nothing reads it.
+        // With the gates off, the integral part decays with the lag, unused.
         let enable = self.inputs.enable;
         let of_loop = |rate: f64| if enable { rate } else { 0.0 };
         let k_1 = solve(lagging(one.tau), of_loop(one.integral), one.speed);

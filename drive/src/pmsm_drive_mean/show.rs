@@ -1,4 +1,4 @@
-//! The outputs of `PmsmDriveMean`: those of `PmsmDrive` in steady state.
+//! The outputs of `PmsmDriveMean`: the steady-state outputs of `PmsmDrive`.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
 use crate::dc_link::LinkOutputs;
@@ -15,7 +15,7 @@ use drive_plant::signals::PlantOutputs;
 use drive_plant::thermal::Temperatures;
 
 impl PmsmDriveMean {
-    /// The outputs in this state with its point and these `temperatures` (K), except those of the controller.
+    /// The outputs in this state with its point and these `temperatures` (K), except the controller's.
     pub(super) fn show(&self, state: &State, point: &Point, temperatures: Temperatures, out: &mut MeanOutputs) {
         let plant = &self.drive.plant;
         let speed = self.speed(state);
@@ -71,7 +71,7 @@ impl PmsmDriveMean {
             tau_min,
             u_share,
             weakens,
-            // Without samples, nothing trips and no sensor is lost.
+            // Without samples there are no trips, and no sensor is lost.
             short_circuit: false,
             tripped: Cause::None,
             sensor_lost: false,

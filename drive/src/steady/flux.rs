@@ -1,9 +1,10 @@
 //! Flux linkage for a terminal current in steady state.
 //!
-//! The current at the terminals is the sum of that of the flux linkage and that of the iron, i_s = i(psi) + (h + j g) psi: g = G w, and h =
-//! 0 unless the voltage is behind the flux linkage's motion. Newton's method from psi = (L_d i_d + psi_M, L_q i_q); d i/d psi is
-//! symmetric. A machine without saturation is linear, and the first step is exact: with h = 0, i_md = (i_d + g L_q (i_q - g
-//! psi_M)) / (1 + g^2 L_d L_q). Derived here from the circuit of [`iron`](drive_plant::iron). i in A, psi in Wb, g and h in 1/H.
+//! The current at the terminals is the sum of the currents of the flux linkage and of the iron, i_s = i(psi) + (h + j g) psi: g
+//! = G w, and h = 0 unless the voltage is behind the flux linkage's motion. Newton's method from psi = (L_d i_d + psi_M, L_q
+//! i_q); d i/d psi is symmetric. A machine without saturation is linear, and the first step is exact: with h = 0, i_md = (i_d +
+//! g L_q (i_q - g psi_M)) / (1 + g^2 L_d L_q). Derived here from the circuit of [`iron`](drive_plant::iron). i in A, psi in Wb,
+//! g and h in 1/H.
 
 use drive_base::frame::Dq;
 use drive_base::motor::Motor;

@@ -16,7 +16,7 @@ const SMALL: f64 = 1e-7;
 
 impl Steady {
     /// The steady temperatures (K) at the mechanical `speed` (rad/s) on a link of `u_dc` (V) with the coolant at `coolant` (K),
-    /// and the point that `find` selects under the condition, for example that of a torque at the shaft. `None` if the winding
+    /// and the point that `find` selects under the condition, for example for a given shaft torque. `None` if the winding
     /// runs away, a heated part is insulated, or `find` returns no point.
     pub fn warmed(
         &self,

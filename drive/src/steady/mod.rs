@@ -11,13 +11,13 @@
 //! ```
 //!
 //! [`Steady::new`] takes the parameters of plant and controller, [`Steady::at`] a [`Condition`]: speed, link voltage and
-//! temperatures. There, [`At::by_reference`] gives the [`Point`] of a torque reference, [`At::by_shaft`] that of a torque at the
-//! shaft, [`At::by_current`] that of a current, [`At::ends`] those of minimum and maximum torque, which over the speeds form the
-//! envelope, and [`At::off`] that with the gates off. [`Steady::warmed`] also finds the temperatures.
+//! temperatures. There, [`At::by_reference`] gives the [`Point`] of a torque reference, [`At::by_shaft`] the point of a shaft
+//! torque, [`At::by_current`] the point of a current, [`At::ends`] the points of minimum and maximum torque, which form the
+//! envelope over speed, and [`At::off`] the point with the gates off. [`Steady::warmed`] also computes the temperatures.
 //!
-//! The controller's estimates of angle and speed are exact, and nothing is injected. Dead time loses no power. The means of
-//! the inverter are those of sinusoidal currents. [`Steady::new`] has a controller without a sample period;
-//! [`Steady::sampled`] accounts for the voltage that is constant over T_s.
+//! The controller's estimates of angle and speed are exact, and nothing is injected. Dead time loses no power. The means of the
+//! inverter are computed for sinusoidal currents. [`Steady::new`] has a controller without a sample period; [`Steady::sampled`]
+//! accounts for the voltage that is constant over T_s.
 //!
 //! Units SI, peak-valued vectors; torque and power have the motor's sign.
 

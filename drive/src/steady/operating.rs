@@ -27,7 +27,7 @@ pub enum Region {
     Weakening,
     /// Maximum torque per voltage, below the current limit.
     Mtpv,
-    /// The limit of current or torque, or without field weakening that of the voltage.
+    /// The limit of current or torque, or without field weakening the voltage limit.
     Limit,
 }
 
@@ -216,7 +216,7 @@ impl<'a> At<'a> {
             sw: self.sw * amplitude,
             friction: self.friction * self.condition.speed,
         };
-        // The current of the flux linkage is that at the terminals minus that of the iron.
+        // The current of the flux linkage is the terminal current minus the iron current.
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i - e * *G);
         let requested = (i * (R + drop) + e).magnitude() / held;
         let u_share = share(requested, self.condition.u_dc);
@@ -229,7 +229,7 @@ impl<'a> At<'a> {
 
     /// Conduction loss (W) with the voltage `u` (V) at the machine and the current `i` (A) of this amplitude, and the drop along
     /// the current per ampere (Ohm). The voltage of the legs includes the drop and determines how long transistor and diode
-    /// conduct: a fixed point, whose error each iteration multiplies by about drop / u_dc.
+    /// conduct: a fixed point, where each iteration multiplies the error by about drop / u_dc.
     fn conduction(&self, u: Dq, i: Dq, amplitude: f64) -> (f64, f64) {
         let (devices, u_dc) = (&self.drive.plant.inverter.devices, self.condition.u_dc);
         let (mut loss, mut drop) = (0.0, 0.0);
@@ -263,7 +263,7 @@ impl<'a> At<'a> {
         let losses = Losses { iron, friction: self.friction * self.condition.speed, ..Losses::default() };
         let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i_m);
         let point = self.point(Point { psi, u: e, tau_e, ..Point::default() }, losses);
-        // The link supplies exactly nothing.
+        // The link supplies exactly zero power.
         Point { powers: Powers { p_in: 0.0, i_dc: 0.0, ..point.powers }, efficiency: 0.0, ..point }
     }
 

@@ -12,15 +12,15 @@
 //! iron follows the voltage: at a sample, at the end of the period, it is s G j w psi_sample e^(-jx/2).
 //!
 //! Between the samples, the flux linkage differs from its mean by r psi, with r = x^2/8 (1 - (2t/T_s)^2) minus its mean; the
-//! mean of r^2 is (4/45) (x^2/8)^2. The corresponding current adds copper loss: 2 % of that of an idle machine without
-//! saliency that turns by 0.35 rad in a period. Derived here.
+//! mean of r^2 is (4/45) (x^2/8)^2. The corresponding current adds copper loss: 2 % in an idle machine without saliency that
+//! turns by 0.35 rad in a period. Derived here.
 
 use drive_base::math::sin_cos_small;
 
 /// Maximum x at which the drive works; above, the factors stay constant.
 const MAX_TURN: f64 = 2.0;
 
-/// The factors of a sample period in which the rotor turns by x.
+/// The factors for a rotation by x per sample period.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HeldVoltage {
     /// s.

@@ -12,7 +12,7 @@ use drive_control::weakening::GREATEST_TRIM;
 /// Relative error of the voltage at which the equation is solved.
 const SMALL: f64 = 1e-10;
 
-/// Steps to the minimum voltage, each of which leaves two thirds of the interval.
+/// Steps to the minimum voltage; each reduces the interval to two thirds.
 const THIRDS: u32 = 40;
 
 impl At<'_> {
@@ -29,7 +29,7 @@ impl At<'_> {
         weakening.used && weakening.bandwidth > 0.0
     }
 
-    /// The point of the torque reference `tau` (N.m) within the voltage of the link; `at_once` is that regardless of it.
+    /// The point of the torque reference `tau` (N.m) within the voltage of the link; `at_once` ignores it.
     #[cold]
     pub(super) fn within_voltage(&self, tau: f64, at_once: Point) -> Point {
         let allowed = self.allowed();

@@ -22,7 +22,7 @@ pub(super) type Figures = [f64; 2];
 pub(super) struct Case {
     /// Name in the table.
     pub(super) option: &'static str,
-    /// A drive in which it has an effect.
+    /// A drive in which the option has an effect.
     pub(super) on: fn(Kind) -> Pair,
     /// Turns it on.
     pub(super) ask: fn(&mut Par),
@@ -141,7 +141,7 @@ pub(super) const CASES: &[Case] = &[
         on: slow,
         ask: |p| p.current.active_resistance = true,
         figures: current_error,
-        // The error over w_c, regardless of the resistance; without it, 1.5 times as much by the wrong one.
+        // The error over w_c, regardless of the resistance; without it, 1.5 times as much from the wrong one.
         acts: |_, [without, _], [with, _]| {
             let expected = 7.0 / Motor::IPMSM_2_2_KW.torque_constant() / (TAU * 200.0);
             (with / expected - 1.0).abs() < 0.1 && without > 1.4 * expected
@@ -251,7 +251,7 @@ pub(super) const CASES: &[Case] = &[
             pair
         },
         ask: |p| p.compensation.observe = true,
-        // The voltage that estimators and lock_lost use as that of the machine.
+        // The voltage that estimators and lock_lost use as the machine's voltage.
         figures: |mut pair| {
             let (mut sum, mut n) = (0.0, 0.0);
             pair.controller.model.inputs.tau_ref = 0.2;

@@ -139,8 +139,8 @@ fn no_option_is_forgotten() {
     }
 }
 
-/// The d-axis current at standstill is that of `zero_speed` with the two estimators named in its description, and zero with the
-/// others.
+/// The d-axis current at standstill comes from `zero_speed` with the two estimators named in its description, and is zero with
+/// the others.
 #[test]
 fn the_low_speed_law_is_that_of_the_flux_observers() {
     for &kind in Kind::ALL {

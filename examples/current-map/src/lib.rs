@@ -43,7 +43,7 @@ impl CurrentMap {
         (self.i_d_table, self.i_q_table) = rows.map(|(psi_d, psi_q)| currents(psi_d, psi_q)).unzip();
     }
 
-    /// The values of both tables at the flux linkages, linear between the points and beyond the outermost ones.
+    /// The values of both tables at the flux linkages, interpolated linearly and extrapolated beyond the outermost points.
     fn currents(&self) -> [f64; 2] {
         let ((row, x), (column, y)) = (place(&self.psi_d_axis, self.psi_d), place(&self.psi_q_axis, self.psi_q));
         [&self.i_d_table, &self.i_q_table].map(|table| {

@@ -35,7 +35,7 @@ fn an_fmu_may_end_itself() {
     }
 }
 
-/// With OK and without an early return, lastSuccessfulTime may deviate (FMI 3.0.2, 4.2.1); that time stands still is odd.
+/// With OK and without an early return, lastSuccessfulTime may deviate (FMI 3.0.2, 4.2.1); but time must advance.
 #[test]
 fn a_step_may_end_a_little_elsewhere() {
     let dir = tempfile::tempdir().unwrap();
@@ -45,7 +45,7 @@ fn a_step_may_end_a_little_elsewhere() {
     assert_eq!((at(&report, Level::Must), at(&report, Level::Should)), (vec![], vec!["T06a"]), "{}", listed(&report));
 }
 
-/// An FMU for Model Exchange alone need not have what co-simulation needs: functions (FMI 2.0.5, 2.3) and flags.
+/// An FMU for Model Exchange alone does not need the functions (FMI 2.0.5, 2.3) and flags of co-simulation.
 #[test]
 fn model_exchange_alone() {
     let dir = tempfile::tempdir().unwrap();
@@ -136,7 +136,7 @@ fn a_missing_library() {
     assert_eq!(at(&report, Level::Must), ["B00"], "{}", listed(&report));
 }
 
-/// Limits of this computer are no fault of the FMU: long names, few open files, another working directory.
+/// Limits of this computer are not the FMU's fault: long names, few open files, another working directory.
 #[test]
 fn our_own_errors() {
     let dir = tempfile::tempdir().unwrap();
@@ -272,8 +272,8 @@ fn a_crash_stands_out() {
     assert_eq!((violated(&report), report.fatal()), (vec!["G01a"], vec![]));
 }
 
-/// In FMI 2.0 a wrong value reference "has to return with an error" (2.0.5, 2.1.2), and a variable that is not Real says
-/// what it is, because continuous is the default (2.0.5, 2.2.7).
+/// In FMI 2.0 a wrong value reference "has to return with an error" (2.0.5, 2.1.2), and a variable that is not Real states its
+/// variability, because continuous is the default (2.0.5, 2.2.7).
 #[test]
 fn what_fmi_2_requires() {
     let dir = tempfile::tempdir().unwrap();
@@ -289,8 +289,8 @@ fn what_fmi_2_requires() {
     assert!(listed(&report).contains("variable n: is a continuous Int32 by default"), "{}", listed(&report));
 }
 
-/// An FMU that exceeds a limit of the checker is not tried, and this is no fault of the FMU: here it has more files than the
-/// checker copies.
+/// Exceeding a limit of the checker is not a fault of the FMU, which is then not run: here it has more files than the checker
+/// copies.
 #[test]
 fn our_own_limits() {
     let dir = tempfile::tempdir().unwrap();
@@ -312,7 +312,7 @@ fn our_own_limits() {
     assert!(matches!(verdict(&report, "B08p"), Verdict::Pass(_)), "{:?}", verdict(&report, "B08p"));
 }
 
-/// What can be set need not be readable before the end of the initialization of FMI 2.0; FMI 3.0 lets start values be read in
+/// A settable value need not be readable before the end of the initialization in FMI 2.0; FMI 3.0 lets start values be read in
 /// Instantiated by its table and not by its list of calls.
 #[test]
 fn what_cannot_be_read_has_no_value() {
@@ -335,7 +335,7 @@ fn the_importer_chooses_communication_points() {
     assert!(violated(&report).is_empty(), "{}", listed(&report));
 }
 
-/// An integrator that starts anew may differ by some of its tolerances, and nobody needs a text of a megabyte.
+/// A restarted integrator may deviate by a few tolerances, and a text of a megabyte is unusual.
 #[test]
 fn what_can_be_disputed_is_a_should() {
     let dir = tempfile::tempdir().unwrap();
@@ -350,7 +350,7 @@ fn what_can_be_disputed_is_a_should() {
     }
 }
 
-/// Explicit steps of a stiff model must be short: if the checker's own integrator diverges, this is no fault of the FMU.
+/// Explicit steps of a stiff model must be short: if the checker's own integrator diverges, this is not the FMU's fault.
 #[test]
 fn a_stiff_model_is_integrated_in_short_steps() {
     let dir = tempfile::tempdir().unwrap();

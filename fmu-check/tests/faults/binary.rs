@@ -107,21 +107,21 @@ const RUNNING: &[(&str, &[&str])] = &[
     // A state lacks a text.
     ("F02x", &["F02b"]),
     ("F01l", &["F01l"]),
-    // A state that is saved into an existing one.
+    // A state saved into an existing one.
     ("F01e", &["F01l"]),
     ("G_L3c", &["G-L3c"]),
     // A dependency whose factor is 0 at the start.
     ("S04h", &["S04"]),
-    // 700 bytes an instance, and memory that nobody touches.
+    // 700 bytes per instance, and memory that is never accessed.
     ("B07m", &["B07a"]),
     ("B07u", &["B07a"]),
 ];
 const RUNNING_GROUPS: [&str; 9] = ["access", "time", "L06", "L13", "F01l", "F02b", "G-L3c", "B07a", "S04"];
 
-/// Faults of both standards, invented by someone who did not know the checks.
+/// Faults of both standards, devised without knowledge of the checks.
 const INVENTED: &[(&str, &[&str])] = &[
     ("NONE", &[]),
-    // What cannot be read, is not written, or set alone only.
+    // Values that cannot be read, are not written, or can only be set alone.
     ("G15", &["G15"]),
     ("G15r", &["G15"]),
     ("G10s", &["G10"]),
@@ -139,7 +139,7 @@ const INVENTED: &[(&str, &[&str])] = &[
     ("T06i", &["T06b"]),
     ("T01s", &["T01a"]),
     ("T03l", &["T03"]),
-    // The rest of a communication step that is no whole number of internal ones is lost.
+    // The remainder of a communication step that is not a multiple of the internal step is lost.
     ("T03r", &["T03"]),
     ("T03w", &["T03"]),
     ("T01k", &["T01c"]),
@@ -179,7 +179,7 @@ const AROUND: &[(&str, &[&str])] = &[
     ("B08o", &["B08p"]),
 ];
 
-/// Faults of FMI 3.0: what only it has, and one of each group.
+/// Faults specific to FMI 3.0, and one of each group.
 const FAULTS3: &[(&str, &[&str])] = &[
     ("NONE", &[]),
     ("B02a", &["B02a"]),
@@ -221,7 +221,7 @@ fn each_fault_of_fmi_3_is_found_by_its_check() {
     all(3, FAULTS3);
 }
 
-/// Each fault is found by its check, and nothing else by those of its groups; without a fault, or without a run, by any.
+/// Each fault is found by its check, and the other checks of its group find nothing; without a fault or a run, no check does.
 fn all(version: u8, faults: &[(&str, &[&str])]) {
     let whole = |fault: &str| ["NONE", "CRASH", "L01a", "X04", "F02", "G02", "L07"].contains(&fault);
     let groups = |ids: &[&str]| {
@@ -254,10 +254,10 @@ fn each_fault_at_run_time_is_found_by_its_check() {
     for version in [2, 3] {
         all_of(version, RUNNING, &RUNNING_GROUPS);
         all_of(version, INVENTED, &INVENTED_CHECKS);
-        // What it reads there later is anything.
+        // Its later reads there return arbitrary data.
         all_of(version, &[("G05", &["G05"])], &["G05"]);
         all_of(version, AROUND, &["B08g", "B08p", "B08r"]);
-        // Alone, because the other rows would see its file come and change too.
+        // Alone, because its file would also appear in the other rows.
         all_of(version, &[("SHARED", &["B08p"])], &["B08g", "B08p", "B08r"]);
     }
     all_of(3, &[("T06e", &["T06a"])], &["time"]);
@@ -310,7 +310,7 @@ fn a_library_for_another_processor() {
     assert!(listed(&report).contains("it is for aarch64-linux, and this computer is x86_64-linux"), "{loads:?}");
 }
 
-/// Two strings of one instance have a value each.
+/// Two strings of one instance have separate values.
 #[test]
 fn two_strings_that_share_a_buffer() {
     let dir = tempfile::tempdir().unwrap();

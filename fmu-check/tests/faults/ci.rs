@@ -59,12 +59,12 @@ fn known_findings_do_not_count() {
     let (code, text, _) = run(&["--allow", "S01,X08"]);
     assert!(code == Some(0) && text.contains("VIOLATED (must, known)") && text.contains("2 known"), "{text}");
     assert_eq!(run(&["--allow", "nonsense"]).0, Some(2));
-    // A baseline knows what was found when it was written.
+    // A baseline lists the findings at the time it was written.
     assert_eq!(run(&["--write-baseline", baseline]).0, Some(1));
     let written = std::fs::read_to_string(baseline).unwrap();
     assert!(written.contains("[\"Small, FMI 2.0\"]\nmust = [\"X08\",\"S01\"]"), "{written}");
     assert_eq!(run(&["--baseline", baseline]).0, Some(0));
-    // It fails on what is new, also below must, and says so.
+    // It fails on new findings, including those below must, and reports them.
     let worse = archive(dir.path(), "worse.fmu", |xml| two_faults(xml).replace(" license=\"MIT\"", ""));
     let (code, text, _) = fmu_check(&[worse.to_str().unwrap(), "--only", STATIC, "--baseline", baseline]);
     assert!(code == Some(1) && text.contains("new: X06"), "{text}");
@@ -140,7 +140,7 @@ fn tables_of_states_are_explained() {
     assert!(!fmu_check(&["--explain", "F02a"]).1.contains("The calls"));
 }
 
-/// The summary counts what could be checked, and does not call it conformity where most could not.
+/// The summary counts the requirements that could be checked, and does not claim conformity if most could not.
 #[test]
 fn the_summary_says_how_much_was_checked() {
     let dir = tempfile::tempdir().unwrap();
@@ -148,7 +148,7 @@ fn the_summary_says_how_much_was_checked() {
     let all = pack(dir.path(), 2, "all", &binary);
     let text = check(&all, &["lifecycle"]).text(false);
     assert!(text.ends_with("not determined\nAll requirements hold.\n"), "{text}");
-    // A library that is none: hardly anything of the binary is known.
+    // A file that is not a library: almost no check of the binary is possible.
     let text = check(&pack(dir.path(), 2, "none", b"no library"), &["lifecycle", "access", "xml"]).text(false);
     let counted = text.lines().find(|line| line.ends_with(" requirements could be checked.")).expect(&text);
     let numbers: Vec<usize> = counted.split(' ').filter_map(|word| word.parse().ok()).collect();
@@ -219,7 +219,7 @@ fn calls_are_told_and_repeated() {
     let (code, text, _) = fmu_check(&[path.to_str().unwrap(), "--replay", "g01a#0"]);
     assert!(code == Some(1) && calls.iter().all(|call| text.contains(call.as_str())), "{text}");
     assert!(text.contains("# case 0") && !text.contains("# case 1"), "{text}");
-    // What a getter returned, or that it returned nothing; which instance it was; both values of a difference.
+    // The value returned by a getter, if any; the instance; both values of a difference.
     let replay = |faults: &str, id: &str, parts: &[&str]| {
         let path = pack(dir.path(), 2, faults, &compile(2, faults).unwrap());
         let (_, text, _) = fmu_check(&[path.to_str().unwrap(), "--replay", id]);

@@ -32,7 +32,7 @@ fn kelvin(offset: &str) -> String {
     format!("<UnitDefinitions><Unit name=\"K\"><BaseUnit K=\"1\"/>{display}</Unit></UnitDefinitions><LogCategories>")
 }
 
-/// A start value that is no item, and a tolerance that is not finite.
+/// A start value that is not an item, and a tolerance that is not finite.
 #[test]
 fn faults_of_starts_and_tolerances() {
     let mode = "<TypeDefinitions><SimpleType name=\"Mode\"><Enumeration><Item name=\"a\" value=\"1\"/><Item name=\"b\" value=\"4\"/>\
@@ -147,13 +147,13 @@ fn faults_of_aliases_and_clocked_states() {
     each(
         &clocked,
         &[
-            // Itself, nothing, another type, an input or a clock, and without clocks.
+            // References to itself, to nothing, to another type, to an input or a clock, and without clocks.
             (&["V15"], "previous=\"18\"", "previous=\"5\""),
             (&["V15"], "previous=\"18\"", "previous=\"99\""),
             (&["V15"], "previous=\"18\"", "previous=\"6\""),
             (&["V15"], "previous=\"18\"", "previous=\"19\""),
             (&["V15", "S02a", "S06"], " clocks=\"19\" previous=\"18\"", " previous=\"18\""),
-            // Clocks that name nothing, no clock, or itself.
+            // Clock references to nothing, to a variable that is not a clock, or to itself.
             (&["V15"], "clocks=\"19\" previous", "clocks=\"99\" previous"),
             (&["V15"], "clocks=\"19\" previous", "clocks=\"19 6\" previous"),
             (&["V15"], "clocks=\"19\" previous", "clocks=\"5\" previous"),

@@ -52,7 +52,7 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("E14", &["E14"]),
     ("E15", &["E15", "E19"]),
     ("E16", &["E16"]),
-    // Co-simulation is slower, or its time events do nothing; an instance that is freed changes the others.
+    // Co-simulation is slower, or its time events have no effect; freeing an instance changes the others.
     ("E19", &["T13", "E19"]),
     ("E19t", &["E19"]),
     ("E17f", &["E17"]),
@@ -75,7 +75,7 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("T13", &["T13"]),
 ];
 
-/// Faults of FMI 3.0: what only it has, and one of each function that differs.
+/// Faults specific to FMI 3.0, and one for each function that differs.
 const FAULTS3: &[(&str, &[&str])] = &[
     ("NONE", &[]),
     ("E03", &["E03"]),
@@ -127,7 +127,7 @@ fn all(version: u8, faults: &[(&str, &[&str])]) {
         if violated(&report) != *ids {
             return Err(format!("{fault}: {}", listed(&report)));
         }
-        // What the fault does not hide is determined.
+        // Everything not hidden by the fault is determined.
         match report.findings.iter().find(|f| matches!(f.verdict, Verdict::NotDetermined(_))) {
             Some(open) if *fault == "NONE" => Err(format!("{fault}: {open:?}")),
             _ => Ok(()),
@@ -135,7 +135,7 @@ fn all(version: u8, faults: &[(&str, &[&str])]) {
     });
 }
 
-/// Derivatives that are computed once for each time, and a start value that Model Exchange alone loses.
+/// Derivatives computed once per time, and a start value lost only in Model Exchange.
 #[test]
 fn faults_of_a_time_and_of_a_start() {
     let dir = tempfile::tempdir().unwrap();
@@ -168,7 +168,7 @@ fn each_fault_of_fmi_3_is_found_by_its_check() {
     all(3, FAULTS3);
 }
 
-/// An FMU for Model Exchange alone is run as such; what co-simulation needs does not apply to it.
+/// An FMU for Model Exchange alone is run as such; the requirements of co-simulation do not apply.
 #[test]
 fn an_fmu_without_co_simulation_is_run() {
     let dir = tempfile::tempdir().unwrap();

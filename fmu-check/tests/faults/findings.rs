@@ -41,7 +41,7 @@ fn in_memory() {
     });
     let large = |option: &&str| option.strip_prefix("size=").is_some_and(|size| size.len() >= "1000000k".len());
     let fits = options.is_some_and(|all| !all.contains(&"noexec") && all.iter().any(large));
-    // The folder may be that of another user.
+    // The folder may belong to another user.
     if fits && std::fs::create_dir_all(&own).is_ok() && tempfile::tempfile_in(&own).is_ok() {
         let _ = tempfile::env::override_temp_dir(&own);
     }

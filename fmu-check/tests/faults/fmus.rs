@@ -50,7 +50,7 @@ pub fn pack_with(dir: &Path, name: &str, xml: &str, binary: &[u8]) -> PathBuf {
     path
 }
 
-/// Looks at all rows, several at a time, because some wait; fails with what is wrong with any of them.
+/// Checks all rows, several at a time because some wait; fails with the problems of all rows.
 pub fn each<T: Sync>(rows: &[T], look: impl Fn(&T) -> Result<(), String> + Sync) {
     let (wrong, next) = (Mutex::new(Vec::new()), Mutex::new(rows.iter()));
     std::thread::scope(|scope| {

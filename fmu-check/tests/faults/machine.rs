@@ -1,4 +1,4 @@
-//! A limit of the checker and the state of this computer are no fault of the FMU.
+//! A limit of the checker and the state of this computer are not the FMU's fault.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use crate::{check, compile, listed, pack, verdict, violated};
@@ -46,7 +46,7 @@ fn the_limit_on_files_is_ours() {
     assert!(matches!(verdict(&report, "L00"), Verdict::Pass(_)), "{:?}", verdict(&report, "L00"));
 }
 
-/// A license that is missing here: the FMU says so, or its tool is one whose FMUs ask for one. Any other refusal is a finding.
+/// A license that is missing here: the FMU reports it, or its tool's FMUs need one. Any other refusal is a finding.
 #[test]
 fn a_license_is_missing() {
     let dir = tempfile::tempdir().unwrap();
@@ -105,7 +105,8 @@ fn under(name: &str, script: &str, path: &Path) -> Option<(Option<i32>, String, 
 fn a_computer_that_is_short_of_something_is_no_fault() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::set_permissions(dir.path(), PermissionsExt::from_mode(0o777)).unwrap();
-    // Another user cannot read the program where it is; a copy by this process may be busy while another thread starts one.
+    // Another user cannot read the program in its folder; a copy made by this process may be busy while another thread starts a
+    // process.
     assert!(Command::new("cp").arg(crate::PROGRAM).arg(dir.path().join("fmu-check")).status().unwrap().success());
     let Some(binary) = compile(2, "NONE") else { return };
     let path = pack(dir.path(), 2, "good", &binary);

@@ -1,6 +1,6 @@
-//! Faults that people reported in public, each made anew in a small FMU: the whole check finds it, and nothing else.
+//! Publicly reported faults, each reproduced in a small FMU: the complete check finds it and nothing else.
 //!
-//! The reports are of exporters and of FMUs of many tools. A row has the thread, the fault, and what the check finds.
+//! The reports are of exporters and of FMUs of many tools. A row lists the thread, the fault, and the expected findings.
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
 use crate::zip::{Entry, write};
@@ -23,7 +23,7 @@ type Row = (&'static str, Of, &'static str, &'static [&'static str]);
 
 /// Faults at run time.
 const RUN: &[Row] = &[
-    // Reset leaves counters as they are; an FMU is used again.
+    // Reset does not reset counters; an FMU is reused.
     ("modelica/Reference-FMUs/issues/204", Small(2), "L06e", &["L06"]),
     ("CATIA-Systems/FMPy/issues/183", Small(3), "L06", &["L06"]),
     ("CATIA-Systems/FMIKit-Simulink/issues/211", Small(2), "RESETS", &["L06", "L09b"]),
@@ -73,7 +73,7 @@ fn reported_faults_at_run_time() {
         eprintln!("there is no C compiler: not tested");
         return;
     }
-    // What the FMU with both interfaces lacks in any case is not counted, unless the row has it.
+    // Findings of the fault-free FMU with both interfaces are ignored unless the row lists them.
     let clean = |of: Of| violated(&report(dir.path(), of, "NONE"));
     let base = [Both(2), Both(3)].map(clean);
     each(RUN, |(thread, of, fault, ids)| {
@@ -134,7 +134,7 @@ const DESCRIPTIONS: &[Edit] = &[
         "variability=\"constant\" initial=\"exact\"><Real",
         &["V04a"],
     ),
-    // The variability of what is no Real.
+    // The variability of variables other than Real.
     (
         "NTNU-IHB/PythonFMU/issues/112",
         XML2,
@@ -297,7 +297,7 @@ fn reported_faults_of_descriptions() {
     }
 }
 
-/// The population has its size: 30 faults of each kind at least.
+/// The population contains at least 30 faults of each kind.
 #[test]
 fn the_population_is_large_enough() {
     assert!(RUN.len() >= 30 && DESCRIPTIONS.len() + 2 >= 30, "{} and {}", RUN.len(), DESCRIPTIONS.len());

@@ -49,7 +49,7 @@ fn the_end_is_told_and_no_step_follows() {
     let dir = tempfile::tempdir().unwrap();
     for version in [2, 3] {
         for (fault, ids) in [("ENDS", &[][..]), ("T12t", &["T12"]), ("T12e", &["L00"]), ("T12s", &["T12s"])] {
-            // FMI 3.0 has the time in the step itself: T06a looks at it.
+            // In FMI 3.0 the step itself contains the time, which T06a checks.
             if (version, fault) == (3, "T12t") {
                 continue;
             }

@@ -9,7 +9,7 @@ const GROUPS: [&str; 3] = ["clocks", "intermediate-update", "scheduled-execution
 const FAULTS: &[(&str, &[&str])] = &[
     ("NONE", &[]),
     ("K00", &["K00"]),
-    // An active clock that nobody has set.
+    // An active clock that was never set.
     ("K01", &["K01", "K02"]),
     ("K02", &["K02"]),
     // An interval, a shift, an interval that cannot be set.
@@ -63,7 +63,7 @@ fn clocks_tick_and_callbacks_come_as_they_should() {
     assert_eq!(violated(&report), ["U04"], "{}", listed(&report));
 }
 
-/// An FMU of Scheduled Execution alone is checked as that.
+/// An FMU for Scheduled Execution alone is checked as such.
 #[test]
 fn scheduled_execution_alone() {
     let dir = tempfile::tempdir().unwrap();
@@ -83,8 +83,8 @@ fn scheduled_execution_alone() {
     }
 }
 
-/// What FMI 3.0 requires or recommends holds for an FMU of Scheduled Execution alone, too: a fault of the library, or an edit of the
-/// description, and the violated checks.
+/// Requirements and recommendations of FMI 3.0 also apply to an FMU for Scheduled Execution alone: a fault of the library, or
+/// an edit of the description, and the violated checks.
 #[test]
 fn faults_of_scheduled_execution_alone() {
     const ELEMENT: &str = "<ScheduledExecution modelIdentifier=\"Small\"/>";
@@ -124,7 +124,7 @@ fn faults_of_scheduled_execution_alone() {
     );
     let xml = text.lines().filter(|line| !line.contains("<CoSimulation")).collect::<Vec<_>>().join("\n");
     let groups = ["archive", "xml", "variables", "structure"];
-    // What the description lacks in any case.
+    // Findings that the description always has.
     let lacks = violated(&check(&pack_with(dir.path(), "plain", &xml, b"no library"), &groups));
     assert!(!lacks.iter().any(|id| ["X01s", "X08", "Z04c", "X03", "V17", "V19", "X10"].contains(id)), "{lacks:?}");
     let elements = IN_ELEMENT.iter().map(|(flag, ids)| (ELEMENT, ELEMENT.replace("/>", &format!(" {flag}/>")), *ids));

@@ -13,7 +13,7 @@ pub struct Entry {
     pub mode: u32,
     pub disk: u16,
     pub crc: Option<u32>,
-    /// Size when unpacked, if that is another one.
+    /// Size when unpacked, if different.
     pub size: Option<u32>,
     pub local_name: Option<String>,
 }

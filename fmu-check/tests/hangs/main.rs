@@ -1,5 +1,5 @@
-//! FMUs whose calls do not return, and a file whose checks take seconds: both have limits in seconds, so nothing else runs beside
-//! this program, nor two of its tests at a time.
+//! FMUs whose calls do not return, and a file whose checks take seconds: both have limits in seconds, so no other program runs
+//! beside it, and its tests run one at a time.
 #![allow(missing_docs, unreachable_pub, clippy::missing_panics_doc)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 

@@ -1,4 +1,4 @@
-//! What a description must not have: start values out of range, and names, types and units that mean two things.
+//! Refuses start values out of range, and ambiguous names, types and units.
 
 use super::{Variable, VariableKind, value};
 use crate::fault::Fault;

@@ -33,7 +33,7 @@ pub(super) fn check_sizes<M: Model>(fresh: &Block<M>) -> Result<(), Fault> {
     M::TABLE.check_sizes(&mut started)
 }
 
-/// Sets the extents of every array with structural sizes at the start, and of every derivative to those of its state.
+/// Sets the extents of every array with structural sizes at the start, and of every derivative, which equal its state's.
 pub(super) fn size<M: Model>(can: &Capabilities<M>, variables: &mut [Variable]) -> Result<(), Fault> {
     if !M::TABLE.has_sizes() && !can.has_arrays() {
         return Ok(());

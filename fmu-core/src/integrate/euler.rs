@@ -1,8 +1,8 @@
 //! Euler's explicit method with a fixed step: x += s f(x) at the points k s of a grid that begins at the start of the simulation.
 //!
 //! A communication step takes the points in it, counted in integers, each with exactly the step s as weight; the remainder is
-//! left to the next step, and until then the states are those of the last point. So the states at a grid point have the same
-//! bits for any communication step. An event is handled at the grid point that follows it; it is not located.
+//! left to the next step, and until then the states keep their values at the last point. So the states at a grid point have the
+//! same bits for any communication step. An event is handled at the grid point that follows it; it is not located.
 
 use super::{MAX_INDICATORS, MAX_SUBSTEPS, arrive, check_indicators, count, crossed, handle, states};
 use crate::rules::check_number;

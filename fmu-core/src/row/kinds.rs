@@ -43,7 +43,7 @@ constructors! {
     state Local Continuous;
     /// A real output that changes at sample instants.
     discrete_output Output Discrete;
-    /// A real variable other than an output, which changes at sample instants.
+    /// A real variable that is not an output and changes at sample instants.
     discrete_local Local Discrete;
     /// A real parameter, fixed after initialization.
     parameter Parameter Fixed;
@@ -85,7 +85,7 @@ constructors! {
     float32_input Input Discrete;
     /// A real output in single precision, which changes at sample instants.
     float32_output Output Discrete;
-    /// A real variable in single precision other than an output, which changes at sample instants.
+    /// A real variable in single precision that is not an output and changes at sample instants.
     float32_local Local Discrete;
     /// A real parameter in single precision.
     float32_parameter Parameter Fixed;

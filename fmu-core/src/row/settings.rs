@@ -33,7 +33,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// The importer may set the start value of this output or local variable, before the initialization and in it. The start
-    /// value is that of the model's `Default`; [`initialize`](crate::Model::initialize) must not change it. The row of a state
+    /// value comes from the model's `Default`; [`initialize`](crate::Model::initialize) must not change it. The row of a state
     /// sets the state itself; the closure of any other row must refer to a field of the model, not to one of its outputs.
     ///
     /// # Panics
@@ -220,7 +220,7 @@ impl<W: 'static> Row<W> {
     }
 
     /// The model reads the input only while a Boolean parameter is `true` or `false`, or while an enumeration has the named
-    /// value. The description says so, with the parameter's full name.
+    /// value. The description states this, with the parameter's full name.
     ///
     /// # Panics
     /// At compile time, if the variable is not an input. Describing the model checks the parameter and the value.
@@ -240,7 +240,7 @@ impl<W: 'static> Row<W> {
     /// Other names of the variable (FMI 3.0).
     ///
     /// # Panics
-    /// At compile time, if a name is missing or is that of the row, or a display unit belongs to a variable without a unit.
+    /// At compile time, if a name is missing or equals the row's, or a display unit belongs to a variable without a unit.
     #[track_caller]
     pub const fn aliases(mut self, aliases: &'static [Alias]) -> Self {
         let mut i = 0;

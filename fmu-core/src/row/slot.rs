@@ -6,7 +6,7 @@ use crate::integer::IntegerField;
 use crate::variable::{Kind, Meta};
 use std::hash::{DefaultHasher, Hasher as _};
 
-/// A read-only value other than a text: a constant, or computed from the state.
+/// A read-only value that is not a text: a constant, or computed from the state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Constant {
     /// A real number.

@@ -1,5 +1,5 @@
-//! The calls that both standards have: from pointers to the instance's functions. Calls without pointers reach those of the
-//! [`Instance`](crate::instance::Instance) directly.
+//! The calls that both standards have: from pointers to the instance's functions. Calls without pointers go directly to the
+//! [`Instance`](crate::instance::Instance).
 
 use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, References};

@@ -192,7 +192,7 @@ fn pass<E: Exported>(
     if instance.standard != entry.standard || !entry.allowed.of_interface(life.interface()).contains(life.state()) {
         return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
     }
-    // A panic can leave a half-done step; from the Error state, only Reset, SetFMUState and Free lead out.
+    // A panic can leave a half-done step; only Reset, SetFMUState and Free leave the Error state.
     match catch_unwind(AssertUnwindSafe(|| body(Abi(instance)))) {
         Ok(Ok(())) => {
             instance.current.life.after(true, entry.next);
@@ -237,7 +237,7 @@ pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
     Fault::new(format!("a fault in the model's code (panic): {}", text.unwrap_or("no message")))
 }
 
-/// The way in which the importer makes communication steps.
+/// How the importer makes communication steps.
 #[derive(Clone, Copy)]
 pub(crate) struct Steps<'a> {
     /// They may end early.

@@ -105,7 +105,7 @@ fn changes_on_loading<M: Model>(made: &Made<M>, resources: Option<&Path>) -> Res
     let mut loaded = fresh();
     loaded.block.model.load(resources)?;
     let before = blob::write(&fresh())?;
-    // A model whose bytes vary from run to run, such as those of a hash map, cannot be compared.
+    // A model whose bytes vary from run to run, for example because of a hash map, cannot be compared.
     Ok(before == blob::write(&fresh())? && before != blob::write(&loaded)?)
 }
 
@@ -216,7 +216,7 @@ macro_rules! functions {
 /// # fn main() {}
 /// ```
 ///
-/// and without it, it does:
+/// and without it, it compiles:
 ///
 /// ```
 /// # use fmu_core::*;

@@ -1,4 +1,4 @@
-//! The C types of both standards, as far as the signatures need them.
+//! The C types of both standards that the signatures need.
 
 pub use super::callbacks::{Callbacks, Fmi3ClockUpdate, Fmi3IntermediateUpdate, Fmi3Preemption};
 pub use super::gate::{Entry, Function};
@@ -20,7 +20,7 @@ pub type References = *const u32;
 /// `fmi2String`, `fmi3String`.
 pub type Text = *const c_char;
 
-/// `fmi2CallbackFunctions`. The memory functions are not used: the model description says so
+/// `fmi2CallbackFunctions`. The memory functions are not used: the model description states this
 /// (`canNotUseMemoryManagementFunctions`).
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -41,9 +41,9 @@ pub struct Fmi2Callbacks {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct Fmi2EventInfo {
-    /// Another update is needed before time goes on.
+    /// Another update is needed before time advances.
     pub new_discrete_states_needed: Fmi2Boolean,
-    /// The simulation is to end.
+    /// The simulation must end.
     pub terminate_simulation: Fmi2Boolean,
     /// The nominal values changed; always false.
     pub nominals_of_continuous_states_changed: Fmi2Boolean,

@@ -99,7 +99,7 @@ fn a_null_pointer_is_an_error_of_its_instance_alone() {
                 assert_eq!((host.ticks(), unsafe { fmi3Reset(host.it.get()) }), (0, OK));
             }
         }
-        // Arguments without effect need no pointer.
+        // Unused arguments need no pointer.
         let it = Host::in_state(kind, 'n');
         assert_eq!(unsafe { fmi3GetIntervalDecimal(it.it.get(), null(), 0, null_mut(), null_mut()) }, OK);
         assert_eq!(unsafe { fmi3SetIntervalDecimal(it.it.get(), null(), 0, null()) }, OK);

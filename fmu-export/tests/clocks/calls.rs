@@ -3,7 +3,7 @@
 use super::*;
 
 /// A call and, for the clocks in their order, the states that allow it: i n v s in Co-Simulation and Model Exchange, i n a in
-/// Scheduled Execution, t and e allow nothing.
+/// Scheduled Execution, t and e allow no call.
 type Cell3 = (&'static str, [&'static str; 8], fn(&Host, u32) -> bool);
 
 /// FMI 3.0.2, 2.2.8.4 and 2.3: no clock has ticked.

@@ -180,7 +180,7 @@ impl Twin {
         [status, verdict(self.is(&[Step]))]
     }
 
-    /// Nor `EnterEventMode`, which does nothing where no time has passed.
+    /// The same applies to `EnterEventMode`, which has no effect if no time has passed.
     fn event(&mut self, host: &Host) -> Statuses {
         let again = self.is(&[Event]) && self.kind == Kind::Me;
         let wanted = verdict(self.is(&[Step, Continuous]) || again);

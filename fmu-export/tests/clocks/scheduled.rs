@@ -101,7 +101,7 @@ mod preemption {
     static DEPTH: AtomicI32 = AtomicI32::new(0);
     static LOCKS: AtomicU32 = AtomicU32::new(0);
 
-    /// A lock that a thread holds once.
+    /// A lock that a thread can acquire only once.
     extern "C" fn lock() {
         while DEPTH.compare_exchange(0, 1, SeqCst, SeqCst).is_err() {
             std::thread::yield_now();
@@ -195,8 +195,8 @@ mod preemption {
         unsafe { fmi3FreeInstance(it) };
     }
 
-    /// A call on a busy instance is an Error that changes nothing; a call during a callback makes the calling function fail,
-    /// whose tick has happened.
+    /// A call on a busy instance is an Error without side effects; a call during a callback makes the calling function fail
+    /// after its tick.
     #[test]
     fn two_threads_without_a_lock() {
         let mut it: InstancePointer = null_mut();

@@ -25,10 +25,10 @@ pub fn token() -> CString {
     CString::new(fmi::This::TOKEN.as_str()).unwrap()
 }
 
-/// Set in a process that leaves the library's panic hook in place.
+/// Set in a process that keeps the library's panic hook.
 pub const CHILD: &str = "FMU_EXPORT_TEST_CHILD";
 
-/// The library silences panics; a test wants to see its own.
+/// The library silences panics; a test needs its own.
 pub fn loud() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {

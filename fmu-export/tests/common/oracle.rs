@@ -57,7 +57,7 @@ pub enum Call {
     /// The importer saves a state, or restores one, possibly through bytes.
     Save,
     Restore,
-    /// It frees the instance, and makes another one.
+    /// It frees the instance and creates another one.
     New,
 }
 
@@ -74,7 +74,7 @@ pub fn bits(values: &[f64]) -> Vec<u64> {
     values.iter().map(|x| x.to_bits()).collect()
 }
 
-/// An instance as its importer has it.
+/// An instance from its importer's point of view.
 pub trait Importer {
     fn it(&self) -> InstancePointer;
 
@@ -95,12 +95,12 @@ pub trait Oracle: Clone {
     const CALLS: &'static [Call];
     const WILD: usize;
 
-    /// A new instance, and what is expected of it.
+    /// A new instance and its expected state.
     fn open(draw: &mut Draw) -> (Self::Importer, Self);
 
     fn state(&mut self) -> &mut State;
 
-    /// The next calls of a simulation, as often as they are listed.
+    /// The next calls of a simulation, weighted by repetition.
     fn next(&self) -> &'static [Call];
 
     /// Makes a call. If it fails, [`failed`](Self::failed) undoes the changes.
@@ -127,18 +127,18 @@ pub trait Oracle: Clone {
         true
     }
 
-    /// What does not belong to a saved state remains.
+    /// Everything outside a saved state remains.
     fn restored(&mut self, saved: &Self) {
         self.clone_from(saved);
     }
 
-    /// Whether the call can succeed for this model at all.
+    /// Whether the call can ever succeed for this model.
     fn can(_call: Call) -> bool {
         true
     }
 }
 
-/// Saved states, and what is expected of an instance that has one.
+/// Saved states, each with the expected state of an instance after restoring it.
 type Saved<O> = [(FmuState, Option<O>); 3];
 
 /// An instance at one call.
@@ -298,7 +298,7 @@ fn asked(name: &str, otherwise: u64) -> u64 {
 
 /// At least this number of calls, in sequences of 250.
 pub fn random_calls<O: Oracle>(calls: u64) {
-    // The library silences panics; a test wants to see its own.
+    // The library silences panics; a test needs its own.
     fmu_export::abi::quiet();
     drop(std::panic::take_hook());
     let (calls, mut draw) = (asked("FMU_CALLS", calls), Draw(asked("FMU_SEED", 1)));

@@ -29,7 +29,7 @@ impl State {
         Self::Terminated,
         Self::Error,
     ];
-    /// Those in which it can be saved.
+    /// States in which it can be saved.
     pub const SAVED: &[Self] = {
         let [saved @ .., _] = Self::ALL else { unreachable!() };
         saved

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 struct Counting;
 
 thread_local! {
-    /// Neither this start value nor dropping a number allocates.
+    /// Creating this start value or dropping a number does not allocate.
     static CALLS: Cell<u64> = const { Cell::new(0) };
     static LARGEST: Cell<usize> = const { Cell::new(0) };
 }

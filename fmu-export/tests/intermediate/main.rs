@@ -1,5 +1,5 @@
-//! Intermediate update of FMI 3.0: the importer reads and sets variables inside a communication step, and ends it; calls that
-//! are not allowed there fail, without effect on others.
+//! Intermediate update of FMI 3.0: the importer reads and sets variables inside a communication step, and ends it; forbidden
+//! calls there fail without side effects.
 #![allow(missing_docs, clippy::float_cmp, clippy::borrow_as_ptr, clippy::type_complexity)]
 #![allow(clippy::undocumented_unsafe_blocks, reason = "an importer calls C functions, rightly or not")]
 
@@ -307,7 +307,7 @@ fn the_importer_ends_a_step() {
         assert_eq!(importer.step(0.0, 0.1).status, ERROR);
         assert!(importer.errors()[0].contains("earlyReturnTime"));
     }
-    // Not allowed at instantiation: the answer does not count.
+    // Not allowed at instantiation, so the answer is ignored.
     let importer = Importer::start(false, &[], true, Box::new(|_, _| Some(0.05)));
     assert_eq!(importer.step(0.0, 0.1), Stepped { status: OK, early: false, end: 0.1 });
 }
@@ -343,13 +343,13 @@ fn only_variables_of_the_list_are_for_the_inside() {
     let importer = Importer::open(false, &[X, 88], true, silent());
     assert!(importer.it.get().is_null());
     assert!(importer.errors()[0].contains("value reference 88 does not exist"));
-    // Without a callback the list means nothing.
+    // Without a callback the list has no meaning.
     assert!(!Importer::open(false, &[X, TWICE], false, silent()).it.get().is_null());
     let importer = Importer::open(false, &[], true, silent());
     assert!(!importer.it.get().is_null());
 }
 
-/// Calls for the time between two calls fail inside one, and the step with it. Nothing is freed; a reset leads out.
+/// Calls for the time between two calls fail inside one, and the step with it. Nothing is freed; a reset recovers the instance.
 #[test]
 fn other_calls_are_refused_inside() {
     type Refused = fn(InstancePointer) -> c_int;
@@ -382,7 +382,7 @@ fn other_calls_are_refused_inside() {
             true,
             Box::new(move |it, _| {
                 assert_eq!(call(it), ERROR, "{name}");
-                // Not even the calls that lead out of Error.
+                // Not even the calls that leave the Error state.
                 assert_eq!(unsafe { fmi3Reset(it) }, ERROR, "{name}");
                 assert_eq!(get(it, X), None, "{name}");
                 unsafe { fmi3FreeInstance(it) };

@@ -6,7 +6,7 @@ use State::{Initialization, Instantiated, Step, Terminated};
 use fmu_core::draw::Draw;
 use std::fmt::Write;
 
-/// A step that is under way, in equal parts of at most 10 ms.
+/// A step in progress, in equal parts of at most 10 ms.
 #[derive(Clone, Copy)]
 struct Plan {
     t: f64,
@@ -78,7 +78,7 @@ impl Twin {
         let Inside { twin, draw, trace } = host.inside.take();
         (*self, *turn.draw, *turn.trace) = (twin, draw, trace);
         let mut plan = self.plan.take().expect("it is under way");
-        // Without a callback, all of it.
+        // Without a callback, the whole step.
         while !host.called && plan.done < plan.parts && self.part(&mut plan) {}
         if plan.done < plan.parts {
             assert!(!self.is(&[Step]) || self.model.u > 1e6, "{}", turn.trace);
@@ -196,7 +196,7 @@ impl Host {
         host
     }
 
-    /// A call inside a step; whether the step can go on.
+    /// A call inside a step; returns whether the step can continue.
     fn act(&self, twin: &mut Twin, draw: &mut Draw, trace: &mut String) -> bool {
         let it = self.it.get();
         let name = if draw.below(20) == 0 {
@@ -209,7 +209,7 @@ impl Host {
         let vr = if any { draw.of(&[TIME, U, X, TWICE, HELD]) } else { draw.of(&wanted) };
         let x = if draw.below(20) == 0 { draw.of(&[f64::NAN, 2e6]) } else { draw.of(&[0.0, 1.0, -2.5]) };
         let _ = write!(trace, " ({name} {vr} {x})");
-        // After a failed call, nothing but the end of the step leads on.
+        // After a failed call, only the end of the step is allowed.
         let good = twin.is(&[Step]);
         let (status, fits) = match name {
             "get" if vr == ON || vr == HELD => return good,

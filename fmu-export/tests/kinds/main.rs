@@ -202,7 +202,7 @@ fn lists_of_every_type_cross_the_interface() {
     }
 }
 
-/// One element out of range or of no item: nothing has changed.
+/// One element out of range or not an item: all values are unchanged.
 #[test]
 fn a_list_is_set_as_a_whole_or_not_at_all() {
     let it = started();
@@ -292,13 +292,13 @@ fn bytes_are_copied() {
         assert_eq!((step(it, 0.1), bytes(it, TX)), (OK, Ok(vec![])));
         fmi3FreeInstance(it);
     }
-    // Four bytes at the output, whose row allows three: a fault of the model that no importer sees.
+    // Four bytes at the output, whose row allows three: a fault of the model that stays invisible to importers.
     let it = started();
     assert_eq!((set_bytes(it, RX, &[0; 4]), step(it, 0.0), bytes(it, TX)), (OK, OK, Err(ERROR)));
     unsafe { fmi3FreeInstance(it) };
 }
 
-/// Sizes are checked before pointers: a page is not read, and nothing changes.
+/// Sizes are checked before pointers: a page is not read, and all values stay.
 #[test]
 fn what_is_too_large_is_refused_at_once() {
     let nowhere = NonNull::<u8>::dangling().as_ptr().cast_const();
@@ -306,7 +306,7 @@ fn what_is_too_large_is_refused_at_once() {
         let it = started();
         assert_eq!(set_bytes(it, RX, b"kept"), OK);
         let begun = Instant::now();
-        // Another value before it: all or nothing.
+        // A valid value before it: all or nothing is set.
         let (references, sizes) = ([RX, RX], [2, size]);
         let status =
             unsafe { fmi3SetBinary(it, references.as_ptr(), 2, sizes.as_ptr(), [b"no".as_ptr(), pointer].as_ptr(), 2) };

@@ -16,7 +16,7 @@ struct Twin {
     time: f64,
     model: Kinds,
     out: Outputs,
-    /// Something was set before the initialization ended, and nothing was read since.
+    /// A value was set before the initialization ended, without a read since.
     set: bool,
 }
 
@@ -138,7 +138,7 @@ impl Twin {
         let fits = n == right && self.open(false) && (!wrong || [1, 2, 3].contains(&kind));
         let (it, model) = (turn.importer.0, &mut self.model);
         self.set |= [Instantiated, Initialization].contains(&self.state);
-        // The last element is the wrong one: those before it keep their values.
+        // The last element is wrong: the elements before it keep their values.
         let status = unsafe {
             match kind {
                 0 => {
@@ -214,7 +214,7 @@ impl Twin {
 
 static CONTENT: [u8; MOST] = [7; MOST];
 
-/// Reference, size and pointer. Beyond the maximum size, nothing is read.
+/// Reference, size and pointer. Above the maximum size, nothing is read.
 fn some_bytes(turn: &mut Turn<'_, Twin>) -> (u32, usize, *const u8) {
     let nowhere = NonNull::<u8>::dangling().as_ptr().cast_const();
     let reference = turn.mostly(&[RX, RX, RX, KEY], &[TX, TITLE, COUNTS, NOBODY]);

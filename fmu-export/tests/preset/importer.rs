@@ -115,7 +115,7 @@ pub(crate) fn token(bytes: &[u8]) -> String {
     plain() + &preset::suffix(bytes)
 }
 
-/// An instance with a preset of these values, or the reason why there is none.
+/// An instance with a preset of these values, or the reason for the mismatch.
 pub(crate) fn with(way: Way, values: &[(&str, &str)]) -> Result<InstancePointer, String> {
     let text = preset::write(values.iter().copied());
     let folder = Folder::new(text.as_bytes());

@@ -27,7 +27,7 @@ pub(crate) struct All {
     fan: Fan,
     label: String,
     weights: [f64; 4],
-    /// The preset as seen by `load`.
+    /// The preset in `load`.
     seen: Resource<f64>,
     doubled: f64,
 }

@@ -6,7 +6,7 @@ use crate::oracle::{State, Statuses, Turn, verdict};
 use State::{Continuous, Event, Initialization, Instantiated, Terminated};
 use fmu_core::Elapsed;
 
-/// The turn of an instance, and what is expected of it.
+/// The turn of an instance, and its expected state.
 pub struct Attempt<'a, 'b, M: Twin> {
     pub now: &'a mut Snapshot<M>,
     pub turn: &'a mut Turn<'b, Snapshot<M>>,
@@ -67,7 +67,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
             self.now.kind.handles_events() && self.is(&[State::Step])
         };
         let wanted = verdict(may);
-        // FMI 3.0 does not allow it in Event Mode; where no time has passed, it does nothing.
+        // FMI 3.0 does not allow it in Event Mode; if no time has passed, it has no effect.
         let (again, later) = (self.is(&[Event]) && self.now.kind.version() == 3, self.now.end > self.now.settled);
         if may && (!again || later) {
             self.now.begin();
@@ -157,7 +157,7 @@ impl<M: Twin> Attempt<'_, '_, M> {
         if wanted == OK {
             self.now.show();
         }
-        // Outside of Continuous-Time Mode, equal values change nothing.
+        // Outside Continuous-Time Mode, equal values have no effect.
         if wanted == OK && (self.is(&[Continuous]) || self.now.states() != x) {
             for (state, x) in M::CAN.states().iter().zip(&x) {
                 *state.at(&mut self.now.block.model) = *x;

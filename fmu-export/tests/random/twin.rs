@@ -16,7 +16,7 @@ pub trait Twin: Model + PartialEq {
     const KINDS: &'static [Kind];
     /// References of all reals in the table, of arrays the first.
     const REALS: &'static [u32];
-    /// Variables that are set most.
+    /// The most frequently set variables.
     const SET: &'static [u32];
     /// Valid values for them.
     const VALUES: &'static [f64];
@@ -38,7 +38,7 @@ pub struct Snapshot<M: Twin> {
     pub settled: f64,
     /// States were set in Initialization Mode.
     pub stated: bool,
-    /// In Initialization Mode, the outputs are not those of these states.
+    /// In Initialization Mode, the outputs do not belong to these states.
     pub old: bool,
     pub pending: bool,
     pub fresh: bool,
@@ -176,7 +176,7 @@ impl<M: Twin> Snapshot<M> {
         self.output();
     }
 
-    /// In Co-Simulation, outputs are those of the last step or event.
+    /// In Co-Simulation, outputs come from the last step or event.
     fn output(&mut self) {
         self.block.model.output(self.elapsed, &mut self.block.out);
     }
@@ -311,7 +311,7 @@ impl<M: Twin> Snapshot<M> {
         }
     }
 
-    /// The value equals that of the variable, which cannot change now.
+    /// The value equals the variable's, which cannot change now.
     fn is_held(&mut self, index: usize, value: f64) -> bool {
         let tunes = self.state != Continuous;
         match M::TABLE.entry(&mut self.block, index) {

@@ -40,7 +40,7 @@ pub(crate) struct Snapshot {
     experiment: Option<(f64, Option<f64>)>,
     elapsed: Elapsed,
     end: f64,
-    /// Set and not yet seen by the model.
+    /// Set but not yet passed to the model.
     fresh: bool,
     block: Block<Probe>,
 }
@@ -97,7 +97,7 @@ impl Snapshot {
         self.slot(reference, |slot| if let Slot::Boolean(x) = slot { *x } else { unreachable!() })
     }
 
-    /// The value is that of a fixed parameter: in Step Mode such a set is accepted and changes nothing.
+    /// The value belongs to a fixed parameter: in Step Mode such a set is accepted without effect.
     fn is_kept(&self, version: u8, kind: Kind, reference: u32, value: Mixed) -> bool {
         match (kind, reference) {
             // -0 equals 0.
@@ -298,7 +298,7 @@ impl Reference {
         (status, bits)
     }
 
-    /// Whether the arrays can be used at all.
+    /// Whether the arrays are usable.
     fn arrays(&self, kind: Kind, references: &[u32], arrays: Arrays) -> Result<(), ()> {
         let empty = references.is_empty();
         let byte = matches!(kind, Kind::Boolean | Kind::Foreign(1 | 2));

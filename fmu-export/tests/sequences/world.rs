@@ -115,7 +115,7 @@ impl World {
         self.prints[who] = self.fingerprint(who);
     }
 
-    /// A call that this instance's standard has, with values that its types can carry.
+    /// A call of this instance's standard, with values that its types can represent.
     fn resolved(&self, who: usize, call: &Call) -> Call {
         let reference = &self.references[who];
         let version = reference.version;

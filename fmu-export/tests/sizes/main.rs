@@ -151,7 +151,7 @@ struct It(InstancePointer);
 
 impl It {
     fn new(exchange: bool) -> Self {
-        // The library silences panics; a test wants to see its own.
+        // The library silences panics; a test needs its own.
         static LOUD: Once = Once::new();
         LOUD.call_once(|| {
             fmu_export::abi::quiet();
@@ -281,8 +281,8 @@ fn references_do_not_move_with_the_sizes() {
     assert_eq!(d.variable("der(x)").unwrap().dependencies, Some(vec![X, X + 1]));
 }
 
-/// Every size, before the start and in the simulation: arrays have it from the exit on, and one value more or less is an Error
-/// that writes nothing.
+/// Every size, before the start and in the simulation: it applies to arrays from the exit on, and one value more or less is an
+/// Error without writes.
 #[test]
 fn arrays_have_the_sizes_that_were_set() {
     for (n, k) in (0..=5).flat_map(|n| (0..=4).map(move |k| (n, k))).filter(|&(n, k)| (n, k) != (5, 4)) {
@@ -333,7 +333,7 @@ fn sizes_are_judged() {
             assert!(asked < 256, "{reference} = {size}: {asked} bytes");
         }
     }
-    // The model refuses combinations that no bound expresses; then nothing has changed.
+    // The model refuses combinations that bounds cannot express, without side effects.
     let it = It::new(false);
     assert_eq!((it.enter(), it.set_sizes(&[N, K], &[5, 4]), it.exit()), (OK, OK, ERROR));
     assert_eq!(it.values(GAINS, 4), [1.0; 4]);
@@ -390,7 +390,7 @@ fn each_mode_takes_its_own_parameters() {
     let it = It::new(false);
     assert_eq!((it.set_sizes(&[N, K], &[3, 1]), it.set(GAINS, &[1.0, 2.0, 3.0]), it.begin()), (OK, OK, OK));
     assert_eq!(it.values(Y, 1), [14.0]);
-    // In Continuous-Time Mode there is none.
+    // Continuous-Time Mode has none.
     let it = It::begun(true);
     assert_eq!((unsafe { fmi3EnterContinuousTimeMode(it.0) }, it.enter()), (OK, ERROR));
 }

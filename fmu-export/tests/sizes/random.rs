@@ -15,7 +15,7 @@ struct Twin {
     block: Block<Chain>,
     time: f64,
     elapsed: Elapsed,
-    /// Something was set before the initialization, and nothing was read since.
+    /// A value was set before the initialization, without a read since.
     set: bool,
     /// The initialization is over.
     begun: bool,
@@ -182,7 +182,7 @@ impl Twin {
         let n = turn.count(expected.len());
         turn.note((reference, n));
         let known = !(self.is(&[Configuration, Reconfiguration]) && [DER_X, DER_Z].contains(&reference));
-        // Without values, there is nothing to get.
+        // Without values there is nothing to read.
         let fits = n == expected.len() && (known || n == 0);
         let (status, values) = turn.importer.get(reference, n);
         assert!(status != OK || !fits || bits(&values) == bits(&expected), "{}", turn.trace);

@@ -252,7 +252,7 @@ impl Fmu {
         update
     }
 
-    /// Updates until nothing more happens: whether states changed, and the last update.
+    /// Updates until no further update is needed; returns whether states changed, and the last update.
     pub fn settle(&self) -> (bool, Update) {
         let mut changed = false;
         for _ in 0..100 {

@@ -19,7 +19,7 @@ type Wrong = (&'static str, fn(&Fmu) -> c_int);
 const KNOWNS: [u32; 3] = [U, H, V];
 const UNKNOWNS: [u32; 6] = [DER_H, DER_V, H, E, A, V_MEAN];
 
-/// In Continuous-Time Mode at 100 points: standstill and a ball that lies on the ground among them.
+/// In Continuous-Time Mode at 100 points: including standstill and a ball lying on the ground.
 fn points(kind: Kind, mut at: impl FnMut(&Fmu, [f64; 3], &mut Draw)) {
     let mut draw = Draw(7);
     for i in 0..100 {
@@ -100,7 +100,7 @@ pub fn superposition_and_adjoint(exactness: Exactness) {
     });
 }
 
-/// Where the description lists no dependency, there is none.
+/// An unlisted dependency does not exist.
 pub fn columns_without_dependency_are_zero() {
     for kind in ME {
         points(kind, |fmu, _, _| {
@@ -153,7 +153,7 @@ pub fn knowns_of_other_modes() {
     }
 }
 
-/// Co-Simulation: derivatives at a communication point, and those of outputs with respect to time.
+/// Co-Simulation: derivatives at a communication point, and derivatives of outputs with respect to time.
 pub fn output_derivatives(exactness: Exactness) {
     for kind in CS {
         let fmu = Fmu::running(kind, 0.5);

@@ -54,7 +54,7 @@ impl Calls {
 
     /// Whether there is a function of this full name.
     pub(super) fn has(&self, name: &str) -> bool {
-        // SAFETY: only the existence of the symbol is checked; nothing is called under this type.
+        // SAFETY: only the existence of the symbol is checked; this type is never called.
         unsafe { self.library.get::<OfInstance>(name) }.is_ok()
     }
 
@@ -120,13 +120,14 @@ impl Calls {
     /// Frees an instance; `None` if the function is missing.
     ///
     /// # Safety
-    /// Nothing uses the instance or its states after this.
+    /// The instance and its states are not used afterwards.
     pub(super) unsafe fn free(&self, instance: Given<'_>) -> Option<()> {
         // SAFETY: an instance of this library or NULL; the caller promises that this is its last call.
         self.free.1.map(|f| unsafe { f(instance.0) })
     }
 
-    /// A function of an instance and nothing else. `fmi3EnterInitializationMode` takes more: see [`experiment`](Self::experiment).
+    /// A function whose only argument is the instance. `fmi3EnterInitializationMode` takes more: see
+    /// [`experiment`](Self::experiment).
     #[inline]
     pub(super) fn simple(&self, name: Simple, i: Given<'_>) -> Answer {
         if name == Simple::EnterInitializationMode && self.version == FmiVersion::V3 {
@@ -239,7 +240,7 @@ impl Calls {
     /// `FreeFMUState`: returns the content of the variable afterwards; `None` passes NULL for its address.
     ///
     /// # Safety
-    /// Nothing uses the state after this.
+    /// The state is not used afterwards.
     pub(super) unsafe fn free_state(&self, i: Given<'_>, place: Option<Given<'_>>) -> Answer<StatePointer> {
         Self::with_place(&self.free_state, i, place)
     }

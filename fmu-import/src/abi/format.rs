@@ -2,7 +2,7 @@
 //!
 //! The format is divided into conversions, and the C library formats each with its value, so the text is the same as in C.
 //! `%n`, which writes, and `%L...`, whose values have no common size, are not supported; from there on the format is copied
-//! unchanged, and the text says so.
+//! unchanged, with a note in the text.
 //!
 //! A variadic function cannot see how many arguments it was given. One case of a missing argument is certain: compilers often call
 //! the callback through the next free register, which is where the first argument would be, so its value is the callback's address.
@@ -58,7 +58,7 @@ fn low(word: u64) -> c_int {
 
 /// What `%` introduces.
 struct Conversion<'a> {
-    /// All of it, with the `%`.
+    /// The whole conversion, including the `%`.
     text: &'a [u8],
     flags: &'a [u8],
     width: Number,
@@ -97,7 +97,7 @@ fn number(rest: &mut &[u8]) -> Number {
     Number::Is(std::str::from_utf8(digits).ok().and_then(|d| d.parse().ok()).unwrap_or(i32::MAX))
 }
 
-/// The conversion at the start of `format`, which is a `%`, and the rest.
+/// The conversion at the start of `format`, which begins with `%`, and the remainder.
 fn conversion(format: &[u8]) -> (Conversion<'_>, &[u8]) {
     let mut rest = &format[1..];
     let flags = run(&mut rest, |c| b"-+ #0".contains(&c));
@@ -131,7 +131,7 @@ impl Conversion<'_> {
     /// The text of the next argument; `None` if this conversion is not supported or no argument is left.
     ///
     /// # Safety
-    /// The arguments are those of the format; one of `%s` is NULL or a C string, or as long as the precision.
+    /// The arguments match the format; an argument of `%s` is NULL, a C string, or at least as long as the precision.
     unsafe fn write(&self, arguments: &mut Arguments<'_>) -> Option<Vec<u8>> {
         let mut size = |number| match number {
             Number::None => Some(None),
@@ -228,14 +228,14 @@ unsafe fn print<T: Copy>(format: Vec<u8>, value: T) -> Option<Vec<u8>> {
 pub(super) struct Formatted {
     /// In the encoding of the format and of its arguments.
     pub(super) text: Vec<u8>,
-    /// What is certainly wrong with the format or its arguments.
+    /// Certain defects of the format or its arguments.
     pub(super) fault: Option<String>,
 }
 
 /// The text of a format and its arguments.
 ///
 /// # Safety
-/// The arguments are those of the format; one of `%s` is NULL or a C string, or as long as the precision.
+/// The arguments match the format; an argument of `%s` is NULL, a C string, or at least as long as the precision.
 pub(super) unsafe fn formatted(format: &[u8], mut arguments: Arguments<'_>) -> Formatted {
     let (mut text, mut rest, mut fault) = (Vec::new(), format, None);
     loop {

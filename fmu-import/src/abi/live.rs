@@ -69,7 +69,7 @@ pub(crate) struct Live {
     experiment: Experiment,
     /// `lastSuccessfulTime` of the last step (FMI 3.0).
     last_successful_time: f64,
-    /// Number of saved states; without one the instance cannot return to an earlier time.
+    /// Number of saved states; without any, the instance cannot return to an earlier time.
     saved: usize,
     /// FMI 2.0 before its revision 5 let the FMU keep the pointer to the callbacks.
     _callbacks: Arc<Callbacks>,
@@ -221,7 +221,7 @@ impl Live {
         outcome
     }
 
-    /// With a category, for it alone.
+    /// With a category, only for it.
     pub(crate) fn set_debug_logging(&mut self, on: bool, category: Option<&CStr>) -> Outcome {
         let list = category.map(|category| [Some(category)]);
         let list = list.as_ref().map(<[_; 1]>::as_slice);
@@ -390,7 +390,7 @@ impl Live {
         self.vector(if self.is_v2() { Vector::GetDerivatives } else { Vector::GetContinuousStateDerivatives }, dx)
     }
 
-    /// Numbers of continuous states and event indicators; `None` if only the description has them.
+    /// Numbers of continuous states and event indicators; `None` if they are only in the description.
     pub(crate) fn counts(&mut self) -> Outcome<Option<(usize, usize)>> {
         if self.is_v2() {
             return Ok(None);
@@ -437,7 +437,7 @@ impl Drop for Live {
     fn drop(&mut self) {
         if !self.instance.0.is_null() {
             trace::note(self.calls.free.0, String::new);
-            // SAFETY: the instance is alive, and nothing uses it after this.
+            // SAFETY: the instance is alive and not used afterwards.
             unsafe { self.calls.free(self.given()) };
         }
     }
@@ -460,7 +460,7 @@ pub(super) const FILL: u8 = 0xc5;
 /// A buffer for a serialized state of this `size`, followed by `more` bytes.
 ///
 /// # Errors
-/// The size is more than [`LARGEST_STATE`], or there is no memory for it.
+/// The size exceeds [`LARGEST_STATE`] or the available memory.
 pub(super) fn room(size: usize, more: usize) -> Result<Vec<u8>, String> {
     let mut bytes = Vec::new();
     if size > LARGEST_STATE || bytes.try_reserve_exact(size + more).is_err() {

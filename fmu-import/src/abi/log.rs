@@ -20,7 +20,7 @@ pub struct Message {
     pub text: String,
 }
 
-/// The messages that an instance asks its FMU for.
+/// The messages that an instance requests from its FMU.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Logging {
     /// Errors, which an FMU logs without being asked.
@@ -48,7 +48,7 @@ impl Status {
     pub const OK: Self = Self(0);
     /// The call succeeded with a warning.
     pub const WARNING: Self = Self(1);
-    /// The call did nothing; the instance remains usable.
+    /// The call had no effect; the instance remains usable.
     pub const DISCARD: Self = Self(2);
     /// The call failed; only a reset, a restored state or freeing can follow.
     pub const ERROR: Self = Self(3);
@@ -85,7 +85,7 @@ impl fmt::Debug for Status {
     }
 }
 
-/// The messages of one instance. The callbacks receive a number as the instance environment and look the log up by it: an FMU
+/// The messages of one instance. The callbacks receive a number as the instance environment and use it to look up the log: an FMU
 /// may pass another pointer, or call back after its instance was freed, so that pointer is never dereferenced.
 #[derive(Debug, Default)]
 pub(crate) struct Log(Mutex<Messages>);

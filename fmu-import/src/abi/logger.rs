@@ -116,14 +116,14 @@ mod tests {
         }
     }
 
-    /// The callback as a C program sees it.
+    /// The callback as seen from a C program.
     type Variadic = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char, ...);
 
     macro_rules! heard {
         ($format:expr $(, $argument:expr)*) => {{
             let format = CString::new($format).unwrap();
             // SAFETY: a caller of a variadic function passes its arguments where the callback reads them. As in an FMU, the
-            // compiler must not know which function is behind the pointer.
+            // compiler must not see which function the pointer refers to.
             unsafe {
                 let logger = transmute::<Logger, Variadic>(black_box(logger::<Ear> as Logger));
                 logger(ptr::null_mut(), c"x".as_ptr(), Status::OK, c"".as_ptr(), format.as_ptr() $(, $argument)*);

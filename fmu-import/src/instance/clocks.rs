@@ -1,6 +1,6 @@
-//! Clocks of an instance (FMI 3.0.2, 2.2.8): the facade generates their ticks, so that the user of an instance sees time
-//! events. Clocked variables are read and set while the clock is active; at other times, a read returns the last value, and a set
-//! value is stored until the next tick.
+//! Clocks of an instance (FMI 3.0.2, 2.2.8): the facade generates their ticks, so that users of an instance only have to handle
+//! time events. Clocked variables are read and set while the clock is active; at other times, a read returns the last value,
+//! and a set value is stored until the next tick.
 
 use super::Instance;
 use crate::abi::journal::Call;
@@ -243,7 +243,7 @@ impl Instance {
             return Ok(clocks.read.get(&reference).cloned());
         }
         let value = self.call(Call::Get, |s| s.get(base, reference, count))?;
-        // A value before the first tick is that of the initialization.
+        // Before the first tick, a value comes from the initialization.
         if clocks.phase != Phase::Start && clocks.on.contains_key(&reference) {
             clocks.read.insert(reference, value.clone());
         }

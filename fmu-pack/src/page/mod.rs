@@ -99,7 +99,7 @@ pub fn page(source: &Source<'_>) -> Result<String> {
     Ok(document(of.model_name(), POLICY, STYLE, &body))
 }
 
-/// The ranges of the inputs of a run, twice those needed, for a machine to which the author's ranges do not apply.
+/// The ranges of a run's inputs, twice as large as needed, for a machine to which the author's ranges do not apply.
 fn ranges_of(run: &PresetRun) -> Value {
     let mut ranges = Map::new();
     for (_, name, value) in &run.events {
@@ -286,7 +286,7 @@ fn plots(of: &Description) -> Value {
     plots.iter().take(PLOTS).map(|(_, curves)| json!({ "title": "", "curves": curves })).collect()
 }
 
-/// The default experiment, with its inputs held over the steps.
+/// The default experiment, with constant inputs over each step.
 fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<PresetRun> {
     let experiment = &of.experiment;
     let mut run = PresetRun {

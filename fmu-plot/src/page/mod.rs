@@ -123,7 +123,7 @@ impl Data {
     }
 }
 
-/// A value rounded by at most 1e-6 of itself, which saves a sixth of the space. The vertical axis never spans less than 2e-3 of
+/// A value rounded by at most a relative 1e-6, which saves a sixth of the space. The vertical axis never spans less than 2e-3 of
 /// its values, so the error is less than a pixel at any zoom.
 fn seen(y: f64) -> f32 {
     let bits = single(y).to_bits();

@@ -8,7 +8,7 @@ pub(super) fn bits(seed: u64, column: u64, row: u64) -> u64 {
     mix(of_column.wrapping_add(GOLDEN.wrapping_mul(row.wrapping_add(1))))
 }
 
-/// A number between 0 and 1, neither of them included: the middle of one of 2^52 intervals.
+/// A number strictly between 0 and 1: the middle of one of 2^52 intervals.
 pub(super) fn unit(bits: u64) -> f64 {
     #[expect(clippy::cast_precision_loss, reason = "52 bits and a half are exact")]
     let middle = (bits >> 12) as f64 + 0.5;

@@ -37,8 +37,8 @@ impl Dimension {
         Self(v)
     }
 
-    /// Coordinate of point `index`, in units of 2^-52. The order is that of the Gray code (Antonov and Saleev, 1979), in which
-    /// 2^k points from a multiple of 2^k on have one in each of 2^k strata, as in the sequence itself.
+    /// Coordinate of point `index`, in units of 2^-52. The points follow the Gray code (Antonov and Saleev, 1979); 2^k points
+    /// starting at a multiple of 2^k contain one in each of 2^k strata, as in the sequence itself.
     pub(super) fn coordinate(&self, index: u64) -> u64 {
         let gray = index ^ (index >> 1);
         (0..BITS).filter(|bit| gray >> bit & 1 == 1).fold(0, |x, bit| x ^ self.0[bit])

@@ -9,7 +9,7 @@
 //! sum k e^(j a k) = N / (e^(j a) - 1) = -N/2 - j N/2 cot(a/2)
 //! ```
 //!
-//! The removal of the slope is derived here; the rest is the sine fit at a known frequency of IEEE Std 1057.
+//! The removal of the slope is derived here; the sine fit at a known frequency follows IEEE Std 1057.
 
 use num_complex::Complex64;
 use std::f64::consts::TAU;

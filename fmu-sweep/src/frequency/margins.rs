@@ -1,4 +1,5 @@
-//! What is read from a frequency response: bandwidth and peak of a closed loop, margins of an open one, passivity of an impedance.
+//! Results derived from a frequency response: bandwidth and peak of a closed loop, margins of an open one, passivity of an
+//! impedance.
 //!
 //! Between two frequencies, gain in dB and unwrapped phase are linear in the logarithm of the frequency.
 
@@ -36,7 +37,7 @@ pub fn open_loop(closed: Complex64) -> Complex64 {
 /// Properties of a closed loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Passband {
-    /// Frequency (Hz) from which on the gain is 3 dB below that of the lowest frequency.
+    /// Frequency (Hz) above which the gain is 3 dB below its value at the lowest frequency.
     pub bandwidth: Option<f64>,
     /// Frequency (Hz) of the largest gain.
     pub peak_at: f64,
@@ -51,7 +52,7 @@ pub struct Margins {
     pub crossover: Option<f64>,
     /// Phase margin there in degrees, in (-90, 270]; negative: unstable, if the loop without feedback is stable.
     pub phase: Option<f64>,
-    /// Delay in s that makes the loop unstable; negative: the delay that it has too much.
+    /// Delay in s that makes the loop unstable; negative: the excess delay.
     pub delay: Option<f64>,
     /// Frequency (Hz) at which the phase is -180 degrees: of several, the one with the smallest gain margin.
     pub phase_crossover: Option<f64>,
@@ -184,13 +185,13 @@ mod tests {
         // The same from the closed loop.
         let again: Vec<_> = l.iter().map(|(f, x)| (*f, open_loop(x / (1.0 + x)))).collect();
         near(margins(&again).phase, found.phase.unwrap(), 1e-9);
-        // A delay beyond the margin: negative.
+        // A delay larger than the margin makes it negative.
         assert!(margins(&response(|s| w / s * (-s * 0.06).exp())).phase.unwrap() < 0.0);
     }
 
     #[test]
     fn two_integrators_begin_at_minus_180() {
-        // L = (s + a) k / s^2, whose phase comes from -180 deg; the principal value may be either sign of it.
+        // L = (s + a) k / s^2, whose phase starts at -180 deg; its principal value may have either sign.
         let l = response(|s| 40.0 * (s + 10.0) / (s * s) * Complex64::from_polar(1.0, -1e-9));
         assert!((phases(&l)[0] + 180.0).abs() < 5.0, "{}", phases(&l)[0]);
         let found = margins(&l);
@@ -207,7 +208,7 @@ mod tests {
         assert!((found.peak - 20.0 * peak.log10()).abs() < 0.1, "{found:?}");
         let a = 1.0 - 2.0 * zeta * zeta;
         near(found.bandwidth, w * (a + (a * a + 1.0_f64).sqrt()).sqrt() / TAU, 5e-3);
-        // Without a fall of 3 dB there is none.
+        // Without a fall of 3 dB there is no bandwidth.
         assert_eq!(band(&response(|s| 1.0 + 0.0 * s)).bandwidth, None);
     }
 

@@ -4,14 +4,14 @@
 //! measured (file `fit.rs`) until two agree. Frequencies are moved to the grid of the communication steps, so that a window also has whole
 //! sample periods of a part that samples on this grid.
 //!
-//! An FMU holds an input over a communication step h, and an importer reads outputs at its end: a continuous part sees the sine h/2
-//! late, a sampled one in time. Both agree for h to 0, so the response at h and h/2 is extrapolated, G = 2 G(h/2) - G(h), with at
-//! least 40 steps a period. The result is that of a continuous sine at the input on the signal at the output, held or not. A run at
-//! half the amplitude shows whether the system is linear there.
+//! An FMU holds an input over a communication step h, and an importer reads outputs at its end: a continuous part receives the
+//! sine h/2 late, a sampled one in time. Both agree as h tends to 0, so the response at h and h/2 is extrapolated, G = 2 G(h/2) -
+//! G(h), with at least 40 steps a period. The result describes the response of the output signal, held or not, to a continuous
+//! sine at the input. A run at half the amplitude shows whether the system is linear there.
 //!
 //! Sources: G. F. Franklin, J. D. Powell, M. Workman, Digital Control of Dynamic Systems, 3rd ed., 1998, for sampled loops; the
-//! extrapolation is Richardson's. Sines of single frequencies, settled periods left out, are what Simulink's frequency response
-//! estimator does with a sinestream.
+//! extrapolation is Richardson's. Sines of single frequencies, settled periods left out, correspond to a sinestream in
+//! Simulink's frequency response estimator.
 
 mod fit;
 mod margins;
@@ -29,14 +29,14 @@ use fmu_system::cosimulation::{CoarseSteps, Settings, Sine, SystemPlan};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// What to excite, and what to measure.
+/// Excitation and measured variables.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Excitation {
     /// The input, or tunable parameter, that gets the sine.
     pub input: String,
     /// The measured variables.
     pub outputs: Vec<String>,
-    /// A measured variable that takes the place of the input: the responses are ratios to it.
+    /// A measured variable used in place of the input: the responses are ratios to it.
     pub over: Option<String>,
     /// Variables whose largest magnitude during the measurement is reported, such as flags of limits.
     pub watch: Vec<String>,
@@ -102,9 +102,10 @@ const STEPS: f64 = 40.0;
 const SETTLED: f64 = 3e-4;
 /// Maximum number of windows, and of the settling time for which windows follow each other.
 const WINDOWS: (f64, f64) = (10.0, 500.0);
-/// Reductions of the amplitude, each to a quarter, and the change at half the amplitude that makes another one worth it.
+/// Maximum number of reductions of the amplitude, each to a quarter, and the change at half the amplitude that justifies
+/// another one.
 const REDUCTIONS: (u32, f64) = (6, 0.005);
-/// Passes that add frequencies, and the change of the response's logarithm that asks for them.
+/// Maximum number of passes that add frequencies, and the change of the response's logarithm that triggers one.
 const REFINEMENTS: usize = 2;
 const BEND: f64 = 0.15;
 /// Share of the sampling frequency up to which a sine is measured.
@@ -146,7 +147,7 @@ struct Measured {
     watched: Vec<f64>,
 }
 
-/// What all measurements have in common.
+/// Common settings of all measurements.
 struct Sweep<'a> {
     /// Records the variable that replaces the input, the outputs, then the watched variables.
     plan: SystemPlan,
@@ -161,8 +162,8 @@ impl Plan {
     /// stop. The measures of the plan are not used.
     ///
     /// # Errors
-    /// A variable does not exist or is not a number, the input cannot follow a sine, or a number is out of range. An error of a run is
-    /// that of its frequency.
+    /// A variable does not exist or is not a number, the input cannot follow a sine, or a number is out of range. An error of a
+    /// run is reported for its frequency.
     pub fn frequency_response(
         &self,
         excitation: &Excitation,
@@ -220,7 +221,8 @@ fn bends(outcomes: &[FrequencyOutcome]) -> Vec<f64> {
     let mut between = Vec::new();
     for three in points.windows(3) {
         let [(a, x), (b, y), (c, z)] = three else { continue };
-        // On a straight line of gain and phase, the middle is the geometric mean; the sign of its root is that of the middle.
+        // On a straight line of gain and phase, the middle is the geometric mean; the sign of its root is chosen to match the
+        // middle.
         let share = (b / a).ln() / (c / a).ln();
         let straight = x * ((z / x).ln() * share).exp();
         if (y / straight).ln().norm() > BEND {
@@ -288,7 +290,7 @@ impl Sweep<'_> {
         Ok(all)
     }
 
-    /// Whether a run is possible at all.
+    /// Checks that a run is possible.
     fn runnable(&self, tone: Tone) -> Result<(), Error> {
         let sine = Sine { amplitude: 1.0, frequency: tone.frequency(), zero: 0.0 };
         Ok(self.plan.excited(&self.port, sine, self.plan.settings(), CoarseSteps::default()).map(drop)?)

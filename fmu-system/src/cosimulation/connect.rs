@@ -85,7 +85,7 @@ impl System {
         Ok(self.parts.0[port.instance].description().measured(variable))
     }
 
-    /// Connects every input that nothing feeds to the output of the same name of another FMU; returns the connections.
+    /// Connects every unconnected input to the output of the same name of another FMU; returns the connections.
     ///
     /// # Errors
     /// Several FMUs have the output.

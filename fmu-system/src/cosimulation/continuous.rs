@@ -1,8 +1,8 @@
 //! Model Exchange: the master integrates all FMUs of a system as one, [`Fmus`](super::coupled::Fmus).
 //!
-//! Outputs are passed on to continuous inputs until nothing changes; a point of a schedule is an event. FMUs for Co-Simulation
-//! in the system step from one communication point to the next: between two points, the other FMUs receive their outputs at the
-//! first point. A communication point is an event of all FMUs.
+//! Outputs are propagated to continuous inputs until all values are stable; a point of a schedule is an event. FMUs for
+//! Co-Simulation in the system step from one communication point to the next: between two points, the other FMUs receive their
+//! outputs at the first point. A communication point is an event of all FMUs.
 
 use super::coupled::{Equations, Feed};
 use super::exchange::{Exchange, Inputs};

@@ -1,7 +1,7 @@
 //! FMUs for Model Exchange as one system of differential equations with events.
 //!
-//! At every evaluation, all FMUs receive time and states, and a [`Feed`] sets their continuous inputs. Discrete inputs are set in
-//! event mode alone. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of
+//! At every evaluation, all FMUs receive time and states, and a [`Feed`] sets their continuous inputs. Discrete inputs are set
+//! only in event mode. At an event of any FMU, all FMUs enter event mode; the feed passes values on before the first update of
 //! discrete states, and after each (FMI 2.0.5, 3.2; FMI 3.0.2, 3.2). FMUs for Co-Simulation among them are skipped.
 
 use super::exchange::Inputs;
@@ -13,7 +13,7 @@ use std::ops::Range;
 
 /// Sets the inputs of FMUs for Model Exchange.
 pub trait Feed {
-    /// Sets inputs at the time `t` (s) until nothing changes; returns whether a discrete input has changed.
+    /// Sets inputs at the time `t` (s) until all values are stable; returns whether a discrete input has changed.
     ///
     /// # Errors
     /// An FMU refuses, or the inputs do not settle.

@@ -44,7 +44,7 @@ impl Fmus<'_> {
 
     /// Event mode at the time `at` (s), and back to step mode. After the initialization, the instances are in event mode.
     fn event(&mut self, at: f64, initial: bool) -> Result<(), Error> {
-        // The time of the event itself where a communication point differs only by rounding, so that schedules give the same
+        // The time of the event itself if a communication point differs from it only by rounding, so that schedules give the same
         // bits at any communication step.
         let next = self.with_events.iter().filter_map(|&i| self.outcomes[i].next);
         let t = next.filter(|next| (next - at).abs() <= self.near).fold(f64::INFINITY, f64::min);
@@ -120,7 +120,7 @@ impl Fmus<'_> {
             }
             (goal, h) = (time, time - t);
             if h <= self.near {
-                // An instance returned at its start time: those that stepped go back.
+                // An instance returned at its start time: the others go back.
                 for (index, time) in came.iter().enumerate() {
                     if let Some(time) = time.filter(|time| *time > goal + self.near) {
                         self.go_back(index, time, goal, saved)?;

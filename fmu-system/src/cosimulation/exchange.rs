@@ -18,7 +18,7 @@ enum Place {
         slot: usize,
         conversion: Option<Conversion>,
     },
-    /// A variable that is read alone.
+    /// A variable read individually.
     Single {
         instance: usize,
         slot: usize,
@@ -32,14 +32,14 @@ enum Place {
 struct Traffic {
     read: Vec<u32>,
     read_singly: Vec<Port>,
-    /// Numbers of variables in `read` and `read_singly` that feed inputs: these come first.
+    /// Numbers of variables in `read` and `read_singly` that feed inputs, which come first.
     feeding: [usize; 2],
     /// Values of `read`, read last.
     values: Vec<f64>,
     /// Values of `read_singly`, read last; `None` while the clock of one has not ticked.
     others: Vec<Option<Values>>,
     write: Vec<(u32, Place)>,
-    /// Clocks come last: a tick finds the values of its variables.
+    /// Clocks come last: at a tick, the values of its variables are already set.
     write_singly: Vec<(Port, Place)>,
     /// Numbers of variables in `write` and `write_singly` that are continuous: these come first.
     continuous: [usize; 2],
@@ -48,7 +48,7 @@ struct Traffic {
     buffer: Vec<f64>,
     /// Values of `write_singly`, written last.
     singles: Vec<Option<Values>>,
-    /// Inputs over time other than single numbers, and the index of the value written last.
+    /// Inputs over time that are not single numbers, and the index of the value written last.
     held: Vec<(Port, Held, Option<usize>)>,
 }
 
@@ -81,7 +81,7 @@ pub(super) struct Unsettled {
     pub(super) reference: u32,
     /// Instance and reference of its source, if both are continuous double-precision numbers.
     pub(super) source: Option<(usize, u32)>,
-    /// Change of the input for a change of what feeds it: not 1 between different units.
+    /// Change of the input per change of its source; not 1 between different units.
     pub(super) factor: f64,
 }
 
@@ -95,7 +95,7 @@ pub enum Inputs {
 }
 
 impl Exchange {
-    /// `texts` are recorded, too, elsewhere; here they are read while their clocks are active.
+    /// `texts` are also recorded elsewhere; here they are read while their clocks are active.
     pub(super) fn new<'a>(
         instances: usize,
         wiring: &Wiring,
@@ -104,7 +104,7 @@ impl Exchange {
     ) -> Self {
         let mut traffic: Vec<Traffic> = (0..instances).map(|_| Traffic::default()).collect();
         let fed = |port: &Port| wiring.feeds.iter().find(|feed| feed.target == *port).map(|feed| &feed.source);
-        // A fed input need not be read: its value is known here, unless what feeds it may have none yet.
+        // A fed input need not be read: its value is known here, unless its source may have none yet.
         let origin = |record: &Record| match fed(&record.port) {
             Some(source) if !source.may_lack() && record.change.is_none() => source.clone(),
             _ => Source::Port(record.port.clone(), record.change.clone()),
@@ -184,7 +184,7 @@ impl Exchange {
         }
     }
 
-    /// A run begins: no value is held or has been written.
+    /// Start of a run: no value is held or has been written.
     pub(super) fn begin(&mut self) {
         self.since = None;
         for t in &mut self.traffic {
@@ -239,7 +239,7 @@ impl Exchange {
                 if new != Values::Booleans(vec![true]) || instance.is_active(port.reference) {
                     continue;
                 }
-                // A tick brings values also where they are those of the last one.
+                // A tick transfers values even if they equal those of the last one.
                 let on_it = |(other, _): &&(Port, Place)| other.clocks.contains(&port.reference);
                 for (other, place) in traffic.write_singly.iter().filter(on_it) {
                     if let Some(values) = self.values(place, other, t)? {
@@ -271,9 +271,9 @@ impl Exchange {
         Ok(changed)
     }
 
-    /// Passes outputs on to inputs until nothing changes: an output may depend on an input, through several FMUs. A loop of
-    /// continuous inputs is solved. FMUs for Co-Simulation are excluded: they exchange values at communication points. Returns
-    /// whether a discrete input changed.
+    /// Propagates outputs to inputs until all values are stable: an output may depend on an input, through several FMUs. A loop
+    /// of continuous inputs is solved. FMUs for Co-Simulation are excluded: they exchange values at communication points.
+    /// Returns whether a discrete input changed.
     pub(super) fn settle(&mut self, instances: &mut [Instance], t: f64, inputs: Inputs) -> Result<bool, Error> {
         if inputs == Inputs::Continuous && self.traffic.iter().all(|traffic| traffic.continuous == [0, 0]) {
             return Ok(false);
@@ -368,8 +368,9 @@ impl Exchange {
         inputs.iter().map(|input| self.traffic[input.index].buffer[input.slot]).collect()
     }
 
-    /// Passes outputs on to inputs once, as at a communication point; while a clock is active, until nothing changes: what is on
-    /// it depends on the inputs of the same instant. Returns whether a discrete input of one of these instances changed.
+    /// Propagates outputs to inputs once, as at a communication point; while a clock is active, until all values are stable,
+    /// because clocked variables depend on the inputs of the same instant. Returns whether a discrete input of one of these
+    /// instances changed.
     pub(super) fn pass_on_once(&mut self, instances: &mut [Instance], t: f64, of: &[usize]) -> Result<bool, Error> {
         let mut discrete = false;
         for _ in 0..self.fed + 2 {
@@ -469,7 +470,7 @@ impl Exchange {
         }
     }
 
-    /// The values at a place, as those of a target; `None` if there are none yet.
+    /// The values at a position, converted for a target; `None` if there are none yet.
     fn values(&self, place: &Place, target: &Port, t: f64) -> Result<Option<Values>, Error> {
         let found = match place {
             Place::Single { instance, slot, change: None } => self.traffic[*instance].others[*slot].clone(),

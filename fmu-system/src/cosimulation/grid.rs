@@ -16,7 +16,7 @@ pub struct Settings {
     pub sequential: bool,
 }
 
-/// Steps of another length before those of the settings.
+/// Initial steps of another length than in the settings.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CoarseSteps {
     /// Their number.
@@ -25,7 +25,7 @@ pub struct CoarseSteps {
     pub step: f64,
 }
 
-/// What happens so short before a communication point, as a share of the step, counts as at that point.
+/// An event this close before a communication point, as a share of the step, counts as at that point.
 pub(super) const EARLY: f64 = 0.01;
 
 /// The communication points of a run.
@@ -35,7 +35,7 @@ pub(super) struct Grid {
     steps: u32,
     /// Longer steps at the beginning.
     approach: CoarseSteps,
-    /// Relative tolerance for the solvers inside the FMUs; otherwise that of the default experiment of each.
+    /// Relative tolerance for the solvers inside the FMUs; by default the tolerance of each default experiment.
     pub(super) tolerance: Option<f64>,
     /// Steps end where inputs jump.
     pub(super) meets: bool,

@@ -1,7 +1,7 @@
 //! Algebraic loops: continuous inputs that depend on each other through outputs at one instant.
 //!
-//! Newton's method on u = G(u), where G passes the outputs on once; the derivatives of outputs with respect to inputs come from the
-//! FMUs, or from differences where an FMU has none.
+//! Newton's method on u = G(u), where G propagates the outputs once; the derivatives of outputs with respect to inputs come
+//! from the FMUs, or from differences if an FMU provides none.
 
 use super::exchange::{Exchange, Unsettled};
 use fmu_import::{Error, Instance};

@@ -25,8 +25,8 @@ impl Default for Method {
     }
 }
 
-/// Settings of Model Exchange. The settings after the solver are for tests of FMUs: if the FMUs are right, results do not
-/// depend on them beyond the solver's tolerance.
+/// Settings of Model Exchange. The settings after the solver are for testing FMUs: with correct FMUs, they change results only
+/// within the solver's tolerance.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Integration {
     /// How states are integrated.

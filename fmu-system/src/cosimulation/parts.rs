@@ -18,7 +18,7 @@ pub(super) struct Port {
     pub(super) base: BaseType,
     /// Number of elements of the variable; 1 for a scalar.
     pub(super) count: usize,
-    /// The element that it is, if it is one of an array.
+    /// The element of an array, if it is one.
     pub(super) element: Option<usize>,
     /// The clocks of the variable, by value reference.
     pub(super) clocks: Vec<u32>,
@@ -166,7 +166,8 @@ impl Parts {
         part.description().variable(name).or_else(|| Some(part.element(name)?.0)).ok_or_else(none)
     }
 
-    /// Whether a port is an input clock that the FMU asks the importer to tick: it may then tick a triggered clock of another FMU.
+    /// Whether a port is an input clock whose ticks the FMU requests from the importer: it may then tick a triggered clock of
+    /// another FMU.
     pub(super) fn is_timed_clock(&self, port: &Port) -> bool {
         let timing = self.variable(port.instance, &port.name).ok().and_then(|v| v.timing);
         timing.is_some_and(|timing| timing.ticks != IntervalVariability::Triggered)

@@ -1,7 +1,7 @@
 //! A system prepared for many runs.
 //!
 //! A [`SystemPlan`] contains the data shared by all runs and threads. A [`Worker`] owns its instances and runs one setting after
-//! another: it resets its instances where that works and creates new ones after an error.
+//! another: it resets its instances if possible and creates new ones after an error.
 //!
 //! ```no_run
 //! # fn main() -> Result<(), fmu_import::Error> {
@@ -230,7 +230,7 @@ impl SystemPlan {
         })
     }
 
-    /// Size of the values of an input, written `instance.variable`: the largest of its nominal value, 1 without one, and of the
+    /// Size of the values of an input, written `instance.variable`: the maximum of its nominal value (1 by default) and the
     /// values set or fed over time.
     ///
     /// # Errors
@@ -259,9 +259,9 @@ impl SystemPlan {
         })
     }
 
-    /// The system together with a copy of it, without connections between the two; the columns are those of the system, then
-    /// those of the copy. FMUs for Model Exchange of both are integrated in the same steps. The results of two near values then
-    /// differ by these values alone and not by the solver's choice of steps.
+    /// The system together with a copy of it, without connections between the two; the system's columns come first, then the
+    /// copy's. FMUs for Model Exchange of both are integrated in the same steps. The results for two close values then differ
+    /// only because of the values, and not because of the solver's choice of steps.
     #[must_use]
     pub fn with_copy(&self) -> Self {
         let count = self.parts.0.len();
@@ -300,7 +300,7 @@ impl SystemPlan {
         self.grid.settings()
     }
 
-    /// The name of an FMU that allows only one instance per process, if there is one; then there is one worker.
+    /// The name of an FMU, if any, that allows only one instance per process; there is then one worker.
     pub fn only_one_instance(&self) -> Option<&str> {
         let flag = |interface: &Interface| interface.flag("canBeInstantiatedOnlyOncePerProcess");
         let interface = |part: &Part| match part.kind {

@@ -1,10 +1,10 @@
-//! A communication point of a run, and the last one.
+//! A communication point of a run.
 
 use super::exchange::Exchange;
 use fmu_import::{Error, Instance, Message, Number};
 use std::ops::ControlFlow;
 
-/// A communication point as seen by a hook: outputs are read, inputs are set, the step has not been taken.
+/// A communication point passed to a hook: outputs are read, inputs are set, the step has not been taken.
 pub struct CommunicationPoint<'a> {
     /// Number of the point, from 0.
     pub index: u32,

@@ -116,7 +116,7 @@ impl Recording {
         out.finish()
     }
 
-    /// The last values as a table, with the display unit where there is one.
+    /// The last values as a table, with the display unit, if any.
     pub fn last_values(&self) -> String {
         // Longer names of other tools misalign only their own row.
         let texts = || self.texts.iter().filter_map(|c| Some((c.name.as_str(), c.values.last()?)));
@@ -139,7 +139,7 @@ impl Recording {
     }
 }
 
-/// The name of the value `x` among those of an enumeration.
+/// The name of the value `x` of an enumeration.
 pub fn item(items: &[(i64, String)], x: f64) -> Option<&str> {
     #[expect(clippy::cast_precision_loss, reason = "as in the column")]
     let named = items.iter().find(|(value, _)| (*value as f64).to_bits() == x.to_bits());

@@ -10,11 +10,11 @@ use super::{continuous, events};
 use fmu_import::{Error, Instance, Kind, Number};
 use std::ops::ControlFlow;
 
-/// Fractions of a step down to which a discarded one is taken in halves.
+/// Minimum fraction of a step when a discarded one is repeatedly halved.
 const HALVES: u32 = 10;
 
-/// Simulates instances whose values are set, from start to stop. `hook` sees every communication point, the last one included,
-/// and may end the run. All runs begin and end here.
+/// Simulates instances whose values are set, from start to stop. `hook` is called at every communication point, including the
+/// last one, and may end the run. All runs begin and end here.
 pub(super) fn simulate(
     method: &Method,
     instances: &mut [Instance],
@@ -143,7 +143,7 @@ fn step(
 }
 
 impl System {
-    /// Simulates from start to stop. `hook` sees every communication point, the last one included, and may end the run.
+    /// Simulates from start to stop. `hook` is called at every communication point, including the last one, and may end the run.
     ///
     /// # Errors
     /// The settings are invalid, or an FMU refuses.

@@ -9,7 +9,7 @@ use std::fmt;
 pub struct Schedule {
     points: Vec<(f64, f64)>,
     linear: bool,
-    /// Unit of each value, if any has a unit; empty means that of the variable.
+    /// Unit of each value, if any has a unit; empty means the variable's unit.
     units: Vec<String>,
     /// Added to the values.
     sine: Option<Sine>,
@@ -94,7 +94,7 @@ impl Schedule {
         Ok(Self { points, units: Vec::new(), ..self })
     }
 
-    /// Whether values have a unit other than that of the variable.
+    /// Whether values have a unit that differs from the variable's.
     pub(crate) fn has_units(&self) -> bool {
         !self.units.is_empty()
     }
@@ -104,7 +104,7 @@ impl Schedule {
         Self { points: self.points.iter().map(|(t, x)| (*t, conversion.apply(*x))).collect(), ..self }
     }
 
-    /// With these units of the values, if there is one.
+    /// With these units of the values, if any.
     fn with_units(self, units: Vec<String>) -> Self {
         let units = if units.iter().all(String::is_empty) { Vec::new() } else { units };
         Self { units, ..self }
@@ -221,7 +221,7 @@ mod tests {
         for (t, base) in [(0.025, 1.0), (0.525, 3.0), (1.025, 3.0)] {
             assert!((steps.at(t) - base - 2.0).abs() < 1e-12, "{}", steps.at(t));
         }
-        // A step holds until its event; the sine goes on.
+        // A step is constant until its event; the sine continues.
         assert!((steps.held(0.0, 0.525) - 3.0).abs() < 1e-12);
         assert_eq!(steps.jumps().collect::<Vec<_>>(), [0.5]);
     }

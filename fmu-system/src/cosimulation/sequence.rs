@@ -15,7 +15,7 @@ const EXACT: f64 = 9_007_199_254_740_992.0;
 pub struct Sequence {
     /// Time (s), text, and its location in the file.
     points: Vec<(f64, String, String)>,
-    /// Unit of all values; empty means that of the variable.
+    /// Unit of all values; empty means the variable's unit.
     unit: String,
 }
 
@@ -95,7 +95,7 @@ impl Sequence {
         }
     }
 
-    /// Whether the values have a unit other than that of the variable.
+    /// Whether the values have a unit that differs from the variable's.
     pub(crate) fn has_unit(&self) -> bool {
         !self.unit.is_empty()
     }
@@ -125,7 +125,7 @@ impl Sequence {
         &self.points[until.saturating_sub(1)].1
     }
 
-    /// The texts as numbers of this variable, in its unit: a real number on lines, every other held until the next.
+    /// The texts as numbers of this variable, in its unit: real numbers interpolated linearly, others held until the next.
     ///
     /// # Errors
     /// Names the first text that is not a value of the variable, or a unit.
@@ -178,7 +178,7 @@ impl Schedule {
 pub(super) struct Held(Arc<[(f64, Values)]>);
 
 impl Held {
-    /// Number of the value at time `t` (s); before the first time, that of the first value.
+    /// Number of the value at time `t` (s); before the first time, of the first value.
     pub(super) fn index(&self, t: f64) -> usize {
         last_before(&self.0, t).saturating_sub(1)
     }
@@ -188,7 +188,7 @@ impl Held {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (t, values) in &*self.0 {
             let x = values.number().filter(|x| values.len() == 1 && x.abs() <= EXACT)?;
-            // Of several values at one time, the last holds.
+            // If several values have the same time, the last one applies.
             points.pop_if(|(last, _)| last.to_bits() == t.to_bits());
             points.push((*t, x));
         }

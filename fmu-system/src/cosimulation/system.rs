@@ -46,15 +46,14 @@ impl System {
         Self { units, ..self }
     }
 
-    /// The system with this relative tolerance for the solvers inside FMUs for Co-Simulation; by default each has that of its default
-    /// experiment.
+    /// The system with this relative tolerance for the solvers inside FMUs for Co-Simulation; by default each uses the
+    /// tolerance of its default experiment.
     #[must_use]
     pub fn with_tolerance(self, tolerance: Option<f64>) -> Self {
         Self { tolerance, ..self }
     }
 
-    /// The system with a listener to notes that matter while a run lasts: they are then not among those of
-    /// [`take_notes`](Self::take_notes).
+    /// The system with a listener for notes during a run, which [`take_notes`](Self::take_notes) then omits.
     #[must_use]
     pub fn with_listener(self, listener: fn(&str)) -> Self {
         Self { listener: Some(listener), ..self }
@@ -190,7 +189,7 @@ impl System {
         Ok(self.parts.causality(&self.parts.port(port)?) == Causality::StructuralParameter)
     }
 
-    /// Sets structural parameters, `instance.variable` and a text each: those of an instance together, in Configuration Mode.
+    /// Sets structural parameters, each as `instance.variable` and a text; all of an instance together, in Configuration Mode.
     /// Arrays then have other sizes, so call this before anything that names variables; values already set are set again.
     ///
     /// # Errors
@@ -216,7 +215,7 @@ impl System {
         Ok(())
     }
 
-    /// Sets a parameter, or the value of an input that nothing else feeds: `instance.variable` and a text. Setting an element
+    /// Sets a parameter or the value of an unconnected input: `instance.variable` and a text. Setting an element
     /// of an array keeps the set or start values of the others. [`configure`](Self::configure) sets several structural
     /// parameters.
     ///
@@ -294,7 +293,7 @@ impl System {
         Ok(())
     }
 
-    /// Feeds an input or a tunable parameter of any type over time; the values of one that is not a real number are held.
+    /// Feeds an input or a tunable parameter of any type over time; values that are not real numbers are held.
     ///
     /// # Errors
     /// The variable does not exist, a text is not a value of its type, or it is fed already.
@@ -335,7 +334,7 @@ impl System {
         Ok(if port.is_whole() { self.parts.shape(&port) } else { Vec::new() })
     }
 
-    /// The variables whose names have the form of a pattern, in the order of the FMUs; neither clocks nor time.
+    /// The variables whose names match a pattern, in the order of the FMUs, without clocks and time.
     pub fn matching(&self, pattern: &str) -> Vec<String> {
         let alone = self.instances.len() == 1;
         let is_value = |v: &&ModelVariable| v.base != BaseType::Clock && v.causality != Causality::Independent;
@@ -470,7 +469,7 @@ impl System {
         Ok(())
     }
 
-    /// Whether the variable takes values, over time or from a connection, and nothing feeds it yet.
+    /// Whether the variable takes values, over time or from a connection, and is not fed yet.
     pub(super) fn check_fed(&self, target: &Port, written: &str, over_time: bool) -> Result<(), Error> {
         if self.wiring.feeds(target.instance, &target.name) {
             return Err(Error::usage(written, "is fed twice"));

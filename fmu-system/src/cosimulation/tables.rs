@@ -25,7 +25,7 @@ impl Parts {
         check_table(to, target)?;
         let entry = |(one, other): &(String, String)| {
             let taken = self.read(target, other)?.map_err(|cause| Error::usage(to, cause))?;
-            // The table may have values beyond those of the source.
+            // The table may have values that the source lacks.
             Ok::<_, Error>(self.read(source, one)?.ok().map(|sent| (sent, taken)))
         };
         let entries: Vec<Option<_>> = table.iter().map(entry).collect::<Result<_, _>>()?;
@@ -33,7 +33,7 @@ impl Parts {
         Ok(Change::Table { entries: entries.into_iter().flatten().collect(), keeps })
     }
 
-    /// A text as the number of a port, or why it is none.
+    /// A text as the number of a port, or why this fails.
     fn read(&self, port: &Port, text: &str) -> Result<Result<Number, String>, Error> {
         let description = self.0[port.instance].description();
         let values = Values::read(text, self.variable(port.instance, &port.name)?, description);
@@ -78,7 +78,7 @@ pub(super) fn widens(source: &Port, target: &Port) -> bool {
     matches!((family(source.base), family(target.base)), ('i', 'r'))
 }
 
-/// A table takes and gives one integer, Boolean or item.
+/// A table maps one integer, Boolean or item to another.
 fn check_table(name: &str, port: &Port) -> Result<(), Error> {
     if port.is_whole() || kind(port.base).is_none_or(|kind| kind == 'c') {
         return Err(Error::usage(name, "is not one number, which a table of values needs"));

@@ -13,7 +13,7 @@ impl System {
     /// Connects two terminals, both written `instance.terminal`; returns the connections, from output to input.
     ///
     /// # Errors
-    /// There is no such terminal, the two do not match, or a pair of members is not an output and an input.
+    /// A terminal does not exist, the two do not match, or a pair of members is not an output and an input.
     pub fn connect_terminals(&mut self, a: &str, b: &str) -> Result<Vec<(String, String)>, Error> {
         let ((i, one), (k, other)) = (self.terminal(a)?, self.terminal(b)?);
         let mut found = Vec::new();

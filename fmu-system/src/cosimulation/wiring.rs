@@ -1,4 +1,4 @@
-//! The connections of a system: who feeds whom, and what becomes of a value on its way.
+//! The connections of a system: the source of each input, and the transformation of values on the way.
 
 use super::parts::Port;
 use super::schedule::Schedule;
@@ -13,7 +13,7 @@ pub enum Units {
     /// It converts the number.
     #[default]
     Convert,
-    /// It passes the number on as it is.
+    /// It passes the number on unchanged.
     PassOn,
 }
 
@@ -31,7 +31,7 @@ pub struct Crossing {
 pub enum Transformation {
     /// A number is converted.
     Linear(Conversion),
-    /// Values and what becomes of each; other values stay as they are.
+    /// Values and their images; other values stay unchanged.
     Table(Arc<[(String, String)]>),
 }
 
@@ -57,7 +57,7 @@ impl Transformation {
     }
 }
 
-/// A variable to record, and what becomes of its values.
+/// A variable to record, and the transformation of its values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Outlet {
     /// `instance.variable`.
@@ -66,26 +66,26 @@ pub struct Outlet {
     pub name: String,
     /// Transformation of the values.
     pub transformation: Option<Transformation>,
-    /// Unit after the transformation; `None` is that of the variable.
+    /// Unit after the transformation; `None` means the variable's.
     pub unit: Option<String>,
     /// Numbers and names of the values after a table.
     pub items: Vec<(i64, String)>,
 }
 
-/// What becomes of a value on its way.
+/// Transformation of a value on its way.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Change {
     Linear(Conversion),
-    /// Values and what becomes of each.
+    /// Values and their images.
     Table {
         entries: Arc<[(Number, Number)]>,
-        /// Values without an entry stay as they are; otherwise they are missing, because the type of the target has no such value.
+        /// Values without an entry stay unchanged; otherwise they are missing, because the type of the target has no such value.
         keeps: bool,
     },
 }
 
 impl Change {
-    /// The number that arrives; missing if a table does not have it.
+    /// The resulting number; missing if a table has no entry for it.
     pub(super) fn apply(&self, number: Number) -> Number {
         match self {
             _ if number == Number::Missing => number,
@@ -122,7 +122,7 @@ pub(super) enum Source {
 }
 
 impl Source {
-    /// Whether it may have no value: before a clock ticks, or beyond a table.
+    /// Whether it may have no value: before a clock ticks, or without a table entry.
     pub(super) fn may_lack(&self) -> bool {
         matches!(self, Self::Port(port, change) if !port.clocks.is_empty() || matches!(change, Some(Change::Table { .. })))
     }
@@ -141,7 +141,7 @@ pub(super) struct Feed {
 #[derive(Clone, Default)]
 pub(super) struct Wiring {
     pub(super) feeds: Vec<Feed>,
-    /// Inputs other than single numbers, with their values over time.
+    /// Inputs that are not single numbers, with their values over time.
     pub(super) held: Vec<(Port, Held)>,
 }
 
@@ -154,7 +154,7 @@ impl Wiring {
         self.held.push((target, values));
     }
 
-    /// These connections and schedules, together with those of a copy of the instances, numbered from `instances` on.
+    /// These connections and schedules, and the same for a copy of the instances, numbered from `instances` on.
     pub(super) fn with_copy(&self, instances: usize) -> Self {
         let mut both = self.clone();
         both.feeds.extend(self.feeds.iter().map(|feed| Feed {
@@ -182,7 +182,7 @@ impl Wiring {
         self.feeds.iter().map(|feed| &feed.target).chain(self.held.iter().map(|(target, _)| target))
     }
 
-    /// Whether the variable with this reference is fed, or an element of it.
+    /// Whether the variable with this reference, or an element of it, is fed.
     pub(super) fn feeds_any(&self, instance: usize, reference: Option<u32>) -> bool {
         self.targets().any(|target| target.instance == instance && Some(target.reference) == reference)
     }

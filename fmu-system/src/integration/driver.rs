@@ -74,7 +74,7 @@ pub struct Driver {
     z: Vec<f64>,
     z_end: Vec<f64>,
     next_event: Option<f64>,
-    /// Number of events at the time of the last one.
+    /// Number of consecutive events at the same time.
     events: u32,
     last_event: f64,
     stability: Stability,

@@ -6,7 +6,7 @@
 //!
 //! The integrators are our own: event location needs their stages and interpolants, every trial step may be discarded by an FMU,
 //! and together they are shorter than the adapters that a crate of integrators would need. Both are explicit: a stiff FMU runs
-//! with many steps, and [`HybridSystem::limited`] learns of it.
+//! with many steps, which [`HybridSystem::limited`] is notified of.
 
 mod dopri;
 mod driver;

@@ -1,14 +1,14 @@
 //! Whether stability limits the steps of the method of Dormand and Prince, not its error: the equations are stiff.
 //!
-//! The last two stages are derivatives at the end of the step, at two states. Their difference over that of the states estimates the
-//! largest eigenvalue; times the step, it is at most 3.3 in a stable step. Source: E. Hairer, G. Wanner, Solving Ordinary
-//! Differential Equations II, 2nd ed., Springer 1996, IV.2, and their code DOPRI5 for the numbers.
+//! The last two stages are derivatives at the end of the step, at two states. Their difference divided by the states'
+//! difference estimates the largest eigenvalue; times the step, it is at most 3.3 in a stable step. Source: E. Hairer, G.
+//! Wanner, Solving Ordinary Differential Equations II, 2nd ed., Springer 1996, IV.2, and their code DOPRI5 for the numbers.
 
 use super::steps::Step;
 
 /// Steps from one test to the next.
 const EVERY: u32 = 200;
-/// Step times eigenvalue beyond which a step is close to the limit.
+/// Product of step and eigenvalue above which a step is close to the limit.
 const LIMIT: f64 = 3.25;
 /// Number of steps close to the limit after which it is the limit.
 const STIFF: u32 = 15;
@@ -58,7 +58,7 @@ fn eigenvalue(step: &Step, nominals: &[f64]) -> f64 {
     if states > 0.0 { f64::sqrt(slopes / states) } else { 0.0 }
 }
 
-/// What to do about steps of the size `h` (s) at the time `t` (s), if the run to the time `stop` (s) needs many of them.
+/// Advice about steps of the size `h` (s) at the time `t` (s), if the run to the time `stop` (s) needs many of them.
 pub fn advice(t: f64, h: f64, stop: f64) -> Option<String> {
     let steps = (stop - t) / h;
     (steps > MANY).then(|| {

@@ -2,7 +2,7 @@
 
 use super::hybrid::{HybridSystem, TrialError};
 
-/// A step from `x` at `t`, where the derivative is `f`, to `x_end` at `t_end`, where it is `f_end`.
+/// A step from `x` at `t`, with the derivative `f`, to `x_end` at `t_end`, with the derivative `f_end`.
 pub(super) struct Step {
     pub(super) t: f64,
     pub(super) t_end: f64,

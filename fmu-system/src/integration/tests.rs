@@ -265,7 +265,7 @@ fn the_first_of_several_events_comes_first() {
     assert!(events[1] >= 0.3 && events[2] >= LN_2, "an event is behind its crossing: {events:?}");
 }
 
-/// Location takes few evaluations, and at most three times those of bisection (34) where the indicator is flat or jumps.
+/// Location takes few evaluations, and at most three times as many as bisection (34) if the indicator is flat or jumps.
 #[test]
 fn location_is_fast_and_sure() {
     for (name, z, most) in [

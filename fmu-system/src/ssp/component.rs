@@ -7,7 +7,7 @@ use super::ssv::Parameter;
 /// An FMU of the system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Component {
-    /// Name, by which connections refer to it.
+    /// Name used by connections.
     pub name: String,
     /// Its archive, a path within the SSP.
     pub source: String,
@@ -15,7 +15,7 @@ pub struct Component {
     pub connectors: Vec<Connector>,
     /// Values of its variables.
     pub bindings: Vec<Binding>,
-    /// `CoSimulation` or `ModelExchange`, if it runs in this way alone.
+    /// `CoSimulation` or `ModelExchange`, if it supports only this one.
     pub implementation: Option<String>,
     /// Line of the element.
     pub line: usize,
@@ -24,7 +24,7 @@ pub struct Component {
 /// A variable that can be connected.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connector {
-    /// Name; of a component, that of the variable.
+    /// Name; for a component, the variable's name.
     pub name: String,
     /// `input`, `output`, `parameter` and so on.
     pub kind: String,

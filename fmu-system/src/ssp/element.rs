@@ -30,7 +30,7 @@ pub(super) fn is_true(text: &str) -> bool {
     matches!(text.trim(), "true" | "1")
 }
 
-/// What a file defines for its elements: units (SSP 1.0, 4.3) and enumerations.
+/// Definitions of a file for its elements: units (SSP 1.0, 4.3) and enumerations.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Definitions {
     units: Vec<StatedUnit>,

@@ -6,7 +6,7 @@
 use super::component::{Binding, Component, Connection, ConnectionEnd, Connector};
 use super::path::{Hop, StatedUnit};
 
-/// A system as its element has it.
+/// A system as described by its element.
 #[derive(Default)]
 pub(super) struct Level {
     /// Names of the systems around its contents, each with a dot; empty for the outer one.
@@ -21,7 +21,7 @@ pub(super) struct Level {
     pub references: Vec<Reference>,
 }
 
-/// A signal dictionary, seen as an element of a system.
+/// A signal dictionary as an element of a system.
 pub(super) struct Reference {
     pub name: String,
     pub dictionary: String,
@@ -38,7 +38,7 @@ pub(super) struct Reached {
     pub hops: Vec<Hop>,
 }
 
-/// Names and what they reach.
+/// Names and their targets.
 pub(super) type Reach = Vec<(String, Vec<Reached>)>;
 
 /// A system without inner ones.
@@ -112,7 +112,7 @@ struct Edge {
 /// Resolves the inner systems.
 ///
 /// # Errors
-/// The line of a connection, and what is wrong with it.
+/// The line of a connection, and its error.
 pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
     let mut levels = Vec::new();
     collect(&[outer], &mut levels);
@@ -150,7 +150,7 @@ pub(super) fn flat(outer: &Level) -> Result<Flat, String> {
             }
         }
         let from = &path[0].from;
-        // Parameters are set and not connected, and what nothing feeds keeps its value.
+        // Parameters are set, not connected, and an unconnected input keeps its value.
         if path.iter().any(|edge| edge.is_parameter) {
             continue;
         }
@@ -199,7 +199,7 @@ fn allowed([(from_element, from), (to_element, to)]: [(bool, &str); 2]) -> bool 
 /// The connection with its direction, which follows from the kinds of the connectors and not from start and end.
 fn edge(around: &[&Level], c: &Connection) -> Result<Edge, String> {
     let ((start, one), (end, other)) = (node(around, &c.start)?, node(around, &c.end)?);
-    // A clock that asks to be ticked counts as an output.
+    // A clock that requests ticks counts as an output.
     let kind = |c: &Connector| match c.ticks.as_deref() {
         Some(ticks) if ticks != "triggered" => "output".to_owned(),
         _ => c.kind.clone(),
@@ -265,7 +265,8 @@ fn node(around: &[&Level], end: &ConnectionEnd) -> Result<(Node, Connector), Str
     Ok((Node { of, owner, connector: end.connector.clone() }, connector))
 }
 
-/// The entry of a dictionary, seen through a reference. Its name is sought in the system of the reference, then in those around it.
+/// The entry of a dictionary, accessed through a reference. Its name is sought in the system of the reference, then in those
+/// around it.
 fn entry(around: &[&Level], reference: &Reference, end: &ConnectionEnd) -> Result<(Node, Connector), String> {
     let mut seen = connector(&reference.connectors, &end.connector, &reference.name)?.clone();
     let defined = |level: &&&Level| level.dictionaries.iter().any(|(name, _)| *name == reference.dictionary);

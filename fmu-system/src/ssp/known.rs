@@ -1,4 +1,4 @@
-//! What the files of SSP may have (schemas of SSP 1.0 and 2.0); everything else is named in a note, so that nothing is ignored
+//! Allowed content of SSP files (schemas of SSP 1.0 and 2.0); everything else is reported in a note, so that nothing is ignored
 //! silently.
 
 use super::element::{TYPES, at, local};
@@ -63,7 +63,7 @@ const TYPE: (&str, &str) = (
     "Value Item",
 );
 
-/// What a file has that is not read: one note for each kind of thing.
+/// Content of a file that is not read: one note per kind.
 pub(super) fn notes(root: &Element) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(version) = root.get("version").filter(|version| !["1.0", "2.0"].contains(version)) {

@@ -35,7 +35,7 @@ impl Loaded {
     /// Opens FMUs written `FILE` or `NAME=FILE`, or one SSP file. Relative paths begin in `folder`.
     ///
     /// # Errors
-    /// As [`open`](Self::open), or an SSP file is not alone.
+    /// As for [`open`](Self::open), or an SSP file is combined with other files.
     pub fn open_files(files: &[String], folder: &Path, logging: bool) -> Result<Self, Error> {
         Self::open_files_with(files, folder, logging, |_| System::default())
     }
@@ -157,7 +157,7 @@ impl Loaded {
             loaded.notes.extend(notes.into_iter().map(|note| format!("{}: {description}: {note}", of())));
         }
         loaded.notes.extend(structure.notes.iter().map(|note| format!("{}: {description}: {note}", of())));
-        // Inner values first: those of the system replace them. Sizes of arrays are set before arrays are connected.
+        // Inner values first; the system's values replace them. Sizes of arrays are set before arrays are connected.
         let mut given = Vec::new();
         for component in &structure.components {
             for binding in &component.bindings {
@@ -231,7 +231,7 @@ impl Loaded {
         Ok(())
     }
 
-    /// Whether a name is that of a connector of the system or of a variable, written `component.variable`.
+    /// Whether a name belongs to a connector of the system or to a variable, written `component.variable`.
     pub fn has(&self, name: &str) -> bool {
         self.connectors.outlet(name).is_ok_and(|outlet| self.system.has(&outlet.port))
     }
@@ -260,7 +260,7 @@ impl Loaded {
         Ok(self.system.record_through(&outlet)?)
     }
 
-    /// Records all outputs of the system, or those of all FMUs if it has none.
+    /// Records all outputs of the system or, if it has none, of all FMUs.
     ///
     /// # Errors
     /// As [`record`](Self::record).
@@ -316,14 +316,14 @@ impl Loaded {
         }
     }
 
-    /// What becomes of a value between two connectors, each with its variable if it is that of a component.
+    /// Transformation of a value between two connectors, each with its variable if it belongs to a component.
     fn way(&self, ends: [(Option<&str>, &Connector); 2], hops: &[Hop]) -> Result<Way, String> {
         let own =
             |port: Option<&str>| port.map(|port| self.system.measured(port)).transpose().map_err(|e| e.to_string());
         let [(source, start), (target, end)] = ends;
         let (of_source, of_target) = (own(source)?, own(target)?);
         let relative = of_source.or(of_target).is_some_and(|unit| unit.relative);
-        // An FMU knows the units of its variables, a file those of variables without one.
+        // The FMU defines the units of its variables, and a file the units of variables without one.
         let first = of_source.filter(|unit| unit.unit.is_some());
         let first = first.or_else(|| start.unit.as_ref().map(|unit| unit.measured(relative))).or(of_source);
         let last = of_target.filter(|unit| unit.unit.is_some());
@@ -360,7 +360,7 @@ impl Loaded {
                     continue;
                 };
                 let mut parameter = Parameter { name, ..p.clone() };
-                // A number without a unit has that of the connector.
+                // A number without a unit takes the connector's.
                 if let (None, Some(unit)) = (&parameter.unit, &unit) {
                     (parameter.unit, parameter.base) = (Some(unit.name.clone()), unit.base);
                 }
@@ -375,7 +375,7 @@ impl Loaded {
     }
 }
 
-/// Every connector of a component is a variable of its FMU, of that kind; returns notes on what it says otherwise.
+/// Every connector of a component is a variable of its FMU, of that kind; returns notes on differences.
 fn check_connectors(system: &System, component: &Component) -> Result<Vec<String>, String> {
     let Some(instance) = system.instances().iter().find(|i| i.name() == component.name) else { return Ok(Vec::new()) };
     let (md, of) = (instance.description(), &component.name);
@@ -414,7 +414,7 @@ fn check_connectors(system: &System, component: &Component) -> Result<Vec<String
     Ok(notes)
 }
 
-/// Whether a type of a connector is that of a variable. Types of integers convert, and FMI 2.0 has one of each kind.
+/// Whether a connector's type matches a variable's. Integer types are converted, and FMI 2.0 has one type of each kind.
 fn is_of_type(base: BaseType, stated: &str) -> bool {
     match stated {
         "Real" | "Float64" | "Float32" => base.is_float(),
@@ -446,7 +446,7 @@ fn check_extents(system: &System, component: &Component) -> Result<(), String> {
 /// `plant=a/b.fmu`, or `a/b.fmu` with the name `b`.
 ///
 /// # Errors
-/// The name is empty, or there is no file name.
+/// The name is empty, or the file name is missing.
 pub fn name_and_path(text: &str) -> Result<(String, &Path), Error> {
     // A path may have an equals sign; a name has no separator.
     if let Some((name, path)) = text.split_once('=').filter(|(name, _)| !name.contains(['/', '\\'])) {

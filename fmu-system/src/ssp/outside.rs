@@ -1,4 +1,4 @@
-//! Connectors of a system, by which users name variables.
+//! Connectors of a system, which name variables for users.
 
 use super::error::{Error, invalid};
 use super::path::transformed;
@@ -15,7 +15,7 @@ pub struct Connectors {
     pub outputs: Vec<Outlet>,
 }
 
-/// A variable that takes values, and what becomes of them.
+/// A variable that receives values, and their transformation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inlet {
     /// `component.variable`.
@@ -24,7 +24,7 @@ pub struct Inlet {
     pub transformation: Option<Transformation>,
     /// Unit before the transformation.
     pub unit: Option<String>,
-    /// The transformation converts units and does nothing else.
+    /// The transformation only converts units.
     pub only_units: bool,
 }
 
@@ -85,7 +85,7 @@ impl Inlet {
 }
 
 impl Connectors {
-    /// The variables denoted by a name to set: the inputs that an input of the system feeds, or the name itself.
+    /// The variables denoted by a name to set: the inputs fed by an input of the system, or the name itself.
     ///
     /// # Errors
     /// The name has no dot, and the system has no such input.

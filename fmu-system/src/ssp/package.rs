@@ -18,7 +18,7 @@ pub(super) struct Package<'a> {
     /// Name of the description that is read.
     pub(super) description: &'a str,
     pub(super) zip: ZipArchive<File>,
-    /// What files of values have that is not used.
+    /// Unused content of files of values.
     pub(super) notes: Vec<String>,
 }
 

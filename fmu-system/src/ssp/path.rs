@@ -32,11 +32,11 @@ pub struct Hop {
     pub transformation: Option<Transformation>,
 }
 
-/// What becomes of a value from the beginning of a path to its end.
+/// Transformation of a value from the beginning of a path to its end.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Way {
     pub(super) transformation: Option<Transformation>,
-    /// The path converts units and does nothing else.
+    /// The path only converts units.
     pub(super) only_units: bool,
     /// Name of the unit at the end.
     pub(super) unit: Option<String>,
@@ -44,7 +44,7 @@ pub(super) struct Way {
     pub(super) notes: Vec<String>,
 }
 
-/// Follows a path; a connector without a unit has that of the one before it.
+/// Follows a path; a connector without a unit takes that of the preceding one.
 ///
 /// # Errors
 /// The units of two connectors belong to different quantities, or two transformations do not fit.
@@ -77,7 +77,7 @@ pub(super) fn along<'a>(
     Ok(way)
 }
 
-/// A text as it is after a transformation.
+/// A text after a transformation.
 ///
 /// # Errors
 /// The text is not a number, for a linear one; a number with a unit passes only if units alone are converted.

@@ -18,7 +18,7 @@ pub struct MappingEntry {
 /// The entries of a mapping.
 ///
 /// # Errors
-/// The line, and what is missing, unknown or twice there.
+/// The line, and the missing, unknown or repeated item.
 pub fn read(root: &Element) -> Result<Vec<MappingEntry>, String> {
     if local(root) != "ParameterMapping" {
         return Err(at(root, format!("<{}> is not a ParameterMapping of SSP", root.name)));
@@ -43,7 +43,7 @@ pub(super) fn suppresses(e: &Element) -> bool {
 /// The transformation of a connection or an entry.
 ///
 /// # Errors
-/// The line, and what is wrong there.
+/// The line and its error.
 pub(super) fn transformation(parent: &Element) -> Result<Option<Transformation>, String> {
     let mut all = parent.children.iter().filter(|c| local(c).ends_with("Transformation"));
     let Some(e) = all.next() else { return Ok(None) };
@@ -59,7 +59,7 @@ pub(super) fn transformation(parent: &Element) -> Result<Option<Transformation>,
     }
 }
 
-/// The entries of a table, none of whose sources is there twice.
+/// The entries of a table, with unique sources.
 fn table(e: &Element) -> Result<Vec<(String, String)>, String> {
     let boolean = local(e).starts_with("Boolean");
     let text = |entry: &Element, name: &str| {

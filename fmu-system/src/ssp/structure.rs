@@ -1,5 +1,5 @@
 //! SystemStructure.ssd, read (SSP 1.0 and 2.0, 5). A feature that our co-simulation does not support is an error with
-//! its line, and what has no effect is named in a note, so that nothing is ignored silently.
+//! its line, and content without effect is reported in a note, so that nothing is ignored silently.
 
 use super::FMU_TYPE;
 pub use super::component::{Binding, Component, Connection, ConnectionEnd, Connector, Contents};
@@ -28,7 +28,7 @@ pub struct Structure {
     pub bindings: Vec<Binding>,
     /// Connectors of systems: the variables behind them.
     pub(super) reach: Reach,
-    /// What the file has that is not used.
+    /// Unused content of the file.
     pub notes: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ impl Structure {
     /// Reads the text of a SystemStructure.ssd; `files` reads another file of the archive.
     ///
     /// # Errors
-    /// As [`read`](Self::read), or those of `files`.
+    /// As for [`read`](Self::read), or from `files`.
     pub fn read_with(text: &str, files: &mut dyn FnMut(&str) -> Result<String, String>) -> Result<Self, String> {
         let root = Element::parse(text).map_err(|e| e.to_string())?;
         let system = system(&root)?;
@@ -105,12 +105,12 @@ struct Reader<'a> {
     folder: String,
     files: &'a mut dyn FnMut(&str) -> Result<String, String>,
     notes: &'a mut Vec<String>,
-    /// Number of descriptions around this one.
+    /// Nesting depth of this description.
     depth: usize,
 }
 
 impl Reader<'_> {
-    /// A system with what is inside it.
+    /// A system with its contents.
     fn level(&mut self, e: &Element, path: String) -> Result<Level, String> {
         let mut level = Level { connectors: connectors(e, &self.of)?, path, ..Level::default() };
         level.bindings = self.bindings(e, &level.path, false)?;
@@ -187,7 +187,7 @@ impl Reader<'_> {
         let of = Definitions::read(&root).map_err(inside)?;
         self.notes.extend(known::notes(&root).into_iter().map(|note| format!("{file}: {note}")));
         let path = format!("{path}{}.", required(e, "name")?);
-        // Values of the component replace those of the system.
+        // Values of the component replace the system's.
         let more = self.bindings(e, &path, false)?;
         let folder = file.rfind('/').map_or("", |slash| &file[..=slash]).to_owned();
         let mut reader = Reader { of, folder, files: &mut *self.files, notes: &mut *self.notes, depth: self.depth + 1 };

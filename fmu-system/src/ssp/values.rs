@@ -16,7 +16,7 @@ pub struct Given {
     pub file: String,
     /// Name and value of the variable.
     pub parameter: Parameter,
-    /// The path of the value to the variable: one part if nothing is in between.
+    /// The path of the value to the variable; a single part if direct.
     pub hops: Vec<Hop>,
 }
 
@@ -37,7 +37,7 @@ impl Given {
     }
 }
 
-/// Sets the values in their order, each checked by its FMU; first come the structural parameters of all files, those of an
+/// Sets the values in their order, each checked by its FMU; first come the structural parameters of all files, all of an
 /// instance in one Configuration Mode.
 ///
 /// # Errors
@@ -79,7 +79,7 @@ fn one(system: &mut System, instance: &str, p: &Parameter, hops: &[Hop]) -> Resu
     Ok(system.set(&format!("{instance}.{name}"), &value)?)
 }
 
-/// The value as the variable takes it, if it is another one, and notes on units that are not known.
+/// The value converted for the variable, if it differs, and notes on unknown units.
 type Arrived = Result<(Option<String>, Vec<String>), String>;
 
 /// The value in the unit of the variable, then transformed.
@@ -107,7 +107,7 @@ fn along_path(p: &Parameter, hops: &[Hop], variable: &ModelVariable, description
     Ok((Some(taken.into_owned()), way.notes))
 }
 
-/// The value in the unit of the variable, if that is another one, and a note if one of the units is unknown.
+/// The value in the unit of the variable, if that differs, and a note if one of the units is unknown.
 fn in_unit_of(
     p: &Parameter,
     variable: &ModelVariable,

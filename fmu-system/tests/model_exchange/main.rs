@@ -98,7 +98,7 @@ fn a_sampled_loop_has_its_solution_in_every_order_of_exchange() {
                 let recording = run(&mut pair(&plant, &sampler, Method::ModelExchange(integration)), &settings(2.0, T));
                 assert_solution(&recording, tolerance);
             }
-            // A late sample sees a later input, and acts later.
+            // A late sample reads a later input and acts later.
             let late = Method::ModelExchange(Integration { late: 1e-5, ..plain });
             let recording = run(&mut pair(&plant, &sampler, late), &settings(2.05, 2.05));
             let (x, y) = (recording.columns[0].values[1], recording.columns[1].values[1]);
@@ -421,7 +421,7 @@ fn calls_of_an_instance() {
     }
 }
 
-/// The same calls one by one, as the checker makes them.
+/// The same calls one by one, as in the checker.
 #[test]
 fn raw_calls() {
     use fmu_import::Status;

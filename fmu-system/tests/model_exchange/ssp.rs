@@ -1,4 +1,4 @@
-//! Systems from SSP files: inner systems, units, transformations, mappings, signals, and what is refused or ignored with a note.
+//! Systems from SSP files: inner systems, units, transformations, mappings, signals, and content refused or ignored with a note.
 
 use crate::workshop::Workshop;
 use fmu_system::cosimulation::{Integration, Method, Settings, System};
@@ -72,7 +72,7 @@ fn an_ssp_with_inner_systems_mappings_and_transformations() {
     let expected = [6.0, -11.0, -4.5, 10.0, 0.2, 0.6];
     assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{last:?}");
 
-    // Another variant, and what is missing.
+    // Another variant, and missing parts.
     packed(&path, &[("B.ssd", NESTED.as_bytes()), ("A.ssd", NESTED.as_bytes()), entries[1], entries[2], entries[3]]);
     let open =
         |name: &str| Loaded::open_files(&[name.to_owned()], folder.path(), false).map(drop).map_err(|e| e.to_string());
@@ -107,7 +107,7 @@ fn values(inside: &str) -> String {
     format!("<v:ParameterSet><v:Parameters>{inside}</v:Parameters></v:ParameterSet>")
 }
 
-/// A system of components `a` and `b` with u, z and T, and what else is in it; the file has units of length.
+/// A system of components `a` and `b` with u, z and T, and further content; the file defines units of length.
 fn description(connectors: &str, inside: &str, connections: &str) -> String {
     let of = "<s:Connectors><s:Connector name='u' kind='input'/><s:Connector name='z' kind='output'/>\
         <s:Connector name='T' kind='parameter'/></s:Connectors>";
@@ -151,8 +151,8 @@ fn near(found: &[f64], expected: &[f64]) {
     assert!(found.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{found:?} {expected:?}");
 }
 
-/// Every connection converts from the unit of one connector to that of the next, and then transforms; a value given for a
-/// connector is in its unit.
+/// Every connection converts from the unit of one connector to that of the next, and then transforms; a value for a connector
+/// is in the connector's unit.
 #[test]
 fn connectors_of_systems_have_units_and_transformations() {
     let length = |unit: &str| format!("<c:Real unit='{unit}'/>");
@@ -163,7 +163,7 @@ fn connectors_of_systems_have_units_and_transformations() {
         length("km"),
         length("km"),
     );
-    // The FMU has no units: those of the connectors of the inner system count.
+    // The FMU has no units, so the units of the inner system's connectors apply.
     let inner = format!(
         "<s:System name='i'><s:Connectors><s:Connector name='u' kind='input'>{m}</s:Connector><s:Connector name='z' kind='output'>{m}</s:Connector>\
          <s:Connector name='T' kind='parameter'>{m}</s:Connector></s:Connectors><s:Elements><s:Component name='c' source='plant.fmu'><s:Connectors>\
@@ -218,7 +218,7 @@ fn connectors_of_systems_have_units_and_transformations() {
     }
 }
 
-/// Signals of a dictionary, in the description or in a file, are shared by all references, in inner systems too.
+/// Signals of a dictionary, in the description or in a file, are shared by all references, including in inner systems.
 #[test]
 fn signals_travel_through_dictionaries() {
     let entries = |units: &str| {
@@ -374,7 +374,7 @@ fn files_within_files() {
     assert!(error.ends_with("more than 20 descriptions are inside each other"), "{error}");
 }
 
-/// What a system may not have, with the line; and what it has in vain, in a note.
+/// Content that is refused, with its line, and content without effect, in a note.
 #[test]
 fn the_rest_is_refused_or_noted() {
     let connection = |from: &str, to: &str| {

@@ -1,4 +1,4 @@
-//! Attributes by type; an error names the element, the attribute, its value and the expected one.
+//! Attributes by type; an error states the element, the attribute, its value and the expected one.
 
 use crate::error::Error;
 use crate::number::parse;

@@ -77,7 +77,7 @@ fn variable(
     let declared_type = owned(typed, "declaredType");
     let declared = declared_type.as_deref().and_then(|name| types.get(name).copied());
     let unit = owned(typed, "unit");
-    // A display unit belongs to a unit: that of the type does not apply to a variable with another unit.
+    // A display unit belongs to a unit: the type's display unit does not apply to a variable with another unit.
     let same_unit = unit.is_none() || unit.as_ref() == declared.and_then(|t| t.unit.as_ref());
     let inherited = |of: fn(&TypeDefinition) -> &Option<String>| declared.and_then(|t| of(t).clone());
     let start_texts: Vec<String> = element.all("Start").filter_map(|e| owned(e, "value")).collect();

@@ -9,7 +9,7 @@ use fmu_core::table::DENSE;
 use fmu_core::{Causality, Description};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// An entry: the number of the variable and those of its dependencies, `None` if they are unknown.
+/// An entry: the numbers of the variable and of its dependencies, `None` if they are unknown.
 type Unknown = (u32, Option<Vec<u32>>);
 
 /// A longer list of dependencies is omitted, which means that everything counts: a large table would repeat its parameters in
@@ -76,7 +76,7 @@ struct Numbering<'a> {
     known: BTreeMap<u32, u32>,
     /// Parameters may be knowns between events (FMI 3.0).
     parameters: bool,
-    /// There are no values between events: the model is for co-simulation only.
+    /// Without values between events, the model is for co-simulation only.
     steps_only: bool,
 }
 

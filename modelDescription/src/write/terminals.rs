@@ -1,6 +1,6 @@
 //! terminalsAndIcons.xml (FMI 3.0.2, 2.4.9).
 //!
-//! An FMU of FMI 2.0 carries the file of FMI 3.0 (FMI 2.0.5, 2.3), so both get the same text.
+//! An FMU of FMI 2.0 contains the file of FMI 3.0 (FMI 2.0.5, 2.3), so both get the same text.
 
 use crate::number;
 use crate::terminals::CoordinateSystem;

@@ -1,4 +1,4 @@
-//! Units and type definitions: those that variables use, in the order of their first use.
+//! Units and type definitions used by variables, in the order of first use.
 //!
 //! FMI 2.0.5, 2.2.2 and 2.2.3; FMI 3.0.2, 2.4.3 and 2.4.4.
 
@@ -10,7 +10,7 @@ use fmu_core::Description;
 use fmu_core::description::VariableKind;
 use fmu_core::unit::{Exponents, SECOND};
 
-/// `UnitDefinitions`: those of the variables, time among them in FMI 3.0. It must not be empty: `None` without a unit.
+/// `UnitDefinitions`: the units of the variables, including time in FMI 3.0. It must not be empty: `None` without a unit.
 pub(super) fn units(description: &Description, version: FmiVersion) -> Option<Element> {
     let second = unit(SECOND.unit.name, SECOND.unit.exponents, SECOND.unit.factor);
     let mut units: Vec<Element> = (version == FmiVersion::V3).then_some(second).into_iter().collect();
@@ -73,7 +73,7 @@ pub(super) fn definitions(description: &Description, version: FmiVersion) -> Opt
 
 fn definition(kind: &VariableKind, version: FmiVersion) -> Option<Element> {
     let (name, description, base, three) = match kind {
-        // FMI 3.0 has other types for single precision; its variables carry the attributes themselves.
+        // FMI 3.0 has other types for single precision; its variables have the attributes themselves.
         VariableKind::Real { single: true, .. } if version == FmiVersion::V3 => return None,
         VariableKind::Real { quantity, unit, display, relative, .. } if !quantity.is_empty() => {
             let display = display.as_ref().map(|(name, ..)| name.as_str()).filter(|_| !unit.is_empty());

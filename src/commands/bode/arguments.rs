@@ -62,8 +62,8 @@ pub struct Bode {
     /// Time in s from the start to the operating point [default: the duration of the FMUs' default experiment, else 1]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub settle: Option<f64>,
-    /// Communication step in s, best the sample period of a controller; high frequencies take fractions of it [default: with --loop
-    /// controller.T_s, else the shortest of the FMUs, else a thousandth of the settling time]
+    /// Communication step in s, preferably the sample period of a controller; high frequencies use fractions of it [default:
+    /// with --loop controller.T_s, else the shortest of the FMUs, else a thousandth of the settling time]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Set a parameter or an unconnected input (repeatable)
@@ -84,7 +84,7 @@ pub struct Bode {
     /// Relative tolerance of the integrator of --me [default: 1e-6]
     #[arg(long, value_name = "TOLERANCE", requires = "me", allow_negative_numbers = true)]
     pub rtol: Option<f64>,
-    /// Threads [default: as many as the machine runs at once]
+    /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
     /// Write the responses as CSV; - for standard output

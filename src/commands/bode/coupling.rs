@@ -1,17 +1,17 @@
 //! The communication step that a compliant shaft allows, from the mechanical impedance of the drive.
 //!
 //! A drive with the impedance Z(s) = Z_0(s) + s J, where J is the rotor, turns a load behind a spring: K = c/s + d with c in N.m/rad, d in
-//! N.m.s/rad, and J_L in kg.m2. At each step h the importer reads angle and speed of the rotor, lets it go on at this speed for the load,
-//! and holds the torque of the spring. A held value has the response H = (1 - e^(-s h)) / (s h), an angle that goes on at its speed
-//! E = 2 H - e^(-s h), and the loop at the samples is
+//! N.m.s/rad, and J_L in kg.m2. At each step h the importer reads angle and speed of the rotor, extrapolates them at this speed
+//! for the load, and holds the torque of the spring. A held value has the response H = (1 - e^(-s h)) / (s h), an angle
+//! extrapolated at its speed E = 2 H - e^(-s h), and the loop at the samples is
 //!
 //! ```text
 //! L(s) = sum over n of H K (1 - (E c/s + H d) / (s J_L + K)) / Z  at  s + j n 2 pi / h
 //! ```
 //!
-//! The longest step is the one at which L passes through -1: from a short step on, the command lengthens it by the delay that L still
-//! allows. Derived here; for a spring much faster than drive and load, Z = s J, and the rule is h = 2 d / c. The impedance of a drive at
-//! its shaft and its passivity: the package motulator-impedance.
+//! The longest step is the one at which L passes through -1: starting from a short step, the command lengthens it by the delay
+//! that L still allows. Derived here; for a spring much faster than drive and load, Z = s J, and the rule is h = 2 d / c. The
+//! impedance of a drive at its shaft and its passivity: the package motulator-impedance.
 
 use fmu_core::digits;
 use fmu_sweep::frequency::{Complex64, ResponsePoint, crossovers};
@@ -65,7 +65,7 @@ struct Control<'a> {
 }
 
 impl Control<'_> {
-    /// Z_0 at an angular frequency in rad/s, either sign; outside the measured ones, that of the nearest, and 0 above.
+    /// Z_0 at an angular frequency in rad/s, either sign; below the measured range the nearest value, above it 0.
     fn at(&self, w: f64) -> Complex64 {
         let f = w.abs() / TAU;
         let own = |k: usize| self.points[k].1 - Complex64::new(0.0, TAU * self.points[k].0 * self.rotor);
@@ -96,7 +96,7 @@ impl Train {
         (-IMAGES..=IMAGES).map(image).sum()
     }
 
-    /// The longest step in s that is stable; `None`: there is no limit.
+    /// The longest step in s that is stable; `None`: no limit.
     fn longest(&self, control: &Control<'_>) -> Option<f64> {
         let (first, last) = (control.points[0].0, control.points[control.points.len() - 1].0);
         let mut h = 0.02 / last;
@@ -147,7 +147,7 @@ mod tests {
         let rotor = 1.5e-3;
         let f = |k: u32| 10.0_f64.powf(1.0 + f64::from(k) / 20.0);
         let mass: Vec<ResponsePoint> = (0..=60).map(|k| (f(k), Complex64::new(0.0, TAU * f(k) * rotor))).collect();
-        // The rule holds for a damping that is small: the crossover is then the resonance.
+        // The rule applies to small damping, where the crossover is at the resonance.
         let train: Train = "500,0.02,1".parse().unwrap();
         let longest = train.longest(&Control { rotor, points: &mass });
         assert!((longest.unwrap() / (2.0 * 0.02 / 500.0) - 1.0).abs() < 0.02, "{longest:?}");

@@ -1,4 +1,4 @@
-//! The loops of a drive with the variables of `PmsmDrive`: what to excite and what to measure for each.
+//! The loops of a drive with the variables of `PmsmDrive`: excitation and measurement for each.
 
 use anyhow::{Result, bail};
 use clap::ValueEnum;
@@ -36,7 +36,7 @@ pub(super) enum Meaning {
     Impedance,
 }
 
-/// What to excite and measure.
+/// Excitation and measurement.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Probe {
     pub(super) from: String,

@@ -68,7 +68,7 @@ fn value(description: &ModelDescription, instance: &str, set: &[(String, String)
     }
 }
 
-/// What the options ask for.
+/// The request made by the options.
 fn probe(args: &Bode, set: &[(String, String)]) -> Result<Probe> {
     if let Some(which) = args.which {
         let [file] = &args.fmus[..] else {
@@ -78,7 +78,7 @@ fn probe(args: &Bode, set: &[(String, String)]) -> Result<Probe> {
         let fmu = Fmu::open(path)?;
         let of = |variable: &str| value(fmu.description(), &name, set, variable);
         let probe = which.probe(fmu.description(), of)?;
-        // In Model Exchange, outputs are those of the instant.
+        // In Model Exchange, outputs are instantaneous.
         return Ok(if args.me { Probe { mean: 0.0, ..probe } } else { probe });
     }
     let meaning = match (args.closed, args.open) {

@@ -27,7 +27,7 @@ pub(super) fn four(x: f64) -> String {
     digits::text(x, 4, 1e6)
 }
 
-/// A response with what is derived from it.
+/// A response with its derived quantities.
 pub(super) struct Response {
     pub(super) point: FrequencyPoint,
     pub(super) value: Complex64,
@@ -37,7 +37,7 @@ impl Response {
     pub(super) fn new(point: FrequencyPoint, probe: &Probe) -> Self {
         let measured = point.values[0];
         let half = std::f64::consts::PI * point.frequency * probe.mean;
-        // The mean of a period, then held for one.
+        // The mean over a period, then held for one period.
         let mean = if half > 0.0 { Complex64::from_polar(half.sin() / half, -half) } else { Complex64::new(1.0, 0.0) };
         let measured = measured / (mean * mean);
         let value = if probe.meaning == Meaning::Impedance { -1.0 / measured } else { measured };
@@ -59,7 +59,7 @@ pub(super) fn check(args: &Bode) -> Result<()> {
     Ok(())
 }
 
-/// Warns of values that are not those of a linear, settled system.
+/// Warns of values that a linear, settled system cannot have.
 pub(super) fn warn(responses: &[Response], probe: &Probe) {
     let at = |text: &str, of: &Response| format!("{} Hz: {text}", four(of.point.frequency));
     let mut doubts: Vec<(String, String)> = Vec::new();
@@ -90,7 +90,7 @@ pub(super) fn warn(responses: &[Response], probe: &Probe) {
     }
 }
 
-/// The responses as points, and the open loop if there is one.
+/// The responses as points, and the open loop, if any.
 fn points(responses: &[Response], meaning: Meaning) -> (Vec<ResponsePoint>, Option<Vec<ResponsePoint>>) {
     let own: Vec<ResponsePoint> = responses.iter().map(|of| (of.point.frequency, of.value)).collect();
     let open = match meaning {

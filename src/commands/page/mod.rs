@@ -67,7 +67,7 @@ struct Model {
     plain: Description,
     package: String,
     folder: PathBuf,
-    /// Text of the inputs of the default experiment, if they differ from those of the package.
+    /// Text of the inputs of the default experiment, if they differ from the package's.
     stimuli: Option<Vec<u8>>,
 }
 

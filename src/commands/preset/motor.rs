@@ -45,7 +45,7 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<NewExperiment
 }
 
 /// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of
-/// the rated speed, and then takes half of the rated torque, after the I-f start if there is one. The plant alone gets a tenth
+/// the rated speed, and then takes half of the rated torque, after the I-f start, if any. The plant alone gets a tenth
 /// of that torque and a third of the voltage for its maximum current at standstill; the controller alone gets a tenth of the
 /// speed and an eighth of its maximum current.
 fn course(own: &Description, tuned: &Tuned) -> NewExperiment {

@@ -1,4 +1,4 @@
-//! A model with a clock of every kind, which records the ticks of each.
+//! A model with a clock of every kind that records all ticks.
 
 use fmu_core::unit::SECOND;
 use fmu_core::{Block, Clock, Clocked, Elapsed, Experiment, Fault, Info, Model, Row, Step, Table, table};

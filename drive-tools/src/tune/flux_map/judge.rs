@@ -43,7 +43,7 @@ impl Errors {
     }
 }
 
-/// Refuses a map that is far from its table, or is not that of a machine.
+/// Refuses a map that deviates from its table or is physically impossible.
 pub(super) fn check(map: &FluxMap, errors: &Errors, points: &[Point], file: &str, psi_M: f64) -> Result<()> {
     const CAUSES: &str = "usual causes are swapped axes, the other sign of i_d (convention = \"syr\"?), or columns of another \
                           run; columns are i_d,i_q in A and psi_d,psi_q in Wb";
@@ -69,7 +69,7 @@ pub(super) fn check(map: &FluxMap, errors: &Errors, points: &[Point], file: &str
     )
 }
 
-/// Refuses a table whose magnet is not that of the machine.
+/// Refuses a table whose magnet differs from the machine's.
 pub(super) fn judge_magnet(found: f64, motor: &MotorFile) -> Result<()> {
     let given = &motor.data.machine.psi_M;
     let ratio = found / given.get_ref();
@@ -134,7 +134,7 @@ pub(super) fn reciprocity(points: &[Point], file: &str) -> Result<Option<String>
     )))
 }
 
-/// Comparison of the torques in the table with those of its flux linkages and currents.
+/// Compares the torques in the table with those computed from its flux linkages and currents.
 ///
 /// # Errors
 /// They are too far off.
@@ -162,7 +162,7 @@ pub(super) fn torque(points: &[Point], torques: &[f64], motor: &MotorFile, file:
     )))
 }
 
-/// Says where the table ends before the currents in use do.
+/// Reports an axis on which the table ends below the currents in use.
 pub(super) fn coverage(points: &[Point], motor: &MotorFile) -> Option<String> {
     let limit = *motor.data.rating.current.get_ref();
     let most = |of: fn(Dq) -> f64| points.iter().map(|p| of(p.i)).fold(f64::NEG_INFINITY, f64::max);

@@ -14,16 +14,16 @@ pub(super) struct Point {
 /// Weight of the third differences, as a share of the mean weight of the table's points in a coefficient.
 const SMOOTHNESS: f64 = 1e-5;
 
-/// Weight of an equation for the incremental inductance where there are no points, as a share of the same.
+/// Weight of an equation for the incremental inductance where there are no points, as a share of the weight of a point.
 const CONVEXITY: f64 = 1e-3;
 
 /// Factors of a third difference.
 const BINOMIAL: [f64; 4] = [-1.0, 3.0, -3.0, 1.0];
 
-/// Most rounds that add such equations.
+/// Maximum number of rounds that add such equations.
 const ROUNDS: u32 = 40;
 
-/// Weighted least squares of the coefficients, by the normal equations.
+/// Coefficients by weighted least squares, with the normal equations.
 struct Squares {
     normal: DMatrix<f64>,
     right: DVector<f64>,
@@ -58,8 +58,8 @@ impl Squares {
     }
 }
 
-/// The coefficients that minimize the error of the currents and, weakly, the third differences. Where the table has no points and
-/// the extrapolation is not that of a machine, further equations keep the incremental inductances of the table's edge.
+/// The coefficients that minimize the error of the currents and, weakly, the third differences. Where the table has no points
+/// and the extrapolation is physically impossible, further equations keep the incremental inductances of the table's edge.
 pub(super) fn solve(map: &mut FluxMap, points: &[Point], psi_M: f64) -> Option<()> {
     let (mut squares, magnet) = (Squares::new(), Dq::new(psi_M, 0.0));
     for p in points {
@@ -93,7 +93,7 @@ pub(super) fn solve(map: &mut FluxMap, points: &[Point], psi_M: f64) -> Option<(
         }
         for x in flawed {
             let [a, b, c] = map.hessian(x);
-            // The direction of the least curvature.
+            // The direction of minimum curvature.
             let angle = 0.5 * (2.0 * b).atan2(a - c) + std::f64::consts::FRAC_PI_2;
             let (sin, cos) = angle.sin_cos();
             let along = |[dd, dq, qq]: [f64; 3]| dd * cos * cos + 2.0 * dq * sin * cos + qq * sin * sin;

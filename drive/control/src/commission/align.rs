@@ -103,7 +103,7 @@ impl Align {
         Self { dc, rest: Rest::default(), k: 0.0 }
     }
 
-    /// Begins anew with the direct current as it is.
+    /// Restarts with the present direct current.
     pub(super) fn restart(&mut self) {
         (self.rest, self.k) = (Rest::default(), 0.0);
     }

@@ -6,11 +6,11 @@
 //!                                                      beyond at cos(beta) = i_1 / i, on either side
 //! ```
 //!
-//! A current far beyond i_1 therefore rests on the q-axis, as the magnet of a machine with L_d > L_q rests on its greater
+//! A current far above i_1 therefore comes to rest on the q-axis, as the magnet of a machine with L_d > L_q rests on its greater
 //! inductance. A smaller current separates the two: if the axis of smaller inductance turns to the current, the magnet lies along
-//! it. The angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change is that of a
-//! blocked rotor, which the [swing](super::swing) recognizes, of one that friction stops, or of L_d > L_q; for the latter the
-//! swing must also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
+//! it. The angle also shows i_1, and so psi_M; an alignment by 0.6 i_1 is stiff. An angle that does not change means a blocked
+//! rotor, which the [swing](super::swing) recognizes, a rotor stopped by friction, or L_d > L_q; for the latter the swing must
+//! also show a magnet, psi - L i > 0, because beyond i_1 the flux linkage is L_q i alone.
 
 use drive_base::math::{sin_cos, wrap};
 use serde::{Deserialize, Serialize};
@@ -101,7 +101,7 @@ mod tests {
         panic!("no end: {alignment:?}");
     }
 
-    /// cos(beta) = i_1 / i beyond i_1: the alignment comes to 0.6 i_1, and knows psi_M.
+    /// cos(beta) = i_1 / i beyond i_1: the alignment reaches 0.6 i_1, and psi_M is known.
     #[test]
     fn a_magnet_beside_the_current_gets_less_current() {
         for i_1 in [15.0_f64, 8.0, 3.0] {

@@ -4,7 +4,7 @@
 //! 1/L = g_0 +- g_2         axis = atan2(g_s, g_c) / 2
 //! ```
 //!
-//! Means and trends of each loop are removed. Up to L_q/L_d = 1.15 a free rotor's axis is that of its alignment.
+//! Means and trends of each loop are removed. Up to L_q/L_d = 1.15 a free rotor's axis is taken from its alignment.
 
 use super::bench::Bench;
 use super::excitation::{Excitation, Record};
@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 /// blocked one.
 const SALIENT: [f64; 2] = [1.15, 1.03];
 
-/// Ratio of the inductances above which the angle of the rest has shown which of them is the magnet's.
+/// Ratio of the inductances above which the angle at rest has revealed the magnet's inductance.
 const LOOKED: f64 = 1.5;
 
 /// The loops so far.

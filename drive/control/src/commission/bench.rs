@@ -24,7 +24,7 @@ pub(super) struct Sample {
 pub(super) enum Part<T> {
     /// The voltage of this sample in V.
     Voltage(AlphaBeta),
-    /// The part is over, with 0 V and what the next part needs.
+    /// The part is over: 0 V, and the input of the next part.
     Over(T),
 }
 
@@ -43,7 +43,7 @@ pub(super) struct Bench {
     pub(super) psi_r: f64,
     /// Standard deviation of a component of the current in A.
     pub(super) sigma: f64,
-    /// Smallest inductance in H of the probe, and that of every direction.
+    /// Smallest inductance in H found by the probe, and the inductance in each direction.
     pub(super) L_c: f64,
     pub(super) tensor: Tensor,
     /// Stator resistance in Ohm, with one transistor; 0: unknown.

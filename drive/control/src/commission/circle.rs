@@ -8,8 +8,8 @@
 //!
 //! For any course of the angle, a_2 of a least squares is its acceleration averaged with the weight (1 - tau^2)^2: the
 //! second integral of the quadratic Legendre polynomial. Speed and torque are averaged with the same weight, so that
-//! J w' + B w + tau_coulomb = tau holds for the means exactly, in spite of cogging and control in the part, and what has
-//! a period much shorter than the part vanishes. The torque 1.5 n_p (p - c - d tau) x i needs neither L_q nor psi_M.
+//! J w' + B w + tau_coulomb = tau holds for the means exactly, in spite of cogging and control in the part, and components with
+//! a period much shorter than the part vanish. The torque 1.5 n_p (p - c - d tau) x i needs neither L_q nor psi_M.
 //!
 //! At most 256 points; when the buffer is full, every second point is dropped. The circle is Kasa's (1976, IEEE Trans. Instrum.
 //! Meas. 25), extended by the drift here; noise s of p makes the radius (s/psi)^2 too large. A part of less than two turns
@@ -217,7 +217,7 @@ mod tests {
         }
     }
 
-    /// J w' + B w = K i_q holds for the means, however speed and current oscillate in the part.
+    /// J w' + B w = K i_q holds for the means, even if speed and current oscillate during the part.
     #[test]
     fn the_means_fulfill_the_equation_of_motion() {
         let (J, B) = (1e-3, 4e-4);

@@ -1,7 +1,7 @@
 //! Voltage that a leg of the inverter loses, as a table over the current.
 //!
 //! Sixteen points in each octave from `i_0` to 256 `i_0` (A), read by linear interpolation; below, the leg is a resistance,
-//! above, the loss is constant. Half of a current lies sixteen points below it, which [`resistance`](super::resistance) uses.
+//! above, the loss is constant. Half of a current is sixteen points below it; [`resistance`](super::resistance) uses this.
 
 use drive_base::frame::{AlphaBeta, Phases};
 use nalgebra::SVector;

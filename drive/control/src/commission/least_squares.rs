@@ -26,7 +26,7 @@ impl<const P: usize> Default for Normal<P> {
 pub(super) struct Solution<const P: usize> {
     pub(super) x: [f64; P],
     pub(super) half_width: [f64; P],
-    /// Standard errors of the unknowns over that of the residual.
+    /// Standard errors of the unknowns, divided by the residual's.
     pub(super) spread: [f64; P],
     /// Variance of the residual.
     pub(super) variance: f64,

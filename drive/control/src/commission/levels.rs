@@ -11,14 +11,14 @@
 //! ```
 //!
 //! A machine without load needs so little current that noise and the dead zone of the legs would dominate u. With i_d,
-//! all legs carry current, and the error of what they lose points along d, where it turns the angle instead of changing the
+//! all legs carry current, and the error of their voltage loss points along d, where it turns the angle instead of changing the
 //! radius; the radius is psi_M + (L_d - L_q) i_d, where the saturation changes L_d: by 5 % at 0.06 I, or psi_M by 0.3 %. An
 //! error of 1 % of L_d changes psi_M by less than 0.1 %. The torque, however, is free of an error of the angle where i_d = 0.
 //!
 //! J / (n_p K) of the speed control and of i_a is updated after each sweep, and i_f from the last two levels. psi_M is the mean
-//! radius at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is the
-//! error at 0.45 w_r and so part of the half-width, as is that of L_d. If time runs out after each level has been measured once,
-//! the rest is omitted. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
+//! radius at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is
+//! the error at 0.45 w_r and so part of the half-width, like the error of L_d. If time runs out after each level has been
+//! measured once, the rest is omitted. At the end the control brakes to 0.1 w_r, and the gates go off. Derived here.
 
 use super::bench::{Bench, Sample};
 use super::circle::{Part, Points};
@@ -49,7 +49,7 @@ const DEVIATION: f64 = 0.05;
 const UNKNOWN: f64 = 0.1;
 /// Minimum relative half-width of psi_M.
 const LEAST: f64 = 0.001;
-/// Speed off a level over that of the level: near enough to measure, and lost.
+/// Speed deviation relative to the level: close enough to measure, and lost.
 const NEAR: f64 = 0.03;
 const FAR: f64 = 0.1;
 /// Time in s in which the d-axis current changes by I.
@@ -115,7 +115,7 @@ fn T_b(bench: &Bench) -> f64 {
     (30.0 / bench.w_r()).max(0.06)
 }
 
-/// Duration in s of a part at the speed `w` (rad/s) in a stretch of `whole` (s): 40 turns or 1.2 s, whichever is less, but at
+/// Duration in s of a part at the speed `w` (rad/s) in a stretch of `whole` (s): the shorter of 40 turns and 1.2 s, but at
 /// least 2.5 turns and a tenth of the stretch.
 fn part(w: f64, whole: f64) -> f64 {
     let turn = std::f64::consts::TAU / w;
@@ -353,7 +353,7 @@ impl Levels {
         self.inertia = found.clamp(0.3 * self.inertia, 2.0 * self.inertia);
     }
 
-    /// The observer's flux linkage follows that of the levels.
+    /// The observer's flux linkage follows the value found at the levels.
     fn follow(&self, bench: &Bench, turning: &mut Turning) {
         let best = self.radii.iter().rev().find(|r| r.parts > 0.0);
         if let Some(r) = best {

@@ -4,7 +4,7 @@
 //! J w' + B w + tau_coulomb = tau          weight 1 / (0.01 |tau| + 1e-4 K I + J sigma), K = 1.5 n_p psi_M
 //! ```
 //!
-//! The rotor turns in one direction. Parts beyond 3.5 standard deviations are left out, a fifth of them at most. The
+//! The rotor turns in one direction. Parts beyond 3.5 standard deviations are left out, at most a fifth of all. The
 //! residual's variance counts as 1 at least, and half-widths are 4 standard errors: what remains, such as cogging and
 //! the loss of the legs at small currents, is not white. w and w' are mechanical here, in rad/s and rad/s2; tau in N.m.
 
@@ -22,7 +22,7 @@ const LEFT_OUT: f64 = 0.2;
 const BEYOND: f64 = 3.5;
 /// Rounds of rejection.
 const ROUNDS: usize = 8;
-/// Relative half-width that all values have at least.
+/// Minimum relative half-width of all values.
 const LEAST: f64 = 0.003;
 
 /// The parts: w' in rad/s2, its standard error, w in rad/s, tau in N.m.

@@ -26,11 +26,11 @@
 //! A free rotor shows which inductance belongs to the magnet axis (`alignment`); if the rotor is blocked, the smaller inductance
 //! is taken as L_d.
 //!
-//! Limits: a load present from the first level to the last counts as friction; friction and inertia are those of the
-//! whole shaft. Only the range from 0.15 to 0.45 of the rated speed separates B from tau_coulomb, so often only their sum is
-//! accepted. J needs two turns in a sweep: a rotor with few turns per second that reaches its rated speed within some 10 ms
-//! yields no J. Values scale with the gains of the sensors: currents that read 1 % high give R and L 1 % low, J and friction 1 %
-//! high; a voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
+//! Limits: a load present from the first level to the last counts as friction; friction and inertia belong to the whole shaft.
+//! Only the range from 0.15 to 0.45 of the rated speed separates B from tau_coulomb, so often only their sum is accepted. J
+//! needs two turns in a sweep: a rotor with few turns per second that reaches its rated speed within some 10 ms yields no J.
+//! Values scale with the gains of the sensors: currents that read 1 % high give R and L 1 % low, J and friction 1 % high; a
+//! voltage that reads 1 % high gives R, L, psi_M, J and friction 1 % high.
 
 mod align;
 mod alignment;

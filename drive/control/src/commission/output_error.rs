@@ -85,7 +85,7 @@ fn current(along: Along, g: &[f64], z: f64) -> (f64, f64, [f64; 4]) {
 }
 
 impl OutputError {
-    /// Starts from a regression of the current on the flux linkage; `L` (H) is about that of the axis.
+    /// Starts from a regression of the current on the flux linkage; `L` (H) approximates the inductance of the axis.
     pub(super) fn start(bench: &Bench, excitation: &Excitation, record: &Record, along: Along, L: f64) -> Option<Self> {
         let A = excitation.plan.A;
         let psi = L * A;

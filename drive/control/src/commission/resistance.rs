@@ -6,7 +6,7 @@
 //! u = R i + (4/3) u_dead - u_dead i_x / i
 //! ```
 //!
-//! gives R, u_dead and i_x by least squares over nine currents that the PI holds. Nine smaller ones follow at constant
+//! gives R, u_dead and i_x by least squares over nine controlled currents. Nine smaller ones follow at constant
 //! voltages; f(i) = u - R i of all eighteen, and l(i) = 1.5 f(i) - l(i/2) from the smallest current upward. An error of f
 //! returns in each higher octave with the other sign, undiminished, and the bend of f about i_x makes one of some percent of
 //! u_dead. So the same equation also leads downward, from u_dead (1 - i_x / (2 i)) at the largest currents, and the curve passes

@@ -108,7 +108,7 @@ impl Results {
         if self.L_d.u < 1.0 { limit } else { 0.0 }
     }
 
-    /// Inertia and friction; the latter is refused where L_d is: the iron loss brakes as friction does.
+    /// Inertia and friction; the latter is refused if L_d is, because the iron loss brakes like friction.
     pub(super) fn show_mechanics(&mut self, found: Found) {
         let of = |x: Identified, limit: f64| Identified::within(x.value, x.u, limit);
         self.J = of(found.J, LIMIT_J);

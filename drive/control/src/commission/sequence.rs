@@ -122,7 +122,7 @@ impl Commission {
         }
     }
 
-    /// Whether it has neither ended nor stopped.
+    /// Whether it is still running.
     pub fn is_running(&self) -> bool {
         !self.is_over()
     }

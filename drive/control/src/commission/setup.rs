@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// Inputs of the commissioning.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CommissionSetup {
-    /// What is commissioned; with `Off`, nothing happens.
+    /// Scope of the commissioning; `Off` disables it.
     pub mode: CommissionMode,
     /// Number of pole pairs, > 0.
     pub n_p: i32,

@@ -9,9 +9,9 @@
 //! ```
 //!
 //! The rotor follows if the mean of |e| / w - (L_d - L_q) i_d is within 0.3 and 1.3 psi_r and the observer turns at w_h, over the second half of
-//! the hold. If not, the gates go off and the rotor coasts. Zero voltage would short-circuit a turning machine: a pulse of
-//! it, as long as the delay, shows by its current whether the rotor still turns. Then it is aligned again, three times at
-//! most. Derived here, except for the damping of [`start`](crate::start).
+//! the hold. If not, the gates go off and the rotor coasts. Zero voltage would short-circuit a turning machine: the current of
+//! a pulse as long as the delay shows whether the rotor still turns. Then it is aligned again, at most three times. Derived
+//! here, except for the damping of [`start`](crate::start).
 
 use super::align::{Dc, LONGEST, Rest};
 use super::bench::{Bench, Sample};
@@ -21,7 +21,7 @@ use crate::start::damping;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use serde::{Deserialize, Serialize};
 
-/// Speed of the hand-over over the rated one.
+/// Speed of the hand-over relative to the rated speed.
 const HAND_OVER: f64 = 0.12;
 /// Current over I.
 const CURRENT: f64 = 0.6;

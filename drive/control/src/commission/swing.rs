@@ -7,7 +7,7 @@
 //! ```
 //!
 //! A blocked rotor's p is a linear function of the current at every instant, with any saliency; a free rotor turns after
-//! the current has turned. The residual of a least squares of p on current and time, over the whole record, separates the two.
+//! the current has turned. The residual of a least-squares fit of p to current and time over the whole record separates the two.
 
 use super::bench::{Bench, Sample};
 use super::curve::Between;
@@ -92,7 +92,7 @@ impl Swing {
     }
 }
 
-/// The sample of the record that follows that of the sample `k`, in whole samples.
+/// The sample of the record after the one of sample `k`, in whole samples.
 fn after(k: f64) -> f64 {
     (1.025 * k).ceil().max(k + 1.0)
 }

@@ -95,7 +95,7 @@ impl Turning {
         (self.theta, self.w) = (estimate.theta, estimate.w);
     }
 
-    /// Rotor's frame after `samples` from the last one.
+    /// The rotor's frame `samples` after the last one.
     fn ahead(&self, bench: &Bench, samples: f64) -> Axis<Estimated> {
         Axis::at(self.theta + samples * bench.T * self.w)
     }
@@ -111,7 +111,7 @@ impl Turning {
         for _ in 0..PASSES {
             let (mut axis, mut i, mut sum) = (start, from, AlphaBeta::ZERO);
             let ((mut loss, mut slope), mut k) = (first, 0.0);
-            // What 1 V of `missing` adds to the current by the end, in 1/Ohm.
+            // Change of the final current per volt of `missing`, in 1/Ohm.
             let mut gain = DqHat::ZERO;
             while k < STEPS {
                 sum += loss;
@@ -178,7 +178,7 @@ impl Turning {
         limited
     }
 
-    /// The control goes on in the rotor's frame, where the feed-forward is complete.
+    /// Control continues in the rotor's frame, where the feed-forward is complete.
     pub(super) fn hand_over(&mut self) {
         self.controller = CurrentController::default();
     }

@@ -165,10 +165,10 @@ pub trait Estimating<All>: Sized {
     }
 }
 
-/// The signal from which a method finds the rotor; it determines how a drive starts and which scenarios it can run.
+/// The signal used to locate the rotor; it determines how a drive starts and which scenarios it can run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Class {
-    /// The stator flux. The method starts by itself and holds standstill with the d-axis current of `zero_speed`.
+    /// The stator flux. The method starts on its own power and works at standstill with the d-axis current of `zero_speed`.
     FluxObserver,
     /// The back EMF, which vanishes at standstill: an I-f start accelerates the rotor until the EMF is large enough.
     BackEmf,
@@ -181,13 +181,13 @@ pub enum Class {
 }
 
 impl Class {
-    /// Whether the method injects a voltage that finds the d-axis at standstill.
+    /// Whether the method finds the d-axis at standstill by injecting a voltage.
     pub fn injects(self) -> bool {
         matches!(self, Self::Injection | Self::Hybrid)
     }
 }
 
-/// The controller that an estimator is to work in.
+/// The controller around an estimator.
 #[expect(clippy::struct_excessive_bools, reason = "settings of the controller, each on its own")]
 pub struct SetupOf<'a, All> {
     /// The estimators' parameters.
@@ -202,7 +202,7 @@ pub struct SetupOf<'a, All> {
     pub reference_feed_forward: bool,
     /// The current loop has an active resistance.
     pub active_resistance: bool,
-    /// The start finds the rotor by injection.
+    /// The start locates the rotor by injection.
     pub starts_by_injection: bool,
     /// Field weakening is in use.
     pub weakens: bool,

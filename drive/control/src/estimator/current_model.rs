@@ -9,7 +9,7 @@
 //! Correction to the paper: the q row of (30) is psi_M T_s (w^ - w_r cos theta~) / L_q, with the speed error in the
 //! fraction.
 //!
-//! Limits: those of the voltage model, because the two models are equivalent and differ only in form. It holds rated load
+//! Limits: the same as for the voltage model, because the two models are equivalent and differ only in form. It holds rated load
 //! down to 0.010 of the rated speed, 0.010 with a compensated dead time.
 
 use crate::estimator::contract::ContextOf;

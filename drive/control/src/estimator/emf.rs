@@ -47,7 +47,7 @@ pub struct EmfParameters {
     pub frame_term: bool,
     /// Holds the rotor in a reversal.
     pub hold_reversal: bool,
-    /// Electrical speed w_h in rad/s, > 0, below which a reversal is held.
+    /// Electrical speed w_h in rad/s, > 0, below which the direction is kept through a reversal.
     pub w_hold: f64,
 }
 
@@ -248,7 +248,7 @@ mod tests {
         }
     }
 
-    /// Where the EMF is less than that of w_h, its own sign is that of the direction; beyond, the tracker's is.
+    /// Where the EMF is smaller than at w_h, its sign gives the direction; elsewhere the tracker's sign does.
     #[test]
     fn the_direction_comes_from_a_small_emf() {
         let (mut par, motor) = (crate::estimator::EstimatorParameters::default(), drive_base::motor::Motor::default());

@@ -7,7 +7,7 @@
 //! Correction to the paper: in (14) the EMF columns have -1/L_d and -1/L_q, and the input is (v_ds, v_qs); (11) has
 //! w_r.
 //!
-//! Limits: those of the extended EMF; for large angle errors, the neglected saliency slows convergence. It holds rated
+//! Limits: the same as for the extended EMF; for large angle errors, the neglected saliency slows convergence. It holds rated
 //! load down to 0.020 of the rated speed, 0.020 with a compensated dead time.
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};

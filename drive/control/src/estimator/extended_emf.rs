@@ -6,8 +6,9 @@
 //! Each axis has one observer ([`emf`]). A tracker receives theta~ = atan2(-s e_d, s e_q), where s is the sign of w.
 //! Correction to the paper: (19) and (21) use the measured current in the innovation; (20) is missing.
 //!
-//! **A wrong R^** adds (R - R^) i to the EMF and is integrated nowhere: with E = w (psi_M + (L_d - L_q) i_d), the estimate stands at
-//! tan theta~ = (R - R^) i_d / (E + (R - R^) i_q). It does not swing, and it is at the rotor as long as the sum keeps the sign of w:
+//! **A wrong R^** adds (R - R^) i to the EMF and is not integrated: with E = w (psi_M + (L_d - L_q) i_d), the estimate settles
+//! at tan theta~ = (R - R^) i_d / (E + (R - R^) i_q). It does not swing, and it is at the rotor as long as the sum keeps the
+//! sign of w:
 //! |w| > (R^ - R) |i_q| / (psi_M + (L_d - L_q) i_d), motoring with R^ > R or generating with R^ < R. Below, the estimate is half a turn
 //! off.
 //!
@@ -90,7 +91,7 @@ impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for E
         let x = Interval::new(tracker.theta_last, tracker.theta, sample, context.T_s);
         let mut e = observer.emf(context, &x, tracker.w);
         if context.of::<EmfParameters>().hold_reversal {
-            // The EMF of the magnet alone, which is what the speed is taken from.
+            // The EMF of the magnet alone, from which the speed is computed.
             let motor = context.motor;
             let active = motor.psi_M + (motor.L_d - motor.L_q) * x.i.d();
             e = e * (motor.psi_M / at_least(active, LEAST_FLUX * motor.psi_M));

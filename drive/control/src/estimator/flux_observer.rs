@@ -240,7 +240,8 @@ mod tests {
         assert!(angle(&par).abs() < 0.02, "{} deg", angle(&par));
     }
 
-    /// The feedback, and that of the resistance's effect, acts in the frame of the middle of the interval, in both directions.
+    /// The feedback, including the one of the resistance's effect, acts in the frame at the middle of the interval, in both
+    /// directions.
     #[test]
     fn the_feedback_acts_half_way() {
         let (mut par, motor, T_s) = (EstimatorParameters::default(), salient(), 1e-4);
@@ -250,7 +251,7 @@ mod tests {
             let (mut observer, _) = FluxObserver::start(&context, &Sample::default(), 0.4, w);
             (observer.v, observer.v_h) = (DqHat::new(3.0, -2.0), DqHat::new(0.5, 1.5));
             let FluxObserver { psi, v, v_h, .. } = observer;
-            // No error: what the feedback adds is taken from the voltage, and the new flux linkage is that of the magnet.
+            // No error: the feedback is subtracted from the voltage, and the new flux linkage equals the magnet's.
             let middle = Axis::<Estimated>::at(0.4 + 0.5 * T_s * w);
             let end = Axis::<Estimated>::at(0.4 + T_s * w).along(motor.psi_M);
             let u = (end - psi) * (1.0 / T_s) - middle.to_stator(v);

@@ -36,7 +36,7 @@ impl Default for MatsuiParameters {
 
 /// Both rows of the machine's voltage equation in the estimated frame.
 pub trait Rows<All> {
-    /// Smooths the electrical speed `w` (rad/s) with that of the q row, and returns the voltage -w psi_M sin theta~ (V) of
+    /// Smooths the electrical speed `w` (rad/s) with the speed of the q row, and returns the voltage -w psi_M sin theta~ (V) of
     /// the d row. `slip` is the frame-speed term in rad/s.
     fn rows(w: &mut f64, context: &ContextOf<All>, x: &Interval, slip: f64) -> f64;
 }

@@ -75,7 +75,7 @@ impl<All: AsRef<GradientParameters> + AsRef<TrackerParameters>> Estimating<All> 
             let within = |x: f64| x.max(-psi_a).min(psi_a);
             self.eta = AlphaBeta::new(within(self.eta.alpha()), within(self.eta.beta()));
         } else {
-            // At most the whole way: a state that is far off would overshoot.
+            // At most the full correction, since a state far off would overshoot.
             let off = 1.0 - self.eta.dot(self.eta) / (psi_a * psi_a);
             let gain =
                 0.5 * T_s * context.of::<GradientParameters>().bandwidth * psi_a * psi_a / (motor.psi_M * motor.psi_M);
@@ -128,7 +128,7 @@ mod tests {
         assert!((more - 5.78).abs() < 0.3 && (less + 5.91).abs() < 0.3, "{more} {less} deg");
     }
 
-    /// The clamp removes an initial flux error in one direction at least.
+    /// The clamp removes an initial flux error in at least one direction.
     #[test]
     fn the_clamp_holds_the_rotor() {
         let mut par = EstimatorParameters::default();

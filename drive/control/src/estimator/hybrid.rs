@@ -4,10 +4,10 @@
 //! [`square_wave`](crate::estimator::square_wave) and [`extended_emf`](crate::estimator::extended_emf) supply the two
 //! errors. One tracker follows e; its pole changes with h from `tracker.bandwidth` to `hybrid.bandwidth`. Both
 //! observers process every sample, so neither has to settle at the transition. At h = 1 the hybrid injects nothing; at
-//! h = 0 it ignores the EMF. The EMF observer sees the carrier in both voltage and current.
+//! h = 0 it ignores the EMF. The carrier enters the EMF observer through both voltage and current.
 //!
 //! Transition speeds: 0.1 and 0.2 of the rated speed; above them the injection lacks voltage, below them the EMF is too
-//! small. Limits: those of the active method; a machine without saliency needs another low-speed method.
+//! small. Limits: the same as for the active method; a machine without saliency needs another low-speed method.
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Injection, Sample, SetupOf};
 use crate::estimator::emf::EmfParameters;

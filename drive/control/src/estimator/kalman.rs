@@ -1,8 +1,7 @@
 //! Extended Kalman filter for stator flux, speed and angle: Kim & Sul name it in section II.A; derived here.
 //!
-//! The state is x = (psi_d, psi_q, w, theta), with the flux in the rotor frame. Because the state holds the flux
-//! instead of the current, the prediction does not depend on the saliency. It is exact for a voltage held in stator
-//! axes:
+//! The state is x = (psi_d, psi_q, w, theta), with the flux in the rotor frame. Because the state contains the flux instead of
+//! the current, the prediction does not depend on the saliency. It is exact for a voltage held in stator axes:
 //!
 //! ```text
 //! psi[k]   = e^{-j theta[k]} (e^{j theta[k-1]} psi[k-1] + T_s (u - R (i[k-1] + i[k]) / 2))
@@ -11,7 +10,7 @@
 //! ```
 //!
 //! The measurement is the current, i = e^{j theta} L^-1 (psi - psi_M), L = diag(L_d, L_q);
-//! the innovation, seen from the estimated frame, is r = e^{-j theta^} i - L^-1 (psi^ - psi_M).
+//! the innovation, in the estimated frame, is r = e^{-j theta^} i - L^-1 (psi^ - psi_M).
 //!
 //! The rotor frame is essential: in it, only the constants 1/L and the current divide the measurement between flux and
 //! angle. With the usual flux in stator axes, the unobservable direction turns with the noise of theta^. The filter

@@ -6,7 +6,7 @@
 //! estimates, inertia, its parameters).
 //!
 //! A new estimator implements [`Estimating`] and adds a row to the list at the end of this file. If it has new
-//! parameters, it also adds a row to [`tables`]. The list row states the method's type ([`Class`]) and whether it holds
+//! parameters, it also adds a row to [`tables`]. The list row states the method's type ([`Class`]) and whether it works at
 //! standstill. The estimator then appears in the enumeration, the FMUs, their documentation and every scenario of the
 //! comparison.
 
@@ -48,7 +48,7 @@ pub use tables::EstimatorParameters;
 /// An estimator's inputs in addition to the sample, with the parameters of all estimators.
 pub type Context<'a> = contract::ContextOf<'a, EstimatorParameters>;
 
-/// The controller that an estimator is to work in, with the parameters of all estimators.
+/// The controller around an estimator, with the parameters of all estimators.
 pub type Setup<'a> = contract::SetupOf<'a, EstimatorParameters>;
 
 /// The list: value, name, state, class, standstill and description define the enumeration and the single dispatch.
@@ -63,14 +63,14 @@ macro_rules! estimators {
         }
 
         impl Kind {
-            /// The signal from which it finds the rotor.
+            /// The signal used to locate the rotor.
             pub fn class(self) -> Class {
                 match self {
                     $(Self::$name => Class::$class,)*
                 }
             }
 
-            /// Whether it holds a loaded rotor at standstill.
+            /// Whether it can hold a loaded rotor at standstill.
             pub fn holds_standstill(self) -> bool {
                 match self {
                     $(Self::$name => $standstill,)*

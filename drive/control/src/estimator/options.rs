@@ -2,7 +2,7 @@
 //! silently.
 //!
 //! An option is a variable that is off at its start value. Values of a method (bandwidths, voltages, noise densities) are not
-//! options: each estimator reads its own, and a set of values may hold those of several.
+//! options: each estimator reads its own, and a set of values may serve several.
 
 use crate::estimator::pulsating::Demodulation;
 use crate::estimator::tracker::TrackerKind;
@@ -16,7 +16,7 @@ struct Choice {
     name: &'static str,
     /// Whether it is on with this estimator.
     asked: fn(&Setup, Kind) -> bool,
-    /// Whether an estimator has it.
+    /// Whether an estimator supports it.
     has: fn(Kind) -> bool,
     /// The function that other estimators lack.
     why: &'static str,

@@ -20,16 +20,17 @@
 //! Forward Euler in the estimated frame would add a bias of w T_s / 2 (1.4 deg at 1500 rpm and 10 kHz). Using the
 //! newest command instead of the one that acted would add w T_s.
 //!
-//! **R^ > R swings at any speed.** A flux error that stands still in stator axes turns at -w in the rotor frame. The estimated speed
-//! swings with it, the speed loop (K_p = J w_s / K) answers with i_q, and the mean of (R^ - R) i in stator axes lets the error grow:
-//! e' = (J w_s (R^ - R) w_n 2 a^4 / (3 n_p^2 psi_M^2 (1 + a^2)^2) - c_1 / 2) e with a = w / w_n. So the speed loop is calm while R^ - R <
-//! 3 c_1 n_p^2 psi_M^2 / (4 J w_s w_n), for w well above w_n, and a little more below. There is no such loop in torque mode. The adaptation of the resistance
-//! removes the cause.
+//! **R^ > R swings at any speed.** A flux error that is constant in stator axes rotates at -w in the rotor frame. The estimated
+//! speed swings with it, the speed loop (K_p = J w_s / K) answers with i_q, and the mean of (R^ - R) i in stator axes lets the
+//! error grow: e' = (J w_s (R^ - R) w_n 2 a^4 / (3 n_p^2 psi_M^2 (1 + a^2)^2) - c_1 / 2) e with a = w / w_n. So the speed loop
+//! is calm while R^ - R < 3 c_1 n_p^2 psi_M^2 / (4 J w_s w_n), for w well above w_n, and a little more below. There is no such
+//! loop in torque mode. The adaptation of the resistance removes the cause.
 //!
-//! **R^ < R swallows small torques.** In torque mode, a rotor without a load lies along the current, tan delta = i_q / i_d, and
-//! the frame turns on with w^ (psi_rd^ - psi_M cos delta) = (R - R^) i_q, psi_rd^ = psi_M + ((R - R^) i_d - w^ psi_M sin delta) / c_1.
-//! With a constant i_d = i_0 and a small delta, this has no solution above delta = (2 - sqrt 2) sqrt((R - R^) i_0 / (psi_M c_1)): the
-//! rotor turns. i_0 that falls with the speed lowers the threshold to 0.4 to 0.5 of that. `stands.rs` warns.
+//! **With R^ < R, small torques are lost.** In torque mode, a rotor without a load lies along the current, tan delta = i_q /
+//! i_d, and the frame turns on with w^ (psi_rd^ - psi_M cos delta) = (R - R^) i_q, psi_rd^ = psi_M + ((R - R^) i_d - w^ psi_M
+//! sin delta) / c_1. With a constant i_d = i_0 and a small delta, this has no solution above delta = (2 - sqrt 2) sqrt((R - R^)
+//! i_0 / (psi_M c_1)): the rotor turns. i_0 that falls with the speed lowers the threshold to 0.4 to 0.5 of that. `stands.rs`
+//! warns.
 //!
 //! Limits: at w = 0 the angle is not observable (the slow pole is -w^2/c_1 below |w| = c_1/2). A resistance estimate
 //! above the true value diverges at standstill; one below it is safe.

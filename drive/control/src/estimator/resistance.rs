@@ -18,9 +18,9 @@
 //! together with the error of psi_M^, and a fast k with i_q / w as regressor lost 3 to 7 of 56 creeping cells with a generating
 //! load. R^ therefore stays constant while the reference is a speed, unless it is tracked.
 //!
-//! A drive with Rasmussen's observer that starts at rest stays there, with i_0 and without a reference, until 0.05 of R~ is left (3.7 / b
-//! with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that starts before R^ has been measured loses
-//! the start.
+//! A drive with Rasmussen's observer that starts at rest stays at rest, with i_0 and without a reference, until 0.05 of R~
+//! remains (3.7 / b with i = i_0 / 2, longer where the rotor swings), at most for 20 / b: a rotor that starts before R^ is
+//! measured fails to start.
 //!
 //! **At creep**, the steady state is sin theta~ = -(c_1 d + R~ i_d) / (w psi_M) + c_1 R~ i_q / (w^2 psi_M). A constant
 //! c_1 lets both terms grow without limit towards w = 0: at 30 rpm, psi_M^ = 1.2 psi_M has no equilibrium. With
@@ -39,7 +39,7 @@
 //! With c_1' = |w|, its poles are those of s^3 + |w| s^2 + (w^2 + k i_d) s + k w i_q, k = k_t |w| w i_q / (i_q^2 + ...):
 //! stable for k_t (1 + i_d / |i_q|) < 1 with a generating load, where the zero at -w i_q / i_d lies in the right
 //! half-plane. So k_t = 0.15 is the useful value; it lags a ramp of R by dR/dt / (k_t |w|). A psi_M^ that is wrong by more than
-//! delta drives R^ away; without i_q, nothing is observable and R^ stays.
+//! delta makes R^ drift; without i_q, nothing is observable and R^ stays.
 //!
 //! **k_a** adds the voltage k_a R_nom g i_q on the q-axis, which acts like a lower R^ there: dy/dt = k_a R_nom i_q
 //! turns the frame until i_d carries the load, the safe side at rest, where theta~ is not observable: with an exact R^
@@ -81,7 +81,7 @@ const LEAST_C_1: f64 = 0.2;
 const KNOWN: f64 = 0.05;
 const LONGEST_REST: f64 = 20.0;
 
-/// Voltage of a swinging rotor, as a share of R^ i_d, beyond which R~ does not count as measured.
+/// Voltage of a swinging rotor, as a share of R^ i_d, above which R~ does not count as measured.
 const SWING: f64 = 0.05;
 
 /// Parameters of the adaptation; shares are relative to `motor.R_s`.
@@ -133,7 +133,7 @@ impl ResistanceParameters {
         share * motor.R_s
     }
 
-    /// Longest time in s for which a drive that starts at rest stays there to measure its resistance.
+    /// Maximum time in s for which a drive starting at rest waits to measure its resistance.
     pub fn longest_rest(&self) -> f64 {
         LONGEST_REST / self.bandwidth
     }
@@ -239,7 +239,7 @@ impl Resistance {
 /// Checks that the clamps contain `motor.R_s`.
 ///
 /// # Errors
-/// States which parameter is unsuitable, and what to do.
+/// States the unsuitable parameter and a remedy.
 pub fn validate<All: AsRef<ResistanceParameters>>(setup: &SetupOf<All>) -> Result<(), Fault> {
     let ResistanceParameters { resistance, start, min, max, .. } = setup.of();
     if !resistance {

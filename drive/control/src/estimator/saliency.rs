@@ -2,7 +2,7 @@
 //!
 //! In stator axes, with u and i as complex numbers, di/dt = S u + D e^{j 2 theta} conj(u), where S = (1/L_d + 1/L_q) /
 //! 2 and D = (1/L_d - 1/L_q) / 2. Only the D term contains the angle, and it contains 2 theta. Injection therefore
-//! cannot identify the magnet polarity; the start by injection of the controller does. Limits of all injection methods:
+//! cannot identify the magnet polarity; the controller's start by injection does. Limits of all injection methods:
 //! the machine must be salient, and cross-saturation shifts the axis of the inductances itself, by -9 to -21 deg at
 //! rated load.
 //!

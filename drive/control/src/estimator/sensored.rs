@@ -1,6 +1,6 @@
 //! The measured angle and speed (Kim & Sul, Fig. 1a): the reference for all estimators.
 //!
-//! Limits: those of the sensor, which is ideal unless the importer adds errors.
+//! Limits: only the sensor's, which is ideal unless the importer adds errors.
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
 use drive_base::math::wrap;

@@ -9,10 +9,10 @@
 //! delta (a near 1) is the switching function; beyond a = 2 the sampled observer chatters.
 //!
 //! At constant speed z lags by phi = arg(1 - (1 - a) e^{-j w T_s}), and by w T_s / 2, because e is the mean of the
-//! interval. The application notes add this lag to the angle, and that of the low-pass filter, which here (`emf.bandwidth`)
-//! acts in the estimated frame and has none. The [tracker](crate::estimator::tracker) receives theta~ = atan2(-s e_d, s e_q).
+//! interval. The application notes add this lag to the angle, and the low-pass filter's lag; here the filter (`emf.bandwidth`)
+//! acts in the estimated frame, without lag. The [tracker](crate::estimator::tracker) receives theta~ = atan2(-s e_d, s e_q).
 //!
-//! Limits: those of the extended EMF. It holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead
+//! Limits: the same as for the extended EMF. It holds rated load down to 0.020 of the rated speed, 0.020 with a compensated dead
 //! time. K below |E| loses the angle.
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample, SetupOf};

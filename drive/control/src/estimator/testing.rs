@@ -13,7 +13,7 @@ pub(crate) fn salient() -> Motor {
 
 /// Angle error theta - theta^ (rad) and speed error (rad/s) after `n` samples of 0.1 ms next to a machine that has the
 /// current `i` (A, rotor frame) and turns at `w` (rad/s, electrical). The estimate starts `theta_tilde` (rad) behind
-/// with the correct speed; `hat` holds its machine values. The voltage of each interval is the exact mean; its
+/// with the correct speed; `hat` contains its machine values. The voltage of each interval is the exact mean; its
 /// resistive part uses the trapezoid that every estimator assumes between samples.
 pub(crate) fn beside<E: Estimating<EstimatorParameters>>(
     par: &EstimatorParameters,

@@ -49,7 +49,7 @@ impl<All: AsRef<EmfParameters> + AsRef<TrackerParameters>> Estimating<All> for V
         let v_dfb = sample.u_pi.d() + self.frame;
         let (mut s, mut fade, mut least) = (s, 1.0, context.of::<EmfParameters>().w_sign);
         if context.of::<EmfParameters>().hold_reversal {
-            // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the rest.
+            // On the q-axis, the feed-forward supplies w^ psi_M of the EMF, the PI the remainder.
             let e_q = w * motor.psi_M + sample.u_pi.q();
             let g = emf::hold(&mut self.tracker, context, DqHat::new(v_dfb, e_q));
             (s, fade, least) =

@@ -140,7 +140,7 @@ fn standstill_is_the_first_part_of_spin() {
     assert_eq!((whole.results().R_s, whole.results().L_q), (commission.results().R_s, commission.results().L_q));
 }
 
-/// Off does nothing; a blocked rotor cannot spin, and the results at standstill are kept.
+/// `Off` has no effect; a blocked rotor cannot spin, and the results at standstill are kept.
 #[test]
 fn nothing_spins_that_must_not() {
     let motor = Motor::draw(2, 51).held();
@@ -270,7 +270,7 @@ fn faults_are_named_and_safe() {
         let fault = commission.fault();
         is_safe(&mut commission, fault);
     }
-    // The link falls by a fifth, a current is not finite or beyond its limit, the time is over.
+    // The link falls by a fifth, a current is not finite or exceeds its limit, or time runs out.
     for (state, u_dc, gain, fault) in [
         (State::Probe, 0.79, 1.0, Fault::Voltage),
         (State::Saturation, 0.79, 1.0, Fault::Voltage),
@@ -350,8 +350,8 @@ fn a_rotor_that_is_held_or_loaded_gives_no_wrong_value() {
     }
 }
 
-/// Beyond psi_M / (L_q - L_d) = 12.5 A the rotor rests with its magnet at an angle to the current, far beyond with its q-axis
-/// along it.
+/// Above psi_M / (L_q - L_d) = 12.5 A the rotor rests with its magnet at an angle to the current, far above it with the q-axis
+/// along the current.
 #[test]
 fn a_magnet_beside_the_current_swaps_no_inductance() {
     let motor = Motor::reluctance(50.0);

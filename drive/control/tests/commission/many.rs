@@ -20,7 +20,7 @@ impl Errors {
         self.inside += usize::from((found.value - truth).abs() <= found.u * found.value.abs());
     }
 
-    /// The least error in % that `percent` of the errors do not exceed.
+    /// The `percent` percentile of the errors, in %.
     fn at(&self, percent: usize) -> f64 {
         let mut sorted = self.all.clone();
         sorted.sort_by(f64::total_cmp);
@@ -135,7 +135,7 @@ fn survey(class: Class, seed: u64, index: u64, counts: &mut [Errors; 15]) -> (St
     (commission.state(), commission.fault(), swaps)
 }
 
-/// Other classes of machines: no accepted value is that of the other axis, and accepted values lie inside their intervals.
+/// Other classes of machines: no accepted value belongs to the other axis, and accepted values lie inside their intervals.
 /// `CLASS` selects one, `MACHINES`, `FROM` and `SEED` as above.
 #[test]
 #[ignore = "an hour: cargo test --release -p drive-control --test commission classes -- --ignored --nocapture"]

@@ -243,7 +243,7 @@ impl Motor {
     }
 }
 
-/// x of sign(i) in +-`most` with f(x) = `i`, of a rising f.
+/// Solution x, with the sign of `i` and within +-`most`, of f(x) = `i` for an increasing f.
 fn bisect(f: &dyn Fn(f64) -> f64, i: f64, most: f64) -> f64 {
     let (mut low, mut high) = (-most, most);
     for _ in 0..80 {

@@ -24,7 +24,7 @@ fn one(random: &mut Draw) -> Machine {
     Machine { motor: Motor { n_p: 4, R_s: share * U / i, L_d, L_q, psi_M }, i, u_dc, J: 1.0 }
 }
 
-/// Electrical speeds in rad/s from near standstill to far beyond that at which the EMF is the voltage.
+/// Electrical speeds in rad/s from near standstill to far above the one at which the EMF equals the voltage.
 pub(crate) fn speeds(machine: &Machine) -> [f64; 8] {
     [0.02, 0.3, 0.6, 0.85, 0.98, 1.1, 1.6, 3.0].map(|share| share * machine.U(1.0) / machine.motor.psi_M)
 }
@@ -86,7 +86,7 @@ impl Brute<'_> {
         all.into_iter().flatten().fold((0.0, [0.0; 2]), |a, b| if b.0 > a.0 { b } else { a })
     }
 
-    /// The least current (A) of the torque `tau` (N.m) that fits the voltage and about the current limit.
+    /// The minimum current (A) for the torque `tau` (N.m) within the voltage and roughly within the current limit.
     pub(crate) fn least_current(&self, tau: f64) -> Option<f64> {
         let Motor { n_p, L_d, L_q, psi_M, .. } = self.motor;
         let t = tau / (1.5 * f64::from(*n_p));

@@ -17,7 +17,7 @@
 //! u I (1/(2 pi) +- m cos phi / 8) + r I^2 (1/8 +- m cos phi / (3 pi) +- c_3),  c_3 = -(3 sqrt 3/(8 pi)) m cos(3 phi)/(15 pi)
 //! ```
 //!
-//! The model of a device (threshold and resistance) is that of the data sheets, and the closed form is the usual one; a test
+//! The model of a device (threshold and resistance) follows the data sheets, and the closed form is standard; a test
 //! compares [`mean`] with the legs. u in V, i in A.
 
 use drive_base::frame::{AlphaBeta, Phases, SQRT_3, Stator, Vector};

@@ -8,7 +8,7 @@
 //! [`iron`](crate::iron). Dead time, and the diodes with the gates off, depend on the value of i_s in steady state,
 //! i_m + G j w psi; the drop of the devices depends on i_s without that drop, a difference of G drop, mA. So everything is
 //! explicit, no loss is negative, and the balance p_in = p_cu + p_iron + p_cond + p_sw + 1.5 i_m e holds exactly. With i_m
-//! instead, the drops would be those of a current 10 % lower at a fifth of the torque, and diodes would block the wrong
+//! instead, the drops would belong to a current that is 10 % lower at a fifth of the torque, and diodes would block the wrong
 //! current.
 
 use crate::inverter::{Gates, Inverter};
@@ -20,7 +20,7 @@ use drive_base::frame::{AlphaBeta, Stator, Vector};
 use fmu_core::Scalar;
 use serde::{Deserialize, Serialize};
 
-/// The winding beyond its resistance.
+/// Winding parameters other than its resistance.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Winding {
     /// Growth of the resistance with the square of the electrical speed, in s2/rad2: R = R_s (1 + k_ac w^2), >= 0.

@@ -21,7 +21,7 @@ use drive_base::frame::{AlphaBeta, Phases};
 pub struct Sides([[i8; 3]; 2]);
 
 impl Sides {
-    /// Allowed distance of a current beyond its edge at the end of a step, as a share of the zone.
+    /// Allowed excess of a current over its edge at the end of a step, as a share of the zone.
     const TOLERANCE: f64 = 0.02;
 
     /// The sides of the currents `i` (A) with the zone +-`zone` (A).
@@ -41,12 +41,12 @@ impl Sides {
     }
 
     /// Share of a step after which the first current crosses the edge of its side, if one leaves its side by more than the
-    /// tolerance while the currents go from `start` (A) to `end` (A). The point is half the tolerance beyond the edge.
+    /// tolerance while the currents go from `start` (A) to `end` (A). The point lies half the tolerance outside the edge.
     #[inline]
     pub fn first_crossing(&self, start: [AlphaBeta; 2], end: [AlphaBeta; 2], zone: f64) -> Option<f64> {
         let tolerance = Self::TOLERANCE * zone;
         let leg = |side: i8, from: f64, to: f64| {
-            // The edges below and above; a side beyond the zone has only one.
+            // The lower and upper edges; a side outside the zone has only one.
             let (below, above) = (if side > 0 { zone } else { -zone }, if side < 0 { -zone } else { zone });
             let edge = if side <= 0 && to > above + tolerance {
                 above + 0.5 * tolerance

@@ -1,4 +1,4 @@
-//! Switching loss of the inverter: a current from the link in addition to that of the legs.
+//! Switching loss of the inverter: a current from the link in addition to the legs' current.
 //!
 //! ```text
 //! p_sw = E_sw / T_pwm (u_dc / u_sw)^k_sw (|i_a| + |i_b| + |i_c|) / i_sw          i_dc += p_sw / u_dc

@@ -73,7 +73,7 @@ fn a_voltage_that_depends_on_the_currents_is_integrated_in_short_steps() {
 
 #[test]
 fn dead_time_stops_a_current_at_zero() {
-    // A voltage below u_dead, 6.5 V, in every leg drives at most the zone's current, however narrow the zone is.
+    // A voltage below u_dead, 6.5 V, in every leg drives at most the zone's current, even in a narrow zone.
     for i_zero in [0.1, 1e-3] {
         let mut block = Block::<PmsmPlant>::default();
         let inverter = &mut block.model.parameters.inverter;

@@ -13,10 +13,10 @@
 //! that is open (`inverter.open_phase`) has no limit to its voltage: its current ends at once.
 //!
 //! After a command, both switches of a leg are off for the dead time; a command that does not last as long vanishes. Where
-//! the voltage depends on the sign of the current, a current that reaches zero stays zero as long as the voltage that keeps
-//! it there lies between `low` and `high`; beyond, a diode conducts again. So each leg of zero current has one of three
-//! states, and the laws of the three legs have exactly one solution: a linear complementarity problem with a positive
-//! definite matrix. u in V, i in A, times in s.
+//! the voltage depends on the sign of the current, a current that reaches zero stays zero as long as the voltage that keeps it
+//! there is between `low` and `high`; outside, a diode conducts again. So each leg of zero current has one of three states, and
+//! the laws of the three legs have exactly one solution: a linear complementarity problem with a positive definite matrix. u in
+//! V, i in A, times in s.
 
 use crate::inverter::Inverter;
 use crate::losses::conduction::Devices;
@@ -31,7 +31,7 @@ const CHOICES: [i8; 3] = [0, 1, -1];
 pub(super) const DIRECTIONS: [AlphaBeta; 3] =
     [AlphaBeta::new(1.0, 0.0), AlphaBeta::new(-0.5, 0.5 * SQRT_3), AlphaBeta::new(-0.5, -0.5 * SQRT_3)];
 
-/// What a leg is commanded to do.
+/// Command of a leg.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Command {
     /// Both switches are off.
@@ -65,7 +65,7 @@ impl Leg {
         new
     }
 
-    /// What it does at present.
+    /// Present state of a leg.
     #[inline]
     pub(super) fn on(&self) -> Command {
         if self.wait > 0.0 { Command::Off } else { self.command }
@@ -110,8 +110,8 @@ impl Ways {
         [0, 1, 2].map(|x| self.of[x][legs[x].on() as usize])
     }
 
-    /// The ways that the legs take with the current `i` (A), which changes by at most `reach` (A), as a number: 8 bits for each leg,
-    /// the same ones for the same way. `None` if a sign may change.
+    /// The paths of the legs at the current `i` (A), which changes by at most `reach` (A), as a number: 8 bits per leg, equal
+    /// bits for equal paths. `None` if a sign may change.
     #[inline]
     pub(super) fn numbers(&self, legs: &[Leg; 3], i: AlphaBeta, reach: f64) -> Option<u32> {
         let mut numbers = 0;
@@ -120,7 +120,7 @@ impl Ways {
             let depends = &self.depends[x];
             let number = if depends[on as usize] {
                 let i = n.dot(i);
-                // An open phase carries none.
+                // An open phase carries no current.
                 if i.abs() <= reach || self.of[x][on as usize][1].u == f64::INFINITY {
                     return None;
                 }
@@ -232,8 +232,8 @@ impl Response {
         low <= high
     }
 
-    /// The sides of legs with these `bounds` (V): the signs of their currents, or for a current of at most `tiny` (A) those of the
-    /// solution of the laws. Legs that do not depend on the sign have the side 1.
+    /// The sides of legs with these `bounds` (V): the signs of their currents, or, for a current of at most `tiny` (A), the
+    /// solution of the leg equations. Legs that do not depend on the sign have the side 1.
     pub(super) fn sides(&self, bounds: [[f64; 2]; 3], depends: [bool; 3], tiny: f64) -> [i8; 3] {
         let (mut sides, mut zero) = ([1_i8; 3], [false; 3]);
         for x in 0..3 {

@@ -72,7 +72,7 @@ impl Carrier {
         grid.period + now.minus_periods(self.extremes, grid.period)
     }
 
-    /// Passes the extremes up to the time `at` (s) since the last one; returns the time (s) since the new last one.
+    /// Advances past the extremes up to the time `at` (s) since the last one; returns the time (s) since the new last one.
     pub(super) fn pass(&mut self, inverter: &Inverter, at: f64, u: Phases, u_dc: f64) -> f64 {
         let grid = SampleGrid { period: 0.5 * inverter.T_pwm };
         if at < grid.period - grid.width() {
@@ -104,7 +104,7 @@ impl Carrier {
 mod tests {
     use super::*;
 
-    /// The mean of each line-to-line voltage over a period is that of the references, for every zero sequence.
+    /// The mean of each line-to-line voltage over a period equals the reference, for every zero sequence.
     #[test]
     fn every_zero_sequence_keeps_the_differences() {
         let mut inverter = Inverter::default();

@@ -27,7 +27,7 @@ impl PmsmPlant {
     /// The voltages of the legs at a point, where some depend on the current.
     #[inline(never)]
     fn dependent(&self, ways: [[Way; 2]; 3], at: &Point, tiny: f64) -> Voltages {
-        // The drop of the other legs, as the signs of their currents have it.
+        // The drop of the other legs, from the signs of their currents.
         let i = self.current_at(at);
         let signs = DIRECTIONS.map(|n| if n.dot(i) < 0.0 { -1 } else { 1 });
         let response = self.response_at(at, Some(&Voltages::watched(ways, signs).drop()));
@@ -56,7 +56,7 @@ impl PmsmPlant {
         let mut i = self.current_at(&at);
         let mut steepest = self.steepest(&at, i);
         let ways = Ways::new(inverter, u_dc);
-        // Not yet integrated, in s, and the voltages of that time.
+        // Time not yet integrated, in s, and its voltages.
         let (mut pending, mut numbers, mut due) = (0.0, None, [0.0; 3]);
         let mut searches = MOST_SEARCHES;
         let mut voltages = Voltages::fixed([Way { rail: 0.0, u: 0.0, r: 0.0 }; 3]);

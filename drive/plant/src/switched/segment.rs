@@ -8,8 +8,8 @@
 //! k_1 = f(psi), k_2 = f(psi + h/2 k_1), k_3 = f(psi + h (2 k_2 - k_1))          psi + h/6 (k_1 + 4 k_2 + k_3)
 //! ```
 //!
-//! A segment lasts a part of a carrier period; over the 100 us of the average inverter the classical method needs its
-//! fourth order, over a fourth of it this one is as exact. A segment ends early where a current whose sign determines a
+//! A segment lasts a part of a carrier period; over the 100 us of the average inverter the classical method needs its fourth
+//! order; over a quarter of that, this one is equally exact. A segment ends early where a current whose sign determines a
 //! voltage reaches zero, or where a blocked leg begins to conduct.
 
 use super::bridge::{DIRECTIONS, Response, Way, stator};
@@ -117,7 +117,7 @@ impl Voltages {
     }
 }
 
-/// Devices that each carry a current of one sign.
+/// Devices, each carrying current of one sign.
 #[derive(Clone, Copy)]
 struct OneWay(Option<Affine>);
 
@@ -209,7 +209,7 @@ impl PmsmPlant {
         magnetic_energy(&self.warm.motor, self.parameters.magnetics(), psi)
     }
 
-    /// By how much the `voltages` remain those of the point: below 0, a leg has another side.
+    /// Margin by which the `voltages` stay valid: below 0, a leg has changed sides.
     fn margin(&self, at: &Point, voltages: &Voltages) -> f64 {
         let i = self.current_at(at);
         let mut least = f64::INFINITY;

@@ -92,7 +92,7 @@ impl Thermal {
         Motor { n_p, R_s: resistance * R_s, L_d, L_q, psi_M: magnet * psi_M }
     }
 
-    /// The heat of the parts with these `losses`; the coolant receives all of it.
+    /// The heat of the parts with these `losses`, all of which reaches the coolant.
     #[inline]
     pub fn heat<S: Scalar>(&self, losses: &Losses<S>) -> Heat<S> {
         let magnet = losses.iron * self.rotor_share;

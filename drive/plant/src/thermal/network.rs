@@ -260,7 +260,7 @@ mod tests {
 
     #[test]
     fn above_a_current_the_winding_runs_away() {
-        // Current, relative to that of the operating point, at which alpha p (1/G_ws + 1/G_sc) is 1.
+        // Current, relative to the operating point, at which alpha p (1/G_ws + 1/G_sc) is 1.
         for (network, ([losses, ..], wanted)) in networks().iter().zip(FIGURES.iter().zip([2.374, 2.057, 4.061])) {
             let [coolant, p_20, iron] = *losses;
             let r = 1.0 / network.G_ws + 1.0 / network.G_sc;

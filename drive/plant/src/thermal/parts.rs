@@ -27,7 +27,7 @@ impl Temperatures {
         Self { winding: T, stator: T, magnet: T, inverter: T }
     }
 
-    /// Applies `f` to each and that of `other`.
+    /// Applies `f` to each part and the same part of `other`.
     fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> Temperatures<T> {
         Temperatures {
             winding: f(self.winding, other.winding),
@@ -51,7 +51,7 @@ impl<S: Scalar> Temperatures<S> {
 pub struct Heat<S = f64> {
     /// From the winding.
     pub winding: S,
-    /// From the stator iron, including that of friction.
+    /// From the stator iron, including friction.
     pub iron: S,
     /// From the rotor with its magnets.
     pub magnet: S,
@@ -85,7 +85,7 @@ impl Default for ThermalInputs {
 }
 
 impl ThermalInputs {
-    /// Applies `f` to each and that of `other`.
+    /// Applies `f` to each part and the same part of `other`.
     pub fn zip<T>(&self, other: &Self, f: impl Fn(f64, f64) -> T) -> ThermalInputs<T> {
         ThermalInputs { coolant: f(self.coolant, other.coolant), imposed: self.imposed.zip(&other.imposed, f) }
     }

@@ -18,7 +18,7 @@ const CAN: (&str, usize) = ("application/org.fmi-standard.fmi-ls-bus.can; versio
 struct CanDisplay {
     /// Operations that wait for the tick, which takes them out.
     received: Bytes,
-    /// A confirmation is to be sent.
+    /// A confirmation must be sent.
     confirms: bool,
     out: Outputs,
 }

@@ -1,7 +1,8 @@
 //! A node of a CAN bus: sends the measured speed in a frame at each period, and counts the confirmations.
 //!
-//! Low cut of FMI-LS-BUS 1.0.0: `Tx_Data` is on the clock `Tx_Clock`, whose ticks the node asks the importer for; `Rx_Data` is on
-//! `Rx_Clock`, which another node ticks. An operation is a code and a length of 4 bytes each, then its arguments, little-endian.
+//! Low cut of FMI-LS-BUS 1.0.0: `Tx_Data` is on the clock `Tx_Clock`, whose ticks the node requests from the importer;
+//! `Rx_Data` is on `Rx_Clock`, which another node ticks. An operation is a code and a length of 4 bytes each, then its
+//! arguments, little-endian.
 
 use fmu_core::unit::{RAD_PER_S, SECOND};
 use fmu_core::{

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 struct Clocks {
     input2: i32,
     counts: Counts,
-    /// `inClock3` is to tick at once.
+    /// `inClock3` must tick at once.
     asked: bool,
     /// `outClock` has ticked.
     ticked: bool,

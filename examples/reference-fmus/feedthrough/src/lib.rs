@@ -121,7 +121,7 @@ impl Model for Feedthrough {
     }
 }
 
-/// For Model Exchange: nothing happens by itself.
+/// For Model Exchange: no events of the model itself.
 impl Events for Feedthrough {
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
         Ok(Outcome::default())

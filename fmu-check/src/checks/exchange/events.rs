@@ -58,7 +58,7 @@ fn each_event(
         STEPS,
         &mut |instance, event| {
             events += 1;
-            // One finding per kind is enough, but the first event differs from the others.
+            // One finding per kind is enough, except that the first event differs from the others.
             if found < 3
                 && let Some(text) = rule(instance.time.get(), event)
             {
@@ -250,7 +250,7 @@ fn renewed(session: &Session) -> Result<(), NotDetermined> {
                 return Ok(());
             }
         }
-        // On to the time event itself.
+        // Continue to the time event itself.
         if let Some(next) = importer.next {
             let rest = next - instance.time.get();
             for _ in 0..60 {

@@ -157,7 +157,7 @@ fn differences(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// A derivative in the direction of all knowns is the sum of those of each, whose seed is 1.
+/// A derivative in the direction of all knowns is the sum over the single knowns with seed 1.
 fn together(
     session: &Session,
     instance: &Instance<'_>,

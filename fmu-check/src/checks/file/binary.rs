@@ -158,7 +158,7 @@ fn format(fmu: &FmuFile) -> Verdict {
                     continue;
                 }
             };
-            // A bundle of macOS, which dlopen loads too, is of no kind that the reader knows.
+            // A macOS bundle, which dlopen also loads, is not a kind known to the reader.
             let bundle = file.format() == BinaryFormat::MachO && file.kind() == object::ObjectKind::Unknown;
             if file.kind() != object::ObjectKind::Dynamic && !bundle {
                 find(format!("is not a shared library but {:?}", file.kind()));

@@ -61,7 +61,7 @@ fn list(d: &ModelDescription, unknowns: &[Unknown]) -> BTreeSet<String> {
     unknowns.iter().map(|u| name(d, u.reference)).collect()
 }
 
-/// The line of this name in the list, or that of the variable.
+/// The line of this name in the list, or the variable's line.
 fn line(d: &ModelDescription, unknowns: &[Unknown], of: &str) -> usize {
     let listed = unknowns.iter().find(|u| name(d, u.reference) == of).map(|u| u.line);
     listed.or_else(|| d.variables.iter().find(|v| v.name == of).map(|v| v.line)).unwrap_or_default()

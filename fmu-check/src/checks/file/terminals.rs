@@ -36,7 +36,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Runs 20 steps from a copy of the folder without them, and compares.", fix: "Read at run time from resources/ only." },
 ];
 
-/// The file's text; `None` where there is none.
+/// The file's text; `None` if absent.
 fn text(fmu: &FmuFile) -> Option<Result<String, String>> {
     let bytes = zip_headers::contents(&fmu.source, fmu.zip.find(FILE)?, limits::XML.most);
     Some(bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not UTF-8".to_owned())))

@@ -66,7 +66,7 @@ pub(crate) fn with_description(fmu: &FmuFile, check: impl Fn(&ModelDescription) 
     }
 }
 
-/// Every element below one, and itself.
+/// An element and all elements below it.
 pub(crate) fn all(root: &Element) -> Vec<&Element> {
     let (mut found, mut open) = (Vec::new(), vec![root]);
     while let Some(element) = open.pop() {

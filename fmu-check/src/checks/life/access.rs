@@ -127,7 +127,7 @@ fn start_values(session: &Session) -> Result<(), NotDetermined> {
     if session.is_v2() { Ok(()) } else { compare_starts(session, &session.fresh()?, false) }
 }
 
-/// Compares start values with those of an instance: in Initialization Mode, those that nothing changes there.
+/// Compares start values with an instance's values: in Initialization Mode, those that do not change there.
 fn compare_starts(session: &Session, instance: &Instance<'_>, initializing: bool) -> Result<(), NotDetermined> {
     let tell = |text: String| if initializing { session.violated(text) } else { session.lesser(Level::Should, text) };
     let mut compared = 0;
@@ -285,7 +285,7 @@ fn subject<'b>(session: &'b Session, way: &str) -> Option<&'b ModelVariable> {
 /// A reference that no variable has.
 fn free_reference(session: &Session) -> u32 {
     let used: Vec<u32> = session.description.variables.iter().map(|v| v.value_reference).collect();
-    // An FMU may number the elements of its arrays internally: choose a reference far beyond all of them.
+    // An FMU may number the elements of its arrays internally: choose a reference far above all of them.
     (0..1_000_000).map(|k| 0x0fff_fff0_u32 - k).find(|r| !used.contains(r)).unwrap_or(u32::MAX)
 }
 
@@ -422,7 +422,7 @@ fn not_settable(session: &Session) -> Result<(), NotDetermined> {
             });
             Ok(())
         });
-        // What is calculated cannot be set before either.
+        // A calculated variable cannot be set before, either.
         if v.initial_or_default() == Some(Initial::Calculated) {
             session.case(|| {
                 let (instance, values) = (session.initializing()?, session.different_value(v, 7.0));

@@ -103,7 +103,7 @@ impl<'a> Size<'a> {
     }
 }
 
-/// Reads this number of values; also returns whether nothing was written past them.
+/// Reads this number of values; also returns whether the memory behind them is intact.
 fn get(instance: &Instance<'_>, v: &ModelVariable, count: usize) -> Result<(Status, bool), NotDetermined> {
     let mut buffer = Buffer::room(v.base, instance.session.description.version, count);
     let status = instance.call(&format!("Get({}, nValues={count})", v.name), |raw| {

@@ -297,7 +297,7 @@ fn reset(session: &Session) -> Result<(), NotDetermined> {
             Ok(())
         });
     }
-    // What was set before and during the run, and what events have changed.
+    // Values set before and during the run, and values changed by events.
     session.case(|| {
         let (fresh, instance) = (session.initializing()?, session.fresh()?);
         if let Err(NotDetermined(why)) = set_all(&instance, 1.0) {
@@ -397,7 +397,7 @@ fn terminated(session: &Session) -> Result<(), NotDetermined> {
     instance.change_inputs(2)?;
     instance.steps(2, session.h())?;
     let watched = session.watched();
-    // What cannot be read before cannot be read after.
+    // A value that cannot be read before cannot be read after.
     let watched: Vec<_> =
         watched.into_iter().filter(|v| instance.get(v).is_ok_and(|(status, _)| status.is_ok())).collect();
     let before = instance.snapshot(&watched)?;

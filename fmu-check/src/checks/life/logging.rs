@@ -63,7 +63,7 @@ fn log_of_a_run(session: &Session, name: &str, logging: bool) -> Result<(Vec<Log
     if let Err(NotDetermined(why)) = instance.provoke() {
         session.note(why);
     }
-    // What was passed on instantiation stays. L06 looks at the reset itself.
+    // The arguments of the instantiation stay valid. L06 checks the reset itself.
     session.prepare(|| {
         if instance.simple(Simple::Reset)?.is_ok() {
             instance.experiment(session.start(), None);

@@ -184,7 +184,7 @@ fn rerun_given_f02a(instance: &Instance<'_>, first: &[Vec<Vec<u64>>], what: &str
         return Ok(());
     }
     session.prepare(|| {
-        // Another instance, where the FMU can have one.
+        // Another instance, if the FMU supports several.
         let Ok(control) = running_instance(session) else { return Ok(()) };
         let (state, time) = (control.save()?, control.time.get());
         let first = control.run(first.len(), h)?;

@@ -45,7 +45,7 @@ pub(crate) fn only_once(session: &Session) -> bool {
 
 const ONLY_ONCE: &str = "canBeInstantiatedOnlyOncePerProcess is true";
 
-/// Why a comparison of two instances proves nothing.
+/// Why a comparison of two instances is inconclusive.
 pub(crate) const DISTURBED: &str = "see L04a: a new instance differs from an earlier one, although nothing was changed";
 
 fn interleaved(session: &Session) -> Result<(), NotDetermined> {
@@ -223,7 +223,7 @@ fn memory() -> Option<[u64; 2]> {
 
 /// Bytes per repetition that are not a leak: the struct of callbacks kept for FMI 2.0, and the checker's tables.
 const LEFT: u64 = 300;
-/// Bytes per saved state below which growth is not a leak; the checker itself stores nothing per state.
+/// Growth in bytes per saved state that does not count as a leak; the checker itself stores nothing per state.
 pub(crate) const LEFT_BY_STATE: u64 = 50;
 /// Total bytes that are not a leak: pages that the allocator keeps.
 const MINIMUM: u64 = 300_000;
@@ -242,7 +242,7 @@ pub(crate) fn leak(
         session.record_calls(&format!("up to {most} {what}"), || {
             for k in 0..most {
                 once()?;
-                // Messages that are kept here are no leak of the FMU.
+                // Messages stored here do not count as a leak of the FMU.
                 let _ = take_events();
                 if session.half_time_used() || (k >= 300 && began.elapsed() > Duration::from_secs(1)) {
                     return Ok(k + 1);

@@ -107,11 +107,11 @@ impl<'b> Stepper<'b> {
         self.leave_event_mode()
     }
 
-    /// A step of `h`, at most to the next event, and the event that it ends in: its result, and the request.
+    /// A step of `h`, at most to the next event, and the event at its end: its result, and the request.
     fn step(&mut self, whole: f64) -> Result<(Status, StepResults, f64), NotDetermined> {
         let t = self.instance.time.get();
         let variable = self.instance.session.flag("canHandleVariableCommunicationStepSize");
-        // A step that ends where the event is: the importer must not go beyond. Closer than this it is reached.
+        // A step that ends at the event, which the importer must not pass. Closer than this it is reached.
         let near = 1e-9 * whole + 4.0 * f64::EPSILON * t.abs();
         let inside = |next: &f64| variable && *next > t + near && *next < t + whole;
         let h = self.next.filter(inside).map_or(whole, |next| next - t);
@@ -144,7 +144,7 @@ fn each_step(session: &Session, rule: Rule<'_>) -> Result<(), NotDetermined> {
 fn each_step_of(session: &Session, must_start: bool, rule: Rule<'_>) -> Result<(), NotDetermined> {
     needs_event_mode!(session);
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
-    // An FMU with a fixed step may insist on that of its default experiment.
+    // An FMU with a fixed step may require the step of its default experiment.
     let variable = session.flag("canHandleVariableCommunicationStepSize");
     for flags in COMBINATIONS {
         for multiple in if variable { &[1.0, 5.0][..] } else { &[1.0] } {

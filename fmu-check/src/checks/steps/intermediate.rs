@@ -151,7 +151,7 @@ fn outputs(session: &Session) -> Result<(), NotDetermined> {
     Ok(())
 }
 
-/// The time of the first callback of a step in which the importer may ask for its end.
+/// The time of the first callback of a step in which the importer may request its end.
 fn first_chance(meanwhile: &Meanwhile) -> Option<f64> {
     meanwhile.heard.iter().find_map(|heard| match heard {
         Heard::Intermediate { time, can_return: 1, .. } => Some(*time),

@@ -148,7 +148,7 @@ fn accumulated(session: &Session) -> Result<(), NotDetermined> {
 
 fn many_steps(session: &Session) -> Result<(), NotDetermined> {
     let (instance, h) = (session.stepping()?, session.h());
-    // Beyond its default experiment, an FMU may lack data: a failure there proves nothing.
+    // Outside its default experiment, an FMU may lack data, so a failure there is inconclusive.
     let stop = session.description.default_experiment.stop.unwrap_or(f64::INFINITY);
     let began = Instant::now();
     session.record_calls(&format!("up to 100000 steps of {h}, t = t + h"), || {

@@ -23,7 +23,7 @@ impl Buffer {
         Self { words: vec![CANARY; (count * width).div_ceil(8) + CANARIES], kind, width, count }
     }
 
-    /// Values from their bits, the low ones of each.
+    /// Values from the low bits of each word.
     ///
     /// # Panics
     /// A text that is not NULL: only [`Raw::set_strings`](super::Raw::set_strings) passes pointers.
@@ -58,7 +58,7 @@ impl Buffer {
         if self.width < 4 { self.count > 0 && untouched.all(|u| u) } else { untouched.any(|u| u) }
     }
 
-    /// Whether nothing was written past the values.
+    /// Whether the memory behind the values is intact.
     pub fn intact(&self) -> bool {
         self.words[(self.count * self.width).div_ceil(8)..].iter().all(|w| *w == CANARY)
     }
@@ -73,7 +73,7 @@ impl Buffer {
         8 * self.words.len() / self.width
     }
 
-    /// Whether the values are those of a C type of this name.
+    /// Whether the values have the C type of this name.
     pub(super) fn holds(&self, kind: &str) -> bool {
         self.kind == kind
     }

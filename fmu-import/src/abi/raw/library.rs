@@ -51,7 +51,7 @@ impl Raw {
 
     /// The table, locked for one call: the calls of a `Raw` follow one another, even from several threads.
     pub(super) fn owned(&self) -> MutexGuard<'_, Owned> {
-        // A refusal changes nothing, so the table is good after it.
+        // A refusal has no side effects, so the table is valid afterwards.
         self.owned.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -250,7 +250,7 @@ impl Raw {
         self.calls.do_step(self.owned().pointer(instance), (t, h), no_prior, pointers, before).result()
     }
 
-    /// `SetDebugLogging`; `categories` may be NULL, and an element of it.
+    /// `SetDebugLogging`; `categories` and its elements may be NULL.
     ///
     /// # Panics
     /// There are fewer than `n` categories.

@@ -33,7 +33,7 @@ macro_rules! names {
 }
 
 names! {
-    /// Functions of an instance and nothing else.
+    /// Functions whose only argument is the instance.
     Simple {
         Reset Terminate EnterInitializationMode ExitInitializationMode EnterConfigurationMode ExitConfigurationMode
         EnterEventMode EnterStepMode EnterContinuousTimeMode EvaluateDiscreteStates CancelStep

@@ -58,7 +58,7 @@ impl Raw {
         let owned = self.owned();
         let (vr, i, name) = (&raw const reference, owned.pointer(instance).0, self.name(function.as_str()));
         let calls = &self.calls;
-        // SAFETY: every type is that of the standard, except for the target of data pointers; each buffer has 512 bytes, more
+        // SAFETY: every type matches the standard, except for the target of data pointers; each buffer has 512 bytes, more
         // than one value needs.
         Some(unsafe {
             match function {

@@ -90,7 +90,7 @@ impl Owned {
     /// Address of a state, or NULL.
     ///
     /// # Panics
-    /// The state is freed, by itself or with its instance, or of another binary.
+    /// The state was freed, individually or with its instance, or belongs to another binary.
     pub(super) fn state<'a>(&self, state: SavedState) -> Given<'a> {
         let address = self.state_index(state).map_or(0, |index| self.states[index].address);
         // SAFETY: a state that the table has, which is locked for one call, or NULL.

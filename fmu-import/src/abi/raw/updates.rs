@@ -113,7 +113,7 @@ fn hear(heard: Heard) -> Option<Plan> {
 }
 
 impl Plan {
-    /// Executes the importer's plan; returns the time at which the step is to end, if requested.
+    /// Executes the importer's plan; returns the requested end of the step, if any.
     fn play(&self) -> Option<f64> {
         // SAFETY: `Raw::under_way` lends the functions and the instance until it takes the plan back.
         let (calls, instance) = unsafe {

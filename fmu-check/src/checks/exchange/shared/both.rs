@@ -1,7 +1,7 @@
 //! Co-simulation and Model Exchange of one FMU, side by side: the same equations give about the same results.
 //!
-//! The importer's own integration has an error too. It is estimated from a run in half the steps, and only what differs by far more,
-//! at many points, is a finding.
+//! The importer's own integration is also inexact. It is estimated from a run in half the steps, and only what differs by far
+//! more, at many points, is a finding.
 
 use crate::exchange::Importer;
 use crate::instance::Instance;

@@ -21,7 +21,7 @@ fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable,
     }
 }
 
-/// Whether a new instance in which nothing was changed has other values than the first one had.
+/// Whether the values of a new, unchanged instance differ from the first one's.
 fn is_disturbed(
     session: &Session,
     moved: bool,

@@ -250,7 +250,7 @@ pub(crate) fn build_description(fmu: &FmuFile) -> Verdict {
     Verdict::of(found)
 }
 
-/// Whether a file below sources/ is in the archive. Its name may have parts that are `.`, as those of OpenModelica have.
+/// Whether a file below sources/ is in the archive. Its name may contain `.` as a part, as in OpenModelica.
 fn is_source(fmu: &FmuFile, name: &str) -> bool {
     let parts: Vec<_> = name.split('/').filter(|part| *part != ".").collect();
     fmu.zip.find(&format!("sources/{}", parts.join("/"))).is_some()

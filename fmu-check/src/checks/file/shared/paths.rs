@@ -71,7 +71,7 @@ fn on_a_drive(text: &str) -> Option<String> {
     drive.then(|| text.to_owned())
 }
 
-/// The path whose home folder begins here, if it names a file or folder that a program may want to open.
+/// The path whose home folder begins here, if it names a file or folder that a program might open.
 fn path_at(text: &[u8], at: usize) -> Option<String> {
     let home = HOMES.iter().find(|home| text[at..].starts_with(home.as_bytes()))?;
     let windows = home.starts_with(':');

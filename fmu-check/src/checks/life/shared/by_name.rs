@@ -1,4 +1,4 @@
-//! Calls of functions by their names: those of capabilities that the FMU does not have, and every function without an instance.
+//! Calls of functions by name: functions of capabilities that the FMU does not have, and every function without an instance.
 
 use crate::checks::file::shared::libraries::functions;
 use crate::encoding::bits;

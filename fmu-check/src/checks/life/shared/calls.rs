@@ -33,11 +33,11 @@ const CALLS: &[Call] = &[
     Call("DoStep",                        |s| s.raw.has("DoStep"), ["",  "",     "-----", "-----", ""  ], do_step),
     Call("NewDiscreteStates",             any,                  ["",     "",     "--+--", "",      ""  ], |i, _| Ok(i.update()?.0)),
     Call("UpdateDiscreteStates",          any,                  ["",     "",     "",      "--+--", "- "], |i, _| Ok(i.update()?.0)),
-    // In Event Mode, the table of FMI 2.0 allows it, and its text knows a use only for discrete FMUs.
+    // In Event Mode, the table of FMI 2.0 allows it, and its text mentions a use only for discrete FMUs.
     Call("EnterEventMode",                any,                  ["",     "",     "--?+-", "--?+-", ""  ], |i, _| i.simple(Simple::EnterEventMode)),
     Call("EnterStepMode",                 |s| s.raw.has("EnterStepMode"), ["", "", "",    "-----", "- "], |i, _| i.simple(Simple::EnterStepMode)),
     Call("EnterContinuousTimeMode",       any,                  ["",     "",     "--+--", "--+--", ""  ], enter_continuous_time),
-    // In Event Mode, FMI 2.0 allows it for a purely discrete FMU, and does not say what that is.
+    // In Event Mode, FMI 2.0 allows it for a purely discrete FMU, without a definition of that term.
     Call("SetTime",                       any,                  ["",     "",     "--?+-", "---+-", ""  ], |i, _| i.set_time(i.time.get())),
     Call("CompletedIntegratorStep",       any,                  ["",     "",     "---+-", "---+-", ""  ], |i, _| Ok(i.completed()?.0)),
     // FMI 2.0 allows the vectors in Initialization Mode, though a simulation needs them after it only.
@@ -80,7 +80,7 @@ pub(crate) fn attempt(session: &Session, life: Life, sign: char) {
         (Life::EventMode, _) => 4,
     };
     for Call(name, _, cells, make) in CALLS.iter().filter(|Call(_, tried, ..)| tried(session)) {
-        // E01i has those of Model Exchange.
+        // E01i covers Model Exchange.
         let wanted = |cell: char| cell == sign || (life == Life::CoSimulation && (sign, cell) == ('+', 's'));
         let states = life.states().iter().zip(cells[column].chars()).filter(|(_, cell)| wanted(*cell));
         for (&state, cell) in states {

@@ -1,4 +1,4 @@
-//! Values that a run must keep or return as they are: several in one call, inputs, parameters, Booleans, numbers.
+//! Values that a run must keep or return unchanged: several in one call, inputs, parameters, Booleans, numbers.
 
 use crate::checks::life::shared::values::is_rounded;
 use crate::encoding::{bits, quoted, same, show};
@@ -311,7 +311,7 @@ pub(crate) fn derivatives_are_slopes(session: &Session) -> Result<(), NotDetermi
         for (n, (der, state)) in pairs.iter().enumerate() {
             let [d0, d1, x0, x1] = [before[2 * n], after[2 * n], before[2 * n + 1], after[2 * n + 1]];
             let (slope, scale) = ((x1 - x0) / h, d0.abs().max(d1.abs()));
-            // If the derivative itself changes, or rounding dominates, a slope proves nothing.
+            // If the derivative itself changes, or rounding dominates, a slope is inconclusive.
             let rough = (d1 - d0).abs() > 0.2 * scale || scale * h <= 1e-9 * x0.abs().max(x1.abs()).max(1e-9);
             if rough || !slope.is_finite() {
                 continue;

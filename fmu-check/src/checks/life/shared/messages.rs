@@ -1,14 +1,15 @@
-//! What is wrong with the text of a message.
+//! Defects in the text of a message.
 
 use crate::confidence::Confidence;
 use fmu_import::raw::LogCall;
 
-/// A text that the FMU is given and may log: `START` and `PERCENT`. Where an FMU uses it as a printf format, the `%d` is replaced.
+/// A text passed to the FMU, which it may log: `START` and `PERCENT`. Where an FMU uses it as a printf format, the `%d` is
+/// replaced.
 pub(crate) const START: &str = "a probe's text, 100";
 /// See [`START`].
 pub(crate) const PERCENT: &str = "%d";
 
-/// What is wrong, and how sure that is.
+/// A defect and its confidence.
 pub(crate) fn fault(event: &LogCall) -> Option<(Confidence, String)> {
     let certain = |why: &str| Some((Confidence::Certain, why.to_owned()));
     if let Some(fault) = &event.fault {

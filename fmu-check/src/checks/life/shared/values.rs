@@ -113,7 +113,7 @@ pub(crate) fn is_rounded(v: &ModelVariable, version: FmiVersion, set: &[u64], go
     version == FmiVersion::V2 && v.base == BaseType::Float64 && set.iter().map(rounded).eq(got.iter().copied())
 }
 
-/// A text longer than this in bytes is beyond use.
+/// Maximum length in bytes of a text that is useful in practice.
 const LONG: usize = 4096;
 
 pub(crate) fn strings(session: &Session) -> Result<(), NotDetermined> {
@@ -158,7 +158,7 @@ fn read_back(set: &str, got: Option<&str>) -> String {
     }
 }
 
-/// Strings that are set in one call keep a value each.
+/// Strings set in one call keep separate values.
 fn several_strings(session: &Session) -> Result<(), NotDetermined> {
     let fits = |v: &&ModelVariable| v.base == BaseType::String && settable(v) && !v.is_array();
     let all: Vec<_> = session.description.variables.iter().filter(fits).take(20).collect();

@@ -10,7 +10,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, SystemTime};
 
-/// Loads a copy of the binary, runs it, unloads it, and returns what `look` sees before and after.
+/// Loads a copy of the binary, runs it, unloads it, and returns the results of `look` before and after.
 fn around<T>(session: &Session, look: &dyn Fn() -> T) -> Result<(T, T), NotDetermined> {
     let binary = second_binary(session, "guest")?;
     // The first loading may have left it already.
@@ -51,7 +51,7 @@ fn current_settings() -> BTreeMap<String, String> {
             );
         }
     }
-    // The name of the program stands in parentheses and may contain anything.
+    // The program name is in parentheses and may contain any character.
     let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let words: Vec<&str> = stat.rsplit_once(')').map_or("", |(_, rest)| rest).split_whitespace().collect();
     for (name, at) in [("the priority", 15), ("the nice value", 16), ("the scheduling policy", 38)] {

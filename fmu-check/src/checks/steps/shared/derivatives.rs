@@ -5,7 +5,7 @@ use crate::session::{NotDetermined, Session};
 use fmu_import::Status;
 use model_description::{BaseType, Causality, ModelVariable, Variability};
 
-/// The highest order, and the continuous outputs; `None` if there is nothing to check, which is reported.
+/// The highest order, and the continuous outputs; `None`, with a report, if there is nothing to check.
 fn scope(session: &Session) -> Result<Option<(i32, Vec<&ModelVariable>)>, NotDetermined> {
     let simulation = session.description.co_simulation.as_ref();
     let order = simulation.and_then(|c| c.attribute("maxOutputDerivativeOrder")?.trim().parse().ok()).unwrap_or(0);
@@ -66,7 +66,7 @@ pub(crate) fn slopes(session: &Session) -> Result<(), NotDetermined> {
     session.case(|| {
         let instance = moving(session)?;
         let values = || instance.numbers(&outputs);
-        // A hundredth of the step, so that the slope has no time to change much.
+        // A hundredth of the step, so that the slope hardly changes.
         let short_step = session.h() / 100.0;
         if !session.flag("canHandleVariableCommunicationStepSize") || !instance.step(short_step)?.is_ok() {
             session.note("the step cannot be shortened: slopes are not compared");
@@ -80,7 +80,7 @@ pub(crate) fn slopes(session: &Session) -> Result<(), NotDetermined> {
         }
         let mut constant = 0;
         for (((v, derivative), before), after) in outputs.iter().zip(&derivatives).zip(&before).zip(values()?) {
-            // An output that a sampling part of the FMU holds has no slope in a short step.
+            // An output held by a sampled part of the FMU has no slope in a short step.
             if *derivative != 0.0 && after.to_bits() == before.to_bits() {
                 constant += 1;
                 continue;

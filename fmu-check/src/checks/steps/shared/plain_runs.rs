@@ -1,4 +1,4 @@
-//! Two plain runs of two instances, in each interface: a variable in which they differ cannot be compared by any other check.
+//! Two plain runs of two instances, in each interface: other checks skip a variable in which they differ.
 //!
 //! Such a variable is a measured time, a random number, memory that is not initialized, or data that instances share.
 

@@ -69,8 +69,7 @@ fn column(rows: &[Vec<f64>], i: usize) -> Vec<f64> {
     rows.iter().map(|row| row[i]).collect()
 }
 
-/// The largest value of a run, or the nominal, and the largest change after the first step: the values before it may be those of
-/// the start.
+/// The largest value of a run, or the nominal, and the largest change after the first step: earlier values may be start values.
 struct Extent {
     value: f64,
     change: f64,
