@@ -29,7 +29,7 @@ pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     [at_the_start(can, fresh, states), between_events(can, fresh, states)]
 }
 
-/// As [`dependencies`], without any.
+/// Empty counterpart of [`dependencies`]: no variable is an unknown.
 pub(crate) fn no_dependencies<M: Model>(states: &[usize]) -> [Dependencies; 2] {
     [const { None }; 2].map(|none| vec![none; metas::<M>().len() + states.len()])
 }
