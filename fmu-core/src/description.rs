@@ -211,13 +211,32 @@ pub enum Value {
     Binary(Vec<u8>),
 }
 
+/// Whether a description has the dependencies of its variables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dependencies {
+    /// Found by running the model, which takes seconds if it is large.
+    Probed,
+    /// No variable has any: for a caller that knows them from the archive.
+    Omitted,
+}
+
+impl Dependencies {
+    /// Those of initial values, and those between two events.
+    fn of<M: Model>(self, can: &Capabilities<M>, block: &Block<M>, states: &[usize]) -> [probe::Dependencies; 2] {
+        match self {
+            Self::Probed => probe::dependencies(can, block, states),
+            Self::Omitted => probe::no_dependencies::<M>(states),
+        }
+    }
+}
+
 impl Description {
     /// Describes model `M` for co-simulation only: see [`exported`](Self::exported).
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
     pub fn of<M: Model>() -> Result<Self, Fault> {
-        Self::with(&Capabilities::<M>::NONE, fresh()?)
+        Self::with(&Capabilities::<M>::NONE, fresh()?, Dependencies::Probed)
     }
 
     /// Describes a model as it is exported; start values come from its `Default`, dependencies from probing it.
@@ -226,23 +245,22 @@ impl Description {
     /// Reports problems that no compile-time check can find: a name shared by two parts, a start value outside its
     /// range, a type definition named like a variable, a terminal with missing variables, a state without a row.
     pub fn exported<E: Exported>() -> Result<Self, Fault> {
-        Self::instantiated::<E>(fresh()?)
+        Self::instantiated::<E>(fresh()?, Dependencies::Probed)
     }
 
     /// Describes an instance like [`exported`](Self::exported), with the start values and resources of `block`.
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
-    pub fn instantiated<E: Exported>(block: Block<E::Model>) -> Result<Self, Fault> {
-        Self::with(&E::CAN, block)
+    pub fn instantiated<E: Exported>(block: Block<E::Model>, dependencies: Dependencies) -> Result<Self, Fault> {
+        Self::with(&E::CAN, block, dependencies)
     }
 
-    fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>) -> Result<Self, Fault> {
+    fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>, dependencies: Dependencies) -> Result<Self, Fault> {
         let states = can.rows()?;
         check_sizes(&block)?;
         probe::keeps_starts(can, &block, &states)?;
-        let initial = probe::initial_dependencies(can, &block, &states);
-        let between = probe::dependencies(can, &block, &states);
+        let [initial, between] = dependencies.of(can, &block, &states);
         block.initialize();
         let reference = |index: usize| if index == probe::NOW { TIME } else { can.reference(index) };
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());

@@ -22,7 +22,17 @@ pub(crate) const NOW: usize = usize::MAX;
 
 /// For each variable, the indices that it depends on; wide arrays, each as a whole under its first index, and then derivatives
 /// follow the table. `None` for a variable that is not an unknown.
-type Dependencies = Vec<Option<Vec<usize>>>;
+pub(crate) type Dependencies = Vec<Option<Vec<usize>>>;
+
+/// The dependencies of initial values, and those between two events.
+pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> [Dependencies; 2] {
+    [at_the_start(can, fresh, states), between_events(can, fresh, states)]
+}
+
+/// Empty counterpart of [`dependencies`]: no variable is an unknown.
+pub(crate) fn no_dependencies<M: Model>(states: &[usize]) -> [Dependencies; 2] {
+    [const { None }; 2].map(|none| vec![none; metas::<M>().len() + states.len()])
+}
 
 /// Checks that an exact variable keeps the start value set by the importer.
 pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Result<(), Fault> {
@@ -46,11 +56,7 @@ pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
 }
 
 /// Dependencies of initial values: outputs, calculated parameters, states and derivatives on inputs and parameters.
-pub(crate) fn initial_dependencies<M: Model>(
-    can: &Capabilities<M>,
-    fresh: &Block<M>,
-    states: &[usize],
-) -> Dependencies {
+fn at_the_start<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
     let metas = metas::<M>();
     let knowns: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
     let mut found = Found::new(metas.len() + states.len());
@@ -81,7 +87,7 @@ pub(crate) fn initial_dependencies<M: Model>(
 
 /// Dependencies between two events: outputs and derivatives on states, inputs, tunable parameters and time, for any values of
 /// the parameters.
-pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
+fn between_events<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
     let metas = metas::<M>();
     let known = |meta: &Meta| meta.causality == Causality::Input || meta.variability == Variability::Tunable;
     let mut found = Found::new(metas.len() + states.len());

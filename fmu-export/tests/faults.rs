@@ -141,7 +141,7 @@ extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
 fn the_description_is_handed_out() {
     loud();
     let mut bytes = Vec::new();
-    assert_eq!(unsafe { fmu_description(collect, (&raw mut bytes).cast(), null()) }, 0);
+    assert_eq!(unsafe { fmu_description(collect, (&raw mut bytes).cast(), null(), 1) }, 0);
     let description: Description = serde_json::from_slice(&bytes).unwrap();
     assert_eq!(description, Description::of::<Probe>().unwrap());
     assert_eq!(description.token, token().to_str().unwrap());

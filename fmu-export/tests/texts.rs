@@ -240,7 +240,7 @@ fn a_load_that_changes_the_state_is_not_described() {
     }
     let describe = |folder: &CStr| {
         let mut said: Vec<u8> = Vec::new();
-        let status = unsafe { fmu_description(collect, (&raw mut said).cast(), folder.as_ptr()) };
+        let status = unsafe { fmu_description(collect, (&raw mut said).cast(), folder.as_ptr(), 0) };
         (status, String::from_utf8(said).unwrap())
     };
     assert_eq!(describe(c"/where").0, 0);

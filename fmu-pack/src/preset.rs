@@ -6,7 +6,7 @@ use crate::archive::{self, GenerationTime, PackedFile};
 use crate::documentation;
 use crate::error::{Context, Error, Result, ensure, invalid};
 use crate::reference::{self, FOLDER};
-use fmu_core::description::{Value, Variable, VariableKind};
+use fmu_core::description::{Dependencies, Value, Variable, VariableKind};
 use fmu_core::preset::{self, FILE};
 use fmu_core::variable::{Causality, position};
 use fmu_core::{Bytes, Description};
@@ -69,7 +69,7 @@ impl PresetFmu {
             fs::remove_file(&path)?;
         }
         let name = file.display();
-        let own = describe(&unpacked.library, Some(&unpacked.resources())).map_err(|e| {
+        let own = described(&unpacked).map_err(|e| {
             invalid!("{name}: {}: a preset is for FMUs of this program (fmu build)", cause(&e.to_string(), &unpacked))
         })?;
         let suffix = preset::suffix_of(&md.token, &own.token).with_context(|| {
@@ -190,7 +190,12 @@ impl PresetFmu {
             .collect();
         let version = self.md.version;
         let mut put = |name: &str, text: String| files.insert(name.into(), entry(name, text.into_bytes()));
-        put(DESCRIPTION, model_description::write(&description, version, &generation(moment)));
+        let text = model_description::write(&description, version, &generation(moment));
+        let text = self.files.get(DESCRIPTION).and_then(|archived| with_structure_of(archived, &text));
+        put(
+            DESCRIPTION,
+            text.with_context(|| format!("{}: {DESCRIPTION} has no ModelStructure", self.file.display()))?,
+        );
         put(&format!("resources/{FILE}"), self.text());
         let documentation = documentation::preset::preset(&description, &self.own);
         put(PAGE, documentation::page(&Description { documentation, ..description.clone() }, version));
@@ -217,8 +222,8 @@ impl PresetFmu {
     fn described(&self, title: Option<&str>) -> Result<Description> {
         let (name, text) = (self.file.display(), self.text());
         fs::write(self.unpacked.resources().join(FILE), &text)?;
-        let described = describe(&self.unpacked.library, Some(&self.unpacked.resources()));
-        let mut description = described.map_err(|e| invalid!("{name}: {}", cause(&e.to_string(), &self.unpacked)))?;
+        let mut description =
+            described(&self.unpacked).map_err(|e| invalid!("{name}: {}", cause(&e.to_string(), &self.unpacked)))?;
         let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
         ensure!(
             description.token == token,
@@ -270,6 +275,24 @@ fn initialized(fmu: &Fmu, kind: Kind) -> Result<(), fmu_import::Error> {
     instance.setup(fmu.description().default_experiment.start.unwrap_or(0.0), None)?;
     instance.enter_initialization()?;
     instance.exit_initialization()
+}
+
+/// The description that the library returns. The archive knows the dependencies: they hold for any values of the parameters.
+fn described(unpacked: &Unpacked) -> Result<Description, fmu_import::Error> {
+    describe(&unpacked.library, Some(&unpacked.resources()), Dependencies::Omitted)
+}
+
+/// The text of a description with the model structure of the archive.
+fn with_structure_of(archived: &[u8], text: &str) -> Option<String> {
+    let structure = |text: &str| {
+        let start = text.find("<ModelStructure")?;
+        let end =
+            ["<ModelStructure/>", "</ModelStructure>"].map(|end| text[start..].find(end).map(|at| at + end.len()));
+        Some(start..start + end.into_iter().flatten().next()?)
+    };
+    let archived = std::str::from_utf8(archived).ok()?;
+    let (own, of_archive) = (structure(text)?, structure(archived)?);
+    Some([&text[..own.start], &archived[of_archive], &text[own.end..]].concat())
 }
 
 fn generation(moment: GenerationTime) -> Generation {

@@ -6,6 +6,7 @@ use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::{Args, ValueEnum};
 use fmu_core::Description;
+use fmu_core::description::Dependencies;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
 use fmu_import::{describe, printable};
@@ -455,7 +456,7 @@ fn load(
     let folder =
         resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
     let files = folder.as_deref().map_or_else(|| Ok(BTreeMap::new()), archive::resources)?;
-    let description = describe(own, folder.as_deref())?;
+    let description = describe(own, folder.as_deref(), Dependencies::Probed)?;
     let read = |(platform, path): &(Platform, PathBuf)| anyhow::Ok((*platform, read(path)?));
     let binaries = libraries.iter().map(read).collect::<Result<_>>()?;
     let own = vec![read(&(Platform::host(), own.to_owned()))?];

@@ -120,6 +120,8 @@ fn a_preset_is_in_the_description_and_in_every_instance() {
                 (&old.name, old.value_reference, &old.declared_type)
             );
         }
+        assert_eq!((&md.outputs, &md.derivatives), (&old_md.outputs, &old_md.derivatives));
+        assert_eq!((&md.initial_unknowns, &md.event_indicators), (&old_md.initial_unknowns, &old_md.event_indicators));
         let suffix = fmu_core::preset::suffix(&files[&format!("resources/{FILE}")]);
         assert_eq!((md.version, &md.model_name), (version, &old_md.model_name));
         assert_eq!(md.token, old_md.token.clone() + &suffix);

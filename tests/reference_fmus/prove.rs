@@ -16,7 +16,7 @@ fn fed(package: &str, stimuli: &str, folder: &Path, change: (&str, &str)) -> Pat
     let library =
         super::python::scratch().parent().unwrap().join(if cfg!(debug_assertions) { "debug" } else { "release" });
     let library = library.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_")));
-    let description = fmu_import::describe(&library, None).unwrap();
+    let description = fmu_import::describe(&library, None, fmu_core::description::Dependencies::Omitted).unwrap();
     let more = fmu_pack::reference::files(&plain, &description, &file, None).unwrap();
     let (_, files) = fmu_import::contents(&plain).unwrap();
     let changed = |bytes| String::from_utf8(bytes).unwrap().replace(change.0, change.1).into_bytes();

@@ -18,6 +18,7 @@ use crate::blob;
 use crate::instance::{Instance, Refusal};
 use crate::preset::Made;
 use crate::snapshot::Snapshot;
+use fmu_core::description::Dependencies;
 use fmu_core::{Description, Exported, Fault, Interface, Model, preset};
 use std::ffi::{CStr, c_int, c_void};
 use std::ops::{Deref, DerefMut};
@@ -68,7 +69,7 @@ impl<E: Exported> Abi<'_, E> {
     }
 
     /// Passes the model's description to `sink` as JSON and returns 0, or a message and 1. `resources` is the folder of the
-    /// model's resources, or NULL.
+    /// model's resources, or NULL; with `dependencies` = 0, no variable has dependencies.
     ///
     /// # Safety
     /// `resources` is NULL or a C string.
@@ -76,7 +77,9 @@ impl<E: Exported> Abi<'_, E> {
         sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),
         context: *mut c_void,
         resources: types::Text,
+        dependencies: c_int,
     ) -> c_int {
+        let dependencies = if dependencies == 0 { Dependencies::Omitted } else { Dependencies::Probed };
         // SAFETY: the caller's promise.
         let resources = crate::resources::folder(unsafe { pointer::text(resources) });
         let json = catch_unwind(|| {
@@ -85,7 +88,7 @@ impl<E: Exported> Abi<'_, E> {
                 return Err(Fault::new("load changes what a state saves: store what it reads in a Resource"));
             }
             made.block.model.load(resources.as_deref())?;
-            let mut description = Description::instantiated::<E>(made.block)?;
+            let mut description = Description::instantiated::<E>(made.block, dependencies)?;
             description.token.push_str(&made.suffix);
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
@@ -269,10 +272,11 @@ macro_rules! export {
                 sink: extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize),
                 context: *mut c_void,
                 resources: Text,
+                dependencies: c_int,
             ) -> c_int {
                 $crate::abi::quiet();
                 // SAFETY: what `fmu build` passes.
-                unsafe { $crate::abi::Abi::<This>::describe(sink, context, resources) }
+                unsafe { $crate::abi::Abi::<This>::describe(sink, context, resources, dependencies) }
             }
         }
     };

@@ -209,7 +209,7 @@ fn described(values: &[(&str, &str)]) -> Result<Description, String> {
     let text = preset::write(values.iter().copied());
     let (folder, mut bytes) = (Folder::new(text.as_bytes()), Vec::new());
     let resources = CString::new(folder.name(Way::Two)).unwrap();
-    match unsafe { fmu_description(collect, (&raw mut bytes).cast(), resources.as_ptr()) } {
+    match unsafe { fmu_description(collect, (&raw mut bytes).cast(), resources.as_ptr(), 0) } {
         0 => Ok(serde_json::from_slice(&bytes).unwrap()),
         _ => Err(String::from_utf8(bytes).unwrap()),
     }
@@ -223,6 +223,7 @@ fn the_description_has_the_start_values_and_the_token() {
         let value = ALL.iter().find(|(name, _)| *name == variable.name);
         assert_eq!(variable.start != start.start, value.is_some(), "{}", variable.name);
         assert_eq!((&variable.kind, variable.value_reference), (&start.kind, start.value_reference));
+        assert_eq!((&variable.dependencies, &variable.initial_dependencies), (&None, &None), "{}", variable.name);
     }
     let start = |name: &str| preset.variable(name).unwrap().start.clone().unwrap();
     assert_eq!(start("large"), [Value::Integer(u64::MAX.into())]);

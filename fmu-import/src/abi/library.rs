@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::text::file_uri;
+use fmu_core::description::Dependencies;
 use libloading::Library;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::path::Path;
@@ -33,14 +34,20 @@ fn advised(reason: String) -> String {
 }
 
 type Sink = extern "C" fn(context: *mut c_void, bytes: *const u8, len: usize);
-type Describe = unsafe extern "C" fn(sink: Sink, context: *mut c_void, resources: *const c_char) -> c_int;
+type Describe =
+    unsafe extern "C" fn(sink: Sink, context: *mut c_void, resources: *const c_char, dependencies: c_int) -> c_int;
 
-/// The description that a library made with `fmu_export::export!` returns, with the folder of the model's resources.
+/// The description that a library made with `fmu_export::export!` returns, with the folder of the model's resources. Large
+/// models take seconds to find their dependencies.
 ///
 /// # Errors
 /// The file is not a library for this platform, or was not built with this version of the exporter; or the model refuses its
 /// resources.
-pub fn describe(path: &Path, resources: Option<&Path>) -> Result<fmu_core::Description, Error> {
+pub fn describe(
+    path: &Path,
+    resources: Option<&Path>,
+    dependencies: Dependencies,
+) -> Result<fmu_core::Description, Error> {
     extern "C" fn collect(context: *mut c_void, bytes: *const u8, len: usize) {
         if context.is_null() || bytes.is_null() {
             return;
@@ -58,8 +65,9 @@ pub fn describe(path: &Path, resources: Option<&Path>) -> Result<fmu_core::Descr
     let describe = unsafe { library.get::<Describe>("fmu_description") }.map_err(|_| {
         Error::file(path, "has no function fmu_description: not a library made with fmu_export::export!")
     })?;
+    let dependencies = c_int::from(dependencies == Dependencies::Probed);
     // SAFETY: the function calls the sink with the context, before it returns; both live until then, and so does the text.
-    let status = unsafe { describe(collect, (&raw mut json).cast(), resources) };
+    let status = unsafe { describe(collect, (&raw mut json).cast(), resources, dependencies) };
     if status != 0 {
         let said = String::from_utf8_lossy(&json);
         return Err(Error::file(path, format!("fmu_description returned {status}: {said}")));

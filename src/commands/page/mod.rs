@@ -7,7 +7,7 @@ use crate::{Failed, message};
 use anyhow::{Context, Result, anyhow, ensure};
 use clap::Args;
 use fmu_core::Description;
-use fmu_core::description::VariableKind;
+use fmu_core::description::{Dependencies, VariableKind};
 use fmu_import::describe;
 use fmu_pack::compile::{compile, module};
 use fmu_pack::licenses::Licenses;
@@ -165,7 +165,7 @@ fn models(workspace: &Workspace, args: &Page) -> Result<Vec<Model>> {
     }
     for (package, library) in compile(workspace, &names, &Tools::find()?.host())? {
         let folder = workspace.package(&package).map_or(Path::new("."), Package::folder).to_owned();
-        let description = describe(&library, None).map_err(|e| reads_files(&folder, e))?;
+        let description = describe(&library, None, Dependencies::Omitted).map_err(|e| reads_files(&folder, e))?;
         if let Some(clock) = description.variables.iter().find(|v| matches!(v.kind, VariableKind::Clock(_))) {
             let why = format!("{}: a page does not tick the clock {}", description.name, clock.name);
             if args.fmus.is_empty() && args.package.is_empty() {
