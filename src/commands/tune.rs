@@ -56,7 +56,7 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
-    /// Print the values as JSON, only a dictionary per FMU; enumerations are integers, as FMPy expects
+    /// Print the values as JSON, only a dictionary per FMU, without the trial and its notes; enumerations are integers, as FMPy expects
     #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
     pub json: bool,
     /// Estimator to tune for, instead of the motor file's
