@@ -271,6 +271,13 @@ fn the_check_prints_what_holds_and_what_was_announced() {
         let text = String::from_utf8(checked.stdout).unwrap();
         assert_eq!(checked.status.code(), Some(0), "{text}");
         let rows: Vec<_> = text.lines().filter(|line| line.contains(" pu  24 of 24 ")).collect();
+        let rest = text.lines().find(|line| line.starts_with("under the rated torque from rest: 0.5 pu reached from "));
+        let carried = rest.expect("the start under a load").ends_with("from 24 of 24 angles");
+        assert_ne!(
+            carried,
+            text.contains("note: under the rated torque from rest, the drive gets to 0.5 pu from "),
+            "{text}"
+        );
         assert!(rows.len() == 3 && rows.iter().zip(ends).all(|(row, end)| row.ends_with(end)), "{text}");
         text
     };

@@ -195,6 +195,22 @@ fn a_start_that_fails_is_told() {
     assert!(text.starts_with("will not hold START at 0.1 pu: from 4 of 4 angles, the speed loop acts"), "{text}");
 }
 
+/// The rated torque acts from the first sample on: a drive with a sensor carries it; an I-f start whose current holds less than the load
+/// does not, and the note has the count and the time.
+#[test]
+fn a_load_from_rest_is_carried_or_announced() {
+    let sensored = rules::tune(&changed("reference", 1.0, "[control]\nestimator = \"Sensored\"\n")).unwrap();
+    let (level, started) = trial::loaded(&sensored, 4);
+    assert_eq!((level, started, limits::under_load(&sensored, level, (started, 4))), (0.5, 4, None));
+    let lost = tuned("traction-60kw");
+    let (level, started) = trial::loaded(&lost, 4);
+    let note = limits::under_load(&lost, level, (started, 4)).unwrap();
+    let head = format!(
+        "under the rated torque from rest, the drive gets to 0.5 pu from {started} of 4 angles: the growth of the"
+    );
+    assert!(started < 4 && note.starts_with(&head) && note.contains("takes 0.083 s"), "{note}");
+}
+
 #[test]
 fn lock_and_emf_are_scaled_to_the_machine() {
     for (name, u) in [("reference", 5.0), ("drone-22v", 0.45), ("flat-24v", 0.688)] {

@@ -23,9 +23,10 @@ use std::path::{Path, PathBuf};
 ///
 /// The command tries the drive: starts from 24 angles, then rated torque as a step at 0.1, 0.5 and 1 pu of the rated speed, and
 /// a load at rating.speed_max if that is given. A note lists each load and each start at which the drive fails, with remedies
-/// that the command has tried too; the exit status is still 0. Another note states the speed at which the drive without a load
-/// swings most, on the way from 0.1 to 1 pu and back. Rasmussen's observer adapts the resistance, unless the trial holds fewer
-/// loads with it, as a note reports. --check prints the trial as a table, also for the machine at -30 and 130 degC.
+/// that the command has tried too; the exit status is still 0. Another note states the starts that fail while the rated torque
+/// acts from the first sample on, and another the speed at which the drive without a load swings most, on the way from 0.1 to 1 pu
+/// and back. Rasmussen's observer adapts the resistance, unless the trial holds fewer loads with it, as a note reports. --check
+/// prints the trial as a table, also for the machine at -30 and 130 degC.
 ///
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
@@ -55,7 +56,7 @@ pub struct Tune {
     /// Write enumerations as integers, for importers that cannot read names (OMSimulator)
     #[arg(long)]
     pub integers: bool,
-    /// Print the values as JSON, only a dictionary per FMU; enumerations are integers, as FMPy expects
+    /// Print the values as JSON, only a dictionary per FMU, without the trial and its notes; enumerations are integers, as FMPy expects
     #[arg(long, conflicts_with_all = ["fmu", "out", "check", "integers"])]
     pub json: bool,
     /// Estimator to tune for, instead of the motor file's
@@ -120,6 +121,10 @@ pub fn run(args: &Tune) -> Result<()> {
     for limit in &limits {
         println!("\nnote: {limit}");
     }
+    let (level, started) = trial::loaded(&tuned, ANGLES);
+    if let Some(note) = limits::under_load(&tuned, level, (started, ANGLES)) {
+        println!("\nnote: {note}");
+    }
     let swings = trial::swings(&tuned);
     if let Some(worst) = swings.iter().max_by(|a, b| a.speed.total_cmp(&b.speed)) {
         let cure = remedy::calm(&motor, &tuned, &trials);
@@ -128,6 +133,7 @@ pub fn run(args: &Tune) -> Result<()> {
     }
     if args.check {
         table(&trials, "does not hold: see the note");
+        println!("under the rated torque from rest: {level} pu reached from {started} of {ANGLES} angles");
         if swings.is_empty() {
             println!("without a load, from 0.1 to 1 pu and back, the drive does not swing");
         }

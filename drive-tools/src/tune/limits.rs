@@ -87,6 +87,33 @@ pub fn of(motor: &MotorFile, tuned: &Tuned, trials: &[Trial]) -> (Vec<Limit>, Ve
     (limits, notes)
 }
 
+/// A note if the drive does not start from every angle while the rated torque acts from the first sample on: from `started` of
+/// `angles` it does.
+pub fn under_load(tuned: &Tuned, level: f64, (started, angles): (u32, u32)) -> Option<String> {
+    if started == angles {
+        return None;
+    }
+    let pair = tuned.pair();
+    let (par, plant) = (&pair.controller.model.parameters, &pair.plant.model.parameters);
+    let back = |time: f64| f64::from(par.motor.n_p) * tuned.torque * time * time / (2.0 * plant.mechanics.J);
+    let turns = |what: &str, time: f64| {
+        let turned = back(time);
+        format!("{what} takes {time:.3} s, in which the load turns a free rotor by n_p T t^2 / (2 J) = {turned:.1} rad")
+    };
+    let why = match par.start.mode {
+        StartMode::CurrentFrequency => turns("the growth of the start's current", par.start.t_align / 3.0),
+        StartMode::Injection => turns("the search for the pole", par.polarity.t_find),
+        StartMode::Direct => {
+            "the estimate is wrong until the rotor has aligned with i_0, and the load acts before".into()
+        }
+    };
+    Some(format!(
+        "under the rated torque from rest, the drive gets to {} pu from {started} of {angles} angles: {why}; let the load act \
+         once the estimator leads, or hold the rotor with a brake until then",
+        rounded(level, 3)
+    ))
+}
+
 fn step(trial: &Trial) -> String {
     if trial.task.level > 1.0 {
         format!("a step of {:.3} N.m", trial.task.torque)

@@ -186,15 +186,15 @@ impl Bench<'_> {
         Some((self.pair.plant.out.speed / self.tuned.speed, ahead.to_degrees()))
     }
 
-    /// Starts up to `level`; returns whether the speed settles there.
-    fn starts(&mut self, level: f64) -> bool {
+    /// Starts up to `level` under `load` (N.m); returns whether the speed settles there.
+    fn starts(&mut self, level: f64, load: f64) -> bool {
         let Begin { rest, ready, .. } = Begin::of(self.tuned, &self.pair, level);
         while self.now() < rest || self.pair.controller.model.measures_resistance() {
-            if self.step(if self.now() < rest { 0.0 } else { level }, 0.0).is_none() {
+            if self.step(if self.now() < rest { 0.0 } else { level }, load).is_none() {
                 return false;
             }
         }
-        self.until_settled(level, ready, |_| 0.0, |_, _| ())
+        self.until_settled(level, ready, |_| load, |_, _| ())
     }
 
     /// Runs at `level` with `load` (N.m over the time in s since now), which is constant from `from` (s) on, until it settles
@@ -245,7 +245,7 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
     }
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
     let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 };
-    run.started = bench.starts(task.level);
+    run.started = bench.starts(task.level, 0.0);
     if !run.started {
         return Run { lock: bench.lock, ..run };
     }
@@ -257,6 +257,23 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
         error = error.max(angle.abs());
     });
     Run { least, error, most, lock: bench.lock, ..run }
+}
+
+/// From how many of `angles` start angles the drive runs up under the rated torque, which acts from the first sample on: a free rotor
+/// turns back until a current holds it. To half the rated speed, or to the highest of the method: the speed in pu.
+pub fn loaded(tuned: &Tuned, angles: u32) -> (f64, u32) {
+    let level = tuned.levels.iter().fold(0.0, |a: f64, &b| a.max(b)).min(0.5);
+    let starts: Vec<f64> = (0..angles).map(|k| f64::from(k) * TAU / f64::from(angles)).collect();
+    let ran = |theta: &f64| {
+        let mut pair = tuned.pair();
+        pair.plant.model.parameters.initial.theta_e = *theta;
+        if pair.start().is_err() {
+            return false;
+        }
+        let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
+        Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 }.starts(level, tuned.torque)
+    };
+    (level, queue::map(&starts, ran).into_iter().map(u32::from).sum())
 }
 
 /// Number of speeds between 0 and the rated one at which a drive without a load is tried for swings.
@@ -323,7 +340,7 @@ pub fn swings(tuned: &Tuned) -> Vec<Swing> {
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, par.T_s);
     let least = [SWING[0], SWING[1] * par.limit.i, SWING[2] * tuned.torque * tuned.speed];
     let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 };
-    if !bench.starts(first) {
+    if !bench.starts(first, 0.0) {
         return all;
     }
     let mut last = first;

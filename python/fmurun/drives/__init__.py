@@ -39,6 +39,8 @@ machines = {path.stem: str(path) for path in sorted((_FOLDER / "motors").glob("*
 def tune(motor, *, fmu="PmsmDrive", estimator=None, fmi=3):
     """Start values of an FMU for a machine, by the rules of `fmu tune`: a dictionary for FMPy and `fmurun`.
 
+    The drive is not tried: `fmu tune MOTOR.toml` does that, and notes the starts and the loads at which it fails.
+
     Args:
         motor: a motor file, or the name of one of `machines`
         fmu: "PmsmDrive", "PmsmDriveMean", "PmsmPlant" or "SensorlessController"
