@@ -77,7 +77,7 @@ pub fn universal(images: &[&[u8]]) -> Result<Vec<u8>, String> {
             return Err(format!("is for an unknown processor (cputype {cpu:#x})"));
         };
         if there.contains(&platform) {
-            return Err(format!("is for {platform}, as another one is"));
+            return Err(format!("is for {platform}, like another one"));
         }
         there.push(platform);
         let at = end.next_multiple_of(1 << alignment);

@@ -72,8 +72,8 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
     let (R_s, highest) = (of(&machine.R_s), u_dc / 3.0_f64.sqrt());
     let of_current = if i * R_s > highest {
         format!(
-            "rating.current = {i} A takes {} V of R_s, and a phase has u_dc / sqrt(3) = {} V at most: lower rating.current, a peak \
-             value, below {} A, or correct R_s, which is that of one phase",
+            "rating.current = {i} A drops {} V across R_s, and a phase has at most u_dc / sqrt(3) = {} V: lower rating.current, a peak \
+             value, below {} A, or correct R_s, the resistance of one phase",
             rounded(i * R_s, 4),
             rounded(highest, 4),
             rounded(0.6 * u_dc / R_s, 4)
