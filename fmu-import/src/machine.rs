@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(found, expected);
         assert!(read.arches().iter().all(|a| a.offset() % (1 << a.align()) == 0), "aligned to a page");
         assert_eq!(read.arches()[1].cpusubtype(), object::macho::CpuSubtype(0x8000_0002), "that of the image");
-        assert!(universal(&[&intel, &intel]).unwrap_err().contains("as another one is"));
+        assert!(universal(&[&intel, &intel]).unwrap_err().contains("like another one"));
         assert!(universal(&[b"\x7fELF"]).unwrap_err().contains("is not a library of macOS"));
         assert!(images(&both[..both.len() - 1]).unwrap_err().contains("lies outside"));
     }

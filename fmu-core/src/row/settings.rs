@@ -45,7 +45,7 @@ impl<W: 'static> Row<W> {
             && !matches!(self.meta.variability, Variability::Constant)
             && !matches!(self.meta.kind, Kind::Text | Kind::Binary { .. })
             && !self.meta.mean;
-        let rule = "only an output or a local variable other than a text, bytes, a mean or a constant can be exact";
+        let rule = "only an output or a local variable can be exact, and neither a text, bytes, a mean nor a constant";
         demand(calculated, self.meta.name, rule);
         self.meta.exact = true;
         self
