@@ -160,7 +160,7 @@ fn what_does_not_fit_is_refused() {
     }
 
     elsewhere("fmi3", FmiVersion::V3, &other);
-    refused(&plant("fmi2"), &["is of FMI 3.0", "of FMI 2.0", "merge those of one standard"]);
+    refused(&plant("fmi2"), &["is of FMI 3.0", "of FMI 2.0", "merge archives of one standard"]);
     fs::write(&other, "no archive").unwrap();
     let error = merged(&[&plant("fmi2"), &other], &out).unwrap_err();
     assert!(error.contains("other.fmu: not a ZIP archive") && !out.exists(), "{error}");

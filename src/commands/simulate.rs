@@ -331,8 +331,11 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
 
 /// Why a run ended early, with advice.
 fn ending(error: &fmu_import::Error, last: Option<&f64>, step: f64) -> String {
-    let advice =
-        if error.is_discard() { format!("; a shorter step may go on: --step {}", 0.5 * step) } else { String::new() };
+    let advice = if error.is_discard() {
+        format!("; a shorter step may continue: --step {}", 0.5 * step)
+    } else {
+        String::new()
+    };
     format!("{error}; the results end at {} s{advice}", last.copied().unwrap_or_default())
 }
 

@@ -71,7 +71,7 @@ pub fn start(data: &Data, (speed, rule): (f64, &str), notes: &mut Vec<String>) -
         real(
             "start.settle",
             (4.0 / decay).max(0.2),
-            "its swing has died at the hand-over: 4 time constants, at least 0.2 s",
+            "its swing has decayed at the hand-over: 4 time constants, at least 0.2 s",
         ),
     ]
 }

@@ -391,7 +391,7 @@ mod tests {
             for tau_ref in [100.0, -100.0] {
                 let References { i, tau: (low, high), limited, .. } = at(tau_ref);
                 let (tau, most) = (par.motor.torque(i.d(), i.q()), if tau_ref > 0.0 { high } else { -low });
-                assert!(limited && (tau / most - 1.0).abs() < 0.02, "{speed} rad/s: {tau} N.m, not {most} N.m");
+                assert!(limited && (tau / most - 1.0).abs() < 0.02, "{speed} rad/s: {tau} N.m instead of {most} N.m");
             }
         }
         par.speed_loop.torque_mode = false;

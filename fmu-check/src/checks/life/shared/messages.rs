@@ -33,7 +33,7 @@ pub(crate) fn fault(event: &LogCall) -> Option<(Confidence, String)> {
     } else if altered.next().is_some() {
         certain(&format!("the FMU was given the text \"{START}{PERCENT}\" and has used it as a printf format"))
     } else if let Some(conversion) = unresolved(&text.replace(&format!("{START}{PERCENT}"), START)) {
-        Some((Confidence::Likely, format!("{conversion:?} stands where a value belongs")))
+        Some((Confidence::Likely, format!("{conversion:?} appears in place of a value")))
     } else if let Some(conversion) = event.format.as_deref().and_then(percentage) {
         Some((
             Confidence::Likely,
