@@ -77,7 +77,7 @@ fn first_example(help: &str, name: &str) -> Option<String> {
 }
 
 /// The arguments. Cargo runs `cargo-fmu fmu ...` for `cargo fmu ...`.
-fn arguments() -> impl Iterator<Item = OsString> {
+pub(crate) fn arguments() -> impl Iterator<Item = OsString> {
     let is_second = |(place, argument): &(usize, OsString)| *place == 1 && argument == "fmu";
     std::env::args_os().enumerate().filter(move |a| !is_second(a)).map(|(_, argument)| argument)
 }
@@ -90,7 +90,11 @@ pub fn main() -> ExitCode {
     let command =
         Cli::from_arg_matches(&line().get_matches_from(arguments())).unwrap_or_else(|error| error.exit()).command;
     // The process that started a worker prints its error.
-    let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
+    let is_worker = match &command {
+        Command::Simulate(args) => args.process.worker,
+        Command::Bode(args) => args.process.worker,
+        _ => false,
+    };
     let outcome = match command {
         Command::New(args) => new::run(&args).map(|text| {
             print!("{text}");
