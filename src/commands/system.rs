@@ -130,7 +130,9 @@ impl SystemOptions {
             bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
         }
         std::env::set_current_dir(&home)?;
-        std::mem::take(&mut loaded.notes).iter().for_each(|note| message::note(&printable(note)));
+        for note in std::mem::take(&mut loaded.notes) {
+            message::note(&printable(&note));
+        }
         prepare(&mut loaded, self, stepping.sequential)?;
         Ok(loaded)
     }

@@ -71,7 +71,7 @@ fn guarded(name: &str, args: &ProcessOptions, threads: bool) -> Result<()> {
     let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
     let mut command = guard::command(&std::env::current_exe()?, allowance);
     // Output of the FMUs goes to standard error.
-    command.args([name, "--worker"]).args(crate::cli::arguments().skip(2)).stdout(io::stderr());
+    command.args([name, "--worker"]).args(crate::arguments().skip(2)).stdout(io::stderr());
     let mut worker = Guarded::start(command)?;
     let folder = worker.folder().to_owned();
     let (mut since, mut progress) = (Instant::now(), None);

@@ -30,7 +30,6 @@ use std::path::PathBuf;
 ///   fmu bode PmsmDrive.fmu --from speed_ref --to i_q_est --over i_q_ref --closed --step 1e-4 --set controller.estimator=Sensored
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
-#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Bode {
     /// FMUs and values.
     #[command(flatten)]

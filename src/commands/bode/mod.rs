@@ -106,7 +106,7 @@ fn measure(args: &Bode, threads: usize, out: Box<dyn Write>) -> Result<()> {
     // An FMU may change the working directory; file names of the command are relative to this one.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
-    let loaded = args.system.open(&args.stepping, Events::default(), false, |system| system)?;
+    let mut loaded = args.system.open(&args.stepping, Events::default(), false, |system| system)?;
     let probe = probe(args, loaded.system.instances())?;
     let settings = loaded.settings(None, None, args.step.or(probe.sample), args.stepping.sequential);
     let settings = loaded.system.feasible(&settings)?;
