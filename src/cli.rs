@@ -8,7 +8,6 @@ use crate::message;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use fmu_check::{command as check, probe};
 use fmu_import::printable_lines;
-use std::ffi::OsString;
 use std::process::ExitCode;
 
 /// Builds, runs and checks FMUs of sensorless permanent-magnet motor drives.
@@ -76,21 +75,20 @@ fn first_example(help: &str, name: &str) -> Option<String> {
     Some(format!("Example:\n{}", help[start..].lines().take(lines).collect::<Vec<_>>().join("\n")))
 }
 
-/// The arguments. Cargo runs `cargo-fmu fmu ...` for `cargo fmu ...`.
-fn arguments() -> impl Iterator<Item = OsString> {
-    let is_second = |(place, argument): &(usize, OsString)| *place == 1 && argument == "fmu";
-    std::env::args_os().enumerate().filter(move |a| !is_second(a)).map(|(_, argument)| argument)
-}
-
 /// Runs the command of this process's arguments.
 pub fn main() -> ExitCode {
     if let Some(status) = fmu_import::guard::serve() {
         return status;
     }
-    let command =
-        Cli::from_arg_matches(&line().get_matches_from(arguments())).unwrap_or_else(|error| error.exit()).command;
+    let command = Cli::from_arg_matches(&line().get_matches_from(crate::arguments()))
+        .unwrap_or_else(|error| error.exit())
+        .command;
     // The process that started a worker prints its error.
-    let is_worker = matches!(&command, Command::Simulate(args) if args.worker);
+    let is_worker = match &command {
+        Command::Simulate(args) => args.process.worker,
+        Command::Bode(args) => args.process.worker,
+        _ => false,
+    };
     let outcome = match command {
         Command::New(args) => new::run(&args).map(|text| {
             print!("{text}");

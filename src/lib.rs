@@ -35,3 +35,9 @@ pub fn exit_status(error: &anyhow::Error) -> u8 {
     };
     if error.chain().any(failed) { 1 } else { 2 }
 }
+
+/// The arguments. Cargo runs `cargo-fmu fmu ...` for `cargo fmu ...`.
+fn arguments() -> impl Iterator<Item = std::ffi::OsString> {
+    let is_second = |(place, argument): &(usize, std::ffi::OsString)| *place == 1 && argument == "fmu";
+    std::env::args_os().enumerate().filter(move |a| !is_second(a)).map(|(_, argument)| argument)
+}

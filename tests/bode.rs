@@ -319,17 +319,20 @@ fn the_pair_has_the_response_of_the_drive() {
         arguments.extend(both.into_iter().flat_map(|value| ["--set".to_owned(), value]));
     }
     let rest = "--from p.tau_load --to p.speed --settle 0.1 --step 1e-4 --frequencies 20,250,1000 --csv - \
-        --auto-connect --connect p.theta_e=c.theta_meas --connect p.speed=c.speed_meas";
+        --connect p.theta_e=c.theta_meas --connect p.speed=c.speed_meas";
     arguments.extend(rest.split_whitespace().map(str::to_owned));
-    let output = bode(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
-    let text = String::from_utf8(output.stdout).unwrap();
-    let line = |line: &str| {
-        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
-        (cells[0], C::new(cells[1], cells[2]), None)
-    };
-    let pair: Vec<Line> = text.lines().skip(1).map(line).collect();
-    assert_eq!(pair.len(), 3, "{}", String::from_utf8_lossy(&output.stderr));
-    agree_within("the pair", &pair, (0.05, 0.3), |f| speed_loop(f, 0.0, 1.0).1);
+    for wiring in ["--auto-connect", "--terminal p.phases=c.phases"] {
+        let all: Vec<&str> = arguments.iter().map(String::as_str).chain(wiring.split(' ')).collect();
+        let output = bode(&all);
+        let text = String::from_utf8(output.stdout).unwrap();
+        let line = |line: &str| {
+            let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap_or(f64::NAN)).collect();
+            (cells[0], C::new(cells[1], cells[2]), None)
+        };
+        let pair: Vec<Line> = text.lines().skip(1).map(line).collect();
+        assert_eq!(pair.len(), 3, "{}", String::from_utf8_lossy(&output.stderr));
+        agree_within("the pair", &pair, (0.05, 0.3), |f| speed_loop(f, 0.0, 1.0).1);
+    }
 }
 
 /// A load behind a spring, integrated between the communication points while the rotor is extrapolated at its speed.

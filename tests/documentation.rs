@@ -423,3 +423,43 @@ fn patterns_are_found() {
         assert_eq!(words::pattern(plain), None, "{plain}");
     }
 }
+
+/// Rows of the first table after a heading.
+fn table<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
+    let (_, after) = page.split_once(heading).unwrap_or_else(|| panic!("docs/methods.md has no {heading}"));
+    let rows = after.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
+    rows.skip(2).map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect()
+}
+
+/// The decision of docs/methods.md: each method once, with the worst cell of the machines that it holds, and the others.
+#[test]
+fn the_decision_is_that_of_the_comparison() {
+    const MACHINES: [&str; 3] = ["reference", "ipmsm-2.2kw", "traction-100kw"];
+    let page = std::fs::read_to_string(root().join("docs/methods.md")).unwrap();
+    let machines = MACHINES.map(|name| table(&page, &format!("### `{name}`\n")));
+    let decision = table(&page, "## The decision\n");
+    let names = |cell: &str| cell.split(", ").map(|name| name.trim_matches('`').to_owned()).collect::<Vec<_>>();
+    let mut chosen: Vec<String> = decision.iter().flat_map(|row| names(row[1])).collect();
+    chosen.sort();
+    let mut all: Vec<String> = Kind::ALL.iter().map(|kind| kind.name().to_owned()).collect();
+    all.sort();
+    assert_eq!(chosen, all, "each method once");
+    for row in &decision {
+        for method in names(row[1]) {
+            let (mut cells, mut not_on): (Vec<Vec<&str>>, Vec<String>) = (Vec::new(), Vec::new());
+            for (name, rows) in MACHINES.iter().zip(&machines) {
+                match rows.iter().find(|row| row[0] == method).filter(|row| row[4] != "lost") {
+                    Some(row) => cells.push(row[4..].to_vec()),
+                    None => not_on.push(format!("`{name}`")),
+                }
+            }
+            let worst = |k: usize| {
+                let speed = |cells: &Vec<&str>| cells[k].parse().unwrap_or(f64::INFINITY);
+                let worst = cells.iter().map(speed).fold(0.0, f64::max);
+                if worst.is_finite() { worst.to_string() } else { "lost".into() }
+            };
+            assert_eq!(row[2], (0..5).map(worst).collect::<Vec<_>>().join(" / "), "{method}");
+            assert_eq!(row[4], if not_on.is_empty() { "–".into() } else { not_on.join(", ") }, "{method}");
+        }
+    }
+}

@@ -416,7 +416,7 @@ const STAYING: &[(&str, &[&str])] = &[
 const SMALL: &[(&str, &[&str])] = &[
     ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
     ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
-    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs", "commands/simulate/worker.rs"]),
+    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs"]),
     (
         "fmu-core",
         &[

@@ -33,6 +33,22 @@ struct Shared {
     notes: Vec<String>,
 }
 
+impl Shared {
+    /// A system that is ready to run, without measures.
+    fn new(loaded: Loaded, settings: &Settings) -> Result<Self, Error> {
+        let outputs = if loaded.connectors.outputs.is_empty() {
+            loaded.system.outputs()
+        } else {
+            loaded.connectors.outputs.iter().map(|outlet| outlet.name.clone()).collect()
+        };
+        let Loaded { mut system, connectors, mut notes, .. } = loaded;
+        notes.extend(system.take_notes());
+        let system = Arc::new(system.into_plan(settings)?);
+        let (measures, columns, trace, set) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { system, connectors, measures, columns, trace, set, outputs, reuse: true, notes })
+    }
+}
+
 /// The first column of all results; its name is reserved: no measure or varied variable may use it.
 pub(crate) const RUN: &str = "run";
 
@@ -169,14 +185,8 @@ impl Plan {
         for name in &recorded {
             loaded.record(name)?;
         }
-        let outputs = if loaded.connectors.outputs.is_empty() {
-            loaded.system.outputs()
-        } else {
-            loaded.connectors.outputs.iter().map(|outlet| outlet.name.clone()).collect()
-        };
-        let Loaded { mut system, connectors, mut notes, .. } = loaded;
-        notes.extend(system.take_notes());
-        let system = Arc::new(system.into_plan(&settings)?);
+        let mut shared = Shared::new(loaded, &settings)?;
+        let system = Arc::clone(&shared.system);
         let of = |name: &str| system.columns().iter().find(|c| c.name == name);
         let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {
             // The unit of a sum of several units, or of a sum with factors, is unknown.
@@ -190,10 +200,18 @@ impl Plan {
             let unit = measure.unit(if same { units[0] } else { "" });
             ResultColumn { name: name.clone(), unit, items: items.unwrap_or_default() }
         });
-        let columns = columns.collect();
-        let measures = measures.into_iter().map(|(measure, _)| measure).collect();
-        let reuse = definition.reuse.unwrap_or(true);
-        Ok(Self(Arc::new(Shared { system, connectors, measures, columns, trace, set, outputs, reuse, notes })))
+        shared.columns = columns.collect();
+        shared.measures = measures.into_iter().map(|(measure, _)| measure).collect();
+        (shared.trace, shared.set, shared.reuse) = (trace, set, definition.reuse.unwrap_or(true));
+        Ok(Self(Arc::new(shared)))
+    }
+
+    /// A plan without measures for a system that is ready to run.
+    ///
+    /// # Errors
+    /// The settings or the connections do not allow runs.
+    pub fn of(loaded: Loaded, settings: &Settings) -> Result<Self, Error> {
+        Ok(Self(Arc::new(Shared::new(loaded, settings)?)))
     }
 
     /// The FMUs, ready for runs.

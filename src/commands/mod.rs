@@ -18,7 +18,9 @@ pub mod simulate;
 pub mod simulink;
 pub mod ssp;
 pub mod sweep;
+mod system;
 pub mod tune;
+mod worker;
 
 use anyhow::{Result, anyhow};
 use indicatif::{ProgressBar, ProgressStyle};

@@ -6,19 +6,18 @@ mod output;
 mod overlay;
 mod overview;
 mod record;
-mod worker;
 
+use super::system::{Events, SteppingOptions, SystemOptions};
+use super::worker::{self, ProcessOptions};
 use crate::Failed;
 use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
-use clap::{Args, ValueEnum};
-use fmu_import::guard::{Allowance, Streams};
-use fmu_import::written::{assignment, names, pair};
-use fmu_import::{Fmu, Instance, Kind, Number, journal, printable, printable_lines};
-use fmu_system::cosimulation::{CommunicationPoint, Integration, Method, Sequence, Settings, Solver, System, Units};
+use clap::Args;
+use fmu_import::guard::Streams;
+use fmu_import::written::names;
+use fmu_import::{Instance, Kind, Number, journal, printable, printable_lines};
+use fmu_system::cosimulation::{CommunicationPoint, Settings, System};
 use fmu_system::ssp::load::Loaded;
-use fmu_system::ssp::ssv;
-use fmu_system::ssp::values::{self, Given};
 use indicatif::{ProgressBar, ProgressStyle};
 use log::Log;
 use model_description::ModelVariable;
@@ -76,33 +75,9 @@ use std::time::{Duration, Instant};
 #[command(verbatim_doc_comment)]
 #[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Simulate {
-    /// FMUs, each optionally with a name; or one SSP file
-    #[arg(value_name = "[NAME=]FILE", required = true)]
-    pub fmus: Vec<String>,
-    /// Connect an output to an input (repeatable)
-    #[arg(long, value_name = "OUTPUT=INPUT")]
-    pub connect: Vec<String>,
-    /// Connect two terminals, which group the variables of an instance (repeatable)
-    #[arg(long, value_name = "TERMINAL=TERMINAL")]
-    pub terminal: Vec<String>,
-    /// Connect every unconnected input to the output of the same name of another FMU
-    #[arg(long)]
-    pub auto_connect: bool,
-    /// Pass numbers between different units unchanged; by default they are converted by the BaseUnits of both FMUs
-    #[arg(long)]
-    pub no_unit_conversion: bool,
-    /// Set the values of a parameter file (SSV of SSP 1.0) before --set (repeatable)
-    #[arg(long, value_name = "INSTANCE=FILE.ssv")]
-    pub parameters: Vec<String>,
-    /// Set a parameter or an unconnected input (repeatable); a number may have a unit that the FMU shows: 20degC
-    #[arg(long, value_name = "VARIABLE=VALUE")]
-    pub set: Vec<String>,
-    /// Feed an input or a tunable parameter over time (repeatable): TIME:VALUE,TIME:VALUE for steps, TIME:VALUE~TIME:VALUE for
-    /// straight lines, or a CSV file with time in the first column; without VARIABLE=, the headings of the other columns name
-    /// the inputs. VALUE and headings may have a unit: 1000rpm, `speed_ref [rpm]`. Values that are not real numbers are held
-    /// from point to point: texts, bytes as hexadecimal digits, arrays with spaces between their elements
-    #[arg(long, value_name = "[VARIABLE=]POINTS|FILE.csv")]
-    pub input: Vec<String>,
+    #[command(flatten)]
+    /// FMUs and values.
+    pub system: SystemOptions,
     /// Start time in s [default: from the FMUs, else 0]
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
     pub start: Option<f64>,
@@ -134,21 +109,9 @@ pub struct Simulate {
     /// in this run
     #[arg(long, conflicts_with = "record")]
     pub all: bool,
-    /// Step the FMUs one after another; each receives the new outputs of those before it
-    #[arg(long)]
-    pub sequential: bool,
-    /// Integrate the FMUs (Model Exchange) instead of letting them step themselves (Co-Simulation)
-    #[arg(long, conflicts_with = "sequential")]
-    pub me: bool,
-    /// Integrator of --me [default: dopri]
-    #[arg(long, value_enum)]
-    pub solver: Option<SolverOption>,
-    /// Relative tolerance of --solver dopri; the absolute one is this times the nominal value of a state [default: 1e-6]
-    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true)]
-    pub rtol: Option<f64>,
-    /// Relative tolerance of the solvers inside FMUs for Co-Simulation [default: from each default experiment]
-    #[arg(long, value_name = "TOLERANCE", allow_negative_numbers = true, conflicts_with = "me")]
-    pub tolerance: Option<f64>,
+    #[command(flatten)]
+    /// Stepping.
+    pub stepping: SteppingOptions,
     /// Handle events at their time, for FMUs of FMI 3.0 with event mode (Co-Simulation)
     #[arg(long, conflicts_with_all = ["me", "sequential"])]
     pub event_mode: bool,
@@ -158,51 +121,9 @@ pub struct Simulate {
     /// Show all messages that the FMUs log, not only each warning once
     #[arg(long)]
     pub logging: bool,
-    /// Maximum time in s for loading, for initialization, and between two communication points; 0 for no limit
-    #[arg(long, value_name = "S", default_value_t = 300.0)]
-    pub timeout: f64,
-    /// Address space of the process of the FMUs, in GiB; 0 for no limit
-    #[arg(long, value_name = "GIB", default_value_t = Allowance::default().memory >> 30, value_parser = clap::value_parser!(u64).range(..=1 << 20))]
-    pub memory: u64,
-    /// Run the FMUs without network (Linux with user namespaces; refused elsewhere)
-    #[arg(long)]
-    pub sandbox: bool,
-    /// Run the FMUs in this process, without limits: for FMUs that you trust
-    #[arg(long, conflicts_with_all = ["sandbox", "timeout", "memory"])]
-    pub in_process: bool,
-    /// Run as the process of the FMUs
-    #[arg(long, hide = true)]
-    pub worker: bool,
-}
-
-/// Integrators of Model Exchange.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum SolverOption {
-    /// Runge-Kutta of order 4, with fixed steps of the size --step
-    Rk4,
-    /// Dormand-Prince of order 5, with adaptive steps
-    Dopri,
-}
-
-/// How to run these FMUs.
-fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
-    let cannot_step = fmus.iter().find(|(_, fmu)| fmu.description().co_simulation.is_none());
-    let all_exchange = fmus.iter().all(|(_, fmu)| fmu.description().model_exchange.is_some());
-    match cannot_step {
-        Some((name, _)) if all_exchange && !args.me && !args.event_mode && !args.early_return => {
-            message::note(&printable(&format!("{name} has no Co-Simulation: the FMUs are integrated, as with --me")));
-        }
-        _ if !args.me => {
-            return Method::CoSimulation { event_mode: args.event_mode, early_return: args.early_return };
-        }
-        _ => {}
-    }
-    let solver = match (args.solver, args.rtol) {
-        (Some(SolverOption::Rk4), _) => Solver::Rk4,
-        (_, Some(rtol)) => Solver::Dopri { rtol },
-        (_, None) => Solver::default(),
-    };
-    Method::ModelExchange(Integration { solver, ..Integration::default() })
+    #[command(flatten)]
+    /// The process of the FMUs.
+    pub process: ProcessOptions,
 }
 
 /// Runs the command `fmu simulate` of this process.
@@ -210,9 +131,6 @@ fn method(args: &Simulate, fmus: &[(String, Fmu)]) -> Method {
 /// # Errors
 /// A file is not an FMU that runs here, a name is wrong, an FMU fails, or it ends its process.
 pub fn run(args: &Simulate) -> Result<()> {
-    if args.worker {
-        return worker::work(args);
-    }
     let has_ending = |path: &Path, endings: &[&str]| {
         path.extension().is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
     };
@@ -225,37 +143,19 @@ pub fn run(args: &Simulate) -> Result<()> {
     if !args.overlay.is_empty() && args.plot.is_none() && args.html.is_none() {
         bail!("--overlay {} is for --plot or --html: add one of them", args.overlay[0]);
     }
-    worker::catch_interrupts()?;
-    if args.in_process {
-        return simulate(args, io::stdout());
-    }
-    worker::guarded(args)
+    worker::run("simulate", &args.process, false, |out| simulate(args, out))
 }
 
-fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
+fn simulate(args: &Simulate, mut out: Box<dyn Write>) -> Result<()> {
     // An FMU may change the working directory; file names of the command are relative to this one.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
     let overlays = overlay::read(&args.overlay)?;
-    let units = if args.no_unit_conversion { Units::PassOn } else { Units::Convert };
-    if let Some(x) = args.tolerance.filter(|x| !(1e-14..=0.1).contains(x)) {
-        bail!("--tolerance {x}: expected a number between 1e-14 and 0.1");
-    }
-    let system = |fmus: &[_]| {
-        let system = System::new(method(args, fmus)).with_units(units).with_tolerance(args.tolerance);
-        system.with_listener(|note| message::note(&printable(note)))
-    };
-    let mut loaded = Loaded::open_files_with(&args.fmus, Path::new(""), args.logging, system)?;
-    let steps = loaded.system.instances().iter().any(|instance| instance.kind() != Kind::ModelExchange);
-    if steps && (args.solver.is_some() || args.rtol.is_some()) {
-        bail!("--solver and --rtol are for Model Exchange: add --me");
-    }
-    if args.solver == Some(SolverOption::Rk4) && args.rtol.is_some() {
-        bail!("--rtol is for --solver dopri; --solver rk4 takes the steps of --step");
-    }
-    std::env::set_current_dir(&home)?;
-    loaded.notes.iter().for_each(|note| message::note(&printable(note)));
-    let (settings, for_plot) = prepare(&mut loaded, args)?;
+    let listens = |system: System| system.with_listener(|note| message::note(&printable(note)));
+    let events = Events { mode: args.event_mode, early_return: args.early_return };
+    let mut loaded = args.system.open(&args.stepping, events, args.logging, listens)?;
+    let for_plot = record_what_is_asked(&mut loaded, args)?;
+    let settings = loaded.settings(args.start, args.stop, args.step, args.stepping.sequential);
     let Loaded { mut system, connectors, .. } = loaded;
     for overlay in &overlays {
         overlay.like(system.columns()).map_err(|cause| anyhow!("--overlay {cause}"))?;
@@ -268,7 +168,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
         message::note(&printable(note));
     }
     let (mut progress, mut log) = (Progress::new(settings), Log::new(args.logging));
-    let (mut look, mut interrupted) = (worker::look(args), None);
+    let (mut look, mut interrupted) = (worker::look(&args.process), None);
     let mut hook = |point: &mut CommunicationPoint<'_>| {
         log.show(&point.take_messages());
         progress.at(point.time);
@@ -303,7 +203,7 @@ fn simulate(args: &Simulate, mut out: impl Write) -> Result<()> {
     let bad = recording.columns.iter().find(|c| matches!(c.last(), Number::Real(x) if !x.is_finite()));
     let bad = failed.or(bad.map(|column| format!("{} is not finite at the end", column.name)));
     let instances: Vec<&str> = system.instances().iter().map(Instance::name).collect();
-    let named = |name: &&str| args.fmus[0].strip_prefix(*name).is_some_and(|rest| rest.starts_with('='));
+    let named = |name: &&str| args.system.fmus[0].strip_prefix(*name).is_some_and(|rest| rest.starts_with('='));
     let plain = !of_system && instances.len() == 1 && !instances.iter().any(named);
     let naming = output::Naming { instances: &instances, plain, for_plot };
     let written = output::write(recording, &naming, &overlays, args, &mut out);
@@ -368,65 +268,8 @@ fn warnings(system: &System, settings: &Settings) -> Vec<String> {
     found
 }
 
-/// Prepares the run; also returns how many of the last columns are only for the plot.
-fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
-    let value =
-        |text| assignment(text, |name| loaded.has(name)).ok_or_else(|| anyhow!("{text}: is not --set VARIABLE=VALUE"));
-    let values = args.set.iter().map(|text| value(text.as_str())).collect::<Result<Vec<_>>>()?;
-    let Loaded { system, .. } = loaded;
-    // The following arguments name elements of arrays whose sizes are set here.
-    let (sizes, values): (Vec<_>, Vec<_>) =
-        values.into_iter().partition(|(port, _)| system.is_size(port).unwrap_or(false));
-    system.configure(sizes)?;
-    for text in &args.connect {
-        let both = pair(text, |name| system.has(name), |name| system.has(name));
-        let (from, to) = both.ok_or_else(|| anyhow!("{text}: is not --connect OUTPUT=INPUT"))?;
-        system.connect(from, to.trim())?;
-    }
-    for text in &args.terminal {
-        let (one, other) = halves(text, "--terminal INSTANCE.TERMINAL=INSTANCE.TERMINAL")?;
-        for (from, to) in system.connect_terminals(one, other)? {
-            eprintln!("connected {} -> {}", printable(&from), printable(&to));
-        }
-    }
-    for text in &args.input {
-        match assignment(text, |name| loaded.has(name)) {
-            Some((port, file)) if file.to_lowercase().ends_with(".csv") => {
-                loaded
-                    .sequence(port, &column(port, file).map_err(|cause| anyhow!("--input {text}: {cause}"))?)
-                    .with_context(|| format!("--input {text}"))?;
-            }
-            Some((port, points)) => loaded.points(port, points).with_context(|| format!("--input {text}"))?,
-            None => {
-                for (port, texts) in Sequence::read_csv(Path::new(text)).map_err(|cause| anyhow!("--input {cause}"))? {
-                    loaded.sequence(&port, &texts).with_context(|| format!("--input {text}"))?;
-                }
-            }
-        }
-    }
-    if args.auto_connect {
-        let connected = loaded.system.connect_by_name()?;
-        for (from, to) in &connected {
-            eprintln!("connected {} -> {}", printable(from), printable(to));
-        }
-        if connected.is_empty() {
-            message::warning("--auto-connect connects nothing: no free input has the name of an output of another FMU");
-        }
-    }
-    if args.sequential && loaded.system.instances().len() == 1 {
-        message::warning("--sequential has no effect: there is one FMU");
-    }
-    let mut parameters = Vec::new();
-    for text in &args.parameters {
-        let (instance, file) = halves(text, "--parameters INSTANCE=FILE.ssv")?;
-        let content = std::fs::read_to_string(file).with_context(|| format!("reading {file}"))?;
-        let given = ssv::read(&content).map_err(|cause| anyhow!("{file}: {cause}"))?;
-        parameters.extend(Given::all(instance, file, &given));
-    }
-    values::set(&mut loaded.system, &parameters)?;
-    for (port, value) in values {
-        loaded.set(port, value)?;
-    }
+/// Records what the options ask for; returns how many of the last columns are only for the plot.
+fn record_what_is_asked(loaded: &mut Loaded, args: &Simulate) -> Result<usize> {
     if args.record.is_empty() {
         loaded.record_outputs()?;
     }
@@ -442,21 +285,7 @@ fn prepare(loaded: &mut Loaded, args: &Simulate) -> Result<(Settings, usize)> {
             loaded.record(&name).with_context(|| format!("--record {text}"))?;
         }
     }
-    Ok((loaded.settings(args.start, args.stop, args.step, args.sequential), for_plot))
-}
-
-/// The column of a CSV file that feeds the input `port`: the one with its name, or the only one.
-fn column(port: &str, file: &str) -> Result<Sequence, String> {
-    let mut columns = Sequence::read_csv(Path::new(file))?;
-    let names: Vec<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
-    match names.iter().position(|name| *name == port).or_else(|| (names.len() == 1).then_some(0)) {
-        Some(index) => Ok(columns.swap_remove(index).1),
-        None => Err(format!("has the columns {}; name one of them {port}", names.join(", "))),
-    }
-}
-
-fn halves<'a>(text: &'a str, form: &str) -> Result<(&'a str, &'a str)> {
-    text.split_once('=').ok_or_else(|| anyhow!("{text}: is not {form}"))
+    Ok(for_plot)
 }
 
 /// A progress bar on a terminal, if the run takes longer than a second.

@@ -485,6 +485,16 @@ fn runs_and_measurements_are_overlaid() {
     refused(&bench, "speed [krpm]: expected the unit rad/s or rpm");
 }
 
+/// Cargo's spelling of the command also starts the process of the FMUs.
+#[test]
+fn cargo_fmu_simulates() {
+    let drive = archive("fmi3", "PmsmDrive");
+    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_cargo-fmu"));
+    let output = command.args(["fmu", "simulate", drive.to_str().unwrap(), "--stop", "0.001", "--csv", "-"]).output();
+    let output = output.unwrap();
+    assert!(output.status.success() && text(&output.stdout).starts_with("time,speed,"), "{}", text(&output.stderr));
+}
+
 /// Ctrl-C keeps the results so far.
 #[cfg(unix)]
 #[test]

@@ -90,6 +90,36 @@ fn standard_output_is_the_recording() {
     });
 }
 
+/// A measurement of frequency responses ends with an error, and its results are the command's alone.
+#[test]
+fn bode_survives() {
+    if library().is_none() {
+        return;
+    }
+    let input = "<ScalarVariable name=\"u\" valueReference=\"2\" causality=\"input\"><Real start=\"0\"/></ScalarVariable></ModelVariables>";
+    let xml = XML.replace("</ModelVariables>", input);
+    let (step, run) = ("x: a step at or after t = 0.3", "x: a run (--jobs 1 names the call)");
+    let closed = "closed or replaced standard input, standard output, standard error of its process";
+    let cases = [
+        ("step exit", "1", step, "ended the process with exit status 0"),
+        ("step crash", "1", step, "ended the process by SIGSEGV"),
+        ("step hang", "1", step, "did not return within 2 s"),
+        ("step hang", "2", run, "did not return within 2 s"),
+        ("load crash", "2", "x.fmu: loading the library", "ended the process by SIGSEGV"),
+        ("step close", "1", "x.fmu: an FMU", closed),
+        ("step print", "1", "", ""),
+    ];
+    each(&cases, |(how, jobs, what, why)| {
+        let options = ["--from", "u", "--to", "y", "--frequencies", "1,2", "--settle", "0.5", "--amplitude", "1"];
+        let limits = ["--timeout", if how.contains("hang") { "2" } else { "90" }, "--memory", "1", "--jobs", *jobs];
+        let ended = described(&xml).run("bode", &[&options[..], &limits].concat(), how);
+        assert_eq!(ended.status, if why.is_empty() { 0 } else { 2 }, "{how}: {ended:?}");
+        assert!(ended.errors.contains(what) && ended.errors.contains(why), "{how}: {ended:?}");
+        assert!(!ended.out.contains("hello"), "the output is the command's alone: {ended:?}");
+        assert_eq!(ended.out.contains("frequency Hz"), why.is_empty(), "{how}: {ended:?}");
+    });
+}
+
 /// The checker names the call, or the remaining processes, and its other probes still run.
 #[test]
 fn check_survives() {

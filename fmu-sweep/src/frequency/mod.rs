@@ -25,6 +25,7 @@ use crate::error::invalid;
 use crate::plan::Plan;
 use crate::{Error, pool};
 use fit::{Periods, SineFit};
+use fmu_import::journal;
 use fmu_system::cosimulation::{CoarseSteps, Settings, Sine, SystemPlan};
 use std::ops::ControlFlow;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -368,7 +369,8 @@ impl Sweep<'_> {
         let mut largest = vec![0.0_f64; signals - watched];
         let (mut values, mut unsettled, mut windows) = (Vec::new(), f64::INFINITY, 0_u32);
         plan.worker()?
-            .run([] as [(&_, f64); 0], |_, row| {
+            .run([] as [(&_, f64); 0], |time, row| {
+                journal::reached(time);
                 let at = point;
                 point += 1;
                 if at < skipped {

@@ -2,6 +2,8 @@
 
 use super::coupling::Train;
 use super::loops::Loop;
+use crate::commands::system::{SteppingOptions, SystemOptions};
+use crate::commands::worker::ProcessOptions;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -15,6 +17,9 @@ use std::path::PathBuf;
 /// --closed and --open say that the response is a closed loop T or an open loop L; T / (1 - T) = L. The command prints bandwidth,
 /// peak, crossover, gain and phase margin, and the largest sensitivity, between the frequencies measured.
 ///
+/// The FMUs run in a separate process with limits, as those of fmu simulate: one that crashes or blocks ends the measurement with an
+/// error. Ctrl-C ends it after the frequencies under way, a second Ctrl-C at once.
+///
 /// --loop selects input and outputs of PmsmDrive and of FMUs with its variables, in steps of the controller's sample period.
 ///
 /// The speed loop of the drive at 1000 rpm, with margins, on a page:
@@ -25,11 +30,13 @@ use std::path::PathBuf;
 ///   fmu bode PmsmDrive.fmu --from speed_ref --to i_q_est --over i_q_ref --closed --step 1e-4 --set controller.estimator=Sensored
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
-#[expect(clippy::struct_excessive_bools, reason = "options of a command")]
 pub struct Bode {
-    /// FMUs, each optionally with a name; or one SSP file
-    #[arg(value_name = "[NAME=]FILE", required = true)]
-    pub fmus: Vec<String>,
+    /// FMUs and values.
+    #[command(flatten)]
+    pub system: SystemOptions,
+    /// Stepping.
+    #[command(flatten)]
+    pub stepping: SteppingOptions,
     /// A response of a drive
     #[arg(long = "loop", value_enum, required_unless_present_all = ["from", "to"], conflicts_with_all = ["from", "to", "over", "closed", "open"])]
     pub which: Option<Loop>,
@@ -66,24 +73,6 @@ pub struct Bode {
     /// with --loop controller.T_s, else the shortest of the FMUs, else a thousandth of the settling time]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Set a parameter or an unconnected input (repeatable)
-    #[arg(long, value_name = "VARIABLE=VALUE")]
-    pub set: Vec<String>,
-    /// Feed an input over time until the operating point (repeatable), as for fmu simulate
-    #[arg(long, value_name = "VARIABLE=POINTS")]
-    pub input: Vec<String>,
-    /// Connect an output to an input (repeatable)
-    #[arg(long, value_name = "OUTPUT=INPUT")]
-    pub connect: Vec<String>,
-    /// Connect every unconnected input to the output of the same name of another FMU
-    #[arg(long)]
-    pub auto_connect: bool,
-    /// Integrate the FMUs (Model Exchange) instead of letting them step themselves (Co-Simulation)
-    #[arg(long)]
-    pub me: bool,
-    /// Relative tolerance of the integrator of --me [default: 1e-6]
-    #[arg(long, value_name = "TOLERANCE", requires = "me", allow_negative_numbers = true)]
-    pub rtol: Option<f64>,
     /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
@@ -96,4 +85,7 @@ pub struct Bode {
     /// Write the plot as an offline page with zoom and values at the cursor
     #[arg(long, value_name = "FILE.html")]
     pub html: Option<PathBuf>,
+    /// The process of the FMUs.
+    #[command(flatten)]
+    pub process: ProcessOptions,
 }

@@ -7,21 +7,22 @@ mod output;
 
 pub use arguments::Bode;
 
+use super::system::Events;
+use super::worker;
 use crate::Failed;
 use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
-use fmu_import::{Fmu, printable};
-use fmu_sweep::definition::{Definition, Interface, Ordered, SetValue};
+use fmu_import::guard::Streams;
+use fmu_import::{Instance, journal, printable};
 use fmu_sweep::frequency::{Excitation, FrequencyOutcome};
 use fmu_sweep::{Plan, threads_here};
-use fmu_system::ssp::load::name_and_path;
 use indicatif::{ProgressBar, ProgressStyle};
 use loops::{Loop, Meaning, Probe};
-use model_description::{ModelDescription, parse_number};
+use model_description::parse_number;
 use output::Response;
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, Write, stderr};
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 /// Maximum number of frequencies.
 const MOST: usize = 10_000;
@@ -50,18 +51,11 @@ fn frequencies(text: &str) -> Result<Vec<f64>> {
     }
 }
 
-/// The two sides of `NAME=VALUE`.
-fn halves(text: &str, form: &str) -> Result<(String, String)> {
-    let (name, value) = text.split_once('=').ok_or_else(|| anyhow!("{text}: is not {form}"))?;
-    Ok((name.trim().into(), value.trim().into()))
-}
-
 /// The number that a variable starts with: set, or of the description.
-fn value(description: &ModelDescription, instance: &str, set: &[(String, String)], name: &str) -> Option<f64> {
-    let full = format!("{instance}.{name}");
-    let given = set.iter().rev().find(|(other, _)| other == name || *other == full).map(|(_, text)| text.as_str());
-    let text = given.or(description.variable(name)?.start.as_deref())?;
-    match text {
+fn value(args: &Bode, instance: &Instance, name: &str) -> Option<f64> {
+    let given = args.system.given(instance.name(), name).ok().flatten();
+    let text = given.or_else(|| instance.description().variable(name)?.start.clone())?;
+    match text.as_str() {
         "true" => Some(1.0),
         "false" => Some(0.0),
         other => parse_number(other),
@@ -69,17 +63,14 @@ fn value(description: &ModelDescription, instance: &str, set: &[(String, String)
 }
 
 /// The request made by the options.
-fn probe(args: &Bode, set: &[(String, String)]) -> Result<Probe> {
+fn probe(args: &Bode, instances: &[Instance]) -> Result<Probe> {
     if let Some(which) = args.which {
-        let [file] = &args.fmus[..] else {
+        let [instance] = instances else {
             bail!("--loop is for one FMU; --from, --to and --over name variables of several")
         };
-        let (name, path) = name_and_path(file)?;
-        let fmu = Fmu::open(path)?;
-        let of = |variable: &str| value(fmu.description(), &name, set, variable);
-        let probe = which.probe(fmu.description(), of)?;
+        let probe = which.probe(instance.description(), |variable| value(args, instance, variable))?;
         // In Model Exchange, outputs are instantaneous.
-        return Ok(if args.me { Probe { mean: 0.0, ..probe } } else { probe });
+        return Ok(if args.stepping.me { Probe { mean: 0.0, ..probe } } else { probe });
     }
     let meaning = match (args.closed, args.open) {
         (true, _) => Meaning::Closed,
@@ -107,22 +98,19 @@ pub fn run(args: &Bode) -> Result<()> {
     if args.spring.is_some() && args.which != Some(Loop::Impedance) {
         bail!("--spring is for --loop impedance");
     }
-    let set = args.set.iter().map(|text| halves(text, "--set VARIABLE=VALUE")).collect::<Result<Vec<_>>>()?;
-    let probe = probe(args, &set)?;
-    let pair = |text: &String| halves(text, "--connect OUTPUT=INPUT").map(|(from, to)| [from, to]);
-    let input = args.input.iter().map(|text| halves(text, "--input VARIABLE=POINTS")).collect::<Result<_>>()?;
-    let definition = Definition {
-        fmus: args.fmus.clone(),
-        auto_connect: args.auto_connect,
-        connect: args.connect.iter().map(pair).collect::<Result<_>>()?,
-        interface: args.me.then_some(Interface::ModelExchange),
-        rtol: args.rtol,
-        step: args.step.or(probe.sample),
-        set: Ordered(set.into_iter().map(|(name, text)| (name, SetValue::Text(text))).collect()),
-        input: Ordered(input),
-        ..Definition::default()
-    };
-    let plan = Plan::new(&definition, Path::new(""))?;
+    let threads = args.jobs.map_or_else(threads_here, usize::from);
+    worker::run("bode", &args.process, threads > 1, |out| measure(args, threads, out))
+}
+
+fn measure(args: &Bode, threads: usize, out: Box<dyn Write>) -> Result<()> {
+    // An FMU may change the working directory; file names of the command are relative to this one.
+    let home = std::env::current_dir()?;
+    let streams = Streams::now();
+    let mut loaded = args.system.open(&args.stepping, Events::default(), false, |system| system)?;
+    let probe = probe(args, loaded.system.instances())?;
+    let settings = loaded.settings(None, None, args.step.or(probe.sample), args.stepping.sequential);
+    let settings = loaded.system.feasible(&settings)?;
+    let plan = Plan::of(loaded, &settings)?;
     plan.notes().iter().for_each(|text| message::note(&printable(text)));
     let excitation = Excitation {
         input: probe.from.clone(),
@@ -136,13 +124,27 @@ pub fn run(args: &Bode) -> Result<()> {
     let bar = if stderr().is_terminal() { ProgressBar::new(0) } else { ProgressBar::hidden() };
     let style = ProgressStyle::with_template("{wide_bar} {pos} frequencies  {elapsed}");
     let bar = bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    let look = Mutex::new(worker::look(&args.process));
     let progress = |done: u64| {
         bar.set_position(done);
-        ControlFlow::Continue(())
+        let ends = look.lock().unwrap_or_else(PoisonError::into_inner)();
+        if ends { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let jobs = args.jobs.map_or_else(threads_here, usize::from);
-    let outcomes: Vec<FrequencyOutcome> = plan.frequency_response(&excitation, jobs, &progress)?;
+    let outcomes = plan.frequency_response(&excitation, threads, &progress);
     bar.finish_and_clear();
+    // The numbers of closed descriptors would be reused for files of the command.
+    let lost = streams.lost();
+    if !lost.is_empty() {
+        // Files of the command may have been closed too, and their descriptors reused.
+        std::mem::forget(plan);
+        bail!("{}: an FMU closed or replaced {} of its process", args.system.fmus.join(" or "), lost.join(", "));
+    }
+    let outcomes: Vec<FrequencyOutcome> = match outcomes {
+        Err(fmu_sweep::Error::Interrupted) => return Err(Failed("interrupted: nothing is written".into()).into()),
+        other => other?,
+    };
+    journal::writes();
+    std::env::set_current_dir(&home)?;
     let mut failed = Vec::new();
     let mut responses = Vec::new();
     for (frequency, outcome) in outcomes {
@@ -158,7 +160,7 @@ pub fn run(args: &Bode) -> Result<()> {
         message::warning(&printable(text));
     }
     output::warn(&responses, &probe);
-    output::write(args, &probe, &responses).context("output")?;
+    output::write(args, &probe, &responses, out).context("output")?;
     match failed.len() {
         0 => Ok(()),
         count => Err(Failed(format!("{count} frequencies failed")).into()),

@@ -15,7 +15,7 @@ use fmu_sweep::frequency::{
     Complex64, FrequencyPoint, ResponsePoint, active_ranges, band, decibels, margins, open_loop, phases,
 };
 use std::fmt::Write as _;
-use std::io::Write as _;
+use std::io::Write;
 use std::path::Path;
 use std::rc::Rc;
 
@@ -149,7 +149,7 @@ fn summary(args: &Bode, probe: &Probe, own: &[ResponsePoint], open: Option<&[Res
 }
 
 /// Writes files, and the table with its summary.
-pub(super) fn write(args: &Bode, probe: &Probe, responses: &[Response]) -> Result<()> {
+pub(super) fn write(args: &Bode, probe: &Probe, responses: &[Response], mut out: Box<dyn Write>) -> Result<()> {
     let (own, open) = points(responses, probe.meaning);
     let open_only = if probe.meaning == Meaning::Open { None } else { open.as_deref() };
     let mut text =
@@ -188,7 +188,7 @@ pub(super) fn write(args: &Bode, probe: &Probe, responses: &[Response]) -> Resul
     }
     match args.csv.as_deref() {
         Some(path) if path == Path::new("-") => {
-            std::io::stdout().write_all(&table(responses, open_only)?).context("standard output")?;
+            out.write_all(&table(responses, open_only)?).context("standard output")?;
             eprintln!("{text}");
         }
         other => {
@@ -196,7 +196,7 @@ pub(super) fn write(args: &Bode, probe: &Probe, responses: &[Response]) -> Resul
                 archive::write(path, &table(responses, open_only)?)?;
                 let _ = write!(text, "\nresponses: {}", path.display());
             }
-            println!("{text}");
+            writeln!(out, "{text}").context("standard output")?;
         }
     }
     Ok(())

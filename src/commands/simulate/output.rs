@@ -78,7 +78,8 @@ pub(super) fn write(
         lines.push(format!("plot: {}", path.display()));
     }
     if let (Some(path), Some(plotted)) = (&args.html, &plotted) {
-        let names: Vec<&str> = args.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
+        let names: Vec<&str> =
+            args.system.fmus.iter().map(|file| file.rsplit(['/', '\\']).next().unwrap_or(file)).collect();
         let figure =
             page::figure(plotted, "The plot needs JavaScript; fmu simulate --plot FILE.svg draws it without.")?;
         let ended = recording

@@ -1,10 +1,10 @@
-//! The process of the FMUs that `fmu simulate` starts, watches and interrupts.
+//! The process of the FMUs that `fmu simulate` and `fmu bode` start, watch and interrupt.
 
-use super::{Simulate, simulate};
 use crate::Failed;
 use anyhow::{Context, Result, anyhow, bail};
+use clap::Args;
 use fmu_import::guard::{self, Allowance, End, Guarded};
-use fmu_import::journal;
+use fmu_import::journal::{self, Call, Last};
 use std::fs::File;
 use std::io;
 use std::path::PathBuf;
@@ -27,13 +27,51 @@ const LOOK: Duration = Duration::from_millis(100);
 /// File there whose existence ends the run of the worker.
 const INTERRUPT: &str = "interrupt";
 
+/// The process of the FMUs.
+#[derive(Debug, Default, Args)]
+pub struct ProcessOptions {
+    /// Maximum time in s for loading, for initialization, and between two communication points; 0 for no limit
+    #[arg(long, value_name = "S", default_value_t = 300.0)]
+    pub timeout: f64,
+    /// Address space of the process of the FMUs, in GiB; 0 for no limit
+    #[arg(long, value_name = "GIB", default_value_t = Allowance::default().memory >> 30, value_parser = clap::value_parser!(u64).range(..=1 << 20))]
+    pub memory: u64,
+    /// Run the FMUs without network (Linux with user namespaces; refused elsewhere)
+    #[arg(long)]
+    pub sandbox: bool,
+    /// Run the FMUs in this process, without limits: for FMUs that you trust
+    #[arg(long, conflicts_with_all = ["sandbox", "timeout", "memory"])]
+    pub in_process: bool,
+    /// Run as the process of the FMUs
+    #[arg(long, hide = true)]
+    pub worker: bool,
+}
+
+/// Runs a command in a process that it guards. `work` writes standard output, which it drops before the FMUs are freed. With `threads`,
+/// several runs share the process, and the call that ended it is unknown.
+pub(super) fn run(
+    name: &str,
+    options: &ProcessOptions,
+    threads: bool,
+    work: impl FnOnce(Box<dyn io::Write>) -> Result<()>,
+) -> Result<()> {
+    if options.worker {
+        return serve(work);
+    }
+    catch_interrupts()?;
+    if options.in_process {
+        return work(Box::new(io::stdout()));
+    }
+    guarded(name, options, threads)
+}
+
 /// Runs the same command as a worker.
-pub(super) fn guarded(args: &Simulate) -> Result<()> {
+fn guarded(name: &str, args: &ProcessOptions, threads: bool) -> Result<()> {
     let timeout = Duration::try_from_secs_f64(args.timeout).map_err(|e| anyhow!("--timeout {}: {e}", args.timeout))?;
     let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
     let mut command = guard::command(&std::env::current_exe()?, allowance);
     // Output of the FMUs goes to standard error.
-    command.args(["simulate", "--worker"]).args(std::env::args_os().skip(2)).stdout(io::stderr());
+    command.args([name, "--worker"]).args(crate::arguments().skip(2)).stdout(io::stderr());
     let mut worker = Guarded::start(command)?;
     let folder = worker.folder().to_owned();
     let (mut since, mut progress) = (Instant::now(), None);
@@ -74,7 +112,12 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
             }
         }
         (end, _) => {
-            let last = journal::read(&folder).map_or_else(|| "the process of the FMUs".into(), |last| last.describe());
+            let describe = |last: Last| match last.call {
+                Call::Load | Call::Write => last.describe(),
+                _ if threads => format!("{}: a run (--jobs 1 names the call)", last.name),
+                _ => last.describe(),
+            };
+            let last = journal::read(&folder).map_or_else(|| "the process of the FMUs".into(), describe);
             match end {
                 End::Refused(_) => bail!("the process of the FMUs {}", end.describe()),
                 End::Stopped if INTERRUPTS.load(Ordering::Relaxed) > 1 => {
@@ -91,7 +134,7 @@ pub(super) fn guarded(args: &Simulate) -> Result<()> {
 ///
 /// # Errors
 /// The system refuses.
-pub(super) fn catch_interrupts() -> Result<()> {
+fn catch_interrupts() -> Result<()> {
     ctrlc::set_handler(|| {
         INTERRUPTS.fetch_add(1, Ordering::Relaxed);
     })?;
@@ -99,7 +142,7 @@ pub(super) fn catch_interrupts() -> Result<()> {
 }
 
 /// Whether the run must end. Called at every communication point; cheap, because the file is checked only ten times a second.
-pub(super) fn look(args: &Simulate) -> impl FnMut() -> bool + use<> {
+pub(super) fn look(args: &ProcessOptions) -> impl FnMut() -> bool + use<> {
     let (mut looked, worker, interrupt) = (Instant::now(), args.worker, std::env::temp_dir().join(INTERRUPT));
     move || {
         if looked.elapsed() <= LOOK {
@@ -131,11 +174,11 @@ impl io::Write for Later {
 }
 
 /// The worker. It writes its status and its error to a file, because an FMU may have closed the standard streams.
-pub(super) fn work(args: &Simulate) -> Result<()> {
+fn serve(work: impl FnOnce(Box<dyn io::Write>) -> Result<()>) -> Result<()> {
     guard::end_with_parent();
     let folder = std::env::temp_dir();
     journal::open(&folder)?;
-    let outcome = simulate(args, Later { path: folder.join(OUTPUT), file: None });
+    let outcome = work(Box::new(Later { path: folder.join(OUTPUT), file: None }));
     let (status, text) = match &outcome {
         Ok(()) => (0, String::new()),
         Err(error) => (crate::exit_status(error), format!("{error:#}")),
