@@ -109,7 +109,7 @@ pub fn under_load(tuned: &Tuned, level: f64, (started, angles): (u32, u32)) -> O
     };
     Some(format!(
         "under the rated torque from rest, the drive gets to {} pu from {started} of {angles} angles: {why}; let the load act \
-         once the estimator leads, or hold the rotor with a brake until then",
+         once start_state is Running, or hold the rotor with a brake until then",
         rounded(level, 3)
     ))
 }

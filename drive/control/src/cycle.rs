@@ -7,7 +7,7 @@ use crate::estimator::{Estimate, Estimating, Estimator, EstimatorParameters, Inj
 use crate::lock::Lock;
 use crate::model::SensorlessController;
 use crate::signals::{ControllerInputs, ControllerOutputs};
-use crate::start::StartMode;
+use crate::start::{StartMode, StartState};
 use crate::state::{Command, Leader, Mode, References, context};
 use crate::tables::{Compensation, ControllerParameters};
 use crate::trip::Cause;
@@ -78,10 +78,14 @@ impl SensorlessController {
     fn any_cycle(&mut self) {
         let ControllerInputs { speed_ref, tau_ref, .. } = self.inputs;
         let release = self.parameters.zero_speed.release;
-        if self.measures_resistance() {
+        let measures = self.measures_resistance();
+        if measures {
             (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
         }
         self.state.computed = self.cycle(false);
+        if measures {
+            self.state.computed.start_state = StartState::Aligning;
+        }
         (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) =
             (speed_ref, tau_ref, release);
     }
@@ -130,6 +134,7 @@ impl SensorlessController {
             u_share,
             weakens,
             R_s_est,
+            start_state: if steady { StartState::Running } else { self.state.leader.start_state() },
             ..ControllerOutputs::default()
         }
     }

@@ -202,6 +202,7 @@ impl SensorlessController {
             enabled: true,
             sensor_lost: state.sensor_lost,
             R_s_est,
+            start_state: state.leader.start_state(),
             ..ControllerOutputs::default()
         };
     }
@@ -285,7 +286,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 18;
+    const STATE_VERSION: u16 = 19;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -423,6 +424,7 @@ impl Warns for SensorlessController {
             R_s_est: out.R_s_est,
             commission_state: out.commission_state,
             commission_fault: out.commission_fault,
+            start_state: out.start_state,
             ..ControllerOutputs::default()
         };
         if *out == restarted {
