@@ -87,8 +87,7 @@ pub struct Simulate {
     /// Communication step in s [default: the shortest of the FMUs, else a thousandth of the duration]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: the outputs,
-    /// see --all]
+    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: the outputs]
     #[arg(long, value_name = "VARIABLE,...")]
     pub record: Vec<String>,
     /// Write the recording as CSV; - for standard output
@@ -105,8 +104,8 @@ pub struct Simulate {
     /// the headings of the others name variables, optionally with a unit: `time [ms]`, `speed [rpm]`. LABEL names its curves
     #[arg(long, value_name = "[LABEL=]FILE.csv")]
     pub overlay: Vec<String>,
-    /// Record, show and plot all outputs; without it, the recording omits large groups of outputs in which nothing changes
-    /// in this run
+    /// Show and plot all outputs; by default, the plot shows the main ones, and the terminal, of many outputs, those that
+    /// change
     #[arg(long, conflicts_with = "record")]
     pub all: bool,
     #[command(flatten)]
