@@ -105,7 +105,7 @@ fn refusals(path: &str) -> Vec<String> {
         let connectors: Vec<&Element> = owner.child("ssd:Connectors").unwrap().children.iter().collect();
         let names = connectors.iter().map(|c| c.get("name").unwrap()).chain([owned]);
         for name in names.filter(|name| !is_identifier(name)) {
-            refuse("ComRef.cpp", format!("{name} is no identifier"));
+            refuse("ComRef.cpp", format!("{name} is not an identifier"));
         }
         for connector in connectors {
             let name = connector.get("name").unwrap();
