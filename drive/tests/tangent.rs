@@ -4,8 +4,28 @@
 use drive::motor::Motor;
 use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::{PmsmDrive, PmsmPlant};
-use fmu_core::draw::Draw;
 use fmu_core::{Block, Causality, ContinuousTime, Differentiable, Elapsed, Events, Kind, Model, Slot, Variability};
+
+/// A deterministic stream of numbers (xorshift, Marsaglia 2003).
+struct Draw(u64);
+
+impl Draw {
+    /// Uniform in 0..1.
+    fn unit(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        f64::from(u32::try_from(self.0 >> 32).unwrap()) / f64::from(u32::MAX)
+    }
+
+    fn around(&mut self, size: f64) -> f64 {
+        size * (2.0 * self.unit() - 1.0)
+    }
+
+    fn often(&mut self) -> bool {
+        self.unit() < 0.5
+    }
+}
 
 /// A known: its access in a model, and the size of a change.
 struct Known<M: Model> {
@@ -110,14 +130,14 @@ struct Kinds {
 fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
     let mut block = Block::<PmsmPlant>::default();
     let par = &mut block.model.parameters;
-    if draw.of(&[true, false]) {
+    if draw.often() {
         par.motor = Motor::IPMSM_2_2_KW;
     }
-    if draw.of(&[true, false]) {
+    if draw.often() {
         (par.saturation.s_2, par.saturation.s_3, par.saturation.s_dq) = (40.0, 40.0, 7.0);
         kinds.saturated += 1;
     }
-    if draw.of(&[true, false]) {
+    if draw.often() {
         (par.inverter.dead_time, par.inverter.i_zero) = (2e-6, 1.0);
     }
     if point % 5 < 2 {
@@ -142,7 +162,7 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
     inputs.enable = point % 3 != 2;
     // Voltages up to three times the hexagon.
     (inputs.u.a, inputs.u.b, inputs.u.c) = (draw.around(300.0), draw.around(300.0), draw.around(300.0));
-    inputs.u_dc = if point % 25 == 7 { 0.0 } else { 100.0 + 300.0 * draw.share() };
+    inputs.u_dc = if point % 25 == 7 { 0.0 } else { 100.0 + 300.0 * draw.unit() };
     (inputs.tau_load, inputs.speed_shaft, inputs.angle_shaft) =
         (draw.around(3.0), draw.around(300.0), draw.around(9.0));
     // Diodes that block at the start would fix the states.
@@ -156,7 +176,7 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
         *(known.iter().find(|known| known.name == name).unwrap().at)(&mut block) = value;
     };
     // Half of the points have currents of the order of the dead-time zone.
-    let size = if draw.of(&[true, false]) { 1.0 } else { 0.05 };
+    let size = if draw.often() { 1.0 } else { 0.05 };
     set("psi_d", psi_m + draw.around(0.05 * size));
     set("psi_q", draw.around(0.05 * size));
     set("speed", if still { 0.0 } else { draw.around(400.0) });

@@ -94,10 +94,10 @@ mod tests {
             ("done\n", Confidence::Certain, "line break"),
             ("x\u{1}y", Confidence::Certain, "control character '\\u{1}'"),
             ("name a probe's text, 10012 is used", Confidence::Certain, "as a printf format"),
-            ("x = %g", Confidence::Likely, "\"%g\" stands"),
-            ("from %s, %.3g s", Confidence::Likely, "\"%s\" stands"),
-            ("%.3g s", Confidence::Likely, "\"%.3g\" stands"),
-            ("%lu steps", Confidence::Likely, "\"%lu\" stands"),
+            ("x = %g", Confidence::Likely, "\"%g\" appears"),
+            ("from %s, %.3g s", Confidence::Likely, "\"%s\" appears"),
+            ("%.3g s", Confidence::Likely, "\"%.3g\" appears"),
+            ("%lu steps", Confidence::Likely, "\"%lu\" appears"),
             ("a \u{fffd}", Confidence::Likely, "U+FFFD"),
         ];
         for (text, confidence, words) in texts {
