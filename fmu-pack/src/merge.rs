@@ -183,7 +183,7 @@ fn other_platforms(a: &Part, b: &Part) -> Result<()> {
         let (here, there) = (folder(theirs.path), folder(ours.path));
         if here != there {
             let what = format!("is for {}, as {there} of {} is", theirs.platform, a.name);
-            return Err(invalid!("{}: {}: {what}; give it in one of them only", b.name, theirs.path));
+            return Err(invalid!("{}: {}: {what}; provide it in only one of them", b.name, theirs.path));
         }
         if ours.bytes != theirs.bytes {
             let name = here.trim_start_matches(BINARIES);
