@@ -126,7 +126,7 @@ fn rows() -> Vec<Wrong> {
             "shown_alias",
             r#"V::boolean_output("x", "", |m| &mut m.on).aliases(&[
             fmu_core::Alias { name: "x_rpm", description: "", display: Some(fmu_core::unit::RPM) }])"#,
-            "x_rpm: only a real variable with a unit can be shown in another one",
+            "x_rpm: only a real variable with a unit can have a display unit",
             5,
         ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),

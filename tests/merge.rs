@@ -132,7 +132,7 @@ fn what_does_not_fit_is_refused() {
         refused(&here, &["modelDescription.xml, line ", "build both from the same sources"]);
 
         changed(standard, &other, |files| files.get_mut(&own(version)).unwrap().push(0));
-        refused(&here, &[&own(version), "differs", "in one of them only"]);
+        refused(&here, &[&own(version), "differs", "in only one of them"]);
 
         changed(standard, &other, |files| {
             without(files);
@@ -156,11 +156,11 @@ fn what_does_not_fit_is_refused() {
             let binary = files.remove(&own(FmiVersion::V2)).unwrap();
             files.insert("binaries/x86_64-linux/PmsmPlant.so".into(), binary);
         });
-        refused(&plant("fmi2"), &["binaries/x86_64-linux/PmsmPlant.so", "binaries/linux64", "in one of them only"]);
+        refused(&plant("fmi2"), &["binaries/x86_64-linux/PmsmPlant.so", "binaries/linux64", "in only one of them"]);
     }
 
     elsewhere("fmi3", FmiVersion::V3, &other);
-    refused(&plant("fmi2"), &["is of FMI 3.0", "of FMI 2.0", "merge those of one standard"]);
+    refused(&plant("fmi2"), &["is of FMI 3.0", "of FMI 2.0", "merge archives of one standard"]);
     fs::write(&other, "no archive").unwrap();
     let error = merged(&[&plant("fmi2"), &other], &out).unwrap_err();
     assert!(error.contains("other.fmu: not a ZIP archive") && !out.exists(), "{error}");
@@ -219,7 +219,7 @@ fn libraries_for_macos_become_a_universal_one() {
     with_libraries("fmi2", FmiVersion::V2, &other, &[("darwin64/PmsmPlant.dylib", &dylib(ArmDarwin, "2"))]);
     let error = merged(&[&both, &other], &out).unwrap_err();
     assert!(
-        error.contains("binaries/darwin64/PmsmPlant.dylib: differs") && error.contains("in one of them only"),
+        error.contains("binaries/darwin64/PmsmPlant.dylib: differs") && error.contains("in only one of them"),
         "{error}"
     );
     let error = merged(&[&both, &old], &out).unwrap_err();

@@ -210,7 +210,7 @@ fn cargo_fmu_is_the_command() {
     fs::write(dir.path().join("Cargo.toml"), manifest).unwrap();
     fs::create_dir(dir.path().join("src")).unwrap();
     fs::write(dir.path().join("src/lib.rs"), "").unwrap();
-    refused(&["error: no package here is an FMU: expected crate-type = [\"cdylib\"] and the dependency fmu-export"]);
+    refused(&["error: no FMU package here: expected crate-type = [\"cdylib\"] and the dependency fmu-export"]);
     fs::write(dir.path().join("Cargo.toml"), "[package]\nname = 1\n").unwrap();
     refused(&["error: cargo metadata: "]);
 }

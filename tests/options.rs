@@ -280,7 +280,7 @@ const COMMANDS: &[Options] = &[
             line: "--resistance 1 --flux 1 --load 0,1 --speed 0.01 --angle 0 --scenario load --out out",
             same: &[
                 ("jobs", SPEED),
-                ("full", "each of its axes is given"),
+                ("full", "every axis is given"),
                 ("set", "the adaptation is off"),
                 ("angle", START),
                 ("scenario", START),
@@ -554,8 +554,8 @@ fn every_option_changes_something_or_is_refused() {
             let names_it = parts || excludes || after.error.contains(&flag) || after.error.contains(&setting);
             let removed = words(mode).contains(&flag);
             let problem = match (same, *before == after) {
-                (false, true) => "changes nothing and is not refused".to_owned(),
-                (true, false) => format!("is listed as without effect, and has one: {}", after.error),
+                (false, true) => "has no effect and is not refused".to_owned(),
+                (true, false) => format!("is listed as having no effect but has one: {}", after.error),
                 _ if refused && !names_it && !removed => {
                     format!("is refused by a message that does not name it: {}", after.error)
                 }

@@ -40,7 +40,7 @@ impl Sink for Silent {
 /// A number from the environment.
 fn asked(name: &str, otherwise: u64) -> u64 {
     let number = std::env::var(name).ok();
-    number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is no whole number")))
+    number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is not a whole number")))
 }
 
 /// Watches the trials and ends the process with a message when one takes too long: a hang is also a finding.
@@ -224,7 +224,7 @@ fn damage<M: Model>(seeds: &[Vec<u8>], trials: u64) {
         }
     }
     println!("{name}: {trials} trials, {taken} taken, the longest step {longest:?}");
-    assert!(taken > trials / 100, "{name}: hardly any damage was plausible, so this tests nothing: {taken}");
+    assert!(taken > trials / 100, "{name}: hardly any damage was plausible, so the test is ineffective: {taken}");
     // Damage of an unconstrained number gives another valid state, so no particular share must be refused.
     assert!(longest < PATIENCE / 3, "{name}: a step of {longest:?}");
 }

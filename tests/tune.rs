@@ -286,7 +286,7 @@ fn the_check_prints_what_holds_and_what_was_announced() {
     let lost = "does not hold: see the note";
     let text = checked(&light, [lost, lost, "deg   holds"]);
     for printed in
-        ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise in 0.27 s or more"]
+        ["note: will not hold LOAD at 0.1 pu: a step of the rated torque", "; let the load rise over at least 0.27 s"]
     {
         assert!(text.contains(printed), "{printed:?} is not in {text}");
     }

@@ -84,7 +84,7 @@ fn every_arrow_goes_one_way() {
         let more: Vec<_> = known.difference(&allowed).collect();
         assert!(
             more.is_empty(),
-            "{name} may not know {more:?}: ARCHITECTURE.md and this list say which crate knows which"
+            "{name} may not depend on {more:?}: see ARCHITECTURE.md and this list for the allowed dependencies"
         );
     }
     let listed: BTreeSet<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
@@ -92,7 +92,7 @@ fn every_arrow_goes_one_way() {
     let author = BTreeSet::from(["fmu-core".to_owned(), "fmu-export".to_owned()]);
     let is_example = |folder: &Path| folder.starts_with(root().join("examples"));
     let foreign = crates.values().find(|(folder, known)| is_example(folder) && !known.is_subset(&author));
-    assert!(foreign.is_none(), "{foreign:?} knows more than an author's package does");
+    assert!(foreign.is_none(), "{foreign:?} depends on more than an author's package does");
     let others = crates.iter().filter(|(name, (folder, _))| !listed.contains(name.as_str()) && !is_example(folder));
     let others: Vec<_> = others.map(|(name, _)| name).collect();
     assert_eq!(others, ["faulty-fmu", "ticks-fmu", "types-fmu"], "a new crate needs its row");
@@ -180,7 +180,7 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
         let (lib, main) = (source("lib.rs"), source("main.rs"));
         if ["fmu-export", "fmu-import"].contains(name) {
             assert!(lib.contains("#![deny(unsafe_code)]"), "{name}");
-            assert_eq!(lib.matches("#[allow(unsafe_code)]").count(), 1, "{name}: the module abi alone");
+            assert_eq!(lib.matches("#[allow(unsafe_code)]").count(), 1, "{name}: only the module abi");
             let mut files = Vec::new();
             sources(&folder.join("src"), &mut files);
             for file in files.iter().filter(|f| !f.starts_with(folder.join("src/abi"))) {
@@ -219,7 +219,7 @@ fn an_estimator_does_not_know_the_controller() {
         let text = std::fs::read_to_string(&file).unwrap();
         for path in text.split("crate::").skip(1).map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_')) {
             let module = path.into_iter().next().unwrap();
-            assert!(module == "estimator", "{} knows the controller by crate::{module}", file.display());
+            assert!(module == "estimator", "{} depends on the controller through crate::{module}", file.display());
         }
     }
 }
@@ -346,7 +346,7 @@ fn no_two_crates_share_the_name_of_a_public_type() {
     let new: Vec<_> = shared.iter().filter(|(name, _)| !listed.contains(**name)).collect();
     assert!(new.is_empty(), "public types with the name of a type of another crate: {new:?}");
     let gone: Vec<_> = listed.iter().filter(|&name| !shared.contains_key(name)).collect();
-    assert!(gone.is_empty(), "remove from SHARED, because one crate alone has the type: {gone:?}");
+    assert!(gone.is_empty(), "remove from SHARED, because only one crate has the type: {gone:?}");
 }
 
 /// A line of source fits a screen; rows of a long table are split into several lines.

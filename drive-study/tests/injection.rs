@@ -201,7 +201,7 @@ fn start_from(pair: &Pair, degrees: f64, s_2: f64, speed: f64) -> f64 {
         p.controller.model.inputs.speed_ref = if t > 0.6 { speed * RATED_SPEED } else { 0.0 };
         if t < 0.37 {
             turned = turned.max(p.plant.out.speed.abs());
-            assert!(p.controller.out.lock_lost < 1.0, "what is still searched is not lost");
+            assert!(p.controller.out.lock_lost < 1.0, "a rotor still being located is not lost");
         }
     });
     assert!(turned < 0.3, "from {degrees} deg: the rotor turned at {turned} rad/s");

@@ -139,7 +139,7 @@ fn false_lock() {
     // At 2 s, the swing has died away to 1e-12 of the speed; from there on, it grows from rounding errors.
     let (speed, angle) = after(2.0, R);
     assert!(
-        speed.abs() < 1.0 && PAGE.contains(&format!("stands at 0 rpm with {} for more than 2 s", degrees(angle))),
+        speed.abs() < 1.0 && PAGE.contains(&format!("stays at 0 rpm with {} for more than 2 s", degrees(angle))),
         "{speed} rpm, {angle} deg"
     );
     assert!((after(0.5, 0.9 * R).0 - 500.0).abs() < 1.0);

@@ -294,6 +294,6 @@ fn an_imposed_shaft_is_the_free_one() {
     let (fine, off, bound) = imposed(1e-5, 6000);
     // Saturation lowers the inductance that turns flux linkage into current: by half at most here.
     assert!(fine < 2.0 * bound && coarse < 2.0 * bound_coarse, "{fine} A, {bound} A; {coarse} A, {bound_coarse} A");
-    assert!((coarse / fine - 16.0).abs() < 3.0, "of second order, nothing adds up: {coarse} A, {fine} A");
+    assert!((coarse / fine - 16.0).abs() < 3.0, "not of second order, or errors add up: {coarse} A, {fine} A");
     assert!(off < 0.02 && off < off_coarse, "speed from tau_shaft: {off} rad/s off, {off_coarse} rad/s at 40 us");
 }

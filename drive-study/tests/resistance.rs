@@ -177,12 +177,12 @@ fn the_atlas() {
         let seen = lost.iter().filter(|(_, verdict)| verdict.lock_lost_is_right()).count();
         let alarms = atlas.that_are(false).filter(|(_, verdict)| verdict.lock_lost >= 1.0).count();
         println!(
-            "k_a {k_a:?}: {} of {} lost, {near} with R^ 0.8..1.2 R and the exact flux; lock_lost sees {seen}, {alarms} false",
+            "k_a {k_a:?}: {} of {} lost, {near} with R^ 0.8..1.2 R and the exact flux; lock_lost detects {seen}, {alarms} false",
             lost.len(),
             cells.len()
         );
         assert!(lost.len() <= most && near <= most_near, "{lost:?}");
-        assert!(100 * seen >= 95 * lost.len() && alarms == 0, "lock_lost sees {seen}, {alarms} false alarms");
+        assert!(100 * seen >= 95 * lost.len() && alarms == 0, "lock_lost detects {seen}, {alarms} false alarms");
     }
 }
 

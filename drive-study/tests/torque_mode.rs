@@ -159,7 +159,7 @@ fn a_pulsating_shaft() {
         let w = n_p * speed * (1.0 + share);
         let off = if found { 0.02 * 60.0 } else { 3.0 * 0.3 * w * T_S * w * 0.004 * T_S / 60e-6 };
         assert!(most < 60.0 + off, "{most} A beyond the limit of 60 A by more than {off} A");
-        assert!(found && tau_ref == 0.0 || cut > 0, "the limit is seen to act");
+        assert!(found && tau_ref == 0.0 || cut > 0, "the limit should act");
         if found {
             assert!((error - expected).abs() < 0.15 * expected + 1.0, "{error} deg, not {expected} deg");
             assert!(lost < 0.8, "{lost}");
@@ -230,7 +230,7 @@ fn no_torque_releases_the_shaft() {
         assert_eq!(i > 4.9, !release, "release {release}: {i} A");
         assert!(
             (most - 0.675 * (7.5_f64 * 7.5 - 25.0).sqrt()).abs() < 1e-6,
-            "the limit is that of a torque: {most} N.m"
+            "the limit acts on the torque: {most} N.m"
         );
         let (_, speed, _) = run(0.0, -0.1, 2000);
         assert_eq!(speed > 5.0, release, "release {release}: {speed} rad/s under a load of 0.1 N.m");

@@ -150,7 +150,7 @@ fn a_ramp_begins_at_the_reference() {
     tune(&mut pair, "speed_loop.ramp", |_| 50.0).unwrap();
     run(&mut pair, inputs, 1);
     run(&mut untuned, inputs, 1);
-    assert_eq!(pair.controller.out, untuned.controller.out, "at the reference there is nothing to do");
+    assert_eq!(pair.controller.out, untuned.controller.out, "no correction is needed at the reference");
     // 0.1 s of 50 rad/s2 from 60 rad/s on.
     run(&mut pair, (80.0, 1.0, 325.0), 1000);
     assert!((pair.plant.out.speed - 65.0).abs() < 3.0, "{}", pair.plant.out.speed);

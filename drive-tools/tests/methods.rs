@@ -125,3 +125,20 @@ fn a_refusal_has_numbers() {
         assert!(parts.iter().all(|part| refusal.reason.contains(part)), "{}", refusal.reason);
     }
 }
+
+/// A start that takes long, or that the maximum current limits, has a note with the figure.
+#[test]
+fn a_slow_or_a_weak_start_has_a_note() {
+    let notes = |motor: &MotorFile| match rules::suited(motor, Kind::ExtendedEmf).unwrap() {
+        Suited::Tuned(tuned) => tuned.notes.join("\n"),
+        Suited::Refused(refusal) => panic!("{}", refusal.reason),
+    };
+    let slow = notes(&read("wind-5kw"));
+    assert!(slow.contains("the I-f start takes 2.1 s: the swing of the rotor"), "{slow}");
+    let mut weak = read("servo-48v");
+    let quick = notes(&weak);
+    assert!(!quick.contains("I-f start takes") && !quick.contains("maximum current gives"), "{quick}");
+    *weak.data.rating.current.get_mut() *= 0.45;
+    let weak = notes(&weak);
+    assert!(weak.contains("in the I-f start, 1.1"), "{weak}");
+}

@@ -124,7 +124,7 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     }
     if let Some(id) = &args.explain {
         let Some(text) = report::explain(id) else {
-            return Err(Error(format!("--explain {id}: there is no such check; --list shows them")));
+            return Err(Error(format!("--explain {id}: unknown check; --list shows all")));
         };
         print!("{text}");
         return Ok(true);
@@ -132,13 +132,10 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
     let group = |name: &str| check::GROUPS.iter().any(|g| g.name.eq_ignore_ascii_case(name));
     if let Some(name) = args.only.iter().find(|name| !is_check(name) && !group(name)) {
         let groups: Vec<_> = check::GROUPS.iter().map(|g| g.name).collect();
-        return Err(Error(format!(
-            "--only {name}: is neither a check (--list shows them) nor a group: {}",
-            groups.join(", ")
-        )));
+        return Err(Error(format!("--only {name}: unknown check (--list shows all) or group: {}", groups.join(", "))));
     }
     if let Some(name) = args.allow.iter().find(|name| !is_check(name)) {
-        return Err(Error(format!("--allow {name}: there is no such check; --list shows them")));
+        return Err(Error(format!("--allow {name}: unknown check; --list shows all")));
     }
     if args.verbose && args.format != Format::Text {
         return Err(Error("--verbose: is for --format text; the other formats have every check".into()));

@@ -21,7 +21,7 @@ pub(super) struct Deviation {
 impl Deviation {
     /// The value, with its name: `x is 2.0, expected 1.0`.
     pub(super) fn text(&self, names: &[String]) -> String {
-        let Some((column, expected, found)) = self.values else { return "only one of the two runs goes on".into() };
+        let Some((column, expected, found)) = self.values else { return "only one of the two runs continues".into() };
         let name = names.get(column).map_or("a value", String::as_str);
         format!("{name} is {found:?}, expected {expected:?}")
     }

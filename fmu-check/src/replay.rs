@@ -19,7 +19,7 @@ pub(super) fn run(path: &Path, what: &str, options: &Options) -> Result<bool, Er
     };
     let check = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id.eq_ignore_ascii_case(id));
     let Some(check) = check.filter(|c| c.is_probe()) else {
-        return Err(Error(format!("--replay {id}: there is no such check of the binary; --list shows the checks")));
+        return Err(Error(format!("--replay {id}: unknown check of the binary; --list shows the checks")));
     };
     let fmu = FmuFile::open(path)?;
     let runner = Runner::new(&fmu, options).map_err(Error)?;

@@ -197,7 +197,7 @@ impl Report {
         let end = match (self.conforms(), self.unknown().count()) {
             (true, _) if 2 * c.not_determined > applicable => "Most requirements could not be checked.",
             (true, 0) if self.counts().known > 0 => "All findings are known.",
-            (true, 0) if self.counts().not_determined > 0 => "What could be determined holds.",
+            (true, 0) if self.counts().not_determined > 0 => "All requirements that could be checked are met.",
             (true, 0) => "All requirements hold.",
             (true, _) => "No requirement of the standard (must) is violated.",
             (false, _) => "Requirements of the standard (must) are violated.",

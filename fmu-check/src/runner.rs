@@ -377,7 +377,7 @@ impl Runner {
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) if !SEVERAL.contains(&check.id) && is_of_second(call, out) => Err(format!(
-                "{} {how} within {limit} s, unlike that of the first instance: see L04a",
+                "{} {how} within {limit} s, unlike in the first instance: see L04a",
                 call.trim_start_matches(['C', 'P', 'S', 'H']).trim()
             )),
             Outcome::Hang(how) => Ok((format!("{how} within {limit} s"), call.into())),

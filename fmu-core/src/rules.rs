@@ -136,7 +136,11 @@ const fn check_clocks<E: Exported>(model: &str) {
     demand(clocks == 0 || can.clocked.is_some(), model, "a row V::clock needs the capability Clocked");
     demand(can.clocked.is_some() || !can.scheduled, model, "the capability ScheduledExecution needs Clocked");
     let alone = can.samples.is_none() && can.intermediate.is_none();
-    demand(alone || can.clocked.is_none(), model, "Clocked excludes Sampled, which ticks by itself, and Intermediate");
+    demand(
+        alone || can.clocked.is_none(),
+        model,
+        "Clocked excludes Sampled, which generates its own ticks, and Intermediate",
+    );
 }
 
 /// Maximum number of clocks.
@@ -159,7 +163,7 @@ const fn check_state(meta: &Meta, name: &str, dimension: Option<usize>) {
     demand(array, name, "the row is an array: its state is State::array");
     let one = same_dimension(meta.dimension, dimension);
     demand(one, name, "State::array and its row have different numbers of elements");
-    let rule = "the row of a state is V::output or V::state, that of an array V::array_output or V::array_local";
+    let rule = "the row of a state is V::output or V::state, the row of an array V::array_output or V::array_local";
     demand(can_be_state(meta, dimension), name, rule);
 }
 

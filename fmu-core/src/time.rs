@@ -186,7 +186,7 @@ mod tests {
         for (t, k) in [(0.0, 1), (1e-4, 2), (1e-4 - 5e-10, 2), (1e-4 - 5e-9, 1), (2.5e-4, 3), (0.9999, 10_000)] {
             assert_eq!(grid.first_after(Elapsed::ZERO.plus(t)), k, "after {t} s");
         }
-        assert!(grid.first_after(Elapsed::ZERO.plus(1e300)) > 0, "an absurd time ends too");
+        assert!(grid.first_after(Elapsed::ZERO.plus(1e300)) > 0, "an absurd time also ends");
         let (early, late) = (Elapsed::ZERO.plus(1e6), Elapsed::ZERO.plus(1e6).plus(1e-9));
         assert!((late.since(early) - 1e-9).abs() < 1e-24, "a nanosecond after 1e6 s");
     }

@@ -27,7 +27,7 @@ impl Habit {
                 "the importer sets variables that cannot change now, such as fixed parameters after the initialization; their values are unchanged"
             }
             Self::States => {
-                "the importer sets the continuous states outside Continuous-Time Mode; they are taken as those of its integrator"
+                "the importer sets the continuous states outside Continuous-Time Mode; they are used as values from its integrator"
             }
             Self::Back => {
                 "the importer sets a time before the last completed step; counts after that time are discarded"

@@ -414,7 +414,11 @@ fn the_description_has_it_all() {
     let v = |name: &str| d.variable(name).unwrap();
     let unknowns: Vec<&str> =
         d.variables.iter().filter(|v| v.initial_dependencies.is_some()).map(|v| v.name.as_str()).collect();
-    assert_eq!(unknowns, ["energy", "der(h)", "der(v)"], "what starts exactly is no initial unknown");
+    assert_eq!(
+        unknowns,
+        ["energy", "der(h)", "der(v)"],
+        "a variable with an exact start value is not an initial unknown"
+    );
     assert_eq!(v("energy").initial_dependencies.as_ref().unwrap(), &[H, V_], "but a known of them");
     assert_eq!(v("der(v)").initial_dependencies.as_ref().unwrap(), &[RESTS]);
     assert!(v("h").exact && !v("energy").exact && v("v_min").start.is_some() && v("bounces").start.is_some());

@@ -154,7 +154,7 @@ const FRACTIONS: [(u32, u32); 4] = [(1, 1), (1, 3), (7, 10), (10, 1)];
 
 fn steps() -> u32 {
     let asked = std::env::var("FMU_STEPS").ok();
-    asked.map_or(10_000_000, |n| n.parse().unwrap_or_else(|_| panic!("FMU_STEPS = {n:?} is no whole number")))
+    asked.map_or(10_000_000, |n| n.parse().unwrap_or_else(|_| panic!("FMU_STEPS = {n:?} is not a whole number")))
 }
 
 /// Runs and compares with integers after every step.

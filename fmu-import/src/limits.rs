@@ -48,7 +48,7 @@ pub fn list() -> String {
         row("Address space of a process that runs FMUs (`--memory`)", PROCESS_MEMORY >> 30, "GiB"),
         row("Open files of a process that runs FMUs (no limit with `--memory 0`)", PROCESS_FILES, "files"),
         row(
-            "Threads and processes that a process that runs FMUs may add to those of the system",
+            "Threads and processes that a process running FMUs may start in addition to the system's",
             PROCESS_THREADS,
             "threads",
         ),

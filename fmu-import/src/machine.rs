@@ -77,7 +77,7 @@ pub fn universal(images: &[&[u8]]) -> Result<Vec<u8>, String> {
             return Err(format!("is for an unknown processor (cputype {cpu:#x})"));
         };
         if there.contains(&platform) {
-            return Err(format!("is for {platform}, as another one is"));
+            return Err(format!("is for {platform}, like another one"));
         }
         there.push(platform);
         let at = end.next_multiple_of(1 << alignment);
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(found, expected);
         assert!(read.arches().iter().all(|a| a.offset() % (1 << a.align()) == 0), "aligned to a page");
         assert_eq!(read.arches()[1].cpusubtype(), object::macho::CpuSubtype(0x8000_0002), "that of the image");
-        assert!(universal(&[&intel, &intel]).unwrap_err().contains("as another one is"));
+        assert!(universal(&[&intel, &intel]).unwrap_err().contains("like another one"));
         assert!(universal(&[b"\x7fELF"]).unwrap_err().contains("is not a library of macOS"));
         assert!(images(&both[..both.len() - 1]).unwrap_err().contains("lies outside"));
     }

@@ -88,7 +88,7 @@ fn an_instance_that_is_freed_or_foreign_is_refused() {
     assert_eq!(refused(|| raw.free(freed)), "the instance is freed");
     assert_eq!(refused(|| raw.simple(Simple::Reset, freed)), "the instance is freed");
     assert_eq!(refused(|| raw.simple(Simple::Reset, foreign)), "the instance is of another binary");
-    assert_eq!(raw.simple(Simple::Reset, alive), Some(Status::OK), "a refusal changes nothing");
+    assert_eq!(raw.simple(Simple::Reset, alive), Some(Status::OK), "a refusal leaves the model unchanged");
     raw.free(Handle::NULL).unwrap();
 }
 
@@ -107,7 +107,7 @@ fn a_state_that_is_freed_or_foreign_is_refused() {
     assert_eq!(raw.set_state(two, saved), Some(Status::OK), "of another instance of the same binary");
     assert_eq!(raw.free_state(one, Some(&mut saved)), Some(Status::OK));
     assert_eq!(saved, SavedState::NULL);
-    let ended = "the state is freed, by itself or with its instance";
+    let ended = "the state was freed, individually or with its instance";
     assert_eq!(refused(|| raw.set_state(one, copy)), ended);
     assert_eq!(refused(|| raw.free_state(one, Some(&mut copy.clone()))), ended);
     raw.free(two).unwrap();

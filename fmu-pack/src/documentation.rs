@@ -108,7 +108,7 @@ fn timing(d: &Description) -> String {
     let outputs = if discrete {
         "Outputs marked “sampled” change at the model's own sample instants, independent of the communication step."
     } else {
-        "Outputs are those of the end of the step."
+        "Outputs apply to the end of the step."
     };
     format!(
         "<h2>Recommended experiment and timing</h2>\n<table>\n\

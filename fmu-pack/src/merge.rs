@@ -87,7 +87,7 @@ fn same_fmu(a: &Part, b: &Part) -> Result<()> {
     if version(a) != version(b) {
         let (of_a, of_b) = (version(a), version(b));
         return Err(invalid!(
-            "{}: {DESCRIPTION}: is of FMI {of_b}, {} of FMI {of_a}; merge those of one standard",
+            "{}: {DESCRIPTION}: is of FMI {of_b}, {} of FMI {of_a}; merge archives of one standard",
             b.name,
             a.name
         ));
@@ -128,7 +128,7 @@ fn same_files(a: &Part, b: &Part) -> Result<()> {
             let alike = of_a.iter().zip(&of_b).take_while(|(x, y)| x == y).count();
             let line = of_b[..alike].split(|byte| *byte == b'\n').count();
             let remedy = "build both from the same sources with the same fmu";
-            return Err(invalid!("{}: {name}, line {line}: differs from that of {}; {remedy}", b.name, a.name));
+            return Err(invalid!("{}: {name}, line {line}: differs from {}; {remedy}", b.name, a.name));
         }
     }
     Ok(())
@@ -183,12 +183,12 @@ fn other_platforms(a: &Part, b: &Part) -> Result<()> {
         let (here, there) = (folder(theirs.path), folder(ours.path));
         if here != there {
             let what = format!("is for {}, as {there} of {} is", theirs.platform, a.name);
-            return Err(invalid!("{}: {}: {what}; give it in one of them only", b.name, theirs.path));
+            return Err(invalid!("{}: {}: {what}; provide it in only one of them", b.name, theirs.path));
         }
         if ours.bytes != theirs.bytes {
             let name = here.trim_start_matches(BINARIES);
             return Err(invalid!(
-                "{}: {}: differs from that of {}; give {name} in one of them only",
+                "{}: {}: differs from {}; provide {name} in only one of them",
                 b.name,
                 theirs.path,
                 a.name
@@ -198,7 +198,7 @@ fn other_platforms(a: &Part, b: &Part) -> Result<()> {
     let is_library = |path: &str| of_b.iter().any(|l| l.path == path);
     for (name, bytes) in b.files.iter().filter(|(name, _)| name.starts_with(BINARIES) && !is_library(name)) {
         if a.files.get(name).is_some_and(|other| other != bytes) {
-            return Err(invalid!("{}: {name}: differs from that of {}; give it in one of them only", b.name, a.name));
+            return Err(invalid!("{}: {name}: differs from {}; provide it in only one of them", b.name, a.name));
         }
     }
     Ok(())

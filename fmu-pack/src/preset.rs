@@ -81,7 +81,7 @@ impl PresetFmu {
         if !suffix.is_empty() {
             let old = old.filter(|bytes| preset::suffix(bytes) == suffix);
             let old =
-                old.with_context(|| format!("{name}: resources/{FILE} is missing, or not that of {DESCRIPTION}"))?;
+                old.with_context(|| format!("{name}: resources/{FILE} is missing or does not match {DESCRIPTION}"))?;
             for preset::PresetValue { name, value, .. } in
                 preset::read(&old).map_err(|e| invalid!("{}: {e}", file.display()))?
             {
@@ -153,13 +153,13 @@ impl PresetFmu {
                 _ => "a local variable",
             };
             return Err(invalid!(
-                "{name} is {what}: a preset has start values of inputs and parameters, and of exact variables"
+                "{name} is {what}: a preset contains start values of inputs, parameters, and exact variables"
             ));
         }
         let read = self.reader.variable(&variable.name).context(variable.name.clone())?;
         let own_unit = read.unit.as_deref().unwrap_or("1");
         if let Some(unit) = unit.filter(|unit| *unit != own_unit) {
-            return Err(invalid!("{name} is given in {unit}, but {model} has it in {own_unit}: convert the value"));
+            return Err(invalid!("{name} is given in {unit}, but {model} uses {own_unit}: convert the value"));
         }
         let elements = texts(&Values::read(text, read, &self.reader).map_err(Error::Invalid)?, variable);
         let places: Vec<usize> = element.map_or_else(|| (0..variable.elements()).collect(), |one| vec![one]);

@@ -71,7 +71,9 @@ pub fn files(
         "smoke-test.exp".into(),
         "application/x-ma-hs-experiments",
         "experiment/smoke-test",
-        format!("The default experiment with its inputs, held over communication steps of {step} s, and its result"),
+        format!(
+            "The default experiment with its inputs, constant over communication steps of {step} s, and its result"
+        ),
     ));
     if let Some((set, text)) = parameters {
         texts.push((format!("{set}.ssv"), text.into()));

@@ -221,7 +221,7 @@ impl Measure {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
+#[expect(clippy::float_cmp, reason = "exact if nothing is rounded")]
 mod tests {
     use super::*;
     use crate::signal::Sum;

@@ -388,7 +388,7 @@ impl Plan {
         progress: &(dyn Fn(u64) -> ControlFlow<()> + Sync),
     ) -> Result<RunResults, Error> {
         let rows =
-            usize::try_from(count).map_err(|_| Error::Invalid(format!("{count} rows are too many for the memory")))?;
+            usize::try_from(count).map_err(|_| Error::Invalid(format!("{count} rows do not fit into the memory")))?;
         let all = Mutex::new((RunResults::empty(self.0.measures.len(), rows), 0));
         let threads = if self.only_one_instance().is_some() { 1 } else { threads };
         pool::run(

@@ -42,7 +42,7 @@ fn a_model_without_has_no_file() {
     let bare = Description { terminals: Vec::new(), icon: None, ..sample() };
     assert_eq!(write_terminals(&bare, V3), None);
     let only_icon = write_terminals(&Description { terminals: Vec::new(), ..sample() }, V3).unwrap();
-    assert!(only_icon.contains("<Icon ") && !only_icon.contains("<Terminals"), "an empty list is no valid XML");
+    assert!(only_icon.contains("<Icon ") && !only_icon.contains("<Terminals"), "an empty list is not valid XML");
     let no_icon = write_terminals(&Description { icon: None, ..sample() }, V3).unwrap();
     assert!(!no_icon.contains("<Icon ") && no_icon.contains("<Terminals>"));
 }

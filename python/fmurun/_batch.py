@@ -5,7 +5,7 @@ import os
 import numpy as np
 
 from . import _core
-from ._simulate import _value
+from ._simulate import _no_variable, _value
 from ._instance import _described, _open
 
 
@@ -62,7 +62,7 @@ def _start(description, n, values):
     variables, start = {v.name: v for v in description.modelVariables}, []
     for name, given in (values or {}).items():
         if name not in variables:
-            raise ValueError(f"{description.modelName} has no variable {name}; see start_values")
+            raise _no_variable(description, [name], "start_values")
         single = isinstance(given, (str, tuple)) or np.ndim(given) == 0
         row = [float(_value(variables[name], description, x)[0]) for x in ([given] if single else given)]
         if len(row) not in (1, n):

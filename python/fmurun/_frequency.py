@@ -76,7 +76,7 @@ def frequency_response(fmus, input, output, *, over=None, frequencies=None, ampl
         frequencies: in Hz; by default 10 a decade from 2e-4 to 0.2 times 1 / step_size
         amplitude: of the input; by default a hundredth of its size, reduced until the FMUs are linear
         settle_time: from the start to the operating point (s); by default the duration of the default experiments
-        step_size: communication step (s), best the sample period of a controller; high frequencies take fractions of it
+        step_size: communication step (s), preferably the sample period of a controller; high frequencies use fractions of it
         start_values, inputs: name -> value, and name -> values over time, as `start_values` and `input` of `Plan`
         connections, fmi_type, relative_tolerance: as for `Plan`
         threads: by default all processors

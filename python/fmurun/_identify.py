@@ -15,9 +15,9 @@ def identify(frame, *, n_p, current=None, speed=None, torque=None, u_dc=None, de
         frame: pandas DataFrame, dictionary of arrays, or structured array with a column per signal: t, u_a, u_b, u_c, i_a, i_b,
             i_c, theta, ...; a header may have a unit: "i_a [mA]"
         n_p: pole pairs
-        current: maximum current (A); by default the greatest of the record
-        speed: rated mechanical speed (rad/s); by default the greatest of the record
-        torque: rated torque (N.m); by default the greatest of the record
+        current: maximum current (A); by default the maximum in the record
+        speed: rated mechanical speed (rad/s); by default the maximum in the record
+        torque: rated torque (N.m); by default the maximum in the record
         u_dc: DC-link voltage (V); by default the mean of the column u_dc
         delay: samples from a row to the action of its voltage; by default the best of 0, 0.5, 1, 1.5, 2
         every: the record keeps one of so many samples of the controller

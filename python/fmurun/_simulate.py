@@ -1,5 +1,6 @@
 """FMPy's `simulate_fmu`: its arguments, its result, its bits."""
 
+import re
 import warnings
 from math import prod
 
@@ -89,7 +90,7 @@ def simulate_fmu(filename, validate=True, start_time=None, stop_time=None, solve
         output_interval: communication step (s); by default the FMU's, doubled until there are at most 1000 steps
         record_events: Model Exchange: two rows for each event, before and after it
         fmi_type: "CoSimulation" or "ModelExchange"; by default the first of them that the FMU has
-        start_values: name -> value, or (value, unit); inputs that `input` does not have keep theirs
+        start_values: name -> value, (value, unit) or "1000rpm"; inputs that `input` does not have keep theirs
         input: structured array, its first column is time (s), the others are inputs and tunable parameters
         output: names to record; by default the outputs
         timeout: end after this much time of the clock (s)
@@ -284,7 +285,7 @@ def _start_values(variables, description, given, validate):
     """(variable, values) to set before and during initialization mode, in the order of the description."""
     missing = [name for name in given if name not in variables]
     if missing and validate:
-        raise ValueError(f"{description.modelName} has no variable {', '.join(map(str, missing))}; see start_values")
+        raise _no_variable(description, missing, "start_values")
     before, during, never = [], [], []
     ordered = [variables[n] for n in given if n in variables] if len(given) < 2 else [v for v in variables.values() if v.name in given]
     for v in ordered:
@@ -300,17 +301,24 @@ def _start_values(variables, description, given, validate):
     return before, during
 
 
+def _no_variable(description, missing, argument):
+    """An error that names unknown variables of an argument, each with those that resemble it."""
+    names = [v.name for v in description.modelVariables]
+    meant = ", ".join(f"{name}{_core.suggest(str(name), names)}" for name in missing)
+    return ValueError(f"{argument}: {description.modelName} has no variable {meant}")
+
+
 def _value(v, description, value):
     """A start value as a list for the setter."""
     if type(value) is tuple:
         if len(value) != 2:
             raise ValueError(f"the start value of {v.name} must be a value or (value, unit), not {value!r}")
         value = _without_unit(v, description, *value)
+    if isinstance(value, str) and not v.shape:
+        value = _read(v, description, value)
     try:
         if v.type == "Boolean" and isinstance(value, str):
             value = {"true": True, "false": False}[value.lower()]
-        if v.type == "Enumeration" and isinstance(value, str) and v.declaredType:
-            value = {item.name: item.value for item in v.declaredType.items}.get(value, value)
         convert = float if v.type in _FLOATS else {"Boolean": bool, "String": str}.get(v.type, int)
         elements = [value] if not v.shape else value.split() if isinstance(value, str) else np.ravel(value)
         values = [convert(x) for x in elements]
@@ -326,14 +334,47 @@ def _value(v, description, value):
     return values
 
 
+def _read(v, description, text):
+    """The value of a text: a number that may have a unit, as in `1000rpm`, or the name of an item."""
+    if v.type == "Enumeration" and v.declaredType:
+        items = {item.name: item.value for item in v.declaredType.items}
+        if text not in items and not re.fullmatch(r"\s*[+-]?\d+\s*", text):
+            raise ValueError(f"{v.name} = {text} is not one of {', '.join(items)}")
+        return items.get(text, text)
+    if v.type not in _FLOATS or _is_number(text):
+        return text
+    parts = re.fullmatch(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\S+)\s*", text)
+    if not parts:
+        raise ValueError(f"{v.name} = {text} is not a number")
+    own, known = _units(v, description)
+    if own is None:
+        raise ValueError(f"{v.name} = {text} is not a number, and the variable has no unit")
+    if parts[2] not in {own, *known}:
+        raise ValueError(f"{v.name} = {text} is not a number in {' or '.join([own, *known])}")
+    return _without_unit(v, description, float(parts[1]), parts[2])
+
+
+def _is_number(text):
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _units(v, description):
+    """The unit of a variable, and its display units by name."""
+    own = v.unit or (v.declaredType and v.declaredType.unit)
+    return own, {u.name: {d.name: d for d in u.displayUnits} for u in description.unitDefinitions}.get(own, {})
+
+
 def _without_unit(v, description, value, unit):
     """The value in the variable's unit, from one in a display unit."""
-    own = v.unit or (v.declaredType and v.declaredType.unit)
+    own, known = _units(v, description)
     if unit is None or unit == own:
         return value
     if own is None:
         raise ValueError(f"{v.name} has no unit, and its start value has {unit!r}")
-    known = {u.name: {d.name: d for d in u.displayUnits} for u in description.unitDefinitions}.get(own, {})
     if unit not in known:
         raise ValueError(f"the unit {unit!r} of the start value of {v.name} is not one of {', '.join([own, *known])}")
     shown = known[unit]
@@ -362,7 +403,7 @@ def _columns(description, variables, output):
         names = {output} if isinstance(output, str) else set(output)
         missing = [name for name in names if name not in variables and name != "time"]
         if missing:
-            raise ValueError(f"{description.modelName} has no variable {', '.join(sorted(map(str, missing)))}; see output")
+            raise _no_variable(description, sorted(map(str, missing)), "output")
     fields, groups = [("time", np.float64)], {}
     enumeration = "Integer" if description.fmiVersion == "2.0" else "Int64"
     for v in [variables[n] for n in names if n in variables] if len(names) < 2 else variables.values():
@@ -402,7 +443,7 @@ def _samples(description, variables, signals):
         raise ValueError("the times of input must be finite and must not decrease")
     unknown = [name for name in names if name not in variables]
     if unknown:
-        raise ValueError(f"{description.modelName} has no variable {', '.join(unknown)}; see input")
+        raise _no_variable(description, unknown, "input")
     wrong = [n for n in names if variables[n].causality != "input" and variables[n].variability != "tunable"]
     if wrong:
         raise ValueError(f"{', '.join(wrong)}: neither an input nor a tunable parameter; see input")

@@ -15,6 +15,13 @@ pub(crate) fn type_name(version: FmiVersion, base: BaseType) -> &'static str {
     }
 }
 
+/// `; did you mean a or b?` with the names that resemble the written one, as the command says it, or nothing.
+#[pyfunction]
+#[expect(clippy::needless_pass_by_value, reason = "PyO3 extracts values")]
+pub(crate) fn suggest(written: &str, names: Vec<String>) -> String {
+    fmu_import::suggest(written, names.iter().map(String::as_str))
+}
+
 /// Extents of an array; an extent given by a structural parameter is its start value, or 0 without one.
 pub(crate) fn shape(description: &ModelDescription, variable: &ModelVariable) -> Vec<usize> {
     let start = |reference| {

@@ -28,7 +28,9 @@ impl Ports {
         let description = fmu.description();
         let usage = |cause: String| Error::Usage { instance: description.model_name.clone(), cause };
         let port = |name: &String| {
-            let v = description.variable(name).ok_or_else(|| usage(format!("has no variable {name}")))?;
+            let meant = || fmu_import::suggest(name, description.variables.iter().map(|v| v.name.as_str()));
+            let none = || usage(format!("has no variable {name}{}", meant()));
+            let v = description.variable(name).ok_or_else(none)?;
             if v.is_array() || matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock) {
                 return Err(usage(format!("{name} is not a scalar number")));
             }

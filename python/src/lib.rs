@@ -32,6 +32,8 @@ mod _core {
     #[pymodule_export]
     use super::cache::{Fmu, open};
     #[pymodule_export]
+    use super::describe::suggest;
+    #[pymodule_export]
     use super::error::panic;
     #[pymodule_export]
     use super::frequency::{frequency_response, loop_properties, phases};

@@ -110,18 +110,29 @@ def test_a_timeout_ends_it(plant):
 
 
 WRONG = {
-    "a variable of start_values": ({"start_values": {"motor.R": 3.0}}, "has no variable motor.R; see start_values"),
-    "a variable of output": ({"output": ["speed", "sped"]}, "has no variable sped; see output"),
-    "a variable of input": ({"input": np.array([(0.0, 1.0)], dtype=[("t", float), ("load", float)])}, "no variable load; see in"),
+    "a variable of start_values": ({"start_values": {"motor.R": 3.0}}, "start_values: PmsmPlant has no variable motor.R; did you mean motor.R_s"),
+    "a variable of output": ({"output": ["speed", "sped"]}, "output: PmsmPlant has no variable sped; did you mean speed"),
+    "a variable of input": ({"input": np.array([(0.0, 1.0)], dtype=[("t", float), ("load", float)])}, "input: PmsmPlant has no variable load"),
     "an output as input": ({"input": np.array([(0.0, 1.0)], dtype=[("t", float), ("speed", float)])}, "neither an input nor"),
     "a start value for an output": ({"start_values": {"speed": 3.0}}, "could not be set: speed"),
     "a type": ({"start_values": {"motor.n_p": "two"}}, "start value 'two' of motor.n_p is not of the type Int32"),
     "the range of a type": ({"start_values": {"motor.n_p": 2**40}}, "start value 1099511627776 of motor.n_p is not of the type Int32"),
+    "a text": ({"start_values": {"motor.R_s": "much"}}, "motor.R_s = much is not a number"),
+    "the unit of a text": ({"start_values": {"initial.speed": "1krpm"}}, "initial.speed = 1krpm is not a number in rad/s or rpm"),
     "a unit": ({"start_values": {"motor.R_s": (3.0, "rpm")}}, "unit 'rpm' of the start value of motor.R_s is not one of"),
     "an interval of zero": ({"output_interval": 0.0}, "output_interval must be positive"),
     "a stop that is no number": ({"stop_time": float("nan")}, "must be finite"),
     "times that fall": ({"input": STEP[::-1]}, "must not decrease"),
 }
+
+
+def test_a_text_may_have_a_unit_as_for_the_command(plant):
+    runs = [
+        simulate_fmu(plant, stop_time=0.01, start_values={"initial.speed": speed}, output=["speed"])["speed"]
+        for speed in ((300.0, "rpm"), "300rpm", "3.0e2 rpm", f"{300 * np.pi / 30} rad/s")
+    ]
+    assert runs[0][0] == pytest.approx(300 * np.pi / 30) and all(np.array_equal(runs[0], other) for other in runs[1:3])
+    assert runs[3] == pytest.approx(runs[0])
 
 
 @pytest.mark.parametrize("case", WRONG)

@@ -416,7 +416,7 @@ pub(super) fn choose<'a>(all: &[&'a Package], names: &[String]) -> Result<Vec<&'
     let letters = |name: &str| name.to_lowercase().replace(['-', '_'], "");
     if all.is_empty() {
         bail!(
-            "no package here is an FMU: expected crate-type = [\"cdylib\"] and the dependency fmu-export in a Cargo.toml; \
+            "no FMU package here: expected crate-type = [\"cdylib\"] and the dependency fmu-export in a Cargo.toml; \
              fmu new my-model creates such a package"
         );
     }

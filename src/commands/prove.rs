@@ -147,7 +147,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
             validations.push(format!("FMPy {version}, validate_fmu: {found}"));
         }
         None => message::note(&format!(
-            "{} has no FMPy: {} lists only this program; --python selects a Python that has it (pip install fmpy)",
+            "{} has no FMPy: {} lists only this program; select a Python with FMPy by --python (pip install fmpy)",
             python.display(),
             example.folder.join("Readme.txt").display()
         )),

@@ -87,8 +87,7 @@ pub struct Simulate {
     /// Communication step in s [default: the shortest of the FMUs, else a thousandth of the duration]
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: the outputs,
-    /// see --all]
+    /// Variables to record; * in a name stands for any text, ? for one character: '*' records all [default: the outputs]
     #[arg(long, value_name = "VARIABLE,...")]
     pub record: Vec<String>,
     /// Write the recording as CSV; - for standard output
@@ -105,8 +104,8 @@ pub struct Simulate {
     /// the headings of the others name variables, optionally with a unit: `time [ms]`, `speed [rpm]`. LABEL names its curves
     #[arg(long, value_name = "[LABEL=]FILE.csv")]
     pub overlay: Vec<String>,
-    /// Record, show and plot all outputs; without it, the recording omits large groups of outputs in which nothing changes
-    /// in this run
+    /// Show and plot all outputs; by default, the plot shows the main ones, and the terminal, of many outputs, those that
+    /// change
     #[arg(long, conflicts_with = "record")]
     pub all: bool,
     #[command(flatten)]
@@ -231,8 +230,11 @@ fn simulate(args: &Simulate, mut out: Box<dyn Write>) -> Result<()> {
 
 /// Why a run ended early, with advice.
 fn ending(error: &fmu_import::Error, last: Option<&f64>, step: f64) -> String {
-    let advice =
-        if error.is_discard() { format!("; a shorter step may go on: --step {}", 0.5 * step) } else { String::new() };
+    let advice = if error.is_discard() {
+        format!("; a shorter step may continue: --step {}", 0.5 * step)
+    } else {
+        String::new()
+    };
     format!("{error}; the results end at {} s{advice}", last.copied().unwrap_or_default())
 }
 

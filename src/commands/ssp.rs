@@ -67,7 +67,7 @@ pub fn run(args: &Ssp) -> Result<()> {
     let values = values(args)?;
     let dir = tempfile::tempdir()?;
     if values.is_empty() && args.names {
-        bail!("--names: there are no values to write: add --motor or --parameters");
+        bail!("--names has no values to write: add --motor or --parameters");
     }
     let fmi = args.fmi.as_deref().unwrap_or("2");
     let standard = format!("fmi{fmi}");
@@ -81,7 +81,7 @@ pub fn run(args: &Ssp) -> Result<()> {
         let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
         let out = Some(dir.path().into());
         build::run(&Build { fmus, fmi: Some(fmi.to_owned()), out, ..Build::default() })
-            .context("the FMUs of the drive cannot be built here; --fmus DIR takes those of a folder")?;
+            .context("the FMUs of the drive cannot be built here; --fmus DIR takes FMUs from a folder")?;
         dir.path().join(standard)
     };
     let options = Options { gates: args.gates, geometry: args.geometry, names: args.names };

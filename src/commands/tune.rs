@@ -69,7 +69,7 @@ pub struct Tune {
 
 /// The help of --estimator: the names of all.
 fn estimator_help() -> String {
-    format!("Estimator to tune for, instead of that of the motor file: {}", estimators())
+    format!("Estimator to tune for, instead of the motor file's: {}", estimators())
 }
 
 /// The motor file of --example.

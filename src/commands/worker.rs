@@ -121,7 +121,7 @@ fn guarded(name: &str, args: &ProcessOptions, threads: bool) -> Result<()> {
             match end {
                 End::Refused(_) => bail!("the process of the FMUs {}", end.describe()),
                 End::Stopped if INTERRUPTS.load(Ordering::Relaxed) > 1 => {
-                    Err(Failed("interrupted twice: nothing is written".into()).into())
+                    Err(Failed("interrupted twice: no file is written".into()).into())
                 }
                 End::Stopped => bail!("{last} did not return within {} s; --timeout changes the limit", args.timeout),
                 _ => bail!("{last} {}", end.describe()),

@@ -155,8 +155,14 @@ pub(super) fn text(package: &str, about: &str, interface: &Interface, machine: &
             &placement(around(-120.0, y, 12.0)),
         );
         let sink = head.replace("Input", "Output");
-        inside +=
-            &declare(&sink, &format!("{name}_internal"), &[], "", "The connector, or the constant without it", "");
+        inside += &declare(
+            &sink,
+            &format!("{name}_internal"),
+            &[],
+            "",
+            "The connector, or the constant if there is none",
+            "",
+        );
         let _ = writeln!(equations, "  connect({name}, {name}_internal);");
         let _ = writeln!(equations, "  if not use_{name} then\n    {name}_internal = {name}_constant;\n  end if;");
         let _ = writeln!(equations, "  fmu.{name} = {name}_internal;");

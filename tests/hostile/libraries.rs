@@ -65,7 +65,7 @@ fn simulate_says_what_happened() {
         // Descriptors closed while the archive is open end the process when the archive is closed.
         let named = how == "load close" && ended.errors.contains("x.fmu");
         assert!(named || ended.errors.contains(part), "{how}: {ended:?}");
-        assert!(!ended.out.contains("hello"), "the output is the command's alone: {ended:?}");
+        assert!(!ended.out.contains("hello"), "the output comes only from the command: {ended:?}");
         let error: Vec<_> = ended.errors.lines().filter(|l| l.starts_with("error: ")).collect();
         assert_eq!(error.len(), usize::from(*status == 2), "{how}: {ended:?}");
         if *status == 2 && !["close", "files"].contains(act) {

@@ -15,6 +15,7 @@ mod order;
 mod packed;
 
 use case::{Case, OURS, REFERENCE};
+use fmu_core::draw::Draw;
 use fmu_system::cosimulation::Method;
 use importer::{run, stepped, strict};
 use instance::Loaded;
@@ -159,7 +160,7 @@ fn the_orders_of_co_simulation() {
             assert_eq!(plain.rows, reference, "{}", case.fmu);
             assert!(plain.warnings.iter().all(|text| !text.contains("the importer")), "{:?}", plain.warnings);
             let set = stepped(&fmu, &case, (false, true));
-            assert_eq!(set.rows, reference, "{}: parameters set to what they are", case.fmu);
+            assert_eq!(set.rows, reference, "{}: parameters set to their present values", case.fmu);
             let warned = set.warnings.iter().filter(|text| text.contains("their values are unchanged")).count();
             assert_eq!(warned, 1, "{:?}", set.warnings);
             let later = stepped(&fmu, &case, (true, false)).rows;
@@ -182,11 +183,7 @@ fn no_enumeration_is_tunable() {
 
 /// Random orders: each habit and each of its calls occurs at random.
 fn random(calls: u64) {
-    let mut seed = std::env::var("FMU_SEED").map_or(1, |text| text.parse::<u64>().expect("a whole number"));
-    let mut next = move || {
-        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        seed >> 33
-    };
+    let mut draw = Draw(std::env::var("FMU_SEED").map_or(1, |text| text.parse().expect("a whole number")));
     let short: Vec<Case> = OURS.iter().map(|case| Case { points: case.points / 4, ..*case }).collect();
     let all: Vec<_> = (0..short.len()).flat_map(|i| [(i, 0), (i, 1)]).collect();
     let loaded: Vec<_> = all
@@ -200,7 +197,7 @@ fn random(calls: u64) {
     while made < calls {
         let which = runs % all.len();
         let ((i, standard), (fmu, reference)) = (all[which], &loaded[which]);
-        let mut flip = |n: u64| next() % n == 0;
+        let mut flip = |n| draw.below(n) == 0;
         let order = Order {
             name: "random",
             standards: [standard == 0, standard == 1],
@@ -217,10 +214,10 @@ fn random(calls: u64) {
             returns: flip(2),
             ..STRICT
         };
-        let (case, rarity) = (&short[i], 1 + next() % 4);
+        let (case, rarity) = (&short[i], 1 + draw.below(4));
         let outcome = run(fmu, case, order, &mut || {
             made += 1;
-            next() % rarity == 0
+            draw.below(rarity) == 0
         });
         let (deviation, output) = case.deviation(&outcome.rows, reference);
         assert!(

@@ -136,7 +136,7 @@ fn a_preset_is_in_the_description_and_in_every_instance() {
                 assert_ne!(files[&name], bytes, "the reference result is run anew");
             }
         }
-        assert!(!files.keys().any(|name| name.contains(".ssv")), "it holds what differs from other start values");
+        assert!(!files.keys().any(|name| name.contains(".ssv")), "it contains the differences from other start values");
         let page = String::from_utf8(files["documentation/index.html"].clone()).unwrap();
         for part in [
             "<li><a href=\"#preset\">Preset</a></li>",
@@ -267,7 +267,7 @@ fn without_its_preset_the_fmu_does_not_run() {
             }
             let out = dir.path().join("none.fmu");
             let said = preset(&broken, &out, &["motor.L_d=0.01"]).unwrap_err();
-            assert!(said.contains("is missing, or not that of modelDescription.xml") && !out.exists(), "{said}");
+            assert!(said.contains("is missing or does not match modelDescription.xml") && !out.exists(), "{said}");
         }
     }
 }

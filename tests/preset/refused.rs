@@ -59,7 +59,7 @@ fn files_that_are_no_fmus_of_this_program() {
     fs::write(&ssv, format!("<ParameterSet><Parameters>\n{values}</Parameters></ParameterSet>")).unwrap();
     let said = fmu(&["preset", text(&two), "--ssv", text(&ssv), "--out", text(&new)]).unwrap_err();
     assert!(
-        said.contains("values.ssv: line 2: motor.L_d is given in mH, but PmsmPlant has it in H: convert the value"),
+        said.contains("values.ssv: line 2: motor.L_d is given in mH, but PmsmPlant uses H: convert the value"),
         "{said}"
     );
     assert!(!new.exists() && contents(&two).is_ok());

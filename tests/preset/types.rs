@@ -121,7 +121,7 @@ fn wrong_names_and_values_are_told_and_nothing_is_written() {
         ("lable=x", "EveryType has no variable lable; did you mean label?"),
         ("time=1", "EveryType has no variable time"),
         ("weights[3,1]=1", "EveryType has no variable weights[3,1]"),
-        ("sums=1,2", "sums is an output: a preset has start values of inputs and parameters"),
+        ("sums=1,2", "sums is an output: a preset contains start values of inputs, parameters"),
         ("local.int8=1", "local.int8 is a local variable: a preset"),
         ("revision=r2", "revision is a local variable: a preset"),
         ("weights=1,2", "weights has 6 elements, not 2"),

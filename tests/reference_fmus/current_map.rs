@@ -41,7 +41,7 @@ fn its_terminal_is_a_map() {
     assert_eq!((domains.len(), codomains.len(), of("domainInput").len(), of("codomainOutput").len()), (2, 2, 2, 2));
     let sizes: Vec<_> = domains.iter().map(|v| v.dimensions[0]).collect();
     for codomain in &codomains {
-        assert_eq!(codomain.dimensions, sizes, "the i-th length is that of the i-th domain");
+        assert_eq!(codomain.dimensions, sizes, "the i-th length belongs to the i-th domain");
     }
     for size in sizes {
         let Dimension::Variable(reference) = size else { panic!("a fixed size") };

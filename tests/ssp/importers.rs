@@ -64,7 +64,7 @@ fn omsimulator_runs_it_as_it_is() {
         (
             "name=\"tau_load\" kind=\"input\"",
             "name=\"tau.load\" kind=\"input\"",
-            "ComRef.cpp: tau.load is no identifier",
+            "ComRef.cpp: tau.load is not an identifier",
         ),
         ("<ssc:Boolean/>", "", "Connector.cpp: voltage_limited has no type"),
         ("oms-ma", "oms-mav", "SystemWC.cpp: the master oms-mav"),
@@ -105,7 +105,7 @@ fn refusals(path: &str) -> Vec<String> {
         let connectors: Vec<&Element> = owner.child("ssd:Connectors").unwrap().children.iter().collect();
         let names = connectors.iter().map(|c| c.get("name").unwrap()).chain([owned]);
         for name in names.filter(|name| !is_identifier(name)) {
-            refuse("ComRef.cpp", format!("{name} is no identifier"));
+            refuse("ComRef.cpp", format!("{name} is not an identifier"));
         }
         for connector in connectors {
             let name = connector.get("name").unwrap();
@@ -115,7 +115,7 @@ fn refusals(path: &str) -> Vec<String> {
             }
         }
         for binding in owner.child("ssd:ParameterBindings").into_iter().flat_map(|all| &all.children) {
-            assert!(binding.attributes.iter().all(|(name, _)| name == "source"), "Values.cpp knows no prefix");
+            assert!(binding.attributes.iter().all(|(name, _)| name == "source"), "Values.cpp has no prefix");
             let values = Element::parse(&entry(path, binding.get("source").unwrap())).unwrap();
             for parameter in &values.child("ssv:Parameters").unwrap().children {
                 let port = format!("{owned}.{}", parameter.get("name").unwrap());

@@ -191,7 +191,7 @@ fn packed_fmus_are_enough_outside_a_checkout() {
     };
     let missing = "expected SensorlessController.fmu and PmsmPlant.fmu there or in its folder fmi2, as fmu build --out writes them";
     refused(&["ssp", "--fmus", ".", "--out", "none.ssp"], &["error: --fmus .: ", missing]);
-    refused(&["ssp", "--out", "none.ssp"], &["--fmus DIR takes those of a folder", "no Cargo package here"]);
+    refused(&["ssp", "--out", "none.ssp"], &["--fmus DIR takes FMUs from a folder", "no Cargo package here"]);
     refused(&["reproduce"], &["no Cargo package here"]);
     assert!(!dir.path().join("none.ssp").exists());
 }

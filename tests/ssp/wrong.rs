@@ -65,7 +65,7 @@ fn a_wrong_structure_is_told_with_file_line_and_remedy() {
     std::fs::write(&plain, "hello").unwrap();
     fails(&["simulate", plain.to_str().unwrap()], 2, &["plain.ssp: not a ZIP archive"]);
     let fmu = common::archives().join("fmi2/PmsmPlant.fmu").display().to_string();
-    fails(&["simulate", &ssp("fmi2.ssp"), &fmu], 2, &["fmi2.ssp: an SSP is simulated alone"]);
+    fails(&["simulate", &ssp("fmi2.ssp"), &fmu], 2, &["fmi2.ssp: an SSP file cannot be combined with other files"]);
     fails(
         &["simulate", &ssp("fmi2.ssp"), "--input", "speed_rev=1"],
         2,
@@ -87,7 +87,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     let out = out.to_str().unwrap();
     for (old, new, status, part) in [
         ("motor.R_s", "motor.R", 2, "PmsmPlant has no variable motor.R: correct the name, or remove the parameter"),
-        ("value=\"3.6\"", "value=\"3.6\" unit=\"mOhm\"", 2, "motor.R_s is given in mOhm, but PmsmPlant has it in Ohm"),
+        ("value=\"3.6\"", "value=\"3.6\" unit=\"mOhm\"", 2, "motor.R_s is given in mOhm, but PmsmPlant uses Ohm"),
         ("value=\"3.6\"", "value=\"much\"", 2, "motor.R_s = much"),
         ("value=\"3.6\"", "value=\"-1\"", 1, "motor.R_s = -1 is not allowed"),
     ] {

@@ -102,7 +102,7 @@ impl Drive {
         let block = &mut self.bench.pair.controller;
         let (_, slot) = index
             .and_then(|i| table.entry(block, i))
-            .ok_or_else(|| Error::new(format!("--set {name}: has no place")))?;
+            .ok_or_else(|| Error::new(format!("--set {name}: does not accept --set")))?;
         match (slot, &variable.kind) {
             (Slot::Real(x), _) => {
                 let range = variable.range();

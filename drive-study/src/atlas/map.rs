@@ -27,7 +27,7 @@ const LEGEND: [(&str, bool, &str); 4] = [
     ("h", false, "held"),
     ("l", false, "lost, and lock_lost reports it: it is 1 or more within 1 s"),
     ("l", true, "white dot: lost, and lock_lost does not report it within 1 s"),
-    ("h", true, "red dot: held, and lock_lost is 1 or more all the same, a false alarm"),
+    ("h", true, "red dot: held although lock_lost is 1 or more (false alarm)"),
 ];
 /// Height of a line of the legend, and width of its longest.
 const LINE: f64 = 18.0;

@@ -170,14 +170,14 @@ fn definitions(atlases: &[Atlas]) -> Vec<&'static str> {
     let mut all = Vec::new();
     if has(Approach::Rest) {
         all.push(
-            "Flux observers come from rest: speed as a step at 0.2 s, load as a step at 1 s (scenario speed: load at 0.5 s, \
+            "Flux observers start from rest: speed as a step at 0.2 s, load as a step at 1 s (scenario speed: load at 0.5 s, \
              speed at 1.5 s). Lost: the speed is off by more than 1/600 of the rated speed + 5 % of the reference at any time \
              in the last 2 of 6 s.",
         );
     }
     if has(Approach::Turning) {
         all.push(
-            "The others come from 0.2 of the rated speed by a ramp 0.2..1 s; the load comes by a ramp 1.5..1.8 s (scenario \
+            "The others start from 0.2 of the rated speed with a ramp 0.2..1 s; the load is a ramp 1.5..1.8 s (scenario \
              speed: load 0.2..0.5 s, ramp 1..1.8 s). Lost: the speed is off by more than 0.02 of the rated speed, or the angle \
              by more than 30 deg, at any time in the last 2 of 6 s.",
         );
@@ -216,8 +216,9 @@ pub fn page(atlases: &[Atlas]) -> String {
         let (name, machine) = (escape(&drive.name), escape(&drive.machine));
         let _ = write!(
             html,
-            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not report it within 1 s. A \
-             red dot on a held cell: a false alarm. Speed n and load are shares of the rated values.</p>\n<div class=\"scroll\" tabindex=\"0\">{}</div>\n",
+            "<h2>{swatch}{name} ({machine})</h2>\n<p>Red: lost. A white dot: lost, and lock_lost does not report it within \
+            1 s. A red dot on a held cell marks a false alarm. Speed n and load are shares of the rated values.</p>\n<div \
+            class=\"scroll\" tabindex=\"0\">{}</div>\n",
             map::svg(atlas)
         );
     }

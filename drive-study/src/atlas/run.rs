@@ -79,7 +79,7 @@ impl Loss {
             Self::Slips => "the rotor slips against the estimate",
             Self::Creeps => "rotor and estimate turn together, not at the reference",
             Self::Swings => "the speed swings about the reference",
-            Self::Angle => "the speed holds, the angle is off",
+            Self::Angle => "the speed is right, the angle is wrong",
             Self::Failed => "a step failed",
         }
     }

@@ -129,7 +129,7 @@ impl Candidate {
     /// Why the scenarios at `speed` (pu) leave the estimator out.
     pub fn no_speed(&self, speed: f64) -> Option<&'static str> {
         (self.class == Class::Injection && speed > 0.2)
-            .then_some("injection above 0.2 pu is limited by the voltage: Hybrid goes on from there")
+            .then_some("injection above 0.2 pu is limited by the voltage: Hybrid covers the speeds above")
     }
 
     /// The candidate of an estimator without a variant.

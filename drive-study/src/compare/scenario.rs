@@ -63,7 +63,7 @@ pub static SCENARIOS: &[Scenario] = &[
         "reversal",
         START,
         "0.5 to -0.5 pu in 0.5 s with 0.3 pu of load (injection 0.1 to -0.1; Hybrid 0, 0.95, -0.95, 0 with 0.8): at light \
-         load those that take the sign of the EMF for that of the speed lose the rotor, as the review says",
+         load those that derive the sign of the speed from the EMF lose the rotor, as the review says",
         |s, _| running::reversal(s),
     ),
     row("load-0", LOAD, "100 % load step at standstill", |s, _| running::load_step(s, 0.0, 1.0)),
@@ -105,7 +105,7 @@ pub static SCENARIOS: &[Scenario] = &[
     row(
         "bandwidth-fast",
         BANDWIDTH,
-        "with the speed loop for which the review quotes one, without noise",
+        "with the speed loop for which the review gives one, without noise",
         running::bandwidth_fast,
     ),
     row("signal", SIGNAL, "at standstill, without load and noise", |s, _| signal::cost(s)),

@@ -41,7 +41,7 @@ pub fn run(folder: &Path, out: &Path) -> Result<(String, bool)> {
         out.write(&format!("{}.csv", experiment.id), &report::csv(record))?;
     }
     let [start, step_20, step_500, step_1000, step_1500, load_0, load_1000] = &fmi3[..] else {
-        unreachable!("as many records as experiments")
+        unreachable!("one record per experiment")
     };
     let plots = [
         ("figure-4.svg", plots::figure_4(start, [step_20, step_500, step_1000, step_1500])),

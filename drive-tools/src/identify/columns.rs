@@ -154,7 +154,7 @@ impl Signals {
         let mut columns: Vec<(&'static str, Vec<f64>)> = Vec::new();
         for (place, header) in table.names().iter().enumerate() {
             let Some((name, kind)) = naming.column(header) else { continue };
-            ensure!(columns.iter().all(|(n, _)| *n != name), "{file}: two columns hold {name}: remove one");
+            ensure!(columns.iter().all(|(n, _)| *n != name), "{file}: two columns contain {name}: remove one");
             let given = naming.units.iter().find(|(n, _)| n == name).map(|(_, unit)| unit.as_str());
             let size = match given.or(split(header).1) {
                 None => 1.0,
@@ -225,7 +225,7 @@ mod tests {
                 None,
                 "r.csv: i_a [kg]: the unit is not known; i_a has one of A, or one with a prefix",
             ),
-            ("t,i_a,i_a\n0,1,1\n", None, "r.csv: two columns hold i_a"),
+            ("t,i_a,i_a\n0,1,1\n", None, "r.csv: two columns contain i_a"),
             ("t,x\n0,1\n", Some(("i_a", "y")), "r.csv: --map i_a=y: the record has no column y"),
             ("t,x\n0,1\n", Some(("amps", "x")), "--map amps: a record has no such column: use one of t, u_a,"),
         ] {

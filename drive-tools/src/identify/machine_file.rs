@@ -26,9 +26,7 @@ pub struct Content<'a> {
 pub fn text(found: &Identified, name: &str, source: &str) -> String {
     let mut remarks = vec![];
     if let Some(values) = found.fit.saturation() {
-        remarks.push(
-            "[saturation]  # as the fit has it, without intervals; L_d and L_q are those of no current".to_owned(),
-        );
+        remarks.push("[saturation] # as fitted, without intervals; L_d and L_q apply at zero current".to_owned());
         let line = |(name, value): (&&str, f64)| format!("{name} = {}", number(value));
         remarks.extend(["s_2", "s_3", "s_dq"].iter().zip(values).map(line));
     }
@@ -56,7 +54,7 @@ impl Content<'_> {
         line(format_args!("\n[rating]"));
         let mut rating = |name: &str, unit: &str, (x, given): (f64, bool)| {
             if x > 0.0 {
-                let origin = if given { "given" } else { "the greatest of the record" };
+                let origin = if given { "given" } else { "the maximum in the record" };
                 line(format_args!("{name} = {}  # {unit}: {origin}", number(x)));
             } else {
                 line(format_args!("# {name} = ...  # {unit}: {} does not tell it; give --{name}", self.from));

@@ -115,8 +115,8 @@ impl Identified {
 }
 
 /// What no interval contains.
-const SCALE: &str = "values scale with the sensors: 1 % more current makes R_s, L_d and L_q 1 % less and J and friction 1 % more; \
-    1 % more voltage makes all of them and psi_M 1 % more";
+const SCALE: &str = "values scale with the sensors: 1 % more current lowers R_s, L_d and L_q by 1 % and raises J and friction by 1 %; \
+    1 % more voltage raises all of them and psi_M by 1 %";
 
 /// Delays that are tried.
 const DELAYS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];

@@ -112,8 +112,8 @@ fn figures(found: &Identified) -> [(Figure, &'static str); 4] {
     [
         (
             voltages(found),
-            "Means over a window of some samples, in rotor axes. Below, what the fit leaves: it should look like noise. A pattern that \
-             repeats with the course of the record is what the model leaves out.",
+            "Means over a window of some samples, in rotor axes. Below, the residual of the fit, which should look like \
+            noise. A pattern that follows the course of the record indicates an effect missing in the model.",
         ),
         (
             fluxes(found),
@@ -126,7 +126,7 @@ fn figures(found: &Identified) -> [(Figure, &'static str); 4] {
         ),
         (
             friction(found),
-            "What the torque leaves beside the acceleration, averaged over like speeds: a run-down. The line is tau_coulomb + B w.",
+            "Torque that does not accelerate, averaged over similar speeds: a run-down. The line is tau_coulomb + B w.",
         ),
     ]
 }

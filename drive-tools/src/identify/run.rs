@@ -96,7 +96,7 @@ pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commiss
         let mut places = table.names().iter().enumerate().filter(|(_, header)| bare(header) == name);
         let first = places.next();
         if let (Some((_, one)), Some((_, other))) = (first, places.next()) {
-            bail!("{file}: two columns hold {name}: {one} and {other}; record one of them");
+            bail!("{file}: two columns contain {name}: {one} and {other}; record one of them");
         }
         Ok(first.map(|(place, _)| place))
     };
@@ -172,7 +172,7 @@ pub fn commissioned(text: &str, file: &str, options: &Options) -> Result<Commiss
         n_p,
         notes: vec![
             SCALE.into(),
-            "R_s has the mean of the resistances of a transistor and a diode in it, and is that of the temperature of the run".into(),
+            "R_s includes the mean resistance of a transistor and a diode, at the temperature of the run".into(),
         ],
         seen: (values("time")?.with_context(|| format!("{file}: has no column time"))?.collect(), seen),
     })

@@ -135,7 +135,7 @@ pub(super) fn better(record: &BenchRecord, motion: &Motion, timing: Timing, i_ma
     let best = tries.into_iter().filter_map(|(what, f)| Some((what, f.filter(sound)?)));
     match best.min_by(|(_, a), (_, b)| a.rest.total_cmp(&b.rest)) {
         Some((what, _)) => format!("the model does not fit; it fits with {what}: correct the columns"),
-        None => "the model does not fit, with other phases, signs and delays neither: check columns, units and timing"
+        None => "the model does not fit, not even with other phases, signs and delays: check columns, units and timing"
             .into(),
     }
 }
@@ -166,7 +166,7 @@ pub(super) fn values(
     let rest = facts.standing.then(|| "the rotor stood still: record a turning rotor".to_owned());
     let one_speed =
         (facts.levels < 2 && !facts.standing).then(|| "the speed was constant: record two speeds".to_owned());
-    let two_speeds = (facts.levels < 3).then(|| "the record has too few speeds: record three".to_owned());
+    let two_speeds = (facts.levels < 3).then(|| "the record contains too few speeds: record three".to_owned());
     let load = facts.unloaded.then(|| "the load is unknown: add tau_load or tau_shaft, or give --load none".to_owned());
     let [R, L_d, L_q, psi_M, ..] = fit.p;
     let (m, half) = mechanics.map_or(([f64::NAN; 3], [f64::NAN; 3]), |m| (m.p, m.half));

@@ -72,7 +72,7 @@ pub fn of(map: &Map, cycle: &Cycle, asked: bool) -> Report {
                 energy.push(std::iter::once(title).chain(values).chain([error]).collect());
             }
             Err([speed, tau]) if asked => notes.push(format!(
-                "{title}: the drive cannot follow the driving cycle, which asks for {tau:.2} N.m at {:.0} rpm",
+                "{title}: the drive cannot follow the driving cycle, which requires {tau:.2} N.m at {:.0} rpm",
                 speed * RPM
             )),
             // The example's vehicle is not this drive's.

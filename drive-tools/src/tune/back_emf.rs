@@ -50,7 +50,7 @@ pub fn narrow(data: &Data, bandwidths: &Bandwidths, notes: &mut Vec<String>) {
     let least = 0.1 * data.machine.R_s.get_ref() * i / (rated(data) * data.machine.psi_M.get_ref());
     if least > LEVELS[0] {
         notes.push(format!(
-            "a winding of -30 degC has less than R^ = 0.9 R_s: below (R^ - R) i / (n_p psi_M) = {least:.2} pu, the rated torque turns the \
+            "a winding at -30 degC has less resistance than R^ = 0.9 R_s: below (R^ - R) i / (n_p psi_M) = {least:.2} pu, the rated torque turns the \
              estimate by half a turn"
         ));
     }
@@ -107,7 +107,7 @@ pub fn voltage_feedback(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
         set(
             "current.reference_feed_forward",
             Value::Boolean(true),
-            "the angle error appears at the integrators alone (31)",
+            "the angle error acts only on the integrators (31)",
         ),
         real("current.integral", 0.2, "K_i = 0.2 w_c^2 L"),
     ];

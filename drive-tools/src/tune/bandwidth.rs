@@ -81,7 +81,7 @@ impl Bandwidths {
         let needed = DIP_OF_A_STEP * acceleration(data) / (DIP * data.rating.speed.get_ref());
         let wanted = needed.max(if flux { 40.0 } else { TAU * 5.0 });
         let tracker = || {
-            Chosen::new(given.observer.as_ref(), "follows the greatest torque, at least 2 pi 20 rad/s", || {
+            Chosen::new(given.observer.as_ref(), "follows the maximum torque, at least 2 pi 20 rad/s", || {
                 let least = 1.1 * (n_p * GREATEST_TORQUE * acceleration(data) / 0.35).sqrt();
                 // With w_s = rho / 3, this bounds the gain.
                 let calm = if emf { (3.0 * CALM / gain_per_bandwidth(data, 1.0)).cbrt() } else { f64::INFINITY };
@@ -96,7 +96,7 @@ impl Bandwidths {
             PERIODS.into_iter().find(|T_s| TAU / (fastest * T_s) >= SAMPLES).unwrap_or(PERIODS[3])
         });
         let observer = tracker.unwrap_or_else(|| {
-            Chosen::new(given.observer.as_ref(), "follows the greatest acceleration, at least 300 rad/s", || {
+            Chosen::new(given.observer.as_ref(), "follows the maximum acceleration, at least 300 rad/s", || {
                 (1.05 * least_observer(data)).max(300.0).max((3.0 * wanted).min(600.0 * PERIODS[0] / T_s.value))
             })
         });
@@ -113,7 +113,7 @@ impl Bandwidths {
         let most = if sensored { current.value / CURRENT_PER_SPEED } else { observer.value / 3.0 };
         let chosen = wanted.min(most).min(calm);
         let why = if chosen < wanted.min(most) {
-            "what the gain through the change of i_q allows"
+            "limited by the gain through the change of i_q"
         } else if chosen < wanted {
             if sensored { "a fifth of the current loop" } else { "a third of the observer" }
         } else if chosen > needed {

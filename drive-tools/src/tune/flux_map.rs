@@ -49,7 +49,7 @@ pub fn fit(motor: &MotorFile) -> Result<Option<Fitted>> {
     if let Some(saturation) = &motor.data.saturation {
         let first = [&saturation.s_2, &saturation.s_3, &saturation.s_dq].into_iter().flatten().next();
         let place = first.map_or_else(|| place.clone(), |x| motor.place(x));
-        bail!("{place}: [saturation] besides [flux_map], which has the saturation: remove one of them");
+        bail!("{place}: [saturation] and [flux_map] both define saturation: remove one of them");
     }
     let table = Columns::read(&motor.beside(given.file.get_ref())).with_context(|| place.clone())?;
     let (points, torques) = read(&table, given, motor)?;
@@ -69,7 +69,7 @@ pub fn fit(motor: &MotorFile) -> Result<Option<Fitted>> {
     let found = psi_M + moved;
     (map.d_min, map.d_max) = (map.d_min - moved, map.d_max - moved);
     judge_magnet(found, motor)?;
-    let mut notes = vec![errors.tell(&points)];
+    let mut notes = vec![errors.text(&points)];
     notes.extend(reciprocal);
     notes.extend(torque(&points, &torques, motor, table.file())?);
     notes.extend(coverage(&points, motor));

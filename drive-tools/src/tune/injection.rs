@@ -67,8 +67,9 @@ impl View {
         let saliency = (machine.L_q - machine.L_d).abs() / (machine.L_q + machine.L_d);
         if saliency < LEAST_SALIENCY {
             bail!(
-                "{}: |L_q - L_d| / (L_q + L_d) = {saliency:.3} with L_d = {} H and L_q = {} H: a method that injects needs {LEAST_SALIENCY} \
-                 or more, because it finds the rotor by the saliency; choose a method that needs none, such as Rasmussen or ExtendedEmf",
+                "{}: |L_q - L_d| / (L_q + L_d) = {saliency:.3} with L_d = {} H and L_q = {} H: injection needs \
+                {LEAST_SALIENCY} or more, because it locates the rotor by the saliency; choose a method that needs none, \
+                such as Rasmussen or ExtendedEmf",
                 motor.place(&data.machine.L_q),
                 machine.L_d,
                 machine.L_q
@@ -168,7 +169,7 @@ pub fn settings(
 
 /// The tracker with the torque: the angle shows up to 45 deg only, which a load step exceeds without it.
 fn observed() -> Setting {
-    set("tracker.kind", Value::Item("MechanicalObserver".into()), "knows the torque: the saliency shows 45 deg at most")
+    set("tracker.kind", Value::Item("MechanicalObserver".into()), "uses the torque: the saliency shows at most 45 deg")
 }
 
 fn reached(motor: &MotorFile, view: &View, V: f64) -> Result<f64> {

@@ -31,7 +31,7 @@ pub fn fit(motor: &MotorFile) -> Result<Vec<Setting>> {
     let fastest = points.iter().fold(0.0_f64, |most, [speed, _]| most.max(*speed));
     if fastest <= 1.05 * slowest {
         bail!(
-            "{place}: eddy currents and hysteresis differ by their dependence on speed: give pairs at two speeds at least, best 1 to 3"
+            "{place}: eddy currents and hysteresis differ by their dependence on speed: give pairs for at least two speeds, preferably in the ratio 1 to 3"
         );
     }
     let w_0 = Iron::default().w_0;
@@ -89,8 +89,8 @@ mod tests {
     #[test]
     fn points_that_say_nothing_are_refused() {
         for (points, message) in [
-            ("[[100.0, 5.0]]", "give pairs at two speeds at least"),
-            ("[[100.0, 5.0], [100.0, 5.1]]", "give pairs at two speeds at least"),
+            ("[[100.0, 5.0]]", "give pairs for at least two speeds"),
+            ("[[100.0, 5.0], [100.0, 5.1]]", "give pairs for at least two speeds"),
             ("[[100.0, -5.0], [200.0, 9.0]]", "[100, -5] must be a speed in rad/s greater than 0"),
             ("[[0.0, 0.0], [200.0, 9.0]]", "[0, 0] must be"),
         ] {

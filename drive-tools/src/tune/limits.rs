@@ -109,7 +109,7 @@ pub fn under_load(tuned: &Tuned, level: f64, (started, angles): (u32, u32)) -> O
     };
     Some(format!(
         "under the rated torque from rest, the drive gets to {} pu from {started} of {angles} angles: {why}; let the load act \
-         once the estimator leads, or hold the rotor with a brake until then",
+         once start_state is Running, or hold the rotor with a brake until then",
         rounded(level, 3)
     ))
 }
@@ -161,8 +161,8 @@ fn of_start(data: &Data, par: &ControllerParameters, trial: &Trial) -> String {
         let i_0 = par.zero_speed.i_0;
         let beside = par.limit.i_q_beside(i_0).atan2(i_0).to_degrees();
         return format!(
-            "{from}the speed loop is faster than the rotor, and the estimate stays near atan(i_q / i_0) = {beside:.0} deg beside \
-             it, where the currents give no torque"
+            "{from}the speed loop is faster than the rotor, and the estimate stays near atan(i_q / i_0) = {beside:.0} deg \
+            away from it, where the currents produce no torque"
         );
     }
     let gain = gain_per_bandwidth(data, par.estimators.tracker.bandwidth) * par.speed_loop.bandwidth;

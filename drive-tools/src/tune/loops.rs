@@ -10,6 +10,9 @@ use super::setting::{Setting, Value, real, set};
 use drive::control::limits::Limits;
 use drive::control::reference::max_torque;
 
+/// Duration of a start (s) above which a note gives it.
+const LONG: f64 = 2.0;
+
 /// The loops; `active`: with active resistance.
 pub fn settings(data: &Data, active: bool) -> Vec<Setting> {
     let mut all = vec![
@@ -52,8 +55,24 @@ pub fn start(data: &Data, (speed, rule): (f64, &str), notes: &mut Vec<String>) -
             k * stable
         ));
     }
+    if stable >= wanted && wanted < 1.2 * torque / k {
+        notes.push(format!(
+            "the maximum current gives {:.2} N.m in the I-f start, {:.2} of the rated torque",
+            k * wanted,
+            k * wanted / torque
+        ));
+    }
     // Of the swing on the current vector, in 1/s.
     let decay = 0.5 * swing(data, lead) * (1.0 - saliency * lead / data.machine.psi_M.get_ref());
+    let (align, settle) = ((3.0 / decay).max(0.25), (4.0 / decay).max(0.2));
+    let acceleration = 0.3 * k * lead / data.mechanics.J.get_ref();
+    let duration = 2.0 * align + speed / acceleration + settle;
+    if duration > LONG {
+        notes.push(format!(
+            "the I-f start takes {duration:.1} s: the swing of the rotor on the current vector has a time constant of {:.2} s",
+            1.0 / decay
+        ));
+    }
     vec![
         set("start.mode", Value::Item("CurrentFrequency".into()), "no EMF at standstill"),
         real(
@@ -62,16 +81,8 @@ pub fn start(data: &Data, (speed, rule): (f64, &str), notes: &mut Vec<String>) -
             "1.4 times the rated torque / K, at most the maximum current and psi_M / (2 |L_q - L_d|)",
         ),
         real("start.speed", speed, rule),
-        real("start.acceleration", 0.3 * k * lead / data.mechanics.J.get_ref(), "0.3 of the start's torque"),
-        real(
-            "start.t_align",
-            (3.0 / decay).max(0.25),
-            "the rotor settles on the current vector: 3 time constants, at least 0.25 s",
-        ),
-        real(
-            "start.settle",
-            (4.0 / decay).max(0.2),
-            "its swing has died at the hand-over: 4 time constants, at least 0.2 s",
-        ),
+        real("start.acceleration", acceleration, "0.3 of the start's torque"),
+        real("start.t_align", align, "the rotor settles on the current vector: 3 time constants, at least 0.25 s"),
+        real("start.settle", settle, "its swing has decayed at the hand-over: 4 time constants, at least 0.2 s"),
     ]
 }

@@ -39,7 +39,10 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
     all.extend(zero("inverter.i_zero", motor));
     for (key, x) in [("i_sw", i_sw), ("u_sw", u_sw)] {
         if let (Some(energy), None) = (E_sw, x) {
-            bail!("{}: inverter.E_sw needs inverter.{key}: give the one at which it was measured", motor.place(energy));
+            bail!(
+                "{}: inverter.E_sw needs inverter.{key}: give the value at which it was measured",
+                motor.place(energy)
+            );
         }
     }
     let period = match f_sw {

@@ -78,8 +78,8 @@ pub fn weaken(
             let needed = max_torque_per_ampere(&machine, *rating.torque.get_ref()).magnitude();
             if needed > most {
                 bail!(
-                    "{}: VoltageModel divides by psi_M + L_d i_d: with field weakening, limit.i may be 0.7 psi_M / L_d = {most:.2} A at \
-                     most, and rating.torque takes {needed:.2} A: choose CurrentModel or another estimator",
+                    "{}: VoltageModel divides by psi_M + L_d i_d: with field weakening, limit.i may be at most 0.7 psi_M / \
+                    L_d = {most:.2} A, and rating.torque needs {needed:.2} A: choose CurrentModel or another estimator",
                     motor.place(&rating.torque)
                 );
             }

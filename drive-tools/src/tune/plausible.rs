@@ -72,8 +72,8 @@ fn checks(data: &Data) -> Vec<Check<'_>> {
     let (R_s, highest) = (of(&machine.R_s), u_dc / 3.0_f64.sqrt());
     let of_current = if i * R_s > highest {
         format!(
-            "rating.current = {i} A takes {} V of R_s, and a phase has u_dc / sqrt(3) = {} V at most: lower rating.current, a peak \
-             value, below {} A, or correct R_s, which is that of one phase",
+            "rating.current = {i} A drops {} V across R_s, and a phase has at most u_dc / sqrt(3) = {} V: lower rating.current, a peak \
+             value, below {} A, or correct R_s, the resistance of one phase",
             rounded(i * R_s, 4),
             rounded(highest, 4),
             rounded(0.6 * u_dc / R_s, 4)
@@ -151,7 +151,9 @@ mod tests {
         assert!(flux.contains("60 / (2 pi sqrt(3) n_p KV) with n_p = 3") && !flux.contains("would fit"), "{flux}");
         assert!(flux.contains("psi_M is 0.6616 Wb"), "{flux}");
         let current = refused("R_s = 3.6", "R_s = 22.0");
-        for part in ["rating.current = 15 A takes 330 V of R_s", "u_dc / sqrt(3) = 311.8 V at most", "below 14.73 A"] {
+        for part in
+            ["rating.current = 15 A drops 330 V across R_s", "at most u_dc / sqrt(3) = 311.8 V", "below 14.73 A"]
+        {
             assert!(current.contains(part) && !current.contains("would fit"), "{current}");
         }
     }

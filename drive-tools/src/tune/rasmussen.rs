@@ -82,8 +82,8 @@ pub fn settings(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<Stri
     if i_0 > limit {
         let place = motor.place(&rating.current);
         bail!(
-            "{place}: rating.current = {limit} A, the maximum current, is less than the {i_0:.2} A that hold rating.torque at \
-             standstill (1.35 torque / K, K = 1.5 n_p psi_M = {:.4} N.m/A): raise it, or lower the torque",
+            "{place}: rating.current = {limit} A, the maximum current, is less than the {i_0:.2} A needed to hold \
+            rating.torque at standstill (1.35 torque / K, K = 1.5 n_p psi_M = {:.4} N.m/A): raise it, or lower the torque",
             torque_constant(data)
         );
     }
@@ -92,7 +92,7 @@ pub fn settings(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<Stri
     if w_n < least {
         let place = motor.place_at(bandwidths.observer.origin.unwrap_or_default());
         bail!(
-            "{place}: bandwidth.observer = {w_n} rad/s cannot follow the greatest acceleration: at least {least:.0} rad/s, or a lower rating.current"
+            "{place}: bandwidth.observer = {w_n} rad/s cannot follow the maximum acceleration: choose at least {least:.0} rad/s, or a lower rating.current"
         );
     }
     if !(150.0..=800.0).contains(&w_n) {
@@ -104,7 +104,7 @@ pub fn settings(motor: &MotorFile, bandwidths: &Bandwidths, notes: &mut Vec<Stri
     }
     let c_1 = (4.0 * resistance_margin(data) * machine.R_s.get_ref() * i_0 / machine.psi_M.get_ref()).max(50.0);
     if c_1 > 200.0 {
-        notes.push(format!("c_1 psi_M >= 4 |R - R^| i_0 asks for c_1 = {c_1:.0} 1/s; up to 200 were tried"));
+        notes.push(format!("c_1 psi_M >= 4 |R - R^| i_0 requires c_1 = {c_1:.0} 1/s; values up to 200 were tried"));
     }
     let c_1 = c_1.min(200.0);
     Ok(vec![

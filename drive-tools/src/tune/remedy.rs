@@ -60,7 +60,7 @@ pub enum Cure {
 impl fmt::Display for Cure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Rise(time) => write!(f, "let the load rise in {time} s or more"),
+            Self::Rise(time) => write!(f, "let the load rise over at least {time} s"),
             Self::Torque(torque) => write!(f, "keep steps of the load below {torque} N.m"),
             Self::Bandwidths { speed, observer } => {
                 write!(f, "set bandwidth.speed to {speed} rad/s and bandwidth.observer to {observer} rad/s")
@@ -70,7 +70,7 @@ impl fmt::Display for Cure {
             }
             Self::Inertia { J, .. } => write!(f, "lower mechanics.J to {J:.2e} kg.m2"),
             Self::Ramp(rate) => {
-                write!(f, "let speed_ref change by at most {rate} rad/s2 (speed_loop.ramp of the controller)")
+                write!(f, "limit the change of speed_ref to {rate} rad/s2 (speed_loop.ramp of the controller)")
             }
             Self::Sensor => f.write_str("use a sensor (estimator Sensored)"),
         }

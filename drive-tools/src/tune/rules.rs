@@ -158,7 +158,7 @@ fn estimator(motor: &MotorFile) -> Result<Kind> {
     let known = Kind::ALL.iter().copied().find(|kind| kind.name() == given.get_ref());
     known.ok_or_else(|| {
         let (place, name) = (motor.place(given), given.get_ref());
-        Error::new(format!("{place}: {name} is not an estimator: choose one of {}, or leave it out", estimators()))
+        Error::new(format!("{place}: unknown estimator {name}: choose one of {}, or omit it", estimators()))
     })
 }
 
@@ -309,7 +309,7 @@ fn cap_current_loop(
         let (asked, given) = (wanted / TAU, most / TAU);
         notes.push(format!(
             "current.bandwidth is {given:.0} Hz, not the {asked:.0} Hz of bandwidth.current: at {i:.1} A the incremental \
-             inductance falls to {:.1} mH, and the loop would oscillate in the start, where the frame is not at the rotor yet",
+             inductance falls to {:.1} mH, and the loop would oscillate during the start, while the frame is not yet aligned with the rotor",
             1e3 * least
         ));
         for setting in controller.iter_mut().filter(|s| s.name == "current.bandwidth") {

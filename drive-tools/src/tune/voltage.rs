@@ -40,8 +40,7 @@ pub fn of(motor: &MotorFile, mtpa: bool, k_u: f64, notes: &mut Vec<String>) -> R
     let least = currents(torque).magnitude();
     if least > current {
         bail!(
-            "{}: rating.current = {current} A, the maximum current, is less than the {least:.2} A that rating.torque takes: \
-             raise it, or lower the torque",
+            "{}: rating.current = {current} A, the maximum current, is less than the {least:.2} A needed for rating.torque: raise it, or lower the torque",
             motor.place(&rating.current)
         );
     }

@@ -212,7 +212,7 @@ fn held_or_said() {
     assert!(100 * all.off_and_silent <= all.on_sensor.0, "{} cells are off without a word", all.off_and_silent);
     #[expect(clippy::cast_precision_loss, reason = "thousands")]
     let share = all.on_sensor.1 as f64 / all.on_sensor.0 as f64;
-    assert!(share >= 0.95, "held {share:.3} of what a sensor holds");
+    assert!(share >= 0.95, "held {share:.3} of the cells held with a sensor");
 }
 
 /// A few cells that stay cheap enough for every run of the tests.

@@ -89,7 +89,7 @@ fn bad_files_are_named_by_place() {
         (good.replace("t [s]", "x"), "r.csv: has no column t; add it, name it with --map t=..., or give --rate in Hz"),
         (good.replace("u_dc", "u_dc [mV]"), "r.csv:5"),
         (good.replace("u_dc", "u_dc [kg]"), "r.csv: u_dc [kg]: the unit is not known; u_dc has one of V"),
-        (good.replace("u_beta", "u_alpha"), "r.csv: two columns hold u_alpha: remove one"),
+        (good.replace("u_beta", "u_alpha"), "r.csv: two columns contain u_alpha: remove one"),
         (duties, "r.csv:5"),
         (degrees, "r.csv:1513:theta: jumps by -359.2884 rad, more than a turn, between two rows"),
         (milli, "r.csv:5"),

@@ -150,7 +150,7 @@ pub(crate) mod tests {
             }
             let [still, fast] = [0.0, 1e4]
                 .map(|speed| gains.currents(&par, &gains.law(&par, par.zero_speed.i_0, speed), tau / gains.k));
-            assert!((still.d() - 4.0).abs() < 1e-12, "at rest the law alone: {still:?}");
+            assert!((still.d() - 4.0).abs() < 1e-12, "at rest only the law acts: {still:?}");
             let mtpa = max_torque_per_ampere(&par.motor, tau);
             assert!((fast - mtpa).magnitude() < 1e-6, "at speed: {fast:?}, not {mtpa:?}");
         }

@@ -202,6 +202,7 @@ impl SensorlessController {
             enabled: true,
             sensor_lost: state.sensor_lost,
             R_s_est,
+            start_state: state.leader.start_state(),
             ..ControllerOutputs::default()
         };
     }
@@ -285,7 +286,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 18;
+    const STATE_VERSION: u16 = 19;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -423,6 +424,7 @@ impl Warns for SensorlessController {
             R_s_est: out.R_s_est,
             commission_state: out.commission_state,
             commission_fault: out.commission_fault,
+            start_state: out.start_state,
             ..ControllerOutputs::default()
         };
         if *out == restarted {
@@ -495,28 +497,4 @@ pub(crate) const ROWS: &[V] = rows![
 ];
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The mean reading of the sensors without current is subtracted from later readings, provided that no current flows in a
-    /// short circuit.
-    #[test]
-    fn a_calibrated_sensor_has_no_offset() {
-        for asc in [false, true] {
-            let mut controller = SensorlessController::default();
-            let par = &mut controller.parameters;
-            par.compensation.calibrate = true;
-            par.sensor.offset = Phases { a: 0.3, b: -0.2, c: 0.05 };
-            controller.derive();
-            controller.initialize();
-            (controller.inputs.enable, controller.inputs.asc) = (false, asc);
-            (0..500).for_each(|_| controller.compute());
-            controller.inputs.i = Phases { a: 2.0, b: -3.0, c: 1.0 };
-            let Phases { a, b, c } = controller.currents();
-            let expected = if asc { [2.3, -3.2, 1.05] } else { [2.0, -3.0, 1.0] };
-            for (i, expected) in [a, b, c].into_iter().zip(expected) {
-                assert!((i - expected).abs() < 1e-12, "{i} A, not {expected} A, asc {asc}");
-            }
-        }
-    }
-}
+mod tests;

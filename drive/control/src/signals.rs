@@ -1,6 +1,7 @@
 //! Inputs and outputs of the controller.
 
 use crate::commission::{CommissionFault, CommissionState};
+use crate::start::StartState;
 use crate::trip::Cause;
 use drive_base::connection::{Commanded, Measured};
 use drive_base::frame::{DqHat, Phases};
@@ -106,6 +107,8 @@ pub struct ControllerOutputs {
     pub commission_state: CommissionState,
     /// Why the self-commissioning has stopped.
     pub commission_fault: CommissionFault,
+    /// What the start does.
+    pub start_state: StartState,
 }
 
 impl ControllerOutputs {

@@ -48,6 +48,19 @@ enumeration! {
     }
 }
 
+enumeration! {
+    /// What the start of a drive does; the assigned values never change.
+    #[derive(Default, Serialize, Deserialize)]
+    pub enum StartState("StartState", "What the start of the drive does") {
+        #[default]
+        1 Idle "The controller rests: before its first sample, not enabled, tripped, short-circuited or commissioning";
+        2 Aligning "At rest: a current aligns the rotor, injection and pulses find it, or the resistance is measured";
+        3 Ramping "A rotating current takes the rotor to start.speed";
+        4 Catching "For a start on a rotor that turns; no start.mode has it yet";
+        5 Running "The estimator supplies the angle: speed or torque follow the reference";
+    }
+}
+
 /// The parameters with the prefix `start.`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartParameters {
@@ -118,6 +131,14 @@ pub enum StartStep {
 }
 
 impl CurrentFrequencyStart {
+    /// What it does.
+    pub fn state(&self) -> StartState {
+        match self.stage {
+            Stage::Behind | Stage::On => StartState::Aligning,
+            Stage::Ramp | Stage::Hold => StartState::Ramping,
+        }
+    }
+
     /// One sample. The second alignment brings the rotor to `theta_est` (rad); the sign of `reference` sets the
     /// direction of rotation.
     pub fn update(

@@ -11,7 +11,7 @@ use crate::sensor::Offset;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::speed::{SpeedController, SpeedGains};
 use crate::stands::Stands;
-use crate::start::{CurrentFrequencyStart, StartMode, StartStep};
+use crate::start::{CurrentFrequencyStart, StartMode, StartState, StartStep};
 use crate::tables::ControllerParameters;
 use crate::trip::Trip;
 use crate::weakening::Weakening;
@@ -62,6 +62,15 @@ impl Leader {
             StartMode::CurrentFrequency => Self::Start(CurrentFrequencyStart::default()),
             StartMode::Injection => Self::Search(PolaritySearch::default()),
             StartMode::Direct => Self::Estimator,
+        }
+    }
+
+    /// What the start does.
+    pub(super) fn start_state(&self) -> StartState {
+        match self {
+            Self::Estimator => StartState::Running,
+            Self::Start(start) => start.state(),
+            Self::Search(_) => StartState::Aligning,
         }
     }
 }
@@ -391,7 +400,7 @@ mod tests {
             for tau_ref in [100.0, -100.0] {
                 let References { i, tau: (low, high), limited, .. } = at(tau_ref);
                 let (tau, most) = (par.motor.torque(i.d(), i.q()), if tau_ref > 0.0 { high } else { -low });
-                assert!(limited && (tau / most - 1.0).abs() < 0.02, "{speed} rad/s: {tau} N.m, not {most} N.m");
+                assert!(limited && (tau / most - 1.0).abs() < 0.02, "{speed} rad/s: {tau} N.m instead of {most} N.m");
             }
         }
         par.speed_loop.torque_mode = false;

@@ -340,6 +340,11 @@ pub const STATUS: &Table<ControllerOutputs> = table![
         "Why the self-commissioning was refused",
         &Field(|o| &mut o.commission_fault),
     ),
+    O::enumeration_output(
+        "start_state",
+        "What the start does: speed or torque follow the reference once it is Running",
+        &Field(|o| &mut o.start_state),
+    ),
 ];
 
 /// The controller's outputs.

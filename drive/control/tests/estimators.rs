@@ -17,7 +17,12 @@ fn salient() -> Motor {
 fn the_row_is_an_item_of_the_enumeration() {
     assert_eq!(Kind::ENUMERATION.items.len(), Kind::ALL.len());
     for (place, (&kind, item)) in Kind::ALL.iter().zip(Kind::ENUMERATION.items).enumerate() {
-        assert_eq!(usize::try_from(item.value), Ok(place + 1), "{}: the values are the places in the list", item.name);
+        assert_eq!(
+            usize::try_from(item.value),
+            Ok(place + 1),
+            "{}: the values are the positions in the list",
+            item.name
+        );
         assert_eq!((Kind::of(item.value), item.name), (Some(kind), kind.name()));
         assert!(!item.description.is_empty(), "{}", item.name);
     }
@@ -42,7 +47,7 @@ fn the_row_dispatches_every_call() {
         assert_eq!(estimator, before, "{name}: the same parameters change nothing");
         estimator.place(&context, &at(1, 2.0), 2.0, 0.0);
         let estimate = estimator.update(&context, &at(2, 2.0));
-        assert!(wrap(estimate.theta - 2.0).abs() < 0.01, "{name} goes on where it is placed: {}", estimate.theta);
+        assert!(wrap(estimate.theta - 2.0).abs() < 0.01, "{name} continues from the given angle: {}", estimate.theta);
     }
 }
 

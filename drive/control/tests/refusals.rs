@@ -37,7 +37,10 @@ fn refused(kind: Kind, set: impl FnOnce(&mut ControllerParameters), parts: &[&st
     let names: Vec<String> = (0..PARAMETERS.len()).filter_map(|i| PARAMETERS.locate(i)).map(|found| found.0).collect();
     for (word, next) in words.iter().zip(words.iter().skip(1).chain(&[""])) {
         let dotted = word.contains('.') && word.starts_with(|first: char| first.is_alphabetic()) && *word != "kg.m2";
-        assert!(!(dotted || *next == "=") || names.iter().any(|name| name == word), "{word} is no variable: {message}");
+        assert!(
+            !(dotted || *next == "=") || names.iter().any(|name| name == word),
+            "{word} is not a variable: {message}"
+        );
     }
 }
 

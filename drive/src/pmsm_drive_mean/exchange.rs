@@ -56,9 +56,10 @@ impl ContinuousTime for PmsmDriveMean {
         self.show(&state, &point, temperatures, out);
         let Powers { p_in, p_mech, p_loss, tau_shaft, .. } = out.drive.plant.powers;
         out.drive.means = Means { p_in, p_mech, p_loss, tau_shaft };
-        let ControllerOutputs { enabled, voltage_limited, current_limited, weakens, .. } = self.held;
+        let ControllerOutputs { enabled, voltage_limited, current_limited, weakens, start_state, .. } = self.held;
         let now = self.controller(&state, &point);
-        out.drive.controller = ControllerOutputs { enabled, voltage_limited, current_limited, weakens, ..now };
+        out.drive.controller =
+            ControllerOutputs { enabled, voltage_limited, current_limited, weakens, start_state, ..now };
     }
 }
 

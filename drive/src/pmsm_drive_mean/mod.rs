@@ -236,7 +236,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 2;
+    const STATE_VERSION: u16 = 3;
 
     const CONTINUOUS: bool = true;
 

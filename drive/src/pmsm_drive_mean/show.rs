@@ -8,6 +8,7 @@ use drive_base::frame::{Axis, Phases, Rotor};
 use drive_base::math::wrap;
 use drive_control::commission::{CommissionFault, CommissionState};
 use drive_control::signals::{ControllerOutputs, DqParts};
+use drive_control::start::StartState;
 use drive_control::trip::Cause;
 use drive_plant::losses::efficiency;
 use drive_plant::power::Powers;
@@ -78,6 +79,8 @@ impl PmsmDriveMean {
             R_s_est: self.drive.controller.motor.R_s,
             commission_state: CommissionState::Idle,
             commission_fault: CommissionFault::None,
+            // The estimates are exact at once.
+            start_state: if enabled { StartState::Running } else { StartState::Idle },
         }
     }
 }

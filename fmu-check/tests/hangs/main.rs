@@ -81,7 +81,7 @@ fn a_second_instance_that_hangs() {
         let report = check_within(&path, &["L04a", "T10", "G-L4"], 2);
         assert_eq!((violated(&report), report.fatal()), (vec!["L04a"], vec!["L04a"]), "{}", listed(&report));
         let Verdict::NotDetermined(why) = &report.finding("T10").unwrap().verdict else { panic!("{report:?}") };
-        assert!(why.starts_with("[2] ") && why.ends_with("unlike that of the first instance: see L04a"), "{why}");
+        assert!(why.starts_with("[2] ") && why.ends_with("unlike in the first instance: see L04a"), "{why}");
     }
 }
 

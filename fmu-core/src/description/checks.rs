@@ -51,7 +51,7 @@ pub(super) fn check_types(variables: &[Variable]) -> Result<(), Fault> {
         let (first, others, another) = units.entry(unit).or_insert((of, *exponents, *factor));
         if (*others, *another) != (*exponents, *factor) {
             return Err(Fault::new(format!(
-                "the unit {unit} of {} is not that of {}: it has other base units, or another factor",
+                "the unit {unit} of {} differs from that of {}: other base units or another factor",
                 of.name, first.name
             )));
         }

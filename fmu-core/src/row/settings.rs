@@ -232,7 +232,7 @@ impl<W: 'static> Row<W> {
     #[track_caller]
     const fn needed(mut self, need: Need<'static>) -> Self {
         let input = matches!(self.meta.causality, Causality::Input);
-        demand(input, self.meta.name, "only an input can be left alone");
+        demand(input, self.meta.name, "only an input can be left unconnected");
         self.meta.need = need;
         self
     }
@@ -249,7 +249,7 @@ impl<W: 'static> Row<W> {
             demand(named, self.meta.name, "an alias needs its own name");
             let with_unit = matches!(self.meta.kind, Kind::Real(of) | Kind::Float32(of) if !of.unit.name.is_empty());
             let fits = with_unit || aliases[i].display.is_none();
-            demand(fits, aliases[i].name, "only a real variable with a unit can be shown in another one");
+            demand(fits, aliases[i].name, "only a real variable with a unit can have a display unit");
             i += 1;
         }
         self.meta.aliases = aliases;

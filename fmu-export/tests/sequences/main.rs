@@ -29,7 +29,7 @@ const LENGTH: usize = 250;
 /// A number from the environment.
 fn asked(name: &str, otherwise: u64) -> u64 {
     let number = std::env::var(name).ok();
-    number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is no whole number")))
+    number.map_or(otherwise, |text| text.parse().unwrap_or_else(|_| panic!("{name} = {text:?} is not a whole number")))
 }
 
 #[test]

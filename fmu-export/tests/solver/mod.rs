@@ -1,6 +1,12 @@
 //! An importer for tests that integrates and handles events: the C functions of both standards behind one set of names,
 //! for the model that the test program exports.
-#![allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    unused_imports,
+    unused_macros,
+    reason = "a module of several test programs, each of which uses a part"
+)]
 #![allow(clippy::float_cmp, reason = "values that are set or counted, to the last bit")]
 
 /// The function of one of the standards.

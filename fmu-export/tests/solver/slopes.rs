@@ -4,6 +4,42 @@ use super::ball::*;
 use super::*;
 use fmu_core::draw::Draw;
 
+/// The tests of this file for the exported model, with this [`Exactness`].
+macro_rules! derivatives {
+    ($exactness:expr) => {
+        #[test]
+        fn directional_derivatives_are_those_of_set_and_get() {
+            solver::slopes::directional_derivatives_are_those_of_set_and_get($exactness);
+        }
+
+        #[test]
+        fn superposition_and_adjoint() {
+            solver::slopes::superposition_and_adjoint($exactness);
+        }
+
+        #[test]
+        fn columns_without_dependency_are_zero() {
+            solver::slopes::columns_without_dependency_are_zero();
+        }
+
+        #[test]
+        fn knowns_of_other_modes() {
+            solver::slopes::knowns_of_other_modes();
+        }
+
+        #[test]
+        fn output_derivatives() {
+            solver::slopes::output_derivatives($exactness);
+        }
+
+        #[test]
+        fn input_derivatives() {
+            solver::slopes::input_derivatives();
+        }
+    };
+}
+pub(crate) use derivatives;
+
 /// Their accuracy.
 #[derive(Clone, Copy)]
 pub struct Exactness {

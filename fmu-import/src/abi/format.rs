@@ -51,7 +51,7 @@ impl<'a> Arguments<'a> {
 }
 
 /// An `int`, which is the low half of its word.
-#[expect(clippy::cast_possible_truncation, reason = "the high half of the word is not part of it")]
+#[expect(clippy::cast_possible_truncation, reason = "the high half of the word is ignored")]
 fn low(word: u64) -> c_int {
     word as c_int
 }

@@ -172,7 +172,7 @@ mod tests {
     fn what_cannot_be_shown_is_named() {
         let note = " (the values of this message from \"%";
         assert!(heard!("a %Lf b", 1.0_f64).starts_with(&format!("a %Lf b{note}Lf\" on")));
-        assert!(heard!("a %n b", ptr::null_mut::<i32>()).contains("%n"), "nothing is written through a pointer");
+        assert!(heard!("a %n b", ptr::null_mut::<i32>()).contains("%n"), "no value is written through a pointer");
         let unknown = heard!("%d%%%y%d", 1_i32, 2_i32);
         assert!(unknown.starts_with("1%%y%d (the values"), "{unknown}");
         assert!(unknown.ends_with("(\"%y\" is not a conversion of printf)"), "{unknown}");

@@ -287,7 +287,7 @@ impl Model<'_> {
         match Values::read(text, read, self.reader)? {
             Values::Reals(x) if x.len() == 1 => number(x[0]),
             Values::Integers(x) if x.len() == 1 => {
-                let x = i64::try_from(x[0]).map_err(|_| format!("{name} = {text} is beyond 64 bits"))?;
+                let x = i64::try_from(x[0]).map_err(|_| format!("{name} = {text} exceeds 64 bits"))?;
                 if matches!(v.kind, VariableKind::Enumeration { .. }) {
                     return Ok(json!(x));
                 }

@@ -130,7 +130,7 @@ fn seen(y: f64) -> f32 {
     f32::from_bits(bits.saturating_add(8) & !15)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "the rest is a second array, or too small to be seen")]
+#[expect(clippy::cast_possible_truncation, reason = "the remainder is a second array, or too small to be seen")]
 fn single(x: f64) -> f32 {
     x as f32
 }

@@ -214,7 +214,7 @@ fn stratified(k: u64, u: f64, count: u64) -> f64 {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "the same numbers come out again")]
+#[expect(clippy::float_cmp, reason = "the same numbers result")]
 mod tests {
     use super::*;
     use crate::definition::Definition;

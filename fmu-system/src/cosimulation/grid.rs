@@ -141,7 +141,7 @@ impl Grid {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
+#[expect(clippy::float_cmp, reason = "exact if nothing is rounded")]
 mod tests {
     use super::*;
 

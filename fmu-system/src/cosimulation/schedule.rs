@@ -191,7 +191,7 @@ impl fmt::Display for Schedule {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "exact where nothing is rounded")]
+#[expect(clippy::float_cmp, reason = "exact if nothing is rounded")]
 mod tests {
     use super::*;
 

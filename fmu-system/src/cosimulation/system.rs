@@ -100,7 +100,7 @@ impl System {
             let instance = &self.instances[port.instance];
             let stepped = matches!(instance.kind(), Kind::CoSimulation { event_mode: false, .. });
             let (t, after) = times.into_iter().find_map(|t| Some((t, grid.after(t)?))).filter(|_| stepped)?;
-            let what = format!("the value of {t} s lies between two communication points");
+            let what = format!("the value at {t} s lies between two communication points");
             let cause = match &meets {
                 Ok(()) => format!("{what}: a step ends there"),
                 Err(why) => format!("{what} and acts from {after} s on: {why}"),

@@ -126,9 +126,8 @@ fn in_unit_of(
             return Ok((None, None));
         }
         let model = &description.model_name;
-        let unknown = |_| {
-            format!("is given in {unit}, but {model} has it in {own}: define {unit} in the file, or convert the value")
-        };
+        let unknown =
+            |_| format!("is given in {unit}, but {model} uses {own}: define {unit} in the file, or convert the value");
         return Ok((Some(each(&|x| quantity::convert(x, unit, variable, description).map_err(unknown))?), None));
     }
     let given = Measured { unit: Some(unit), base: p.base, relative: variable.relative };

@@ -93,7 +93,7 @@ fn a_jump_between_two_communication_points_is_met_or_acts_late_with_a_note() {
         let solved = |t: f64| 3.0 - 2.0 * f64::exp(-(1.0 - t));
         let (x, notes) = run(&fmu, "0:1,0.25:3", Method::default());
         assert!((x - solved(0.25)).abs() < 1e-12, "{x}");
-        let expected = "p.u: the value of 0.25 s lies between two communication points: a step ends there";
+        let expected = "p.u: the value at 0.25 s lies between two communication points: a step ends there";
         assert_eq!(notes, [expected]);
         let (x, notes) = run(&rigid, "0:1,0.25:3", Method::default());
         assert!((x - solved(0.3)).abs() < 1e-12, "{x}");

@@ -137,7 +137,7 @@ fn summary(args: &Bode, probe: &Probe, own: &[ResponsePoint], open: Option<&[Res
         let ranges = active_ranges(own, ACCURACY);
         let text: Vec<String> = ranges.iter().map(|(a, b)| format!("{} to {} Hz", four(*a), four(*b))).collect();
         lines.push(if text.is_empty() {
-            "passive at all these frequencies: stable with every passive train".into()
+            "passive at all these frequencies: stable with any passive drive train".into()
         } else {
             format!("active from {}: the drive feeds a resonance there", text.join(", from "))
         });

@@ -87,7 +87,7 @@ pub fn run(args: &Page) -> Result<Vec<PathBuf>> {
     let single = args.out.as_ref().filter(|out| out.extension().is_some_and(|e| e == "html"));
     ensure!(
         models.len() == 1 || (single.is_none() && args.module.is_none()),
-        "{} pages need a folder, and a module each: --out DIR",
+        "{} pages need a folder, with one module per page: --out DIR",
         models.len()
     );
     // Errors in page.toml are reported before anything is compiled.

@@ -48,7 +48,6 @@ pub(super) fn write(
     let first_plot = draws && all_outputs;
     let plotted = if draws { Some(plotted(&recording, overlays, first_plot)?) } else { None };
     recording.columns.truncate(recording.columns.len() - naming.for_plot);
-    let left_out = if all_outputs { record::leave_out(&mut recording, naming.instances) } else { None };
     let mut lines = Vec::new();
     match args.csv.as_deref() {
         Some(path) if path == Path::new("-") => {
@@ -66,7 +65,6 @@ pub(super) fn write(
         }
         None => {}
     }
-    lines.extend(left_out.filter(|_| args.csv.is_some()));
     if let (Some(path), Some(plotted)) = (&args.plot, &plotted) {
         let svg = svg::draw(plotted)?;
         if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {

@@ -130,7 +130,7 @@ impl Model for EveryType {
         ..Info::DEFAULT
     };
 
-    #[expect(clippy::large_stack_arrays, reason = "a constant, of which the stack never sees anything")]
+    #[expect(clippy::large_stack_arrays, reason = "a constant that never reaches the stack")]
     const TABLE: &'static Table<Block<Self>> = table![
         V::input("voltage", &VOLT, "Input of the state", |m| &mut m.model.voltage),
         V::array_input("vector", &VOLT, "Three inputs", 3, |m| &mut m.model.vector),

@@ -32,7 +32,7 @@ impl Errors {
         }
     }
 
-    pub(super) fn tell(&self, points: &[Point]) -> String {
+    pub(super) fn text(&self, points: &[Point]) -> String {
         let Self { rms, worst, .. } = self;
         format!(
             "flux_map comes within {:.2e} A (i_d) and {:.2e} A (i_q) rms of its {} points, {worst:.2e} A at worst",
@@ -60,7 +60,7 @@ pub(super) fn check(map: &FluxMap, errors: &Errors, points: &[Point], file: &str
     let nearest =
         points.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).with_context(|| "no points".to_owned())?;
     bail!(
-        "{file}: more flux takes less current at psi = ({:.4}, {:.4}) Wb, near i = ({:.2}, {:.2}) A: no machine does that; add or \
+        "{file}: more flux takes less current at psi = ({:.4}, {:.4}) Wb, near i = ({:.2}, {:.2}) A, which is impossible; add or \
          correct points there; {CAUSES}",
         psi.d(),
         psi.q(),
@@ -170,7 +170,7 @@ pub(super) fn coverage(points: &[Point], motor: &MotorFile) -> Option<String> {
     (d.min(q) < 1.2 * limit).then(|| {
         format!(
             "the table ends at i_d = {:.1} A and |i_q| = {q:.1} A; with 1.2 times rating.current, {:.1} A, transients stay inside it; \
-             beyond, the inductances of its edge go on",
+             beyond, the inductances at its edge are used",
             -d,
             1.2 * limit
         )

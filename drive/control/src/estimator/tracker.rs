@@ -212,7 +212,7 @@ mod tests {
                         (theta - tracker.theta, (-x).exp() * (1.0 - 2.0 * x + 0.5 * x * x))
                     }
                 };
-                assert!((seen - expected).abs() < 1e-3, "{kind:?} at {x} / rho: {seen}, not {expected}");
+                assert!((seen - expected).abs() < 1e-3, "{kind:?} at {x} / rho: {seen} instead of {expected}");
             }
         }
     }

@@ -244,9 +244,8 @@ fn renewed(session: &Session) -> Result<(), NotDetermined> {
             let lost = kept.is_none_or(|kept| kept > next + 1e-6 * (next - t));
             if lost && !event.jumped() && !event.terminates() {
                 let kept = kept.map_or_else(|| "there is none".into(), |kept| format!("it is at {kept:?}"));
-                session.violated(format!(
-                    "the next event was at {next:?}; after an event at {now:?} that nothing requested, {kept}"
-                ));
+                session
+                    .violated(format!("the next event was at {next:?}; after an unrequested event at {now:?}, {kept}"));
                 return Ok(());
             }
         }

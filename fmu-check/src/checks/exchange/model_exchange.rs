@@ -91,7 +91,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Reinitialize states in the update of the discrete states only." },
     Check { id: "E17", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Exchange(interleaved),
         requirement: "Interleaved instances of Model Exchange give the same results as each alone.",
-        tried: "Runs 3 instances in turns and compares each with one alone; frees the others, and runs the last one on.",
+        tried: "Runs 3 interleaved instances and compares each with one alone; frees two, and continues the last one.",
         fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "E18", clause: "2.0.5, 3.2.2; 3.0.2, 2.3.3", levels: Levels::SHOULD, run: Run::Exchange(start_times),
         requirement: "Model Exchange runs from start times of 0, -1, 1000 and 1e6, and its next time events are later than the start time.",

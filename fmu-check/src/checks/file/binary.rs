@@ -47,7 +47,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Link them statically (-static-libgcc -static-libstdc++, /MT), or pack them beside the binary." },
     Check { id: "B03r", clause: "2.0.5, 2.3; 3.0.2, 2.5.1.4", levels: Levels::SHOULD, run: Run::File(rpath),
         requirement: "Every library search path is $ORIGIN or below.",
-        tried: "Reads the search paths of the binary.", fix: "Set the search path to $ORIGIN, and strip those of the build machine." },
+        tried: "Reads the search paths of the binary.", fix: "Set the search path to $ORIGIN, and remove the build machine's paths." },
     Check { id: "B04", clause: "hardening", levels: Levels::HARD, run: Run::File(c_library),
         requirement: "Linux binaries need at most version 2.17 (2012) of the GNU C library, so that they load on old systems.",
         tried: "Reads the versions of symbols that the binary needs.", fix: "Build on an old system, or with `zig cc -target x86_64-linux-gnu.2.17`." },

@@ -73,7 +73,7 @@ fn elements(fmu: &FmuFile) -> Verdict {
     let own = fmu.root().and_then(|root| root.get("fmiVersion")).unwrap_or_default();
     match fmu.version {
         FmiVersion::V2 if !version.starts_with("3.") => findings.push(format!(
-            "fmiVersion={version:?}, which does not define this file: in an FMU of FMI 2.0 the version is that of FMI 3.0"
+            "fmiVersion={version:?}, which does not define this file: in an FMU of FMI 2.0 it must be the version of FMI 3.0"
         )),
         FmiVersion::V3 if version != own => {
             findings.push(format!("fmiVersion={version:?}, but the model description has {own:?}"));

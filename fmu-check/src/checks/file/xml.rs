@@ -21,7 +21,7 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "X01s", clause: "3.0.2, 2.4.2", levels: Levels(None, Some(Level::Should)), run: Run::File(spelling),
         requirement: "Capability flags are spelled as in the standard: its schema allows other attributes there, but importers read a misspelled flag as \
             false.",
-        tried: "Compares the attributes of the interfaces with those of the standard.",
+        tried: "Compares the attributes of the interfaces with the standard.",
         fix: "Correct the spelling; store data of the tool in annotations." },
     Check { id: "X02a", clause: "2.0.5, 2.2.1; 3.0.2, 2.4.1", levels: Levels::MUST, run: Run::File(version),
         requirement: "fmiVersion is 2.0 or 3.0, without a patch release.",

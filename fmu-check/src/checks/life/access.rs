@@ -114,7 +114,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "A parameter outside min and max is refused, at the latest at the end of initialization.",
         tried: "Sets parameters outside min and max.", fix: "Compare with min and max, and refuse at the latest in ExitInitializationMode." },
     Check { id: "G08", clause: "hardening", levels: Levels::HARD, run: Run::Probe(booleans),
-        requirement: "A Boolean other than 0 and 1 does no harm.",
+        requirement: "A Boolean other than 0 and 1 is tolerated.",
         tried: "Sets Booleans of 2, 255 and all bits.", fix: "Compare with 0." },
 ];
 

@@ -22,7 +22,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "SetDebugLogging accepts an empty list, meaning all categories, and each category of LogCategories.",
         tried: "Switches logging with an empty list and with each category, also between steps.", fix: "Accept 0 categories with NULL, and every listed one." },
     Check { id: "G-L2b", clause: "hardening", levels: Levels::HARD, run: Run::Any(unknown),
-        requirement: "A category that does not exist or is NULL gives Error and does no harm.",
+        requirement: "A category that does not exist or is NULL gives Error without side effects.",
         tried: "Switches logging with an unknown category and with NULL.", fix: "Look the category up, and return Error." },
     Check { id: "G-L3a", clause: "3.0.2, 2.3.1", levels: Levels(Some(Level::Should), Some(Level::Must)), run: Run::Probe(errors),
         requirement: "With logging on, every Error is accompanied by a message of that status.",

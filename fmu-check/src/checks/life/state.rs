@@ -30,7 +30,7 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "F01l", clause: "hardening", levels: Levels::HARD, run: Run::Probe(state_leaks),
         requirement: "Saving and freeing states, and saving into an existing state, leak no memory.",
         tried: "Saves and frees some thousand states, saves some thousand times into the same one, and measures memory.",
-        fix: "Free in FreeFMUState what GetFMUState allocated, and let GetFMUState reuse the memory of a state that it is given." },
+        fix: "Free in FreeFMUState what GetFMUState allocated, and let GetFMUState reuse the memory of the state passed to it." },
     Check { id: "F02a", clause: STATE, levels: Levels::MUST, run: Run::Probe(rerun_from_state),
         requirement: "A run from a restored state equals the run from the time of saving.",
         tried: "Saves, runs 50 steps, restores twice, and compares.",

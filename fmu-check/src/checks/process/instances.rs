@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "L04a", clause: "2.0.5, 2.1.5; 3.0.2, 2.3.1", levels: Levels::MUST, run: Run::Probe(interleaved),
         requirement: "Interleaved instances give the same results as each alone.",
-        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one alone; frees 6, and reads the others.",
+        tried: "Runs 8 instances in turns, half of them with other parameters, and compares each with one running alone; frees 6, and reads the others.",
         fix: "Keep all data in the instance; no globals and statics." },
     Check { id: "L04b", clause: "2.0.5, 2.1; 3.0.2, 2.2.1", levels: Levels::SHOULD, run: Run::Probe(threads),
         requirement: "Instances in several threads give the same results as each alone.",
@@ -29,7 +29,7 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "B05d", clause: "hardening", levels: Levels::HARD, run: Run::Probe(copies),
         requirement: "Two copies of the binary, loaded with their symbols visible to each other, do not interfere.",
         tried: "Loads two copies with their symbols visible to each other and compares.",
-        fix: "Hide all symbols but those of the standard, or link with -Bsymbolic." },
+        fix: "Hide all symbols except those of the standard, or link with -Bsymbolic." },
     Check { id: "B07a", clause: "hardening", levels: Levels::HARD, run: Run::Any(leaks),
         requirement: "Creating and freeing instances leaks no memory.",
         tried: "Creates, runs, reads and frees some thousand instances and measures memory.",

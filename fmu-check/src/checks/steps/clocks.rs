@@ -16,7 +16,7 @@ const SHOULD: Levels = Levels(None, Some(Level::Should));
 pub(crate) const CHECKS: &[Check] = &[
     Check { id: "K00", clause: "3.0.2, 2.3.5", levels: MUST, run: Run::Probe(served),
         requirement: "A simulation in which clocks tick when they are due runs: SetClock, UpdateDiscreteStates, GetIntervalDecimal and steps succeed.",
-        tried: "Ticks each clock when the description or GetIntervalDecimal says so, a triggered one at every third event, for 40 events.",
+        tried: "Ticks each clock at the instants given by the description or GetIntervalDecimal, a triggered one at every third event, for 40 events.",
         fix: "Accept SetClock in Event Mode for every clock with causality input, and return new intervals after the update." },
     Check { id: "K01", clause: "3.0.2, 2.3.5", levels: MUST, run: Run::Probe(deactivated),
         requirement: "After UpdateDiscreteStates, a clock that was active is inactive.",

@@ -43,7 +43,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Checks nextEventTime of the updates.", fix: "Return an absolute time after now." },
     Check { id: "N07", clause: "hardening", levels: Levels(None, Some(Level::Hard)), run: Run::Probe(round_trip),
         requirement: "Entering and leaving Event Mode without an event changes no result.",
-        tried: "Enters and leaves Event Mode between steps and compares.", fix: "Change nothing if there is no event." },
+        tried: "Enters and leaves Event Mode between steps and compares.", fix: "Leave the state unchanged if there is no event." },
 ];
 
 /// Ends a probe of an FMU without event mode.

@@ -39,7 +39,7 @@ pub(crate) const CHECKS: &[Check] = &[
         requirement: "In the callback, Terminate, EnterEventMode and EnterStepMode return Error.",
         tried: "Calls each in the first callback.", fix: "Give the instance a separate state while the callback runs." },
     Check { id: "U06", clause: "hardening", levels: HARD, run: Run::Probe(silent),
-        requirement: "A callback that does nothing changes no result.",
+        requirement: "An empty callback does not change results.",
         tried: "Makes 20 steps with and without it, and compares the outputs.", fix: "Use the same internal steps in both." },
 ];
 
@@ -265,7 +265,7 @@ fn silent(session: &Session) -> Result<(), NotDetermined> {
     };
     if let Some(found) = deviation(&run(false)?, &run(true)?) {
         let text = found.text(&session.names_of(&outputs));
-        session.violated(format!("with a callback that does nothing, after {} {text}", steps(found.step)));
+        session.violated(format!("with an empty callback, after {} {text}", steps(found.step)));
     }
     Ok(())
 }

@@ -68,7 +68,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Reads first derivatives of all continuous outputs.", fix: "Implement the function, or set maxOutputDerivativeOrder to 0." },
     Check { id: "T09s", clause: "2.0.5, 4.2.1; 3.0.2, 4.1.2", levels: Levels::SHOULD, run: Run::Probe(slopes),
         requirement: "First derivatives of outputs match the slopes, to 10 %; orders above the maximum give Error.",
-        tried: "Compares derivatives with slopes over short steps, and asks for other orders.",
+        tried: "Compares derivatives with slopes over short steps, and requests other orders.",
         fix: "Return the derivative at the end of the step, and Error for orders beyond the maximum." },
     Check { id: "T13", clause: "2.0.5, 2.2.7; 3.0.2, 2.4.7.5", levels: Levels::SHOULD, run: Run::Probe(derivatives_are_slopes),
         requirement: "A variable that is the derivative of another has the value of its slope, to 30 %.",
@@ -79,7 +79,7 @@ pub(crate) const CHECKS: &[Check] = &[
     Check { id: "T12", clause: "2.0.5, 4.2.3; 3.0.2, 4.2.1", levels: Levels::MUST, run: Run::Probe(ended),
         requirement: "After a step in which the FMU ends the simulation, outputs can be read, fmi2LastSuccessfulTime lies in the step, and Terminate \
             succeeds.",
-        tried: "Steps through the default experiment; if the FMU ends the simulation, asks for time and outputs, and terminates.",
+        tried: "Steps through the default experiment; if the FMU ends the simulation, reads time and outputs, and terminates.",
         fix: "Keep the state of the end, and return its time." },
     Check { id: "T12s", clause: "hardening", levels: Levels::HARD, run: Run::Probe(no_step_after),
         requirement: "No step succeeds after the FMU has ended the simulation.",
@@ -91,7 +91,7 @@ pub(crate) const CHECKS: &[Check] = &[
         fix: "Initialize all memory, share no data between instances, and give random numbers a seed; a measured time always differs." },
     Check { id: "T10p", clause: "hardening", levels: Levels::HARD, run: Run::Twice(two_processes),
         requirement: "Two processes with different addresses give the same results bit for bit.",
-        tried: "Runs in two processes and compares hashes.", fix: "Let nothing depend on addresses, time or the process." },
+        tried: "Runs in two processes and compares hashes.", fix: "Avoid any dependence on addresses, time or the process." },
 ];
 
 fn start_times(session: &Session) -> Result<(), NotDetermined> {

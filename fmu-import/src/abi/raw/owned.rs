@@ -83,7 +83,7 @@ impl Owned {
     fn state_index(&self, state: SavedState) -> Option<usize> {
         let Place { of, index } = state.0?;
         assert!(of == self.of, "the state is of another binary");
-        assert!(self.states[index].address != 0, "the state is freed, by itself or with its instance");
+        assert!(self.states[index].address != 0, "the state was freed, individually or with its instance");
         Some(index)
     }
 

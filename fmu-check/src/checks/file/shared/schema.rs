@@ -94,7 +94,7 @@ fn unknown(element: &Element, all: &[&str], findings: &mut Vec<String>) {
         let known = name.contains(':') || name == "xmlns" || all.iter().any(|w| w.split(':').next() == Some(name));
         if !known {
             let at = format!("line {}: <{}>", element.line, element.name);
-            findings.push(format!("{at} has an attribute {name} that the standard does not know"));
+            findings.push(format!("{at} has an attribute {name}, which the standard does not define"));
         }
     }
 }

@@ -218,7 +218,7 @@ fn values_of_input(session: &Session, v: &ModelVariable) -> Vec<Vec<u64>> {
 pub(crate) fn inputs_keep(session: &Session) -> Result<(), NotDetermined> {
     let inputs: Vec<_> = session.number_inputs().take(40).collect();
     if inputs.is_empty() {
-        return session.not_applicable("there is no input that is a number");
+        return session.not_applicable("there is no numeric input");
     }
     let version = session.description.version;
     session.cases(inputs, |v| {
@@ -256,7 +256,7 @@ pub(crate) fn parameters_keep(session: &Session) -> Result<(), NotDetermined> {
     };
     let all: Vec<_> = session.numeric().filter(fits).collect();
     if all.is_empty() {
-        return session.not_applicable("there is no parameter that is a number");
+        return session.not_applicable("there is no numeric parameter");
     }
     let instance = session.stepping()?;
     let before = instance.snapshot(&all)?;

@@ -33,7 +33,7 @@ pub(crate) fn fault(event: &LogCall) -> Option<(Confidence, String)> {
     } else if altered.next().is_some() {
         certain(&format!("the FMU was given the text \"{START}{PERCENT}\" and has used it as a printf format"))
     } else if let Some(conversion) = unresolved(&text.replace(&format!("{START}{PERCENT}"), START)) {
-        Some((Confidence::Likely, format!("{conversion:?} stands where a value belongs")))
+        Some((Confidence::Likely, format!("{conversion:?} appears in place of a value")))
     } else if let Some(conversion) = event.format.as_deref().and_then(percentage) {
         Some((
             Confidence::Likely,
@@ -94,10 +94,10 @@ mod tests {
             ("done\n", Confidence::Certain, "line break"),
             ("x\u{1}y", Confidence::Certain, "control character '\\u{1}'"),
             ("name a probe's text, 10012 is used", Confidence::Certain, "as a printf format"),
-            ("x = %g", Confidence::Likely, "\"%g\" stands"),
-            ("from %s, %.3g s", Confidence::Likely, "\"%s\" stands"),
-            ("%.3g s", Confidence::Likely, "\"%.3g\" stands"),
-            ("%lu steps", Confidence::Likely, "\"%lu\" stands"),
+            ("x = %g", Confidence::Likely, "\"%g\" appears"),
+            ("from %s, %.3g s", Confidence::Likely, "\"%s\" appears"),
+            ("%.3g s", Confidence::Likely, "\"%.3g\" appears"),
+            ("%lu steps", Confidence::Likely, "\"%lu\" appears"),
             ("a \u{fffd}", Confidence::Likely, "U+FFFD"),
         ];
         for (text, confidence, words) in texts {
