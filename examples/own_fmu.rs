@@ -79,7 +79,7 @@ impl Model for RcCircuit {
 
     // Co-Simulation: the built-in integrator, with substeps of at most 1 ms.
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-        integrate::smooth::<Self, 1>(self, step, 1e-3)
+        integrate::smooth::<Self, { Self::SCALARS }>(self, step, 1e-3)
     }
 }
 

@@ -1,11 +1,12 @@
 //! The command line: one variant for each command.
 
 use crate::commands::{
-    atlas, bode, build, compare, identify, info, map, merge, modelica, new, page, preset, prove, reproduce, simulate,
-    simulink, ssp, sweep, tune,
+    atlas, bode, build, compare, datasheet, identify, map, merge, modelica, page, preset, prove, reproduce, simulink,
+    ssp, sweep, tune,
 };
-use crate::message;
-use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use cargo_fmu::message;
+use cargo_fmu::{info, model, new, simulate, worker};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use fmu_check::{command as check, probe};
 use fmu_import::printable_lines;
 use std::process::ExitCode;
@@ -36,6 +37,7 @@ enum Command {
     Tune(tune::Tune),
     Identify(identify::Identify),
     Map(map::Map),
+    Datasheet(datasheet::Datasheet),
     Ssp(ssp::Ssp),
     Modelica(modelica::Modelica),
     Simulink(simulink::Simulink),
@@ -57,11 +59,17 @@ enum Command {
     Probe(probe::ProbeArguments),
     #[command(hide = true)]
     SweepWorker,
+    #[command(hide = true)]
+    Model(model::ModelWork),
 }
 
 /// The command line. `-h` shows the first example of `--help`.
 pub fn line() -> clap::Command {
-    Cli::command().mut_subcommands(|command| {
+    // The help of `build` is that of the models.
+    let models = build::Models::augment_args(clap::Command::new("build"));
+    let [about, long] = [models.get_about(), models.get_long_about()].map(|text| text.cloned().unwrap_or_default());
+    let line = Cli::command().mut_subcommand("build", |command| command.about(about).long_about(long));
+    line.mut_subcommands(|command| {
         let example = command.get_long_about().and_then(|text| first_example(&text.to_string(), command.get_name()));
         example.into_iter().fold(command, |command, text| command.after_help(text).after_long_help(""))
     })
@@ -80,13 +88,15 @@ pub fn main() -> ExitCode {
     if let Some(status) = fmu_import::guard::serve() {
         return status;
     }
-    let command = Cli::from_arg_matches(&line().get_matches_from(crate::arguments()))
+    worker::serves();
+    let command = Cli::from_arg_matches(&line().get_matches_from(cargo_fmu::arguments()))
         .unwrap_or_else(|error| error.exit())
         .command;
     // The process that started a worker prints its error.
     let is_worker = match &command {
         Command::Simulate(args) => args.process.worker,
         Command::Bode(args) => args.process.worker,
+        Command::Model(args) => args.process.worker,
         _ => false,
     };
     let outcome = match command {
@@ -109,6 +119,7 @@ pub fn main() -> ExitCode {
             Ok(ExitCode::SUCCESS)
         }
         Command::Merge(args) => merge::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Model(args) => model::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Simulate(args) => simulate::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Sweep(args) => sweep::run(&args).map(|good| ExitCode::from(u8::from(!good))),
         Command::SweepWorker => fmu_sweep::isolate::serve().map(|()| ExitCode::SUCCESS).map_err(Into::into),
@@ -117,6 +128,7 @@ pub fn main() -> ExitCode {
         Command::Reproduce(args) => reproduce::run(&args).map(|holds| ExitCode::from(u8::from(!holds))),
         Command::Bode(args) => bode::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Atlas(args) => atlas::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Datasheet(args) => datasheet::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Map(args) => map::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Tune(args) => tune::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Identify(args) => identify::run(&args).map(|whole| ExitCode::from(u8::from(!whole))),
@@ -151,7 +163,7 @@ pub fn main() -> ExitCode {
         if !is_worker {
             message::error(&printable_lines(&format!("{error:#}")));
         }
-        ExitCode::from(crate::exit_status(&error))
+        ExitCode::from(cargo_fmu::exit_status(&error))
     })
 }
 
@@ -164,7 +176,7 @@ mod tests {
     fn several_packages_are_built_at_once() {
         let arguments = ["fmu", "build", "--package", "own-fmu", "--package", "my-fmu"];
         let Command::Build(args) = Cli::try_parse_from(arguments).unwrap().command else { panic!("another command") };
-        assert_eq!(args.package, ["own-fmu", "my-fmu"]);
+        assert_eq!(args.models.package, ["own-fmu", "my-fmu"]);
     }
 
     /// An example is a line of the long help that starts with two spaces and the command; `\\` continues it.

@@ -8,7 +8,7 @@ mod counting;
 use counting::{calls, neighbor};
 use drive::estimator::Kind;
 use drive_study::runner::{self, RATED_SPEED};
-use fmu_core::{Block, Elapsed, Model, Plain, Step};
+use fmu_core::{Block, Elapsed, Plain, Step, Stored};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::Standard;
 use fmu_export::log::{Log, Sink, Status};
@@ -16,7 +16,7 @@ use fmu_export::registry;
 use fmu_export::snapshot::Snapshot;
 
 /// Saves and restores a block's state.
-fn again_and_again<M: Model>(block: Block<M>, what: &str) {
+fn again_and_again<M: Stored>(block: Block<M>, what: &str) {
     let log = Log::new(Box::new(Silent), false);
     let mut instance =
         Instance::<Plain<M>>::new(Standard::Fmi3, what.into(), log, Snapshot { block, ..Snapshot::default() });
@@ -66,6 +66,17 @@ fn a_step_does_not_allocate() {
     }
     assert_eq!(calls(), before, "PmsmDriveMean");
     again_and_again(mean, "speed control");
+    let mut mapped = Block::<drive::MappedDrive>::default();
+    mapped.model.inputs.speed_ref = 100.0;
+    mapped.initialize();
+    let (mut now, before) = (Elapsed::ZERO, calls());
+    for _ in 0..200 {
+        let step = Step { start: now, h: 1e-2 };
+        mapped.step(&step).unwrap();
+        now = step.end();
+    }
+    assert_eq!(calls(), before, "MappedDrive");
+    again_and_again(mapped, "speed control");
     let before = calls();
     drop(std::hint::black_box(Box::new(1)));
     assert!(calls() > before, "the counter counts");

@@ -130,6 +130,18 @@ fn rows() -> Vec<Wrong> {
             5,
         ),
         row("mean", r#"V::float32_output("f", &VOLT, "", |m| &mut m.f).mean()"#, "f: only a real output", 5),
+        row(
+            "blank",
+            r#"V::output("coil.loss [W]", &VOLT, "", |m| &mut m.u)"#,
+            "coil.loss [W]: not a structured name of FMI: letters of ASCII, digits and _ in parts with dots; write coil.'loss [W]'",
+            5,
+        ),
+        row(
+            "umlaut",
+            r#"V::output("Wärme", &VOLT, "", |m| &mut m.u)"#,
+            "Wärme: not a structured name of FMI: letters of ASCII, digits and _ in parts with dots; put other characters of ASCII",
+            5,
+        ),
         row("place", r#"V::uint8_input("on", "", |m| &mut m.on)"#, "mismatched types", 5),
         // These two are reported at the table, which starts in line 3.
         row("twice", r#"V::boolean_input("u", "", |m| &mut m.on)"#, "u: two rows of the table have this name", 3),
@@ -169,6 +181,19 @@ fn models() -> Vec<Wrong> {
             "the above error was encountered while instantiating",
             17,
         ),
+        model(
+            "unserialized",
+            ("serde::Serialize, serde::Deserialize)]\nstruct Ball", "serde::Deserialize)]\nstruct Ball"),
+            "`Ball` cannot be stored: a stored state is a clone in bytes",
+            EXPORT,
+        ),
+        model(
+            "uncloned",
+            ("Clone, Default, serde::Serialize, serde::Deserialize)]\nstruct Ball", "Default)]\nstruct Ball"),
+            "lacks `Clone`, `Serialize` or `Deserialize`",
+            EXPORT,
+        ),
+        model("unmodeled", ("export!(Ball: ContinuousTime)", "export!(f64)"), "`f64` is not a model", EXPORT),
         model(
             "inside",
             ("Ball: ContinuousTime", "Ball: ContinuousTime + Intermediate"),
@@ -321,6 +346,17 @@ fn clocks() -> Vec<Wrong> {
             "`Ball` has no clocks",
             EXPORT,
         ),
+        Wrong {
+            name: "unsaved_clock",
+            source: unranked.source.replace(
+                export.0,
+                &export
+                    .1
+                    .replace("ContinuousTime + Clocked + ScheduledExecution", "Unsaved + ContinuousTime + Clocked"),
+            ),
+            why: "Ball: Clocked needs a model that is saved, not Unsaved",
+            line: EXPORT + 1,
+        },
         Wrong { source: unranked.source.replace(export.0, export.1), ..unranked },
         model(
             "adrift",

@@ -7,13 +7,13 @@ use common::shows::{differs, shows};
 use common::{Native, words};
 use drive::estimator::Kind;
 use drive::plant::losses::Losses;
-use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController, documentation as fragments};
+use drive::{MappedDrive, PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController, documentation as fragments};
 use drive_study::plane::{self, OperatingPoint};
 use drive_study::reproduce::experiment::{
     ClosedLoop, Experiment, LOAD_0, LOAD_1000, Record, START, STEP_20, STEP_500, STEP_1000, STEP_1500,
 };
 use drive_study::reproduce::plots;
-use fmu_core::{Description, Model};
+use fmu_core::{Description, Stored};
 use fmu_import::elf::FLOOR;
 use fmu_pack::documentation;
 use fmu_plot::{chart, svg};
@@ -144,7 +144,7 @@ fn keep_in(pages: &[&str], name: &str, drawn: &str) {
 /// A page works offline: no address except those of the SVG name space and of the licenses beside it.
 #[test]
 fn pages_need_nothing_from_outside() {
-    fn check<M: Model>() {
+    fn check<M: Stored>() {
         let page = documentation::page(&Description::of::<M>().unwrap(), FmiVersion::V3);
         let name = M::INFO.name;
         std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{name}.html")), &page).unwrap();
@@ -163,7 +163,7 @@ fn pages_need_nothing_from_outside() {
 #[test]
 fn one_floor_of_glibc() {
     let floor = format!("glibc {}.{}", FLOOR.0, FLOOR.1);
-    let pages = ["README.md", "python/README.md", "docs/platforms.md", "docs/check.md", "src/commands/build.rs"];
+    let pages = ["README.md", "python/README.md", "docs/platforms.md", "docs/check.md", "cargo-fmu/src/build.rs"];
     for page in pages {
         let text = std::fs::read_to_string(root().join(page)).unwrap();
         let named: Vec<&str> = text.split("glibc ").skip(1).filter(|rest| rest.starts_with('2')).collect();
@@ -241,6 +241,7 @@ fn pages_stand_alone() {
         ("SensorlessController", include_str!("../drive/control/docs/sensorless_controller.svg")),
         ("PmsmDrive", include_str!("../drive/docs/pmsm_drive.svg")),
         ("PmsmDriveMean", include_str!("../drive/docs/pmsm_drive.svg")),
+        ("MappedDrive", include_str!("../drive/docs/mapped_drive.svg")),
     ] {
         for standard in ["fmi2", "fmi3"] {
             let archive = common::archives().join(standard).join(name).with_extension("fmu");
@@ -268,6 +269,7 @@ fn pages_stand_alone() {
             "PmsmPlant" => Description::of::<PmsmPlant>(),
             "PmsmDrive" => Description::of::<PmsmDrive>(),
             "PmsmDriveMean" => Description::of::<PmsmDriveMean>(),
+            "MappedDrive" => Description::of::<MappedDrive>(),
             _ => Description::of::<SensorlessController>(),
         };
         let inputs = description.unwrap().variables;
@@ -429,6 +431,36 @@ fn table<'a>(page: &'a str, heading: &str) -> Vec<Vec<&'a str>> {
     let (_, after) = page.split_once(heading).unwrap_or_else(|| panic!("docs/methods.md has no {heading}"));
     let rows = after.lines().skip_while(|line| !line.starts_with('|')).take_while(|line| line.starts_with('|'));
     rows.skip(2).map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect()
+}
+
+/// Every row of the table of attributes names a test that there is.
+#[test]
+fn every_attribute_of_a_description_has_a_test() {
+    let page = std::fs::read_to_string(root().join("docs/import.md")).unwrap();
+    let rows = table(&page, "## What our importer does with a description");
+    assert!(rows.len() > 30, "{}", rows.len());
+    let mut functions = std::collections::HashSet::new();
+    let mut folders = vec![root().join("tests"), root().join("fmu-system/tests"), root().join("fmu-import/tests")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|e| e == "rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                let tests =
+                    text.split("#[test]").skip(1).filter_map(|after| after.split_once("fn ")?.1.split_once('('));
+                functions.extend(tests.map(|(name, _)| name.to_owned()));
+            }
+        }
+    }
+    for row in rows {
+        let named: Vec<&str> = row[2].split('`').skip(1).step_by(2).collect();
+        assert!(!named.is_empty(), "{row:?}");
+        for name in named {
+            assert!(functions.contains(name), "{}: there is no test {name}", row[0]);
+        }
+    }
 }
 
 /// The decision of docs/methods.md: each method once, with the worst cell of the machines that it holds, and the others.

@@ -15,8 +15,14 @@ use std::{fs, process};
 
 #[test]
 fn fmpy_validates_and_cosimulates() {
-    let files =
-        ["test_validate.py", "test_controller.py", "test_cosimulation.py", "test_simulate_fmu.py", "test_weakening.py"];
+    let files = [
+        "test_validate.py",
+        "test_controller.py",
+        "test_cosimulation.py",
+        "test_simulate_fmu.py",
+        "test_weakening.py",
+        "test_documents.py",
+    ];
     pytest("fmpy", "fmpy", &files, &[]);
 }
 
@@ -98,7 +104,7 @@ fn misuse_under_asan() {
     let libasan = fs::canonicalize(String::from_utf8_lossy(&libasan.stdout).trim()).expect("libasan.so of gcc");
     let (target, triple) = (scratch().join("asan"), fmu_pack::target::host_triple().unwrap());
     let (libraries, archives) = (target.join(&triple).join("release"), target.join("fmu"));
-    let fmus = ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller"];
+    let fmus = ["mapped-drive", "pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller"];
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--locked", "--release", "--target", &triple, "--target-dir"]).arg(&target);
     build.args(fmus.iter().flat_map(|name| ["--package", name]));

@@ -64,3 +64,8 @@ fn whole_drive() {
 fn mean_drive() {
     check("PmsmDriveMean");
 }
+
+#[test]
+fn mapped_drive() {
+    check("MappedDrive");
+}

@@ -1,7 +1,16 @@
 //! The importer on our own FMUs: state, reset, values of every type, several instances.
 #![allow(missing_docs, clippy::float_cmp)]
 
+#[path = "../fmu-import/examples/co_simulation.rs"]
+#[allow(dead_code, reason = "its main function")]
+mod co_simulation;
 mod common;
+#[path = "../fmu-sweep/examples/sweep.rs"]
+#[allow(dead_code, reason = "its main function")]
+mod sweep;
+#[path = "../fmu-system/examples/two_fmus.rs"]
+#[allow(dead_code, reason = "its main function")]
+mod two_fmus;
 
 use fmu_import::{Error, Fmu, Instance, Values};
 use fmu_system::cosimulation::{Integration, Method, Settings, System, Units};
@@ -28,7 +37,7 @@ fn started(fmu: &Fmu) -> Result<Instance, Error> {
 
 /// Steps with a torque on the shaft; returns speed and angle.
 fn steps(plant: &mut Instance, from: u32, to: u32) -> Result<[f64; 2], Error> {
-    plant.set("tau_load", &Values::Reals(vec![-1.0]))?;
+    plant.set("tau_load", Values::Reals(vec![-1.0]))?;
     for k in from..to {
         assert!(plant.do_step(f64::from(k) * 1e-4, 1e-4)?.is_continue());
     }
@@ -87,9 +96,55 @@ fn values_of_every_type() {
         assert_eq!(controller.get("motor.n_p").unwrap(), Values::Integers(vec![4]));
         assert_eq!(controller.get("current.active_resistance").unwrap(), Values::Booleans(vec![true]));
         assert_eq!(controller.get("estimator").unwrap(), Values::Integers(vec![13]));
-        let wrong = controller.set("T_s", &Values::Booleans(vec![true])).unwrap_err();
+        let wrong = controller.set("T_s", true).unwrap_err();
         assert_eq!(wrong.to_string(), "controller: true is not a value of the type Float64");
     });
+}
+
+#[test]
+fn values_have_the_types_of_rust() {
+    in_both("SensorlessController", |fmu| {
+        let mut controller = fmu.instantiate("controller", false).unwrap();
+        controller.set("T_s", 2e-4).unwrap();
+        controller.set("motor.n_p", 4).unwrap();
+        controller.set("current.active_resistance", true).unwrap();
+        controller.set("estimator", 13_i64).unwrap();
+        controller.setup(0.0, None).unwrap();
+        controller.enter_initialization().unwrap();
+        assert_eq!(controller.get_as("T_s"), Ok(2e-4));
+        assert_eq!(controller.get_as("motor.n_p"), Ok(4_u16));
+        assert_eq!(controller.get_as("current.active_resistance"), Ok(true));
+        assert_eq!(controller.get_as("estimator"), Ok(13_i32));
+        let wrong = controller.get_as::<bool>("T_s").unwrap_err();
+        assert_eq!(wrong.to_string(), "controller: T_s = 0.0002 is not one Boolean");
+    });
+}
+
+#[test]
+fn a_wrong_name_comes_with_those_that_resemble_it() {
+    in_both("PmsmPlant", |fmu| {
+        let mut plant = fmu.instantiate("plant", false).unwrap();
+        let error = plant.set("motor.R", 2.0).unwrap_err();
+        assert_eq!(error.to_string(), "plant: has no variable motor.R; did you mean motor.R_s?");
+        let Error::Variable { instance, name, similar } = error else { panic!("another error") };
+        assert_eq!((instance.as_str(), name.as_str(), similar), ("plant", "motor.R", vec!["motor.R_s".to_owned()]));
+    });
+    let missing = Fmu::open("missing.fmu").err().unwrap();
+    let source = std::error::Error::source(&missing).and_then(|source| source.downcast_ref::<std::io::Error>());
+    assert_eq!(source.map(std::io::Error::kind), Some(std::io::ErrorKind::NotFound), "{missing}");
+}
+
+#[test]
+fn the_examples_run() {
+    let fmi3 = common::archives().join("fmi3");
+    let drive = fmi3.join("PmsmDrive.fmu");
+    let speed = co_simulation::run(&drive).unwrap();
+    assert!((speed - 500.0 * std::f64::consts::PI / 30.0).abs() < 1.0, "{speed}");
+    let pair = two_fmus::run(&fmi3).unwrap();
+    let (t, speed) = *pair.last().unwrap();
+    assert!(pair.len() == 5001 && (t - 0.5).abs() < 1e-9 && (speed - 52.36).abs() < 1.0, "{t} {speed}");
+    let lowest = sweep::run(&drive, &[0.0, 2.0]).unwrap();
+    assert!(lowest[0].0 == 0.0 && lowest[1].0 == 2.0 && lowest[1].1 < lowest[0].1, "{lowest:?}");
 }
 
 #[test]

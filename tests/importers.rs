@@ -25,13 +25,21 @@ fn ecos_libcosim_fmucontainer_pathsim_and_fmuloader() {
     pytest("importers", "importers", &files, &[("FMU_REFERENCE", &file)]);
 }
 
+/// FMUs of PythonFMU, pythonfmu3 and fmucontainer in `fmu simulate` and in FMPy: equal bits.
+#[test]
+fn fmus_of_other_tools_run_as_in_fmpy() {
+    let variables = [("FMU_REFERENCE", &*references()), ("FMU_COMMAND", Path::new(env!("CARGO_BIN_EXE_fmu")))];
+    pytest("importers", "foreign", &["test_foreign.py"], &variables);
+}
+
 /// PathSim integrates the template for users' FMUs; the test explains why the motor FMUs do not run there.
 #[test]
 #[ignore = "opt-in: cargo test --test importers pathsim_in_model_exchange -- --ignored (half a minute)"]
 fn pathsim_in_model_exchange() {
     let own = scratch().join("pathsim-own-fmu");
-    let template = build::Build { package: vec!["own-fmu".into()], out: Some(own.clone()), ..build::Build::default() };
-    build::run(&template).unwrap();
+    let template =
+        build::Models { package: vec!["own-fmu".into()], out: Some(own.clone()), ..build::Models::default() };
+    build::models(&template).unwrap();
     let variables = [("FMU_REFERENCE", &*references()), ("FMU_OWN", &*own)];
     pytest("importers", "pathsim-exchange", &["test_pathsim_exchange.py"], &variables);
 }

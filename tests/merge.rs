@@ -3,7 +3,7 @@
 
 mod common;
 
-use fmu::commands::build::Linux64;
+use cargo_fmu::build::Linux64;
 use fmu::commands::merge::{self, Merge};
 use fmu_check as check;
 use fmu_import::platform::Platform;

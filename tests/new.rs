@@ -43,15 +43,16 @@ for path in sys.argv[1:]:
         print(path, kind, error)
 ";
 
-/// Outside of any checkout: `cargo fmu new`, then the steps of the project's file for CI.
+/// Outside of any checkout: `fmu new`, then the steps of the project's file for CI.
 #[test]
+#[expect(clippy::too_many_lines, reason = "one way from the name to FMPy, in order")]
 fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let requirements = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fmpy/requirements.txt");
     let python = python::environment(&requirements);
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().join("my-model");
     let start = Instant::now();
-    let said = succeeds(command("cargo", dir.path()).args(["fmu", "new", "my-model"]));
+    let said = succeeds(command("fmu", dir.path()).args(["new", "my-model"]));
     assert!(said.contains("my-model: the FMU MyModel"), "{said}");
     // All dependencies have the versions of this workspace.
     succeeds(command("cargo", &folder).args(["metadata", "--locked", "--format-version", "1"]));
@@ -122,6 +123,29 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let binary = files.iter().find(|(name, _)| name.starts_with("binaries/")).unwrap().1;
     assert!(!binary.windows(root.len()).any(|w| w == root.as_bytes()), "the binary names a folder of this machine");
 
+    // A default experiment that fails is an error, and the archives of before stay.
+    let (stimuli, before) = (folder.join("stimuli.csv"), fs::read(folder.join(archives[1])).unwrap());
+    let right = fs::read_to_string(&stimuli).unwrap();
+    fs::write(&stimuli, "time,hea\n0,1\n").unwrap();
+    let output = command("fmu", &folder).arg("build").output().unwrap();
+    let said = text(&output);
+    let line = said.lines().find(|line| line.starts_with("error: ")).unwrap();
+    assert!(output.status.code() == Some(1) && line.contains("MyModel: the default experiment fails: "), "{said}");
+    assert!(line.contains("hea") && line.ends_with("or build with --no-reference"), "{said}");
+    assert_eq!(fs::read(folder.join(archives[1])).unwrap(), before);
+    succeeds(command("fmu", &folder).args(["build", "--no-reference"]));
+    assert!(fmu_import::contents(&folder.join(archives[1])).unwrap().1.keys().all(|name| !name.contains("fmi-ls-ref")));
+    fs::write(&stimuli, right).unwrap();
+
+    // A build for development has the paths of the sources, for a debugger, and no reference result.
+    let lines = ("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
+    succeeds(command("fmu", &folder).args(["build", "--dev"]).env(lines.0, lines.1));
+    let files = fmu_import::contents(&folder.join(archives[1])).unwrap().1;
+    let binary = files.iter().find(|(name, _)| name.starts_with("binaries/")).unwrap().1;
+    let path = folder.to_str().unwrap().as_bytes();
+    assert!(binary.windows(path.len()).any(|w| w == path), "the binary does not name the folder of its sources");
+    assert!(files.keys().all(|name| !name.contains("fmi-ls-ref")));
+
     // A mistake of the model found while `fmu build` varies its parameters is reported with the model's message.
     let source = folder.join("src/lib.rs");
     let right = fs::read_to_string(&source).unwrap();
@@ -130,11 +154,14 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     let wrong = right.replacen("*out = Outputs {", mistake, 1);
     assert_ne!(wrong, right);
     fs::write(&source, wrong).unwrap();
-    let output = command("fmu", &folder).arg("build").output().unwrap();
+    let output = command("fmu", &folder).args(["build", "--dev"]).env(lines.0, lines.1).output().unwrap();
     let said = text(&output);
     assert!(!output.status.success(), "{said}");
     let line = said.lines().find(|line| line.starts_with("error: ")).unwrap();
-    assert!(line.contains("a fault in the model's code (panic): ") && line.contains(" W/K is too much"), "{said}");
+    assert!(
+        line.contains("a fault in the model's code (panic): ") && line.contains(" W/K is too much (src/lib.rs:"),
+        "{said}"
+    );
     println!("{line}");
 }
 
@@ -146,7 +173,7 @@ fn walk(folder: &Path) -> Vec<PathBuf> {
 /// Lines that are neither blank nor part of the model: the manifest, imports, derives, the export line, the module of tests.
 #[test]
 fn at_most_20_lines_are_not_the_model() {
-    let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("template");
+    let template = Path::new(env!("CARGO_MANIFEST_DIR")).join("cargo-fmu/template");
     let read = |name: &str| fs::read_to_string(template.join(name)).unwrap();
     let manifest = read("manifest.toml").replace("{dependencies}", "fmu-core\nfmu-export");
     let beside = |line: &&str| ["use ", "#[", "fmu_export::", "mod tests"].iter().any(|p| line.starts_with(p));
@@ -187,30 +214,4 @@ fn what_cannot_be_made_is_refused_in_one_line() {
     }
     assert!(walk(dir.path()).is_empty(), "nothing is left");
     assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1, "the folder that was there");
-}
-
-/// The same command in both spellings, and a folder that has no package.
-#[test]
-fn cargo_fmu_is_the_command() {
-    let dir = tempfile::tempdir().unwrap();
-    let one = succeeds(command("cargo", dir.path()).args(["fmu", "--version"]));
-    assert_eq!(one, succeeds(command("fmu", dir.path()).arg("--version")));
-    let refused = |parts: &[&str]| {
-        let output = command("cargo", dir.path()).args(["fmu", "build"]).output().unwrap();
-        let said = text(&output);
-        assert!(output.status.code() == Some(2) && said.lines().count() == 1, "{said}");
-        for part in parts {
-            assert!(said.contains(part), "{part}: {said}");
-        }
-    };
-    let here = dir.path().display().to_string();
-    refused(&["error: no Cargo package here: expected a Cargo.toml in ", &here, "fmu new my-model"]);
-    // A package that is not an FMU.
-    let manifest = "[package]\nname = \"plain\"\nversion = \"0.1.0\"\nedition = \"2024\"\n[workspace]\n";
-    fs::write(dir.path().join("Cargo.toml"), manifest).unwrap();
-    fs::create_dir(dir.path().join("src")).unwrap();
-    fs::write(dir.path().join("src/lib.rs"), "").unwrap();
-    refused(&["error: no FMU package here: expected crate-type = [\"cdylib\"] and the dependency fmu-export"]);
-    fs::write(dir.path().join("Cargo.toml"), "[package]\nname = 1\n").unwrap();
-    refused(&["error: cargo metadata: "]);
 }

@@ -50,11 +50,13 @@ const GUARDED: &[(&str, &str)] = &[
     ("tolerance", ACCURATE),
 ];
 
-/// Options that need a compiler, a browser's module, Python or minutes, with the test that shows their effect.
+/// Options that need a compiler, a browser's module, Python or several minutes, with the test that shows their effect.
 const ELSEWHERE: &[(&str, &str, &str)] = &[
     ("build", "target", "tests/targets.rs"),
     ("build", "package", "tests/own_fmu.rs"),
     ("build", "release_dir", "tests/targets.rs"),
+    ("build", "dev", "tests/new.rs"),
+    ("build", "keep_symbols", "fmu-pack/src/compile.rs"),
     ("page", "package", "tests/page.rs"),
     ("page", "site", "tests/page.rs"),
     ("prove", "python", "tests/prove.rs"),
@@ -115,10 +117,18 @@ const COMMANDS: &[Options] = &[
             ("target", "x86_64-pc-windows-gnu"),
             ("linux64", "aarch64"),
             ("release_dir", "release"),
+            ("timeout", "1e-9"),
+            ("memory", "64"),
         ],
         modes: &[
-            Mode { line: "--library in/lib.so --out out", same: &[] },
-            Mode { line: "--library in/lib.so --out out --fmi 3", same: &[] },
+            Mode {
+                line: "--library in/lib.so --out out",
+                same: &[("memory", LIMIT), ("sandbox", LIMIT), ("in-process", EQUAL)],
+            },
+            Mode {
+                line: "--library in/lib.so --out out --fmi 3",
+                same: &[("memory", LIMIT), ("sandbox", LIMIT), ("in-process", EQUAL)],
+            },
         ],
     },
     Options {
@@ -142,6 +152,7 @@ const COMMANDS: &[Options] = &[
             ("step", "0.0005"),
             ("record", "speed"),
             ("overlay", "in/earlier.csv"),
+            ("replay", "in/none.calls"),
             ("csv", "out.csv"),
             ("plot", "out.svg"),
             ("html", "out.html"),
@@ -289,7 +300,13 @@ const COMMANDS: &[Options] = &[
     },
     Options {
         command: "tune",
-        values: &[("out", "other"), ("fmu", "in/PmsmPlant.fmu"), ("estimator", "Rasmussen")],
+        values: &[
+            ("out", "other"),
+            ("fmu", "in/PmsmPlant.fmu"),
+            ("estimator", "Rasmussen"),
+            ("control", "torque"),
+            ("shaft", "imposed"),
+        ],
         modes: &[
             Mode { line: "in/motor.toml --out out", same: &[] },
             Mode { line: "in/motor.toml --json", same: &[] },
@@ -337,6 +354,16 @@ const COMMANDS: &[Options] = &[
             ("vehicle", "in/vehicle.toml"),
         ],
         modes: &[Mode { line: "in/traction.toml --out out --grid 5x5 --verify 0", same: &[] }],
+    },
+    Options {
+        command: "datasheet",
+        values: &[("out", "other"), ("fmu", "in/MappedDrive.fmu")],
+        modes: &[
+            Mode { line: "in/sheet.toml --out out", same: &[] },
+            Mode { line: "in/sheet.toml --json", same: &[] },
+            Mode { line: "in/sheet.toml --fmu in/MappedDrive.fmu --out out.fmu", same: &[] },
+            Mode { line: "--example", same: &[] },
+        ],
     },
     Options {
         command: "ssp",
@@ -439,7 +466,7 @@ fn inputs(folder: &Path) {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let write = |name: &str, text: &str| fs::write(folder.join(name), text).unwrap();
     let copy = |from: &str, to: &str| assert!(fs::copy(root.join(from), folder.join(to)).unwrap() > 0);
-    for name in ["PmsmDrive", "PmsmPlant", "SensorlessController"] {
+    for name in ["MappedDrive", "PmsmDrive", "PmsmPlant", "SensorlessController"] {
         let file = format!("{name}.fmu");
         fs::copy(common::archives().join("fmi3").join(&file), folder.join(&file)).unwrap();
     }
@@ -449,7 +476,9 @@ fn inputs(folder: &Path) {
         let text = || String::from_utf8(bytes.clone()).unwrap().replacen("fmiVersion=\"3.0\"", "fmiVersion=\"3.7\"", 1);
         Some(if name == "terminalsAndIcons/terminalsAndIcons.xml" { text().into() } else { bytes })
     });
-    let mut archive = zip::ZipArchive::new(fs::File::open(&plant).unwrap()).unwrap();
+    // A small model: each mode of `fmu build` runs it.
+    let stair = &common::packed::packed("examples/reference-fmus/stair", "stair", &folder.join("packed"))[1];
+    let mut archive = zip::ZipArchive::new(fs::File::open(stair).unwrap()).unwrap();
     let platform = fmu_import::platform::Platform::host();
     let library = (0..archive.len()).find_map(|k| {
         let mut entry = archive.by_index(k).unwrap();
@@ -463,6 +492,7 @@ fn inputs(folder: &Path) {
     write("resources/table.txt", "1\n");
     let motor = fs::read_to_string(root.join("motors/reference.toml")).unwrap();
     write("motor.toml", &(motor + "\n[control]\nestimator = \"ExtendedEmf\"\n"));
+    copy("examples/datasheet/drive.toml", "sheet.toml");
     copy("motors/traction-63kw.toml", "traction.toml");
     copy("examples/bench.csv", "bench.csv");
     write("cycle.csv", "t,v\n0,0\n10,20\n20,0\n");

@@ -1,7 +1,7 @@
 //! The example of a user's FMU: built with the commands of its first lines, run, and checked.
 #![allow(missing_docs)]
 
-use fmu::commands::build::{self, Build};
+use fmu::commands::build::{self, Models};
 use fmu_check::Level;
 use fmu_import::Fmu;
 use fmu_system::cosimulation::{Recording, Schedule, Settings, System, Units};
@@ -14,7 +14,7 @@ fn archives() -> &'static [PathBuf] {
     static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
     FILES.get_or_init(|| {
         let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("own-fmu");
-        build::run(&Build { package: vec!["own-fmu".into()], out: Some(out), ..Build::default() }).unwrap()
+        build::models(&Models { package: vec!["own-fmu".into()], out: Some(out), ..Models::default() }).unwrap()
     })
 }
 

@@ -268,7 +268,7 @@ fn in_node(script: &str) -> Option<String> {
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-/// A CSV file of a page is one of `fmu_import::csv`: the same quotation marks, headings with units, and numbers with all bits.
+/// `fmu_import::csv` reads the CSV file of a page: the same quotation marks, headings with units, and numbers with all bits.
 #[test]
 fn a_csv_of_a_page_is_one_of_ours() {
     let names = ["time", "a,b", "m[1,2]", "say \"x\"", "plain name", "two\nlines", " blank "];

@@ -49,7 +49,7 @@ fn the_whole_drive_in_one_fmu() {
         drive.exit_initialization().unwrap();
         for k in 0..600_u32 {
             let t = f64::from(k) * 1e-3;
-            drive.set("speed_ref", &Values::Reals(vec![at(experiment.speed_ref, t) * RPM])).unwrap();
+            drive.set("speed_ref", Values::Reals(vec![at(experiment.speed_ref, t) * RPM])).unwrap();
             let _ = drive.do_step(t, 1e-3).unwrap();
         }
         for (name, expected) in [("speed", &pair.speed), ("speed_est", &pair.speed_est)] {

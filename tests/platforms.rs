@@ -3,7 +3,7 @@
 #![allow(missing_docs)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 
-use fmu::commands::build::{self, Build};
+use fmu::commands::build::{self, Models};
 use fmu_check as check;
 use fmu_import as importer;
 use fmu_import::platform::Platform;
@@ -101,9 +101,9 @@ fn said(command: &mut Command) -> String {
 }
 
 /// Archives of the FMU for the three platforms, FMI 2.0 and FMI 3.0.
-fn archives(what: Build, out: &Path) -> Vec<PathBuf> {
+fn archives(what: Models, out: &Path) -> Vec<PathBuf> {
     let target = TARGETS.map(String::from).to_vec();
-    build::run(&Build { target, out: Some(out.into()), ..what }).unwrap_or_else(|e| panic!("{e:#}"))
+    build::models(&Models { target, out: Some(out.into()), ..what }).unwrap_or_else(|e| panic!("{e:#}"))
 }
 
 /// Runs the binaries of one archive; returns what each printed.
@@ -142,7 +142,7 @@ fn checked(archive: &Path) {
 fn the_drive_has_the_same_states_on_three_platforms() {
     let _ = Machines::find();
     let dir = tempfile::tempdir().unwrap();
-    let drive = Build { fmus: vec!["PmsmDrive".into()], ..Build::default() };
+    let drive = Models { fmus: vec!["PmsmDrive".into()], ..Models::default() };
     let mut all = Vec::new();
     for archive in archives(drive, dir.path()) {
         let size = fs::metadata(&archive).unwrap().len();
@@ -175,7 +175,7 @@ fn the_drive_has_the_same_states_on_three_platforms() {
 fn an_error_and_a_panic_are_a_status_on_three_platforms() {
     let _ = Machines::find();
     let dir = tempfile::tempdir().unwrap();
-    for archive in archives(Build { package: vec!["faulty-fmu".into()], ..Build::default() }, dir.path()) {
+    for archive in archives(Models { package: vec!["faulty-fmu".into()], ..Models::default() }, dir.path()) {
         let answers = everywhere(&archive, dir.path(), |md| {
             // The values of mode: see fmu-export/tests/common/model.rs.
             ["fault", &reference(md, "mode"), "2", "4"].map(String::from).to_vec()

@@ -4,7 +4,6 @@
 mod common;
 
 use common::python::{environment, pytest_with, run, scratch};
-use fmu::commands::build::{self, Build};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::{env, fs, iter, process};
@@ -32,9 +31,9 @@ fn installed() -> PathBuf {
 /// Archives of the Reference-FMUs that the tests integrate.
 fn reference() -> PathBuf {
     let folder = scratch().join("python-reference");
-    let package = ["bouncing-ball", "van-der-pol", "stair", "dahlquist", "state-space"].map(String::from).to_vec();
-    let build = Build { package, out: Some(folder.clone()), ..Build::default() };
-    build::run(&build).expect("Reference-FMUs that build");
+    for package in ["bouncing-ball", "van-der-pol", "stair", "dahlquist", "state-space", "feedthrough"] {
+        common::packed::packed(&format!("examples/reference-fmus/{package}"), package, &folder);
+    }
     folder
 }
 
@@ -75,6 +74,7 @@ fn the_package() {
         "linearize",
         "frequency",
         "drives",
+        "vehicle",
         "plot",
         "fmpy",
         "batch",
@@ -85,6 +85,7 @@ fn the_package() {
         "cli",
         "types",
         "docs",
+        "pages",
         "figures",
         "identify",
     ];

@@ -4,10 +4,10 @@
 #![allow(missing_docs)]
 
 use drive::estimator::Kind;
-use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
+use drive::{MappedDrive, PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
 use drive_study::runner;
 use fmu_core::draw::Draw;
-use fmu_core::{Block, Model, Plain};
+use fmu_core::{Block, Capabilities, Fault, Plain, Stored};
 use fmu_export::instance::Instance;
 use fmu_export::lifecycle::{Next, Standard, State};
 use fmu_export::log::{Log, Sink, Status};
@@ -25,7 +25,7 @@ const H: f64 = 1e-4;
 /// Bytes before the content, and the part of them that is the same in every state of a model.
 const HEADER: usize = 32;
 /// Maximum duration of a trial on any machine. A step of our models has at most 1e7 substeps and so takes seconds.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_mins(1);
 
 struct Silent;
 
@@ -63,12 +63,22 @@ fn watch(name: &'static str) -> Arc<AtomicU64> {
     trial
 }
 
-fn instance<M: Model>(current: Snapshot<M>) -> Instance<Plain<M>> {
+fn instance<M: Stored>(current: Snapshot<M>) -> Instance<Plain<M>> {
     Instance::new(Standard::Fmi3, "stored".into(), Log::new(Box::new(Silent), false), current)
 }
 
+/// The bytes of an instance.
+fn written<M: Stored>(instance: &Instance<Plain<M>>) -> Vec<u8> {
+    blob::write(&instance.current, &Capabilities::NONE.stored.unwrap()).unwrap()
+}
+
+/// The state in these bytes.
+fn read<M: Stored>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
+    blob::read(bytes, &Capabilities::NONE.stored.unwrap())
+}
+
 /// Sets the variable `name`, if it exists.
-fn put<M: Model>(current: &mut Snapshot<M>, name: &str, value: f64) {
+fn put<M: Stored>(current: &mut Snapshot<M>, name: &str, value: f64) {
     let index = (0..M::TABLE.len()).find(|&i| M::TABLE.locate(i).is_some_and(|(n, ..)| n == name));
     if let Some((_, fmu_core::Slot::Real(x))) = index.and_then(|i| M::TABLE.entry(&mut current.block, i)) {
         *x = value;
@@ -76,23 +86,23 @@ fn put<M: Model>(current: &mut Snapshot<M>, name: &str, value: f64) {
 }
 
 /// Ends initialization as the gate would.
-fn exit<M: Model>(instance: &mut Instance<Plain<M>>) -> bool {
+fn exit<M: Stored>(instance: &mut Instance<Plain<M>>) -> bool {
     let done = instance.exit_initialization().is_ok();
     instance.current.life.after(done, Next::Start);
     done
 }
 
 /// Bytes of a block in every state of its life.
-fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
+fn seeds<M: Stored>(block: Block<M>) -> Vec<Vec<u8>> {
     let mut instance = instance(Snapshot { block, ..Snapshot::default() });
-    let mut seeds = vec![blob::write(&instance.current).unwrap()];
+    let mut seeds = vec![written(&instance)];
     instance.set_up(0.5, Some(1e3)).unwrap();
     instance.current.life.after(true, Next::To(State::Initialization));
-    seeds.push(blob::write(&instance.current).unwrap());
+    seeds.push(written(&instance));
     assert!(exit(&mut instance));
     for k in 0..400 {
         if [0, 1, 30].contains(&k) {
-            seeds.push(blob::write(&instance.current).unwrap());
+            seeds.push(written(&instance));
         }
         for (name, value) in [("u_a", 20.0), ("u_b", -5.0), ("i_a", 1.0), ("i_b", -2.0), ("u_dc", 540.0)] {
             put(&mut instance.current, name, value);
@@ -100,9 +110,9 @@ fn seeds<M: Model>(block: Block<M>) -> Vec<Vec<u8>> {
         put(&mut instance.current, "speed_ref", 50.0);
         instance.do_step(instance.current.end, H).unwrap();
     }
-    seeds.push(blob::write(&instance.current).unwrap());
+    seeds.push(written(&instance));
     instance.current.life.after(true, Next::To(State::Terminated));
-    seeds.push(blob::write(&instance.current).unwrap());
+    seeds.push(written(&instance));
     seeds
 }
 
@@ -159,20 +169,17 @@ fn damaged(seeds: &[Vec<u8>], draw: &mut Draw) -> (Vec<u8>, bool) {
 }
 
 /// Restores the bytes; returns whether they were accepted, and the duration of the longest step.
-fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
+fn trial<M: Stored>(bytes: &[u8]) -> Option<Duration> {
     let mut instance = instance::<M>(Snapshot::default());
-    let before = blob::write(&instance.current).unwrap();
+    let before = written(&instance);
     let handle = instance.deserialize(bytes);
-    assert!(blob::write(&instance.current).unwrap() == before, "the instance changed");
+    assert!(written(&instance) == before, "the instance changed");
     let handle = handle.ok()?;
     // A state of an instance for another interface is refused here.
     let restored = instance.restore(handle);
     registry::free::<M>(handle).unwrap();
     restored.ok()?;
-    assert!(
-        blob::read::<M>(&blob::write(&instance.current).unwrap()).is_ok(),
-        "a state that was taken is one that can be stored"
-    );
+    assert!(read::<M>(&written(&instance)).is_ok(), "a state that was taken is one that can be stored");
     let references: Vec<u32> = (1..=u32::try_from(M::TABLE.len()).unwrap())
         .filter(|&r| {
             let row = M::TABLE.locate(r as usize - 1);
@@ -207,12 +214,12 @@ fn trial<M: Model>(bytes: &[u8]) -> Option<Duration> {
     Some(longest)
 }
 
-fn damage<M: Model>(seeds: &[Vec<u8>], trials: u64) {
+fn damage<M: Stored>(seeds: &[Vec<u8>], trials: u64) {
     let name = M::INFO.name;
     let (number, mut draw) = (watch(name), Draw(asked("FMU_SEED", 1)));
     let (mut taken, mut longest) = (0_u64, Duration::ZERO);
     for seed in seeds {
-        assert!(blob::read::<M>(seed).is_ok(), "a seed is whole");
+        assert!(read::<M>(seed).is_ok(), "a seed is whole");
     }
     for k in 0..trials {
         number.store(k, Relaxed);
@@ -262,6 +269,11 @@ fn controller() {
 #[test]
 fn mean() {
     damage::<PmsmDriveMean>(&seeds(Block::<PmsmDriveMean>::default()), trials());
+}
+
+#[test]
+fn mapped() {
+    damage::<MappedDrive>(&seeds(Block::<MappedDrive>::default()), trials());
 }
 
 #[test]

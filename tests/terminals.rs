@@ -142,7 +142,7 @@ fn the_files_are_in_the_archives() {
         zip.file_names().map(|n| n.unwrap().into_owned()).collect::<Vec<_>>()
     };
     for standard in ["fmi2", "fmi3"] {
-        for name in ["PmsmPlant", "SensorlessController", "PmsmDrive", "PmsmDriveMean"] {
+        for name in ["PmsmPlant", "SensorlessController", "PmsmDrive", "PmsmDriveMean", "MappedDrive"] {
             let names = names(&archive(standard, name));
             for file in ["terminalsAndIcons.xml", "icon.svg", "icon.png"] {
                 assert!(names.contains(&format!("terminalsAndIcons/{file}")), "{standard} {name}: {file}");

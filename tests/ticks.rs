@@ -1,7 +1,6 @@
 //! FMUs with clocks in our importer, which generates their ticks: Co-Simulation with Event Mode and Model Exchange.
 #![allow(missing_docs, clippy::float_cmp)]
 
-use fmu::commands::build::{self, Build};
 use fmu_import::{Fmu, Values};
 use fmu_system::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
 use std::ops::ControlFlow;
@@ -60,7 +59,7 @@ fn the_clocked_pair_is_the_pair() {
     }
 }
 
-/// Runs two instances of an FMU with a clock of every kind, of which `a` triggers `b`, in this order; for each clock of both, the
+/// Runs two instances of an FMU with a clock of every kind, in this order; `a` triggers `b`; for each clock of both, the
 /// times (s) of its ticks from the start.
 fn ticks(fmu: &Fmu, method: &Method, order: [&str; 2], step: f64) -> [Vec<Vec<f64>>; 2] {
     let mut system = System::new(method.clone());
@@ -87,8 +86,7 @@ fn ticks(fmu: &Fmu, method: &Method, order: [&str; 2], step: f64) -> [Vec<Vec<f6
 /// another. At 0.3 s five clocks tick, whose times are rounded differently.
 #[test]
 fn every_kind_ticks_at_its_times() {
-    let out = common::python::scratch().join("ticks");
-    let files = build::run(&Build { package: vec!["ticks-fmu".into()], out: Some(out), ..Build::default() }).unwrap();
+    let files = common::packed::packed("tests/ticks", "ticks-fmu", &common::python::scratch().join("ticks"));
     // Only the fraction determines when its clock ticks.
     let file = files[0].with_file_name("fractions.fmu");
     let decimals = r#" intervalDecimal="0.3333333333333333" shiftDecimal="0.3333333333333333""#;

@@ -81,9 +81,11 @@ fn every_machine_starts_and_reaches_its_speed() {
 #[test]
 fn the_examples_have_the_parameters_of_today() {
     let dir = tempfile::tempdir().unwrap();
-    for machine in ["traction-100kw", "ipmsm-2.2kw", "servo-6.6kw"] {
+    let vehicle = ["--estimator", "Sensored", "--control", "torque", "--shaft", "imposed"];
+    for (machine, more) in [("traction-100kw", &vehicle[..]), ("ipmsm-2.2kw", &[]), ("servo-6.6kw", &[])] {
         let motor = motors().into_iter().find(|p| p.file_stem().unwrap() == machine).unwrap();
-        let tuned = fmu(&["tune", motor.to_str().unwrap(), "--integers", "--out", dir.path().to_str().unwrap()]);
+        let words = ["tune", motor.to_str().unwrap(), "--integers", "--out", dir.path().to_str().unwrap()];
+        let tuned = fmu(&[&words[..], more].concat());
         assert!(tuned.status.success(), "{}", String::from_utf8_lossy(&tuned.stderr));
         let name = format!("{machine}.PmsmDrive.ssv");
         let written = std::fs::read_to_string(dir.path().join(&name)).unwrap();
@@ -160,7 +162,7 @@ fn files_have_what_differs_from_the_start_values() {
         }
     };
     for path in motors() {
-        let tuned = tune::tune(&path).unwrap();
+        let tuned = rules::fixed(&MotorFile::read(&path).unwrap()).unwrap();
         let (plant, controller) = tune::needed(&tuned, false).unwrap();
         for ((description, all), needed) in
             starts.iter().zip([&tuned.plant, &tuned.controller]).zip([plant, controller])
@@ -311,7 +313,7 @@ fn the_check_prints_what_holds_and_what_was_announced() {
 fn the_drive_has_the_values_of_plant_and_controller() {
     let description = fmu_core::Description::of::<drive::PmsmDrive>().unwrap();
     for path in motors() {
-        let tuned = tune::tune(&path).unwrap();
+        let tuned = rules::fixed(&MotorFile::read(&path).unwrap()).unwrap();
         let (plant, controller) = tune::needed(&tuned, false).unwrap();
         let drive = tune::of_drive(&tuned, false).unwrap();
         for (name, value) in &drive {

@@ -3,7 +3,6 @@
 
 mod common;
 
-use fmu::commands::build::{self, Build};
 use fmu_import::{Fmu, Instance, Kind, Values};
 use fmu_system::cosimulation::{Settings, System};
 use fmu_system::ssp::{ssv, values};
@@ -17,10 +16,7 @@ use std::sync::OnceLock;
 /// EveryType.fmu of FMI 2.0 and of FMI 3.0.
 fn archives() -> &'static [PathBuf] {
     static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
-    FILES.get_or_init(|| {
-        let out = common::python::scratch().join("types");
-        build::run(&Build { package: vec!["types-fmu".into()], out: Some(out), ..Build::default() }).unwrap()
-    })
+    FILES.get_or_init(|| common::packed::packed("tests/types", "types-fmu", &common::python::scratch().join("types")))
 }
 
 fn archive(version: FmiVersion) -> &'static Path {
@@ -74,7 +70,7 @@ fn integers_of_every_type_travel_to_the_end_of_their_range() {
                 assert_eq!(said, (printed(low, least), printed(high, most)), "{input}");
             }
             for value in [low, high] {
-                instance.set(&input, &integer(value)).unwrap();
+                instance.set(&input, integer(value)).unwrap();
                 assert_eq!(instance.get(&output).unwrap(), integer(value), "{output}");
             }
         }
@@ -94,13 +90,13 @@ fn what_does_not_fit_says_why() {
         (V3, "fixed.int32", -10, "fixed.int32 = -10 is not allowed: at least -9"),
     ];
     for (version, name, value, why) in refusals {
-        let error = fresh(version).set(name, &integer(value)).unwrap_err().to_string();
+        let error = fresh(version).set(name, integer(value)).unwrap_err().to_string();
         assert!(error.contains(why), "{error}");
     }
     // FMI 2.0 cannot represent the final value of a 64-bit variable.
     for version in [V2, V3] {
         let mut instance = entered(version);
-        instance.set("fixed.uint64", &integer(100_000)).unwrap();
+        instance.set("fixed.uint64", integer(100_000)).unwrap();
         instance.exit_initialization().unwrap();
         match instance.get("local.uint64") {
             Ok(value) => assert!(version == V3 && value == integer(10_000_000_000_i128)),
@@ -119,12 +115,12 @@ fn single_precision_rounds_once() {
         let v = instance.variable("in.single").unwrap().clone();
         assert_eq!(v.base, if version == V2 { BaseType::Float64 } else { BaseType::Float32 });
         assert_eq!(v.start.unwrap(), if version == V2 { "0.10000000149011612" } else { "0.1" });
-        instance.set("in.single", &Values::Reals(vec![0.2])).unwrap();
+        instance.set("in.single", Values::Reals(vec![0.2])).unwrap();
         assert_eq!(instance.get("out.single").unwrap(), Values::Reals(vec![f64::from(0.2_f32)]));
         // The bound is also rounded, and a value outside single precision is not a number.
-        instance.set("in.single", &Values::Reals(vec![0.3])).unwrap();
+        instance.set("in.single", Values::Reals(vec![0.3])).unwrap();
         for (beyond, said) in [(0.301, "0.301"), (-1e39, "-")] {
-            let error = fresh(version).set("in.single", &Values::Reals(vec![beyond])).unwrap_err().to_string();
+            let error = fresh(version).set("in.single", Values::Reals(vec![beyond])).unwrap_err().to_string();
             assert!(error.contains(&format!("in.single = {said}")) && error.contains("at most 0.3"), "{error}");
         }
     }
@@ -138,29 +134,29 @@ fn texts_are_set_and_said() {
         assert_eq!(instance.get("revision").unwrap(), text("r1 \u{b5}"));
         let long = "\u{3c8}".repeat(10_000);
         for label in ["", "two\nlines, \"quoted\"", &long] {
-            instance.set("label", &text(label)).unwrap();
+            instance.set("label", text(label)).unwrap();
             assert_eq!((instance.get("label").unwrap(), instance.get("status").unwrap()), (text(label), text(label)));
         }
         instance.exit_initialization().unwrap();
-        instance.set("in.truth", &Values::Booleans(vec![false])).unwrap();
+        instance.set("in.truth", Values::Booleans(vec![false])).unwrap();
         let _ = instance.do_step(0.0, 0.1).unwrap();
         assert_eq!(instance.get("status").unwrap(), text("off"));
-        let error = instance.set("label", &text("late")).unwrap_err().to_string();
+        let error = instance.set("label", text("late")).unwrap_err().to_string();
         assert!(error.contains("label is a fixed parameter"), "{error}");
         for (name, why) in [
             ("status", "status is an output and cannot be set"),
             ("revision", "revision is a constant and cannot be set"),
         ] {
-            let error = fresh(version).set(name, &text("x")).unwrap_err().to_string();
+            let error = fresh(version).set(name, text("x")).unwrap_err().to_string();
             assert!(error.contains(why), "{error}");
         }
         let mut instance = entered(version);
         let number = instance.variable("x").unwrap().value_reference;
         let error = instance.get_at(BaseType::String, number, 1).unwrap_err().to_string();
-        assert!(error.contains("x is a real number, and this function carries a text"), "{error}");
+        assert!(error.contains("x is a real number, and this function takes a text"), "{error}");
         let label = fresh(version).variable("label").unwrap().value_reference;
         let error = entered(version).get_at(BaseType::Float64, label, 1).unwrap_err().to_string();
-        assert!(error.contains("label is a text, and this function carries a real number"), "{error}");
+        assert!(error.contains("label is a text, and this function takes a real number"), "{error}");
     }
 }
 
@@ -168,8 +164,8 @@ fn texts_are_set_and_said() {
 fn matrices_are_row_by_row() {
     let mut two = entered(V2);
     assert!(two.variable("weights[2,3]").is_ok() && two.variable("weights[3,2]").is_err());
-    two.set("weights[2,3]", &Values::Reals(vec![10.0])).unwrap();
-    two.set("matrix[1,2]", &Values::Reals(vec![-2.0])).unwrap();
+    two.set("weights[2,3]", Values::Reals(vec![10.0])).unwrap();
+    two.set("matrix[1,2]", Values::Reals(vec![-2.0])).unwrap();
     let mut three = entered(V3);
     let shape = |name: &str| {
         let v = fresh(V3).variable(name).unwrap().clone();
@@ -185,7 +181,7 @@ fn matrices_are_row_by_row() {
     assert_eq!(two.get("sums[2]").unwrap(), Values::Reals(vec![32.5]));
     assert_eq!(three.get("transposed").unwrap(), Values::Reals(vec![1.0, 3.0, -2.0, 4.0]));
     assert_eq!(two.get("transposed[2,1]").unwrap(), Values::Reals(vec![-2.0]));
-    let error = fresh(V2).set("weights[1,3]", &Values::Reals(vec![f64::NAN])).unwrap_err().to_string();
+    let error = fresh(V2).set("weights[1,3]", Values::Reals(vec![f64::NAN])).unwrap_err().to_string();
     assert!(error.contains("weights[1,3] = NaN"), "{error}");
 }
 
@@ -209,7 +205,7 @@ fn resources_are_there_after_every_way_back() {
     for version in [V2, V3] {
         let square = |instance: &mut Instance| instance.get("square").unwrap();
         let mut first = entered(version);
-        first.set("in.int32", &integer(2)).unwrap();
+        first.set("in.int32", integer(2)).unwrap();
         first.exit_initialization().unwrap();
         assert_eq!(square(&mut first), Values::Reals(vec![4.0]));
         let state = first.get_state().unwrap();
@@ -222,7 +218,7 @@ fn resources_are_there_after_every_way_back() {
             assert_eq!(square(instance), Values::Reals(vec![4.0]));
         }
         second.reset().unwrap();
-        second.set("in.int32", &integer(1)).unwrap();
+        second.set("in.int32", integer(1)).unwrap();
         second.setup(0.0, None).unwrap();
         second.enter_initialization().unwrap();
         assert_eq!(square(&mut second), Values::Reals(vec![1.0]));

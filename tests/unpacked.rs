@@ -24,7 +24,7 @@ fn names(folder: &Path) -> Vec<String> {
 fn wait(until: impl Fn() -> bool, what: &str) {
     let begun = Instant::now();
     while !until() {
-        assert!(begun.elapsed() < Duration::from_secs(60), "{what}");
+        assert!(begun.elapsed() < Duration::from_mins(1), "{what}");
         std::thread::sleep(Duration::from_millis(5));
     }
 }

@@ -19,6 +19,7 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("fmu-check", &["fmu-import", "model-description"]),
     ("fmu-plot", &[]),
     ("fmu-pack", &["fmu-core", "fmu-import", "fmu-plot", "fmu-system", "model-description"]),
+    ("cargo-fmu", &["fmu-core", "fmu-import", "fmu-pack", "fmu-plot", "fmu-system", "model-description"]),
     ("drive-base", &["fmu-core"]),
     ("drive-control", &["drive-base", "fmu-core"]),
     ("drive-plant", &["drive-base", "fmu-core"]),
@@ -30,10 +31,12 @@ const ARROWS: &[(&str, &[&str])] = &[
     ("sensorless-controller-clocked", &["drive", "fmu-export"]),
     ("pmsm-drive", &["drive", "fmu-export"]),
     ("pmsm-drive-mean", &["drive", "fmu-export"]),
+    ("mapped-drive", &["drive", "fmu-export"]),
     ("fmurun", &["drive-tools", "fmu-import", "fmu-plot", "fmu-sweep", "fmu-system", "model-description"]),
     (
         "fmu",
         &[
+            "cargo-fmu",
             "drive",
             "drive-study",
             "drive-tools",
@@ -123,12 +126,69 @@ fn what_builds_fmus_knows_no_motor_and_no_command_line() {
     }
 }
 
-/// A library has an error type with cases or a text; only the command collects errors of every kind.
+/// What an author installs is small: under 60 crates.
 #[test]
-fn the_command_alone_depends_on_anyhow() {
+fn the_command_of_an_author_knows_no_motor_no_checker_and_no_fonts() {
+    let tree = cargo(&["tree", "--offline", "-p", "cargo-fmu", "-e", "normal,build", "--prefix", "none"]);
+    let known: BTreeSet<&str> = tree.lines().map(|line| line.trim_end_matches(" (*)")).collect();
+    assert!((30..60).contains(&known.len()), "{} crates: {known:?}", known.len());
+    let names: BTreeSet<&str> = known.iter().filter_map(|line| line.split(' ').next()).collect();
+    for foreign in ["drive", "drive-tools", "drive-study", "fmu-check", "fmu-sweep", "nalgebra", "resvg", "toml"] {
+        assert!(!names.contains(foreign), "cargo-fmu depends on {foreign}");
+    }
+}
+
+/// A library has an error type with cases or a text; only the commands collect errors of every kind.
+#[test]
+fn the_commands_alone_depend_on_anyhow() {
     for (name, (folder, _)) in &crates() {
         let manifest = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap();
-        assert_eq!(manifest.contains("\nanyhow"), name == "fmu", "{name}");
+        assert_eq!(manifest.contains("\nanyhow"), ["fmu", "cargo-fmu"].contains(&name.as_str()), "{name}");
+    }
+}
+
+/// Dependencies that are not named in the code: they choose a feature of another crate.
+const FEATURES: &[(&str, &str)] = &[("fmu-import", "flate2")];
+
+#[test]
+fn every_dependency_is_used() {
+    for (name, (folder, _)) in crates().iter().filter(|(_, (folder, _))| folder.join("src").is_dir()) {
+        let manifest: toml::Table = std::fs::read_to_string(folder.join("Cargo.toml")).unwrap().parse().unwrap();
+        let mut files = Vec::new();
+        sources(&folder.join("src"), &mut files);
+        let code: String = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
+        let all = manifest.get("dependencies").and_then(toml::Value::as_table).into_iter().flat_map(toml::Table::keys);
+        for dependency in all.filter(|d| !FEATURES.contains(&(name.as_str(), d.as_str()))) {
+            let named = dependency.replace('-', "_");
+            assert!(code.contains(&format!("{named}::")), "{name} does not use {dependency}");
+        }
+    }
+}
+
+/// The licenses and the registry that `deny.toml` allows.
+#[test]
+fn every_linked_crate_has_an_allowed_license_and_registry() {
+    let rules: toml::Table = std::fs::read_to_string(root().join("deny.toml")).unwrap().parse().unwrap();
+    let list = |section: &str, key: &str| -> BTreeSet<String> {
+        rules[section][key].as_array().unwrap().iter().map(|text| text.as_str().unwrap().to_owned()).collect()
+    };
+    let (licenses, registries) = (list("licenses", "allow"), list("sources", "allow-registry"));
+    let host = fmu_pack::target::host_triple().unwrap();
+    let json = cargo(&["metadata", "--offline", "--locked", "--format-version", "1", "--filter-platform", &host]);
+    let metadata: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let packages = metadata["packages"].as_array().unwrap();
+    assert!(packages.len() > 100);
+    for package in packages {
+        let name = package["name"].as_str().unwrap();
+        // An expression in which each license of one alternative of every part is allowed.
+        let expression = package["license"].as_str().unwrap_or_default().replace('/', " OR ").replace(['(', ')'], "");
+        let allowed =
+            expression.split(" AND ").all(|part| part.split(" OR ").any(|license| licenses.contains(license)));
+        assert!(allowed, "{name}: {expression} is not in deny.toml");
+        if let Some(source) = package["source"].as_str() {
+            let known = source.strip_prefix("registry+").is_some_and(|registry| registries.contains(registry));
+            assert!(known, "{name} comes from {source}, which is not in deny.toml");
+        }
     }
 }
 
@@ -152,11 +212,18 @@ fn what_an_fmu_links_is_fully_optimized() {
     assert!(lower.contains_key("fmu-check"));
     let examples = crates().into_iter().filter(|(_, (folder, _))| folder.starts_with(root().join("examples")));
     let examples: Vec<String> = examples.map(|(name, _)| name).collect();
-    let fmus =
-        ["pmsm-drive", "pmsm-drive-mean", "pmsm-plant", "sensorless-controller", "sensorless-controller-clocked"];
+    let fmus = [
+        "mapped-drive",
+        "pmsm-drive",
+        "pmsm-drive-mean",
+        "pmsm-plant",
+        "sensorless-controller",
+        "sensorless-controller-clocked",
+    ];
     for fmu in fmus.into_iter().chain(examples.iter().map(String::as_str)) {
         let linked = known_to(fmu);
-        let slow: Vec<_> = linked.iter().filter(|name| lower.contains_key(name.as_str())).collect();
+        let lowered = |name: &&String| lower.get(*name).is_some_and(|set| set.get("opt-level").is_some());
+        let slow: Vec<_> = linked.iter().filter(lowered).collect();
         assert!(slow.is_empty(), "{fmu} links {slow:?}");
     }
 }
@@ -207,6 +274,25 @@ fn unsafe_stands_in_the_two_interfaces_to_c_alone() {
             }
         }
     }
+}
+
+/// An FMU reads the environment and writes files only for its call log.
+#[test]
+fn the_call_log_alone_reads_the_environment_and_writes_files() {
+    let source = root().join("fmu-export/src");
+    let mut files = Vec::new();
+    sources(&source, &mut files);
+    assert!(files.len() > 30, "{files:?}");
+    let mut found = BTreeSet::new();
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let words = ["use std::env", "std::env::", "OpenOptions", "File::create", "fs::write", "create_dir"];
+        for word in words.into_iter().filter(|word| text.contains(word)) {
+            found.insert((file.strip_prefix(&source).unwrap().to_owned(), word));
+        }
+    }
+    let expected = ["OpenOptions", "use std::env"].map(|word| (PathBuf::from("call_log.rs"), word));
+    assert_eq!(found, BTreeSet::from(expected));
 }
 
 /// An estimator checks a small view of the controller, so the controller depends on the estimators, and they do not depend on it.
@@ -388,6 +474,7 @@ const STAYING: &[(&str, &[&str])] = &[
             "row.rs",
             "row/slot.rs",
             "rules.rs",
+            "saved.rs",
             "sizes.rs",
             "table.rs",
             "token.rs",
@@ -405,6 +492,8 @@ const STAYING: &[(&str, &[&str])] = &[
             "inside.rs",
             "instance.rs",
             "message.rs",
+            "origin.rs",
+            "preset.rs",
             "registry.rs",
             "sensitivity.rs",
             "snapshot.rs",
@@ -416,7 +505,7 @@ const STAYING: &[(&str, &[&str])] = &[
 const SMALL: &[(&str, &[&str])] = &[
     ("fmu", &["commands/build.rs", "commands/page/mod.rs", "commands/page/site.rs"]),
     ("fmu", &["commands/preset.rs", "commands/preset/motor.rs", "commands/tune.rs"]),
-    ("fmu", &["commands/simulate.rs", "commands/simulate/output.rs"]),
+    ("cargo-fmu", &["simulate.rs", "simulate/output.rs"]),
     (
         "fmu-core",
         &[

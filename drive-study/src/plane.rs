@@ -237,7 +237,7 @@ pub struct Split {
     pub end: f64,
     /// Losses, stacked, and efficiency.
     pub panels: [Panel; 2],
-    /// By the equations and of the running drive, at each speed that was measured.
+    /// Values from the equations and from the running drive, at each measured speed.
     pub points: Vec<[OperatingPoint; 2]>,
 }
 

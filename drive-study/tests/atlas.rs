@@ -63,7 +63,7 @@ fn every_scenario_and_any_number_of_threads() {
     assert!(page.contains("prefers-color-scheme:dark") && page.contains("width=device-width"));
 }
 
-/// Machines of files, by the rules of `fmu tune`.
+/// Machines from motor files, tuned by the rules of `fmu tune`.
 #[test]
 fn a_tuned_machine_runs() {
     let motors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors");

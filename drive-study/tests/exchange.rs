@@ -53,7 +53,7 @@ impl Order {
         }
     }
 
-    /// `timing.delay` that is right: the period from the instant of the currents to the voltage.
+    /// The correct `timing.delay`: the period from the instant of the currents to the voltage.
     fn right(self) -> i32 {
         match self {
             Self::ControllerFirst | Self::PlantFirst => 0,

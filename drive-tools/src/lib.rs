@@ -2,6 +2,7 @@
 //!
 //! - [`tune`]: parameter values for a machine, from its motor file.
 //! - [`map`]: efficiency over speed and torque.
+//! - [`datasheet`]: the tables of a drive from its data sheet.
 //! - [`identify`]: a machine's data from a record.
 
 #![forbid(unsafe_code)]
@@ -9,6 +10,7 @@
 #![allow(non_snake_case)]
 
 pub mod csv;
+pub mod datasheet;
 pub mod error;
 pub mod identify;
 pub mod map;

@@ -4,6 +4,8 @@
 use drive::Pair;
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Identified, Results};
 use drive::control::commissioning::CommissionMode;
+use drive::plant::iron::Iron;
+use drive::plant::pwm::InverterMode;
 use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
 use std::path::{Path, PathBuf};
@@ -22,8 +24,18 @@ enum Rotor {
 
 /// Plant and controller of a machine. A `real` inverter has dead time and sensors with offsets, noise and 12 bits.
 fn machine(name: &str, rotor: Rotor, real: bool) -> Pair {
-    let motor = MotorFile::read(&motors().join(format!("{name}.toml"))).unwrap();
-    let mut pair = rules::tune(&motor).unwrap().pair();
+    of(&motors().join(format!("{name}.toml")), rotor, real)
+}
+
+fn of(path: &Path, rotor: Rotor, real: bool) -> Pair {
+    tuned(path, rotor, real).unwrap()
+}
+
+/// # Errors
+/// The values of the machine contradict each other.
+fn tuned(path: &Path, rotor: Rotor, real: bool) -> Result<Pair, String> {
+    let motor = MotorFile::read(path).map_err(|e| e.to_string())?;
+    let mut pair = rules::tune(&motor).map_err(|e| e.to_string())?.pair();
     let par = &mut pair.controller.model.parameters;
     par.commission.mode = if rotor == Rotor::Turning { CommissionMode::Spin } else { CommissionMode::Standstill };
     par.commission.i = par.limit.i;
@@ -39,7 +51,7 @@ fn machine(name: &str, rotor: Rotor, real: bool) -> Pair {
         (par.sensor.noise, par.sensor.resolution) = (0.75e-3 * I, 3.0 * I / 4096.0);
         (par.sensor.offset.a, par.sensor.offset.b) = (6e-3 * I, -3e-3 * I);
     }
-    pair
+    Ok(pair)
 }
 
 /// Runs until the commissioning is over; returns the results, and the maximum current over `commission.i`.
@@ -156,4 +168,60 @@ fn all_machines_find_their_values() {
             }
         }
     }
+}
+
+/// Accepted values are inside their intervals. `pmsyrm-5.5kw` is refused as with an average inverter; `elevator-5kw` and
+/// `traction-80kw` are lost at the lowest level with dead time, where it takes a fifth of the EMF.
+#[test]
+#[ignore = "all machines on switching legs without dead time, with 1 % and with 2 %, two minutes: \
+            cargo test --release -p drive-tools --test commissioning -- --ignored --nocapture switching; \
+            COMMISSION_MOTORS=FOLDER takes other machines"]
+fn all_machines_on_switching_legs_find_true_values() {
+    let other = std::env::var_os("COMMISSION_MOTORS").map(PathBuf::from);
+    let mut paths: Vec<_> =
+        std::fs::read_dir(other.clone().unwrap_or_else(motors)).unwrap().map(|e| e.unwrap().path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|x| x == "toml"));
+    paths.sort();
+    let (mut accepted, mut runs, mut outside, mut refused) = (0, 0, vec![], vec![]);
+    for path in &paths {
+        let name = path.file_stem().unwrap().to_str().unwrap();
+        for share in [0.0, 0.01, 0.02] {
+            let mut pair = match tuned(path, Rotor::Turning, true) {
+                Ok(pair) => pair,
+                Err(why) if other.is_some() => {
+                    println!("{why}");
+                    break;
+                }
+                Err(why) => panic!("{why}"),
+            };
+            let T_s = pair.controller.model.parameters.T_s;
+            let plant = &mut pair.plant.model.parameters;
+            plant.iron = Iron::default();
+            plant.inverter.pwm.mode = InverterMode::Switched;
+            (plant.inverter.T_pwm, plant.inverter.dead_time) = (T_s, share * T_s);
+            let (r, most) = run(&mut pair);
+            let out = &pair.controller.out;
+            print!("{name:15} {share:4} {:?} {:4.1} s {most:.2} I", out.commission_state, pair.now.seconds());
+            runs += 1;
+            if out.commission_fault != Fault::None {
+                refused.push(format!("{name} {share} {:?}", out.commission_fault));
+            }
+            for (quantity, found, truth, _) in compared(&pair, &r) {
+                if found.u >= 1.0 {
+                    print!(", {quantity} -");
+                    continue;
+                }
+                accepted += 1;
+                let error = found.value / truth - 1.0;
+                print!(", {quantity} {:+.3} % +-{:.2}", 100.0 * error, 100.0 * found.u);
+                if error.abs() > found.u + 1e-4 {
+                    outside.push(format!("{name} {share} {quantity} {:+.3} % +-{:.3}", 100.0 * error, 100.0 * found.u));
+                }
+            }
+            println!();
+        }
+    }
+    println!("{accepted} values of {runs} runs, outside of their intervals {outside:?}; runs refused {refused:?}");
+    assert!(outside.len() * 50 <= accepted, "more than 2 % are outside: {outside:?}");
+    assert!(other.is_some() || refused.len() <= 8, "{refused:?}");
 }

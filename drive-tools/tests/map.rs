@@ -190,7 +190,7 @@ fn the_points_of_a_map() {
     assert!(map.notes.is_empty(), "{:?}", map.notes);
     let bare = small("reference", Request { T: vec![80.0], ..Request::default() });
     let notes = bare.notes.join("\n");
-    for part in ["no [iron]: the map counts no loss of the iron", "no [inverter]", "no [temperature]"] {
+    for part in ["no [iron]: the map omits the losses of the iron", "no [inverter]", "no [temperature]"] {
         assert!(notes.contains(part), "{notes}");
     }
     let regions: Vec<&str> =

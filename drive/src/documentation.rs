@@ -35,3 +35,6 @@ pub const MEAN: &str = joined!(
     include_str!("../docs/map.html"),
     include_str!("../docs/map.svg"),
 );
+
+/// Documentation of [`MappedDrive`](crate::MappedDrive).
+pub const MAPPED: &str = joined!(include_str!("../docs/mapped_drive.svg"), include_str!("../docs/mapped_drive.html"));

@@ -1,6 +1,7 @@
 //! Conditions under which the variables of plant, controller and DC link have an effect.
 
-use crate::dc_link::LinkParameters;
+use crate::dc_link::{DcSource, LinkParameters};
+use crate::derating::Derating;
 use drive_control::idle as control;
 use drive_control::tables::ControllerParameters;
 use drive_plant::idle as plant;
@@ -11,9 +12,19 @@ use fmu_core::idle::{Acts, why};
 const LINK: &[Acts<LinkParameters>] = &[
     Acts { names: &["dc_link.use", "chopper.use"], when: |_| true, why: "" },
     Acts {
-        names: &["dc_link.C", "dc_link.R_source", "dc_link.R_precharge"],
+        names: &["dc_link.C", "dc_link.source", "dc_link.R_source", "dc_link.R_precharge"],
         when: |p| p.dc_link.used,
         why: "no effect without dc_link.use",
+    },
+    Acts {
+        names: &["dc_link.i_max", "dc_link.i_min"],
+        when: |p| p.dc_link.used && p.dc_link.source == DcSource::Battery,
+        why: "no effect without dc_link.use and dc_link.source = 2 (Battery)",
+    },
+    Acts {
+        names: &["dc_link.f_mains"],
+        when: |p| p.dc_link.used && p.dc_link.pulsates(),
+        why: "no effect without dc_link.use and dc_link.source = 3 (RectifierSingle) or 4 (RectifierThree)",
     },
     Acts {
         names: &["chopper.u_on", "chopper.u_off", "chopper.R"],
@@ -22,9 +33,25 @@ const LINK: &[Acts<LinkParameters>] = &[
     },
 ];
 
+/// Conditions of the derating.
+const HEAT: &[Acts<Derating>] = &[
+    Acts { names: &["limit.T_winding_use"], when: |_| true, why: "" },
+    Acts {
+        names: &["limit.T_winding", "limit.T_winding_max"],
+        when: |p| p.used && !p.by_table,
+        why: "no effect without limit.T_winding_use, or with limit.T_winding_table",
+    },
+    Acts { names: &["limit.T_winding_table"], when: |p| p.used, why: "no effect without limit.T_winding_use" },
+    Acts {
+        names: &["limit.T_winding_at", "limit.T_winding_share"],
+        when: |p| p.used && p.by_table,
+        why: "no effect without limit.T_winding_use and limit.T_winding_table",
+    },
+];
+
 /// Why the parameter or input `name` of a drive has no effect, with the inputs `u_dc` (V), `speed_shaft` and `angle_shaft`.
 pub(crate) fn of_drive(
-    (plant, controller, link): (&PlantParameters, &ControllerParameters, &LinkParameters),
+    (plant, controller, link, derating): (&PlantParameters, &ControllerParameters, &LinkParameters, &Derating),
     (u_dc, shaft): (f64, [f64; 2]),
     name: &str,
 ) -> Option<&'static str> {
@@ -38,6 +65,7 @@ pub(crate) fn of_drive(
     match name.strip_prefix("controller.") {
         Some(name) => why(control::ACTS, controller, name),
         None => why(LINK, link, name)
+            .or_else(|| why(HEAT, derating, name))
             .or_else(|| why(control::ACTS, controller, name))
             .or_else(|| why(plant::ACTS, plant, name)),
     }
@@ -48,6 +76,7 @@ mod tests {
     use super::*;
     use crate::PmsmDrive;
     use crate::dc_link;
+    use crate::derating;
     use fmu_core::idle::unstated;
     use fmu_core::{Causality, Model};
 
@@ -56,6 +85,8 @@ mod tests {
     fn no_variable_is_forgotten() {
         let missing = unstated(LINK, dc_link::LINK);
         assert!(missing.is_empty(), "{missing:?} must be in LINK once");
+        let missing = unstated(HEAT, derating::DERATING);
+        assert!(missing.is_empty(), "{missing:?} must be in HEAT once");
         let lists = |name: &str| {
             control::ACTS.iter().any(|acts| acts.names.contains(&name))
                 || plant::ACTS.iter().any(|acts| acts.names.contains(&name))

@@ -43,6 +43,18 @@ impl Pair {
         self.plant.model.inputs.u_dc = u_dc;
     }
 
+    /// Why some of the controller's commands never reach the machine: the carrier takes over fewer than the controller gives.
+    pub(crate) fn skips_commands(&self) -> Option<String> {
+        let (plant, T_s) = (&self.plant.model.parameters, self.controller.model.parameters.T_s);
+        let period = plant.inverter.update_period().filter(|period| *period > T_s * (1.0 + 1e-9))?;
+        let T_pwm = plant.inverter.T_pwm;
+        Some(format!(
+            "plant.inverter.T_pwm = {T_pwm} s: the carrier takes over a command every {period} s, and the controller gives one every \
+             {T_s} s (controller.T_s), so commands are lost; set plant.inverter.T_pwm to at most {} s",
+            T_pwm / period * T_s
+        ))
+    }
+
     /// One communication step of `h` (s): exchanges values, then advances both.
     ///
     /// # Errors

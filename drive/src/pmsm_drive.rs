@@ -18,8 +18,11 @@ pub use period::Means;
 
 use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
+use crate::derating::{DERATING, Derating};
 use crate::idle;
 use crate::pair::Pair;
+use crate::steady::Steady;
+use crate::torque::{Calibration, TORQUE, TorqueAt, TorqueParameters};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
 use drive_control::commissioning::IDENTIFIED;
@@ -53,7 +56,7 @@ pub struct DriveInputs {
     pub speed_ref: f64,
     /// Load torque in N.m, positive against positive speed.
     pub tau_load: f64,
-    /// DC-link voltage in V, >= 0, of the inverter and as measured by the controller.
+    /// DC-link voltage in V, >= 0, for the inverter and for the controller, which measures it.
     pub u_dc: f64,
     /// Imposed mechanical speed of the shaft in rad/s.
     pub speed_shaft: f64,
@@ -113,6 +116,12 @@ pub struct PmsmDrive {
     pub pair: Pair,
     /// Parameters of the DC link.
     pub link_parameters: LinkParameters,
+    /// The maximum torque of a hot winding.
+    pub derating: Derating,
+    /// Where the torques of the interface apply.
+    pub torque: TorqueParameters,
+    /// Their conversion to torques of the air gap, unless they apply there.
+    calibration: Option<Box<Calibration>>,
     /// The DC link.
     link: Link,
     /// Model Exchange: the command that has been active in the plant since the last sample.
@@ -160,11 +169,44 @@ impl PmsmDrive {
         controller.enable = inputs.enable && !link.precharges;
         controller.sensor_valid = inputs.sensor_valid;
         controller.commission_start = inputs.commission_start;
+        if self.derating.used {
+            let plant = &pair.plant.model;
+            controller.derating = self.derating.share(plant.temperatures(&plant.inputs).winding);
+        }
+        self.convert_reference();
+    }
+
+    /// Converts the torque reference to the air gap.
+    #[inline]
+    fn convert_reference(&mut self) {
+        if let Some(calibration) = &self.calibration {
+            calibration.ask(&mut self.pair, self.inputs.tau_ref);
+        }
+    }
+
+    /// Converts the controller's limits, which change at its samples.
+    #[inline]
+    fn convert_limits(&mut self) {
+        if let Some(calibration) = &mut self.calibration {
+            calibration.take(&self.pair);
+        }
+    }
+
+    /// `out` with the limits where they apply.
+    fn with_limits(&self, out: &mut ControllerOutputs) {
+        if let Some(calibration) = &self.calibration {
+            [out.tau_min, out.tau_max] = calibration.limits;
+        }
     }
 
     /// Voltage of the DC-link capacitor in V; 0 without the link.
     pub fn link_u(&self) -> f64 {
         self.link.u
+    }
+
+    /// Voltage (V) of the source of the DC link.
+    fn source(&self, now: Elapsed) -> f64 {
+        self.inputs.u_dc * self.link_parameters.dc_link.wave(now.seconds())
     }
 
     /// Voltage (V) of inverter and controller.
@@ -214,17 +256,28 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 22;
+    const STATE_VERSION: u16 = 26;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
         let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
-        idle::of_drive((plant, controller, &self.link_parameters), (u_dc, [speed_shaft, angle_shaft]), name)
+        idle::of_drive(
+            (plant, controller, &self.link_parameters, &self.derating),
+            (u_dc, [speed_shaft, angle_shaft]),
+            name,
+        )
     }
 
     fn derive(&mut self) {
         self.pair.plant.model.derive();
         self.pair.controller.model.derive();
+        let limits = self.calibration.as_ref().map_or([0.0; 2], |calibration| calibration.limits);
+        self.calibration = (self.torque.at == TorqueAt::Shaft).then(|| {
+            let Pair { plant, controller, .. } = &self.pair;
+            let mut drive = Steady::new(plant.model.parameters.clone(), controller.model.parameters.clone());
+            drive.derating.clone_from(&self.derating);
+            Box::new(Calibration::new(drive, limits))
+        });
     }
 
     fn validate(&self) -> Result<(), Fault> {
@@ -232,6 +285,7 @@ impl Model for PmsmDrive {
         self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))?;
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
         same_pole_pairs(plant, controller)?;
+        self.derating.validate()?;
         let starts = self.pair.controller.model.samples() == 0;
         self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })
     }
@@ -245,6 +299,8 @@ impl Model for PmsmDrive {
         self.link = Link::new(&self.link_parameters, self.inputs.u_dc);
         self.set_inputs();
         self.pair.initialize();
+        self.convert_reference();
+        self.convert_limits();
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Happened::default();
         self.before = self.pair.plant.model.inputs.commanded();
@@ -254,6 +310,7 @@ impl Model for PmsmDrive {
         let (Block { model, out: plant }, powers) = (&self.pair.plant, self.period.last);
         out.plant = plant.with(powers, model.heat(&model.inputs, &plant.temperatures, &powers.losses));
         out.controller.clone_from(&self.pair.controller.out);
+        self.with_limits(&mut out.controller);
         out.means = self.period.means();
         out.link = if self.link_parameters.dc_link.used {
             LinkOutputs {
@@ -268,7 +325,7 @@ impl Model for PmsmDrive {
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         self.set_inputs();
         self.link.begin(step.h);
-        let Self { inputs, pair, period, link, link_parameters, .. } = self;
+        let Self { inputs, pair, period, link, link_parameters, calibration, .. } = self;
         let linked = link_parameters.dc_link.used;
         let grid = SampleGrid { period: pair.controller.model.parameters.T_s };
         let end = step.end();
@@ -302,8 +359,16 @@ impl Model for PmsmDrive {
             } else {
                 pair.exchange_present();
             }
+            if let Some(calibration) = calibration {
+                calibration.ask(pair, inputs.tau_ref);
+            }
             pair.advance(h)?;
             at_sample = ends;
+            if let Some(calibration) = calibration
+                && ends
+            {
+                calibration.take(pair);
+            }
             period.add(pair.plant.model.powers(), h, ends);
             if linked {
                 supply(link, link_parameters, inputs, pair, (h, ends));
@@ -324,7 +389,7 @@ impl Model for PmsmDrive {
 /// Supplies the `pair` from the `link` over an interval of `h` (s), at whose end a sample period may end.
 #[inline(never)]
 fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mut Pair, (h, ends): (f64, bool)) {
-    link.advance(par, inputs.u_dc, h, pair.plant.model.powers().p_in * h);
+    link.advance(par, inputs.u_dc, (pair.now.seconds() - h, h), pair.plant.model.powers().p_in * h);
     if ends {
         link.sample(inputs.u_dc);
     }
@@ -364,8 +429,17 @@ impl Warns for PmsmDrive {
                 )
             });
         }
+        if self.pair.now.seconds() <= 1.0
+            && let Some(message) = self.pair.skips_commands()
+        {
+            log.warn("T_pwm", || message.clone());
+        }
         plant.warn(log);
-        self.pair.controller.model.warn(log);
+        let controller = &self.pair.controller.model;
+        match &self.calibration {
+            Some(calibration) => controller.warn_with(log, self.inputs.tau_ref, calibration.limits),
+            None => controller.warn(log),
+        }
         if self.overload == Happened::Now {
             let ControllerOutputs { tau_max, tau_min, .. } = self.pair.controller.out;
             let tau_load = self.inputs.tau_load;
@@ -423,7 +497,7 @@ pub(crate) const INPUTS: &Table<DriveInputs> = table![
             I::input(
                 "u_dc",
                 &VOLT,
-                "DC-link voltage of inverter and controller; with dc_link.use, voltage of the source of the DC link",
+                "DC-link voltage of inverter and controller; with dc_link.use, voltage of its source, of a rectifier the amplitude",
                 |i| &mut i.u_dc,
             )
             .at_least(0.0),
@@ -451,6 +525,8 @@ const TABLE: &Table<Block<PmsmDrive>> = table![
         &Part { table: control::PARAMETERS, lens: |m| &mut m.model.pair.controller.model.parameters },
     ),
     V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+    V::part("", &Part { table: TORQUE, lens: |m| &mut m.model.torque }),
+    V::part("", &Part { table: DERATING, lens: |m| &mut m.model.derating }),
 ];
 
 type D = Row<DriveOutputs>;

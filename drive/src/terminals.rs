@@ -6,33 +6,29 @@ use drive_plant::terminals::{
 use fmu_core::{Icon, Member, Terminal};
 
 /// Terminals of `PmsmDrive`.
-pub(crate) const DRIVE: &[Terminal] = &[
-    Terminal::plug(
-        "torque_request",
-        "Torque reference of a vehicle controller (controller.speed_loop.torque_mode), and the torque limits to it",
-        &[Member::signal("tau_ref"), Member::signal("tau_max"), Member::signal("tau_min")],
-    )
-    .drawn(&TORQUE_REQUEST, -100.0, 40.0),
-    SHAFT,
-    SHAFT_IMPOSED,
-    DC_LINK,
-    COOLANT,
-    HEAT_WINDING,
-    HEAT_IRON,
-    HEAT_MAGNET,
-    HEAT_INVERTER,
-];
+pub(crate) const DRIVE: &[Terminal] =
+    &[TORQUE_REQUEST, SHAFT, SHAFT_IMPOSED, DC_LINK, COOLANT, HEAT_WINDING, HEAT_IRON, HEAT_MAGNET, HEAT_INVERTER];
+
+/// Terminals of `MappedDrive`, whose losses have no separate places.
+pub(crate) const MAPPED: &[Terminal] = &[TORQUE_REQUEST, SHAFT, SHAFT_IMPOSED, DC_LINK, COOLANT];
+
+const TORQUE_REQUEST: Terminal = Terminal::plug(
+    "torque_request",
+    "Torque reference of a vehicle controller (controller.speed_loop.torque_mode), and the torque limits to it",
+    &[Member::signal("tau_ref"), Member::signal("tau_max"), Member::signal("tau_min")],
+)
+.drawn(&ICON, -100.0, 40.0);
 
 /// Icon of the terminal `torque_request`.
-const TORQUE_REQUEST: Icon =
+const ICON: Icon =
     Icon { name: "torque_request", svg: include_str!("../icons/torque_request.svg"), color: [95, 61, 196] };
 
 #[cfg(test)]
 mod tests {
     use crate::{PmsmDrive, PmsmPlant, SensorlessController};
-    use fmu_core::{Causality, Description, Model};
+    use fmu_core::{Causality, Description, Stored};
 
-    fn described<M: Model>() -> Description {
+    fn described<M: Stored>() -> Description {
         Description::of::<M>().unwrap_or_else(|e| panic!("{}: {e}", M::INFO.name))
     }
 

@@ -6,7 +6,7 @@ mod importer;
 mod machines;
 
 use drive::PmsmDrive;
-use drive::dc_link::LinkParameters;
+use drive::dc_link::{DcSource, LinkParameters};
 use drive::plant::machine::{flux, magnetic_energy};
 use drive::pmsm_drive::DriveOutputs;
 use drive_base::frame::Dq;
@@ -384,6 +384,12 @@ fn what_cannot_be_is_refused() {
         (|p| (p.chopper.used, p.chopper.u_off) = (true, 325.0), ["chopper.u_off = 325 V", "above u_dc, 325 V"]),
         (|p| (p.chopper.used, p.chopper.R) = (true, 0.0), ["chopper.R = 0 Ohm", "above 0 Ohm"]),
         (|p| (p.chopper.used, p.dc_link.used) = (true, false), ["chopper.use", "dc_link.use"]),
+        (|p| (p.dc_link.source, p.dc_link.i_max) = (DcSource::Battery, 0.0), ["dc_link.i_max = 0 A", "above 0 A"]),
+        (|p| (p.dc_link.source, p.dc_link.i_min) = (DcSource::Battery, 1.0), ["dc_link.i_min = 1 A", "at most 0 A"]),
+        (
+            |p| (p.dc_link.source, p.dc_link.f_mains) = (DcSource::RectifierSingle, 0.0),
+            ["dc_link.f_mains = 0 Hz", "at most 1000 Hz"],
+        ),
     ] {
         let message = refused(set);
         assert!(parts.iter().all(|part| message.contains(part)), "{message}");
@@ -393,7 +399,7 @@ fn what_cannot_be_is_refused() {
     (drive.link_parameters.dc_link.C, drive.link_parameters.chopper.u_off) = (0.0, 1e3);
     drive.derive();
     drive.validate().unwrap();
-    assert_eq!(PmsmDrive::INDICATORS.len(), 3);
+    assert_eq!(PmsmDrive::INDICATORS.len(), 4);
 }
 
 /// Dependencies are found by probing; the chopper is on at some of the points.

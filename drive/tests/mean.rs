@@ -7,6 +7,8 @@ mod lossy;
 mod machines;
 mod vehicle;
 
+use drive::dc_link::{Chopper, DcSource};
+use drive::derating::Derating;
 use drive::plant::flux_map;
 use drive::plant::power::{Energy, Powers};
 use drive::plant::tables::PlantParameters;
@@ -14,6 +16,7 @@ use drive::plant::thermal::ThermalMode;
 use drive::pmsm_drive::{DriveInputs, DriveOutputs};
 use drive::steady::{Condition, Steady};
 use drive::{PmsmDrive, PmsmDriveMean};
+use drive_control::battery::DcLimits;
 use drive_control::tables::ControllerParameters;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Model, Slot, Step, Warns};
@@ -415,10 +418,45 @@ fn it_has_the_variables_of_the_drive() {
     assert!(without > 60 && with > 60 && mean.variables.len() == whole.variables.len() + 3);
 }
 
+/// The first case with a DC link, those that trip by its voltage, also at a speed where the back EMF exceeds the link, and those with
+/// another source.
+const LINKED: usize = 5;
+const OVER: usize = 6;
+const UNDER: usize = 7;
+const FAST: usize = 8;
+const BATTERY: usize = 9;
+const RECTIFIER: usize = 10;
+const CASES: usize = 11;
+
+/// Link and trips of a case with a DC link.
+fn link_of(case: usize, model: &mut PmsmDriveMean) {
+    let (link, trip) = (&mut model.link_parameters, &mut model.drive.controller.trip);
+    (link.dc_link.used, link.dc_link.R_source) = (true, [6.0, 1.0, 1.0, 1.0, 1.0, 0.1][case - LINKED]);
+    (trip.used, trip.i) = (case > LINKED, 500.0);
+    link.chopper = Chopper { used: case == LINKED || case == BATTERY, u_on: 640.0, u_off: 505.0, R: 100.0 };
+    (trip.u_dc, trip.u_dc_min, trip.u_dc_restart) = match case {
+        LINKED | UNDER => (1000.0, 360.0, 460.0),
+        OVER => (520.0, 10.0, 0.0),
+        FAST => (1000.0, 395.0, 0.0),
+        _ => (1000.0, 100.0, 0.0),
+    };
+    trip.asc = case == FAST;
+    if case == BATTERY {
+        (link.dc_link.source, link.dc_link.i_max, link.dc_link.i_min) = (DcSource::Battery, 30.0, -20.0);
+        link.chopper.R = 15.0;
+    } else if case == RECTIFIER {
+        link.dc_link.source = DcSource::RectifierThree;
+    }
+}
+
 /// All outputs as bits after a run with the parameter `index` changed, or `None` if the value is refused.
 fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let (mut plant, mut controller) = traction();
-    if case == 3 {
+    let linked = case >= LINKED;
+    if linked {
+        // Machine c on its link: limits of the battery, a chopper, over-voltage, under-voltage.
+        controller.dc = DcLimits { used: true, max: 80.0, min: -50.0 };
+    } else if case == 3 {
         plant.flux_map = flux_map::linear(&plant.motor, [-0.2, 0.1], 0.3);
     } else if case > 0 {
         (plant, controller) = (lossy::b().par, ControllerParameters::default());
@@ -440,7 +478,22 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     }
     let mut block = PmsmDriveMean::new(&plant, &controller);
     let before = block.model.drive.plant.flux_map.clone();
+    if case == 4 {
+        block.model.drive.derating =
+            Derating { used: true, T_winding: 280.0, T_winding_max: 400.0, ..Derating::default() };
+    }
+    if case == 1 {
+        let curve = Derating { used: true, by_table: true, ..Derating::default() };
+        block.model.drive.derating = Derating { at: [280.0, 400.0, 410.0, 420.0, 430.0, 440.0, 450.0, 460.0], ..curve };
+    }
+    if linked {
+        link_of(case, &mut block.model);
+    }
     let moved = index.and_then(|index| PmsmDriveMean::TABLE.locate(index));
+    if case == RECTIFIER && moved.as_ref().is_some_and(|(name, ..)| !name.starts_with("dc_link.")) {
+        // Its periodic solutions take time, and the other cases move the rest.
+        return None;
+    }
     let map = &mut block.model.drive.plant.flux_map;
     match moved.as_ref().map_or("", |(name, ..)| name) {
         // A machine with other inductances; one of these values alone would make an invalid machine.
@@ -466,13 +519,21 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let inputs = &mut block.model.inputs;
     (inputs.u_dc, inputs.tau_ref, inputs.speed_shaft) = (400.0, if case == 4 { 0.0 } else { 190.0 }, 430.0);
     (inputs.speed_ref, inputs.tau_load) = (40.0, 0.7);
+    if case == LINKED || case == OVER {
+        inputs.tau_ref = -60.0;
+    }
+    if case == FAST {
+        inputs.speed_shaft = 1300.0;
+    }
     block.initialize();
     block.model.validate().ok()?;
     let mut now = Elapsed::ZERO;
     let mut bits = Vec::new();
     for k in 0..60 {
         if k == 20 {
-            block.model.inputs.tau_ref = 60.0;
+            // The chopper is always on at first, and switches later.
+            let later = if case == LINKED { -45.0 } else { -70.0 };
+            block.model.inputs.tau_ref = if case == LINKED || case == OVER || case == BATTERY { later } else { 60.0 };
         }
         let step = Step { start: now, h: 3e-3 };
         block.step(&step).ok()?;
@@ -490,14 +551,14 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
 /// The descriptions state the effect of each parameter correctly.
 #[test]
 fn parameters_have_an_effect_or_say_that_they_have_none() {
-    let plain = [0, 1, 2, 3, 4].map(|case| with_moved(None, case).unwrap());
+    let plain: [_; CASES] = std::array::from_fn(|case| with_moved(None, case).unwrap());
     let mut idle = Vec::new();
     for index in 0..PmsmDriveMean::TABLE.len() {
         let Some((name, meta, element)) = PmsmDriveMean::TABLE.locate(index) else { continue };
         if element > 0 || meta.causality != Causality::Parameter {
             continue;
         }
-        let moved = [0, 1, 2, 3, 4].map(|case| with_moved(Some(index), case));
+        let moved: [_; CASES] = std::array::from_fn(|case| with_moved(Some(index), case));
         let same = moved.iter().zip(&plain).all(|(moved, plain)| moved.as_ref().is_none_or(|bits| bits == plain));
         let tried = moved.iter().any(Option::is_some);
         if !PmsmDriveMean::has_effect(&name) {

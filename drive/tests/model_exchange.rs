@@ -26,7 +26,7 @@ struct Both<M: Model, const N: usize> {
     now: Elapsed,
 }
 
-impl<M: ContinuousTime + Events, const N: usize> Both<M, N> {
+impl<M: ContinuousTime + Events + Clone, const N: usize> Both<M, N> {
     fn new(set: impl FnOnce(&mut M)) -> Self {
         let mut stepped = Block::<M>::default();
         set(&mut stepped.model);
@@ -194,7 +194,7 @@ fn diodes_conduct_while_the_emf_exceeds_the_link() {
             plant.step(T_S, FINE);
             let (di, _) = apart(&plant.stepped.out, &plant.integrated.out);
             current = current.max(di);
-            // A current needs some milliseconds to end.
+            // A current takes a few milliseconds to decay.
             if k > 50 {
                 torque = torque.min(plant.integrated.out.tau_e);
             }

@@ -15,7 +15,7 @@ use drive::motor::Motor;
 use drive::plant::power::Powers;
 use drive::plant::tables::PlantParameters;
 use drive::plant::thermal::Temperatures;
-use drive::steady::{At, Condition, Point, Region, Steady};
+use drive::steady::{At, Condition, Diodes, Point, Region, Steady};
 use fmu_core::{Block, Elapsed, Model, Step};
 use lossy::{Drive, Figures, SILICON_CARBIDE};
 use machines::{Machine, RPM, envelope_figures, inside_figures};
@@ -325,7 +325,7 @@ fn gates_off_iron_and_friction_brake() {
         (lossy::c(), machines::c(240.0), 8000.0, 205.94, -0.85374),
     ] {
         let steady = lossy(&drive, &machine);
-        let point = at(&steady, rpm, drive.u_dc).off();
+        let point = at(&steady, rpm, drive.u_dc).off(Diodes::Blocked);
         assert!((point.powers.losses.iron / watt - 1.0).abs() < 5e-5, "{:?}", point.powers);
         assert!((point.powers.tau_shaft - torque).abs() < 1e-5 && point.powers.p_in == 0.0, "{:?}", point.powers);
         let balance = point.powers.p_mech + point.powers.p_loss;

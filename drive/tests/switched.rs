@@ -1,13 +1,14 @@
 //! The switched inverter against closed forms, against the average inverter, and against an independent switched plant.
 #![allow(missing_docs, non_snake_case)]
 
-use drive::Pair;
 use drive::frame::{AlphaBeta, Phases, SQRT_3};
 use drive::math::wrap;
 use drive::plant::PmsmPlant;
 use drive::plant::inverter::Inverter;
 use drive::plant::pwm::{InverterMode, OpenPhase, OpenSwitch, PwmUpdate, ZeroSequence};
-use fmu_core::{Block, Elapsed, Interface, Model, Step};
+use drive::{Pair, PmsmDrive};
+use fmu_core::log::Warnings;
+use fmu_core::{Block, Elapsed, Interface, Model, Step, Warns};
 use std::f64::consts::{PI, TAU};
 
 const RPM: f64 = PI / 30.0;
@@ -541,4 +542,40 @@ fn what_is_not_modelled_is_refused_by_name() {
     block.initialize();
     let error = message(block.model.validate());
     assert!(error.contains("inverter.pulse_min = 0.00006 s") && error.contains("T_pwm"), "{error}");
+}
+
+/// A carrier that takes over fewer commands than the controller gives loses some: the first second says so.
+#[test]
+fn a_carrier_slower_than_the_controller_is_reported() {
+    let said = |T_s: f64, T_pwm: f64, update: PwmUpdate, mode: InverterMode, steps: u32| {
+        let mut drive = Block::<PmsmDrive>::default();
+        drive.model.pair.controller.model.parameters.T_s = T_s;
+        let inverter = &mut drive.model.pair.plant.model.parameters.inverter;
+        (inverter.T_pwm, inverter.pwm.update, inverter.pwm.mode) = (T_pwm, update, mode);
+        drive.initialize();
+        let (mut now, mut logged) = (Elapsed::ZERO, Vec::new());
+        for _ in 0..steps {
+            let step = Step { start: now, h: 0.5 };
+            drive.step(&step).unwrap();
+            now = step.end();
+            let mut sink = |(_, key, text): fmu_core::log::Said<'_>| logged.push((key, text()));
+            drive.model.warn(&mut Warnings::to(&mut sink));
+        }
+        logged.retain(|(key, _)| *key == "T_pwm");
+        logged.into_iter().map(|(_, text)| text).collect::<Vec<_>>()
+    };
+    let (single, double) = (PwmUpdate::Single, PwmUpdate::Double);
+    let lost = said(5e-5, 1e-4, single, InverterMode::Switched, 4);
+    let why = "plant.inverter.T_pwm = 0.0001 s: the carrier takes over a command every 0.0001 s, and the controller gives one every \
+               0.00005 s (controller.T_s), so commands are lost; set plant.inverter.T_pwm to at most 0.00005 s";
+    assert_eq!(lost, [why, why], "in the first second only");
+    assert!(said(1e-4, 3e-4, double, InverterMode::Switched, 1)[0].ends_with("to at most 0.0002 s"));
+    for (T_s, T_pwm, update, mode) in [
+        (1e-4, 1e-4, single, InverterMode::Switched),
+        (5e-5, 1e-4, double, InverterMode::Switched),
+        (1e-4, 5e-5, single, InverterMode::Switched),
+        (5e-5, 1e-4, single, InverterMode::Average),
+    ] {
+        assert_eq!(said(T_s, T_pwm, update, mode, 1), [""; 0], "{T_s} {T_pwm}");
+    }
 }

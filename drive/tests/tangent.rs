@@ -78,7 +78,7 @@ fn unknowns<M: Model>(dx: &[f64], block: &mut Block<M>) -> Vec<f64> {
 }
 
 /// Derivatives and outputs of the unchanged model.
-fn evaluate<M: Differentiable>(block: &Block<M>) -> Vec<f64> {
+fn evaluate<M: Differentiable + Clone>(block: &Block<M>) -> Vec<f64> {
     let (mut block, mut dx) = (block.clone(), vec![0.0; M::STATES.len()]);
     block.model.settle();
     block.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();

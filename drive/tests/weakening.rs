@@ -141,7 +141,7 @@ fn a_sag_of_the_link() {
 /// Sets a wrong estimate.
 type Wrong = fn(&mut Motor);
 
-/// Share of the true envelope, and of the voltage, at full torque at `n` times the base speed with wrong estimates of a.
+/// Share of the true envelope and share of the voltage at full torque at `n` times the base speed with wrong estimates of a.
 fn with_wrong(set: Wrong, n: f64) -> (f64, f64) {
     let (rpm, mut now) = (n * 999.14, 200.0);
     let mut drive = Drive::imposed(&a(), |p| set(&mut p.motor));

@@ -17,7 +17,11 @@ ENERGIES = ["energy_in", "energy_mech", "energy_loss"]
 
 
 def tuned(machine):
-    """The values of `fmu tune motors/MACHINE.toml --integers --out examples/drive-train` for PmsmDrive and PmsmDriveMean."""
+    """The values for PmsmDrive and PmsmDriveMean of `fmu tune motors/MACHINE.toml --integers --out examples/drive-train`.
+
+    For the vehicle with --estimator Sensored --control torque --shaft imposed: a resolver, torque control and the full current
+    limit, on the shaft of the vehicle.
+    """
     root = ET.parse(HERE / f"{machine}.PmsmDrive.ssv").getroot()
     return {one.get("name"): one[0].get("value") for one in root.iter(f"{SSV}Parameter")}
 

@@ -39,7 +39,7 @@ impl Session {
         }
     }
 
-    /// The values that can be compared, of a vector with the values of these variables.
+    /// The comparable values in a vector with the values of these variables.
     pub(super) fn steady(&self, variables: &[&ModelVariable], values: Vec<f64>) -> Vec<f64> {
         if self.varying.is_empty() {
             return values;

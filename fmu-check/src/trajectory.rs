@@ -134,7 +134,7 @@ fn of_variable(
     Some(Difference { variable: i, first, step, largest, values, element, scale, single: a.len() == 1 })
 }
 
-/// Two values of a variable: of an array, the pair that is farthest apart, and its number from 1.
+/// Two values of a variable: for an array, the pair that is farthest apart, and its number from 1.
 fn farthest(version: FmiVersion, v: &ModelVariable, a: &[u64], b: &[u64]) -> (Option<usize>, [String; 2]) {
     if a.len() != b.len() {
         let one = |x: &[u64]| if x.is_empty() { "no value".into() } else { format!("{} values", x.len()) };

@@ -26,7 +26,7 @@ pub(super) enum Pace {
 /// Watches one process.
 pub(super) struct Watch {
     pid: u32,
-    /// The file with the call that it is in.
+    /// The file in which it records its present call.
     journal: PathBuf,
     limit: Duration,
     /// Time since the watch began. Time in which this process itself was stopped or not scheduled does not count.

@@ -11,6 +11,7 @@ use crate::log::Warnings;
 use crate::model::Block;
 use crate::row::Slot;
 use crate::rules::can_be_state;
+use crate::saved::{Keeps, Saved, Saving, Stored, Storing};
 use crate::sizes::Resizable;
 use crate::table::WIDE;
 use crate::variable::Meta;
@@ -100,6 +101,10 @@ pub type ToEvent<M> = fn(&mut M, &Step) -> Result<Stop, Fault>;
 /// The capabilities of the model `M`: `Capabilities::NONE.ContinuousTime().Events()`. A method exists only if the model
 /// implements the trait of its name.
 pub struct Capabilities<M: Model> {
+    /// Functions of a [`Saved`] model.
+    pub saved: Option<Saving<M>>,
+    /// Functions of a [`Stored`] model.
+    pub stored: Option<Storing<M>>,
     /// Functions of a [`ContinuousTime`] model.
     pub continuous: Option<Continuous<M>>,
     /// Functions of a model with [`Events`].
@@ -126,23 +131,48 @@ pub struct Capabilities<M: Model> {
     pub warn: Option<fn(&M, &mut Warnings<'_>)>,
 }
 
+impl<M: Stored> Capabilities<M> {
+    /// Co-simulation only; an importer can save and store the state.
+    pub const NONE: Self = Self::stored();
+}
+
 #[allow(non_snake_case, reason = "each method has the name of its trait, as in the line that exports a model")]
 impl<M: Model> Capabilities<M> {
-    /// Co-simulation only.
-    pub const NONE: Self = Self {
-        continuous: None,
-        events: None,
-        samples: None,
-        to_event: None,
-        tangent: None,
-        complete: None,
-        clocked: None,
-        scheduled: false,
-        exchange_only: false,
-        resizable: None,
-        intermediate: None,
-        warn: None,
-    };
+    /// Co-simulation only, for a model without `Clone`: an importer can neither save nor store its state.
+    pub const fn unsaved() -> Self {
+        Self {
+            saved: None,
+            stored: None,
+            continuous: None,
+            events: None,
+            samples: None,
+            to_event: None,
+            tangent: None,
+            complete: None,
+            clocked: None,
+            scheduled: false,
+            exchange_only: false,
+            resizable: None,
+            intermediate: None,
+            warn: None,
+        }
+    }
+
+    /// Co-simulation only, for a model without serde: an importer can save its state, but not store it.
+    pub const fn unstored() -> Self
+    where
+        M: Saved,
+    {
+        Self { saved: Some(Saving::FUNCTIONS), ..Self::unsaved() }
+    }
+
+    /// Co-simulation only: [`NONE`](Self::NONE).
+    pub const fn stored() -> Self
+    where
+        M: Stored,
+    {
+        Self { stored: Some(Storing::FUNCTIONS), ..Self::unstored() }
+    }
 
     /// Adds [`ContinuousTime`].
     pub const fn ContinuousTime(self) -> Self
@@ -268,6 +298,15 @@ impl<M: Model> Capabilities<M> {
 }
 
 impl<M: Model> Capabilities<M> {
+    /// What an importer can keep of the state.
+    pub const fn keeps(&self) -> Keeps {
+        match (&self.saved, &self.stored) {
+            (None, _) => Keeps::Nothing,
+            (Some(_), None) => Keeps::Saved,
+            _ => Keeps::Stored,
+        }
+    }
+
     /// The model can be exported for Model Exchange.
     pub const fn model_exchange(&self) -> bool {
         self.continuous.is_some() || self.events.is_some() || self.clocked.is_some()
@@ -346,7 +385,11 @@ impl<M: Model> Capabilities<M> {
 
     /// Hash of the model's table and of the parts of the interface that its capabilities add.
     pub const fn hash(&self) -> Hash {
-        let mut hash = M::HASH;
+        let mut hash = match self.keeps() {
+            Keeps::Stored => M::HASH,
+            Keeps::Saved => M::HASH.text("Unstored"),
+            Keeps::Nothing => M::HASH.text("Unsaved"),
+        };
         if !self.model_exchange() {
             return hash;
         }
@@ -397,7 +440,7 @@ pub trait Exported: Sized + 'static {
 /// A model without capabilities, which `export!(M)` exports.
 pub struct Plain<M>(PhantomData<M>);
 
-impl<M: Model> Exported for Plain<M> {
+impl<M: Stored> Exported for Plain<M> {
     type Model = M;
     const CAN: Capabilities<M> = Capabilities::NONE;
 }

@@ -227,8 +227,8 @@ impl<W: 'static> Row<W> {
 }
 
 /// A model whose parts act when clocks tick, in Event Mode of Co-Simulation and Model Exchange or in Scheduled Execution (FMI
-/// 3.0.2, 2.2.8 and 5). Clocks are rows of the table; they are numbered in its order, from 0. Such an FMU is one of FMI 3.0
-/// only, and its importer handles events.
+/// 3.0.2, 2.2.8 and 5). Clocks are rows of the table; they are numbered in its order, from 0. Such an FMU supports only FMI 3.0
+/// and importers that handle events.
 ///
 /// A [`Sampled`] model with one clock needs no implementation: when the clock becomes active, the outputs computed by the last
 /// sample become visible, and the model takes the next sample.

@@ -88,6 +88,15 @@ impl<M: 'static> State<M> {
     }
 }
 
+/// Number of scalar states, with the maximum sizes of arrays.
+pub(crate) const fn scalars<M>(states: &[State<M>]) -> usize {
+    let (mut sum, mut i) = (0, 0);
+    while i < states.len() {
+        (sum, i) = (sum + states[i].most(), i + 1);
+    }
+    sum
+}
+
 /// A model with continuous states: dx/dt = f(x, u, t). It can be exported for Model Exchange, and gives derivatives of
 /// its outputs.
 ///
@@ -97,8 +106,13 @@ pub trait ContinuousTime: Model {
     /// The states, in the order of all calls.
     const STATES: &'static [State<Self>];
 
-    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an array
-    /// has as many as it has elements in the model. It does not allocate, and its result does not depend on earlier steps.
+    /// Number of scalar states, with the maximum sizes of arrays. An integrator takes it, as in
+    /// `integrate::smooth::<Self, { Self::SCALARS }>`, so that the number need not be written.
+    const SCALARS: usize = scalars(Self::STATES);
+
+    /// Writes the derivatives dx/dt for the present states and inputs to `dx`, in the order of [`STATES`](Self::STATES); an
+    /// array has one for each of its elements in the model. It does not allocate, and its result does not depend on earlier
+    /// steps.
     ///
     /// # Errors
     /// The derivatives do not exist here: the solver tries a shorter step.

@@ -15,6 +15,7 @@ use crate::model::{Block, Experiment, Model};
 use crate::need::Need;
 use crate::probe;
 use crate::row::{Constant, Row, Slot};
+use crate::saved::{Keeps, Stored};
 use crate::unit::{Exponents, ONE, Quantity};
 use crate::variable::{Alias, Causality, Enumeration, Kind, Meta, Range, Variability};
 use checks::{check_names, check_start, check_types};
@@ -59,6 +60,9 @@ pub struct Description {
     pub icon: Option<String>,
     /// Capabilities of the model beyond co-simulation without events, if any.
     pub model_exchange: Option<ModelExchange>,
+    /// What an importer can keep of the state.
+    #[serde(default)]
+    pub keeps: Keeps,
 }
 
 /// The interface for Model Exchange.
@@ -224,8 +228,8 @@ impl Dependencies {
     /// Those of initial values, and those between two events.
     fn of<M: Model>(self, can: &Capabilities<M>, block: &Block<M>, states: &[usize]) -> [probe::Dependencies; 2] {
         match self {
-            Self::Probed => probe::dependencies(can, block, states),
             Self::Omitted => probe::no_dependencies::<M>(states),
+            Self::Probed => probe::dependencies(can, block, states),
         }
     }
 }
@@ -235,7 +239,7 @@ impl Description {
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
-    pub fn of<M: Model>() -> Result<Self, Fault> {
+    pub fn of<M: Stored>() -> Result<Self, Fault> {
         Self::with(&Capabilities::<M>::NONE, fresh()?, Dependencies::Probed)
     }
 
@@ -258,7 +262,7 @@ impl Description {
 
     fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>, dependencies: Dependencies) -> Result<Self, Fault> {
         let states = can.rows()?;
-        check_sizes(&block)?;
+        check_sizes(can, &block)?;
         probe::keeps_starts(can, &block, &states)?;
         let [initial, between] = dependencies.of(can, &block, &states);
         block.initialize();
@@ -356,6 +360,7 @@ impl Description {
             terminals,
             icon: M::ICON.map(Into::into),
             model_exchange: exchange(can, &states),
+            keeps: can.keeps(),
         })
     }
 
@@ -477,7 +482,10 @@ fn words(input: &str, need: Need<'_>, variables: &[Variable]) -> Result<String, 
     };
     let found: Vec<&Variable> = variables.iter().filter(named).collect();
     let [found] = found[..] else {
-        return Err(Fault::new(format!("{input} is read with {parameter}, of which there are {}", found.len())));
+        return Err(Fault::new(format!(
+            "{input} is read with {parameter}: expected one parameter of this name, found {}",
+            found.len()
+        )));
     };
     let has = match &found.kind {
         VariableKind::Boolean => ["true", "false"].contains(&value),

@@ -66,6 +66,9 @@ impl<W, E: Enumerated> Place<W> for Field<W, E> {
 /// assert_eq!((Fan::of(2), Fan::of(3), Fan::On.value(), Fan::On.name()), (Some(Fan::On), None, 2, "On"));
 /// ```
 ///
+/// The enum is `Clone`, `Copy`, `Debug`, `PartialEq` and `Eq`. A model with such a field adds `#[derive(serde::Serialize,
+/// serde::Deserialize)]` to it, like its own.
+///
 /// With `#[derive(Default)]`, one item is marked as the default. A model whose `Default` names an item does not need this.
 ///
 /// ```

@@ -42,6 +42,24 @@ impl Next {
         }
     }
 
+    /// The earlier of two events, for a model with several reasons to stop: samples on a grid and the end of a delay, for example.
+    ///
+    /// ```
+    /// # use fmu_core::{Elapsed, Next};
+    /// let sample = Next::Grid { k: 3, period: 0.1 };
+    /// let delay = Next::At(Elapsed::ZERO.plus(0.25));
+    /// assert_eq!(sample.or(delay, Elapsed::ZERO), delay);
+    /// assert_eq!(sample.or(Next::Never, Elapsed::ZERO), sample);
+    /// ```
+    #[must_use]
+    pub fn or(self, other: Self, now: Elapsed) -> Self {
+        match (self.left(now), other.left(now)) {
+            (Some(left), Some(others)) if others < left => other,
+            (None, _) => other,
+            _ => self,
+        }
+    }
+
     /// Whether the event is due at `now`.
     pub fn is_due(self, now: Elapsed) -> bool {
         self.left(now) == Some(0.0)
@@ -114,7 +132,7 @@ pub struct Indicator {
 ///     }
 ///
 ///     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-///         integrate::hybrid::<Self, 2>(self, step, 1e-2)
+///         integrate::hybrid::<Self, { Self::SCALARS }>(self, step, 1e-2)
 ///     }
 /// }
 ///
@@ -199,7 +217,8 @@ pub struct Stop {
     pub at: Elapsed,
     /// An event must be handled at this instant.
     pub event: bool,
-    /// [`Model::advance`] would handle it at once, even at the end of a step; otherwise one at the end belongs to the next step.
+    /// [`Model::advance`] would handle it at once, even at the end of a step; otherwise an event at the end belongs to the next
+    /// step.
     pub settles: bool,
 }
 

@@ -35,7 +35,7 @@ const WIDTH: f64 = 1e-9;
 ///
 /// ```ignore
 /// fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-///     integrate::smooth::<Self, 2>(self, step, 1e-4)
+///     integrate::smooth::<Self, { Self::SCALARS }>(self, step, 1e-4)
 /// }
 /// ```
 ///

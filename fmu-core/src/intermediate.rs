@@ -26,7 +26,7 @@ use crate::Model;
 ///     ];
 ///
 ///     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-///         integrate::smooth::<Self, 1>(self, step, 1e-3)
+///         integrate::smooth::<Self, { Self::SCALARS }>(self, step, 1e-3)
 ///     }
 /// # }
 /// # impl ContinuousTime for Mass {

@@ -39,7 +39,7 @@ pub enum Account {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Kept<C> {
     event: C,
-    /// A ring of points, from the oldest on at `first`.
+    /// A ring of points; the oldest is at `first`.
     newest: [(Elapsed, C); NEWEST as usize],
     first: u8,
     count: u8,

@@ -47,7 +47,7 @@
 //!
 //!     // Co-Simulation: one state, substeps of at most 0.1 s.
 //!     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-//!         integrate::smooth::<Self, 1>(self, step, 0.1)
+//!         integrate::smooth::<Self, { Self::SCALARS }>(self, step, 0.1)
 //!     }
 //! }
 //!
@@ -76,14 +76,16 @@
 //!
 //! [`Row`] has an example of every kind of variable. [`ContinuousTime`], [`Events`], [`Sampled`], [`Differentiable`],
 //! [`CompletedSteps`], [`Intermediate`], [`Clocked`], [`Resizable`] and [`Warns`] are further capabilities of a model;
-//! [`Model::load`] reads files that the FMU contains, and a [`preset`] is one of them.
+//! [`Saved`] and [`Stored`] are the capabilities that a model has unless its export leaves them out. [`Model::load`] reads files
+//! that the FMU contains, and a [`preset`] is one of them.
 //!
 //! Layers, from below: [`mod@unit`], [`variable`], [`token`], [`row`], [`mod@table`], [`sizes`], [`terminal`], [`model`],
-//! [`continuous`], [`events`], [`capability`], [`rules`], [`description`]. No motor, no XML, no C, no `unsafe`.
+//! [`continuous`], [`events`], [`capability`], [`saved`], [`rules`], [`description`]. No motor, no XML, no C, no `unsafe`.
 
 #![forbid(unsafe_code)]
 
 pub mod bytes;
+pub mod call_log;
 pub mod capability;
 pub mod clock;
 pub mod continuous;
@@ -112,6 +114,7 @@ mod refusal;
 pub mod resource;
 pub mod row;
 pub mod rules;
+pub mod saved;
 pub mod sizes;
 pub mod table;
 pub mod terminal;
@@ -139,6 +142,7 @@ pub use need::Need;
 pub use reals::RealInputs;
 pub use resource::Resource;
 pub use row::{Constant, Row, Slot};
+pub use saved::{Keeps, Saved, Stored};
 pub use sizes::Resizable;
 pub use table::{Part, Table};
 pub use terminal::{Icon, Member, Terminal};

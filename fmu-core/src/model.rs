@@ -88,8 +88,13 @@ pub enum Interface {
 /// 4. [`validate`](Model::validate) checks the parameters together; then the simulation starts.
 /// 5. [`advance`](Model::advance) and [`output`](Model::output) run in turn. An `advance` does not allocate, lock, read a
 ///    clock or print, and never writes a parameter.
-/// 6. Saving is a clone, storing is serde; both at any time between calls.
-pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static {
+/// 6. Saving is a clone, storing is serde; both at any time between calls. A model without them is exported as
+///    [`Unsaved`](crate::Capabilities::unsaved) or [`Unstored`](crate::Capabilities::unstored).
+#[diagnostic::on_unimplemented(
+    message = "`{Self}` is not a model: it lacks the trait `Model`",
+    note = "write `impl Model for {Self}`, and name the type of the model in the line that exports it"
+)]
+pub trait Model: Default + Send + 'static {
     /// The outputs, a separate plain struct.
     type Outputs: Default + Clone + Serialize + DeserializeOwned + Send + 'static;
 
@@ -198,7 +203,7 @@ pub trait Model: Default + Clone + Serialize + DeserializeOwned + Send + 'static
 
 /// A model together with its outputs: the type that the rows of its table access.
 #[derive(Clone, Default, Serialize, Deserialize)]
-#[serde(bound = "")]
+#[serde(bound(serialize = "M: Serialize", deserialize = "M: DeserializeOwned"))]
 pub struct Block<M: Model> {
     /// Inputs, parameters and state.
     pub model: M,

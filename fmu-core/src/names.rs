@@ -1,6 +1,6 @@
 //! Names while compiling: their form, and the ones that exist already.
 
-use crate::refusal::demand;
+use crate::refusal::{demand, fail};
 
 /// Maximum number of rows in a table.
 pub(crate) const MOST_ROWS: usize = 16_384;
@@ -102,20 +102,70 @@ const fn same(a: &str, b: &str) -> bool {
 /// Checks the name of a row: a structured name of both standards (FMI 2.0.5, 2.2.9; FMI 3.0.2, 2.4.7.5.1), or the prefix of a part.
 #[track_caller]
 pub(crate) const fn check_form(name: &str, is_prefix: bool) {
-    match form(name, is_prefix) {
-        Form::Structured => {}
-        Form::Quotable => demand(
-            false,
-            name,
-            "not a structured name of FMI: letters of ASCII, digits and _ in parts with dots; put any other part into single quotes, \
-             as in 'rate [1/s]'",
-        ),
-        Form::Other => demand(
-            false,
-            name,
-            "not a structured name of FMI: it has letters of ASCII, digits and _, in parts with dots, or other characters of ASCII in \
-             single quotes",
-        ),
+    let (mut room, plain) =
+        ([0; 256], "not a structured name of FMI: letters of ASCII, digits and _ in parts with dots; ");
+    let suggested = match form(name.as_bytes(), is_prefix) {
+        Form::Structured => return,
+        Form::Quotable if !is_prefix => quoted(name, &mut room),
+        Form::Quotable | Form::Other => "",
+    };
+    if suggested.is_empty() {
+        fail(&[name, ": ", plain, "put other characters of ASCII into single quotes, as in 'rate [1/s]' or 'Waerme'"]);
+    }
+    fail(&[name, ": ", plain, "write ", suggested]);
+}
+
+/// The name with its parts in single quotes where they need them; empty if it is too long.
+const fn quoted<'a>(name: &str, text: &'a mut [u8; 256]) -> &'a str {
+    let (bytes, mut first, mut len) = (name.as_bytes(), 0, 0);
+    while first <= bytes.len() {
+        let mut end = first;
+        while end < bytes.len() && bytes[end] != b'.' {
+            end += 1;
+        }
+        let part = bytes.split_at(end).0.split_at(first).1;
+        if len + part.len() + 3 > text.len() {
+            return "";
+        }
+        // An empty part has no quoted form: the whole name is one part.
+        if part.is_empty() && first > 0 || end < bytes.len() && part.is_empty() {
+            return whole(name, text);
+        }
+        let bare = matches!(form(part, false), Form::Structured);
+        if first > 0 {
+            text[len] = b'.';
+            len += 1;
+        }
+        len = append(text, len, if bare { b"" } else { b"'" });
+        len = append(text, len, part);
+        len = append(text, len, if bare { b"" } else { b"'" });
+        first = end + 1;
+    }
+    text_of(text, len)
+}
+
+/// The name in single quotes.
+const fn whole<'a>(name: &str, text: &'a mut [u8; 256]) -> &'a str {
+    let opened = append(text, 0, b"'");
+    let named = append(text, opened, name.as_bytes());
+    let len = append(text, named, b"'");
+    text_of(text, len)
+}
+
+/// Writes `more` at `len`; returns the new length.
+const fn append(text: &mut [u8; 256], len: usize, more: &[u8]) -> usize {
+    let mut i = 0;
+    while i < more.len() && len + i < text.len() {
+        text[len + i] = more[i];
+        i += 1;
+    }
+    len + i
+}
+
+const fn text_of(text: &[u8; 256], len: usize) -> &str {
+    match std::str::from_utf8(text.split_at(len).0) {
+        Ok(text) => text,
+        Err(_) => "",
     }
 }
 
@@ -127,8 +177,8 @@ enum Form {
 }
 
 /// The form of a name: parts with dots, each with indices in brackets, as in `cells[2].u`; or `der(name)`.
-const fn form(name: &str, is_prefix: bool) -> Form {
-    let (bytes, mut i, mut quotable, mut structured) = (name.as_bytes(), 0, true, true);
+const fn form(bytes: &[u8], is_prefix: bool) -> Form {
+    let (mut i, mut quotable, mut structured) = (0, true, true);
     let mut end = bytes.len();
     if end > 5 && matches!([bytes[0], bytes[1], bytes[2], bytes[3], bytes[end - 1]], [b'd', b'e', b'r', b'(', b')']) {
         (i, end) = (4, end - 1);
@@ -190,7 +240,7 @@ mod tests {
 
     #[test]
     fn structured_names() {
-        let structured = |name| matches!(form(name, false), Form::Structured);
+        let structured = |name: &str| matches!(form(name.as_bytes(), false), Form::Structured);
         for name in
             ["u", "_u2", "motor.R_s", "cells[2].u", "m[1,2]", "der(h)", "'rate [1/s]'", "a.'b c'.d", r"'don\'t'"]
         {
@@ -201,9 +251,27 @@ mod tests {
         {
             assert!(!structured(name), "{name}");
         }
-        assert!(matches!(form("T ambient", false), Form::Quotable) && matches!(form("Wärme", false), Form::Other));
-        assert!(matches!(form("motor.", true), Form::Structured) && matches!(form("energy_", true), Form::Structured));
-        assert!(matches!(form("", true), Form::Structured));
+        let prefix = |name: &str| matches!(form(name.as_bytes(), true), Form::Structured);
+        assert!(prefix("motor.") && prefix("energy_") && prefix("") && !prefix("T ambient."));
+    }
+
+    #[test]
+    fn suggested_names_are_structured() {
+        for (name, suggested) in [
+            ("T ambient", "'T ambient'"),
+            ("motor.loss [W]", "motor.'loss [W]'"),
+            ("2u", "'2u'"),
+            ("a..b", "'a..b'"),
+            (".b", "'.b'"),
+            ("cells[2].T max", "cells[2].'T max'"),
+            ("der(2)", "'der(2)'"),
+        ] {
+            assert!(matches!(form(name.as_bytes(), false), Form::Quotable), "{name}");
+            assert_eq!(quoted(name, &mut [0; 256]), suggested);
+            assert!(matches!(form(suggested.as_bytes(), false), Form::Structured), "{suggested}");
+        }
+        assert_eq!(quoted(&"long ".repeat(60), &mut [0; 256]), "");
+        assert!(["Wärme", "'open", "a'b"].iter().all(|name| matches!(form(name.as_bytes(), false), Form::Other)));
     }
 
     #[test]

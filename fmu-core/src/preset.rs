@@ -1,108 +1,145 @@
 //! The preset of an FMU: start values in a file of its resources, which replace the values of the model's `Default`.
 //!
-//! `fmu preset` writes the file, the exporter applies it when it creates an instance. The first line names the format; each
-//! other line has a scalar, or an element of an array, a tab (here `→`), and its start value:
+//! `fmu preset` writes the file, the exporter applies it when it creates an instance. It is JSON; each start value is a text,
+//! as in the attribute `start` of `modelDescription.xml`, so numbers keep all bits and infinities are possible:
 //!
-//! ```text
-//! fmu preset 1
-//! motor.R_s→0.775
-//! motor.n_p→5
-//! label→two\nlines
-//! weights[1,2]→0.5
+//! ```json
+//! {
+//!   "format": "fmu preset",
+//!   "version": 2,
+//!   "start": {
+//!     "motor.R_s": "0.775",
+//!     "motor.n_p": "5",
+//!     "label": "two\nlines",
+//!     "weights[1,2]": "0.5"
+//!   }
+//! }
 //! ```
 //!
-//! An enumeration has its integer, a Boolean `true` or `false`; `\n`, `\r`, `\t` and `\\` are escapes as in Rust. The hash of
-//! the file follows the model's token after `+`, so the token identifies the preset.
+//! A name is that of a scalar or of an element of an array. An enumeration has its integer, a Boolean `true` or `false`. The
+//! hash of the file follows the model's token after `+`, so the token identifies the preset.
 
 use crate::{Fault, Hash};
+use serde::de::{Error, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::borrow::Cow;
+use std::fmt;
 
 /// Name of the file in the folder `resources/`.
-pub const FILE: &str = "fmu-preset.txt";
+pub const FILE: &str = "fmu-preset.json";
+
+/// Name of the file in the format 1, which earlier versions wrote.
+pub const FORMER_FILE: &str = "fmu-preset.txt";
 
 /// Largest size of the file in bytes.
 pub const MOST: u64 = 1 << 20;
 
-/// The first line.
-const HEAD: &str = "fmu preset ";
-/// The format that is written and read.
-const FORMAT: &str = "1";
+/// Entry `format` of the file.
+const FORMAT: &str = "fmu preset";
+/// The version that is written and read.
+const VERSION: u64 = 2;
 
-/// A line of the file.
+/// A start value.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PresetValue {
-    /// Number of the line, from 1.
-    pub line: usize,
     /// Name of the variable, an element of an array as `name[1,2]`.
     pub name: String,
     /// Its start value.
     pub value: String,
 }
 
+/// Format and version, in front of entries that other versions may not have.
+#[derive(Deserialize)]
+struct Head<'a> {
+    #[serde(borrow)]
+    format: Cow<'a, str>,
+    version: u64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Content<'a, V> {
+    #[serde(borrow)]
+    format: Cow<'a, str>,
+    version: u64,
+    start: V,
+}
+
+/// Start values in the order of the file.
+struct InOrder(Vec<PresetValue>);
+
+impl<'de> Deserialize<'de> for InOrder {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Entries)
+    }
+}
+
+struct Entries;
+
+impl<'de> Visitor<'de> for Entries {
+    type Value = InOrder;
+
+    fn expecting(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str("an object with a start value for each name")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<InOrder, A::Error> {
+        let mut values = Vec::new();
+        while let Some(name) = map.next_key::<String>()? {
+            let value = map.next_value().map_err(|e| A::Error::custom(format_args!("{name}: {e}")))?;
+            values.push(PresetValue { name, value });
+        }
+        Ok(InOrder(values))
+    }
+}
+
+/// Names and values that are written in their order.
+struct Pairs<'a>(Vec<(&'a str, &'a str)>);
+
+impl Serialize for Pairs<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().copied())
+    }
+}
+
 /// The file with these names and values.
 pub fn write<'a>(values: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {
-    let mut text = format!("{HEAD}{FORMAT}\n");
-    for (name, value) in values {
-        text.push_str(name);
-        text.push('\t');
-        for c in value.chars() {
-            match c {
-                '\n' => text.push_str("\\n"),
-                '\r' => text.push_str("\\r"),
-                '\t' => text.push_str("\\t"),
-                '\\' => text.push_str("\\\\"),
-                c => text.push(c),
-            }
-        }
-        text.push('\n');
-    }
-    text
+    let start = Pairs(values.into_iter().collect());
+    // Texts always have a JSON form.
+    let json = serde_json::to_string_pretty(&Content { format: FORMAT.into(), version: VERSION, start });
+    json.unwrap_or_default() + "\n"
 }
 
 /// The names and values of a file.
 ///
 /// # Errors
-/// Names the line and the fault: size, encoding, format, or syntax of a line.
+/// Names the fault and its position: size, syntax, format, version, or an entry that is not a text.
 pub fn read(bytes: &[u8]) -> Result<Vec<PresetValue>, Fault> {
     if bytes.len() as u64 > MOST {
         return Err(Fault::new(format!("is larger than {MOST} bytes, the maximum size of a preset")));
     }
-    let text = std::str::from_utf8(bytes).map_err(|_| Fault::new("is not a preset: it is not UTF-8"))?;
-    let mut lines = text.split('\n');
-    match lines.next().and_then(|head| head.strip_prefix(HEAD)) {
-        Some(FORMAT) => {}
-        Some(other) if !other.is_empty() && other.bytes().all(|b| b.is_ascii_digit()) => {
-            let why = format!("has the format {other}, and this FMU reads the format {FORMAT}: a later `fmu` wrote it");
-            return Err(Fault::new(why));
-        }
-        _ => return Err(Fault::new(format!("is not a preset: its first line is not `{HEAD}{FORMAT}`"))),
+    if bytes.starts_with(b"fmu preset 1\n") {
+        return Err(former());
     }
-    if lines.next_back() != Some("") {
-        return Err(Fault::new("is cut short: its last line does not end"));
+    let wrong = |e: serde_json::Error| Fault::new(format!("is not a preset: {e}"));
+    let head: Head = serde_json::from_slice(bytes).map_err(wrong)?;
+    if head.format != FORMAT {
+        return Err(Fault::new(format!("is not a preset: its format is {:?}, not {FORMAT:?}", head.format)));
     }
-    let entry = |(line, text): (usize, &str)| {
-        let wrong = |why: &str| Fault::new(format!("line {line}: {why}"));
-        let (name, value) = text.split_once('\t').ok_or_else(|| wrong("expected a name, a tab and a value"))?;
-        let value = unescaped(value).ok_or_else(|| wrong("after \\ comes n, r, t or \\"))?;
-        Ok(PresetValue { line, name: name.into(), value })
-    };
-    (2..).zip(lines).map(entry).collect()
+    if head.version != VERSION {
+        let found = head.version;
+        return Err(Fault::new(format!("has the version {found}, and this FMU reads the version {VERSION}")));
+    }
+    serde_json::from_slice(bytes).map_err(wrong).map(|content: Content<'_, InOrder>| content.start.0)
 }
 
-fn unescaped(text: &str) -> Option<String> {
-    let (mut out, mut chars) = (String::with_capacity(text.len()), text.chars());
-    while let Some(c) = chars.next() {
-        out.push(match c {
-            '\\' => match chars.next()? {
-                'n' => '\n',
-                'r' => '\r',
-                't' => '\t',
-                '\\' => '\\',
-                _ => return None,
-            },
-            c => c,
-        });
-    }
-    Some(out)
+/// The refusal of a preset in the format 1.
+#[must_use]
+pub fn former() -> Fault {
+    Fault::new(format!(
+        "{FORMER_FILE} is a preset in the format 1 of an earlier `fmu`, and this version reads {FILE}, version {VERSION}: build \
+         the FMU again and write its preset with `fmu preset`"
+    ))
 }
 
 /// The suffix of the model's token for the preset of these bytes.
@@ -123,31 +160,47 @@ mod tests {
     fn what_is_written_reads_back() {
         let values = [("motor.R_s", "0.775"), ("label", "a\tb\\n\nc\r = \u{3c8}"), ("empty", ""), ("a = b", "1")];
         let text = write(values);
-        assert!(text.starts_with("fmu preset 1\nmotor.R_s\t0.775\nlabel\ta\\tb\\\\n\\nc\\r = \u{3c8}\n"), "{text}");
+        let head =
+            "{\n  \"format\": \"fmu preset\",\n  \"version\": 2,\n  \"start\": {\n    \"motor.R_s\": \"0.775\",\n";
+        assert!(text.starts_with(head) && text.ends_with("}\n"), "{text}");
         let back = read(text.as_bytes()).unwrap();
         let pairs: Vec<_> = back.iter().map(|e| (e.name.as_str(), e.value.as_str())).collect();
-        assert_eq!(pairs, values);
-        assert_eq!(back.iter().map(|e| e.line).collect::<Vec<_>>(), [2, 3, 4, 5]);
+        assert_eq!(pairs, values, "in their order");
         assert_eq!(read(write([]).as_bytes()).unwrap(), []);
+        // What a user's editor or script writes.
+        let compact = br#"{"start":{"x":"1","x":"\u0032"},"version":2,"format":"fmu preset"}"#;
+        let values = read(compact).unwrap();
+        assert_eq!(values.iter().map(|e| e.value.as_str()).collect::<Vec<_>>(), ["1", "2"]);
     }
 
     #[test]
     fn what_is_no_preset_says_why() {
-        let large = [b"fmu preset 1\n".to_vec(), vec![b'a'; 1 << 20]].concat();
+        let large = vec![b' '; (1 << 20) + 1];
         for (bytes, why) in [
-            (&b""[..], "is not a preset: its first line is not `fmu preset 1`"),
-            (b"<xml/>\n", "its first line"),
-            (b"fmu preset \n", "its first line"),
-            (b"fmu preset 1 \nx\t1\n", "its first line"),
-            (b"fmu preset 1\r\nx\t1\r\n", "its first line"),
-            (b"fmu preset 2\nx\t1\n", "has the format 2, and this FMU reads the format 1: a later `fmu` wrote it"),
-            (b"fmu preset 1", "is cut short"),
-            (b"fmu preset 1\nx\t1", "is cut short"),
-            (b"fmu preset 1\nx\t1\n\ny\t1\n", "line 3: expected a name, a tab and a value"),
-            (b"fmu preset 1\nx = 1\n", "line 2: expected a name"),
-            (b"fmu preset 1\nx\ta\\b\n", "line 2: after \\ comes n, r, t or \\"),
-            (b"fmu preset 1\nx\ta\\\n", "line 2: after"),
-            (b"fmu preset 1\nx\t\xff\n", "is not a preset: it is not UTF-8"),
+            (&b""[..], "is not a preset: EOF while parsing"),
+            (b"<xml/>\n", "is not a preset: expected value at line 1 column 1"),
+            (b"fmu preset 1\nx\t1\n", "fmu-preset.txt is a preset in the format 1 of an earlier `fmu`"),
+            (b"{}", "is not a preset: missing field `format`"),
+            (br#"{"format":"x","version":2,"start":{}}"#, r#"is not a preset: its format is "x", not "fmu preset""#),
+            (br#"{"format":"fmu preset","start":{}}"#, "missing field `version`"),
+            (br#"{"format":"fmu preset","version":"2","start":{}}"#, "expected u64"),
+            (
+                br#"{"format":"fmu preset","version":3,"values":[]}"#,
+                "has the version 3, and this FMU reads the version 2",
+            ),
+            (br#"{"format":"fmu preset","version":2}"#, "missing field `start`"),
+            (br#"{"format":"fmu preset","version":2,"start":{},"more":1}"#, "unknown field `more`"),
+            (br#"{"format":"fmu preset","version":2,"start":{}} x"#, "trailing characters"),
+            (
+                br#"{"format":"fmu preset","version":2,"start":[]}"#,
+                "expected an object with a start value for each name",
+            ),
+            (
+                br#"{"format":"fmu preset","version":2,"start":{"x":1}}"#,
+                "x: invalid type: integer `1`, expected a string",
+            ),
+            (br#"{"format":"fmu preset","version":2,"start":{"x":"1"}"#, "EOF while parsing"),
+            (b"{\"format\":\"fmu preset\",\"version\":2,\"start\":{\"x\":\"\xff\"}}", "is not a preset: "),
             (&large, "is larger than 1048576 bytes"),
         ] {
             let said = read(bytes).unwrap_err().to_string();
@@ -156,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn a_token_tells_its_preset() {
+    fn a_token_identifies_its_preset() {
         let model = Hash::START.guid();
         let (model, bytes) = (model.as_str(), write([("x", "1")]));
         let token = format!("{model}{}", suffix(bytes.as_bytes()));

@@ -8,6 +8,7 @@
 use crate::capability::Capabilities;
 use crate::model::{Block, Model};
 use crate::row::Slot;
+use crate::saved::Saving;
 use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault};
 
@@ -26,7 +27,10 @@ pub(crate) type Dependencies = Vec<Option<Vec<usize>>>;
 
 /// The dependencies of initial values, and those between two events.
 pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> [Dependencies; 2] {
-    [at_the_start(can, fresh, states), between_events(can, fresh, states)]
+    match &can.saved {
+        Some(saving) => [at_the_start(can, saving, fresh, states), between_events(can, saving, fresh, states)],
+        None => all_dependencies(can, states),
+    }
 }
 
 /// Empty counterpart of [`dependencies`]: no variable is an unknown.
@@ -34,12 +38,28 @@ pub(crate) fn no_dependencies<M: Model>(states: &[usize]) -> [Dependencies; 2] {
     [const { None }; 2].map(|none| vec![none; metas::<M>().len() + states.len()])
 }
 
+/// The dependencies of a model that cannot be copied, from its table: every unknown depends on every known.
+fn all_dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> [Dependencies; 2] {
+    let metas = metas::<M>();
+    let found = |known: &dyn Fn(&Meta) -> bool| {
+        let mut found = Found::new(metas.len() + states.len());
+        (0..metas.len()).filter(|&i| known(metas[i])).for_each(|i| found.suspect(i));
+        found
+    };
+    let mut between = found(&|meta| can.model_exchange() && acts_between_events(meta));
+    if can.model_exchange() {
+        states.iter().chain([&NOW]).for_each(|&known| between.suspect(known));
+    }
+    [found(&Meta::takes_start).initial::<M>(&metas, states), between.between::<M>(&metas)]
+}
+
 /// Checks that an exact variable keeps the start value set by the importer.
 pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Result<(), Fault> {
+    let Some(saving) = &can.saved else { return Ok(()) };
     let mut draw = Draw(3);
     for (index, meta) in metas::<M>().into_iter().enumerate().filter(|(_, meta)| meta.exact) {
         let index = wide::<M>().index(index);
-        let mut block = fresh.clone();
+        let mut block = saving.block(fresh);
         change(can, &mut block, states, index, &mut draw);
         let set = can.place(&mut block, states, index).map(|(_, slot)| slot.bits());
         block.initialize();
@@ -56,20 +76,25 @@ pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
 }
 
 /// Dependencies of initial values: outputs, calculated parameters, states and derivatives on inputs and parameters.
-fn at_the_start<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
+fn at_the_start<M: Model>(
+    can: &Capabilities<M>,
+    saving: &Saving<M>,
+    fresh: &Block<M>,
+    states: &[usize],
+) -> Dependencies {
     let metas = metas::<M>();
     let knowns: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
     let mut found = Found::new(metas.len() + states.len());
     let varied = varied(&metas, &knowns);
-    let mut points = Points::new(fresh, &knowns, varied.len(), 1);
+    let mut points = Points::new(saving, fresh, &knowns, varied.len(), 1);
     while let Some(base) = points.next(can, states, &found) {
         let start = |mut block: Block<M>| {
             block.initialize();
             values(can, block, Elapsed::ZERO)
         };
-        let before = start(base.clone());
+        let before = start(saving.block(&base));
         for known in &varied {
-            let mut changed = base.clone();
+            let mut changed = saving.block(&base);
             vary(can, &mut changed, states, known, &mut points.draw);
             found.compare(known, &before, &start(changed));
         }
@@ -77,24 +102,28 @@ fn at_the_start<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usi
     for known in knowns.into_iter().filter(is_opaque::<M>) {
         found.suspect(known);
     }
-    let unknown = |i: usize| {
-        let calculated = |c| matches!(c, Causality::Output | Causality::CalculatedParameter);
-        let state = states.contains(&wide::<M>().index(i));
-        metas.get(i).is_none_or(|meta| !meta.has_start() && (state || calculated(meta.causality)))
-    };
-    found.list(unknown, &wide::<M>())
+    found.initial::<M>(&metas, states)
+}
+
+/// Whether a variable may change other variables between two events.
+fn acts_between_events(meta: &Meta) -> bool {
+    meta.causality == Causality::Input || meta.variability == Variability::Tunable
 }
 
 /// Dependencies between two events: outputs and derivatives on states, inputs, tunable parameters and time, for any values of
 /// the parameters.
-fn between_events<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Dependencies {
+fn between_events<M: Model>(
+    can: &Capabilities<M>,
+    saving: &Saving<M>,
+    fresh: &Block<M>,
+    states: &[usize],
+) -> Dependencies {
     let metas = metas::<M>();
-    let known = |meta: &Meta| meta.causality == Causality::Input || meta.variability == Variability::Tunable;
     let mut found = Found::new(metas.len() + states.len());
     let settable: Vec<usize> = (0..metas.len()).filter(|&i| metas[i].takes_start()).collect();
-    let knowns: Vec<usize> = (0..metas.len()).filter(|&i| known(metas[i])).collect();
+    let knowns: Vec<usize> = (0..metas.len()).filter(|&i| acts_between_events(metas[i])).collect();
     let varied = varied(&metas, &knowns);
-    let mut points = Points::new(fresh, &settable, varied.len() + states.len() + 1, 2);
+    let mut points = Points::new(saving, fresh, &settable, varied.len() + states.len() + 1, 2);
     while can.model_exchange()
         && let Some(mut base) = points.next(can, states, &found)
     {
@@ -113,9 +142,9 @@ fn between_events<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[u
             }
         }
         moved(false).for_each(|i| shift(can, &mut base, states, i, draw));
-        let before = observed(can, base.clone(), now);
+        let before = observed(can, saving.block(&base), now);
         for known in &varied {
-            let mut changed = base.clone();
+            let mut changed = saving.block(&base);
             vary(can, &mut changed, states, known, draw);
             if metas[known[0]].causality == Causality::Parameter {
                 changed.model.derive();
@@ -123,7 +152,7 @@ fn between_events<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[u
             found.compare(known, &before, &observed(can, changed, now));
         }
         for (i, &known) in states.iter().enumerate() {
-            let mut changed = base.clone();
+            let mut changed = saving.block(&base);
             shift(can, &mut changed, states, i, draw);
             found.compare(&[known], &before, &observed(can, changed, now));
         }
@@ -135,7 +164,7 @@ fn between_events<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[u
             found.suspect(input);
         }
     }
-    found.list(|i| metas.get(i).is_none_or(|meta| meta.causality == Causality::Output), &wide::<M>())
+    found.between::<M>(&metas)
 }
 
 /// Whether a variable is a text or bytes; these are not varied, because meaningful values are unknown.
@@ -157,6 +186,7 @@ fn varied(metas: &[&Meta], knowns: &[usize]) -> Vec<Vec<usize>> {
 /// Operating points: the start values; then, in turn, other values for about half of the inputs and parameters, and an earlier
 /// point that showed a new dependency with one to four values changed.
 struct Points<'a, M: Model> {
+    saving: &'a Saving<M>,
     fresh: &'a Block<M>,
     settable: &'a [usize],
     draw: Draw,
@@ -170,9 +200,9 @@ struct Points<'a, M: Model> {
 
 impl<'a, M: Model> Points<'a, M> {
     /// Number of points for a model that runs `runs` times at each.
-    fn new(fresh: &'a Block<M>, settable: &'a [usize], runs: usize, seed: u64) -> Self {
+    fn new(saving: &'a Saving<M>, fresh: &'a Block<M>, settable: &'a [usize], runs: usize, seed: u64) -> Self {
         let most = (RUNS / runs.max(1)).clamp(POINTS.0, POINTS.1);
-        Self { fresh, settable, draw: Draw(seed), fruitful: Vec::new(), last: None, count: 0, most, known: 0 }
+        Self { saving, fresh, settable, draw: Draw(seed), fruitful: Vec::new(), last: None, count: 0, most, known: 0 }
     }
 
     fn next(&mut self, can: &Capabilities<M>, states: &[usize], found: &Found) -> Option<Block<M>> {
@@ -187,7 +217,7 @@ impl<'a, M: Model> Points<'a, M> {
         let draw = &mut self.draw;
         let block = match self.fruitful.len() {
             n if n > 0 && self.count.is_multiple_of(2) => {
-                let mut block = self.fruitful[draw.below(u32::try_from(n).unwrap_or(u32::MAX))].clone();
+                let mut block = self.saving.block(&self.fruitful[draw.below(u32::try_from(n).unwrap_or(u32::MAX))]);
                 for _ in 0..=draw.below(4) {
                     let i = draw.below(u32::try_from(self.settable.len()).unwrap_or(u32::MAX));
                     change(can, &mut block, states, self.settable[i], draw);
@@ -195,7 +225,7 @@ impl<'a, M: Model> Points<'a, M> {
                 block
             }
             _ => {
-                let mut block = self.fresh.clone();
+                let mut block = self.saving.block(self.fresh);
                 for &i in self.settable {
                     if self.count > 0 && draw.below(2) == 0 {
                         change(can, &mut block, states, i, draw);
@@ -205,7 +235,7 @@ impl<'a, M: Model> Points<'a, M> {
             }
         };
         self.count += 1;
-        self.last = Some(block.clone());
+        self.last = Some(self.saving.block(&block));
         Some(block)
     }
 }
@@ -241,6 +271,22 @@ impl Found {
     /// A known on which every unknown may depend.
     fn suspect(&mut self, known: usize) {
         self.0.iter_mut().for_each(|list| list.push(known));
+    }
+
+    /// Dependencies of the initial values of outputs, calculated parameters, states and derivatives.
+    fn initial<M: Model>(self, metas: &[&Meta], states: &[usize]) -> Dependencies {
+        let wide = wide::<M>();
+        let unknown = |i: usize| {
+            let calculated = |c| matches!(c, Causality::Output | Causality::CalculatedParameter);
+            let state = states.contains(&wide.index(i));
+            metas.get(i).is_none_or(|meta| !meta.has_start() && (state || calculated(meta.causality)))
+        };
+        self.list(unknown, &wide)
+    }
+
+    /// Dependencies of outputs and derivatives between two events.
+    fn between<M: Model>(self, metas: &[&Meta]) -> Dependencies {
+        self.list(|i| metas.get(i).is_none_or(|meta| meta.causality == Causality::Output), &wide::<M>())
     }
 
     fn list(self, unknown: impl Fn(usize) -> bool, wide: &Wide) -> Dependencies {

@@ -12,7 +12,7 @@ pub(crate) const fn demand(fits: bool, name: &str, why: &str) {
 #[track_caller]
 pub(crate) const fn fail(parts: &[&str]) -> ! {
     // A panic while compiling takes one text.
-    let (mut text, mut len, mut part) = ([0_u8; 256], 0, 0);
+    let (mut text, mut len, mut part) = ([0_u8; 512], 0, 0);
     while part < parts.len() {
         let (bytes, mut i) = (parts[part].as_bytes(), 0);
         while i < bytes.len() && len < text.len() {

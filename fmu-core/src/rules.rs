@@ -2,7 +2,7 @@
 
 use crate::capability::Exported;
 use crate::clock::word;
-use crate::continuous::ContinuousTime;
+use crate::continuous::{ContinuousTime, scalars};
 use crate::log;
 use crate::model::{Experiment, Info, Model};
 use crate::names::Names;
@@ -30,6 +30,7 @@ pub const fn check<E: Exported>() {
     check_intermediate::<E>(model);
     check_clocks::<E>(model);
     check_resizable::<E>(model);
+    check_saved::<E>(model);
     if states == 0 {
         return;
     }
@@ -111,6 +112,17 @@ const fn check_resizable<E: Exported>(model: &str) {
     demand(capability || !rows, model, "a row V::structural needs the capability Resizable");
 }
 
+/// Checks that a model that is not saved needs no copy.
+#[track_caller]
+const fn check_saved<E: Exported>(model: &str) {
+    let saved = E::CAN.saved.is_some();
+    let sizes = "a row V::structural needs a model that is saved, not Unsaved: new sizes are tried on a copy";
+    demand(saved || E::CAN.resizable.is_none(), model, sizes);
+    let clocks = "Clocked needs a model that is saved, not Unsaved: an importer asks for output clocks before the event, which is \
+                  computed on a copy";
+    demand(saved || E::CAN.clocked.is_none(), model, clocks);
+}
+
 /// Checks that clocks come with the capability, and that a clocked variable names an existing clock.
 #[track_caller]
 const fn check_clocks<E: Exported>(model: &str) {
@@ -190,11 +202,7 @@ pub(crate) const fn can_be_state(meta: &Meta, dimension: Option<usize>) -> bool 
 #[track_caller]
 pub(crate) const fn check_number<M: ContinuousTime>(given: usize) {
     let (mut of_model, mut of_call) = ([0; 20], [0; 20]);
-    let (mut states, mut i) = (0, 0);
-    while i < M::STATES.len() {
-        states += M::STATES[i].most();
-        i += 1;
-    }
+    let states = scalars(M::STATES);
     if states != given {
         let (states, given) = (digits(states, &mut of_model), digits(given, &mut of_call));
         fail(&["STATES of ", M::INFO.name, " has the length ", states, ", and its integrator is made for ", given]);

@@ -172,7 +172,7 @@ impl<W: 'static> Table<W> {
             if row.meta.sized.is_empty() {
                 continue;
             }
-            let product = row.meta.sized.iter().map(|name| self.size(whole, name)).product();
+            let product: usize = row.meta.sized.iter().map(|name| self.size(whole, name)).product();
             let n = row.len(whole);
             if n != product {
                 let sizes = row.meta.sized.join(" x ");

@@ -348,8 +348,8 @@ impl<W: 'static> Table<W> {
         if let Access::Part { node, .. } = &row.access { node.element(inner) } else { Some(inner) }
     }
 
-    /// Names of the clocks of variable `index`, separated by spaces; empty for none. If a part is on a clock, all its variables
-    /// except parameters are.
+    /// Names of the clocks of variable `index`, separated by spaces; empty if it has none. If a part is on a clock, all its
+    /// variables except parameters are.
     pub fn clocks_of(&self, index: usize) -> &'static str {
         let Some((row, place)) = self.near_or_far(index) else { return "" };
         match &row.access {

@@ -252,6 +252,37 @@ pub const M3_PER_S: Quantity = Quantity::new("VolumeFlow", Unit::si("m3/s", Expo
 pub const PASCAL_PER_S: Quantity = Quantity::new("PressureRate", Unit::si("Pa/s", Exponents::mechanical(1, -1, -3, 0)));
 /// Dynamic viscosity in Pa.s.
 pub const PASCAL_S: Quantity = Quantity::new("DynamicViscosity", Unit::si("Pa.s", Exponents::mechanical(1, -1, -1, 0)));
+/// Kinematic viscosity or diffusivity in m2/s.
+pub const METER2_PER_S: Quantity = Quantity::new("Diffusivity", Unit::si("m2/s", Exponents::mechanical(0, 2, -1, 0)));
+/// Flow resistance in Pa.s/m3.
+pub const PASCAL_S_PER_M3: Quantity =
+    Quantity::new("FlowResistance", Unit::si("Pa.s/m3", Exponents::mechanical(1, -4, -1, 0)));
+/// Flow conductance in kg/(s.Pa).
+pub const KG_PER_S_PA: Quantity =
+    Quantity::new("FlowConductance", Unit::si("kg/(s.Pa)", Exponents::mechanical(0, 1, 1, 0)));
+/// Specific power in W/kg.
+pub const W_PER_KG: Quantity = Quantity::new("SpecificPower", Unit::si("W/kg", Exponents::mechanical(0, 2, -3, 0)));
+/// Jerk in m/s3.
+pub const METER_PER_S3: Quantity = Quantity::new("Jerk", Unit::si("m/s3", Exponents::mechanical(0, 1, -3, 0)));
+/// Rate of a force in N/s.
+pub const NEWTON_PER_S: Quantity = Quantity::new("ForceRate", Unit::si("N/s", Exponents::mechanical(1, 1, -3, 0)));
+/// Rate of a mass flow in kg/s2.
+pub const KG_PER_S2: Quantity = Quantity::new("MassFlowRate", Unit::si("kg/s2", Exponents::mechanical(1, 0, -2, 0)));
+/// Magnetic field strength in A/m.
+pub const AMPERE_PER_M: Quantity =
+    Quantity::new("MagneticFieldStrength", Unit::si("A/m", Exponents::mechanical(0, -1, 0, 1)));
+/// Current density in A/m2.
+pub const AMPERE_PER_M2: Quantity =
+    Quantity::new("CurrentDensity", Unit::si("A/m2", Exponents::mechanical(0, -2, 0, 1)));
+/// Resistivity in Ohm.m.
+pub const OHM_METER: Quantity = Quantity::new("Resistivity", Unit::si("Ohm.m", Exponents::mechanical(1, 3, -3, -2)));
+/// Electrical conductivity in S/m.
+pub const SIEMENS_PER_M: Quantity =
+    Quantity::new("ElectricalConductivity", Unit::si("S/m", Exponents::mechanical(-1, -3, 3, 2)));
+/// Permittivity in F/m.
+pub const FARAD_PER_M: Quantity = Quantity::new("Permittivity", Unit::si("F/m", Exponents::mechanical(-1, -3, 4, 2)));
+/// Permeability in H/m.
+pub const HENRY_PER_M: Quantity = Quantity::new("Permeability", Unit::si("H/m", Exponents::mechanical(1, 1, -2, -2)));
 
 #[cfg(test)]
 mod tests {
@@ -302,6 +333,19 @@ mod tests {
             (M3_PER_S, &[(&METER3, 1), (&SECOND, -1)]),
             (PASCAL_PER_S, &[(&PASCAL, 1), (&SECOND, -1)]),
             (PASCAL_S, &[(&PASCAL, 1), (&SECOND, 1)]),
+            (METER2_PER_S, &[(&PASCAL_S, 1), (&KG_PER_M3, -1)]),
+            (PASCAL_S_PER_M3, &[(&PASCAL, 1), (&M3_PER_S, -1)]),
+            (KG_PER_S_PA, &[(&KG_PER_S, 1), (&PASCAL, -1)]),
+            (W_PER_KG, &[(&WATT, 1), (&KILOGRAM, -1)]),
+            (METER_PER_S3, &[(&METER_PER_S2, 1), (&SECOND, -1)]),
+            (NEWTON_PER_S, &[(&NEWTON, 1), (&SECOND, -1)]),
+            (KG_PER_S2, &[(&KG_PER_S, 1), (&SECOND, -1)]),
+            (AMPERE_PER_M, &[(&AMPERE, 1), (&METER, -1)]),
+            (AMPERE_PER_M2, &[(&AMPERE, 1), (&METER2, -1)]),
+            (OHM_METER, &[(&OHM, 1), (&METER, 1)]),
+            (SIEMENS_PER_M, &[(&SIEMENS, 1), (&METER, -1)]),
+            (FARAD_PER_M, &[(&FARAD, 1), (&METER, -1)]),
+            (HENRY_PER_M, &[(&HENRY, 1), (&METER, -1)]),
         ] {
             assert_eq!(quantity.unit.exponents, product(factors), "{}", quantity.name);
         }

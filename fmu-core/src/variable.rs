@@ -98,9 +98,9 @@ pub enum Kind {
 /// The allowed values. A strict bound is excluded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Range {
-    /// Lower bound, -infinity for none.
+    /// Lower bound; -infinity if unbounded.
     pub min: f64,
-    /// Upper bound, infinity for none.
+    /// Upper bound; infinity if unbounded.
     pub max: f64,
     /// The lower bound is strict.
     pub above: bool,
@@ -147,7 +147,7 @@ pub struct Alias {
     pub name: &'static str,
     /// One sentence.
     pub description: &'static str,
-    /// Display unit, of the variable's own unit.
+    /// Display unit: one of those of the variable's unit.
     pub display: Option<DisplayUnit>,
 }
 
@@ -177,7 +177,7 @@ pub struct Meta {
     pub exact: bool,
     /// Whether an importer must feed it.
     pub need: Need<'static>,
-    /// Names of its clocks, separated by spaces; empty for none.
+    /// Names of its clocks, separated by spaces; empty if it has none.
     pub clocks: &'static str,
     /// It can be read or set inside a communication step; for a part, one of its variables can.
     pub intermediate: bool,

@@ -89,8 +89,8 @@ fn a_parameter_that_does_not_exist_is_a_fault() {
     assert_eq!(
         errors,
         [
-            "T is read with thermal, of which there are 0",
-            "T is read with u, of which there are 0",
+            "T is read with thermal: expected one parameter of this name, found 0",
+            "T is read with u: expected one parameter of this name, found 0",
             "T is read with plant.thermal.mode = Imposed, a value that it never has"
         ]
     );

@@ -99,7 +99,7 @@ wrong!(
 
 #[test]
 fn a_model_that_contradicts_itself_is_told_why() {
-    fn why<M: Model>() -> Option<String> {
+    fn why<M: Stored>() -> Option<String> {
         Description::of::<M>().err().map(|fault| fault.to_string())
     }
     assert_eq!((why::<Kept>(), why::<Sized>(), why::<Named>()), (None, None, None));

@@ -188,7 +188,7 @@ mod terminals {
 
     #[test]
     fn what_is_wrong_is_told() {
-        fn why<M: Model>() -> String {
+        fn why<M: Stored>() -> String {
             Description::of::<M>().unwrap_err().to_string()
         }
         assert_eq!(why::<NoVariable>(), "the terminal port names the variable v, which does not exist");

@@ -211,6 +211,9 @@ impl<E: Exported> Instance<E> {
         {
             if const { E::CAN.resizable.is_some() } && state == State::Instantiated {
                 self.set_and_configure(references, values)?;
+            } else if const { E::CAN.saved.is_none() } && !matches!(state, State::Instantiated | State::Initialization)
+            {
+                self.set_and_judge(references, values)?;
             } else {
                 self.set_each(references, values)?;
             }
@@ -253,6 +256,33 @@ impl<E: Exported> Instance<E> {
             }
         }
         Ok(())
+    }
+
+    /// Sets variables of a running model that cannot be copied: tunable parameters take effect at once, and are taken back if the
+    /// model refuses them.
+    #[cold]
+    fn set_and_judge<T: CValue>(&mut self, references: &[u32], values: &[T]) -> Result<(), Refusal> {
+        self.check_count(references, values.len())?;
+        let mut before = Vec::new();
+        for &reference in references {
+            let count = if self.arrays { self.elements(reference)? } else { 1 };
+            for index in (0..count).map(|offset| index::<E>(reference).wrapping_add(offset)) {
+                let found = table::<E>().entry(&mut self.current.block, index);
+                before.extend(found.and_then(|(meta, slot)| Some((index, T::read(meta, &slot, self.standard)?))));
+            }
+        }
+        self.set_each(references, values)?;
+        if !std::mem::take(&mut self.current.dirty) {
+            return Ok(());
+        }
+        self.current.adopt(&E::CAN).map_err(|fault| {
+            for (index, value) in before {
+                self.write(index, value);
+            }
+            self.current.dirty = false;
+            self.current.block.model.derive();
+            fault.into()
+        })
     }
 
     /// Whether the value can be written in this state.

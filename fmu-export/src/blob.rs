@@ -8,14 +8,15 @@
 //! | 2 | `Model::STATE_VERSION` |
 //! | 16 | `Model::HASH`, the model and its interface |
 //! | 4 | length of the payload |
-//! | n | payload in postcard's encoding, padded with zeros to a multiple of a fixed number |
+//! | n | payload in postcard's encoding, the model and its outputs last, padded with zeros to a multiple of a fixed number |
 //! | 4 | CRC-32 of all preceding bytes |
 
 use crate::binary::make_room;
 use crate::lifecycle::State;
-use crate::snapshot::Snapshot;
+use crate::snapshot::{Head, Snapshot};
 use fmu_core::resource::Shelf;
-use fmu_core::{Fault, Model};
+use fmu_core::saved::{self, Storing};
+use fmu_core::{Block, Fault, Model};
 
 const MAGIC: &[u8; 8] = b"FMUstate";
 /// Version of this layout.
@@ -28,21 +29,23 @@ const CHECKSUM: usize = 4;
 ///
 /// # Errors
 /// The model cannot be serialized.
-pub fn size<M: Model>(state: &Snapshot<M>) -> Result<usize, Fault> {
-    padded::<M>(payload_size(state)?)
+pub fn size<M: Model>(state: &Snapshot<M>, storing: &Storing<M>) -> Result<usize, Fault> {
+    padded(payload_size(state, storing)?, storing)
 }
 
 /// A state as bytes, [`size`] of them.
 ///
 /// # Errors
 /// The model cannot be serialized.
-pub fn write<M: Model>(state: &Snapshot<M>) -> Result<Vec<u8>, Fault> {
-    let payload = payload_size(state)?;
+pub fn write<M: Model>(state: &Snapshot<M>, storing: &Storing<M>) -> Result<Vec<u8>, Fault> {
+    let payload = payload_size(state, storing)?;
     let length = u32::try_from(payload).map_err(|_| Fault::new("the state is larger than 4 GB"))?;
-    let mut bytes = vec![0; padded::<M>(payload)?];
+    let mut bytes = vec![0; padded(payload, storing)?];
     let body = bytes.len() - CHECKSUM;
     bytes[..HEADER].copy_from_slice(&header::<M>(length));
-    postcard::to_slice(state, &mut bytes[HEADER..body]).map_err(|e| unable(&e))?;
+    let mut at = HEADER + saved::write(&state.head(), &mut bytes[HEADER..body])?;
+    at += (storing.write)(&state.block.model, &mut bytes[at..body])?;
+    saved::write(&state.block.out, &mut bytes[at..body])?;
     let checksum = crc32(&bytes[..body]);
     bytes[body..].copy_from_slice(&checksum.to_le_bytes());
     Ok(bytes)
@@ -52,7 +55,7 @@ pub fn write<M: Model>(state: &Snapshot<M>) -> Result<Vec<u8>, Fault> {
 ///
 /// # Errors
 /// Names the invalid part of the bytes: length, kind, version, checksum or content.
-pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
+pub fn read<M: Model>(bytes: &[u8], storing: &Storing<M>) -> Result<Snapshot<M>, Fault> {
     let refuse = |why: String| Fault::new(format!("these {} bytes are not a state of this FMU: {why}", bytes.len()));
     let Some((body, checksum)) = bytes.split_last_chunk::<CHECKSUM>() else { return Err(refuse("too short".into())) };
     let Some((header, room)) = body.split_first_chunk::<HEADER>() else { return Err(refuse("too short".into())) };
@@ -68,14 +71,19 @@ pub fn read<M: Model>(bytes: &[u8]) -> Result<Snapshot<M>, Fault> {
         return Err(refuse("written by another version of this FMU".into()));
     }
     let length = length.iter().rev().fold(0_usize, |n, &byte| (n << 8) | usize::from(byte));
-    if length > room.len() || padded::<M>(length)? != bytes.len() {
+    if length > room.len() || padded(length, storing)? != bytes.len() {
         return Err(refuse(format!("{length} bytes of content do not fit this size")));
     }
     if crc32(body).to_le_bytes() != *checksum {
         return Err(refuse("the checksum differs".into()));
     }
-    let (mut state, rest): (Snapshot<M>, &[u8]) =
-        postcard::take_from_bytes(&room[..length]).map_err(|e| refuse(format!("content: {e}")))?;
+    let read = || {
+        let (head, rest) = saved::read::<Head>(&room[..length])?;
+        let (model, rest) = (storing.read)(rest)?;
+        let (out, rest) = saved::read(rest)?;
+        Ok((head.with(Block { model, out }), rest))
+    };
+    let (mut state, rest) = read().map_err(|fault: Fault| refuse(fault.to_string()))?;
     if !rest.is_empty() {
         return Err(refuse("content".into()));
     }
@@ -107,27 +115,23 @@ fn header<M: Model>(length: u32) -> [u8; HEADER] {
     header
 }
 
-fn payload_size<M: Model>(state: &Snapshot<M>) -> Result<usize, Fault> {
-    postcard::experimental::serialized_size(state).map_err(|e| unable(&e))
-}
-
-fn unable(error: &postcard::Error) -> Fault {
-    Fault::new(format!("the state cannot be serialized: {error}"))
+fn payload_size<M: Model>(state: &Snapshot<M>, storing: &Storing<M>) -> Result<usize, Fault> {
+    Ok(saved::size(&state.head())? + (storing.size)(&state.block.model)? + saved::size(&state.block.out)?)
 }
 
 /// Size of a payload: twice the size for a new model, and a reserve for integers that grow from one byte to ten.
-fn unit<M: Model>() -> Result<usize, Fault> {
-    Ok((2 * payload_size(&Snapshot::<M>::default())?).next_multiple_of(64) + 64)
+fn unit<M: Model>(storing: &Storing<M>) -> Result<usize, Fault> {
+    Ok((2 * payload_size(&Snapshot::<M>::default(), storing)?).next_multiple_of(64) + 64)
 }
 
-fn padded<M: Model>(payload: usize) -> Result<usize, Fault> {
-    Ok(HEADER + payload.next_multiple_of(unit::<M>()?) + CHECKSUM)
+fn padded<M: Model>(payload: usize, storing: &Storing<M>) -> Result<usize, Fault> {
+    Ok(HEADER + payload.next_multiple_of(unit(storing)?) + CHECKSUM)
 }
 
 /// The resources of a model.
-pub(crate) fn shelf<M: Model>(model: &M) -> Shelf {
+pub(crate) fn shelf<M: Model>(model: &M, storing: &Storing<M>) -> Shelf {
     // A model that cannot be serialized fails later, when a state is written.
-    Shelf::of(|| drop(postcard::experimental::serialized_size(model)))
+    Shelf::of(|| drop((storing.size)(model)))
 }
 
 /// CRC-32 of ISO 3309, as in PNG and ZIP.

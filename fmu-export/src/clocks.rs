@@ -177,7 +177,9 @@ impl<E: Exported> Instance<E> {
         if !(announced || functions.feedthrough && outputs && self.stale) {
             return Ok(());
         }
-        let mut model = self.current.block.model.clone();
+        // A model with clocks can be saved.
+        let Some(saving) = &E::CAN.saved else { return Ok(()) };
+        let mut model = saving.model(&self.current.block.model);
         let now = self.current.elapsed;
         for number in 0..self.number_of_clocks() {
             if self.is_ticking(number) {
@@ -366,7 +368,7 @@ impl<E: Exported> Instance<E> {
             return Err(Fault::value("activationTime", t, allowed).into());
         }
         if self.current.dirty {
-            self.current.block.model = self.current.judged()?;
+            self.current.adopt(&E::CAN)?;
             self.current.dirty = false;
         }
         (self.current.elapsed, self.current.end) = (Elapsed::between(start, t), t);

@@ -28,7 +28,11 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The model refuses the sizes, or an array does not have the expected length; the instance is unchanged.
     pub fn exit_configuration(&mut self) -> Result<(), Fault> {
-        self.resize(self.current.block.clone())
+        // A model with sizes can be saved.
+        match &E::CAN.saved {
+            Some(saving) => self.resize(saving.block(&self.current.block)),
+            None => Ok(()),
+        }
     }
 
     /// Resizes the arrays of this model to its sizes, and adopts it.
@@ -66,10 +70,10 @@ impl<E: Exported> Instance<E> {
             let found = E::Model::TABLE.locate(E::CAN.index(*reference));
             found.is_some_and(|(_, meta, _)| meta.causality == Causality::StructuralParameter)
         };
-        if !references.iter().any(structural) {
+        let Some(saving) = E::CAN.saved.as_ref().filter(|_| references.iter().any(structural)) else {
             return self.set_each(references, values);
-        }
-        let before = self.current.block.clone();
+        };
+        let before = saving.block(&self.current.block);
         self.set_each(references, values)?;
         let changed = mem::replace(&mut self.current.block, before);
         Ok(self.resize(changed)?)

@@ -76,7 +76,7 @@ impl<E: Exported> Instance<E> {
         self.stale |= self.exchanges();
         let current = &mut self.current;
         if current.dirty {
-            current.block.model = current.judged()?;
+            current.adopt(&E::CAN)?;
             current.dirty = false;
         }
         let mut update = Updated::default();

@@ -6,6 +6,7 @@ use crate::habit::Habit;
 use crate::inside::IntermediateUpdates;
 use crate::lifecycle::{Standard, State};
 use crate::log::Log;
+use crate::origin::Origin;
 use crate::sensitivity::Scratch;
 use crate::snapshot::{Experiment, Snapshot};
 use crate::{blob, message, registry};
@@ -14,7 +15,8 @@ use fmu_core::idle::Watch;
 use fmu_core::log::WARNING;
 use fmu_core::log::{Said, Warnings};
 use fmu_core::resource::Shelf;
-use fmu_core::{Block, Elapsed, Exported, Fault, Interface, Model, Outcome, Range, SampleGrid, Step};
+use fmu_core::saved::{Saving, Storing};
+use fmu_core::{Elapsed, Exported, Fault, Interface, Model, Outcome, Range, SampleGrid, Step};
 use std::ffi::CString;
 
 /// Why a call failed.
@@ -72,8 +74,8 @@ pub struct Instance<E: Exported> {
     pub(crate) texts: Vec<CString>,
     /// The resources that the model loaded, for states from bytes.
     pub(crate) shelf: Shelf,
-    /// The model as it was instantiated, for a reset, if that is not its `Default`.
-    pub(crate) made: Option<Box<Block<E::Model>>>,
+    /// The model as it was instantiated, for a reset.
+    pub(crate) origin: Origin<E::Model>,
     /// The properties of the clocks, for a model with clocks.
     pub(crate) clocks: Option<Box<Clocks>>,
     /// Requests of the importer inside communication steps.
@@ -123,7 +125,7 @@ impl<E: Exported> Instance<E> {
             scratch: None,
             texts: Vec::new(),
             shelf: Shelf::default(),
-            made: None,
+            origin: Origin::Default,
             inside: None,
             clocks: Clocks::of::<E>(),
             warned: Vec::new(),
@@ -161,13 +163,14 @@ impl<E: Exported> Instance<E> {
         // Of many runs, only the first is checked completely: the check takes longer than everything else between reset and
         // first step. Sizes and clocks must be consistent.
         if !self.starts.judged || const { E::CAN.resizable.is_some() || E::CAN.clocked.is_some() } {
-            self.current.check()?;
+            // NaN in an output may follow from parameters that the model refuses with a reason.
+            self.current.check().map_err(|fault| self.current.judge(&E::CAN).err().unwrap_or(fault))?;
         }
-        self.current.judged()?;
+        self.current.judge(&E::CAN)?;
         if self.current.dirty || !self.current.stated {
             self.current.initialize();
         }
-        self.log.event(|| message::start(&self.name, &mut self.current, self.made.as_deref()));
+        self.log.event(|| message::start(&self.name, &mut self.current, self.origin.starts(&E::CAN)));
         if const { E::CAN.clocked.is_some() } {
             self.plan_ticks(true)?;
         }
@@ -179,10 +182,13 @@ impl<E: Exported> Instance<E> {
         self.log.event(|| format!("{}: terminated at {} s", self.name, self.current.end));
     }
 
-    /// Restores the state after instantiation; name and logger stay.
-    pub fn reset(&mut self) {
-        let made = self.made.as_deref().cloned().unwrap_or_default();
-        self.current = Snapshot::of(self.current.life.interface(), made);
+    /// Restores the state after instantiation; name and logger stay. A model that cannot be copied is made again.
+    ///
+    /// # Errors
+    /// Such a model cannot load its resources again.
+    pub fn reset(&mut self) -> Result<(), Fault> {
+        let fresh = self.origin.fresh(&E::CAN)?;
+        self.current = Snapshot::of(self.current.life.interface(), fresh);
         self.starts.judged = *self.starts.pass.get_or_insert_with(|| self.current.check().is_ok());
         self.stale = false;
         if const { E::CAN.resizable.is_some() } {
@@ -193,6 +199,7 @@ impl<E: Exported> Instance<E> {
         self.begun = false;
         self.watch = Watch::default();
         self.log.event(|| format!("{}: reset", self.name));
+        Ok(())
     }
 
     /// One communication step from `t` to `t + h`. Tunable parameters take effect here, all together.
@@ -215,7 +222,7 @@ impl<E: Exported> Instance<E> {
         let next = current.elapsed.plus(h);
         current.check_step(t, h, next)?;
         if current.dirty {
-            current.block.model = current.judged()?;
+            current.adopt(&E::CAN)?;
             current.dirty = false;
         }
         if !self.begun {
@@ -426,12 +433,13 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The handle is unknown.
     pub fn save(&mut self, handle: usize) -> Result<usize, Fault> {
+        let saving = Self::saving()?;
         self.observe();
         if handle == 0 {
-            return Ok(registry::keep(self.current.clone()));
+            return Ok(registry::keep(self.current.copy(saving)));
         }
-        registry::with(handle, |state| {
-            state.clone_from(&self.current);
+        registry::with(handle, |state: &mut Snapshot<E::Model>| {
+            state.overwrite(&self.current, saving);
             Ok(handle)
         })
     }
@@ -441,12 +449,13 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// The handle is unknown, or the state is of an instance for another interface.
     pub fn restore(&mut self, handle: usize) -> Result<(), Fault> {
+        let saving = Self::saving()?;
         registry::with(handle, |state| {
             let (theirs, ours) = (state.life.interface(), self.current.life.interface());
             if theirs != ours {
                 return Err(message::interface(theirs, ours));
             }
-            self.current.clone_from(state);
+            self.current.overwrite(state, saving);
             self.starts.judged = false;
             Ok(())
         })?;
@@ -463,7 +472,21 @@ impl<E: Exported> Instance<E> {
     /// # Errors
     /// As [`blob::read`].
     pub fn deserialize(&self, bytes: &[u8]) -> Result<usize, Fault> {
-        self.shelf.attach(|| blob::read::<E::Model>(bytes)).map(registry::keep)
+        let storing = Self::storing()?;
+        self.shelf.attach(|| blob::read(bytes, storing)).map(registry::keep)
+    }
+
+    /// The functions that turn a state into bytes, and bytes into a state.
+    ///
+    /// # Errors
+    /// The model has none.
+    pub(crate) fn storing() -> Result<&'static Storing<E::Model>, Fault> {
+        const { &E::CAN.stored }.as_ref().ok_or_else(|| message::lacks("canSerializeFMUState", "stored as bytes"))
+    }
+
+    /// The functions that save a state.
+    fn saving() -> Result<&'static Saving<E::Model>, Fault> {
+        const { &E::CAN.saved }.as_ref().ok_or_else(|| message::lacks("canGetAndSetFMUState", "saved"))
     }
 
     /// Whether the importer integrates.

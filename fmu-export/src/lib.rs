@@ -46,7 +46,7 @@
 //!
 //!     // Co-Simulation: one state, substeps of at most 0.1 s.
 //!     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-//!         integrate::smooth::<Self, 1>(self, step, 0.1)
+//!         integrate::smooth::<Self, { Self::SCALARS }>(self, step, 0.1)
 //!     }
 //! }
 //!
@@ -84,6 +84,7 @@ pub mod abi;
 mod access;
 mod binary;
 pub mod blob;
+mod call_log;
 pub mod clocks;
 mod configuration;
 pub mod exchange;
@@ -93,6 +94,7 @@ pub mod instance;
 pub mod lifecycle;
 pub mod log;
 mod message;
+mod origin;
 mod preset;
 pub mod registry;
 mod resources;

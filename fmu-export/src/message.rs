@@ -96,7 +96,7 @@ pub(crate) fn inner_derivative(reference: u32, state: &str, first: u32) -> Fault
 /// The variable's type does not match the function.
 #[cold]
 pub(crate) fn type_of<M: Model>(index: usize, meta: &Meta, carries: &str) -> Fault {
-    Fault::new(format!("{} is {}, and this function carries {carries}", name::<M>(index), kind(&meta.kind)))
+    Fault::new(format!("{} is {}, and this function takes {carries}", name::<M>(index), kind(&meta.kind)))
 }
 
 /// The variable cannot be set, or not in this state.
@@ -156,10 +156,15 @@ pub(crate) fn count(given: usize, needed: usize) -> Fault {
     Fault::value("nValues", given, format_args!("{needed} for these value references"))
 }
 
-/// The start of an instance: the values that differ from the start values, which come from the model's `Default` unless it was
-/// `made` with others.
-pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: Option<&Block<M>>) -> String {
-    let mut fresh = made.cloned().unwrap_or_default();
+/// A model that an importer cannot keep.
+#[cold]
+pub(crate) fn lacks(flag: &str, kept: &str) -> Fault {
+    Fault::new(format!("not supported: the state of this model cannot be {kept}, and the description has no {flag}"))
+}
+
+/// The start of an instance: the values that differ from the start values, if these are known.
+pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, starts: Option<Block<M>>) -> String {
+    let Some(mut fresh) = starts else { return format!("{instance}: initialized at {} s", current.end) };
     fresh.initialize();
     let mut changes = Vec::new();
     for index in M::TABLE.indices() {
@@ -182,10 +187,10 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, made: O
 pub(crate) fn real(time: bool, carries: &str) -> Fault {
     Fault::new(if time {
         format!(
-            "time (value reference {TIME}) is a real number that only a step or SetTime changes; this call carries {carries}"
+            "time (value reference {TIME}) is a real number that only a step or SetTime changes; this call takes {carries}"
         )
     } else {
-        format!("a derivative or an event indicator is a real number; this call carries {carries}")
+        format!("a derivative or an event indicator is a real number; this call takes {carries}")
     })
 }
 

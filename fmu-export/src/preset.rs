@@ -3,7 +3,7 @@
 
 use crate::lifecycle::State;
 use crate::message;
-use fmu_core::preset::{self, FILE, MOST, PresetValue};
+use fmu_core::preset::{self, FILE, FORMER_FILE, MOST, PresetValue};
 use fmu_core::{Block, Bytes, Capabilities, Fault, Kind, Meta, Model, Slot};
 use std::fmt::Display;
 use std::fs::File;
@@ -43,6 +43,9 @@ impl<M: Model> Made<M> {
             )));
         };
         let path = folder.join(FILE);
+        if !path.exists() && folder.join(FORMER_FILE).exists() {
+            return Err(of(folder, preset::former()));
+        }
         let bytes = content(&path).map_err(|e| {
             of(
                 &path,
@@ -105,21 +108,20 @@ fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Prese
     let rows = can.rows()?;
     let indices: Vec<usize> = M::TABLE.indices().collect();
     let (mut set, mut next) = (vec![false; indices.len()], 0);
-    for PresetValue { line, name, value } in entries {
-        let wrong = |fault: Fault| Fault::new(format!("line {line}: {fault}"));
+    for PresetValue { name, value } in entries {
         // `fmu preset` writes the variables in the order of the table.
         let mut places = (next..indices.len()).chain(0..next);
         let found = places.find(|&place| message::sized_name(block, indices[place]) == *name);
-        let place = found.ok_or_else(|| wrong(Fault::new(format!("{} has no variable {name}", M::INFO.name))))?;
+        let place = found.ok_or_else(|| Fault::new(format!("{} has no variable {name}", M::INFO.name)))?;
         let index = indices[place];
         if std::mem::replace(&mut set[place], true) {
-            return Err(wrong(Fault::new(format!("{name} already has a value"))));
+            return Err(Fault::new(format!("{name} already has a value")));
         }
         let Some((meta, slot)) = can.place(block, &rows, index) else { continue };
         if !meta.takes_start() {
-            return Err(wrong(message::fixed::<M>(index, meta, State::Instantiated)));
+            return Err(message::fixed::<M>(index, meta, State::Instantiated));
         }
-        write(meta, slot, value).map_err(|allowed| wrong(Fault::value(name, value, allowed)))?;
+        write(meta, slot, value).map_err(|allowed| Fault::value(name, value, allowed))?;
         next = place + 1;
     }
     Ok(())

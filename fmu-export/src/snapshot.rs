@@ -4,7 +4,8 @@ use crate::binary::make_room;
 use crate::clocks::{Tick, ticks};
 use crate::lifecycle::{Life, State};
 use crate::message;
-use fmu_core::{Block, Causality, Elapsed, Fault, Interface, Kind, Meta, Model, Slot, Variability};
+use fmu_core::saved::Saving;
+use fmu_core::{Block, Capabilities, Causality, Elapsed, Fault, Interface, Kind, Meta, Model, Slot, Variability};
 use serde::{Deserialize, Serialize};
 
 /// Start and stop time of the importer's experiment in s.
@@ -41,9 +42,38 @@ pub(crate) fn ramps(meta: &Meta) -> bool {
         && matches!(meta.kind, Kind::Real(_))
 }
 
-/// Model, outputs, time and state of the lifecycle.
+/// Calculates parameters, and checks them together.
+fn judge<M: Model>(model: &mut M, interface: Interface) -> Result<(), Fault> {
+    model.derive();
+    model.validate()?;
+    model.validate_for(interface)
+}
+
+/// Everything but the model and its outputs, as it is stored.
 #[derive(Serialize, Deserialize)]
-#[serde(bound = "")]
+pub(crate) struct Head {
+    life: Life,
+    experiment: Option<Experiment>,
+    elapsed: Elapsed,
+    end: f64,
+    settled: f64,
+    completed: f64,
+    stated: bool,
+    pending: bool,
+    slopes: Vec<(u32, f64)>,
+    dirty: bool,
+    ticks: Option<Box<[Tick]>>,
+}
+
+impl Head {
+    /// Adds the model and its outputs.
+    pub(crate) fn with<M: Model>(self, block: Block<M>) -> Snapshot<M> {
+        let Self { life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks } = self;
+        Snapshot { life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks, block }
+    }
+}
+
+/// Model, outputs, time and state of the lifecycle.
 pub struct Snapshot<M: Model> {
     /// State of the lifecycle.
     pub life: Life,
@@ -104,13 +134,23 @@ impl<M: Model> Snapshot<M> {
     }
 }
 
-impl<M: Model> Clone for Snapshot<M> {
-    fn clone(&self) -> Self {
-        Self { block: self.block.clone(), slopes: self.slopes.clone(), ticks: self.ticks.clone(), ..*self }
+impl<M: Model> Snapshot<M> {
+    /// All but the model and its outputs.
+    pub(crate) fn head(&self) -> Head {
+        let Self { life, experiment, elapsed, end, settled, completed, stated, pending, dirty, .. } = *self;
+        let (slopes, ticks) = (self.slopes.clone(), self.ticks.clone());
+        Head { life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks }
     }
 
-    /// Reuses the memory of `self`: for a plain model, and for one that implements `clone_from`, nothing is allocated.
-    fn clone_from(&mut self, source: &Self) {
+    /// A copy.
+    pub fn copy(&self, saving: &Saving<M>) -> Self {
+        let block = saving.block(&self.block);
+        Self { block, slopes: self.slopes.clone(), ticks: self.ticks.clone(), ..*self }
+    }
+
+    /// Overwrites `self` with a copy of `source`, and reuses its memory: for a plain model, and for one that implements
+    /// `clone_from`, nothing is allocated.
+    pub fn overwrite(&mut self, source: &Self, saving: &Saving<M>) {
         let Self { life, experiment, elapsed, end, settled, completed, stated, pending, slopes, dirty, ticks, block } =
             source;
         (self.life, self.experiment, self.elapsed) = (*life, *experiment, *elapsed);
@@ -118,7 +158,7 @@ impl<M: Model> Clone for Snapshot<M> {
         (self.pending, self.dirty) = (*pending, *dirty);
         self.slopes.clone_from(slopes);
         self.ticks.clone_from(ticks);
-        self.block.model.clone_from(&block.model);
+        saving.overwrite(&mut self.block.model, &block.model);
         self.block.out.clone_from(&block.out);
     }
 }
@@ -171,16 +211,33 @@ impl<M: Model> Snapshot<M> {
         (self.dirty, self.stated) = (false, false);
     }
 
-    /// A copy of the model with its calculated parameters, if the parameters are consistent.
+    /// Checks the parameters together, with the calculated ones: on a copy or, if there can be none, on the model itself.
     ///
     /// # Errors
     /// As [`Model::validate`].
-    pub fn judged(&self) -> Result<M, Fault> {
-        let mut model = self.block.model.clone();
-        model.derive();
-        model.validate()?;
-        model.validate_for(self.life.interface())?;
-        Ok(model)
+    pub(crate) fn judge(&mut self, can: &Capabilities<M>) -> Result<(), Fault> {
+        match can.saved {
+            Some(_) => self.judged(can).map(drop),
+            None => self.adopt(can),
+        }
+    }
+
+    /// Calculates parameters from those that were set, if they are consistent.
+    ///
+    /// # Errors
+    /// As [`Model::validate`]; a model that can be copied has not changed.
+    pub(crate) fn adopt(&mut self, can: &Capabilities<M>) -> Result<(), Fault> {
+        match self.judged(can)? {
+            Some(model) => self.block.model = model,
+            None => judge(&mut self.block.model, self.life.interface())?,
+        }
+        Ok(())
+    }
+
+    /// A copy of the model with its calculated parameters; `None` for a model that cannot be copied.
+    fn judged(&self, can: &Capabilities<M>) -> Result<Option<M>, Fault> {
+        let copy = can.saved.as_ref().map(|saving| saving.model(&self.block.model));
+        copy.map(|mut model| judge(&mut model, self.life.interface()).map(|()| model)).transpose()
     }
 
     /// Whether an instance for this interface can be in this state.

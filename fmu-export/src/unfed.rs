@@ -16,7 +16,8 @@ impl<E: Exported> Instance<E> {
         if !self.log.hears_model(&[]) {
             return;
         }
-        let (mut fresh, block) = (self.made.as_deref().cloned().unwrap_or_default(), &mut self.current.block);
+        let Some(mut fresh) = self.origin.starts(&E::CAN) else { return };
+        let block = &mut self.current.block;
         let mut unfed = Vec::new();
         for index in E::Model::TABLE.indices() {
             let start = match E::Model::TABLE.entry(&mut fresh, index) {

@@ -332,6 +332,47 @@ fn the_model_ends_the_simulation() {
     assert_eq!(fmu.terminate(), OK);
 }
 
+/// A call, the standards that allow it after the model has ended the simulation in a step, and the function.
+type After = (&'static str, &'static [u8], fn(&Fmu) -> c_int);
+
+/// FMI 2.0.5, 4.2.4, state stepFailed; FMI 3.0.2, 4.2.1: terminateSimulation, after which no step follows.
+const ENDED: &[After] = &[
+    ("SetDebugLogging", &[2, 3], |f| f.logging(false, &[])),
+    ("EnterInitializationMode", &[], |f| f.enter(0.0, None)),
+    ("ExitInitializationMode", &[], Fmu::exit),
+    ("DoStep", &[], |f| f.step(5.453, 0.1).0),
+    ("DoStep", &[], |f| f.step(5.5, 0.1).0),
+    ("Terminate", &[2, 3], Fmu::terminate),
+    ("Reset", &[2, 3], Fmu::reset),
+    ("Get", &[2, 3], |f| f.try_get(&[H, V_], &mut [0.0; 2])),
+    ("Set", &[3], |f| f.set(&[], &[])),
+    ("GetFMUState", &[2, 3], |f| f.save(&mut null_mut())),
+];
+
+#[test]
+fn every_call_after_the_model_has_ended_the_simulation() {
+    for kind in [Kind::Cs2, Kind::Cs3 { event: false, early: false }] {
+        for (name, standards, call) in ENDED {
+            let fmu = Fmu::entered(kind, 5.0);
+            assert_eq!((set_integer(&fmu, LIMIT, 1), fmu.exit()), (OK, OK));
+            if kind == Kind::Cs2 {
+                assert_eq!(fmu.step(5.0, 0.5).0, DISCARD);
+            } else {
+                assert_eq!(step(&fmu, 5.0, 0.5), (OK, [1, 0, 0], 5.5));
+            }
+            fmu.messages();
+            let status = call(&fmu);
+            if standards.contains(&kind.version()) {
+                assert_eq!(status, OK, "{name}, {kind:?}: {:?}", fmu.messages());
+            } else {
+                let error = fmu.error();
+                assert_eq!(status, ERROR, "{name}, {kind:?}");
+                assert!(error.contains("not allowed in the state Ended by the model"), "{name}, {kind:?}: {error}");
+            }
+        }
+    }
+}
+
 /// Outputs at the multiples of `grid` up to 3 s, with steps of `h`, and the times of the events seen by the importer.
 fn run(kind: Kind, h: f64, grid: f64) -> (Vec<[u64; 3]>, Vec<f64>) {
     let fmu = Fmu::running(kind, 0.0);

@@ -62,6 +62,6 @@ fn a_start_value_out_of_range_is_refused_after_each_reset() {
             Ok(()) => assert!(sets),
             Err(fault) => assert!(!sets && fault.message() == "R = 0 is not allowed: greater than 0", "{fault:?}"),
         }
-        open.reset();
+        open.reset().unwrap();
     }
 }

@@ -132,7 +132,7 @@ fn what_no_text_can_be_is_refused_and_changes_nothing() {
         (vec![LABEL], vec![c"\xff".as_ptr()], "the new value of label is not UTF-8"),
         (vec![LABEL, SAID], vec![c"new".as_ptr(); 2], "said is an output and cannot be set"),
         (vec![LABEL, LABEL], vec![c"new".as_ptr(), null()], "label = NULL"),
-        (vec![LABEL, NUL], vec![c"new".as_ptr(); 2], "nul is a truth value, and this function carries a text"),
+        (vec![LABEL, NUL], vec![c"new".as_ptr(); 2], "nul is a truth value, and this function takes a text"),
         (vec![LABEL], vec![c"new".as_ptr(); 2], "nValues = 2 is not allowed: 1 for these value references"),
         (vec![99], vec![without_a_text()], "value reference 99 does not exist"),
     ] {
@@ -215,7 +215,8 @@ fn a_load_that_fails_gives_no_instance() {
     let none = open(Some(c"/none")).unwrap_err();
     assert_eq!(none, "fmi3InstantiateCoSimulation: no file data.bin");
     let panicked = open(Some(c"/panic/")).unwrap_err();
-    assert_eq!(panicked, "fmi3InstantiateCoSimulation: a fault in the model's code (panic): the file is empty");
+    let said = "fmi3InstantiateCoSimulation: a fault in the model's code (panic): the file is empty (";
+    assert!(panicked.starts_with(said) && panicked.contains("texts.rs:"), "{panicked}");
     let token = CString::new(This::TOKEN.as_str()).unwrap();
     for (folder, works) in [(c"file:///none", false), (c"file:///panic", false), (c"file:///where", true)] {
         let callbacks = Fmi2Callbacks {
@@ -247,5 +248,9 @@ fn a_load_that_changes_the_state_is_not_described() {
     let change = "load changes what a state saves: store what it reads in a Resource";
     assert_eq!(describe(c"/change"), (1, change.into()));
     assert_eq!(describe(c"/none"), (1, "no file data.bin".into()));
-    assert_eq!(describe(c"/panic"), (1, "a fault in the model's code (panic): the file is empty".into()));
+    let (status, panicked) = describe(c"/panic");
+    assert!(
+        status == 1 && panicked.starts_with("a fault in the model's code (panic): the file is empty ("),
+        "{panicked}"
+    );
 }

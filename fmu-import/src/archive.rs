@@ -59,8 +59,8 @@ impl Archive {
         if path.is_dir() {
             return Err(wrong(&"is a directory, expected an .fmu file"));
         }
-        let file = File::open(path).map_err(|e| wrong(&e))?;
-        let size = file.metadata().map_err(|e| wrong(&e))?.len();
+        let file = File::open(path).map_err(|e| Error::file_from(path, "", e))?;
+        let size = file.metadata().map_err(|e| Error::file_from(path, "", e))?.len();
         limits::ARCHIVE.check(size).map_err(|cause| wrong(&cause))?;
         Self::read(path, Box::new(file))
     }
@@ -72,11 +72,13 @@ impl Archive {
 
     fn read(path: &Path, source: Box<dyn Source>) -> Result<Self, Error> {
         let wrong = |cause: &dyn std::fmt::Display| Error::file(path, cause);
-        let mut zip = ZipArchive::new(source).map_err(|e| wrong(&format!("not a ZIP archive, or cut short: {e}")))?;
+        let mut zip =
+            ZipArchive::new(source).map_err(|e| Error::file_from(path, "not a ZIP archive, or cut short: ", e))?;
         let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
         let xml = document(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
         let xml = xml.ok_or_else(|| wrong(&no_description(&names)))?;
-        let description = model_description::read(&xml).map_err(|e| wrong(&format!("modelDescription.xml: {e}")))?;
+        let description =
+            model_description::read(&xml).map_err(|e| Error::file_from(path, "modelDescription.xml: ", e))?;
         Ok(Self { path: path.into(), zip, names, description: Arc::new(description) })
     }
 
@@ -85,7 +87,8 @@ impl Archive {
         const NAME: &str = "terminalsAndIcons/terminalsAndIcons.xml";
         let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, cause);
         let xml = document(&mut self.zip, NAME).map_err(|cause| wrong(&cause))?;
-        let read = |xml| model_description::read_terminals(xml).map_err(|e| wrong(&format!("{NAME}: {e}")));
+        let of = format!("{NAME}: ");
+        let read = |xml| model_description::read_terminals(xml).map_err(|e| Error::file_from(&self.path, &of, e));
         xml.map(read).transpose()
     }
 
@@ -100,13 +103,13 @@ impl Archive {
             let has = interfaces(&description);
             return Err(wrong(&format!("has neither Co-Simulation nor Model Exchange; it has {has}")));
         }
-        let folder = Folder::new().map_err(|e| wrong(&e))?;
+        let folder = Folder::new().map_err(|e| Error::file_from(&self.path, "", e))?;
         // The FMU is given the path of the resources folder, so it is created even if the archive has none.
-        fs::create_dir(folder.path().join("resources")).map_err(|e| wrong(&e))?;
+        fs::create_dir(folder.path().join("resources")).map_err(|e| Error::file_from(&self.path, "", e))?;
         let found = co_simulation.iter().chain(model_exchange.iter().flatten());
         let mut prefixes: Vec<String> = found.map(|(folder, _)| format!("binaries/{folder}/")).collect();
         prefixes.push("resources/".into());
-        let files = self.extract_into(folder.path(), &prefixes).map_err(|e| Error::file(&self.path, e))?;
+        let files = self.extract_into(folder.path(), &prefixes).map_err(|e| Error::file_from(&self.path, "", e))?;
         let place = |(of, name): (&str, String)| folder.path().join("binaries").join(of).join(name);
         Ok(Extracted {
             co_simulation: co_simulation.map(place),

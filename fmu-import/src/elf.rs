@@ -21,6 +21,7 @@ impl fmt::Display for Glibc {
 
 /// Needs of a Linux binary.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Needs {
     /// The newest version of the GNU C library that one of its symbols requires.
     pub glibc: Option<Glibc>,

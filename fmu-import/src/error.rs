@@ -1,21 +1,36 @@
 //! Errors of an FMU: in its file, in its use, or in a call.
 
 use crate::Status;
+use crate::quantity::similar;
+use model_description::ModelDescription;
+use std::error::Error as StdError;
+use std::fmt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// One line that names the file or the instance, and the cause.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug)]
+#[non_exhaustive]
 pub enum Error {
     /// The file is not an FMU that can be run here.
-    #[error("{}: {cause}", path.display())]
     File {
         /// Path of the file that cannot be used.
         path: PathBuf,
         /// The fault.
         cause: String,
+        /// The error behind it, if there is one: of the file system, the archive or the XML. Its text is part of `cause`.
+        source: Option<Arc<dyn StdError + Send + Sync>>,
     },
-    /// A name, a type or a value that does not exist in the FMU or that it does not accept.
-    #[error("{instance}: {cause}")]
+    /// The FMU has no variable of this name.
+    Variable {
+        /// Name of the instance, or of the model.
+        instance: String,
+        /// The name.
+        name: String,
+        /// Names that resemble it, the nearest first.
+        similar: Vec<String>,
+    },
+    /// A type, a value or a call that the FMU does not accept or does not have.
     Usage {
         /// Name of the instance.
         instance: String,
@@ -23,7 +38,6 @@ pub enum Error {
         cause: String,
     },
     /// The FMU refused a call.
-    #[error("{instance}: {function} returned {status}{}", said(message.as_deref()))]
     Call {
         /// Name of the instance.
         instance: String,
@@ -36,10 +50,54 @@ pub enum Error {
     },
 }
 
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File { path, cause, .. } => write!(f, "{}: {cause}", path.display()),
+            Self::Variable { instance, .. } => write!(f, "{instance}: {}", self.cause()),
+            Self::Usage { instance, cause } => write!(f, "{instance}: {cause}"),
+            Self::Call { instance, function, status, message } => {
+                write!(f, "{instance}: {function} returned {status}{}", said(message.as_deref()))
+            }
+        }
+    }
+}
+
+impl StdError for Error {
+    fn source(&self) -> Option<&(dyn StdError + 'static)> {
+        match self {
+            Self::File { source: Some(source), .. } => Some(&**source),
+            _ => None,
+        }
+    }
+}
+
+/// Errors are equal if their texts are.
+impl PartialEq for Error {
+    fn eq(&self, other: &Self) -> bool {
+        std::mem::discriminant(self) == std::mem::discriminant(other) && self.to_string() == other.to_string()
+    }
+}
+
+impl Eq for Error {}
+
 impl Error {
     /// An unusable file; the cause becomes one line.
     pub fn file(path: &Path, cause: impl std::fmt::Display) -> Self {
-        Self::File { path: path.into(), cause: one_line(&cause.to_string()) }
+        Self::File { path: path.into(), cause: one_line(&cause.to_string()), source: None }
+    }
+
+    /// An unusable file, with the error behind it; `what` precedes its text.
+    pub(crate) fn file_from(path: &Path, what: &str, source: impl StdError + Send + Sync + 'static) -> Self {
+        let cause = one_line(&format!("{what}{source}"));
+        Self::File { path: path.into(), cause, source: Some(Arc::new(source)) }
+    }
+
+    /// A variable that does not exist, with the names that resemble it.
+    pub fn variable(instance: &str, name: &str, description: &ModelDescription) -> Self {
+        let names = description.variables.iter().map(|v| v.name.as_str());
+        let similar = similar(name, names).into_iter().map(Into::into).collect();
+        Self::Variable { instance: instance.into(), name: name.into(), similar }
     }
 
     /// An impossible use of an instance; the cause becomes one line.
@@ -69,7 +127,7 @@ impl Error {
                 Self::Call { instance, function, status, message }
             }
             Self::Usage { instance, cause } => Self::usage(&instance, format!("{what}: {cause}")),
-            Self::File { .. } => self,
+            Self::File { .. } | Self::Variable { .. } => self,
         }
     }
 
@@ -77,6 +135,14 @@ impl Error {
     pub fn cause(&self) -> String {
         match self {
             Self::File { cause, .. } | Self::Usage { cause, .. } => cause.clone(),
+            Self::Variable { name, similar, .. } => {
+                let meant = if similar.is_empty() {
+                    String::new()
+                } else {
+                    format!("; did you mean {}?", similar.join(" or "))
+                };
+                format!("has no variable {name}{meant}")
+            }
             Self::Call { .. } => self.to_string(),
         }
     }
@@ -104,6 +170,16 @@ fn one_line(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_error_of_a_file_has_its_source() {
+        let error = Error::file_from(Path::new("a.fmu"), "", std::io::Error::from(std::io::ErrorKind::NotFound));
+        let source = error.source().and_then(|source| source.downcast_ref::<std::io::Error>());
+        assert_eq!(source.map(std::io::Error::kind), Some(std::io::ErrorKind::NotFound));
+        assert!(
+            error == Error::file(Path::new("a.fmu"), "entity not found") && error.to_string().starts_with("a.fmu: ")
+        );
+    }
 
     #[test]
     fn an_error_is_one_line() {

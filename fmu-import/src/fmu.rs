@@ -18,7 +18,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The description of an `.fmu` file, and all its files.
 ///
 /// # Errors
-/// The file is missing, no archive, or has no readable description.
+/// The file is missing, is not an archive, or has no readable description.
 pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u8>>), Error> {
     let mut archive = Archive::open(path)?;
     let files = archive.files()?;
@@ -26,6 +26,7 @@ pub fn contents(path: &Path) -> Result<(ModelDescription, BTreeMap<String, Vec<u
 }
 
 /// Summary of an `.fmu` file, from a small part of its bytes.
+#[non_exhaustive]
 pub struct Outline {
     /// Its description.
     pub description: ModelDescription,
@@ -38,7 +39,7 @@ pub struct Outline {
 /// Reads an `.fmu` file as far as needed to describe it: its memory does not grow with the unpacked size of the archive.
 ///
 /// # Errors
-/// The file is missing, no archive, or has no readable description.
+/// The file is missing, is not an archive, or has no readable description.
 pub fn outline(path: &Path) -> Result<Outline, Error> {
     let mut archive = Archive::open(path)?;
     let (files, terminals) = (archive.outline()?, archive.terminals().ok().flatten());
@@ -56,7 +57,7 @@ impl Unpacked {
     /// Unpacks the library for this platform and the resources.
     ///
     /// # Errors
-    /// The file is missing, no archive, has no readable description, or no binary for this platform.
+    /// The file is missing, is not an archive, or lacks a readable description or a binary for this platform.
     pub fn new(path: &Path) -> Result<Self, Error> {
         let Extracted { folder, co_simulation, model_exchange, .. } = Archive::open(path)?.extract()?;
         let library = co_simulation.map(Ok).or(model_exchange).transpose()?;
@@ -89,8 +90,8 @@ impl Fmu {
     /// Opens an `.fmu` file of FMI 2.0 or FMI 3.0.
     ///
     /// # Errors
-    /// The file is missing, no archive, has no readable description, neither Co-Simulation nor Model Exchange, no binary for
-    /// this platform, or a binary that lacks a function.
+    /// The file is missing or is not an archive; it lacks a readable description, an interface (Co-Simulation or Model
+    /// Exchange), or a binary for this platform; or the binary lacks a function.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, Error> {
         Self::load(&Arc::new(Mutex::new(Archive::open(path.as_ref())?)))
     }

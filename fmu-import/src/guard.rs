@@ -51,6 +51,7 @@ pub struct Guarded {
 
 /// The end of a guarded process.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum End {
     /// Normally, or by a signal.
     Ended(ExitStatus),
@@ -64,6 +65,7 @@ pub enum End {
 
 /// Findings of the guard.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Report {
     /// The end of the process.
     pub end: End,

@@ -10,6 +10,7 @@ use crate::abi::log::{Log, Message, Status};
 use crate::abi::raw::Simple;
 use crate::error::Error;
 use crate::standard::{Experiment, Kind, Outcome, Refusal, explain};
+use crate::typed::OtherType;
 use crate::value::Values;
 use clocks::Clocks;
 use model_description::{BaseType, Causality, ModelDescription, ModelVariable};
@@ -78,10 +79,9 @@ impl Instance {
     /// A variable by its name.
     ///
     /// # Errors
-    /// The variable does not exist.
+    /// The variable does not exist; the error has the names that resemble it.
     pub fn variable(&self, name: &str) -> Result<&ModelVariable, Error> {
-        let none = || Error::usage(&self.name, format!("{} has no variable {name}", self.description.model_name));
-        self.description.variable(name).ok_or_else(none)
+        self.description.variable(name).ok_or_else(|| Error::variable(&self.name, name, &self.description))
     }
 
     /// Reads a variable.
@@ -93,19 +93,31 @@ impl Instance {
         self.get_at(base, reference, count)
     }
 
-    /// Writes a variable; a structural parameter in a separate Configuration Mode, as [`configure`](Self::configure).
+    /// Reads a variable as a type of Rust: `let speed: f64 = fmu.get_as("speed")?`; an array as a `Vec`, an enumeration as an
+    /// integer.
+    ///
+    /// # Errors
+    /// As [`get`](Self::get), or the variable has another type.
+    pub fn get_as<T: TryFrom<Values, Error = OtherType>>(&mut self, name: &str) -> Result<T, Error> {
+        let typed = self.get(name)?.try_into();
+        typed.map_err(|other: OtherType| Error::usage(&self.name, format!("{name} = {other}")))
+    }
+
+    /// Writes a variable: a number, a Boolean, a text, [`Values`], or an array as a list; a structural parameter in a separate
+    /// Configuration Mode, as [`configure`](Self::configure).
     ///
     /// # Errors
     /// The variable does not exist, the values do not fit, or the FMU refuses.
-    pub fn set(&mut self, name: &str, values: &Values) -> Result<(), Error> {
+    pub fn set(&mut self, name: &str, values: impl Into<Values>) -> Result<(), Error> {
+        let values = values.into();
         if self.variable(name)?.causality == Causality::StructuralParameter {
-            return self.configure(&[(name, values)]);
+            return self.configure(&[(name, &values)]);
         }
         let (base, reference, count) = self.place(name)?;
         if values.len() != count {
             return Err(Error::usage(&self.name, format!("{name} has {count} elements, not {}", values.len())));
         }
-        self.set_at(base, reference, values)
+        self.set_at(base, reference, &values)
     }
 
     /// Writes a variable as a user writes it: `3.3`, `true`, `Rasmussen`, or elements with commas between them.
@@ -280,7 +292,7 @@ impl Instance {
     /// Saves the state.
     ///
     /// # Errors
-    /// The FMU refuses, or cannot.
+    /// The FMU refuses the call or lacks the capability.
     pub fn get_state(&mut self) -> Result<FmuState, Error> {
         let state = self.call(Call::State, Live::get_state)?;
         self.states.push(Some(state));
@@ -310,7 +322,7 @@ impl Instance {
     /// A saved state as bytes.
     ///
     /// # Errors
-    /// The FMU refuses, or cannot, or the state was freed.
+    /// The FMU refuses the call, lacks the capability, or the state was freed.
     pub fn serialize_state(&mut self, state: FmuState) -> Result<Vec<u8>, Error> {
         let state = self.state(state)?;
         self.call(Call::State, |s| s.serialize(state))
@@ -319,7 +331,7 @@ impl Instance {
     /// A saved state from bytes; it is not yet set.
     ///
     /// # Errors
-    /// The FMU refuses, or cannot.
+    /// The FMU refuses the call or lacks the capability.
     pub fn deserialize_state(&mut self, bytes: &[u8]) -> Result<FmuState, Error> {
         let state = self.call(Call::State, |s| s.deserialize(bytes))?;
         self.states.push(Some(state));
@@ -337,7 +349,7 @@ impl Instance {
         Ok((variable.base, variable.value_reference, self.elements(variable)?))
     }
 
-    /// Number of elements of a variable: of an array, the product of its extents, where a structural parameter counts with its
+    /// Number of elements of a variable: for an array, the product of its extents, where a structural parameter counts with its
     /// present value.
     ///
     /// # Errors

@@ -3,10 +3,12 @@
 //!
 //! - [`Fmu`] and [`Instance`]: one FMU with valid calls only; [`raw`]: single calls, valid or not, for a checker.
 //! - [`quantity`], [`written`], [`csv`](mod@csv): numbers with units, names and tables, as a user writes them; [`threads`]: work for several threads.
+//! - [`replay`](mod@replay): the calls that an FMU recorded in another importer, repeated and compared.
 //! - [`elf`], [`platform`]: requirements and platforms of binaries.
 //! - [`guard`]: separate processes for FMUs of unknown origin; [`limits`]: limits of these processes and of files.
 //!
-//! Several FMUs together are the subject of the crate `fmu-system`.
+//! `examples/` has a run in Co-Simulation and one in Model Exchange. Several FMUs together are the subject of the crate
+//! `fmu-system`.
 //!
 //! `abi` is the only module with `unsafe` code: every pointer passed to an FMU points to memory of the size that the standard
 //! requires. No importer can check the FMU itself: its code runs in this process with all of its rights.
@@ -19,7 +21,8 @@
 //! plant.enter_initialization()?;
 //! plant.exit_initialization()?;
 //! let _ = plant.do_step(0.0, 1e-4)?;
-//! println!("{}", plant.get("speed")?);
+//! let speed: f64 = plant.get_as("speed")?;
+//! println!("{speed} rad/s");
 //! # Ok(()) }
 //! ```
 
@@ -44,6 +47,7 @@ mod standard;
 mod text;
 pub mod threads;
 pub mod trace;
+mod typed;
 mod value;
 pub mod written;
 
@@ -51,6 +55,7 @@ pub use abi::journal;
 pub use abi::library::describe;
 pub use abi::log::{Logging, Message, Status};
 pub use abi::raw;
+pub use abi::replay;
 pub use archive::{check_entries, document};
 pub use error::Error;
 pub use fmu::{Fmu, Outline, Unpacked, contents, outline};
@@ -60,4 +65,7 @@ pub use number::Number;
 pub use quantity::suggest;
 pub use standard::{CompletedStep, Kind, Stepped, Update};
 pub use text::{file_uri, once, printable, printable_lines};
+pub use typed::OtherType;
 pub use value::Values;
+// The types in signatures of this crate.
+pub use model_description::{self, BaseType, Causality, FmiVersion, ModelDescription, ModelVariable, Variability};

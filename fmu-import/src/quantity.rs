@@ -12,6 +12,30 @@ pub fn split(text: &str) -> Option<(f64, &str)> {
     (1..=digits).rev().find_map(|end| Some((text.get(..end)?.parse().ok()?, text.get(end..)?.trim())))
 }
 
+/// The integer that a text is, to the last digit: tools also write `1.0` and `9.007199254740993000e+15`.
+pub fn whole(text: &str) -> Option<i128> {
+    let (mantissa, exponent) = match text.split_once(['e', 'E']) {
+        Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().ok()?),
+        None => (text, 0),
+    };
+    let (before, after) = mantissa.split_once('.').unwrap_or((mantissa, ""));
+    let unsigned = before.strip_prefix(['+', '-']).unwrap_or(before);
+    let is_number = [unsigned, after].iter().all(|part| part.bytes().all(|c| c.is_ascii_digit()));
+    if !is_number || (unsigned.is_empty() && after.is_empty()) {
+        return None;
+    }
+    let digits = format!("{before}{after}");
+    let shift = i64::from(exponent) - i64::try_from(after.len()).ok()?;
+    if shift >= 0 {
+        return digits.parse::<i128>().ok()?.checked_mul(10_i128.checked_pow(u32::try_from(shift).ok()?)?);
+    }
+    // What stands behind the point must be zeros.
+    let cut = usize::try_from(-shift).ok()?.min(digits.len() - (before.len() - unsigned.len()));
+    let (kept, zeros) = digits.split_at(digits.len() - cut);
+    let kept = if kept.trim_start_matches(['+', '-']).is_empty() { "0" } else { kept };
+    if zeros.bytes().all(|c| c == b'0') { kept.parse().ok() } else { None }
+}
+
 /// Converts a number from `unit` to the unit of the variable; `unit` is the variable's unit (also if empty), one of its display
 /// units, or another unit of the FMU for the same quantity.
 ///
@@ -51,6 +75,12 @@ pub fn convert(
 
 /// `; did you mean a or b?` with the names that resemble the input, or empty.
 pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> String {
+    let names = similar(written, names);
+    if names.is_empty() { String::new() } else { format!("; did you mean {}?", names.join(" or ")) }
+}
+
+/// At most three names that resemble the input, the nearest first.
+pub fn similar<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let whole = written.to_lowercase();
     let (parent, last) = split_last(&whole);
     let likeness = |name: &str| {
@@ -69,9 +99,7 @@ pub fn suggest<'a>(written: &str, names: impl Iterator<Item = &'a str>) -> Strin
     near.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.len().cmp(&b.1.len())));
     // As near as the nearest.
     let best = near.first().map_or(1.0, |(x, _)| *x);
-    let names: Vec<&str> =
-        near.into_iter().take_while(|(x, _)| *x > best - 0.05).take(3).map(|(_, name)| name).collect();
-    if names.is_empty() { String::new() } else { format!("; did you mean {}?", names.join(" or ")) }
+    near.into_iter().take_while(|(x, _)| *x > best - 0.05).take(3).map(|(_, name)| name).collect()
 }
 
 /// The parts before the last dot, if there is one, and after it.
@@ -91,6 +119,29 @@ mod tests {
         assert_eq!(split("36 mH"), Some((36.0, "mH")));
         assert_eq!(split("1,5"), Some((1.0, ",5")));
         assert_eq!(split("rpm"), None);
+    }
+
+    #[test]
+    fn an_integer_in_any_form_keeps_its_digits() {
+        for (text, integer) in [
+            ("7", 7),
+            ("-7.0", -7),
+            ("+0.0", 0),
+            ("1e3", 1000),
+            ("1.500e1", 15),
+            ("9.007199254740993000e+15", 9_007_199_254_740_993),
+            ("18446744073709551615.000", u64::MAX.into()),
+            ("0.000000000000000000e+00", 0),
+            ("-.0", 0),
+            ("1200e-2", 12),
+            ("0e-9", 0),
+        ] {
+            assert_eq!(whole(text), Some(integer), "{text}");
+        }
+        for text in ["", "-", ".", "1.5", "1e-1", "0x10", "1_0", "e3", "1e99", "--1", "1.-0", "NaN", "inf", "1 2", "1e"]
+        {
+            assert_eq!(whole(text), None, "{text}");
+        }
     }
 
     #[test]

@@ -53,9 +53,9 @@ impl Values {
                 .collect::<Result<_, _>>()
                 .map(Self::Reals),
             BaseType::Boolean | BaseType::Clock => elements()
-                .map(|e| match e.to_ascii_lowercase().as_str() {
-                    "true" | "1" => Ok(true),
-                    "false" | "0" => Ok(false),
+                .map(|e| match (e.to_ascii_lowercase().as_str(), quantity::whole(e)) {
+                    ("true", _) | (_, Some(1)) => Ok(true),
+                    ("false", _) | (_, Some(0)) => Ok(false),
                     _ => Err(wrong(e, "true or false")),
                 })
                 .collect::<Result<_, _>>()
@@ -72,7 +72,7 @@ impl Values {
             BaseType::Enumeration => elements()
                 .map(|e| {
                     let named = items.iter().find(|(name, _)| name == e).map(|(_, value)| i128::from(*value));
-                    named.or_else(|| e.parse().ok()).ok_or_else(|| {
+                    named.or_else(|| quantity::whole(e)).ok_or_else(|| {
                         let names: Vec<_> = items.iter().map(|(name, _)| name.as_str()).collect();
                         wrong(e, &format!("one of {}", names.join(", ")))
                     })
@@ -81,7 +81,7 @@ impl Values {
                 .map(Self::Integers),
             base => elements()
                 .map(|e| {
-                    let value = e.parse().map_err(|_| wrong(e, "an integer"))?;
+                    let value = quantity::whole(e).ok_or_else(|| wrong(e, "an integer"))?;
                     let (min, max) = bounds(base);
                     let fits = (min..=max).contains(&value);
                     if fits { Ok(value) } else { Err(wrong(e, &format!("of the type {base}: {min} to {max}"))) }

@@ -14,6 +14,39 @@ use std::process::{Command, Stdio};
 /// A library and its package.
 pub type Library = (String, PathBuf);
 
+/// How a library is compiled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Profile {
+    /// Cargo's profile `release`, the whole program optimized as one, without symbols.
+    #[default]
+    Release,
+    /// The profile `release` with the names of functions and with line numbers.
+    Symbols,
+    /// Cargo's profile `dev`, for this computer: compiled in seconds after a change, with the paths of its sources for a debugger.
+    Development,
+}
+
+impl Profile {
+    /// Its name in variables of the environment.
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Release | Self::Symbols => "RELEASE",
+            Self::Development => "DEV",
+        }
+    }
+
+    /// Settings that apply unless the caller's environment has others.
+    const fn settings(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Self::Release => &[("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")],
+            Self::Symbols => {
+                &[("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "none"), ("DEBUG", "line-tables-only")]
+            }
+            Self::Development => &[],
+        }
+    }
+}
+
 #[derive(Deserialize)]
 struct Artifact {
     reason: String,
@@ -28,24 +61,24 @@ struct ArtifactTarget {
     crate_types: Vec<String>,
 }
 
-/// Compiles the cdylibs of these packages, optimized, in a separate target folder (if `cargo` runs this program, it locks the
-/// usual one). Local paths are removed from the binaries, so builds in two folders agree byte for byte.
+/// Compiles the cdylibs of these packages in a separate target folder (if `cargo` runs this program, it locks the usual one).
+/// Except in the profile for development, local paths are removed from the binaries, so builds in two folders agree byte for byte.
 ///
 /// # Errors
 /// Cargo fails; it has then printed the reason.
-pub fn compile(workspace: &Workspace, packages: &[String], target: &Target) -> Result<Vec<Library>> {
+pub fn compile(workspace: &Workspace, packages: &[String], target: &Target, profile: Profile) -> Result<Vec<Library>> {
     let mut libraries = Vec::new();
     if is_darwin(target) {
         // macOS stores an install name in a library, by default the path of the build. The argument that sets it applies to
         // one library only, so Cargo runs once per library.
         for name in packages {
             let one = std::slice::from_ref(name);
-            let mut rustc = build("rustc", workspace, one, target);
+            let mut rustc = build("rustc", workspace, one, target, profile);
             rustc.arg("--lib").arg("--").args(install_name(name));
             libraries.extend(run(workspace, rustc, one, target)?);
         }
     } else {
-        libraries = run(workspace, build("build", workspace, packages, target), packages, target)?;
+        libraries = run(workspace, build("build", workspace, packages, target, profile), packages, target)?;
     }
     libraries.sort();
     Ok(libraries)
@@ -58,7 +91,7 @@ pub fn compile(workspace: &Workspace, packages: &[String], target: &Target) -> R
 /// Those of [`compile`].
 pub fn module(workspace: &Workspace, package: &str) -> Result<PathBuf> {
     let packages = [package.to_owned()];
-    let mut rustc = release(cargo(), "rustc", workspace, &packages, MODULE);
+    let mut rustc = with_options(cargo(), "rustc", workspace, &packages, MODULE, Profile::Release);
     rustc.args(["--target", MODULE, "--lib"]);
     // A panic ends the call in the host; `fmu_fault` has its text.
     rustc.env("CARGO_PROFILE_RELEASE_PANIC", "abort");
@@ -82,7 +115,7 @@ pub fn module(workspace: &Workspace, package: &str) -> Result<PathBuf> {
 /// The compiler cannot be run or fails.
 pub fn program(workspace: &Workspace, package: &str, name: &str, target: &Target) -> Result<PathBuf> {
     let packages = [package.to_owned()];
-    let mut build = build("build", workspace, &packages, target);
+    let mut build = build("build", workspace, &packages, target, Profile::Release);
     build.args(["--bin", name]);
     let program = build.get_program().to_string_lossy().into_owned();
     let status = build.stdin(Stdio::null()).stdout(Stdio::null()).status();
@@ -104,13 +137,13 @@ fn install_name(name: &str) -> [String; 2] {
 }
 
 /// The command, except for the arguments after `--`.
-fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target) -> Command {
+fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target, profile: Profile) -> Command {
     let program = match target.linker {
         Linker::Usual => cargo(),
         Linker::Zig => Command::new("cargo-zigbuild"),
     };
     let verb = if verb == "build" && target.linker == Linker::Zig { "zigbuild" } else { verb };
-    let mut build = release(program, verb, workspace, packages, &target.triple);
+    let mut build = with_options(program, verb, workspace, packages, &target.triple, profile);
     let linux = matches!(target.platform, Platform::X64Linux | Platform::ArmLinux);
     match target.linker {
         // zig links with the C library of this version.
@@ -119,7 +152,7 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
         _ => build.args(["--target", &target.triple]),
     };
     // The C interface turns a panic into a status, so the workspace's panic strategy must not apply.
-    build.env("CARGO_PROFILE_RELEASE_PANIC", "unwind");
+    build.env(format!("CARGO_PROFILE_{}_PANIC", profile.name()), "unwind");
     if target.is_host {
         // The host has a standard library; building one would require --target.
         build.env_remove(BUILD_STD);
@@ -131,15 +164,24 @@ fn build(verb: &str, workspace: &Workspace, packages: &[String], target: &Target
     build
 }
 
-/// An optimized build of these packages, with the options common to all targets.
-fn release(mut build: Command, verb: &str, workspace: &Workspace, packages: &[String], triple: &str) -> Command {
-    build.args([verb, "--release", "--message-format", "json-render-diagnostics", "--target-dir"]);
+/// A build of these packages, with the options common to all targets.
+fn with_options(
+    mut build: Command,
+    verb: &str,
+    workspace: &Workspace,
+    packages: &[String],
+    triple: &str,
+    profile: Profile,
+) -> Command {
+    build.args([verb, "--message-format", "json-render-diagnostics", "--target-dir"]);
     build.arg(workspace.target.join("fmu-build"));
     build.args(packages.iter().flat_map(|name| ["--package", name]));
-    build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, triple));
-    // Link-time optimization, and no symbols except the exported ones, unless the caller sets otherwise.
-    for (setting, value) in [("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")] {
-        let name = format!("CARGO_PROFILE_RELEASE_{setting}");
+    if profile != Profile::Development {
+        build.arg("--release");
+    }
+    build.env("CARGO_ENCODED_RUSTFLAGS", flags(&workspace.root, triple, profile));
+    for (setting, value) in profile.settings() {
+        let name = format!("CARGO_PROFILE_{}_{setting}", profile.name());
         if env::var_os(&name).is_none() {
             build.env(name, value);
         }
@@ -188,7 +230,7 @@ fn artifacts(
 }
 
 /// The flags for rustc: the user's, scalar arithmetic, and the removal of local paths and of the time.
-fn flags(root: &Path, triple: &str) -> OsString {
+fn flags(root: &Path, triple: &str, profile: Profile) -> OsString {
     const SEPARATOR: &str = "\u{1f}";
     let words = |text: String| text.split_whitespace().collect::<Vec<_>>().join(SEPARATOR);
     let users = env::var("CARGO_ENCODED_RUSTFLAGS").or_else(|_| env::var("RUSTFLAGS").map(words));
@@ -210,6 +252,9 @@ fn flags(root: &Path, triple: &str) -> OsString {
     // Pairs of numbers in one register save little arithmetic. But the processor does not forward a store of a pair to a
     // load of a single number, or the reverse: a period of the drive takes a tenth longer.
     add(OsStr::new("-Cno-vectorize-slp"));
+    if profile == Profile::Development {
+        return flags;
+    }
     add(&remap(root, "."));
     if let Some(home) = home {
         add(&remap(&home, "/cargo"));
@@ -237,12 +282,24 @@ mod tests {
     fn an_fmu_is_compiled_so_that_a_panic_unwinds() {
         let workspace = Workspace::find().unwrap();
         let host = Tools::find().unwrap().host();
-        for verb in ["build", "rustc"] {
-            let build = build(verb, &workspace, &["own-fmu".into()], &host);
+        for (verb, profile) in [
+            ("build", Profile::Release),
+            ("rustc", Profile::Release),
+            ("build", Profile::Symbols),
+            ("build", Profile::Development),
+        ] {
+            let build = build(verb, &workspace, &["own-fmu".into()], &host, profile);
             let set: Vec<_> = build.get_envs().collect();
-            let panic = OsStr::new("CARGO_PROFILE_RELEASE_PANIC");
-            assert!(set.contains(&(panic, Some(OsStr::new("unwind")))), "{set:?}");
-            assert!(build.get_args().any(|a| a == "--release"));
+            let panic = format!("CARGO_PROFILE_{}_PANIC", profile.name());
+            assert!(set.contains(&(OsStr::new(&panic), Some(OsStr::new("unwind")))), "{set:?}");
+            assert_eq!(build.get_args().any(|a| a == "--release"), profile != Profile::Development);
+            let of = |name: &str| set.iter().find(|(of, _)| *of == OsStr::new(name)).and_then(|(_, value)| *value);
+            let symbols = (profile == Profile::Symbols).then_some("none");
+            let strip =
+                of("CARGO_PROFILE_RELEASE_STRIP").filter(|_| env::var_os("CARGO_PROFILE_RELEASE_STRIP").is_none());
+            assert_eq!(strip.map(|x| x == "none"), (profile != Profile::Development).then_some(symbols.is_some()));
+            let flags = of("CARGO_ENCODED_RUSTFLAGS").unwrap().to_string_lossy();
+            assert_eq!(flags.contains("--remap-path-prefix"), profile != Profile::Development, "{flags}");
         }
     }
 }

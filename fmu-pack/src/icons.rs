@@ -5,7 +5,8 @@
 
 use crate::archive::PackedFile;
 use crate::error::{Context, Result};
-use crate::picture;
+#[cfg(feature = "full")]
+use crate::picture::without_text;
 use fmu_core::Description;
 use fmu_core::terminal::MatchingRule;
 use model_description::{FmiVersion, write_terminals};
@@ -39,11 +40,30 @@ fn manifest(name: &str, version: &str, description: &str, more: &str) -> String 
     )
 }
 
+/// Whether this build draws pictures: with the feature `full`. Without it, archives have no icon and no pictures of terminals, because
+/// the standards require each as PNG.
+pub const ARE_DRAWN: bool = cfg!(feature = "full");
+
+#[cfg(not(feature = "full"))]
+fn without_text(_: &str) -> Result<Vec<u8>> {
+    Err(crate::error::invalid!("this build draws no pictures"))
+}
+
+/// The model without icon and pictures.
+fn bare(description: &Description) -> Description {
+    let mut bare = description.clone();
+    bare.icon = None;
+    bare.terminals.iter_mut().for_each(|terminal| terminal.picture = None);
+    bare
+}
+
 /// The files; empty for a model without terminals and icon.
 ///
 /// # Errors
 /// A picture is not an SVG document, or contains text.
 pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<String, PackedFile>> {
+    let bare = (!ARE_DRAWN).then(|| bare(description));
+    let description = bare.as_ref().unwrap_or(description);
     let mut files = BTreeMap::new();
     let file = |bytes: Vec<u8>| PackedFile { bytes, executable: false };
     if let Some(xml) = write_terminals(description, version) {
@@ -58,7 +78,7 @@ pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<
     let mut pictures: BTreeMap<&str, &str> = of_terminals.map(|p| (p.icon.as_str(), p.svg.as_str())).collect();
     pictures.extend(description.icon.as_ref().map(|svg| ("icon", svg.as_str())));
     for (name, svg) in pictures {
-        let png = picture::without_text(svg).with_context(|| format!("the picture {name} of {}", description.name))?;
+        let png = without_text(svg).with_context(|| format!("the picture {name} of {}", description.name))?;
         // FMI 2.0.5, 2.3: the icon's location without terminals.
         if name == "icon" && version == FmiVersion::V2 {
             files.insert("model.png".into(), file(png.clone()));
@@ -73,9 +93,9 @@ pub fn files(description: &Description, version: FmiVersion) -> Result<BTreeMap<
 mod tests {
     use super::*;
     use drive::{PmsmDrive, PmsmPlant, SensorlessController};
-    use fmu_core::Model;
+    use fmu_core::Stored;
 
-    fn names<M: Model>(version: FmiVersion) -> Vec<String> {
+    fn names<M: Stored>(version: FmiVersion) -> Vec<String> {
         files(&Description::of::<M>().unwrap(), version).unwrap().into_keys().collect()
     }
 
@@ -102,5 +122,17 @@ mod tests {
         let mut bare = Description::of::<PmsmPlant>().unwrap();
         (bare.terminals, bare.icon) = (Vec::new(), None);
         assert!(files(&bare, FmiVersion::V2).unwrap().is_empty());
+    }
+
+    #[test]
+    fn without_pictures_the_terminals_stay() {
+        let whole = Description::of::<PmsmPlant>().unwrap();
+        let bare = super::bare(&whole);
+        let names = |d: &Description| d.terminals.iter().map(|t| t.name.clone()).collect::<Vec<_>>();
+        assert_eq!(names(&bare), names(&whole));
+        assert_eq!(
+            files(&bare, FmiVersion::V3).unwrap().into_keys().collect::<Vec<_>>(),
+            ["terminalsAndIcons/terminalsAndIcons.xml"]
+        );
     }
 }

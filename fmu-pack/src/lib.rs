@@ -6,6 +6,8 @@
 //! - [`archive`]: all files of an FMU, and a writer that gives equal bytes for equal files; [`merge`]: one archive from several;
 //!   [`release`]: checksums and bill of materials.
 //! - [`preset`]: an FMU with other start values, from its archive; [`page`]: a page that runs an FMU in a browser.
+//!
+//! Without the feature `full`, which is on by default, there are no pages, no files of a release, and no pictures in archives.
 
 #![forbid(unsafe_code)]
 
@@ -16,10 +18,13 @@ mod error;
 pub mod icons;
 pub mod licenses;
 pub mod merge;
+#[cfg(feature = "full")]
 pub mod page;
+#[cfg(feature = "full")]
 pub mod picture;
 pub mod preset;
 pub mod reference;
+#[cfg(feature = "full")]
 pub mod release;
 pub mod target;
 pub mod workspace;

@@ -7,7 +7,7 @@ use crate::documentation;
 use crate::error::{Context, Error, Result, ensure, invalid};
 use crate::reference::{self, FOLDER};
 use fmu_core::description::{Dependencies, Value, Variable, VariableKind};
-use fmu_core::preset::{self, FILE};
+use fmu_core::preset::{self, FILE, FORMER_FILE};
 use fmu_core::variable::{Causality, position};
 use fmu_core::{Bytes, Description};
 use fmu_import::{Fmu, Kind, Unpacked, Values, describe, suggest};
@@ -69,6 +69,7 @@ impl PresetFmu {
             fs::remove_file(&path)?;
         }
         let name = file.display();
+        ensure!(!files.contains_key(&format!("resources/{FORMER_FILE}")), "{name}: {}", preset::former());
         let own = described(&unpacked).map_err(|e| {
             invalid!("{name}: {}: a preset is for FMUs of this program (fmu build)", cause(&e.to_string(), &unpacked))
         })?;
@@ -82,7 +83,7 @@ impl PresetFmu {
             let old = old.filter(|bytes| preset::suffix(bytes) == suffix);
             let old =
                 old.with_context(|| format!("{name}: resources/{FILE} is missing or does not match {DESCRIPTION}"))?;
-            for preset::PresetValue { name, value, .. } in
+            for preset::PresetValue { name, value } in
                 preset::read(&old).map_err(|e| invalid!("{}: {e}", file.display()))?
             {
                 let (variable, element) =
@@ -303,17 +304,11 @@ fn entry(name: &str, bytes: Vec<u8>) -> PackedFile {
     PackedFile { bytes, executable: name.starts_with(BINARIES) }
 }
 
-/// The reason why a library cannot be described, without the unpacked path and without the line of the preset.
+/// The reason why a library cannot be described, without the path of the unpacked preset.
 fn cause(error: &str, unpacked: &Unpacked) -> String {
     let library = unpacked.library.display().to_string();
     let rest = error.strip_prefix(&library).map_or(error, |rest| rest.trim_start_matches([':', ' ']));
-    match rest.split_once(&format!("{FILE}: ")) {
-        Some((_, why)) => match why.strip_prefix("line ").and_then(|why| why.split_once(": ")) {
-            Some((_, why)) => why.into(),
-            None => why.into(),
-        },
-        None => rest.into(),
-    }
+    rest.split_once(&format!("{FILE}: ")).map_or(rest, |(_, why)| why).into()
 }
 
 /// The variable of this name, or the array and the index of the element.

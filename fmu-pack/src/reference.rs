@@ -6,15 +6,13 @@
 //! variables (<https://github.com/modelica/fmi-standard.org>, CONTRIBUTING, "Compatibility information").
 
 use crate::archive::PackedFile;
-use crate::error::{Context, Error, Result, invalid};
+use crate::error::{Context, Error, Result};
 use fmu_core::{Description, Experiment};
-use fmu_import::Fmu;
-use fmu_import::csv;
-use fmu_system::cosimulation::{Recording, Schedule, Sequence, Settings, System};
+use fmu_import::{Fmu, csv, journal};
+use fmu_system::cosimulation::{CommunicationPoint, Recording, Schedule, Sequence, Settings, System};
 use model_description::{BaseType, Causality};
 use std::collections::BTreeMap;
 use std::fmt::Write;
-use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
 
@@ -32,6 +30,15 @@ const INTERVALS: f64 = 200.0;
 /// Maximum number of communication steps, so that a build takes seconds.
 const MOST_STEPS: f64 = 1e6;
 
+/// Why there is no reference result for a model: it cannot run alone, or its default experiment takes too long.
+pub fn impossible(description: &Description) -> Option<String> {
+    let Experiment { start, stop, step, .. } = description.experiment;
+    if description.model_exchange.as_ref().is_some_and(|exchange| exchange.only) {
+        return Some("it has no Co-Simulation".into());
+    }
+    ((stop - start) / step > MOST_STEPS).then(|| format!("its default experiment has more than {MOST_STEPS:e} steps"))
+}
+
 /// Runs a packed FMU through its default experiment, fed with the file `stimuli` if there is one; returns the files for its
 /// archive. `parameters` is a set of values, its name and the text of its SSV file.
 ///
@@ -44,7 +51,8 @@ pub fn files(
     parameters: Option<(&str, &str)>,
 ) -> Result<BTreeMap<String, PackedFile>> {
     let (name, experiment) = (description.model_name(), &description.experiment);
-    let fed = if stimuli.is_file() { Sequence::read_csv(stimuli).map_err(Error::Invalid)? } else { Vec::new() };
+    let known = |name: &str| description.variable(name).is_some();
+    let fed = if stimuli.is_file() { Sequence::read_csv(stimuli, known).map_err(Error::Invalid)? } else { Vec::new() };
     let system = system(archive, &fed).with_context(|| stimuli.display().to_string())?;
     let inputs: Vec<Feed> = fed.iter().map(|(input, texts)| Feed::of(&system, input, texts)).collect::<Result<_>>()?;
     let inputs = held(&inputs, experiment);
@@ -57,8 +65,7 @@ pub fn files(
     if stimuli.is_file() {
         let file = format!("{name}_in.csv");
         stimulus = format!("    <Stimuli source=\"{file}\"/>\n");
-        let text = fs::read_to_string(stimuli)?;
-        texts.push((file, format!("{}\n{inputs}", text.lines().next().unwrap_or_default())));
+        texts.push((file, header(fed.iter().map(|(input, _)| input.as_str())) + &inputs));
     }
     let Experiment { start, stop, .. } = experiment;
     let experiments = format!(
@@ -136,14 +143,15 @@ fn system(archive: &Path, fed: &[(String, Sequence)]) -> Result<System> {
 
 fn simulate(mut system: System, experiment: &Experiment) -> Result<Recording> {
     let Experiment { start, stop, step, .. } = *experiment;
-    if (stop - start) / step > MOST_STEPS {
-        return Err(invalid!("the default experiment has more than {MOST_STEPS:e} steps"));
-    }
     let settings = Settings { start, stop, step, sequential: false };
-    system.run(&settings, |_| Ok(ControlFlow::Continue(()))).context("the default experiment")
+    let go_on = |point: &mut CommunicationPoint<'_>| {
+        journal::reached(point.time);
+        Ok(ControlFlow::Continue(()))
+    };
+    Ok(system.run(&settings, go_on)?)
 }
 
-/// An input over time.
+/// An input over time, in the units of its variable: a CSV file of the archive has no units, because other importers read none.
 enum Feed {
     /// A real number.
     Lines(Schedule),
@@ -153,8 +161,11 @@ enum Feed {
 
 impl Feed {
     fn of(system: &System, input: &str, texts: &Sequence) -> Result<Self> {
-        let real = system.is_real(&format!("fmu.{input}"))?;
-        Ok(if real { Self::Lines(texts.lines().map_err(Error::Invalid)?) } else { Self::Held(texts.clone()) })
+        let port = format!("fmu.{input}");
+        Ok(match system.lines(&port, texts)? {
+            Some(schedule) => Self::Lines(schedule),
+            None => Self::Held(texts.clone()),
+        })
     }
 
     /// The cell at time `t` (s).
@@ -166,7 +177,8 @@ impl Feed {
     }
 }
 
-/// Duration of a change of the inputs, as a share of the step; it ends the same time before the communication point.
+/// Duration of a change of the inputs, as a share of the step; the change ends one such duration before the communication
+/// point.
 const EDGE: f64 = 1e-3;
 
 /// Rows of the inputs as in the run: constant over its communication steps. A change ends just before its communication point, so
@@ -208,12 +220,17 @@ pub fn every(experiment: &Experiment) -> usize {
     every
 }
 
+/// The first line of a CSV file: time and these names, all in quotation marks.
+fn header<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let names = std::iter::once("time").chain(names).map(|name| format!("\"{}\"", name.replace('"', "\"\"")));
+    names.collect::<Vec<_>>().join(",") + "\n"
+}
+
 /// CSV with every `every`-th row, and the last one. A row is a line, so a text of several lines is left out.
 fn thinned(recording: &Recording, every: usize) -> String {
     let texts: Vec<_> = recording.texts.iter().filter(|c| !c.values.iter().any(|x| x.contains(['\n', '\r']))).collect();
     let numbers = recording.columns.iter().map(|c| c.name.as_str());
-    let names = std::iter::once("time").chain(numbers).chain(texts.iter().map(|c| c.name.as_str()));
-    let mut csv = names.map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(",") + "\n";
+    let mut csv = header(numbers.chain(texts.iter().map(|c| c.name.as_str())));
     let last = recording.time.len().saturating_sub(1);
     for (k, t) in recording.time.iter().enumerate().filter(|(k, _)| k % every == 0 || *k == last) {
         let numbers = recording.columns.iter().map(|c| c.at(k).to_string());

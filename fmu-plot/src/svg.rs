@@ -5,7 +5,7 @@ use crate::figure::{Curve, Figure, Panel, decades, ticks};
 use crate::ink::REFERENCE;
 use std::fmt::Write as _;
 
-/// Width and height of a panel in pixels: of one column, of several.
+/// Width and height of a panel in pixels: in one column, in several.
 const SIZE: [(f64, f64); 2] = [(1060.0, 240.0), (520.0, 270.0)];
 /// Space for the legend: next to the panels of one column, above those of several.
 const BESIDE: f64 = 240.0;

@@ -1,14 +1,12 @@
 //! The definition of a sweep: the contents of its TOML file.
 
 use crate::Error;
-use serde::de::{MapAccess, Visitor};
-use serde::ser::SerializeMap;
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use crate::ordered::Ordered;
+use serde::{Deserialize, Serialize};
 use std::fmt;
-use std::marker::PhantomData;
 use std::path::Path;
 
-/// A sweep: the system, its runs, varied variables and measures. A program fills in the fields of a file.
+/// A sweep: the system, its runs, varied variables and measures. A program can set the fields that a file would give.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {
@@ -81,7 +79,7 @@ pub enum SolverName {
 pub struct Design {
     /// The kind of design.
     pub kind: Kind,
-    /// Number of rows, of a random, LHS or Sobol design.
+    /// Number of rows of a random, LHS or Sobol design.
     pub runs: Option<u64>,
     /// Seed of a random, LHS or Sobol design; a different seed gives different rows.
     pub seed: Option<u64>,
@@ -157,6 +155,38 @@ pub struct MeasureDefinition {
     pub band: Option<f64>,
 }
 
+impl MeasureDefinition {
+    /// A function of a variable from the start on: `MeasureDefinition { after: Some(0.3), ..MeasureDefinition::new("speed", is) }`.
+    pub fn new(of: impl Into<String>, is: MeasureFunction) -> Self {
+        let (of, none) = (of.into(), None);
+        Self { of, is, wrap: None, after: none, time: none, from: none, to: none, target: none, band: none }
+    }
+}
+
+impl From<f64> for SetValue {
+    fn from(x: f64) -> Self {
+        Self::Number(x)
+    }
+}
+
+impl From<i64> for SetValue {
+    fn from(x: i64) -> Self {
+        Self::Integer(x)
+    }
+}
+
+impl From<bool> for SetValue {
+    fn from(x: bool) -> Self {
+        Self::Boolean(x)
+    }
+}
+
+impl From<&str> for SetValue {
+    fn from(text: &str) -> Self {
+        Self::Text(text.into())
+    }
+}
+
 /// The function that a measure computes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -223,6 +253,8 @@ pub enum SetValue {
     Boolean(bool),
     /// An integer.
     Integer(i64),
+    /// An integer beyond those, which a program gives: TOML has none.
+    Unsigned(u64),
     /// A number.
     Number(f64),
     /// A text, such as a name of an enumeration.
@@ -234,49 +266,10 @@ impl fmt::Display for SetValue {
         match self {
             Self::Boolean(x) => x.fmt(f),
             Self::Integer(x) => x.fmt(f),
+            Self::Unsigned(x) => x.fmt(f),
             Self::Number(x) => x.fmt(f),
             Self::Text(x) => x.fmt(f),
         }
-    }
-}
-
-/// An ordered table.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ordered<T>(pub Vec<(String, T)>);
-
-impl<T> Default for Ordered<T> {
-    fn default() -> Self {
-        Self(Vec::new())
-    }
-}
-
-impl<T: Serialize> Serialize for Ordered<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        self.0.iter().try_for_each(|(key, value)| map.serialize_entry(key, value))?;
-        map.end()
-    }
-}
-
-impl<'de, T: Deserialize<'de>> Deserialize<'de> for Ordered<T> {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Entries<T>(PhantomData<T>);
-        impl<'de, T: Deserialize<'de>> Visitor<'de> for Entries<T> {
-            type Value = Ordered<T>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
-                let mut all = Vec::new();
-                while let Some(entry) = map.next_entry()? {
-                    all.push(entry);
-                }
-                Ok(Ordered(all))
-            }
-        }
-        deserializer.deserialize_map(Entries(PhantomData))
     }
 }
 
@@ -314,10 +307,10 @@ mod tests {
              [measure]\nend = { of = 'z.x', is = 'max_abs', after = 1 }",
         )
         .unwrap();
-        assert_eq!(d.vary.0.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), ["z.b", "z.a"]);
-        let values: Vec<_> = d.vary.0[1].1.values.as_ref().unwrap().iter().map(ToString::to_string).collect();
+        assert_eq!(d.vary.keys().collect::<Vec<_>>(), ["z.b", "z.a"]);
+        let values: Vec<_> = d.vary["z.a"].values.as_ref().unwrap().iter().map(ToString::to_string).collect();
         assert_eq!(values, ["1", "2.5", "true", "Off"]);
-        assert_eq!((d.measure.0[0].1.is, d.measure.0[0].1.after), (MeasureFunction::MaxAbs, Some(1.0)));
+        assert_eq!((d.measure["end"].is, d.measure["end"].after), (MeasureFunction::MaxAbs, Some(1.0)));
     }
 
     #[test]

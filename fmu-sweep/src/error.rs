@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 /// One line that states the object, its value and the expected one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// An FMU, or a feature that it lacks.
     #[error(transparent)]

@@ -230,7 +230,7 @@ mod tests {
         let definition = crate::Definition::parse(&format!("[measure]\nm = {{ of = 'x', {text} }}"))?;
         let settings = Settings { start: 0.0, stop: 4.0, step: 1.0, sequential: false };
         let signal = Signal::new(&Sum::parse("x", &|_| false).unwrap(), None, |_| 0);
-        Measure::new(&definition.measure.0[0].1, signal, &settings)
+        Measure::new(definition.measure.values().next().unwrap(), signal, &settings)
     }
 
     fn of(text: &str, values: &[f64]) -> Result<f64, String> {

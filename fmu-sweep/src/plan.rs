@@ -69,7 +69,7 @@ pub fn last_columns(taken: impl Fn(&str) -> bool) -> [String; 2] {
 pub struct ResultColumn {
     /// Name.
     pub name: String,
-    /// Unit; empty for none.
+    /// Unit; empty if there is none.
     pub unit: String,
     /// Numbers and names of an enumeration's values (results show the names); empty for other types.
     pub items: Vec<(i64, String)>,
@@ -157,14 +157,14 @@ impl Plan {
         for [one, other] in &definition.terminal {
             loaded.system.connect_terminals(one, other)?;
         }
-        for (name, points) in &definition.input.0 {
+        for (name, points) in &definition.input {
             loaded.points(name, points).map_err(|error| Error::Invalid(once(&format!("input: {name}: {error}"))))?;
         }
         if definition.auto_connect {
             loaded.system.connect_by_name()?;
         }
         let mut set = Vec::new();
-        for (name, value) in &definition.set.0 {
+        for (name, value) in &definition.set {
             loaded.set(name, &value.to_string())?;
             set.extend(loaded.connectors.ports(name)?);
         }
@@ -173,7 +173,7 @@ impl Plan {
         let settings = loaded.system.feasible(&settings)?;
         let mut recorded: Vec<String> = Vec::new();
         let mut measures = Vec::new();
-        for (name, measure) in &definition.measure.0 {
+        for (name, measure) in &definition.measure {
             if name == RUN {
                 return invalid(format!("measure: {name} is the column with the number of each run: rename it"));
             }
@@ -188,11 +188,18 @@ impl Plan {
         let mut shared = Shared::new(loaded, &settings)?;
         let system = Arc::clone(&shared.system);
         let of = |name: &str| system.columns().iter().find(|c| c.name == name);
-        let columns = measures.iter().zip(&definition.measure.0).map(|((measure, sum), (name, _))| {
+        let mut mixed = Vec::new();
+        let columns = measures.iter().zip(&definition.measure).map(|((measure, sum), (name, _))| {
             // The unit of a sum of several units, or of a sum with factors, is unknown.
             let units: Vec<&str> = sum.terms.iter().map(|(_, name)| of(name).map_or("", |c| &c.unit)).collect();
             let plain = sum.terms.iter().all(|(factor, _)| factor.abs().to_bits() == 1.0_f64.to_bits());
             let same = plain && units.iter().all(|other| *other == units[0]);
+            if let Some(other) = units.iter().find(|other| plain && **other != units[0]) {
+                let [one, other] = [units[0], other].map(|unit| if unit.is_empty() { "no unit" } else { unit });
+                mixed.push(format!(
+                    "measure: {name}: its terms are in {one} and {other}: the numbers are added unchanged"
+                ));
+            }
             let items = match &sum.terms[..] {
                 [(1.0, name)] if measure.is_a_value() => of(name).map(|c| c.items.clone()),
                 _ => None,
@@ -201,6 +208,7 @@ impl Plan {
             ResultColumn { name: name.clone(), unit, items: items.unwrap_or_default() }
         });
         shared.columns = columns.collect();
+        shared.notes.append(&mut mixed);
         shared.measures = measures.into_iter().map(|(measure, _)| measure).collect();
         (shared.trace, shared.set, shared.reuse) = (trace, set, definition.reuse.unwrap_or(true));
         Ok(Self(Arc::new(shared)))

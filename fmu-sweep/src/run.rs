@@ -47,7 +47,7 @@ pub struct Report {
     pub missing: u64,
     /// All results, once no part is missing.
     pub results: Option<PathBuf>,
-    /// Rows that failed: of all results, or, while parts are missing, of this call.
+    /// Number of failed rows: among all results, or, while parts are missing, in this call.
     pub failures: Failures,
 }
 

@@ -54,15 +54,15 @@ impl Sweep {
             let variable = plan.bind([name]).map_err(|e| e.to_string())?;
             plan.number(&variable[0], text).map_err(|e| e.to_string())
         };
-        let rows = DesignRows::new(design, &definition.vary, &folder, &number)?;
+        let rows = DesignRows::new(design, &definition.vary, &folder, &|name| plan.bind([name]).is_ok(), &number)?;
         if rows.names().any(|name| name == RUN) {
             return invalid(format!("vary: {RUN} is the column with the number of each run: write INSTANCE.{RUN}"));
         }
         let variables = plan.bind(rows.names())?;
-        if definition.measure.0.is_empty() && definition.trace.is_none() {
+        if definition.measure.is_empty() && definition.trace.is_none() {
             return invalid("expected a table [measure]: nothing is measured");
         }
-        for (name, _) in &definition.measure.0 {
+        for (name, _) in &definition.measure {
             if rows.names().any(|other| other == name) {
                 return invalid(format!("measure: {name} is the name of a varied variable: rename it"));
             }

@@ -8,6 +8,9 @@
 
 #![forbid(unsafe_code)]
 
+/// The types of one FMU.
+pub use fmu_import::{Error, Fmu, Instance, Kind, Logging, Values};
+
 pub mod cosimulation;
 pub mod integration;
 pub mod ssp;

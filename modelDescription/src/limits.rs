@@ -48,7 +48,7 @@ pub const LEVELS: Limit =
 pub const VARIABLES: Limit = Limit::new("Variables of an FMU", "has", 200_000, "variables");
 /// Elements of all variables.
 pub const VALUES: Limit = Limit::new(
-    "Values of all variables of an FMU: an array has as many as elements",
+    "Values of all variables of an FMU: an array counts with all its elements",
     "has variables of",
     10_000_000,
     "values in all",

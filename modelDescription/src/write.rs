@@ -10,8 +10,8 @@ pub use terminals::write_terminals;
 use crate::number;
 use crate::version::FmiVersion;
 use crate::xml::{Element, print};
-use fmu_core::Description;
 use fmu_core::description::{ModelExchange, Value, VariableKind};
+use fmu_core::{Description, Keeps};
 
 /// The tool and the time of generation: the only content that does not follow from the description.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -116,24 +116,31 @@ fn model_exchange(description: &Description, exchange: &ModelExchange, version: 
         .with("needsExecutionTool", "false")
         .with_some(flag, (needed == exchange.completed_steps).then_some("true"))
         .with("canBeInstantiatedOnlyOncePerProcess", "false");
-    derivatives(states_and_memory(element, version), exchange, version)
+    derivatives(description, states_and_memory(description, element, version), exchange, version)
 }
 
 /// The state can be read, set and serialized; memory.
-fn states_and_memory(element: Element, version: FmiVersion) -> Element {
-    match version {
-        FmiVersion::V2 => element
-            // A Rust library has its own allocator; using it without this flag violates the standard.
-            .with("canNotUseMemoryManagementFunctions", "true")
-            .with("canGetAndSetFMUstate", "true")
-            .with("canSerializeFMUstate", "true"),
-        FmiVersion::V3 => element.with("canGetAndSetFMUState", "true").with("canSerializeFMUState", "true"),
-    }
+fn states_and_memory(description: &Description, element: Element, version: FmiVersion) -> Element {
+    let (element, saves, stores) = match version {
+        // A Rust library has its own allocator; using it without this flag violates the standard.
+        FmiVersion::V2 => {
+            (element.with("canNotUseMemoryManagementFunctions", "true"), "canGetAndSetFMUstate", "canSerializeFMUstate")
+        }
+        FmiVersion::V3 => (element, "canGetAndSetFMUState", "canSerializeFMUState"),
+    };
+    element
+        .with_some(saves, is_saved(description).then_some("true"))
+        .with_some(stores, (description.keeps == Keeps::Stored).then_some("true"))
+}
+
+/// Whether the model can be copied: for saved states, and for derivatives, which are computed on a copy.
+fn is_saved(description: &Description) -> bool {
+    description.keeps != Keeps::Nothing
 }
 
 /// Directional and adjoint derivatives of a model with states.
-fn derivatives(element: Element, exchange: &ModelExchange, version: FmiVersion) -> Element {
-    if exchange.states.is_empty() {
+fn derivatives(description: &Description, element: Element, exchange: &ModelExchange, version: FmiVersion) -> Element {
+    if exchange.states.is_empty() || !is_saved(description) {
         return element;
     }
     match version {
@@ -147,7 +154,7 @@ fn derivatives(element: Element, exchange: &ModelExchange, version: FmiVersion) 
 /// FMI 2.0.5, 4.3.1; FMI 3.0.2, 2.4.2 and 4.4. Omitted attributes are `false` in both.
 fn co_simulation(description: &Description, version: FmiVersion) -> Element {
     let exchange = description.model_exchange.as_ref();
-    let continuous = exchange.is_some_and(|exchange| !exchange.states.is_empty());
+    let continuous = exchange.is_some_and(|exchange| !exchange.states.is_empty()) && is_saved(description);
     let event_mode = version == FmiVersion::V3 && exchange.is_some_and(|exchange| exchange.event_mode);
     let intermediate = version == FmiVersion::V3 && description.variables.iter().any(|v| v.intermediate);
     let interpolates = if continuous { "true" } else { "false" };
@@ -159,14 +166,14 @@ fn co_simulation(description: &Description, version: FmiVersion) -> Element {
         .with_some("canInterpolateInputs", (version == FmiVersion::V2).then_some(interpolates))
         .with_some("maxOutputDerivativeOrder", continuous.then_some("1"));
     let fixed_step = description.experiment.fixed_step.filter(|_| version == FmiVersion::V3);
-    let element = states_and_memory(element, version)
+    let element = states_and_memory(description, element, version)
         .with_some("fixedInternalStepSize", fixed_step.map(number::format))
         .with_some("hasEventMode", event_mode.then_some("true"))
         .with_some("mightReturnEarlyFromDoStep", (event_mode && !clocked(description)).then_some("true"))
         .with_some("providesIntermediateUpdate", intermediate.then_some("true"))
         .with_some("canReturnEarlyAfterIntermediateUpdate", intermediate.then_some("true"));
     match exchange {
-        Some(exchange) => derivatives(element, exchange, version),
+        Some(exchange) => derivatives(description, element, exchange, version),
         None => element,
     }
 }
@@ -177,7 +184,7 @@ fn scheduled_execution(description: &Description, version: FmiVersion) -> Elemen
         .with("modelIdentifier", &*description.name)
         .with("needsExecutionTool", "false")
         .with("canBeInstantiatedOnlyOncePerProcess", "false");
-    states_and_memory(element, version)
+    states_and_memory(description, element, version)
 }
 
 /// Whether the model has clocks, which FMI 3.0 has.

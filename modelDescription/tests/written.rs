@@ -4,7 +4,7 @@ mod common;
 
 use common::{AWKWARD, VERSIONS, exchange_sample, generation, sample, sampled_sample, xml};
 use fmu_core::description::{Value, VariableKind};
-use fmu_core::{Description, IntegerType};
+use fmu_core::{Description, IntegerType, Keeps};
 use model_description::{
     BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, Unknown, Variability, fits, read, write,
 };
@@ -82,6 +82,24 @@ fn capabilities() {
         );
         assert_eq!(cs.flag("canNotUseMemoryManagementFunctions"), version == FmiVersion::V2, "X08");
         assert_eq!(cs.attribute("canInterpolateInputs"), (version == FmiVersion::V2).then_some("false"));
+    }
+}
+
+/// What an importer cannot keep is not promised, nor what is computed on a copy.
+#[test]
+fn a_model_that_cannot_be_copied() {
+    for (version, state) in VERSIONS.into_iter().zip(["FMUstate", "FMUState"]) {
+        for keeps in [Keeps::Nothing, Keeps::Saved, Keeps::Stored] {
+            let md = read(write(&Description { keeps, ..exchange_sample() }, version, &generation())).unwrap();
+            for interface in [md.co_simulation.unwrap(), md.model_exchange.unwrap()] {
+                let given = |name: &str| interface.attribute(name) == Some("true");
+                assert_eq!(given(&format!("canGetAndSet{state}")), keeps != Keeps::Nothing);
+                assert_eq!(given(&format!("canSerialize{state}")), keeps == Keeps::Stored);
+                let derivatives = ["providesDirectionalDerivative", "providesDirectionalDerivatives"];
+                assert_eq!(derivatives.into_iter().any(given), keeps != Keeps::Nothing);
+                assert!(!given("canInterpolateInputs") || keeps != Keeps::Nothing);
+            }
+        }
     }
 }
 

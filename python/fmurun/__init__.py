@@ -6,6 +6,7 @@
 - `linearize`: matrices A, B, C and D of an FMU for Model Exchange.
 - `frequency_response`: gain and phase of running FMUs, sampled controllers included, with the margins of loops.
 - `Batch`: many instances that step in one call, for reinforcement learning; environments in `fmurun.gym`.
+- `vehicle`: a vehicle on a driving cycle with a drive: Wh/km, efficiency, losses by cause, temperatures, a figure.
 - `plot`: a result, with matplotlib; notebooks show results by themselves.
 - `fmurun.drives`: the drives of this wheel, and start values for machines.
 - `fmurun.fmpy`: FMPy's classes for loops written by hand.
@@ -22,6 +23,7 @@ from ._linearize import Linearization, linearize
 from ._plan import Plan
 from ._plot import plot
 from ._simulate import simulate_fmu
+from ._vehicle import Trip, Vehicle, vehicle
 
-__all__ = ["Batch", "FmuError", "FrequencyResponse", "Linearization", "Plan", "drives", "frequency_response", "identify", "linearize",
-           "plot", "simulate_fmu"]  # fmt: skip
+__all__ = ["Batch", "FmuError", "FrequencyResponse", "Linearization", "Plan", "Trip", "Vehicle", "drives", "frequency_response", "identify",
+           "linearize", "plot", "simulate_fmu", "vehicle"]  # fmt: skip

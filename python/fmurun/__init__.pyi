@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import drives as drives
 from . import fmpy as fmpy
 
-__all__ = ["Batch", "FmuError", "FrequencyResponse", "Linearization", "Plan", "drives", "frequency_response", "identify", "linearize", "plot", "simulate_fmu"]
+__all__ = ["Batch", "FmuError", "FrequencyResponse", "Linearization", "Plan", "Trip", "Vehicle", "drives", "frequency_response", "identify", "linearize", "plot", "simulate_fmu", "vehicle"]
 
 _Path = str | PathLike[str]
 _Value = bool | int | float | str
@@ -100,6 +100,74 @@ class Plan:
 
 def plot(result: NDArray[Any], columns: str | Sequence[str] | None = None, *, figure: Any = None) -> Any: ...
 
+def vehicle(
+    mass: float,
+    cda: float,
+    c_rr: float,
+    radius: float,
+    gear: float,
+    *,
+    gear_efficiency: float = 1.0,
+    inertia: float = 0.0,
+    rho: float = 1.2,
+    g: float = 9.81,
+) -> Vehicle: ...
+
+class Vehicle:
+    mass: float
+    cda: float
+    c_rr: float
+    radius: float
+    gear: float
+    gear_efficiency: float
+    inertia: float
+    rho: float
+    g: float
+    def __init__(
+        self,
+        mass: float,
+        cda: float,
+        c_rr: float,
+        radius: float,
+        gear: float,
+        *,
+        gear_efficiency: float = 1.0,
+        inertia: float = 0.0,
+        rho: float = 1.2,
+        g: float = 9.81,
+    ) -> None: ...
+    def resistance(self, v: float) -> float: ...
+    def run(
+        self,
+        fmu: _Path,
+        cycle: _Path | ArrayLike,
+        *,
+        start_values: Mapping[str, Any] | None = None,
+        slope: float | ArrayLike = 0.0,
+        driver: tuple[float, float] = (2.3, 0.6),
+        sensor: bool = True,
+        step_size: float = 0.02,
+        stop_time: float | None = None,
+        outputs: Sequence[str] = (),
+    ) -> Trip: ...
+
+class Trip:
+    name: str
+    result: NDArray[Any]
+    distance: float
+    energy: dict[str, float]
+    losses: dict[str, float]
+    temperatures: dict[str, float]
+    efficiency: float
+    def power(self, counter: str = "energy_in") -> NDArray[np.float64]: ...
+    @property
+    def wh_per_km(self) -> float: ...
+    @property
+    def balance(self) -> float: ...
+    @property
+    def error(self) -> float: ...
+    def plot(self, *others: Trip, figure: Any = None) -> Any: ...
+
 class Linearization:
     A: NDArray[np.float64]
     B: NDArray[np.float64]
@@ -147,6 +215,7 @@ def frequency_response(
     fmi_type: _Interface | Mapping[str, _Interface] | None = None,
     relative_tolerance: float | None = None,
     threads: int | None = None,
+    isolate: bool = True,
 ) -> FrequencyResponse: ...
 
 def identify(

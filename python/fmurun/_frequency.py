@@ -7,6 +7,7 @@ import numpy as np
 
 from . import _core
 from ._error import FmuError
+from ._isolated import isolated
 from ._plan import Plan, _number
 
 
@@ -62,7 +63,7 @@ class FrequencyResponse:
 
 def frequency_response(fmus, input, output, *, over=None, frequencies=None, amplitude=None, settle_time=None,
                        step_size=None, start_values=None, inputs=None, connections="by_name", fmi_type=None,
-                       relative_tolerance=None, threads=None):  # fmt: skip
+                       relative_tolerance=None, threads=None, isolate=True):  # fmt: skip
     """The frequency response of running FMUs by a swept sine, as `fmu bode` measures it: a sampled controller is in it.
 
     At each frequency, runs reach the operating point, then whole periods are measured. A warning names frequencies at which the system
@@ -80,12 +81,15 @@ def frequency_response(fmus, input, output, *, over=None, frequencies=None, ampl
         start_values, inputs: name -> value, and name -> values over time, as `start_values` and `input` of `Plan`
         connections, fmi_type, relative_tolerance: as for `Plan`
         threads: by default all processors
+        isolate: the FMUs run in a process of their own, so one that crashes raises an `FmuError`; False: in this process
 
     >>> response = frequency_response(PLANT, "tau_load", "speed", frequencies=[10.0, 100.0], step_size=1e-4, settle_time=0.1,
     ...                               start_values={"mechanics.tau_coulomb": 0.0, "motor.psi_M": 1e-6})
     >>> bool(np.allclose(response.value * (2e-4 + 2j * np.pi * response.frequency * 1.5e-3), -1.0, rtol=1e-3))
     True
     """
+    if isolate:
+        return isolated("_frequency", "frequency_response", {**locals(), "isolate": False})
     plan = Plan(fmus, connections=connections, start_values=start_values, input=inputs, step_size=step_size,
                 fmi_type=fmi_type, relative_tolerance=relative_tolerance)  # fmt: skip
     if threads is not None and threads < 1:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from . import _core
 from ._error import FmuError
 from ._instance import _described, _instance, _interface, _kind, _open
 from ._simulate import _FLOATS, _apply, _start_values, _value
@@ -79,7 +80,8 @@ def linearize(fmu, point=None, *, time=0.0, inputs=None, outputs=None, method=No
         all_ = {v.name: v for v in description.modelVariables if v.causality == causality and real(v)}
         wrong = [name for name in names or () if name not in all_]
         if wrong:
-            raise ValueError(f"{what}: {description.modelName} has no continuous {causality} {', '.join(map(str, wrong))}")
+            meant = ", ".join(f"{name}{_core.suggest(str(name), list(all_))}" for name in wrong)
+            raise ValueError(f"{what}: {description.modelName} has no continuous {causality} {meant}")
         chosen[what] = list(all_.values()) if names is None else [all_[name] for name in names]
     given = dict(point or {})
     at = {v.name: _value(v, description, given.pop(v.name))[0] for v in states if v.name in given}

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 import tempfile
 import threading
@@ -34,7 +35,8 @@ class Plan:
         connections: "by_name" connects each free input to the output of this name, or a list of ("p.i_a", "c.i_a")
         terminals: pairs of terminals to connect, ("p.phases", "c.phases")
         start_values: name -> value, the same in all runs
-        input: name -> a number, a list of (time, value) that hold from their time (s) on, or a text as `fmu simulate --input`
+        input: name -> a number, a list of (time, value) that hold from their time (s) on, or a text as `fmu simulate --input`;
+            values are numbers, Booleans, and names of an enumeration's items
         start_time, stop_time, step_size: in s; by default those of the FMUs' default experiments
         output: names that `simulate` records; by default all outputs
         measures: name -> {"of": "p.speed", "is": "min", "after": 0.2}, or a text ("speed" is its final value), or
@@ -374,15 +376,31 @@ def _scalar(name, value):
 
 
 def _schedule(name, value):
-    """An input in the form of `fmu simulate --input`."""
+    """An input in the form of `fmu simulate --input`: integers keep their digits, items of an enumeration their names."""
     if isinstance(value, str):
         return value
     try:
         if np.ndim(value) == 0:
-            return repr(float(value))
-        return ",".join(f"{float(t)!r}:{float(x)!r}" for t, x in value)
-    except (TypeError, ValueError):
+            return _sample(name, value)
+        return ",".join(f"{float(t)!r}:{_sample(name, x)}" for t, x in value)
+    except (TypeError, ValueError) as error:
+        if str(error).startswith("the input"):
+            raise
         raise TypeError(f"the input {name} must be a number, a list of (time, value) or a text, not {value!r}") from None
+
+
+def _sample(name, value):
+    """A value of an input over time."""
+    value = value.item() if isinstance(value, np.generic) else value
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, int):
+        return str(value)
+    if not isinstance(value, str):
+        return repr(float(value))
+    if re.search(r",[^,:]*:", value):
+        raise ValueError(f"the input {name} has the value {value!r}, whose comma and colon would begin another point")
+    return value
 
 
 def _measure(key, value, name):
@@ -425,7 +443,12 @@ def _values(name, column, core, full):
     if array.ndim != 1:
         raise ValueError(f"the column {name} has {array.ndim} dimensions; expected one")
     if array.dtype.kind in "OUS" and all(isinstance(x, str) for x in array.tolist()):
-        return np.array([core.number(full, x) for x in array.tolist()])
+        column = [core.number(full, x) for x in array.tolist()]
+        array = np.atleast_1d(np.asarray(column))
+    if isinstance(column, (list, tuple)) and array.dtype.kind in "fO":
+        wide = [x for x in column if isinstance(x, (int, np.integer)) and int(float(x)) != int(x)]
+        if wide:
+            raise ValueError(f"the column {name} has {wide[0]} beside numbers of other types: digits would be lost")
     # NumPy also converts other kinds to numbers, for example None to NaN.
     bad = [] if array.dtype.kind in "biuf" else [x for x in array.tolist() if not isinstance(x, (int, float))]
     if bad:

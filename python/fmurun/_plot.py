@@ -40,7 +40,9 @@ def curves(result, columns=None):
         columns = [columns] if isinstance(columns, str) else list(columns)
         wrong = [name for name in columns if name not in result.dtype.names]
         if wrong:
-            raise ValueError(f"the result has no column {', '.join(map(str, wrong))}")
+            names = list(result.dtype.names)
+            has, meant = ", ".join(names), _core.suggest(str(wrong[0]), names)
+            raise ValueError(f"the result has no column {', '.join(map(str, wrong))}; it has {has}{meant}")
     shown, all_ = units(result), []
     for name in columns or [name for name in result.dtype.names if name != "time"]:
         if result[name].ndim != 1:

@@ -297,7 +297,8 @@ def _start_values(variables, description, given, validate):
         else:
             never.append(v.name)
     if never and validate:
-        raise ValueError("The start values for the following variables could not be set: " + ", ".join(never))
+        kinds = ", ".join(f"{name} ({variables[name].causality}, {variables[name].variability})" for name in never)
+        raise ValueError(f"start_values: {kinds}: is computed by the FMU; set inputs and parameters")
     return before, during
 
 
@@ -328,7 +329,8 @@ def _value(v, description, value):
         if not v.shape:
             return values
     except (TypeError, ValueError, KeyError):
-        raise ValueError(f"the start value {value!r} of {v.name} is not of the type {v.type}") from None
+        allowed = {"Boolean": "; expected true or false", "String": ""}.get(v.type, "; expected a whole number" if v.type in _INTEGERS else "")
+        raise ValueError(f"the start value {value!r} of {v.name} is not of the type {v.type}{allowed}") from None
     if len(values) != prod(v.shape):
         raise ValueError(f"the start value of {v.name} must have {prod(v.shape)} elements, not {len(values)}")
     return values
@@ -339,7 +341,7 @@ def _read(v, description, text):
     if v.type == "Enumeration" and v.declaredType:
         items = {item.name: item.value for item in v.declaredType.items}
         if text not in items and not re.fullmatch(r"\s*[+-]?\d+\s*", text):
-            raise ValueError(f"{v.name} = {text} is not one of {', '.join(items)}")
+            raise ValueError(f"{v.name} = {text} is not one of {', '.join(items)}{_core.suggest(text, list(items))}")
         return items.get(text, text)
     if v.type not in _FLOATS or _is_number(text):
         return text
@@ -446,7 +448,8 @@ def _samples(description, variables, signals):
         raise _no_variable(description, unknown, "input")
     wrong = [n for n in names if variables[n].causality != "input" and variables[n].variability != "tunable"]
     if wrong:
-        raise ValueError(f"{', '.join(wrong)}: neither an input nor a tunable parameter; see input")
+        kinds = ", ".join(f"{name} ({variables[name].variability} {variables[name].causality})" for name in wrong)
+        raise ValueError(f"{kinds}: neither an input nor a tunable parameter; see input")
     events = {np.inf} | set(t[:-1][np.diff(t) == 0])
     groups = {}
     for v in variables.values() if len(names) > 1 else map(variables.get, names):

@@ -13,6 +13,7 @@ import multiprocessing
 import signal
 import time
 import uuid
+import warnings
 
 import fsspec
 import numpy as np
@@ -65,7 +66,10 @@ def sweep(plan, rows, out, client, chunk=None):
     out = str(out).rstrip("/")
     fs, folder = fsspec.core.url_to_fs(out)
     fs.makedirs(folder, exist_ok=True)
-    cut = _cut(plan, table, count, chunk or _chunk(seconds, count, client))
+    threads = _threads(client)
+    if not threads:
+        warnings.warn("the cluster has no workers: the sweep waits for the first that joins", stacklevel=2)
+    cut = _cut(plan, table, count, chunk or _chunk(seconds, count, threads))
     cut = _agreed(fs, folder, cut)
     chunk = cut["chunk"]
     there = {path.rsplit("/", 1)[-1] for path in fs.ls(folder, detail=False)}
@@ -110,10 +114,14 @@ def _rows_of(plan, table):
     return lambda first, n: {name: np.asarray(column)[first : first + n] for name, column in table.items()}
 
 
-def _chunk(seconds, count, client):
+def _threads(client):
+    """Number of threads of the cluster."""
+    return sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values())
+
+
+def _chunk(seconds, count, threads):
     """Rows of about 7 s of work, and at least two parts a thread of the cluster."""
-    threads = sum(worker["nthreads"] for worker in client.scheduler_info(n_workers=-1)["workers"].values()) or 1
-    return max(1, min(int(_WORK / max(seconds, 1e-6)), -(-count // (2 * threads))))
+    return max(1, min(int(_WORK / max(seconds, 1e-6)), -(-count // (2 * max(threads, 1)))))
 
 
 def _part(first):

@@ -61,8 +61,7 @@ pub(crate) fn renewed(opened: &Arc<Opened>) -> Result<Arc<Opened>, Error> {
 
 /// Reads a file and opens it.
 pub(crate) fn read(path: &Path) -> Result<Arc<Opened>, Error> {
-    let wrong = |cause: String| Error::File { path: path.into(), cause };
-    let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|e| Error::file(path, e))?;
     opened(path, bytes)
 }
 

@@ -20,11 +20,12 @@ fn make(fields: (Option<&str>, Option<&str>, Option<&str>, &str)) -> PyErr {
 /// The `FmuError` of an importer's error.
 pub(crate) fn raise(error: Error) -> PyErr {
     match error {
-        Error::File { .. } => make((None, None, None, &error.to_string())),
+        Error::Variable { ref instance, .. } => make((None, None, Some(instance), &error.cause())),
         Error::Usage { instance, cause } => make((None, None, Some(&instance), &cause)),
         Error::Call { instance, function, status, message } => {
             make((Some(function), Some(&status), Some(&instance), message.as_deref().unwrap_or_default()))
         }
+        other => make((None, None, None, &other.to_string())),
     }
 }
 

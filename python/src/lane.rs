@@ -28,8 +28,7 @@ impl Ports {
         let description = fmu.description();
         let usage = |cause: String| Error::Usage { instance: description.model_name.clone(), cause };
         let port = |name: &String| {
-            let meant = || fmu_import::suggest(name, description.variables.iter().map(|v| v.name.as_str()));
-            let none = || usage(format!("has no variable {name}{}", meant()));
+            let none = || Error::variable(&description.model_name, name, description);
             let v = description.variable(name).ok_or_else(none)?;
             if v.is_array() || matches!(v.base, BaseType::String | BaseType::Binary | BaseType::Clock) {
                 return Err(usage(format!("{name} is not a scalar number")));

@@ -48,5 +48,5 @@ mod _core {
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
-    use super::tune::tune;
+    use super::tune::{datasheet, tune};
 }

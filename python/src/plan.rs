@@ -126,7 +126,7 @@ impl Plan {
         })
     }
 
-    /// Run at a point, then with each variable above it by its step, then below: columns of the measures, errors.
+    /// Runs at a point, then with each variable increased by its step, then decreased: columns of the measures, and errors.
     #[expect(clippy::type_complexity, clippy::needless_pass_by_value, reason = "Python's; PyO3 extracts values")]
     fn run_around<'py>(
         &self,
@@ -202,11 +202,14 @@ impl Plan {
         fmu_sweep::last_columns(|name| columns.iter().any(|column| column == name))
     }
 
-    /// The number of a text as the value of a variable.
-    fn number(&self, name: &str, text: &str) -> PyResult<f64> {
+    /// The number of a text as the value of a variable; an integer keeps its digits.
+    fn number<'py>(&self, py: Python<'py>, name: &str, text: &str) -> PyResult<Bound<'py, PyAny>> {
         gate(|| {
             let variable = self.plan.bind([name]).map_err(failed)?;
-            self.plan.number(&variable[0], text).map(Number::real).map_err(failed)
+            Ok(match self.plan.number(&variable[0], text).map_err(failed)? {
+                Number::Integer(i) => i.into_pyobject(py)?.into_any(),
+                other => other.real().into_pyobject(py)?.into_any(),
+            })
         })
     }
 }

@@ -4,6 +4,7 @@ import os
 import signal
 import threading
 import time
+import warnings
 
 import dask
 import distributed
@@ -19,13 +20,22 @@ ROWS = 4000
 
 
 @pytest.fixture(scope="module")
-def client():
+def cluster():
     dask.config.set({"distributed.scheduler.allowed-failures": 1, "distributed.logging.distributed": "critical"})
     with (
         LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
         Client(cluster) as client,
     ):
-        yield client
+        yield cluster, client
+
+
+@pytest.fixture
+def client(cluster):
+    """With both workers: the test before may have killed one, and a sweep without workers waits for some."""
+    cluster, client = cluster
+    cluster.scale(2)
+    client.wait_for_workers(2, timeout=120)
+    return client
 
 
 def drive(archives, make=Plan, **more):
@@ -147,3 +157,24 @@ def test_map_partitions(archives):
     results = plan.run_many(table(3))
     assert list(empty) == list(results)
     assert {name: column.dtype for name, column in empty.items()} == {name: column.dtype for name, column in results.items()}
+
+
+def test_a_cluster_without_workers_is_named(archives, tmp_path, monkeypatch):
+    """A warning; a worker joins after it, and the sweep runs."""
+    said = []
+    with (
+        LocalCluster(n_workers=0, processes=False, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
+        Client(cluster) as client,
+    ):
+
+        def show(message, *_):
+            said.append(str(message))
+            if "has no workers" in said[-1]:
+                cluster.scale(1)
+
+        monkeypatch.setattr(warnings, "showwarning", show)
+        warnings.simplefilter("always")
+        report = sweep(drive(archives), table(20), tmp_path, client)
+    assert any("has no workers: the sweep waits" in text for text in said), said
+    assert report["rows"] == 20
+    assert report["failed"] == 0

@@ -27,7 +27,7 @@ def test_every_public_name_has_its_place(pages):
     reference = pages["reference.html"]
     names = [f"fmurun.{name}" for name in fmurun.__all__ if name != "drives"]
     names += [f"fmurun.Plan.{name}" for name in ("simulate", "run_many", "gradient", "rows", "meta", "from_toml")]
-    names += ["fmurun.Batch.step", "fmurun.Batch.reset", "fmurun.drives.tune", "fmurun.dask.sweep", "fmurun.gym.Env", "fmurun.fmpy.FMU3Slave"]
+    names += ["fmurun.Batch.step", "fmurun.Batch.reset", "fmurun.drives.tune", "fmurun.drives.from_datasheet", "fmurun.Vehicle.run", "fmurun.Trip.plot", "fmurun.dask.sweep", "fmurun.gym.Env", "fmurun.fmpy.FMU3Slave"]
     missing = [name for name in names if f'id="{name}"' not in reference]
     assert not missing
 

@@ -57,6 +57,28 @@ def test_the_notebook_of_the_vehicle(tmp_path, monkeypatch):
     notebook.check("vehicle.ipynb", tmp_path, monkeypatch)
 
 
+def test_the_vehicle_with_three_drives(tmp_path):
+    """The page has what the script prints and draws; the three drives use the same energy within 0.5 %."""
+    motor = EXAMPLES.parent / "motors/traction-100kw.toml"
+    command = [os.environ["FMU_COMMAND"], "map", motor, "--verify", "0", "--out", tmp_path]
+    subprocess.run(command, check=True, capture_output=True)
+    plot = tmp_path / "plot.svg"
+    text = run("drive-train/vehicle.py", "PmsmDrive", "PmsmDriveMean", tmp_path / "map.csv", "--plot", plot)
+    differences = [float(x) for x in re.findall(r"differs from PmsmDrive by ([+-][\d.]+) %", text)]
+    assert len(differences) == 2
+    assert max(map(abs, differences)) < 0.5
+    if "UPDATE_GOLDEN" in os.environ:
+        (EXAMPLES.parent / "docs/drive-train-vehicle.svg").write_text(plot.read_text())
+    page = (EXAMPLES.parent / "docs/drive-train.md").read_text()
+    shown = page[page.index("PmsmDrive: ", page.index("vehicle.py")) :].split("```")[0]
+    numbers = lambda text: [float(x) for x in re.findall(r"[+-]?\d+\.\d+", text)]  # noqa: E731
+    assert re.findall(r"[A-Za-z]+", shown) == re.findall(r"[A-Za-z]+", text), text
+    assert numbers(shown) == pytest.approx(numbers(text), rel=2e-3, abs=2e-2), text
+    labels = [re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text()) for path in (plot, EXAMPLES.parent / "docs/drive-train-vehicle.svg")]
+    assert labels[0] == labels[1]
+    assert "time [s]" in labels[0]
+
+
 def test_the_fit_finds_the_values(standard):
     """The recorded run has noise of 1e-3: the true values are within the 95 % interval of the fit."""
     said = run("fit_scipy.py", standard / "PmsmPlant.fmu")

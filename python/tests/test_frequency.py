@@ -1,6 +1,8 @@
 """`frequency_response` against equations, against `linearize`, and on a sampled drive."""
 
+import subprocess
 import warnings
+import zipfile
 
 import numpy as np
 import pytest
@@ -68,6 +70,27 @@ def test_what_is_doubtful_or_wrong_is_said(plant):
         with pytest.raises(error, match=part) as caught:
             frequency_response(**{"fmus": plant, "input": "tau_load", "output": "speed", "frequencies": 20, "step_size": 1e-4, **arguments})
         assert "\n" not in str(caught.value)
+
+
+def test_an_fmu_that_crashes_is_an_error(plant, tmp_path):
+    source, library, archive = tmp_path / "crash.c", tmp_path / "crash.so", tmp_path / "Crash.fmu"
+    source.write_text("#include <stdlib.h>\n__attribute__((constructor)) static void crash(void) { abort(); }\n")
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", library, source], check=True)
+    with zipfile.ZipFile(plant) as old, zipfile.ZipFile(archive, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, library.read_bytes() if name.endswith(".so") else old.read(name))
+    with pytest.raises(FmuError, match="^frequency_response: the process of the FMUs was killed by SIGABRT$"):
+        frequency_response(archive, "tau_load", "speed", frequencies=20, step_size=1e-4)
+
+
+def test_a_process_of_its_own_changes_nothing(plant):
+    request = {"frequencies": [10.0, 20.0], "step_size": 1e-4, "settle_time": 0.1, "amplitude": 0.2}
+    with pytest.warns(UserWarning, match="at half the amplitude") as beside:
+        response = frequency_response(plant, "tau_load", "speed", **request)
+    with pytest.warns(UserWarning, match="at half the amplitude") as here:
+        own = frequency_response(plant, "tau_load", "speed", **request, isolate=False)
+    assert (response.value == own.value).all() and response.doubts == own.doubts
+    assert [(str(w.message), w.filename) for w in beside] == [(str(w.message), w.filename) for w in here]
 
 
 def test_doctests(run_doctests):

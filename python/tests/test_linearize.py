@@ -55,6 +55,7 @@ def test_van_der_pol(reference, standard):
 WRONG = {
     "a variable": ({"point": {"sped": 1.0}}, ValueError, "has no variable sped"),
     "NaN": ({"point": {"speed": float("nan")}}, ValueError, "speed is not finite"),
+    "a misspelled input": ({"inputs": ["u_dcc"]}, ValueError, "did you mean u_dc"),
     "an input": ({"inputs": ["enable"]}, ValueError, "has no continuous input enable"),
     "a method": ({"method": "guess"}, ValueError, "method must be"),
 }

@@ -122,6 +122,32 @@ def test_enumerations_keep_their_names(standard):
     assert pa.table(runs)["c.estimator"].to_pylist() == runs["c.estimator"].tolist()
 
 
+def test_integers_and_items_keep_their_digits(reference):
+    archive, wide = reference / "fmi3" / "Feedthrough.fmu", 2**53 + 1
+    course = {
+        "Int64_input": [(0.0, wide), (0.5, np.int64(-wide))],
+        "UInt64_input": [(0.0, 2**64 - 1), (0.5, 2**63 + 1)],
+        "Enumeration_input": [(0.0, "Option2"), (0.5, 1)],
+        "Boolean_input": [(0.0, True), (0.5, np.bool_(False))],
+    }
+    times = {"start_time": 0.0, "stop_time": 1.0, "step_size": 0.1}
+    outputs = [name.replace("input", "output") for name in course]
+    found = Plan(archive, input=course, output=outputs, **times).simulate()
+    ends = [[int(found[name][k]) for k in (0, -1)] for name in outputs]
+    assert ends == [[wide, -wide], [2**64 - 1, 2**63 + 1], [2, 1], [1, 0]]
+    constant = Plan(archive, input={"Int64_input": wide}, start_values={"UInt64_input": 2**64 - 1}, output=outputs, **times)
+    assert [int(constant.simulate()[name][-1]) for name in outputs[:2]] == [wide, 2**64 - 1]
+    plan = Plan(archive, measures={"last": "Int64_output"}, **times)
+    for column in ([wide, 7], [str(wide), "7"], np.array([wide, 7])):
+        assert [int(x) for x in plan.run_many({"Int64_input": column})["last"]] == [wide, 7]
+    with pytest.raises(ValueError, match="has 9007199254740993 beside numbers of other types"):
+        plan.run_many({"Int64_input": [wide, 0.5]})
+    with pytest.raises(ValueError, match="comma and colon would begin another point"):
+        Plan(archive, input={"String_input": [(0.0, "a"), (0.5, "b, 1:c")]}, **times)
+    with pytest.raises(FmuError, match="Enumeration_input = Option3 is not one of Option1, Option2"):
+        Plan(archive, input={"Enumeration_input": [(0.0, "Option3")]}, **times)
+
+
 def test_a_measure_may_be_called_error(standard):
     """It keeps its name, and the column of all results is renamed; a row that fails is reported there."""
     plan, plain = pair(standard, measures={"error": MEASURES["angle"]}), pair(standard)

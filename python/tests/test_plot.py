@@ -47,7 +47,7 @@ def test_matplotlib_or_a_line(result):
 
 
 def test_bad_columns_are_told(result):
-    with pytest.raises(ValueError, match="has no column sped"):
+    with pytest.raises(ValueError, match="has no column sped; it has time, .*; did you mean speed"):
         _plot.curves(result, ["sped"])
     with pytest.raises(TypeError, match="structured array with the column time, not ndarray"):
         _plot.curves(np.zeros(3))

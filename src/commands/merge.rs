@@ -1,7 +1,7 @@
 //! `fmu merge`: one archive from several archives of one FMU, each with binaries for other platforms.
 
-use super::build::Linux64;
 use anyhow::Result;
+use cargo_fmu::build::Linux64;
 use clap::Args;
 use fmu_pack::archive::{self, GenerationTime};
 use fmu_pack::merge::merge;

@@ -25,7 +25,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Modelica {
-    /// FMU with a shaft: PmsmDrive, PmsmDriveMean, PmsmPlant or a preset of one
+    /// FMU with a shaft: PmsmDrive, PmsmDriveMean, MappedDrive, PmsmPlant or a preset of one
     #[arg(value_name = "FILE.fmu")]
     pub file: PathBuf,
     /// Name of the package [default: the FMU's, with Lib]

@@ -2,14 +2,15 @@
 
 mod motor;
 
-use crate::message;
 use anyhow::{Context, Result, anyhow, bail, ensure};
+use cargo_fmu::message;
 use clap::Args;
+use drive_tools::datasheet::MappedSheet;
 use drive_tools::tune::{self, setting::Tuned};
 use fmu_import::printable;
 use fmu_import::written::assignment;
 use fmu_pack::preset::{NewExperiment, PresetFmu};
-use fmu_system::cosimulation::Schedule;
+use fmu_system::cosimulation::Sequence;
 use fmu_system::ssp::ssv;
 use std::path::{Path, PathBuf};
 
@@ -71,8 +72,8 @@ pub fn run(args: &Preset) -> Result<String> {
     let out = args.out.clone().or_else(|| args.name.as_ref().map(|name| format!("{name}.fmu").into()));
     let out = out.context("--out NEW.fmu is missing")?;
     let tuned = args.motor.as_deref().map(tune::tune).transpose()?;
-    let given = args.stimuli.as_deref().map(course).transpose()?;
     let mut preset = PresetFmu::open(&args.file)?;
+    let given = args.stimuli.as_deref().map(|path| course(path, |name| preset.has(name))).transpose()?;
     if let Some(path) = &args.ssv {
         let of = || path.display().to_string();
         let text = std::fs::read_to_string(path).with_context(of)?;
@@ -102,6 +103,16 @@ pub fn of_machine(file: &Path, tuned: &Tuned, out: &Path) -> Result<()> {
     written(preset, None, Some(&course), out).map(drop)
 }
 
+/// The FMU with the values of a data sheet, for `fmu datasheet --fmu`.
+///
+/// # Errors
+/// Those of [`run`].
+pub fn of_sheet(file: &Path, sheet: &MappedSheet, out: &Path) -> Result<()> {
+    let mut preset = PresetFmu::open(file)?;
+    let course = motor::set_sheet(&mut preset, sheet)?;
+    written(preset, None, Some(&course), out).map(drop)
+}
+
 /// Writes the FMU and shows its limitations; returns its changes.
 fn written(preset: PresetFmu, name: Option<&str>, course: Option<&NewExperiment>, out: &Path) -> Result<Vec<String>> {
     let written = preset.write(name, course, out)?;
@@ -110,13 +121,11 @@ fn written(preset: PresetFmu, name: Option<&str>, course: Option<&NewExperiment>
 }
 
 /// The default experiment with the inputs of a file.
-fn course(path: &Path) -> Result<NewExperiment> {
+fn course(path: &Path, known: impl Fn(&str) -> bool) -> Result<NewExperiment> {
     let of = || format!("--stimuli {}", path.display());
     let stimuli = std::fs::read_to_string(path).with_context(of)?;
-    let wrong = |cause: String| anyhow!("--stimuli {cause}");
-    Schedule::read_csv(path).map_err(wrong)?;
-    let last = stimuli.lines().rfind(|line| !line.trim().is_empty()).and_then(|line| line.split([',', ';']).next());
-    let stop = last.and_then(|time| time.trim().parse().ok()).with_context(|| format!("{}: has no last time", of()))?;
+    let columns = Sequence::read_csv(path, known).map_err(|cause| anyhow!("--stimuli {cause}"))?;
+    let stop = columns.first().map(|(_, texts)| texts.end()).with_context(|| format!("{}: has no last time", of()))?;
     Ok(NewExperiment { stimuli, stop, step: None })
 }
 

@@ -1,8 +1,8 @@
 //! `fmu prove`: the folders of examples required by the FMI tools page, and the importers that replayed them.
 
-use super::build::{self, Build};
-use crate::message;
+use super::build::{self, Models};
 use anyhow::{Context, Result, anyhow, bail};
+use cargo_fmu::message;
 use clap::Args;
 use fmu_core::Experiment;
 use fmu_import::platform::Platform;
@@ -70,7 +70,7 @@ struct Example {
 pub fn run(args: &Prove) -> Result<(Vec<PathBuf>, bool)> {
     let dir = tempfile::tempdir()?;
     let files = match &args.files[..] {
-        [] => build::run(&Build { out: Some(dir.path().into()), ..Build::default() })?,
+        [] => build::models(&Models { out: Some(dir.path().into()), ..Models::default() })?,
         files => files.to_vec(),
     };
     let (mut folders, mut good) = (Vec::new(), true);
@@ -122,7 +122,7 @@ fn proof(example: &Example, md: &ModelDescription, python: &Path) -> Result<(Str
     let Example { name, experiment, .. } = example;
     let file = |ending: &str| example.folder.join(format!("{name}{ending}"));
     let archive = file(".fmu");
-    let deviation = own(example)?;
+    let deviation = own(example, md)?;
     let mut good = deviation <= ROUNDING;
     let mut replays = vec![format!("{TOOL}: {deviation:.1e}")];
     let check = fmu_check::run(&archive, &fmu_check::Options::default())?;
@@ -200,9 +200,10 @@ fn features(md: &ModelDescription) -> String {
 }
 
 /// Largest deviation of the run in this program.
-fn own(example: &Example) -> Result<f64> {
+fn own(example: &Example, md: &ModelDescription) -> Result<f64> {
     let Example { folder, name, experiment } = example;
-    let csv = |ending: &str| Sequence::read_csv(&folder.join(format!("{name}{ending}"))).map_err(|e| anyhow!(e));
+    let known = |name: &str| md.variable(name).is_some();
+    let csv = |ending: &str| Sequence::read_csv(&folder.join(format!("{name}{ending}")), known).map_err(|e| anyhow!(e));
     let fed = if folder.join(format!("{name}_in.csv")).is_file() { csv("_in.csv")? } else { Vec::new() };
     let recording = reference::run(&folder.join(format!("{name}.fmu")), experiment, &fed)?;
     let every = reference::every(experiment);
@@ -258,7 +259,7 @@ fn fmpy(example: &Example, python: &Path) -> Result<Option<Replay>> {
     if !output.status.success() {
         let said = String::from_utf8_lossy(&output.stderr);
         let last = said.lines().last().unwrap_or_default().to_owned();
-        return Err(crate::Failed(format!("{}: FMPy cannot run it: {last}", file(".fmu").display())).into());
+        return Err(cargo_fmu::Failed(format!("{}: FMPy cannot run it: {last}", file(".fmu").display())).into());
     }
     // FMPy may print other text before.
     let said = String::from_utf8_lossy(&output.stdout);

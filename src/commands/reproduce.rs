@@ -1,6 +1,6 @@
 //! `fmu reproduce`: the paper's experiments through the packed FMUs.
 
-use super::build::{self, Build};
+use super::build::{self, Models};
 use anyhow::Result;
 use clap::Args;
 use fmu_pack::workspace::Workspace;
@@ -27,7 +27,7 @@ pub struct Reproduce {
 pub fn run(args: &Reproduce) -> Result<bool> {
     let target = Workspace::find()?.target;
     let fmus = target.join("fmu");
-    build::run(&Build { out: Some(fmus.clone()), ..Build::default() })?;
+    build::models(&Models { out: Some(fmus.clone()), ..Models::default() })?;
     let out = args.out.clone().unwrap_or_else(|| target.join("reproduce"));
     let (table, holds) = drive_study::reproduce::run(&fmus, &out)?;
     println!("{table}");

@@ -1,8 +1,8 @@
 //! `fmu simulink`: a MATLAB script that builds a Simulink model around an FMU.
 
-use crate::message;
 use crate::simulink;
 use anyhow::{Context, Result, bail};
+use cargo_fmu::message;
 use clap::Args;
 use fmu_pack::archive;
 use std::path::PathBuf;

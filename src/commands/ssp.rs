@@ -1,6 +1,6 @@
 //! `fmu ssp`: the closed loop of plant and controller as one file.
 
-use super::build::{self, Build};
+use super::build::{self, Models};
 use crate::ssp::{self, COMPONENTS, ComponentValues, Options};
 use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
@@ -80,7 +80,7 @@ pub fn run(args: &Ssp) -> Result<()> {
     } else {
         let fmus = COMPONENTS.map(|(_, fmu, _)| fmu.to_owned()).to_vec();
         let out = Some(dir.path().into());
-        build::run(&Build { fmus, fmi: Some(fmi.to_owned()), out, ..Build::default() })
+        build::models(&Models { fmus, fmi: Some(fmi.to_owned()), out, ..Models::default() })
             .context("the FMUs of the drive cannot be built here; --fmus DIR takes FMUs from a folder")?;
         dir.path().join(standard)
     };

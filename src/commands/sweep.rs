@@ -161,7 +161,7 @@ struct Shown {
 
 impl Progress for Shown {
     fn note(&self, text: &str) {
-        crate::message::note(text);
+        cargo_fmu::message::note(text);
     }
 
     fn progress(&self, done: u64, failed: u64, all: u64) {

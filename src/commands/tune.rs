@@ -2,9 +2,10 @@
 
 use super::preset;
 use crate::ssv;
-use anyhow::{Result, anyhow};
+use anyhow::Result;
 use clap::Args;
 use drive::{PmsmDrive, PmsmDriveMean, PmsmPlant, SensorlessController};
+use drive_tools::tune::application::Application;
 use drive_tools::tune::motor::{MotorFile, estimators, torque_constant};
 use drive_tools::tune::setting::{Setting, Tuned, Value};
 use drive_tools::tune::trial::{self, Trial};
@@ -31,6 +32,10 @@ use std::path::{Path, PathBuf};
 /// With --fmu it writes an FMU with these start values instead, which needs no parameter file: see `fmu preset`.
 ///
 ///   fmu tune motors/ipmsm-2.2kw.toml --fmu target/fmu/fmi3/PmsmDrive.fmu --out MyMotor.fmu
+///
+/// For a vehicle: torque control with a sensor and the full current limit, on the shaft of the drive train.
+///
+///   fmu tune motors/traction-100kw.toml --estimator Sensored --control torque --shaft imposed --out target/tune
 ///
 ///   fmu tune motors/ipmsm-2.2kw.toml --out target/tune
 ///   fmu simulate target/fmu/fmi3/PmsmPlant.fmu target/fmu/fmi3/SensorlessController.fmu --auto-connect \
@@ -62,6 +67,12 @@ pub struct Tune {
     /// Estimator to tune for, instead of the motor file's
     #[arg(long, value_name = "NAME", long_help = estimator_help())]
     pub estimator: Option<String>,
+    /// Reference of the drive: speed (speed_ref) or torque (tau_ref) [default: speed]. The trial controls the speed in both cases
+    #[arg(long, value_name = "speed|torque")]
+    pub control: Option<String>,
+    /// Shaft of the drive: free (it turns its own inertia against tau_load) or imposed (a drive train sets speed_shaft and angle_shaft) [default: free]
+    #[arg(long, value_name = "free|imposed")]
+    pub shaft: Option<String>,
     /// Print the trial: starts from 24 angles at each speed, loads carried, minimum speed, maximum angle error
     #[arg(long)]
     pub check: bool,
@@ -87,8 +98,9 @@ pub fn run(args: &Tune) -> Result<()> {
         print!("{EXAMPLE}");
         return Ok(());
     };
+    let application = Application::named(args.control.as_deref(), args.shaft.as_deref())?;
     if args.json {
-        println!("{:#}", tune::values(motor, args.estimator.as_deref())?);
+        println!("{:#}", tune::values(motor, args.estimator.as_deref(), application)?);
         return Ok(());
     }
     let mut motor = MotorFile::read(motor)?;
@@ -96,16 +108,17 @@ pub fn run(args: &Tune) -> Result<()> {
         motor.choose(estimator)?;
     }
     let tuned = rules::tune(&motor)?;
+    let used = application.applied(&tuned)?;
     let out = args.out.clone().map_or_else(|| output_folder("tune"), Ok)?;
     let files = match &args.fmu {
         Some(fmu) => {
-            preset::of_machine(fmu, &tuned, &out)?;
+            preset::of_machine(fmu, &used, &out)?;
             vec![out]
         }
-        None => write(&tuned, &out, args.integers)?,
+        None => write(&used, &out, args.integers)?,
     };
     println!("{}\n{}", tuned.name, tuned.source);
-    for (model, settings) in [("PmsmPlant", &tuned.plant), ("SensorlessController", &tuned.controller)] {
+    for (model, settings) in [("PmsmPlant", &used.plant), ("SensorlessController", &used.controller)] {
         println!("\n{model}");
         for Setting { name, value, rule, .. } in settings {
             println!("  {name:26}{:>14}  {rule}", shown(value));
@@ -186,15 +199,14 @@ pub fn example_for(description: &Description) -> Result<Option<(String, String)>
 
 /// Which of the three models an FMU is, in the order of [`texts`]; `PmsmDriveMean` has the values of `PmsmDrive`.
 pub(super) fn place(description: &Description) -> Result<Option<usize>> {
-    // Only the model of this name: a description takes a quarter of a second, because dependencies are found by probing.
     let (place, known) = match &*description.name {
-        name if name == PmsmDrive::INFO.name => (0, Description::of::<PmsmDrive>()),
-        name if name == PmsmDriveMean::INFO.name => (0, Description::of::<PmsmDriveMean>()),
-        name if name == PmsmPlant::INFO.name => (1, Description::of::<PmsmPlant>()),
-        name if name == SensorlessController::INFO.name => (2, Description::of::<SensorlessController>()),
+        name if name == PmsmDrive::INFO.name => (0, tune::check::variables::<PmsmDrive>()),
+        name if name == PmsmDriveMean::INFO.name => (0, tune::check::variables::<PmsmDriveMean>()),
+        name if name == PmsmPlant::INFO.name => (1, tune::check::variables::<PmsmPlant>()),
+        name if name == SensorlessController::INFO.name => (2, tune::check::variables::<SensorlessController>()),
         _ => return Ok(None),
     };
-    let known = known.map_err(|e| anyhow!("{e}"))?;
+    let known = known?;
     let names = |d: &Description| d.variables.iter().map(|v| v.name.clone()).collect::<Vec<_>>();
     Ok(names(description).starts_with(&names(&known)).then_some(place))
 }

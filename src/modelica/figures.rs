@@ -59,10 +59,10 @@ pub(super) fn of(file: &Path, interface: &Interface) -> Result<Vec<Figure>> {
         }
         let at = |from: f64| t > from - 0.5 / RATE;
         if let Some(name) = &reference {
-            drive.set(name, &Values::Reals(vec![if at(0.1) { SPEED } else { 0.0 }]))?;
+            drive.set(name, Values::Reals(vec![if at(0.1) { SPEED } else { 0.0 }]))?;
         }
-        drive.set(&speed, &Values::Reals(vec![x[0]]))?;
-        drive.set(&angle, &Values::Reals(vec![x[1]]))?;
+        drive.set(&speed, Values::Reals(vec![x[0]]))?;
+        drive.set(&angle, Values::Reals(vec![x[1]]))?;
         ensure!(k == ROW[3] || drive.do_step(t, 1.0 / RATE)?.is_continue(), "the FMU ends the run at {t} s");
         let (shaft, outside) = (real(&mut drive, &tau)?, if at(0.6) { -LOAD } else { 0.0 });
         let rate = |x: &[f64; 4]| [(shaft - coupling(x)) / rotor, x[0], (coupling(x) + outside) / load, x[2]];

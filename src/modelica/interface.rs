@@ -144,7 +144,7 @@ impl Interface {
                 if names.is_empty() { "no terminals".into() } else { format!("the terminals {}", names.join(", ")) };
             bail!(
                 "has no shaft for a flange: a terminal with the members speed, angle and the outflow tau; it has {has}. \
-                 PmsmDrive, PmsmDriveMean and PmsmPlant have one; for an FMU of signals, the imported block suffices"
+                 PmsmDrive, PmsmDriveMean, MappedDrive and PmsmPlant have one; for an FMU of signals, the imported block suffices"
             );
         }
         Ok(interface)

@@ -27,7 +27,9 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_fmu");
 fn our_own_archives_violate_nothing() {
     let portable = std::env::var_os("FMU_TEST_ARCHIVES").is_some();
     for (standard, more) in [("fmi2", None), ("fmi3", Some("SensorlessControllerClocked"))] {
-        for name in ["PmsmPlant", "SensorlessController", "PmsmDrive", "PmsmDriveMean"].into_iter().chain(more) {
+        for name in
+            ["PmsmPlant", "SensorlessController", "PmsmDrive", "PmsmDriveMean", "MappedDrive"].into_iter().chain(more)
+        {
             let report = check(&common::archives().join(standard).join(name).with_extension("fmu"), &[]);
             let found: Vec<_> =
                 violated(&report).into_iter().filter(|id| portable || !["B03", "B04"].contains(id)).collect();

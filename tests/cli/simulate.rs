@@ -268,7 +268,7 @@ fn warnings_of_the_fmus_are_shown() {
 fn the_first_run_of_the_readme() {
     let readme = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
     let block = readme.split("```sh\n").nth(1).unwrap().split("```").next().unwrap().replace("\\\n", " ");
-    let command = block.lines().find_map(|line| line.strip_prefix("cargo run --release -- simulate ")).unwrap();
+    let command = block.lines().find_map(|line| line.strip_prefix("cargo fmu simulate ")).unwrap();
     let archives = common::archives().display().to_string();
     let arguments = command.split_whitespace().map(|word| word.replace("target/fmu", &archives));
     let dir = tempfile::tempdir().unwrap();
@@ -476,16 +476,6 @@ fn runs_and_measurements_are_overlaid() {
     refused("missing.csv", "missing.csv");
     std::fs::write(&bench, "t,speed [krpm]\n0,1\n").unwrap();
     refused(&bench, "speed [krpm]: expected the unit rad/s or rpm");
-}
-
-/// Cargo's spelling of the command also starts the process of the FMUs.
-#[test]
-fn cargo_fmu_simulates() {
-    let drive = archive("fmi3", "PmsmDrive");
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_cargo-fmu"));
-    let output = command.args(["fmu", "simulate", drive.to_str().unwrap(), "--stop", "0.001", "--csv", "-"]).output();
-    let output = output.unwrap();
-    assert!(output.status.success() && text(&output.stdout).starts_with("time,speed,"), "{}", text(&output.stderr));
 }
 
 /// Ctrl-C keeps the results so far.

@@ -4,7 +4,7 @@ use drive::control::start::StartMode;
 use drive::estimator::{Class, Kind};
 use drive::{Pair, math};
 use drive_study::runner::{self, RATED_SPEED, RATED_TORQUE};
-use fmu_core::{Block, Causality, Model, Slot};
+use fmu_core::{Block, Causality, Saved, Slot};
 use serde_json::{Map, Value, json};
 
 const T_S: f64 = 1e-4;
@@ -25,7 +25,7 @@ struct Experiment {
 }
 
 /// Every parameter that differs from its start value.
-fn parameters<M: Model>(block: &Block<M>) -> Map<String, Value> {
+fn parameters<M: Saved>(block: &Block<M>) -> Map<String, Value> {
     let (mut block, mut fresh) = (block.clone(), Block::<M>::default());
     let mut map = Map::new();
     for i in 0..M::TABLE.len() {
@@ -176,7 +176,7 @@ impl Experiment {
 
 /// All experiments.
 pub fn experiments() -> Value {
-    let all = Kind::ALL.iter().flat_map(|&kind| [load_step(kind), start(kind)]);
+    let all = Kind::ALL.iter().flat_map(|&kind| vec![load_step(kind), start(kind)]);
     let reversals = [Kind::ExtendedEmf, Kind::FluxObserver].map(reversal);
     let later = vec![adapting_at_rest(), with_a_real_inverter(), adapting()].into_iter().chain(reversals);
     Value::Array(all.chain(later).map(Experiment::run).collect())

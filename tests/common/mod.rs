@@ -3,6 +3,7 @@
 
 pub mod estimators;
 pub mod importers;
+pub mod packed;
 pub mod pages;
 pub mod python;
 #[path = "../../drive-study/tests/common/shows.rs"]
@@ -91,7 +92,7 @@ pub fn archives() -> &'static Path {
         if let Some(folder) = std::env::var_os("FMU_TEST_ARCHIVES") {
             return folder.into();
         }
-        let files = fmu::commands::build::run(&fmu::commands::build::Build::default()).expect("FMUs that build");
+        let files = fmu::commands::build::models(&fmu::commands::build::Models::default()).expect("FMUs that build");
         files[0].parent().and_then(Path::parent).expect("DIR/fmi2/NAME.fmu").to_owned()
     })
 }

@@ -85,7 +85,8 @@ fn find_or_make(requirements: &Path) -> Result<PathBuf, String> {
         Command::new(base).args(["-m", "venv"]).arg(&partial),
         "a virtual environment (on Debian: package python3-venv)",
     )?;
-    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--requirement"];
+    // Python compiles what a test imports; to compile all of it takes as long as the rest of the installation.
+    let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--no-compile", "--requirement"];
     run(
         Command::new(partial.join(inside)).args(install).arg(requirements),
         &format!("the packages of {} from a Python package index", requirements.display()),

@@ -1,7 +1,4 @@
-"""The examples of docs/drive-train.md: PmsmDriveMean or a map instead of PmsmDrive changes the energy by less than 0.5 %.
-
-`FMU_COMMAND` names the command, which makes the map.
-"""
+"""The examples of docs/drive-train.md for FMPy: PmsmDriveMean instead of PmsmDrive changes the energy by less than 0.5 %."""
 
 import os
 import re
@@ -13,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 # The arguments after the drives' names, the duration of the short run in s, and its energy from the link in kJ.
-EXAMPLES = {"vehicle": (56, 66.26), "pump": (120, 102.4), "axis": (1.4, 0.325)}
+EXAMPLES = {"pump": (120, 102.4), "axis": (1.4, 0.325)}
 
 
 def run(script, *words):
@@ -45,13 +42,8 @@ def test_another_file_name_is_another_drive(archives, script):
 
 @pytest.mark.parametrize("script", EXAMPLES)
 def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
-    """The whole example with FMI 3.0, and the vehicle also with a map: the numbers of the page, and the labels of its
-    plot."""
+    """The whole example with FMI 3.0: the numbers of the page, and the labels of its plot."""
     drives = [archives / "fmi3" / f"{name}.fmu" for name in ("PmsmDrive", "PmsmDriveMean")]
-    if script == "vehicle":
-        motor = ROOT / "motors/traction-100kw.toml"
-        subprocess.run([os.environ["FMU_COMMAND"], "map", motor, "--out", tmp_path], check=True, capture_output=True)
-        drives.append(tmp_path / "map.npz")
     text = run(script, *drives, "--plot", tmp_path / "plot.svg")
     assert close(text) == len(drives) - 1
     page = (ROOT / "docs/drive-train.md").read_text()

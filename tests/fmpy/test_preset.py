@@ -3,6 +3,7 @@
 `FMU_PRESETS` names the folder with fmi2/Pump.fmu and fmi3/Pump.fmu; `FMU_ARCHIVES` that of the FMUs without preset.
 """
 
+import json
 import os
 import shutil
 from ctypes import byref, c_bool, c_char_p, c_int, c_size_t, c_void_p, cast
@@ -15,7 +16,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.validation import validate_fmu
 
-FILE = "fmu-preset.txt"
+FILE = "fmu-preset.json"
 VALUES = {
     "plant.motor.R_s": 3.25,
     "plant.initial.speed": np.pi,
@@ -173,7 +174,8 @@ def test_without_its_preset_there_is_no_instance(folder, version, exchange, tmp_
     empty.mkdir()
     wrong = tmp_path / "wrong"
     wrong.mkdir()
-    (wrong / FILE).write_text("fmu preset 1\nplant.motor.R_s\t9.0\n")
+    start = {"plant.motor.R_s": "9.0"}
+    (wrong / FILE).write_text(json.dumps({"format": "fmu preset", "version": 2, "start": start}))
     for resources, why in [
         (None, "the importer names no folder of resources"),
         ("", "the importer names no folder of resources"),

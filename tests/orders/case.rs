@@ -46,7 +46,7 @@ pub struct Case {
     pub fmu: &'static str,
     pub inputs: &'static [Input],
     pub outputs: &'static [&'static str],
-    /// Distance in s of the compared points: none is at a sample.
+    /// Distance in s between compared points; none coincides with a sample.
     pub apart: f64,
     pub points: u32,
     /// Largest deviation, as a part of the largest value of the output.
@@ -163,6 +163,17 @@ pub const OURS: &[Case] = &[
             steps("tau_load", &[(0.0, 0.0), (0.13, 1.0)]),
         ],
         outputs: &["speed", "i_d", "i_q", "energy_in", "energy_mech", "energy_loss"],
+        apart: 2.313_7e-3,
+        points: 100,
+        tolerance: 2e-6,
+    },
+    Case {
+        fmu: "MappedDrive",
+        inputs: &[
+            discrete("speed_ref", &[(0.0, 0.0), (1.003e-2, 60.0)]),
+            steps("tau_load", &[(0.0, 0.0), (0.13, 1.0)]),
+        ],
+        outputs: &["speed", "tau_max", "energy_in", "energy_mech", "energy_loss"],
         apart: 2.313_7e-3,
         points: 100,
         tolerance: 2e-6,

@@ -156,11 +156,11 @@ fn a_preset_is_in_the_description_and_in_every_instance() {
             assert_eq!(resistance(&mut it), Values::Reals(vec![3.25]));
             let state = it.get_state().unwrap();
             let bytes = it.serialize_state(state).unwrap();
-            it.set("plant.motor.R_s", &Values::Reals(vec![1.0])).unwrap();
+            it.set("plant.motor.R_s", Values::Reals(vec![1.0])).unwrap();
             let state = it.deserialize_state(&bytes).unwrap();
             it.set_state(state).unwrap();
             assert_eq!(resistance(&mut it), Values::Reals(vec![3.25]));
-            it.set("plant.motor.R_s", &Values::Reals(vec![1.0])).unwrap();
+            it.set("plant.motor.R_s", Values::Reals(vec![1.0])).unwrap();
             it.reset().unwrap();
             enter(&mut it);
             assert_eq!(resistance(&mut it), Values::Reals(vec![3.25]), "a reset returns to the preset");
@@ -204,7 +204,9 @@ fn a_preset_of_a_preset_merges() {
         assert_eq!((&a.token, &a.model_name), (&b.token, &b.model_name));
         assert_eq!(a.model_name, "My pump");
         let file = format!("resources/{FILE}");
-        assert_eq!(of_a[&file], b"fmu preset 1\nmotor.n_p\t6\nmotor.R_s\t5.0\nmotor.psi_M\t0.2\n");
+        let preset: serde_json::Value = serde_json::from_slice(&of_a[&file]).unwrap();
+        let start = serde_json::json!({"motor.n_p": "6", "motor.R_s": "5.0", "motor.psi_M": "0.2"});
+        assert_eq!(preset, serde_json::json!({"format": "fmu preset", "version": 2, "start": start}));
         assert_eq!(of_a[&file], of_b[&file]);
         assert!(of_a.contains_key(&format!("{REFERENCE}My pump_ref.csv")), "{:?}", of_a.keys());
         let mut it = entered(&second, Kind::default());
@@ -253,8 +255,8 @@ fn without_its_preset_the_fmu_does_not_run() {
     for archive in built("PmsmPlant") {
         preset(&archive, &new, &["motor.R_s=3"]).unwrap();
         let cases: [(Option<&[u8]>, &str); 3] = [
-            (None, "fmu-preset.txt: No such file or directory"),
-            (Some(b"fmu preset 1\nmotor.R_s\t4.0\n"), "its hash is {"),
+            (None, "fmu-preset.json: No such file or directory"),
+            (Some(br#"{"format": "fmu preset", "version": 2, "start": {"motor.R_s": "4.0"}}"#), "its hash is {"),
             (Some(b""), "its hash is {"),
         ];
         for (content, why) in cases {

@@ -1,8 +1,8 @@
 //! Start values of every type and causality: tests/types.
 
 use super::{contents, enter, fmu, preset, text};
+use crate::common::packed::packed;
 use crate::common::python::scratch;
-use fmu::commands::build::{self, Build};
 use fmu_import::{Fmu, Instance, Values};
 use model_description::FmiVersion::{self, V2, V3};
 use std::path::PathBuf;
@@ -11,10 +11,7 @@ use std::sync::OnceLock;
 /// EveryType.fmu of FMI 2.0 and of FMI 3.0.
 fn archives() -> &'static [PathBuf] {
     static FILES: OnceLock<Vec<PathBuf>> = OnceLock::new();
-    FILES.get_or_init(|| {
-        let out = scratch().join("preset-types");
-        build::run(&Build { package: vec!["types-fmu".into()], out: Some(out), ..Build::default() }).unwrap()
-    })
+    FILES.get_or_init(|| packed("tests/types", "types-fmu", &scratch().join("preset-types")))
 }
 
 fn of(version: FmiVersion) -> &'static PathBuf {

@@ -72,6 +72,24 @@ fn event_mode_and_early_return_change_no_bit() {
     assert_eq!(jumps.len(), bounces.len(), "{jumps:?}");
 }
 
+/// The example of the importer integrates by Euler's method, too, so it has the bounces of the original.
+#[test]
+fn the_example_for_model_exchange_runs() {
+    let ([h, v], bounces) = expected(1);
+    for version in BOTH {
+        let events = model_exchange::run(&archive("bouncing-ball", version), 3.0).unwrap();
+        assert_eq!(events.len(), bounces.len(), "{version:?}: {events:?}");
+        for (event, k) in events.iter().zip(&bounces) {
+            assert!(
+                event[0] == h[*k] && (event[1] - v[*k]).abs() < 1e-9,
+                "{version:?}: {event:?}, {} {}",
+                h[*k],
+                v[*k]
+            );
+        }
+    }
+}
+
 #[test]
 fn model_exchange_finds_the_bounce() {
     for version in BOTH {

@@ -23,7 +23,7 @@ fn clocks_tick_by_their_kinds() {
                     continue;
                 }
                 if second {
-                    it.set("inClock2", &Values::Booleans(vec![true])).unwrap();
+                    it.set("inClock2", Values::Booleans(vec![true])).unwrap();
                 }
                 loop {
                     trips |= it.get("outClock").unwrap() == Values::Booleans(vec![true]);

@@ -73,7 +73,7 @@ fn the_map_can_be_replaced() {
         ("psi_d", &[0.15]),
         ("psi_q", &[0.05]),
     ] {
-        it.set(name, &Values::Reals(values.to_vec())).unwrap();
+        it.set(name, Values::Reals(values.to_vec())).unwrap();
     }
     it.setup(0.0, None).unwrap();
     it.enter_initialization().unwrap();
@@ -87,14 +87,14 @@ fn the_map_can_be_replaced() {
     // Between the points, at the last one, and outside.
     let mut time = 0.0;
     for (flux, current) in [(-0.05, -10.0), (0.0, 0.0), (0.1, 30.0), (0.2, 60.0), (-0.2, -40.0)] {
-        it.set("psi_q", &Values::Reals(vec![flux])).unwrap();
+        it.set("psi_q", Values::Reals(vec![flux])).unwrap();
         assert!(it.do_step(time, 0.1).unwrap().is_continue());
         near(it.get("i_q").unwrap(), current);
         time += 0.1;
     }
     // An axis that does not increase.
     let mut it = open("current-map").instantiate("it", false).unwrap();
-    it.set("map.psi_q", &Values::Reals(vec![-0.1, 0.0, 0.0, 0.1, 0.2])).unwrap();
+    it.set("map.psi_q", Values::Reals(vec![-0.1, 0.0, 0.0, 0.1, 0.2])).unwrap();
     it.setup(0.0, None).unwrap();
     it.enter_initialization().unwrap();
     assert!(it.exit_initialization().unwrap_err().to_string().contains("map.psi_q[3] = 0 is not allowed"));

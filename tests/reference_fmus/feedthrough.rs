@@ -20,7 +20,7 @@ fn run(name: &str, inputs: &str) -> Recording {
     system.add("it", &open("feedthrough"), false).unwrap();
     let file = super::archives().join(format!("feedthrough-{name}.csv"));
     fs::write(&file, inputs).unwrap();
-    for (input, texts) in Sequence::read_csv(&file).unwrap() {
+    for (input, texts) in Sequence::read_csv(&file, |_| true).unwrap() {
         system.sequence(&format!("it.{input}"), &texts).unwrap();
     }
     system.record_outputs().unwrap();
@@ -48,6 +48,38 @@ fn its_variables_are_those_of_the_original() {
     }
     let start = |name: &str| md.variable(name).unwrap().start_texts.clone();
     assert_eq!((start("String_input"), start("Binary_input")), (vec!["Set me!".into()], vec!["666f6f".into()]));
+}
+
+/// Integers of 64 bits keep their digits over time, as single values and in a file, with or without a decimal point and zeros; items
+/// have their names.
+#[test]
+fn integers_over_time_keep_their_digits() {
+    let recording = run(
+        "digits",
+        "time_ms,Int64_input,UInt64_input,Enumeration_input\n0,9007199254740993,18446744073709551615,Option2\n\
+         500,-9.007199254740993000e+15,9223372036854775809,1.0\n1000,-9223372036854775808,9007199254740993,Option2\n",
+    );
+    let all = |name: &str| {
+        let column = recording.column(&format!("it.{name}_output")).unwrap();
+        [0, 6, 20].map(|k| column.at(k))
+    };
+    let whole = |numbers: [i128; 3]| numbers.map(Number::Integer);
+    assert_eq!(all("Int64"), whole([9_007_199_254_740_993, -9_007_199_254_740_993, i128::from(i64::MIN)]));
+    assert_eq!(all("UInt64"), whole([u64::MAX.into(), (1 << 63) + 1, 9_007_199_254_740_993]));
+    assert_eq!(all("Enumeration"), whole([2, 1, 2]));
+    let error = |port: &str, text: &str| {
+        let mut system = System::default();
+        system.add("it", &open("feedthrough"), false).unwrap();
+        system.sequence(port, &Sequence::parse(text).unwrap()).unwrap_err().to_string()
+    };
+    for (port, text, cause) in [
+        ("it.Int64_input", "0:1.5", "Int64_input = 1.5 is not an integer"),
+        ("it.Int8_input", "0:300.0", "Int8_input = 300.0 is not of the type Int8: -128 to 127"),
+        ("it.Boolean_input", "0:2.0", "Boolean_input = 2.0 is not true or false"),
+        ("it.Enumeration_input", "0:Option3", "Enumeration_input = Option3 is not one of Option1, Option2"),
+    ] {
+        assert!(error(port, text).contains(cause), "{}", error(port, text));
+    }
 }
 
 /// 21 rows, all of them the start values.
@@ -197,7 +229,7 @@ fn model_exchange_passes_values_through() {
     assert_eq!((it.get("String_output").unwrap(), it.get("Binary_output").unwrap()), (text.clone(), bytes.clone()));
     it.update_discrete_states().unwrap();
     it.enter_continuous_time_mode().unwrap();
-    it.set("Float32_continuous_input", &Values::Reals(vec![0.25])).unwrap();
+    it.set("Float32_continuous_input", Values::Reals(vec![0.25])).unwrap();
     assert_eq!(it.get("Float32_continuous_output").unwrap(), Values::Reals(vec![0.25]));
     for (name, value) in [("String_input", &text), ("Binary_input", &bytes)] {
         let error = it.set(name, value).unwrap_err().to_string();

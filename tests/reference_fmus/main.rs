@@ -8,7 +8,13 @@ mod clocks;
 mod current_map;
 mod dahlquist;
 mod feedthrough;
+#[path = "../../fmu-import/examples/model_exchange.rs"]
+#[allow(dead_code, reason = "its main function")]
+mod model_exchange;
 mod originals;
+#[path = "../common/packed.rs"]
+#[allow(unreachable_pub, reason = "a module of several test programs")]
+mod package;
 mod prove;
 #[path = "../common/python.rs"]
 #[allow(dead_code, unreachable_pub, reason = "a module of several test programs")]
@@ -20,42 +26,21 @@ mod stair;
 mod state_space;
 mod van_der_pol;
 
-use fmu::commands::build::{self, Build};
 use fmu_import::{Fmu, Kind};
 use fmu_system::cosimulation::{Integration, Method, Recording, Settings, Solver, System};
 use model_description::FmiVersion::{self, V2, V3};
 use std::collections::BTreeMap;
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// The archives of a package of `examples/`, of FMI 2.0 and of FMI 3.0: the library is built with the profile of the tests.
+/// The archives of a package of `examples/`, of FMI 2.0 and of FMI 3.0.
 fn packed(package: &str) -> Vec<PathBuf> {
     type Once = Arc<OnceLock<Vec<PathBuf>>>;
     static ALL: Mutex<BTreeMap<String, Once>> = Mutex::new(BTreeMap::new());
     let one = ALL.lock().unwrap_or_else(PoisonError::into_inner).entry(package.into()).or_default().clone();
-    one.get_or_init(|| {
-        let target = python::scratch().parent().unwrap();
-        let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
-        let mut cargo = Command::new(env!("CARGO"));
-        cargo.args(["build", "--quiet", "--locked", "--package", package, "--target-dir"]).arg(target);
-        if profile == "release" {
-            cargo.arg("--release");
-        }
-        assert!(cargo.current_dir(env!("CARGO_MANIFEST_DIR")).status().unwrap().success(), "{package} compiles");
-        let library = target.join(profile).join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_")));
-        let resources = Path::new("examples/reference-fmus").join(package).join("resources");
-        let build = Build {
-            library: vec![library.display().to_string()],
-            resources: resources.is_dir().then_some(resources),
-            out: Some(archives().into()),
-            ..Build::default()
-        };
-        build::run(&build).unwrap()
-    })
-    .clone()
+    one.get_or_init(|| package::packed(&format!("examples/reference-fmus/{package}"), package, archives())).clone()
 }
 
 /// Folder of the archives.

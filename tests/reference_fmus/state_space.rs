@@ -82,7 +82,7 @@ fn sizes_change_while_it_runs() {
     let mut it = open("state-space").instantiate("it", false).unwrap();
     it.configure(&[("m", &size(2)), ("n", &size(0)), ("r", &size(2))]).unwrap();
     assert_eq!(it.get("D").unwrap(), reals(&[1.0, 0.0, 0.0, 1.0]));
-    it.set("u", &reals(&[0.0, 1.0])).unwrap();
+    it.set("u", reals(&[0.0, 1.0])).unwrap();
     it.setup(0.0, Some(1.1)).unwrap();
     it.enter_initialization().unwrap();
     it.exit_initialization().unwrap();
@@ -95,7 +95,7 @@ fn sizes_change_while_it_runs() {
             inputs = 3;
         }
         let u: Vec<f64> = (0..inputs).map(|i| time + 0.1 + f64::from(i)).collect();
-        it.set("u", &reals(&u)).unwrap();
+        it.set("u", reals(&u)).unwrap();
         assert!(it.do_step(time, 0.1).unwrap().is_continue());
         assert_eq!(it.get("y").unwrap(), reals(&u), "step {step}");
     }
@@ -118,7 +118,7 @@ fn compare(it: &mut Instance, time: f64, [m, n, r]: [usize; 3]) {
     let [a, b, c, d, u] = std::array::from_fn(|seed| {
         let (name, count) = matrices[seed];
         let values = drawn(count, seed);
-        it.set(name, &reals(&values)).unwrap();
+        it.set(name, reals(&values)).unwrap();
         values
     });
     let Values::Reals(mut x) = it.get("x").unwrap() else { unreachable!() };
@@ -148,7 +148,7 @@ fn every_size_gives_the_products_of_its_matrices() {
         let (given, counts) = ([("m", &size(m)), ("n", &size(n)), ("r", &size(r))], [m, n, r].map(|n| n as usize));
         let mut it = fmu.instantiate("it", false).unwrap();
         it.configure(&given).unwrap();
-        it.set("x0", &reals(&drawn(counts[1], 9))).unwrap();
+        it.set("x0", reals(&drawn(counts[1], 9))).unwrap();
         begin(&mut it);
         compare(&mut it, 0.0, counts);
         running.configure(&given).unwrap();
@@ -234,7 +234,7 @@ fn arrays_are_connected_whole() {
 fn a_saved_state_has_its_sizes() {
     let mut it = open("state-space").instantiate("it", false).unwrap();
     it.configure(&[("m", &size(3)), ("n", &size(3)), ("r", &size(3))]).unwrap();
-    it.set("x0", &reals(&[1.0, 2.0, 4.0])).unwrap();
+    it.set("x0", reals(&[1.0, 2.0, 4.0])).unwrap();
     it.setup(0.0, None).unwrap();
     it.enter_initialization().unwrap();
     it.exit_initialization().unwrap();
@@ -287,7 +287,7 @@ fn fmi2_has_the_sizes_of_the_start() {
     it.setup(0.0, None).unwrap();
     it.enter_initialization().unwrap();
     assert_eq!(it.get("n").unwrap(), size(3));
-    assert!(it.set("n", &size(2)).is_err());
+    assert!(it.set("n", size(2)).is_err());
 }
 
 #[test]

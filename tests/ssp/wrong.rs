@@ -180,6 +180,7 @@ fn no_message_names_a_thing_twice() {
         (vec!["simulate", &plant, "--connect", "u_dc=u_a"], "is not an output"),
         (vec!["simulate", &plant, "--terminal", "a.b=c.d"], "a.b"),
         (vec!["simulate", &plant, "--parameters", &format!("PmsmPlant={values}")], "values.ssv"),
+        (vec!["simulate", &plant, "--parameters", &values], "values.ssv: line"),
         (vec!["simulate", &nothing], "nothing.fmu"),
         (vec!["simulate", &plain], "plain.fmu"),
         (vec!["simulate", &system, "--record", "speedy"], "speedy"),

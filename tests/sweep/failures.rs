@@ -1,7 +1,7 @@
 //! Bad rows, bad files, crashes, another definition, a full disk: one clear line, and no results are lost.
 
 use crate::{Folder, STARTS, common, ends};
-use fmu::commands::build::{self, Build};
+use fmu::commands::build::{self, Models};
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -87,7 +87,7 @@ fn what_can_be_known_before_the_first_run_is_told_before_it() {
 fn a_row_that_crashes_is_one_row() {
     let folder = Folder::new();
     let out = Some(folder.path("fmu"));
-    let archives = build::run(&Build { package: vec!["faulty-fmu".into()], out, ..Build::default() }).unwrap();
+    let archives = build::models(&Models { package: vec!["faulty-fmu".into()], out, ..Models::default() }).unwrap();
     // n = 1234567 aborts: fmu-export/tests/common/model.rs.
     fs::write(folder.path("rows.csv"), "p.n\n1\n2\n1234567\n3\n4\n5\n1234567\n6\n7\n8\n").unwrap();
     let text = format!(

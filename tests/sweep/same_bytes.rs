@@ -36,7 +36,7 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
     let mut child = start();
     let begun = Instant::now();
     while parts("killed") < 3 {
-        assert!(begun.elapsed() < Duration::from_secs(60) && child.try_wait().unwrap().is_none(), "no parts");
+        assert!(begun.elapsed() < Duration::from_mins(1) && child.try_wait().unwrap().is_none(), "no parts");
         std::thread::sleep(Duration::from_millis(1));
     }
     kill(&mut child);
@@ -57,7 +57,7 @@ fn a_killed_sweep_resumes_to_the_same_bytes() {
             None => kill(&mut child),
         }
         kills += 1;
-        assert!(begun.elapsed() < Duration::from_secs(120), "does not end");
+        assert!(begun.elapsed() < Duration::from_mins(2), "does not end");
     }
     println!("{there} parts at the first kill, {kills} more kills");
     assert_eq!(folder.results("killed"), whole);

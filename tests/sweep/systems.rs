@@ -50,6 +50,21 @@ fn systems_of_several_fmus_and_ssp_files_are_swept() {
     assert!(of_pair.windows(2).any(|w| w[0] != w[1]), "the rows differ: {of_pair:?}");
 }
 
+/// Terms in two units are added unchanged, with a note; a factor says that the user knows.
+#[test]
+fn a_sum_of_two_units_is_noted() {
+    let archive = common::archives().join("fmi2/PmsmDrive.fmu");
+    let notes = |of: &str| {
+        let text = format!("fmus = ['d={}']\n[measure]\nm = {{ of = '{of}', is = 'final' }}\n", archive.display());
+        Plan::new(&Definition::parse(&text).unwrap(), Path::new("")).unwrap().notes().to_vec()
+    };
+    let expected = "measure: m: its terms are in rad/s and A: the numbers are added unchanged";
+    assert_eq!(notes("d.speed - d.i_a"), [expected]);
+    for of in ["d.speed", "d.i_a - d.i_a", "d.speed - 2 * d.i_a"] {
+        assert_eq!(notes(of), [""; 0], "{of}");
+    }
+}
+
 /// Enumerations have their names in the results, in measures of their values and in traces; a list of names runs again.
 #[test]
 fn enumerations_keep_their_names() {

@@ -5,9 +5,9 @@ use drive_tools::error::{Result, bail};
 /// The course of a run: the scenario of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Course {
-    /// The load arrives at the speed.
+    /// The load is applied once the speed is reached.
     Load,
-    /// The speed reference comes under load.
+    /// The speed reference changes under load.
     Speed,
     /// `Load`; then the resistance rises by 40 % within 10 s.
     Heating,

@@ -66,7 +66,7 @@ impl Table {
     }
 }
 
-/// Number of lost runs: of all, and of those with R^ within 20 % of R and psi^ within 5 % of psi.
+/// Number of lost runs: among all, and among those with R^ within 20 % of R and psi^ within 5 % of psi.
 fn lost<'a>(runs: impl Iterator<Item = &'a (Cell, Verdict)>) -> [String; 2] {
     let (mut all, mut near) = ([0_u32; 2], [0_u32; 2]);
     for (cell, verdict) in runs {

@@ -90,7 +90,7 @@ impl Loss {
 pub struct Verdict {
     /// Kind and time (s) of the loss: the first time out of tolerance within the evaluated span.
     pub lost: Option<(Loss, f64)>,
-    /// Maximum `lock_lost` from the loss to 1 s later, or of the whole run if the cell is held.
+    /// Maximum `lock_lost` from the loss to 1 s later, or over the whole run if the cell is held.
     pub lock_lost: f64,
     /// Maximum `lock_lost` of a held cell while the drive has been within its tolerance for 1 s.
     pub while_held: f64,

@@ -27,7 +27,7 @@ pub fn page(cells: &[Run], plots: &[Plot]) -> Result<String> {
          text: <a href=\"compare.md\">compare.md</a>.</p>\n<nav>\n",
         escape(table::verdict(cells).trim_end()),
         escape(table::MACHINES),
-        escape(&table::starts(cells))
+        escape(&table::starts_of(cells))
     );
     let blocks = table::blocks(cells);
     for (k, block) in blocks.iter().enumerate() {
@@ -69,7 +69,7 @@ pub fn machine_page(compared: &OnMachine, plots: &[Plot]) -> Result<String> {
         "<p>{}</p>\n<p>{}</p>\n<p>Every number: <a href=\"compare.csv\">compare.csv</a>; the tables as text: <a \
          href=\"compare.md\">compare.md</a>.</p>\n",
         escape(&compared.machine),
-        escape(&table::starts(&compared.runs))
+        escape(&compared.starts)
     );
     if !compared.refused.is_empty() {
         html.push_str("<h2>Methods that the machine does not suit</h2>\n<ul class=\"notes\">\n");

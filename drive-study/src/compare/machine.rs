@@ -4,7 +4,9 @@ use super::candidate::Entry;
 use super::measure::{Effort, Outcome};
 use super::run::Run;
 use super::scenario::{Scenario, ScenarioRun};
+use super::table;
 use super::trials::running;
+use drive::control::start::StartMode;
 use drive::estimator::Kind;
 use drive_tools::error::Result;
 use drive_tools::queue;
@@ -19,6 +21,8 @@ use std::time::Instant;
 pub struct OnMachine {
     /// Name and ratings of the machine, a sentence.
     pub machine: String,
+    /// How its drives start, a sentence.
+    pub starts: String,
     /// The runs of the estimators that the machine suits.
     pub runs: Vec<Run>,
     /// The others.
@@ -53,7 +57,18 @@ pub fn on_machine(
         Run { entry: Entry::on_machine(one.estimator), scenario, outcome }
     });
     let nanoseconds = tuned.iter().filter_map(|one| Some((one.estimator, sample_time(one)?))).collect();
-    Ok(OnMachine { machine: sentence(motor), runs, refused, nanoseconds })
+    let starts = table::starts(tuned.iter().map(|one| (one.estimator.name(), way(one))));
+    Ok(OnMachine { machine: sentence(motor), starts, runs, refused, nanoseconds })
+}
+
+/// How a drive starts, in words.
+fn way(tuned: &Tuned) -> &'static str {
+    match tuned.pair().controller.model.parameters.start.mode {
+        StartMode::Direct if tuned.estimator == Kind::Sensored => table::SENSOR,
+        StartMode::Direct => table::ITSELF,
+        StartMode::CurrentFrequency => table::I_F,
+        StartMode::Injection => table::INJECTION,
+    }
 }
 
 /// Time in ns of a sample of the turning drive's controller: the shortest of five rounds.

@@ -54,7 +54,7 @@ pub fn write_machine(compared: &OnMachine, out: &Path) -> Result<()> {
         + &reasons(|u| format!("{},,,,,,\"refused: {}\",\n", u.estimator.name(), u.reason.replace('"', "'")));
     let refused = reasons(|u| format!("- {}: {}\n", u.estimator.name(), u.reason));
     let heading = if refused.is_empty() { "" } else { "Methods that the machine does not suit:" };
-    let words = [&compared.machine, &table::starts(cells), heading, &refused];
+    let words = [&compared.machine, &compared.starts, heading, &refused];
     let texts = [
         csv,
         machine_text(compared),

@@ -183,17 +183,29 @@ pub const MACHINES: &str = "All on the 2.2 kW machine with interior magnets (R 3
      on its own reference motor (assumed; 1 pu = 1500 rpm and 2 N.m) with R^ = 0.9 R and without noise. \
      Angle errors are theta - theta^: positive where the rotor is ahead of the estimate.";
 
-/// How the estimators start, in words.
-pub fn starts(cells: &[Run]) -> String {
-    let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
-    for cell in cells {
+/// Ways of starting, in words.
+pub(super) const ITSELF: &str = "by itself, from any angle";
+pub(super) const I_F: &str = "I-f start";
+pub(super) const INJECTION: &str = "initial position by injection, polarity by voltage pulses";
+pub(super) const SENSOR: &str = "by its sensor";
+
+/// How the estimators of the review start, in words.
+pub fn starts_of(cells: &[Run]) -> String {
+    starts(cells.iter().map(|cell| {
         let way = match cell.entry.kind.class() {
-            Class::FluxObserver => "by itself, from any angle",
-            Class::BackEmf => "I-f start",
-            Class::Injection | Class::Hybrid => "initial position by injection, polarity by voltage pulses",
-            Class::Sensored => "by its sensor",
+            Class::FluxObserver => ITSELF,
+            Class::BackEmf => I_F,
+            Class::Injection | Class::Hybrid => INJECTION,
+            Class::Sensored => SENSOR,
         };
-        let name = cell.entry.name;
+        (cell.entry.name, way)
+    }))
+}
+
+/// How estimators start, from the name and the way of each, in words.
+pub(super) fn starts<'a>(each: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+    let mut ways: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, way) in each {
         match ways.iter_mut().find(|(w, _)| *w == way) {
             Some((_, names)) if names.contains(&name) => {}
             Some((_, names)) => names.push(name),
@@ -207,7 +219,7 @@ pub fn starts(cells: &[Run]) -> String {
 /// The tables in Markdown.
 pub fn markdown(cells: &[Run]) -> String {
     let marks = "✓: inside the tolerance of its expected figure; ✗: outside; no mark: no expected figure.";
-    let words = [MACHINES, &starts(cells), marks];
+    let words = [MACHINES, &starts_of(cells), marks];
     format!("{}## Verdict\n\n{}\n", markdown_under("Estimators compared", &words, cells), verdict(cells))
 }
 

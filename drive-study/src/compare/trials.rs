@@ -8,6 +8,7 @@ use super::measure::{Effort, Follow, Measure, Outcome};
 use super::scenario::{Scenario, ScenarioRun};
 use crate::runner::{self, Moment, Statistics, line};
 use drive::Pair;
+use drive::control::start::StartMode;
 use drive::math::wrap;
 use drive_tools::tune::pace::{Begin, Pace};
 use drive_tools::tune::setting::Tuned;
@@ -77,7 +78,7 @@ fn motor(pair: &mut Pair) -> &mut drive::motor::Motor {
     &mut pair.controller.model.parameters.motor
 }
 
-/// Half the rated speed, or the highest of the method.
+/// Half the rated speed, or the method's highest speed if that is lower.
 fn level(tuned: &Tuned) -> f64 {
     tuned.levels.iter().fold(0.0, |a: f64, &b| a.max(b)).min(0.5)
 }
@@ -166,8 +167,11 @@ impl<'a> Rig<'a> {
                 return Follow::default();
             }
         }
-        let seconds = ready + HORIZON * self.slowest(reference, 0.0);
-        self.stay(seconds, reference, 0.0)
+        // The start itself takes `ready`, and only what follows is its end.
+        if !self.run(ready, |_| reference, |_| 0.0, |_| ()) {
+            return Follow::default();
+        }
+        self.stay(HORIZON * self.slowest(reference, 0.0), reference, 0.0)
     }
 }
 
@@ -191,7 +195,7 @@ fn start(tuned: &Tuned, effort: Effort) -> Result<Outcome, Fault> {
     let measures = vec![
         Measure::new("speed", "pu", level(tuned)),
         Measure::new("failed starts", "of 12", failed),
-        Measure::new("peak angle error", "deg", peak),
+        Measure::new("peak angle error", "deg", if failed < f64::from(count) { peak } else { f64::INFINITY }),
     ];
     Ok(Outcome::Measured(measures, None))
 }
@@ -205,7 +209,8 @@ fn course(
 ) -> Result<Outcome, Fault> {
     let mut rig = Rig::new(tuned, |_| ())?;
     let mut follow = Follow::default();
-    let mut ran = rig.start(from).holds();
+    let started = rig.start(from).holds();
+    let mut ran = started;
     let begin = rig.now();
     let (mut changed, mut end) = (0.0, Follow::default());
     if ran {
@@ -235,7 +240,7 @@ fn course(
             m.value = f64::INFINITY;
         }
     }
-    Ok(Outcome::Measured(measures, Some(follow.into_trace(held))))
+    Ok(Outcome::Measured(measures, started.then(|| follow.into_trace(held))))
 }
 
 fn load_step(tuned: &Tuned) -> Result<Outcome, Fault> {
@@ -303,11 +308,21 @@ fn lowest(tuned: &Tuned, effort: Effort, change: fn(&mut Pair)) -> Result<Outcom
     Ok(Outcome::Measured(vec![Measure::new("held down to", "pu", lowest)], None))
 }
 
+/// The drive at rest with its signal alone: the estimate begins at the rotor's angle, instead of an I-f start whose current would
+/// be counted as the carrier's.
+fn standing(pair: &mut Pair) {
+    let par = &mut pair.controller.model.parameters;
+    if par.start.mode == StartMode::CurrentFrequency {
+        par.start.mode = StartMode::Direct;
+        par.theta_est = pair.plant.model.parameters.initial.theta_e;
+    }
+}
+
 fn cost(tuned: &Tuned) -> Result<Outcome, Fault> {
     let injects = tuned.estimator.class().injects();
     let (mut share, mut rms) = (0.0_f64, 0.0);
     if injects {
-        let mut rig = Rig::new(tuned, |_| ())?;
+        let mut rig = Rig::new(tuned, standing)?;
         let limit = rig.u_dc / 3.0_f64.sqrt();
         rig.run(
             0.4,
@@ -320,7 +335,9 @@ fn cost(tuned: &Tuned) -> Result<Outcome, Fault> {
                 }
             },
         );
-        rms = runner::injected_current(tuned.pair());
+        let mut pair = tuned.pair();
+        standing(&mut pair);
+        rms = runner::injected_current(pair);
     }
     let mut ripple = Statistics::default();
     let mut rig = Rig::new(tuned, |_| ())?;
@@ -332,6 +349,8 @@ fn cost(tuned: &Tuned) -> Result<Outcome, Fault> {
         held = held && rig.run(0.2, |_| slow, |_| 1.0, &mut see);
     }
     let R_s = rig.pair.plant.model.parameters.motor.R_s;
+    // A lost drive swings with its limits.
+    let (share, rms) = if share <= 1.0 { (share, rms) } else { (f64::INFINITY, f64::INFINITY) };
     let measures = vec![
         Measure::new("carrier current (rms)", "A", rms),
         Measure::new("copper loss", "W", 1.5 * R_s * rms * rms),

@@ -6,8 +6,8 @@ use std::ops::Range;
 /// Maximum half-width in s of the parabola around a row: a torque change inside it bends the parabola.
 const REACH: f64 = 4e-3;
 
-/// Noise of the angle in rad above which it hides that. Noise falls with the root of the time, the error of a bend grows with its
-/// square, so the best time decreases with the noise to the power 0.4.
+/// Noise of the angle in rad that hides such a change. Noise falls with the root of the time, the error of a bend grows with
+/// its square, so the best time decreases with the noise to the power 0.4.
 const NOISE: f64 = 1e-3;
 
 /// Angle and speed. Rows near the end of a stretch have no parabola and belong to no stretch here.

@@ -36,7 +36,7 @@ pub struct Options {
     pub zero: Option<(f64, f64)>,
     /// Column of the load torque, `tau_load` or `tau_shaft`; `none` for a free shaft; the existing column if `None`.
     pub load: Option<String>,
-    /// Values that a commissioning does not tell, by their names in a motor file.
+    /// Values that a commissioning run does not provide, by their names in a motor file.
     pub given: Vec<(String, f64)>,
 }
 
@@ -212,7 +212,7 @@ fn noise(i: &[Complex], theta: &[f64], runs: &[Range<usize>], turning: bool) -> 
     (squares / (20.0 * count.max(1.0))).sqrt()
 }
 
-/// Mean of some values; 0 for none.
+/// Mean of some values; 0 if there are none.
 pub fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len().max(1) as f64
 }

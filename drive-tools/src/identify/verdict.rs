@@ -7,8 +7,8 @@ use super::record::{BenchRecord, Complex, quantile};
 use super::windows::{Problem, Timing};
 use serde::Serialize;
 
-/// Maximum R T/L of a step, and of a step that is a sample of the controller: within a sample the voltage is constant and the
-/// current's course is known.
+/// Maximum R T/L for a step, and for a step that equals a sample of the controller: within a sample the voltage is constant and
+/// the current's course is known.
 const DECAY: (f64, f64) = (0.2, 0.35);
 
 /// A quantity of the machine.

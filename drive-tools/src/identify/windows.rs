@@ -147,7 +147,7 @@ impl<'a> Problem<'a> {
                 let width = if half.abs() < 1e-4 { 1.0 } else { half.sin() / half };
                 u[row] * Complex::cis(-frame(row, shift)) * width
             };
-            // Mean over the step of the line through the vectors, which are `shift` later than the rows.
+            // Mean over a step of the straight line through the vectors, which lie `shift` after the rows.
             let late = shift / T;
             let back = late.floor() as usize;
             let part = late - late.floor();

@@ -56,7 +56,7 @@ pub struct Map {
     pub axes: Axes,
     /// The points of each voltage and temperature.
     pub sheets: Vec<Sheet>,
-    /// The sheet of the picture, of the motor file's voltage if that is among them.
+    /// The sheet of the picture: the one at the motor file's voltage, if the map has it.
     pub shown: usize,
     /// The comparison with the running drive.
     pub verified: Verified,
@@ -180,7 +180,7 @@ fn top(motor: &MotorFile, drive: &Steady, u_dc: &[f64], T: &[f64]) -> f64 {
 fn notes(drive: &Steady, T: &[f64]) -> Vec<String> {
     let mut notes = Vec::new();
     for (table, loss) in missing(drive) {
-        notes.push(format!("the motor file has no {table}: the map counts no loss of the {loss}"));
+        notes.push(format!("the motor file has no {table}: the map omits the losses of the {loss}"));
     }
     let thermal = &drive.plant.thermal;
     if thermal.alpha_R == 0.0 && thermal.alpha_psi == 0.0 && T.iter().any(|T| T.to_bits() != 20.0_f64.to_bits()) {
@@ -229,8 +229,8 @@ impl Map {
         at.by_shaft(torque)
     }
 
-    /// The energy of a cycle under the condition of a sheet: of the drive itself, and read from the map. If the drive cannot
-    /// brake hard enough, the wheel brakes supply the rest.
+    /// The energy of a cycle under the condition of a sheet: computed with the drive itself, and read from the map. If the
+    /// drive cannot brake hard enough, the wheel brakes supply the rest.
     ///
     /// # Errors
     /// The first speed (rad/s) and torque (N.m) that are out of reach.

@@ -32,7 +32,7 @@ fn row(cells: impl IntoIterator<Item = impl ToString>) -> Vec<String> {
     cells.into_iter().map(|cell| cell.to_string()).collect()
 }
 
-/// The tables of a map, and of a requested cycle (`asked`), or of the example if the drive can follow it.
+/// The tables of a map and of its cycle: the requested one (`asked`), or the example if the drive can follow it.
 pub fn of(map: &Map, cycle: &Cycle, asked: bool) -> Report {
     let heads = |first: &[&str]| row(first.iter().chain(&LOSSES.map(|name| name)).copied());
     let mut best = vec![row(["condition", "speed in rpm", "torque in N.m", "p_mech in W", "efficiency in %"])];

@@ -47,7 +47,7 @@ fn cell(axis: &[f64], x: f64) -> Option<(usize, f64)> {
 }
 
 impl<'a> Table<'a> {
-    /// A sheet on its axes, of a drive with this plant.
+    /// A sheet on its axes, for a drive with this plant.
     pub fn new(axes: &'a Axes, sheet: &'a Sheet, plant: &'a PlantParameters) -> Self {
         Self { axes, sheet, plant }
     }

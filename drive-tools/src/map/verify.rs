@@ -142,7 +142,7 @@ fn compare(drive: &Steady, sheet: &Sheet, speed: f64, point: &Point) -> Result<D
     Ok(found)
 }
 
-/// Means of the power from the link and of the losses of the running drive.
+/// Mean power from the link and mean losses of the running drive.
 fn run(drive: &Steady, sheet: &Sheet, speed: f64, tau_ref: f64) -> Result<(f64, Losses)> {
     let mut block = Block::<PmsmDrive>::default();
     let pair = &mut block.model.pair;

@@ -15,8 +15,11 @@
 //! A load step at low speed reverses the rotor: `emf.hold_reversal` keeps the direction below 0.08 of the rated speed.
 
 use super::bandwidth::{Bandwidths, EMF_PER_TRACKER};
-use super::motor::{Data, torque_constant};
+use super::motor::{Data, MotorFile, electrical, torque_constant};
 use super::setting::{LEVELS, Setting, Value, real, set};
+use crate::error::{Result, bail};
+use drive::control::reference::max_torque_per_ampere;
+use drive::estimator::Kind;
 use drive::estimator::kalman::KalmanParameters;
 use std::f64::consts::TAU;
 
@@ -24,6 +27,9 @@ use std::f64::consts::TAU;
 const SLOWER: f64 = 0.75;
 /// Speed filter of voltage and current model in units of the target.
 const FILTER: f64 = 2.5;
+/// Maximum action of the saliency on the angle of voltage and current model, in units of the angle gain: 0.8 of `compressor-1kw`
+/// and `ipmsm-2.2kw` holds, 4.5 of `traction-80kw` does not.
+const MOST_TURN: f64 = 3.0;
 /// Smoothing of VoltageFeedback in units of its tracker.
 const SMOOTHING: f64 = 20.0;
 /// Rated EMF in V of the review's machine, and its target in rad/s.
@@ -115,14 +121,32 @@ pub fn voltage_feedback(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
     all
 }
 
-/// Voltage model and current model.
-pub fn model(data: &Data, bandwidths: &Bandwidths) -> Vec<Setting> {
-    let rho = bandwidths.observer.value;
-    vec![
-        real("matsui.bandwidth", SLOWER * rho, "0.75 of bandwidth.observer"),
+/// Voltage model and current model. Their q row turns an angle error theta~ into a speed error of n_p w (L_q - L_d) i_q theta~ / psi_M,
+/// in one direction of the torque away from the rotor; the d row corrects it with the gain `matsui.bandwidth`.
+///
+/// # Errors
+/// The saliency acts more than 3 times as much as the correction, at the rated speed and torque.
+pub fn model(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths) -> Result<Vec<Setting>> {
+    let data = &motor.data;
+    let (rho, machine) = (bandwidths.observer.value, electrical(data));
+    let i_q = max_torque_per_ampere(&machine, *data.rating.torque.get_ref()).q();
+    let turns = rated(data) * (machine.L_q - machine.L_d).abs() * i_q / machine.psi_M;
+    let gain = SLOWER * rho;
+    if turns > MOST_TURN * gain {
+        bail!(
+            "{}: {} takes the speed from the magnet's EMF alone: at the rated speed and torque, the saliency turns an angle error into a \
+             speed error of n_p w |L_q - L_d| i_q / psi_M = {turns:.0} rad/s per rad, {:.1} times the gain {gain:.0} rad/s that \
+             corrects it, and {MOST_TURN} times are held: choose ExtendedEmf, or a lower rating.speed",
+            motor.place(&data.machine.L_q),
+            estimator.name(),
+            turns / gain
+        );
+    }
+    Ok(vec![
+        real("matsui.bandwidth", gain, "0.75 of bandwidth.observer"),
         real("matsui.filter", FILTER * rho, "2.5 times bandwidth.observer"),
         sign(data),
-    ]
+    ])
 }
 
 /// The Kalman filter.

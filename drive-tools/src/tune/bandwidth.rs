@@ -9,9 +9,16 @@
 //! - Speed: a step of the torque T makes the speed dip by 2/e T / (J w_s), with a double pole at w_s / 2. The dip should be at
 //!   most 0.05 pu; w_s is at least 40 rad/s (flux observers) or 2 pi 5 rad/s, at most a third of the observer, which rises for it up
 //!   to a limit, or a fifth of the current loop (Sensored); with a back EMF, less where the gain through the change of i_q would be high
-//!   ([`limits`](super::limits)).
-//! - Current: 2 pi 250 rad/s (flux observers); 2 pi 200 rad/s for all others, and 2/3 of the stable limit at most.
+//!   ([`limits`](super::limits)). The hybrid has a third of that gain, and meets it with less bandwidth of the EMF as well.
+//! - Current: 2 pi 250 rad/s (flux observers); 2 pi 200 rad/s for all others, and at most half of what is stable with the estimate 90 deg
+//!   off, as in a reversal, where an estimator is without EMF for a moment. At standstill, the current through the plant's iron answers
+//!   to the voltage at once, so with the gain K of the loop, K (T_s / L_q + G) is at most half, too. With an injection, the limit is a
+//!   third: the mean over the carrier's period delays the current, and the loop answers to the carrier's current, too. VoltageFeedback
+//!   reads the integrators of the current loop, whose slow pole turns at about -K_i / (L (w_c + j w)): at speeds above w_c it lags
+//!   behind the tracker, and the drive swings. Its w_c is at least the highest electrical speed, with a gain w_c L T_s of at most 1/3
+//!   of the least inductance.
 
+use super::iron;
 use super::motor::{Data, Located, torque_constant};
 use super::setting::{LEVELS, Setting, Value};
 use drive::estimator::{Class, Kind};
@@ -29,6 +36,12 @@ const DIP: f64 = 0.05;
 
 /// Gain of the speed loop through the EMF caused by a change of i_q, see [`limits`](super::limits): the limit of the rules.
 const CALM: f64 = 0.6 * GREATEST_GAIN;
+
+/// [`CALM`] for the hybrid, which changes over to the EMF at low speed.
+const CALM_HYBRID: f64 = 0.2 * GREATEST_GAIN;
+
+/// Maximum product of the gain of VoltageFeedback's current loop and T_s / L.
+const FEEDBACK_GAIN: f64 = 1.0 / 3.0;
 
 /// Minimum ratio of the current loop's bandwidth to that of the speed loop, with a sensor.
 const CURRENT_PER_SPEED: f64 = 5.0;
@@ -103,13 +116,40 @@ impl Bandwidths {
         let current = if flux {
             Chosen::new(given.current.as_ref(), "250 Hz", || TAU * 250.0)
         } else {
-            Chosen::new(given.current.as_ref(), "200 Hz, 2/3 of the stable limit at most", || {
-                let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
-                let stable = (0.5 * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
-                if sensored { TAU * 200.0 } else { (TAU * 200.0).min(stable / 1.5) }
-            })
+            let (L_d, L_q) = (*machine.L_d.get_ref(), *machine.L_q.get_ref());
+            let injects = class.injects();
+            let stable = (MARGIN * L_d.min(L_q) / T_s.value + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
+            let stable = if injects { CARRIER / MARGIN * stable } else { stable };
+            // The estimate is right, and the rotor at rest: the iron's current answers to the voltage at once.
+            let of_iron = iron::at_standstill(data);
+            let iron =
+                (MARGIN / (T_s.value / L_d.max(L_q) + of_iron) + 0.9 * machine.R_s.get_ref()) / (2.0 * L_d.max(L_q));
+            let iron = if of_iron > 0.0 { iron } else { f64::INFINITY };
+            let usual = if sensored { TAU * 200.0 } else { (TAU * 200.0).min(stable) }.min(iron);
+            // Without active resistance.
+            let fastest = FEEDBACK_GAIN * L_d.min(L_q) / (L_d.max(L_q) * T_s.value);
+            let reads = (n_p * data.rating.top()).min(fastest);
+            if estimator == Kind::VoltageFeedback && reads > usual {
+                let rule =
+                    "the highest electrical speed: the estimate lags with the integrators; gain T_s / L of 1/3 at most";
+                Chosen::new(given.current.as_ref(), rule, || reads)
+            } else {
+                let rule = if usual >= iron {
+                    "200 Hz, at most half of the stable limit with the iron's current at standstill"
+                } else if injects {
+                    "200 Hz, at most 1/3 of the stable limit with the estimate 90 deg off: the current without the carrier is late"
+                } else {
+                    "200 Hz, at most half of the stable limit with the estimate 90 deg off"
+                };
+                Chosen::new(given.current.as_ref(), rule, || usual)
+            }
         };
-        let calm = if emf { CALM / gain_per_bandwidth(data, observer.value) } else { f64::INFINITY };
+        let calm = match class {
+            // With a third of the EMF's bandwidth, which the gain limits as well: see `by_emf`.
+            Class::Hybrid => (CALM_HYBRID / (9.0 * gain_per_bandwidth(data, 1.0))).cbrt(),
+            _ if emf => CALM / gain_per_bandwidth(data, observer.value),
+            _ => f64::INFINITY,
+        };
         let most = if sensored { current.value / CURRENT_PER_SPEED } else { observer.value / 3.0 };
         let chosen = wanted.min(most).min(calm);
         let why = if chosen < wanted.min(most) {
@@ -126,7 +166,20 @@ impl Bandwidths {
         let speed = Chosen::new(given.speed.as_ref(), &rule, || chosen);
         Self { T_s, current, speed, observer }
     }
+
+    /// Bandwidth in rad/s of the hybrid where it uses the EMF.
+    pub fn by_emf(&self, data: &Data) -> f64 {
+        self.observer.value.min((CALM_HYBRID / (gain_per_bandwidth(data, 1.0) * self.speed.value)).sqrt())
+    }
 }
+
+/// Maximum product of the current loop's gain and T_s / L where the estimate is 90 deg off and the gain for the larger inductance acts on
+/// the lower one: half of the value at which the loop oscillates.
+const MARGIN: f64 = 0.5;
+
+/// [`MARGIN`] with an injection: the mean over the carrier's period delays the current, and with one of three samples the loop oscillates
+/// at 0.71.
+const CARRIER: f64 = 1.0 / 3.0;
 
 /// Dip of the speed loop under a step of the torque T, in units of T / (J w_s): a double pole at w_s / 2.
 pub const DIP_OF_A_STEP: f64 = 2.0 / E;

@@ -4,16 +4,23 @@ use super::motor::MotorFile;
 use super::setting::{Setting, Value};
 use crate::error::{Error, Result, bail};
 use drive::{PmsmPlant, SensorlessController};
-use fmu_core::Description;
-use fmu_core::description::VariableKind;
+use fmu_core::description::{Dependencies, VariableKind};
+use fmu_core::{Block, Description, Plain, Stored};
+
+/// The variables of a model, without their dependencies: to find those takes longer than to tune.
+///
+/// # Errors
+/// The model cannot be described.
+pub fn variables<M: Stored>() -> Result<Description> {
+    Description::instantiated::<Plain<M>>(Block::default(), Dependencies::Omitted).map_err(Error::new)
+}
 
 /// Checks both lists against the descriptions of the models.
 ///
 /// # Errors
 /// States the variable and the position of its value in the machine file.
 pub fn check(plant_settings: &[Setting], controller_settings: &[Setting], motor: &MotorFile) -> Result<()> {
-    let plant = Description::of::<PmsmPlant>().map_err(Error::new)?;
-    let controller = Description::of::<SensorlessController>().map_err(Error::new)?;
+    let (plant, controller) = (variables::<PmsmPlant>()?, variables::<SensorlessController>()?);
     for (description, settings) in [(&plant, plant_settings), (&controller, controller_settings)] {
         for setting in settings {
             one(description, setting).map_err(|what| match setting.origin {

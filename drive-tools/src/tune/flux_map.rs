@@ -1,4 +1,5 @@
-//! A flux map from a table of finite elements or of a bench: the energy whose gradient comes closest to the currents.
+//! A flux map from a table that a finite-element program or a test bench gives: the energy whose gradient comes closest to the
+//! currents.
 //!
 //! The table has the columns `i_d,i_q,psi_d,psi_q` and may have `torque`; peak values, in any order, scattered or on a grid. The
 //! current of [`FluxMap`] is linear in its coefficients, so the fit is linear least squares of the currents at the flux

@@ -5,7 +5,7 @@
 //! sqrt(w^2 + w_0^2). So p / (1.5 psi_M^2) is linear in G_e and G_h: linear least squares. A coefficient that would be negative
 //! is set to 0, and only the other one is fitted.
 
-use super::motor::MotorFile;
+use super::motor::{Data, MotorFile};
 use super::setting::{Setting, Value};
 use crate::error::{Result, bail};
 use drive::plant::iron::Iron;
@@ -34,15 +34,29 @@ pub fn fit(motor: &MotorFile) -> Result<Vec<Setting>> {
             "{place}: eddy currents and hysteresis differ by their dependence on speed: give pairs for at least two speeds, preferably in the ratio 1 to 3"
         );
     }
+    let Iron { G_e, G_h, w_0 } = coefficients(&motor.data).unwrap_or_default();
+    let lost = |speed: f64| {
+        let w = n_p * speed;
+        1.5 * psi_M * psi_M * (G_e * w * w + G_h * w * w / w.hypot(w_0))
+    };
+    let worst = points.iter().map(|&[speed, p]| (lost(speed) - p).abs()).fold(0.0, f64::max);
+    let rule = format!("least squares of the drag test, within {worst:.2} W");
+    let setting =
+        |name, x| Setting { name, value: Value::Real(x), rule: rule.clone(), origin: Some(iron.p.span().start) };
+    Ok(vec![setting("iron.G_e", G_e), setting("iron.G_h", G_h)])
+}
+
+/// The coefficients of the drag test, if there is one.
+#[expect(non_snake_case, reason = "the symbols of the model")]
+fn coefficients(data: &Data) -> Option<Iron> {
+    let points = data.iron.as_ref()?.p.get_ref();
+    let (n_p, psi_M) = (f64::from(*data.machine.n_p.get_ref()), data.machine.psi_M.get_ref());
     let w_0 = Iron::default().w_0;
     // Normal equations of y = G_e a + G_h b.
     let (mut aa, mut ab, mut bb, mut ay, mut by) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    let of = |speed: f64| {
-        let w = n_p * speed;
-        (w * w, w * w / w.hypot(w_0))
-    };
     for &[speed, p] in points {
-        let ((a, b), y) = (of(speed), p / (1.5 * psi_M * psi_M));
+        let w = n_p * speed;
+        let ((a, b), y) = ((w * w, w * w / w.hypot(w_0)), p / (1.5 * psi_M * psi_M));
         (aa, ab, bb, ay, by) = (aa + a * a, ab + a * b, bb + b * b, ay + a * y, by + b * y);
     }
     let determinant = aa * bb - ab * ab;
@@ -51,15 +65,12 @@ pub fn fit(motor: &MotorFile) -> Result<Vec<Setting>> {
         (_, G_h) if G_h < 0.0 => (ay / aa, 0.0),
         both => both,
     };
-    let lost = |speed: f64| {
-        let (a, b) = of(speed);
-        1.5 * psi_M * psi_M * (G_e * a + G_h * b)
-    };
-    let worst = points.iter().map(|&[speed, p]| (lost(speed) - p).abs()).fold(0.0, f64::max);
-    let rule = format!("least squares of the drag test, within {worst:.2} W");
-    let setting =
-        |name, x| Setting { name, value: Value::Real(x), rule: rule.clone(), origin: Some(iron.p.span().start) };
-    Ok(vec![setting("iron.G_e", G_e), setting("iron.G_h", G_h)])
+    Some(Iron { G_e, G_h, w_0 })
+}
+
+/// Conductance of the iron in S at standstill, where it is largest; 0 without a drag test.
+pub fn at_standstill(data: &Data) -> f64 {
+    coefficients(data).map_or(0.0, |iron| iron.conductance(0.0)).max(0.0)
 }
 
 #[cfg(test)]

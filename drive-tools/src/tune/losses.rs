@@ -1,14 +1,17 @@
 //! Losses of the inverter and temperature coefficients: values from the file, only for the plant, and the dead time, which the
 //! controller compensates.
 
-use super::motor::{Inverter, Located, MotorFile};
-use super::setting::{Setting, Value, given, real};
+use super::motor::{Inverter, Located, MotorFile, electrical};
+use super::setting::{LEVELS, Setting, Value, given, real};
 use crate::error::{Result, bail};
 use drive::estimator::Kind;
 
 /// Current below which the dead-time voltage falls to zero where the file gives none, over the maximum current: about the middle of
 /// the 0.5 % to 4 % from which the machines of `tests/population` are drawn; there is no external source.
 const ZERO: f64 = 0.02;
+
+/// Share of the EMF at the lowest speed of the trials above which every method compensates the thresholds.
+const THRESHOLD: f64 = 0.1;
 
 /// The settings of `[inverter]` and `[temperature]`, if the file has any. `T_s` is the sample period in s.
 ///
@@ -67,17 +70,25 @@ pub fn settings(motor: &MotorFile, T_s: f64) -> Result<Vec<Setting>> {
 
 /// The settings of the controller's dead-time compensation; none where the file has no voltage that a leg loses. Near standstill, a leg
 /// conducts for half of the time through a transistor and for half through a diode, and loses the mean of their thresholds in
-/// addition: Rasmussen's observer would take it for R i, swing with it at higher speeds, and adapt R^ to it.
+/// addition: Rasmussen's observer would take it for R i, swing with it at higher speeds, and adapt R^ to it. The other methods take it
+/// for EMF, which matters where it is more than a tenth of the EMF at the lowest speed of the trials.
 pub fn compensation(motor: &MotorFile, estimator: Kind) -> Vec<Setting> {
     let Some(Inverter { u_dead, u_transistor, u_diode, .. }) = &motor.data.inverter else { return Vec::new() };
     let part = |x: &Option<Located>| x.as_ref().map_or(0.0, |x| *x.get_ref());
-    let threshold = if estimator == Kind::Rasmussen { 0.5 * (part(u_transistor) + part(u_diode)) } else { 0.0 };
+    let mean = 0.5 * (part(u_transistor) + part(u_diode));
+    let threshold = if estimator == Kind::Rasmussen || mean > THRESHOLD * slow_emf(motor) { mean } else { 0.0 };
     let lost = match u_dead {
         Some(u_dead) if threshold == 0.0 => given("compensation.u_dead", u_dead),
         None if threshold == 0.0 => return Vec::new(),
         _ => real("compensation.u_dead", part(u_dead) + threshold, "u_dead, and the mean of u_transistor and u_diode"),
     };
     std::iter::once(lost).chain(zero("compensation.i_zero", motor)).collect()
+}
+
+/// EMF in V at the lowest speed of the trials.
+fn slow_emf(motor: &MotorFile) -> f64 {
+    let machine = electrical(&motor.data);
+    LEVELS[0] * f64::from(machine.n_p) * motor.data.rating.speed.get_ref() * machine.psi_M
 }
 
 /// The setting `name` of the current below which the dead-time voltage falls to zero: as given, or by rule where the file has a
@@ -99,7 +110,8 @@ mod tests {
         Ok(settings(&motor, 5e-5)?.into_iter().map(|s| (s.name, s.value)).collect())
     }
 
-    /// The mean of the thresholds joins the dead time, for Rasmussen's observer alone.
+    /// The mean of the thresholds joins the dead time, for Rasmussen's observer alone where the EMF at 0.1 pu, here 25.7 V, is large
+    /// beside it.
     #[test]
     fn the_thresholds_are_compensated() {
         let of = |text: &str, kind| {
@@ -112,6 +124,8 @@ mod tests {
         assert_eq!(of(both, Kind::Rasmussen), [u_dead(0.6)]);
         assert_eq!(of(&format!("{both}\nu_dead = 5.4"), Kind::Rasmussen)[0], u_dead(6.0));
         assert!(of(both, Kind::ExtendedEmf).is_empty() && of("r_diode = 0.1", Kind::Rasmussen).is_empty());
+        assert!(of("u_diode = 5.0", Kind::ExtendedEmf).is_empty());
+        assert_eq!(of("u_diode = 5.4", Kind::ExtendedEmf), [u_dead(2.7)]);
     }
 
     #[test]

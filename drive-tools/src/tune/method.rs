@@ -25,7 +25,7 @@ pub fn settings(
         let mut all = loops::settings(data, active);
         all.push(loops::limit(data));
         all.extend(own);
-        all.extend(loops::start(data, handed_over(data), notes));
+        all.extend(loops::start(data, handed_over(data), false, notes));
         Ok(all)
     };
     match estimator {
@@ -36,13 +36,13 @@ pub fn settings(
         }
         Kind::SlidingMode => by_emf(true, back_emf::sliding_mode(data, bandwidths), notes),
         Kind::VoltageFeedback => by_emf(false, back_emf::voltage_feedback(data, bandwidths), notes),
-        Kind::VoltageModel | Kind::CurrentModel => by_emf(true, back_emf::model(data, bandwidths), notes),
+        Kind::VoltageModel | Kind::CurrentModel => by_emf(true, back_emf::model(motor, estimator, bandwidths)?, notes),
         Kind::KalmanFilter => by_emf(true, back_emf::kalman(data, bandwidths), notes),
         Kind::GradientObserver => by_emf(true, back_emf::gradient(data, bandwidths), notes),
-        Kind::RotatingInjection => injection::settings(motor, bandwidths, injection::rotating, notes),
-        Kind::PulsatingInjection => injection::settings(motor, bandwidths, injection::pulsating, notes),
-        Kind::SquareWaveInjection => injection::settings(motor, bandwidths, injection::square_wave, notes),
-        Kind::NearPwmInjection => injection::settings(motor, bandwidths, injection::near_pwm, notes),
+        Kind::RotatingInjection => injection::settings(motor, bandwidths, (injection::rotating, true), notes),
+        Kind::PulsatingInjection => injection::settings(motor, bandwidths, (injection::pulsating, true), notes),
+        Kind::SquareWaveInjection => injection::settings(motor, bandwidths, (injection::square_wave, false), notes),
+        Kind::NearPwmInjection => injection::settings(motor, bandwidths, (injection::near_pwm, false), notes),
         Kind::Hybrid => injection::hybrid(motor, bandwidths, notes),
         Kind::Sensored => Ok(loops::sensored(data)),
     }

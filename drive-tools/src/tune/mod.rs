@@ -6,10 +6,12 @@
 //!   [`voltage`] for what the DC link allows, [`iron`] for iron loss from a drag test,
 //!   [`flux_map`] for a map from a table, [`losses`] for inverter and temperature coefficients. [`check`](mod@check)
 //!   compares them with the variables of the models; [`Tuned::pair`] is the native drive with these values.
+//! - [`application`]: torque or speed control, and the shaft.
 //! - [`trial`]: tries the drive from many start angles, timed by its own time constants ([`pace`]). [`limits`]: the conditions
 //!   that it cannot hold, and why. [`remedy`]: what helps.
 
 pub mod adaptation;
+pub mod application;
 pub mod back_emf;
 pub mod bandwidth;
 pub mod check;

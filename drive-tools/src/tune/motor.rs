@@ -256,7 +256,7 @@ impl MotorFile {
         })
     }
 
-    /// The file at `path`, read.
+    /// Reads the file at `path`.
     ///
     /// # Errors
     /// The file cannot be read, or [`parse`](Self::parse) fails.

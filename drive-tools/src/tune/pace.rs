@@ -12,6 +12,7 @@ use super::bandwidth::DIP_OF_A_STEP;
 use super::setting::Tuned;
 use drive::Pair;
 use drive::control::start::StartMode;
+use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
 
 /// Minimum torque available in excess of a load, as a share of the load: an assumption if less is available.
@@ -66,6 +67,12 @@ impl Pace {
     }
 }
 
+/// Time in s in which a start by injection finds the pole: the injection, two pairs of pulses, and three pauses of 4 L / R.
+fn search(par: &ControllerParameters) -> f64 {
+    let ControllerParameters { polarity, motor, T_s, .. } = par;
+    polarity.t_find + 4.0 * f64::from(polarity.samples) * T_s + 12.0 * motor.L_d.max(motor.L_q) / motor.R_s
+}
+
 /// Time constant in s of the slower root of s^2 + `a` s + `b` = 0.
 fn slowest(a: f64, b: f64) -> f64 {
     let half = 0.5 * a;
@@ -93,6 +100,9 @@ impl Begin {
         if start.mode == StartMode::CurrentFrequency {
             let ready = 2.0 * start.t_align + start.speed / start.acceleration + start.settle + ramp;
             return Self { rest: 0.0, measures: 0.0, ready };
+        }
+        if start.mode == StartMode::Injection {
+            return Self { rest: 0.0, measures: 0.0, ready: search(par) + ramp };
         }
         let measures = if pair.controller.model.measures_resistance() { adaptation.longest_rest() } else { 0.0 };
         Self { rest: if measures > 0.0 { 0.0 } else { tuned.rest }, measures, ready: ramp }

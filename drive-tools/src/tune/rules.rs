@@ -17,7 +17,7 @@ use super::check::check;
 use super::motor::{Data, Located, MotorFile, estimators, swing};
 use super::setting::{LEVELS, Setting, Suited, Tuned, Unsuited, Value, given, real, set};
 use super::voltage::{self, Voltage};
-use super::{adaptation, flux_map, iron, losses, method, plausible, rasmussen, saturation};
+use super::{adaptation, flux_map, iron, loops, losses, method, plausible, rasmussen, saturation};
 use crate::error::{Error, Result, bail};
 use drive::control::tables::ControllerParameters;
 use drive::estimator::{Class, Kind};
@@ -275,8 +275,15 @@ fn fits(motor: &MotorFile, estimator: Kind, bandwidths: &Bandwidths, notes: &mut
         ));
     }
     let hertz = bandwidths.current.value / TAU;
-    if !(60.0..=600.0).contains(&hertz) {
-        notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to 600 Hz were tried"));
+    let most = if estimator == Kind::VoltageFeedback { 4300.0 } else { 600.0 };
+    if !(60.0..=most).contains(&hertz) {
+        let why = if hertz < 60.0 && bandwidths.current.origin.is_none() {
+            ": with the estimate 90 deg off, the gain for the larger inductance acts on the smaller one; a lower control.T_s raises it in \
+             proportion"
+        } else {
+            ""
+        };
+        notes.push(format!("bandwidth.current is {hertz:.0} Hz; 60 to {most} Hz were tried{why}"));
     }
     Ok(())
 }
@@ -295,8 +302,9 @@ fn cap_current_loop(
     let value = |name: &str| controller.iter().find(|s| s.name == name).map(|s| &s.value);
     let number = |name: &str| if let Some(Value::Real(x)) = value(name) { *x } else { 0.0 };
     let Data { machine, rating, .. } = data;
-    // During a start, the current may be on one axis and the same damping on the other.
-    let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * number("start.i") } else { *rating.current.get_ref() };
+    // During a start, the current may be on one axis and the same damping on the other; a higher one acts after the alignment alone.
+    let aligned = || number("start.i").min(loops::most_on_axis(data));
+    let i = if value("start.mode").is_some() { 2.0_f64.sqrt() * aligned() } else { *rating.current.get_ref() };
     let least = least_inductance(i);
     let greatest = machine.L_d.get_ref().max(*machine.L_q.get_ref());
     let gain = MAX_GAIN * least / number("T_s");
@@ -305,7 +313,7 @@ fn cap_current_loop(
         _ => gain / greatest,
     };
     let wanted = bandwidths.current.value;
-    if most < wanted {
+    if most < wanted * (1.0 - 1e-9) {
         let (asked, given) = (wanted / TAU, most / TAU);
         notes.push(format!(
             "current.bandwidth is {given:.0} Hz, not the {asked:.0} Hz of bandwidth.current: at {i:.1} A the incremental \

@@ -76,8 +76,10 @@ pub struct Trial {
     pub error: f64,
     /// Maximum torque in N.m that the controller allows at this speed.
     pub most: f64,
-    /// Number of the runs that failed while `lock_lost` stayed below 1.
+    /// Number of the runs that failed while `lock_lost` stayed below 1 and no limit was active at the end.
     pub silent: u32,
+    /// Number of the runs that held the load, never lost the rotor, and had `lock_lost` at 1 or more.
+    pub alarmed: u32,
 }
 
 impl Trial {
@@ -109,6 +111,8 @@ struct Run {
     most: f64,
     /// Maximum `lock_lost`.
     lock: f64,
+    /// Whether a limit of current, torque or voltage was active for most of the last time.
+    limited: bool,
 }
 
 /// Speed and angle error in a part of the window.
@@ -168,7 +172,12 @@ struct Bench<'a> {
     k: u32,
     /// Maximum `lock_lost` so far.
     lock: f64,
+    /// Share of the last samples in which a limit was active, smoothed.
+    limited: f64,
 }
+
+/// Time constant in s of the share of samples at a limit.
+const LATELY: f64 = 0.5;
 
 impl Bench<'_> {
     fn now(&self) -> f64 {
@@ -181,7 +190,10 @@ impl Bench<'_> {
         self.pair.set_inputs(level * self.tuned.speed, torque, self.u_dc);
         self.pair.step(self.T_s).ok()?;
         self.k += 1;
-        self.lock = self.lock.max(self.pair.controller.out.lock_lost);
+        let out = &self.pair.controller.out;
+        self.lock = self.lock.max(out.lock_lost);
+        let limited = f64::from(u8::from(out.current_limited || out.voltage_limited));
+        self.limited += (limited - self.limited) * (self.T_s / LATELY).min(1.0);
         let ahead = wrap(self.pair.plant.out.theta_e - self.pair.controller.out.theta_est);
         Some((self.pair.plant.out.speed / self.tuned.speed, ahead.to_degrees()))
     }
@@ -198,7 +210,7 @@ impl Bench<'_> {
     }
 
     /// Runs at `level` with `load` (N.m over the time in s since now), which is constant from `from` (s) on, until it settles
-    /// or time is over: whether it then runs at the reference. `see` gets speed and angle error.
+    /// or the time is over; returns whether it then runs at the reference. `see` gets speed and angle error.
     fn until_settled(
         &mut self,
         level: f64,
@@ -237,17 +249,25 @@ impl Bench<'_> {
 
 /// One run from the electrical angle `theta` (rad).
 fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
-    let mut run = Run { started: false, held: false, least: f64::INFINITY, error: 0.0, most: f64::INFINITY, lock: 0.0 };
+    let mut run = Run {
+        started: false,
+        held: false,
+        least: f64::INFINITY,
+        error: 0.0,
+        most: f64::INFINITY,
+        lock: 0.0,
+        limited: false,
+    };
     let mut pair = tuned.pair();
     pair.plant.model.parameters.initial.theta_e = theta;
     if pair.start().is_err() {
         return run;
     }
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
-    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 };
+    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0, limited: 0.0 };
     run.started = bench.starts(task.level, 0.0);
     if !run.started {
-        return Run { lock: bench.lock, ..run };
+        return Run { lock: bench.lock, limited: bench.limited > 0.5, ..run };
     }
     let most = bench.pair.controller.out.tau_max;
     let load = |t: f64| if t < task.rise { task.torque * t / task.rise } else { task.torque };
@@ -256,7 +276,7 @@ fn one(tuned: &Tuned, task: &Task, theta: f64) -> Run {
         least = least.min(speed);
         error = error.max(angle.abs());
     });
-    Run { least, error, most, lock: bench.lock, ..run }
+    Run { least, error, most, lock: bench.lock, limited: bench.limited > 0.5, ..run }
 }
 
 /// From how many of `angles` start angles the drive runs up under the rated torque, which acts from the first sample on: a free rotor
@@ -271,7 +291,7 @@ pub fn loaded(tuned: &Tuned, angles: u32) -> (f64, u32) {
             return false;
         }
         let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, pair.controller.model.parameters.T_s);
-        Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 }.starts(level, tuned.torque)
+        Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0, limited: 0.0 }.starts(level, tuned.torque)
     };
     (level, queue::map(&starts, ran).into_iter().map(u32::from).sum())
 }
@@ -339,7 +359,7 @@ pub fn swings(tuned: &Tuned) -> Vec<Swing> {
     let par = &pair.controller.model.parameters;
     let (u_dc, T_s) = (pair.plant.model.inputs.u_dc, par.T_s);
     let least = [SWING[0], SWING[1] * par.limit.i, SWING[2] * tuned.torque * tuned.speed];
-    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0 };
+    let mut bench = Bench { tuned, pair, u_dc, T_s, k: 0, lock: 0.0, limited: 0.0 };
     if !bench.starts(first, 0.0) {
         return all;
     }
@@ -404,11 +424,13 @@ pub fn at(tuned: &Tuned, task: &Task, angles: u32) -> Trial {
         error: 0.0,
         most: f64::INFINITY,
         silent: 0,
+        alarmed: 0,
     };
-    for Run { started, held, least, error, most, lock } in runs {
+    for Run { started, held, least, error, most, lock, limited } in runs {
         trial.started += u32::from(started);
         trial.held += u32::from(held);
-        trial.silent += u32::from(!held && lock < 1.0);
+        trial.silent += u32::from(!held && lock < 1.0 && !limited);
+        trial.alarmed += u32::from(held && lock >= 1.0 && error <= 90.0);
         trial.least = trial.least.min(least);
         trial.most = trial.most.min(most);
         if held {

@@ -1,25 +1,28 @@
 //! The values of a machine for importers: the values that differ from the start values, with one dictionary per FMU.
 
+use super::application::Application;
+use super::check::variables;
 use super::motor::MotorFile;
 use super::rules;
 use super::setting::{Setting, Tuned, Value};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use drive::{PmsmPlant, SensorlessController};
+use fmu_core::Stored;
 use fmu_core::description::{self, Variable, VariableKind};
-use fmu_core::{Description, Model};
 use serde_json::{Map, Value as Json, json};
 use std::path::Path;
 
-/// Name, source and notes of a machine, and for each FMU the start values by their names, in SI units, enumerations as integers.
+/// Name, source and notes of a machine in an application, and for each FMU the start values by their names, in SI units,
+/// enumerations as integers.
 ///
 /// # Errors
-/// As for [`tune`](super::tune), or the estimator is unknown.
-pub fn values(path: &Path, estimator: Option<&str>) -> Result<Json> {
+/// As for [`tune`](super::tune) and [`Application::applied`], or the estimator is unknown.
+pub fn values(path: &Path, estimator: Option<&str>, application: Application) -> Result<Json> {
     let mut motor = MotorFile::read(path)?;
     if let Some(estimator) = estimator {
         motor.choose(estimator)?;
     }
-    let tuned = rules::tune(&motor)?;
+    let tuned = application.applied(&rules::tune(&motor)?)?;
     let (plant, controller) = needed(&tuned, true)?;
     let own = |settings: &[Setting]| object(settings.iter().map(|s| (s.name, &s.value)));
     let drive = of_drive(&tuned, true)?;
@@ -71,8 +74,8 @@ pub fn joined(plant: &[Setting], controller: &[Setting]) -> Vec<(String, Value)>
     of_plant.chain(of_controller).collect()
 }
 
-fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
-    let description = Description::of::<M>().map_err(Error::new)?;
+fn of_model<M: Stored>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
+    let description = variables::<M>()?;
     let one = |setting: &Setting| {
         let variable = description.variable(setting.name);
         let number = variable.and_then(|v| item_value(v, &setting.value)).map(Value::Integer);

@@ -67,7 +67,7 @@ fn changed(tuned: Tuned) -> Tuned {
     })
 }
 
-/// Counts of the cells of a machine or of all.
+/// Counts of cells, for one machine or for all.
 #[derive(Clone, Copy, Default)]
 struct Count {
     held: usize,

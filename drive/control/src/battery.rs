@@ -29,6 +29,10 @@ use serde::{Deserialize, Serialize};
 /// Share of the new loss in the low-pass at each sample.
 const SHARE: f64 = 0.25;
 
+/// Maximum number of rounds for a settled drive, and the relative change of the limit at which they end.
+const ROUNDS: u32 = 100;
+const SMALL: f64 = 1e-12;
+
 /// Limits of the current of the DC link.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DcLimits {
@@ -67,8 +71,38 @@ impl Battery {
     pub fn limits(&mut self, par: &DcLimits, motor: &Motor, u_dc: f64, speed: f64, i: DqHat) -> (f64, f64) {
         let R = 1.5 * motor.R_s;
         self.p_d += SHARE * (R * i.d() * i.d() - self.p_d);
-        let per_i_q = motor.torque(i.d(), 1.0);
-        let (a, w, p_d) = (R / (per_i_q * per_i_q), speed.abs(), self.p_d);
+        par.torques(motor, u_dc, speed, (i.d(), self.p_d))
+    }
+}
+
+impl DcLimits {
+    /// Maximum magnitudes of negative and of positive torque of a settled drive, whose i_d follows from the torque: `i_d` gives it
+    /// (A) for a torque (N.m). The fixed point of [`Battery::limits`] for each sign, with a request beyond it.
+    pub fn settled(&self, motor: &Motor, u_dc: f64, speed: f64, i_d: impl Fn(f64) -> f64) -> (f64, f64) {
+        let of = |sign: f64, pick: fn((f64, f64)) -> f64| {
+            let mut p_d = 0.0;
+            let mut last = f64::INFINITY;
+            let mut at = i_d(0.0);
+            for _ in 0..ROUNDS {
+                let limit = pick(self.torques(motor, u_dc, speed, (at, p_d)));
+                if (limit - last).abs() <= SMALL * limit {
+                    break;
+                }
+                last = limit;
+                at = i_d(sign * limit);
+                p_d += 0.5 * (1.5 * motor.R_s * at * at - p_d);
+            }
+            pick(self.torques(motor, u_dc, speed, (at, p_d)))
+        };
+        (of(-1.0, |limits| limits.0), of(1.0, |limits| limits.1))
+    }
+
+    /// Maximum magnitudes of negative and of positive torque with this i_d (A) and the loss (W) of it.
+    #[inline]
+    fn torques(&self, motor: &Motor, u_dc: f64, speed: f64, (i_d, p_d): (f64, f64)) -> (f64, f64) {
+        let (R, par) = (1.5 * motor.R_s, self);
+        let per_i_q = motor.torque(i_d, 1.0);
+        let (a, w) = (R / (per_i_q * per_i_q), speed.abs());
         // Roots of a tau^2 + w tau = p, by their stable forms: with the speed, and against it.
         let far = |root: f64| if a > 0.0 { 0.5 * (w + root) / a } else { f64::INFINITY };
         let near = |p: f64, root: f64| if p > 0.0 { 2.0 * p / (w + root) } else { 0.0 };

@@ -129,6 +129,30 @@ pub(crate) fn weakening(par: &ControllerParameters, u_dc: f64) -> Result<(), Fau
     Ok(())
 }
 
+/// Maximum current of a flying start in units of `limit.i`.
+const CAUGHT: f64 = 1.1;
+
+/// Checks that a short circuit of one sample stays within the current limit at any speed at which the diodes do not conduct, on a DC
+/// link of `u_dc` (V) at the start, or 0 later.
+///
+/// # Errors
+/// The sample period is too long for a flying start.
+pub(crate) fn catch(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
+    let L = par.motor.L_d.min(par.motor.L_q);
+    let i = u_dc * INVERSE_SQRT_3 * par.T_s / L;
+    if !par.start.catch || par.estimator == Kind::Sensored || i <= CAUGHT * par.limit.i {
+        return Ok(());
+    }
+    let table = PARAMETERS;
+    Err(Fault::new(format!(
+        "{}: a short circuit of one sample, {}, may reach {i:.3} A with an EMF of u_dc / sqrt(3), u_dc = {u_dc} V; at most {CAUGHT} times {}: \
+         shorten T_s",
+        table.tell(par, |p| &mut p.start.catch),
+        table.tell(par, |p| &mut p.T_s),
+        table.tell(par, |p| &mut p.limit.i)
+    )))
+}
+
 /// Checks the limits of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.
 ///
 /// # Errors
@@ -144,6 +168,15 @@ pub(crate) fn trip(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
     }
     if trip.u_dc.is_nan() || trip.u_dc <= u_dc.max(0.0) {
         return Err(table.fault(par, |p| &mut p.trip.u_dc, format!("above u_dc, {u_dc} V at the start")));
+    }
+    if u_dc > 0.0 && trip.u_dc_min >= u_dc {
+        return Err(table.fault(par, |p| &mut p.trip.u_dc_min, format!("below u_dc, {u_dc} V at the start")));
+    }
+    let restart = trip.u_dc_restart;
+    if restart.is_nan() || restart > 0.0 && !(trip.u_dc_min..trip.u_dc).contains(&restart) {
+        let (least, most) = (table.tell(par, |p| &mut p.trip.u_dc_min), table.tell(par, |p| &mut p.trip.u_dc));
+        let allowed = format!("at least {least} and below {most}; 0: the trip ends when enable falls");
+        return Err(table.fault(par, |p| &mut p.trip.u_dc_restart, allowed));
     }
     Ok(())
 }
@@ -173,6 +206,17 @@ pub(crate) fn dc_limits(par: &ControllerParameters) -> Result<(), Fault> {
         return Err(PARAMETERS.fault(par, |p| &mut p.dc.min, "at most 0 A: at no speed could the drive keep it"));
     }
     Ok(())
+}
+
+impl ControllerParameters {
+    /// Checks the limits of the DC link and of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.
+    ///
+    /// # Errors
+    /// A limit of the wrong sign, or a trip that normal operation would reach.
+    pub fn validate_limits(&self, u_dc: f64) -> Result<(), Fault> {
+        trip(self, u_dc)?;
+        dc_limits(self)
+    }
 }
 
 /// Checks that i_q produces torque despite the law's i_d, where the references depend on it.

@@ -174,7 +174,7 @@ macro_rules! identified {
     };
 }
 
-/// The results, of the controller and of the drives.
+/// The results, outputs of the controller and of the drives.
 pub const IDENTIFIED: &Table<Held> = identified! {
     R_s OHM "Stator resistance with that of a transistor";
     L_d HENRY "d-axis inductance without current";

@@ -81,6 +81,25 @@ impl CurrentGains {
     }
 }
 
+/// Maximum product of the gain that acts on an error and T_s / L with the lower inductance, in a frame off the rotor: with one sample
+/// of delay, `i[k+2] = i[k+1] - g i[k]` is undamped at g = 1.
+pub const OFF_ROTOR: f64 = 0.5;
+
+impl CurrentGains {
+    /// Gains for a frame at any angle from the rotor, as in a start. There the gains of the axes, G = diag(g_d, g_q), act on the
+    /// inductances L of the rotor's axes, turned: the loop has the gains of T_s L^-1 G, which are real and at most
+    /// T_s max(g_d, g_q) / min(L_d, L_q), because both are symmetric and positive. The inductance of an axis counts as far as that
+    /// is [`OFF_ROTOR`] at most.
+    pub fn off_rotor(par: &CurrentLoop, motor: &Motor, T_s: f64) -> Self {
+        let gain = OFF_ROTOR * motor.L_d.min(motor.L_q) / T_s;
+        let most = if par.active_resistance { 0.5 * (gain + motor.R_s) } else { gain } / par.bandwidth;
+        // A bandwidth that is too high for the lower inductance stays.
+        let most = most.max(motor.L_d.min(motor.L_q));
+        let motor = Motor { L_d: motor.L_d.min(most), L_q: motor.L_q.min(most), ..motor.clone() };
+        Self::new(par, &motor)
+    }
+}
+
 /// State: the integral part in V.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CurrentController {
@@ -115,6 +134,22 @@ impl CurrentController {
             ) + i_ref * gains.R
         };
         self.integral += direct(old) - direct(new);
+    }
+
+    /// Changes from gains `old` at the current `i` (A) to gains `new` at the same current in a frame `angle` (rad) behind, with unchanged
+    /// voltage; the errors are 0.
+    pub fn taken_over(self, old: &CurrentGains, i: DqHat, new: &CurrentGains, angle: f64) -> Self {
+        if old == new {
+            return self.in_frame_behind(angle);
+        }
+        let (mut controller, by) = (self, Axis::<Estimated>::at(angle));
+        let none = CurrentGains::default();
+        controller.retune(old, &none, i, i);
+        let mut controller = controller.in_frame_behind(angle);
+        let turned = by.to_stator(i);
+        let turned = DqHat::new(turned.alpha(), turned.beta());
+        controller.retune(&none, new, turned, turned);
+        controller
     }
 
     /// The controller in a frame `angle` (rad) behind its previous frame: the voltage is unchanged.
@@ -207,6 +242,53 @@ mod tests {
         let stator = Axis::<Estimated>::at(1.2).to_stator(c.integral);
         let turned = c.in_frame_behind(0.5);
         assert!((Axis::<Estimated>::at(0.7).to_stator(turned.integral) - stator).magnitude() < 1e-14);
+    }
+
+    /// On the inductances of a rotor at any angle, the gains of a start stay at half of the stable limit; those of the estimated frame
+    /// exceed it where the saliency is high, and are the same where it is low.
+    #[test]
+    fn the_gains_off_the_rotor_are_stable_at_any_angle() {
+        let high = Motor { n_p: 2, R_s: 0.42, L_d: 10e-3, L_q: 48e-3, psi_M: 0.25 };
+        let T_s = 1e-4;
+        // The largest eigenvalue of T_s L^-1 G for a rotor that is `angle` (rad) off.
+        let greatest = |motor: &Motor, gains: &CurrentGains, angle: f64| {
+            let (mean, half) = (0.5 * (1.0 / motor.L_d + 1.0 / motor.L_q), 0.5 * (1.0 / motor.L_d - 1.0 / motor.L_q));
+            let (a, b, c) =
+                (mean + half * (2.0 * angle).cos(), half * (2.0 * angle).sin(), mean - half * (2.0 * angle).cos());
+            let [d, q] = [&gains.d, &gains.q].map(|axis| axis.k_p + axis.active_resistance);
+            let (trace, product) = (a * d + c * q, (a * c - b * b) * d * q);
+            T_s * 0.5 * (trace + (trace * trace - 4.0 * product).max(0.0).sqrt())
+        };
+        for active_resistance in [true, false] {
+            for bandwidth in [600.0, 1200.0, 2400.0] {
+                let par = CurrentLoop { bandwidth, active_resistance, ..CurrentLoop::default() };
+                let (own, start) = (CurrentGains::new(&par, &high), CurrentGains::off_rotor(&par, &high, T_s));
+                let worst = |gains| (0..90).map(|k| greatest(&high, gains, 0.02 * f64::from(k))).fold(0.0, f64::max);
+                assert!(worst(&start) <= OFF_ROTOR + 1e-9, "{par:?}: {}", worst(&start));
+                assert!(!active_resistance || worst(&own) > OFF_ROTOR, "{par:?}: {}", worst(&own));
+                let low = Motor::IPMSM_2_2_KW;
+                assert_eq!(
+                    CurrentGains::new(&par, &low) == CurrentGains::off_rotor(&par, &low, T_s),
+                    bandwidth < 2000.0 || !active_resistance
+                );
+            }
+        }
+    }
+
+    /// The voltage stays when gains and frame change at once.
+    #[test]
+    fn a_hand_over_to_other_gains_keeps_the_voltage() {
+        let motor = Motor { n_p: 2, R_s: 0.42, L_d: 10e-3, L_q: 48e-3, psi_M: 0.25 };
+        let par = CurrentLoop { active_resistance: true, bandwidth: 1200.0, ..CurrentLoop::default() };
+        let (own, start) = (CurrentGains::new(&par, &motor), CurrentGains::off_rotor(&par, &motor, 1e-4));
+        assert_ne!(own, start);
+        // At standstill, so that nothing is decoupled.
+        let (c, i, angle) = (CurrentController { integral: DqHat::new(3.0, 4.0) }, DqHat::new(2.0, 7.0), 0.5);
+        let before = Axis::<Estimated>::at(1.2).to_stator(c.command(&start, &motor, i, i, 0.0));
+        let turned = Axis::<Estimated>::at(angle).to_stator(i);
+        let turned = DqHat::new(turned.alpha(), turned.beta());
+        let after = c.taken_over(&start, i, &own, angle).command(&own, &motor, turned, turned, 0.0);
+        assert!((Axis::<Estimated>::at(0.7).to_stator(after) - before).magnitude() < 1e-12, "{after:?}");
     }
 
     #[test]

@@ -2,8 +2,10 @@
 
 #![expect(clippy::inline_always, reason = "one sample is one function: its values stay in registers")]
 
+use crate::current::CurrentGains;
 use crate::current_limit::{Predictor, may_exceed};
 use crate::estimator::{Estimate, Estimating, Estimator, EstimatorParameters, Injection, Kind, Sample};
+use crate::gains::Gains;
 use crate::lock::Lock;
 use crate::model::SensorlessController;
 use crate::signals::{ControllerInputs, ControllerOutputs};
@@ -67,6 +69,7 @@ impl SensorlessController {
             && *estimator == Kind::Rasmussen
             && start.mode == StartMode::Direct
             && self.parameters.speed_est == 0.0
+            && self.state.found.is_none()
             && Elapsed::periods(self.state.k, self.parameters.T_s).seconds() < adaptation.longest_rest()
             && match &self.state.estimator {
                 Estimator::Rasmussen(observer) => self.state.k == 0 || !observer.knows_resistance(),
@@ -106,6 +109,9 @@ impl SensorlessController {
             self.reference(mode, speed, frame.injection, tuned);
         if self.parameters.speed_loop.torque_mode {
             self.state.stands.update(&self.parameters, mode == Mode::ClosedLoop, speed, i_ref, at_most(low, high));
+        } else {
+            let limited = current_limited && mode == Mode::ClosedLoop;
+            self.state.overload.update(self.parameters.T_s, limited, self.state.w_ref, [speed; 2]);
         }
         let Modulated { u, voltage_limited, cut, u_share } = self.modulate(mode, &frame, &sample, i_ref, tuned);
         let R_s_est = self.state.estimator.resistance(&context(
@@ -114,7 +120,7 @@ impl SensorlessController {
             &self.parameters.motor,
         ));
         let lock_lost = self.lock(mode, &frame, &sample, R_s_est, at_most(low, high));
-        self.keep(&sample, i_ref, frame.i);
+        self.keep(mode, &sample, i_ref, frame.i);
 
         ControllerOutputs {
             u,
@@ -156,7 +162,7 @@ impl SensorlessController {
 
     /// Values from the sensors and the previous samples.
     #[inline(always)]
-    fn measure(&self) -> Sample {
+    pub(super) fn measure(&self) -> Sample {
         let Self { inputs, parameters: par, gains, state, .. } = self;
         let i = self.currents().to_stator();
         // The command applied since the last sample: the newest one if there is no delay.
@@ -189,7 +195,8 @@ impl SensorlessController {
         }
     }
 
-    /// The estimated frame and the action of the loops in it. Parameters that were `tuned` act on the estimator after that.
+    /// The estimated frame and the action of the loops in it. Changed parameters (`tuned`) act on the estimator from the next
+    /// sample on.
     #[inline(always)]
     fn estimate(&mut self, sample: &Sample, tuned: bool, steady: bool) -> (Frame, Mode) {
         let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
@@ -228,14 +235,13 @@ impl SensorlessController {
     fn modulate(&mut self, mode: Mode, frame: &Frame, sample: &Sample, i_ref: DqHat, tuned: bool) -> Modulated {
         let Self { inputs, parameters: par, gains, last_gains, state, .. } = self;
         let (motor, T_s) = (&par.motor, par.T_s);
+        let of = |gains| current_gains(gains, mode);
         if tuned && mode != Mode::AfterSearch {
-            state.current.retune(&last_gains.current, &gains.current, i_ref, frame.i);
+            state.current.retune(of(last_gains), of(gains), i_ref, frame.i);
         }
-        let requested = if let Mode::Voltage(u) = mode {
-            u
-        } else {
-            state.current.command(&gains.current, motor, i_ref, frame.i, frame.w)
-        };
+        let own = of(gains);
+        let requested =
+            if let Mode::Voltage(u) = mode { u } else { state.current.command(own, motor, i_ref, frame.i, frame.w) };
         let magnitude = requested.magnitude();
         let u_share = share(magnitude, inputs.u_dc);
         if par.weakening.used && matches!(mode, Mode::ClosedLoop) {
@@ -268,7 +274,7 @@ impl SensorlessController {
         let injected = injected.unwrap_or_default();
         let (mut command, limited) = within_hexagon(whole, inputs.u_dc);
         let limitation = (limited || cut).then(|| acting.from_stator(command - injected) - requested);
-        state.current.integrate(&gains.current, i_ref - frame.i, limitation, T_s);
+        state.current.integrate(own, i_ref - frame.i, limitation, T_s);
         let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
         let (mut output, mut beyond) = (command, false);
         if par.compensation.u_dead > 0.0 {
@@ -304,13 +310,19 @@ impl SensorlessController {
 
     /// Stores the values for the next sample: the references and the current `i` (A) of this sample.
     #[inline(always)]
-    fn keep(&mut self, sample: &Sample, i_ref: DqHat, i: DqHat) {
+    fn keep(&mut self, mode: Mode, sample: &Sample, i_ref: DqHat, i: DqHat) {
         let Self { parameters: par, gains, state, .. } = self;
         state.i_last = sample.i;
         state.i_ref = i_ref;
         state.tau_ref = par.motor.torque(i_ref.d(), i_ref.q());
-        state.u_pi = state.current.output(&gains.current, i_ref - i);
+        state.u_pi = state.current.output(current_gains(gains, mode), i_ref - i);
     }
+}
+
+/// The gains of the current loop: during a start, the frame may be off the rotor.
+#[inline(always)]
+fn current_gains(gains: &Gains, mode: Mode) -> &CurrentGains {
+    if matches!(mode, Mode::Current(_)) { &gains.off_rotor } else { &gains.current }
 }
 
 #[cfg(test)]

@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Gains {
     pub(crate) current: CurrentGains,
+    /// Gains of the current loop in the frame of a start, which may be off the rotor by any angle.
+    pub(crate) off_rotor: CurrentGains,
     pub(crate) speed: SpeedGains,
     /// Torque constant in N.m/A.
     pub(crate) k: f64,
@@ -51,6 +53,7 @@ impl Gains {
         let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p / J, lag: speed_loop.lag() };
         Self {
             current: CurrentGains::new(current, motor),
+            off_rotor: CurrentGains::off_rotor(current, motor, *T_s),
             speed,
             k,
             i_tau: tau / k,

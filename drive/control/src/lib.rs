@@ -9,6 +9,8 @@
 #![allow(non_snake_case)]
 
 pub mod battery;
+mod catch;
+mod catching;
 mod checks;
 pub mod clocked;
 pub mod commission;
@@ -24,8 +26,10 @@ pub mod idle;
 pub mod limits;
 pub mod lock;
 pub mod model;
+pub mod overload;
 pub mod polarity;
 pub mod reference;
+mod reluctance;
 pub mod sensor;
 pub mod settled;
 pub mod signals;

@@ -7,6 +7,7 @@ use crate::estimator::{Class, Estimator, Kind, Sample, Setup, options, tracker};
 use crate::gains::Gains;
 use crate::idle;
 use crate::lock::{LOST, Lock};
+use crate::overload::Overload;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::stands;
 use crate::start::StartMode;
@@ -71,6 +72,9 @@ impl SensorlessController {
         if self.commissioning.is_some() && self.commissions() {
             return;
         }
+        if self.state.catch.is_some() && self.catches() {
+            return;
+        }
         let theta = self.state.computed.theta_est;
         self.control();
         self.state.k += 1;
@@ -122,6 +126,10 @@ impl SensorlessController {
             }
             self.state.trip = Trip::new(cause, self.state.computed.speed_est);
         }
+        if self.state.trip.cause == Cause::UnderVoltage && self.parameters.trip.restarts(self.inputs.u_dc) {
+            self.state.trip = Trip::default();
+            return false;
+        }
         let Self { inputs, parameters: par, state, .. } = self;
         let sensor = par.estimator == Kind::Sensored && inputs.sensor_valid && !state.sensor_lost;
         state.trip.update(&par.trip, &par.motor, inputs.u_dc, sensor.then_some(inputs.speed_meas));
@@ -129,7 +137,7 @@ impl SensorlessController {
         true
     }
 
-    /// Takes the sample for the self-commissioning; returns whether the controller does not work.
+    /// Takes the sample for the self-commissioning; returns whether the controller is inactive in this sample.
     #[cold]
     #[inline(never)]
     fn commissions(&mut self) -> bool {
@@ -252,6 +260,7 @@ impl SensorlessController {
         let u_dc = if self.state.samples == 0 { u_dc } else { 0.0 };
         checks::weakening(par, u_dc)?;
         checks::trip(par, u_dc)?;
+        checks::catch(par, u_dc)?;
         checks::commissioning(par)?;
         checks::dc_limits(par)?;
         // The start value is accepted with an estimator that does not read it.
@@ -286,7 +295,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 19;
+    const STATE_VERSION: u16 = 21;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -322,7 +331,8 @@ impl Model for SensorlessController {
         let ControllerInputs { enable, asc, commission_start, .. } = self.inputs;
         let commissions = self.parameters.commission.mode != CommissionMode::Off;
         self.commissioning = commissions.then(Box::default);
-        self.state = State::new(&self.parameters, enable && !asc && !(commissions && commission_start));
+        let waits = self.parameters.start.catch || commissions && commission_start;
+        self.state = State::new(&self.parameters, enable && !asc && !waits);
         self.state.shown.short_circuit = asc;
         self.tuned = false;
     }
@@ -381,13 +391,22 @@ pub fn clipped(tau_ref: f64, [tau_min, tau_max]: [f64; 2]) -> String {
 
 impl Warns for SensorlessController {
     fn warn(&self, log: &mut Warnings<'_>) {
+        let ControllerOutputs { tau_min, tau_max, .. } = self.state.shown;
+        self.warn_with(log, self.inputs.tau_ref, [tau_min, tau_max]);
+    }
+}
+
+impl SensorlessController {
+    /// [`Warns::warn`], with the torque reference and its limits (N.m) as the user knows them.
+    pub fn warn_with(&self, log: &mut Warnings<'_>, asked: f64, limits: [f64; 2]) {
         let (out, par, tau_ref) = (&self.state.shown, &self.parameters, self.inputs.tau_ref);
         if out.tripped != Cause::None {
             let stopped = if out.short_circuit { "the machine is short-circuited" } else { "the gates are off" };
             return log.warn("tripped", || {
                 format!(
-                    "{} beyond its limit: {stopped}, and the controller rests until enable falls",
-                    out.tripped.what(&par.trip)
+                    "{} beyond its limit: {stopped}, and the controller rests until {}",
+                    out.tripped.what(&par.trip),
+                    out.tripped.ends(&par.trip)
                 )
             });
         }
@@ -402,16 +421,22 @@ impl Warns for SensorlessController {
                 )
             });
         }
+        if let Some(why) = self.not_caught() {
+            log.warn("catch", || why.clone());
+        }
         // Where the low-speed law acts.
         if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && checks::lowers_i_0(par, self.inputs.u_dc) {
             log.warn("limit.i_dc_max", || checks::lowered_i_0(par, self.inputs.u_dc));
         }
         let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
         if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
-            log.warn("tau_ref", || clipped(tau_ref, [out.tau_min, out.tau_max]));
+            log.warn("tau_ref", || clipped(asked, limits));
+        }
+        if !par.speed_loop.torque_mode && self.state.overload.reports() {
+            log.warn("overload", || Overload::message([out.speed_est, self.state.w_ref], limits));
         }
         if let Some(time) = self.state.stands.reached(par) {
-            log.warn("stands", || stands::hidden(par, tau_ref, out.speed_est, time));
+            log.warn("stands", || stands::hidden(par, asked, out.speed_est, time));
         }
         if out.lock_lost < 1.0 {
             return;

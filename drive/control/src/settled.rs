@@ -8,6 +8,7 @@ use crate::gains::{Gains, Law};
 use crate::tables::ControllerParameters;
 use crate::weakening::Weakening;
 use drive_base::frame::DqHat;
+use drive_base::math::at_most;
 use serde::{Deserialize, Serialize};
 
 /// Torque that counts as zero with `zero_speed.release`, as a share of the torque of i_0.
@@ -32,17 +33,32 @@ impl Settled {
     }
 
     /// The references at the mechanical `speed` (rad/s) on a DC link of `u_dc` (V), with the trim `trim` (V) of field weakening;
-    /// `par` are the parameters of [`new`](Self::new).
+    /// `par` are the parameters of [`new`](Self::new),
+    /// `derating` is the share of the full torque.
     #[inline]
-    pub fn at<'a>(&'a self, par: &'a ControllerParameters, speed: f64, u_dc: f64, trim: f64) -> SettledAt<'a> {
+    pub fn at<'a>(
+        &'a self,
+        par: &'a ControllerParameters,
+        (speed, u_dc): (f64, f64),
+        trim: f64,
+        derating: f64,
+    ) -> SettledAt<'a> {
         let gains = &self.gains;
-        let (law, w) = (gains.law(par, par.zero_speed.i_0, speed), f64::from(par.motor.n_p) * speed);
+        let mut i_0 = par.zero_speed.i_0;
+        if par.dc.used {
+            i_0 = at_most(i_0, par.dc.i_0(&par.motor, u_dc));
+        }
+        let (law, w) = (gains.law(par, i_0, speed), f64::from(par.motor.n_p) * speed);
         let (weakening, (low, high)) = if par.weakening.used {
             Weakening::settled(&gains.weakening, &par.weakening, (w, u_dc), law.limit, trim)
         } else {
             (Weakening::default(), (law.limit, law.limit))
         };
-        SettledAt { gains, par, law, w, weakening, limits: [-gains.k * low, gains.k * high] }
+        let derated = law.limit * derating;
+        let (low, high): (f64, f64) = (low, high);
+        let (low, high) = (low.min(derated), high.min(derated));
+        let at = SettledAt { gains, par, law, w, weakening, limits: [-gains.k * low, gains.k * high] };
+        if par.dc.used { at.within_the_battery(u_dc, speed) } else { at }
     }
 }
 
@@ -59,6 +75,16 @@ pub struct SettledAt<'a> {
 }
 
 impl SettledAt<'_> {
+    /// With the limits of the DC link's current ([`battery`](crate::battery)).
+    #[cold]
+    fn within_the_battery(mut self, u_dc: f64, speed: f64) -> Self {
+        let [low, high] = self.limits;
+        let i_d = |tau: f64| self.currents(tau.max(low).min(high)).0.d();
+        let (least, most) = self.par.dc.settled(&self.par.motor, u_dc, speed, i_d);
+        self.limits = [low.max(-least), high.min(most)];
+        self
+    }
+
     /// Minimum and maximum torque in N.m that the references may request: the outputs `tau_min` and `tau_max`.
     #[inline]
     pub fn limits(&self) -> [f64; 2] {

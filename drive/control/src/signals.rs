@@ -32,6 +32,8 @@ pub struct ControllerInputs {
     pub sensor_valid: bool,
     /// The self-commissioning runs, unless `commission.mode` is Off.
     pub commission_start: bool,
+    /// Share of the full torque that a drive with a hot winding allows, 0..1; no variable of the controller.
+    pub derating: f64,
 }
 
 impl ControllerInputs {
@@ -61,6 +63,7 @@ impl Default for ControllerInputs {
             asc: false,
             sensor_valid: true,
             commission_start: false,
+            derating: 1.0,
         }
     }
 }

@@ -14,6 +14,9 @@
 //! speed, so i_q = -2 zeta w_0 J / (n_p K) (e_q / psi_M - w_f), limited to I, produces a damping torque, even at
 //! standstill.
 //!
+//! Above psi_M / (L_q - L_d), a current on the d-axis does not hold the rotor, because the reluctance torque outweighs that of the
+//! magnet: `reluctance.rs` is the start for these currents.
+//!
 //! Limits: the load must stay below K I; at standstill, e_q contains the voltage errors of the inverter.
 //!
 //! Neither paper uses this start: the sequence and the damping are derived here for the back-EMF methods (Kim & Sul
@@ -22,6 +25,7 @@
 
 use crate::estimator::interval::Interval;
 use crate::estimator::{Context, Sample};
+use crate::reluctance::{CHANGE_OF_CURRENT, Line};
 use drive_base::frame::DqHat;
 use drive_base::math::{atan2, exp};
 use fmu_core::unit::{AMPERE, Exponents, Quantity, SECOND, SPEED, Unit};
@@ -37,6 +41,10 @@ pub(crate) const RAD_PER_S2: Quantity =
 const ZETA: f64 = 0.5;
 /// Bandwidth of the back-EMF filter in rad/s.
 const FILTER: f64 = TAU * 60.0;
+/// Time in s for the change to the current of the hand-over, above psi_M / (L_q - L_d).
+const CHANGE: f64 = 0.01;
+/// Time in s in which i_q rises there.
+const RISE: f64 = 0.05;
 
 enumeration! {
     /// The start sequences; the assigned values never change.
@@ -56,7 +64,7 @@ enumeration! {
         1 Idle "The controller rests: before its first sample, not enabled, tripped, short-circuited or commissioning";
         2 Aligning "At rest: a current aligns the rotor, injection and pulses find it, or the resistance is measured";
         3 Ramping "A rotating current takes the rotor to start.speed";
-        4 Catching "For a start on a rotor that turns; no start.mode has it yet";
+        4 Catching "With start.catch: finds angle and speed of a rotor that turns";
         5 Running "The estimator supplies the angle: speed or torque follow the reference";
     }
 }
@@ -76,11 +84,21 @@ pub struct StartParameters {
     pub speed: f64,
     /// Time at that speed in s, >= 0.
     pub settle: f64,
+    /// Flying start: finds the rotor before the sequence.
+    pub catch: bool,
 }
 
 impl Default for StartParameters {
     fn default() -> Self {
-        Self { mode: StartMode::Direct, i: 5.0, t_align: 0.25, acceleration: 100.0, speed: 24.0, settle: 0.2 }
+        Self {
+            mode: StartMode::Direct,
+            i: 5.0,
+            t_align: 0.25,
+            acceleration: 100.0,
+            speed: 24.0,
+            settle: 0.2,
+            catch: false,
+        }
     }
 }
 
@@ -105,6 +123,10 @@ pub struct CurrentFrequencyStart {
     w: f64,
     /// Back EMF in the frame in V, low-passed.
     e: DqHat,
+    /// Current without damping in A, above psi_M / (L_q - L_d).
+    i: DqHat,
+    /// Angle of the rotor behind the frame, while the current changes to that of the hand-over.
+    behind: Option<f64>,
 }
 
 /// Requests of the start at a sample; angles in rad and speeds in rad/s, electrical.
@@ -131,6 +153,13 @@ pub enum StartStep {
 }
 
 impl CurrentFrequencyStart {
+    /// On the ramp, with a rotor at `theta` (rad) that turns at `w` (rad/s).
+    pub(crate) fn turning(par: &StartParameters, context: &Context, theta: f64, w: f64) -> Self {
+        let i = Line::of(context.motor, context.J, par.i).map_or(DqHat::ZERO, |line| DqHat::new(0.5 * line.i_0(), 0.0));
+        let e = DqHat::new(0.0, w * context.motor.psi_M);
+        Self { stage: Stage::Ramp, theta: theta - context.T_s * w, w, e, i, ..Self::default() }
+    }
+
     /// What it does.
     pub fn state(&self) -> StartState {
         match self.stage {
@@ -158,11 +187,17 @@ impl CurrentFrequencyStart {
             Stage::On => theta_est,
             Stage::Ramp | Stage::Hold => self.theta + T_s * self.w,
         };
+        let line = Line::of(motor, J, par.i);
         if !jumps {
             let x = Interval::new(theta_last, self.theta, sample, T_s);
-            let flux = DqHat::new(motor.L_d * x.i.d(), motor.L_q * x.i.q());
-            let e = x.v - x.i * motor.R_s - flux.turned() * self.w;
-            self.e += (e - self.e) * (1.0 - exp(-FILTER * T_s));
+            let flux = |i: DqHat| DqHat::new(motor.L_d * i.d(), motor.L_q * i.q());
+            let mut e = x.v - x.i * motor.R_s - flux(x.i).turned() * self.w;
+            let mut filter = FILTER;
+            if let Some(line) = &line {
+                e = e - flux(x.i_now - x.i_last) * (CHANGE_OF_CURRENT / T_s);
+                filter = line.filter(self.i, FILTER);
+            }
+            self.e += (e - self.e) * (1.0 - exp(-filter * T_s));
         }
 
         self.n += 1.0;
@@ -174,10 +209,16 @@ impl CurrentFrequencyStart {
             Stage::Ramp => {
                 // The direction is set once, at the first sample of the ramp.
                 let side = if self.w == 0.0 { side } else { self.w.signum() };
-                self.w = side * (self.w.abs() + T_s * n_p * par.acceleration).min(rated);
-                if self.w.abs() >= rated {
+                let share = if line.is_some() { share(t) } else { 1.0 };
+                self.w = side * (self.w.abs() + T_s * n_p * par.acceleration * share).min(rated);
+                let risen = share >= 1.0;
+                if self.w.abs() >= rated && risen {
                     self.enter(Stage::Hold);
                 }
+            }
+            Stage::Hold if t >= par.settle && line.is_some() => {
+                let behind = self.behind.unwrap_or_default();
+                return StartStep::HandOver { theta: self.theta - behind, w: self.w, theta_frame: self.theta };
             }
             Stage::Hold if t >= par.settle => {
                 let s = self.w.signum();
@@ -187,10 +228,43 @@ impl CurrentFrequencyStart {
             _ => {}
         }
         let grown = if self.stage == Stage::Behind { (3.0 * t / par.t_align).min(1.0) } else { 1.0 };
+        if let Some(line) = line {
+            let i_ref = self.on_line(&line, par, (n_p, T_s), (side, grown));
+            return StartStep::Current { theta: self.theta, w: self.w, i_ref };
+        }
         let K = motor.torque_constant();
         let w_0 = (n_p * K * par.i / J).sqrt();
         let i_q = damping(w_0, J, n_p * K, self.e.q() / motor.psi_M - self.w, par.i);
         StartStep::Current { theta: self.theta, w: self.w, i_ref: DqHat::new(par.i * grown, i_q * grown) }
+    }
+
+    /// The current (A) above psi_M / (L_q - L_d): [`reluctance`](crate::reluctance). `grown` is the share of the first alignment.
+    fn on_line(
+        &mut self,
+        line: &Line,
+        par: &StartParameters,
+        (n_p, T_s): (f64, f64),
+        (side, grown): (f64, f64),
+    ) -> DqHat {
+        let (aligned, most) = (DqHat::new(0.5 * line.i_0(), 0.0), line.i_q(par.i));
+        let (t, side) = (self.n * T_s, if self.w == 0.0 { side } else { self.w.signum() });
+        let left = (par.settle - t) / CHANGE;
+        match self.stage {
+            Stage::Behind | Stage::On => {
+                self.i = aligned;
+                return (aligned + line.damping(aligned, self.e, self.w, 0.5 * line.i_0())) * grown;
+            }
+            Stage::Hold if left < 1.0 => {
+                let behind = *self.behind.get_or_insert_with(|| line.behind(self.i, self.e, self.w));
+                return Line::leaving(self.i, behind, left);
+            }
+            Stage::Ramp => {
+                let acceleration = if self.w.abs() < n_p * par.speed { side * n_p * par.acceleration } else { 0.0 };
+                self.i = line.accelerating(share(t), side * most, acceleration);
+            }
+            Stage::Hold => self.i = line.accelerating(1.0, side * most, 0.0),
+        }
+        self.i + line.damping(self.i, self.e, self.w, 0.5 * par.i)
     }
 
     fn enter(&mut self, stage: Stage) {
@@ -203,6 +277,11 @@ impl CurrentFrequencyStart {
 pub(crate) fn damping(w_0: f64, J: f64, n_p_K: f64, slip: f64, most: f64) -> f64 {
     let gain = 2.0 * ZETA * w_0 * J / n_p_K;
     (-gain * slip).clamp(-most, most)
+}
+
+/// Share of i_q and of the acceleration at the time `t` (s) of the ramp, above psi_M / (L_q - L_d).
+fn share(t: f64) -> f64 {
+    (t / RISE).min(1.0)
 }
 
 type P = Row<StartParameters>;
@@ -229,6 +308,12 @@ pub const START: &Table<StartParameters> = table![
         &mut p.settle
     })
     .at_least(0.0),
+    P::boolean_parameter(
+        "catch",
+        "Flying start: with the gates off until then, short-circuit pulses and the EMF at zero current find the speed of the rotor; at rest, \
+         the start sequence follows",
+        |p| &mut p.catch,
+    ),
 ];
 
 #[cfg(test)]

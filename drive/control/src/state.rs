@@ -1,11 +1,13 @@
 //! The controller state from one sample to the next, and the source of the angle: a start sequence or the estimator.
 
 use crate::battery::Battery;
+use crate::catch::{Catch, Refusal};
 use crate::current::CurrentController;
 use crate::current_limit::Fresh;
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
 use crate::lock::Lock;
+use crate::overload::Overload;
 use crate::polarity::{PolaritySearch, SearchStep};
 use crate::sensor::Offset;
 use crate::signals::{ControllerInputs, ControllerOutputs};
@@ -114,6 +116,12 @@ pub(super) struct State {
     pub(super) k: u64,
     pub(super) estimator: Estimator,
     pub(super) leader: Leader,
+    /// The flying start, until it ends.
+    pub(super) catch: Option<Catch>,
+    /// Angle (rad) and electrical speed (rad/s) at which the flying start has found the rotor.
+    pub(super) found: Option<(f64, f64)>,
+    /// Why the flying start took the rotor to be at rest although it seemed to turn.
+    pub(super) slow: Option<Refusal>,
     pub(super) speed: SpeedController,
     pub(super) current: CurrentController,
     /// Recent commands, the newest first: the one at `timing.delay` was applied since the last sample.
@@ -141,6 +149,8 @@ pub(super) struct State {
     pub(super) limited_for: f64,
     /// Time in s for which a torque has been requested without a speed in the estimate; [`Stands`](crate::stands).
     pub(super) stands: Stands,
+    /// Watch for a load above the torque of the drive.
+    pub(super) overload: Overload,
     /// Outputs of the last sample.
     pub(super) computed: ControllerOutputs,
     /// The outputs of the last sample wait for the next sample instant.
@@ -158,7 +168,15 @@ impl State {
             R_s_est: par.motor.R_s,
             ..ControllerOutputs::default()
         };
-        Self { leader: Leader::of(par.start.mode), w_ref: par.speed_est, computed: shown, shown, ..Self::default() }
+        let catch = par.start.catch.then(Catch::default);
+        Self {
+            leader: Leader::of(par.start.mode),
+            catch,
+            w_ref: par.speed_est,
+            computed: shown,
+            shown,
+            ..Self::default()
+        }
     }
 
     /// Changes from the I-f start's frame at `theta_frame` (rad) to the estimated one at `theta` (rad), which turns at
@@ -174,7 +192,8 @@ impl State {
         let motor = &par.motor;
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let i_q = motor.torque(i.d(), i.q()) / gains.k;
-        self.current = self.current.in_frame_behind(theta_frame - theta);
+        let in_frame = Axis::<Estimated>::at(theta_frame).from_stator(sample.i);
+        self.current = self.current.taken_over(&gains.off_rotor, in_frame, &gains.current, theta_frame - theta);
         // A ramp begins at the rotor's speed.
         self.w_ref = w / f64::from(motor.n_p);
         let w_ref = par.speed_loop.ramped(self.w_ref, speed_ref, par.T_s);
@@ -194,8 +213,8 @@ impl State {
         let context = context(par, &in_use.estimators, &in_use.motor);
         let kind = par.estimator_with(self.sensor_lost);
         let first = (sample.k == 0).then(|| {
-            let w = f64::from(par.motor.n_p) * par.speed_est;
-            let (estimator, estimate) = Estimator::start(kind, &context, sample, par.theta_est, w);
+            let (theta, w) = self.found.unwrap_or((par.theta_est, f64::from(par.motor.n_p) * par.speed_est));
+            let (estimator, estimate) = Estimator::start(kind, &context, sample, theta, w);
             self.estimator = estimator;
             estimate
         });
@@ -264,7 +283,7 @@ impl State {
         if par.speed_loop.torque_mode && par.zero_speed.releases(inputs.tau_ref) {
             law = law.released();
         }
-        let limit = law.limit;
+        let limit = law.limit * inputs.derating;
         if par.weakening.used || par.dc.used {
             return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
         }
@@ -301,6 +320,8 @@ impl State {
             let (least, most) = self.battery.limits(&par.dc, &par.motor, inputs.u_dc, speed, self.i_ref);
             (low, high) = (low.min(least / gains.k), high.min(most / gains.k));
         }
+        let derated = law.limit * inputs.derating;
+        (low, high) = (low.min(derated), high.min(derated));
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
             (requested.clamp(-low, high), requested)

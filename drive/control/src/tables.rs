@@ -259,14 +259,14 @@ pub(crate) const PARAMETER_ROWS: &[P] = rows![
 
 type O = Row<ControllerOutputs>;
 
-/// The voltage references, of the controller and of `PmsmDrive`.
+/// The voltage references: outputs of the controller and of `PmsmDrive`.
 pub const VOLTAGES: &Table<ControllerOutputs> = table![
     O::discrete_output("u_a", &VOLT, "Voltage reference of phase a, inside the hexagon of u_dc", |o| { &mut o.u.a }),
     O::discrete_output("u_b", &VOLT, "Voltage reference of phase b", |o| &mut o.u.b),
     O::discrete_output("u_c", &VOLT, "Voltage reference of phase c", |o| &mut o.u.c),
 ];
 
-/// The estimates, of the controller and of `PmsmDrive`.
+/// The estimates: outputs of the controller and of `PmsmDrive`.
 pub const ESTIMATES: &Table<ControllerOutputs> = table![
     O::discrete_output("speed_est", &SPEED, "Estimated mechanical speed", |o| &mut o.speed_est),
     O::discrete_output("theta_est", &RADIAN, "Estimated electrical rotor angle, in (-pi, pi]", |o| {
@@ -274,7 +274,7 @@ pub const ESTIMATES: &Table<ControllerOutputs> = table![
     }),
 ];
 
-/// The limits and the state of the control, of the controller and of `PmsmDrive`.
+/// The limits and the state of the control: outputs of the controller and of `PmsmDrive`.
 pub const STATUS: &Table<ControllerOutputs> = table![
     O::discrete_output("tau_max", &NEWTON_METER, "Maximum torque that the references may ask for now", |o| {
         &mut o.tau_max

@@ -1,7 +1,8 @@
-//! Trips: over-current and over-voltage end the operation of the inverter until `enable` falls.
+//! Trips: over-current, over-voltage and under-voltage end the operation of the inverter until `enable` falls.
 //!
-//! A sample with a phase current above `trip.i` or a DC-link voltage above `trip.u_dc` trips the drive: from the next sample
-//! instant the controller is inactive and the gates are off. With `trip.asc` the machine is short-circuited instead where gates
+//! A sample with a phase current above `trip.i` or a DC-link voltage above `trip.u_dc` or below `trip.u_dc_min` trips the drive: from the next sample
+//! instant the controller is inactive and the gates are off; with `trip.u_dc_restart` above 0, an under-voltage trip ends once a sample
+//! measures that voltage. With `trip.asc` the machine is short-circuited instead where gates
 //! off would feed the link through the diodes, that is where its line-to-line back EMF exceeds u_dc:
 //!
 //! ```text
@@ -24,6 +25,7 @@ enumeration! {
         1 None "Nothing";
         2 OverCurrent "A phase current beyond trip.i";
         3 OverVoltage "A DC-link voltage beyond trip.u_dc";
+        4 UnderVoltage "A DC-link voltage below trip.u_dc_min";
     }
 }
 
@@ -46,13 +48,17 @@ pub struct TripParameters {
     pub i: f64,
     /// DC-link voltage in V above which the drive trips.
     pub u_dc: f64,
+    /// DC-link voltage in V below which the drive trips; 0: none.
+    pub u_dc_min: f64,
+    /// DC-link voltage in V at which an under-voltage trip ends; 0: when `enable` falls.
+    pub u_dc_restart: f64,
     /// A trip short-circuits the machine where its back EMF exceeds u_dc.
     pub asc: bool,
 }
 
 impl Default for TripParameters {
     fn default() -> Self {
-        Self { used: false, i: 15.0, u_dc: 450.0, asc: false }
+        Self { used: false, i: 15.0, u_dc: 450.0, u_dc_min: 0.0, u_dc_restart: 0.0, asc: false }
     }
 }
 
@@ -60,23 +66,45 @@ impl TripParameters {
     /// The trip caused by the measured currents `i` (A) and the DC-link voltage `u_dc` (V), if any.
     #[inline]
     pub fn cause(&self, Phases { a, b, c }: Phases, u_dc: f64) -> Cause {
-        if a.abs().max(b.abs()).max(c.abs()) > self.i {
-            Cause::OverCurrent
-        } else if u_dc > self.u_dc {
+        if a.abs().max(b.abs()).max(c.abs()) > self.i { Cause::OverCurrent } else { self.cause_of_voltage(u_dc) }
+    }
+
+    /// The trip caused by the DC-link voltage `u_dc` (V), if any.
+    #[inline]
+    pub fn cause_of_voltage(&self, u_dc: f64) -> Cause {
+        if u_dc > self.u_dc {
             Cause::OverVoltage
+        } else if u_dc < self.u_dc_min {
+            Cause::UnderVoltage
         } else {
             Cause::None
         }
+    }
+
+    /// Whether an under-voltage trip ends at the DC-link voltage `u_dc` (V).
+    #[inline]
+    pub fn restarts(&self, u_dc: f64) -> bool {
+        self.u_dc_restart > 0.0 && u_dc >= self.u_dc_restart
     }
 }
 
 impl Cause {
     /// The limit that was exceeded, for messages.
-    pub(crate) fn what(self, par: &TripParameters) -> String {
+    pub fn what(self, par: &TripParameters) -> String {
         match self {
             Self::None => String::new(),
             Self::OverCurrent => format!("trip: a phase current is (trip.i = {} A)", par.i),
             Self::OverVoltage => format!("trip: the DC link is (trip.u_dc = {} V)", par.u_dc),
+            Self::UnderVoltage => format!("trip: the DC link is (trip.u_dc_min = {} V)", par.u_dc_min),
+        }
+    }
+
+    /// What ends the trip, for messages.
+    pub fn ends(self, par: &TripParameters) -> String {
+        if self == Self::UnderVoltage && par.u_dc_restart > 0.0 {
+            format!("the DC link has trip.u_dc_restart = {} V, or enable falls", par.u_dc_restart)
+        } else {
+            "enable falls".into()
         }
     }
 }
@@ -113,11 +141,22 @@ type P = Row<TripParameters>;
 pub const TRIP: &Table<TripParameters> = table![
     P::boolean_parameter(
         "use",
-        "Over-current and over-voltage trips: the gates are off until enable falls; false: no trip",
+        "Trips by current and DC-link voltage: the gates are off until enable falls; false: no trip",
         |p| &mut p.used,
     ),
     P::parameter("i", &AMPERE, "Measured phase current beyond which the drive trips; above limit.i", |p| { &mut p.i }),
     P::parameter("u_dc", &VOLT, "Measured DC-link voltage beyond which the drive trips", |p| &mut p.u_dc),
+    P::parameter("u_dc_min", &VOLT, "Measured DC-link voltage below which the drive trips; 0: none", |p| {
+        &mut p.u_dc_min
+    })
+    .at_least(0.0),
+    P::parameter(
+        "u_dc_restart",
+        &VOLT,
+        "Measured DC-link voltage at which an under-voltage trip ends; 0: only when enable falls",
+        |p| &mut p.u_dc_restart,
+    )
+    .at_least(0.0),
     P::boolean_parameter(
         "asc",
         "A trip short-circuits the machine where its back EMF exceeds u_dc; false: gates off at any speed",
@@ -142,6 +181,12 @@ mod tests {
             }
         }
         assert_eq!(par.cause(Phases::default(), 451.0), Cause::OverVoltage);
+        assert_eq!(par.cause(Phases::default(), 0.0), Cause::None, "0: no trip by a low voltage");
+        let par = TripParameters { u_dc_min: 200.0, ..par };
+        assert_eq!([199.0, 201.0].map(|u| par.cause(Phases::default(), u)), [Cause::UnderVoltage, Cause::None]);
+        assert!(!par.restarts(1e9), "0: only when enable falls");
+        let par = TripParameters { u_dc_restart: 250.0, ..par };
+        assert_eq!([249.0, 251.0].map(|u| par.restarts(u)), [false, true]);
     }
 
     /// sqrt 3 psi_M n_p |w| is the line-to-line EMF: beyond u_dc the machine is shorted until 0.9 u_dc, based on the measured

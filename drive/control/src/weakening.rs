@@ -218,7 +218,7 @@ impl Weakening {
         if w >= 0.0 { (generating, motoring) } else { (motoring, generating) }
     }
 
-    /// Computes the limits, motoring and generating, where the plain references may not fit.
+    /// Computes the limits, motoring and generating, if the plain references may exceed them.
     fn limits_near(&mut self, gains: &WeakeningGains, w: f64, k: u64) {
         let moved = (self.U - self.U_then).abs() > LEAST_CHANGE * self.U;
         if moved {

@@ -1,7 +1,7 @@
 //! Field weakening without a drive: the torque-speed envelope, and the currents inside it.
 //!
 //! Figures: an independent calculation (brute force over the currents, and closed forms) for three [`machines`]. k_u = 0.95
-//! unless another is named.
+//! unless stated otherwise.
 #![allow(missing_docs, non_snake_case)]
 
 mod machines;

@@ -102,7 +102,7 @@ fn eq_44_and_45_without_the_half() {
         small((exact - V::new(d, q)).norm(), "(44)");
         assert!(error.abs() < 0.01 || (exact.y - 0.5 * q).abs() > 0.4 * q.abs(), "the print's half");
     }
-    // (45), corrected: the slope of the q amplitude at no error.
+    // (45), corrected: the slope of the q amplitude at zero error.
     let h = 1e-6;
     let amplitude = |error: f64| (inductance(error).try_inverse().unwrap() * V::new(V_INJ / W_H, 0.0)).y;
     let slope = (amplitude(h) - amplitude(-h)) / (2.0 * h);

@@ -102,7 +102,7 @@ impl FluxMap {
         [(self.d_max - self.d_min) / INTERVALS[0] as f64, self.q_max / INTERVALS[1] as f64]
     }
 
-    /// The splines at `x` (Wb), of the d-axis and of the q-axis at |q|, and the sign of q.
+    /// The splines at `x` (Wb) for the d-axis and, at |q|, for the q-axis, and the sign of q.
     #[inline]
     fn splines<S: Scalar>(&self, x: Vector<Rotor, S>) -> ([Splines<S>; 2], f64) {
         let ([d, q], sign) = (self.interval(), if x.q().value() < 0.0 { -1.0 } else { 1.0 });

@@ -9,7 +9,7 @@
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};
-use crate::pwm::Pwm;
+use crate::pwm::{InverterMode, Pwm, PwmUpdate};
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -41,12 +41,22 @@ impl Inverter {
     pub fn u_dead(&self, u_dc: f64) -> f64 {
         self.dead_time / self.T_pwm * u_dc
     }
+
+    /// Time in s between two instants at which the carrier takes over voltage references; `None` without a carrier.
+    pub fn update_period(&self) -> Option<f64> {
+        let period = match self.pwm.update {
+            PwmUpdate::Single => self.T_pwm,
+            PwmUpdate::Double => 0.5 * self.T_pwm,
+        };
+        (self.pwm.mode == InverterMode::Switched).then_some(period)
+    }
 }
 
 /// State of the inverter's transistors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Gates {
     /// They switch and produce the voltage references.
+    #[default]
     Switch,
     /// All upper or all lower transistors conduct: the terminals of the machine are short-circuited.
     Short,

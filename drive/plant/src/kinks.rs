@@ -147,7 +147,7 @@ impl PmsmPlant {
 
     /// The current (A) at the terminals minus the flux linkage's.
     #[inline(never)]
-    fn by_iron_at<D: Drops<f64>>(&self, state: &State, path: &Path<D>) -> Dq {
+    pub(super) fn by_iron_at<D: Drops<f64>>(&self, state: &State, path: &Path<D>) -> Dq {
         if path.dissipation.G.is_none() {
             return Dq::ZERO;
         }

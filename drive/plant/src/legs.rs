@@ -49,7 +49,7 @@ pub struct Legs<S = f64> {
     ripple: Option<Ripple<S>>,
 }
 
-/// Zone of the dead time by the ripple, of each leg.
+/// Zone of the dead time of each leg, from the ripple.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Ripple<S> {
     /// Currents in A at which the turn-on loss begins and the turn-off loss ends.

@@ -28,6 +28,7 @@ pub mod mechanics;
 pub mod model;
 pub mod power;
 pub mod pwm;
+pub mod rectifier;
 pub mod rules;
 pub mod saturation;
 pub mod signals;

@@ -149,7 +149,7 @@ pub struct PlantOutputs<S = f64> {
     pub efficiency: S,
     /// Temperatures in K.
     pub temperatures: Temperatures<S>,
-    /// Heat in W, of the powers.
+    /// The heat in W among these powers.
     pub heat: Heat<S>,
 }
 

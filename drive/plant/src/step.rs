@@ -104,7 +104,7 @@ impl PmsmPlant {
         Shaft::new(mechanics, self.inputs.tau_load, Standstill::new(mechanics, speed))
     }
 
-    /// An integration step of `h` (s) with ideal legs under the voltage `u` (V), of a machine that is linear or not.
+    /// An integration step of `h` (s) with ideal legs under the voltage `u` (V), for a linear or a nonlinear machine.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn integrate_ideal<C: Coulomb<f64>, const LINEAR: bool>(
@@ -310,7 +310,7 @@ impl PmsmPlant {
     }
 
     /// Energy (J) of the remaining current, which is lost at once when the diodes block; `None` while they conduct.
-    fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
+    pub(super) fn remaining(&self, state: &State, legs: &Legs) -> Option<f64> {
         let motor = &self.warm.motor;
         let i = machine::current(motor, self.parameters.magnetics(), state.psi) - self.idle_current(motor, state.speed);
         let blocked = legs.block(motor, state.axis, i, f64::from(motor.n_p) * state.speed);

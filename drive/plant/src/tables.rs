@@ -216,7 +216,7 @@ pub const PARAMETERS: &Table<PlantParameters> = table![
 
 type S = Row<Dq>;
 
-/// The flux linkage: the states that are not outputs, of the plant and of `PmsmDrive`.
+/// The flux linkage: the states of the plant and of `PmsmDrive` that are not outputs.
 pub const FLUX: &Table<Dq> = table![
     S::state("psi_d", &WEBER, "d-axis stator flux linkage", |psi| psi.parts_mut().0).nominal(0.1),
     S::state("psi_q", &WEBER, "q-axis stator flux linkage", |psi| psi.parts_mut().1).nominal(0.1),

@@ -21,7 +21,7 @@ const RUNAWAY: &str = "the network became too hot; reduce the current, or raise 
 impl PmsmPlant {
     /// The temperatures (K) under these `inputs`.
     #[inline]
-    pub(crate) fn temperatures<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Temperatures<S> {
+    pub fn temperatures<S: Scalar>(&self, inputs: &PlantInputs<S>) -> Temperatures<S> {
         if self.parameters.thermal.mode == ThermalMode::Imposed {
             return inputs.thermal.imposed;
         }

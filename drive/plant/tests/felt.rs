@@ -39,7 +39,7 @@ fn is_elsewhere(name: &str) -> bool {
         || name == "motor.n_p"
 }
 
-/// Parameters whose changed values this one needs to have an effect.
+/// Other parameters that must also be changed for this one to have an effect.
 fn needs(name: &str) -> &'static [&'static str] {
     match name {
         "inverter.i_zero" | "inverter.T_pwm" => &["inverter.dead_time"],

@@ -1,4 +1,4 @@
-//! Flux maps in the plant: of a linear machine and of one that saturates, in both interfaces, over temperature.
+//! Flux maps in the plant: for a linear machine and one that saturates, in both interfaces, over temperature.
 #![expect(clippy::cast_precision_loss, reason = "a few intervals")]
 
 use drive_base::frame::{Dq, Phases};

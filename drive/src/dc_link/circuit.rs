@@ -1,14 +1,15 @@
 //! The circuit of the DC link over an interval with a constant inverter current, solved exactly.
 //!
 //! ```text
-//! C du/dt = (U - u) / R - u / R_chopper - i          i int u dt = energy of the inverter
+//! C du/dt = (U - u) / R + I - u / R_chopper - i      i int u dt = energy of the inverter
 //! ```
 //!
 //! u is an exponential with the time constant tau = C / (1/R + 1/R_chopper), so a stiff source requires no shorter
 //! intervals, and the integrals of u and u^2 for the energies are closed forms. The inverter's energy over the interval is
 //! known from the plant; the current for it is the smaller root of a quadratic equation. Thus no energy is lost between the
 //! two, and u = (U + sqrt(U^2 - 4 R P)) / 2 holds exactly in steady state. U is the voltage of the source, R its resistance,
-//! including the precharge resistance while active.
+//! including the precharge resistance while active. A source at its limit, or one that blocks, has 1/R = 0 and the constant current I;
+//! the voltage U - u is then lost in the limiter.
 //!
 //! With x = t / tau and s = du/dt at the start of the interval:
 //!
@@ -44,15 +45,20 @@ fn phi(x: f64) -> [f64; 3] {
 pub struct LinkEnergy {
     /// From the source.
     pub source: f64,
-    /// Lost in the resistances of source and precharge.
+    /// Lost between the source and the capacitor.
     pub resistor: f64,
     /// Lost in the chopper.
     pub chopper: f64,
 }
 
 impl LinkEnergy {
+    /// These powers in W over `h` (s).
+    pub(crate) fn times(&self, h: f64) -> Self {
+        Self { source: self.source * h, resistor: self.resistor * h, chopper: self.chopper * h }
+    }
+
     /// Adds the values of an interval.
-    pub(super) fn add(&mut self, piece: &Self) {
+    pub(crate) fn add(&mut self, piece: &Self) {
         self.source += piece.source;
         self.resistor += piece.resistor;
         self.chopper += piece.chopper;
@@ -66,6 +72,8 @@ pub(super) struct Circuit {
     pub(super) C: f64,
     /// Conductance of the source in S.
     pub(super) source: f64,
+    /// Constant current of the source in A, in addition to that through its conductance.
+    pub(super) fixed: f64,
     /// Conductance of the chopper in S; 0 while it is off.
     pub(super) chopper: f64,
     /// The source's voltage in V.
@@ -88,7 +96,7 @@ pub(super) struct Piece {
 impl Circuit {
     /// Derivative of the voltage `u` (V) in V/s without the inverter.
     fn slope(&self, u: f64) -> f64 {
-        ((self.U - u) * self.source - u * self.chopper) / self.C
+        ((self.U - u) * self.source + self.fixed - u * self.chopper) / self.C
     }
 
     /// Change of the voltage (V) by a constant current `i` (A) in `t` (s).
@@ -99,7 +107,7 @@ impl Circuit {
 
     /// Starts at the voltage `u` (V) and covers `t` (s), in which the inverter draws `energy` (J).
     pub(super) fn over(&self, u: f64, t: f64, energy: f64) -> Piece {
-        let &Self { C, source, chopper, U } = self;
+        let &Self { C, source, fixed, chopper, U } = self;
         let [phi_1, phi_2, phi_3] = phi(t * (source + chopper) / C);
         let free = self.slope(u);
         // int u = a - b i, so b i^2 - a i + energy = 0.
@@ -116,10 +124,10 @@ impl Circuit {
         let end = (u + s * t * phi_1).max(0.0);
         let mean = u * t + s * t * t * phi_2;
         let squared = u * u * t + 2.0 * u * s * t * t * phi_2 + s * s * t * t * t * phi_3;
-        let charge = source * (U * t - mean);
+        let charge = source * (U * t - mean) + fixed * t;
         let energy_given = LinkEnergy {
             source: U * charge,
-            resistor: source * (U * U * t - 2.0 * U * mean + squared),
+            resistor: source * (U * U * t - 2.0 * U * mean + squared) + fixed * (U * t - mean),
             chopper: chopper * squared,
         };
         let owed = if square < 0.0 { energy - i * mean } else { 0.0 };
@@ -132,7 +140,7 @@ mod tests {
     use super::*;
 
     fn circuit(R: f64, C: f64) -> Circuit {
-        Circuit { C, source: 1.0 / R, chopper: 1.0 / 30.0, U: 400.0 }
+        Circuit { C, source: 1.0 / R, fixed: 0.0, chopper: 1.0 / 30.0, U: 400.0 }
     }
 
     #[test]
@@ -158,6 +166,15 @@ mod tests {
         }
     }
 
+    /// A source at its limit of 20 A charges 1 mF by 2 V in 100 us; 50 V of it are lost in the limiter.
+    #[test]
+    fn a_source_at_its_limit_supplies_a_constant_current() {
+        let limited = Circuit { C: 1e-3, source: 0.0, fixed: 20.0, chopper: 0.0, U: 400.0 };
+        let piece = limited.over(349.0, 1e-4, 0.0);
+        assert!((piece.u - 351.0).abs() < 1e-9 && (piece.charge - 2e-3).abs() < 1e-12, "{piece:?}");
+        assert!((piece.energy.source - 0.8).abs() < 1e-9 && (piece.energy.resistor - 0.1).abs() < 1e-9, "{piece:?}");
+    }
+
     /// Against many small steps of the equation with a constant power.
     #[test]
     fn it_follows_a_constant_power() {
@@ -175,7 +192,7 @@ mod tests {
 
     #[test]
     fn what_the_link_cannot_give_is_owed() {
-        let circuit = Circuit { C: 1e-6, source: 1e-6, chopper: 0.0, U: 400.0 };
+        let circuit = Circuit { C: 1e-6, source: 1e-6, fixed: 0.0, chopper: 0.0, U: 400.0 };
         let piece = circuit.over(100.0, 1e-4, 1.0);
         assert!(piece.u < 0.1 && (piece.owed - (1.0 - 0.5e-6 * 1e4)).abs() < 1e-4, "{piece:?}");
     }

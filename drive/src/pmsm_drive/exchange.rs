@@ -23,6 +23,7 @@ impl PmsmDrive {
         controller.model.show();
         controller.model.output(now, &mut controller.out);
         plant.model.inputs.apply(controller.out.commanded());
+        self.convert_limits();
     }
 }
 
@@ -52,13 +53,13 @@ impl ContinuousTime for PmsmDrive {
         State::<Self>::new("u_cap", &VOLT_PER_S, |m| &mut m.link.u),
     ];
 
-    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+    fn derivatives(&self, now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
         let (inputs, plant) = (self.plant_inputs(), &self.pair.plant.model);
         let [dx @ .., du] = dx else { return Ok(()) };
         plant.derivatives_under(&inputs, dx)?;
         *du = if self.link_parameters.dc_link.used {
             let i_dc = plant.outputs_under(&inputs).powers.i_dc;
-            self.link.slope(&self.link_parameters, (self.link.u, self.inputs.u_dc, i_dc))
+            self.link.slope(&self.link_parameters, (self.link.u, self.source(now), i_dc))
         } else {
             0.0
         };
@@ -69,16 +70,17 @@ impl ContinuousTime for PmsmDrive {
         self.pair.plant.model.settle();
     }
 
-    fn observe(&self, _now: Elapsed, outputs: &mut DriveOutputs) {
+    fn observe(&self, now: Elapsed, outputs: &mut DriveOutputs) {
         let inputs = self.plant_inputs();
         outputs.plant = self.pair.plant.model.outputs_under(&inputs);
         outputs.controller.clone_from(&self.pair.controller.out);
+        self.with_limits(&mut outputs.controller);
         outputs.means = self.period.means();
-        outputs.link = self.link_outputs(&inputs, &outputs.plant, (self.link.u, self.inputs.u_dc));
+        outputs.link = self.link_outputs(&inputs, &outputs.plant, (self.link.u, self.source(now)));
     }
 
-    fn integrands(&self, _now: Elapsed, outputs: &mut DriveOutputs) {
-        let (inputs, (u, U)) = (self.plant_inputs(), (self.link.u, self.inputs.u_dc));
+    fn integrands(&self, now: Elapsed, outputs: &mut DriveOutputs) {
+        let (inputs, (u, U)) = (self.plant_inputs(), (self.link.u, self.source(now)));
         let plant = self.pair.plant.model.outputs_under(&inputs);
         outputs.plant.energy = plant.powers.into();
         if self.link_parameters.dc_link.used {
@@ -90,11 +92,11 @@ impl ContinuousTime for PmsmDrive {
 
 impl CompletedSteps for PmsmDrive {
     fn complete(&mut self, now: Elapsed) -> Result<(), Fault> {
-        let inputs = self.plant_inputs();
+        let (inputs, U) = (self.plant_inputs(), self.source(now));
         let plant = &mut self.pair.plant.model;
         plant.complete_under(&inputs, now)?;
         if self.link_parameters.dc_link.used {
-            self.link.complete(&self.link_parameters, now, self.inputs.u_dc, plant.total().energy.r#in);
+            self.link.complete(&self.link_parameters, now, U, plant.total().energy.r#in);
         }
         Ok(())
     }
@@ -106,10 +108,12 @@ impl CompletedSteps for PmsmDrive {
 }
 
 impl Differentiable for PmsmDrive {
-    fn tangent(&self, _now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut DriveOutputs) -> Result<(), Fault> {
+    fn tangent(&self, now: Elapsed, along: &Self, dx: &mut [f64], outputs: &mut DriveOutputs) -> Result<(), Fault> {
         // The controller's outputs and the means are constant.
         let linked = self.link_parameters.dc_link.used;
-        let (u, U) = (Dual::new(self.link.u, along.link.u), Dual::new(self.inputs.u_dc, along.inputs.u_dc));
+        let wave = self.link_parameters.dc_link.wave(now.seconds());
+        let U = Dual::new(self.inputs.u_dc * wave, along.inputs.u_dc * wave);
+        let u = Dual::new(self.link.u, along.link.u);
         let u_dc = if linked { along.link.u } else { along.inputs.u_dc };
         let change = PlantInputs { u: Phases::default(), u_dc, ..along.plant_inputs() };
         let inputs = self.plant_inputs().changing(&change);
@@ -142,12 +146,17 @@ impl Events for PmsmDrive {
             name: "chopper",
             description: "Voltage of the capacitor divided by that at which the chopper switches next, minus 1; without a chopper 1",
         },
+        Indicator {
+            name: "source",
+            description: "Above 0 while a battery is within the limits of its current, or a rectifier blocks; an ideal source has 1",
+        },
     ];
 
-    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
-        let [z @ .., chopper] = z else { return };
+    fn indicators(&self, now: Elapsed, z: &mut [f64]) {
+        let [z @ .., chopper, source] = z else { return };
         self.pair.plant.model.indicators_under(&self.plant_inputs(), z);
         *chopper = self.link.indicator(&self.link_parameters);
+        *source = self.link.source_indicator(&self.link_parameters, self.source(now), self.inputs.u_dc);
     }
 
     fn begin(&mut self, now: Elapsed) {

@@ -32,17 +32,24 @@ impl ContinuousTime for PmsmDriveMean {
         Variable::<Self>::new("energy_in", &WATT, |m| &mut m.energy.r#in),
         Variable::<Self>::new("energy_mech", &WATT, |m| &mut m.energy.mech),
         Variable::<Self>::new("energy_loss", &WATT, |m| &mut m.energy.loss),
+        Variable::<Self>::new("energy_source", &WATT, |m| &mut m.link_energy.source),
+        Variable::<Self>::new("energy_resistor", &WATT, |m| &mut m.link_energy.resistor),
+        Variable::<Self>::new("energy_chopper", &WATT, |m| &mut m.link_energy.chopper),
     ];
 
     fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
         let state = self.referred();
         let rates = self.rates(&state, self.temperatures());
         let speed = self.speed(&state);
-        let energy = Energy::from(self.powers_of(&rates.point, speed));
+        let powers = self.powers_of(&rates.point, speed);
+        let (energy, link) = (Energy::from(powers), self.link_powers(powers.p_in));
         let par = &self.drive.controller;
         let to = par.current.bandwidth * (self.inputs.speed_ref - self.state.speed_ref);
         let ramp = if par.speed_loop.ramp > 0.0 { to.clamp(-par.speed_loop.ramp, par.speed_loop.ramp) } else { to };
-        let all = [rates.tau, rates.integral, ramp, rates.speed, speed, energy.r#in, energy.mech, energy.loss];
+        let [source, resistor, chopper] = [link.source, link.resistor, link.chopper];
+        let energies = [energy.r#in, energy.mech, energy.loss, source, resistor, chopper];
+        let [a, b, c, d, e, f] = energies;
+        let all = [rates.tau, rates.integral, ramp, rates.speed, speed, a, b, c, d, e, f];
         if !all_finite(all) {
             return Err(Fault::new(format!("the drive has no finite derivatives at {speed} rad/s, {} N.m", state.tau)));
         }
@@ -66,6 +73,11 @@ impl ContinuousTime for PmsmDriveMean {
 impl Events for PmsmDriveMean {
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
         let state = self.referred();
+        self.leave(&state);
+        self.point = self.point_at(&state, self.temperatures());
+        self.known = false;
+        self.settle();
+        self.watch_voltage(self.voltage(self.point.powers.p_in));
         self.held = self.controller(&state, &self.point_at(&state, self.temperatures()));
         Ok(Outcome::default())
     }

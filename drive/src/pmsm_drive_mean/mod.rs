@@ -13,26 +13,38 @@
 //! outputs are values at the end of the step. The estimates are the true values, the phase currents the sinusoids of i_d and
 //! i_q.
 //!
-//! There is no estimator, start, sensor error or injection, and no oscillation of the current loop: their parameters are
-//! accepted, and [`Model::has_effect`] names those with an effect. In Model Exchange the importer integrates the same equations.
+//! With the gates off, the diodes block or [rectify](drive_plant::rectifier): `enable` = false or a trip. A current that flows through
+//! them continues to flow, so the past decides where both are possible. With `asc` or a trip with `trip.asc` the machine is
+//! short-circuited.
+//!
+//! There is no estimator, start, sensor error or injection, no oscillation of the current loop and no capacitor of the DC link: their
+//! parameters are accepted, and [`Model::has_effect`] names those with an effect. In Model Exchange the importer integrates the
+//! same equations.
 //!
 //! [`advance`]: Model::advance
 
+mod bridge;
 mod exchange;
 mod motion;
 mod show;
+mod supply;
 
-use crate::dc_link::{LINK, LinkParameters};
+use crate::dc_link::{LINK, LinkEnergy, LinkParameters};
+use crate::derating::DERATING;
 use crate::idle;
 use crate::pmsm_drive::{DriveInputs, DriveOutputs, Happened, INPUTS, OUTPUTS, in_part, same_pole_pairs};
-use crate::steady::{Condition, Point, Steady};
+use crate::steady::{At, Condition, Diodes, Point, Steady};
+use crate::torque::{TORQUE, TorqueAt, TorqueParameters};
 use drive_base::frame::Dq;
 use drive_base::math::all_finite;
 use drive_control::commissioning::{Held, IDENTIFIED};
 use drive_control::model::clipped;
+use drive_control::overload::Overload;
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables as control;
+use drive_control::trip::{Cause, Trip};
 use drive_plant::PmsmPlant;
+use drive_plant::inverter::Gates;
 use drive_plant::power::{Energy, Powers};
 use drive_plant::pwm::Pwm;
 use drive_plant::rules::check_temperatures;
@@ -52,11 +64,15 @@ pub struct PmsmDriveMean {
     pub inputs: DriveInputs,
     /// Plant and controller with their parameters.
     pub drive: Steady,
-    /// Parameters of the DC link, without effect: `u_dc` is the voltage of the inverter.
+    /// Parameters of the DC link.
     pub link_parameters: LinkParameters,
+    /// Where the torques of the interface apply.
+    pub torque: TorqueParameters,
     state: State,
     /// Energies in J.
     energy: Energy,
+    /// Energies of the DC link in J.
+    link_energy: LinkEnergy,
     /// Temperatures in K of the network.
     network: Temperatures,
     /// The point at the end of the last step, the question that it answers, and whether it is still valid: a changed parameter
@@ -64,6 +80,10 @@ pub struct PmsmDriveMean {
     point: Point,
     asked: Question,
     known: bool,
+    /// What has tripped, and whether it short-circuits the machine.
+    trip: Trip,
+    /// The diodes at the end of the last step.
+    diodes: Diodes,
     /// Whether a step was taken.
     moved: bool,
     /// Model Exchange: outputs of the controller since the last event.
@@ -72,6 +92,8 @@ pub struct PmsmDriveMean {
     impossible: Happened,
     /// Time in s for which the torque reference has exceeded its limits.
     clipped_for: f64,
+    /// Watch for a load above the torque of the drive.
+    overload: Overload,
     /// Always `None`: a drive in steady state does not commission itself.
     commissioning: Held,
 }
@@ -84,16 +106,21 @@ impl Default for PmsmDriveMean {
             inputs: DriveInputs::default(),
             drive,
             link_parameters: LinkParameters::default(),
+            torque: TorqueParameters::default(),
             state: State::default(),
             energy: Energy::default(),
+            link_energy: LinkEnergy::default(),
             network,
             point: Point::default(),
             asked: Question::default(),
             known: false,
+            trip: Trip::default(),
+            diodes: Diodes::default(),
             moved: false,
             held: ControllerOutputs::default(),
             impossible: Happened::default(),
             clipped_for: 0.0,
+            overload: Overload::default(),
             commissioning: None,
         }
     }
@@ -121,8 +148,8 @@ struct Passed {
     point: Point,
 }
 
-/// Inputs of a point: the condition, the torque in N.m, and whether the drive is enabled.
-type Question = (Condition, f64, bool);
+/// Inputs of a point: the condition, the torque in N.m, and the gates.
+type Question = (Condition, f64, Gates);
 
 /// Outputs: as in `PmsmDrive`, plus the flux linkage.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -161,7 +188,7 @@ impl PmsmDriveMean {
 
     /// The inputs of the point in this state at the temperatures `at` (K).
     fn question(&self, state: &State, at: Temperatures) -> Question {
-        (self.condition(state, at), state.tau, self.inputs.enable)
+        (self.condition(state, at), state.tau, self.bridge())
     }
 
     /// The point in this state at the temperatures `at` (K); the point at the end of the last step is cached.
@@ -169,8 +196,10 @@ impl PmsmDriveMean {
         if self.known && self.question(state, at) == self.asked {
             return self.point;
         }
-        let at = self.drive.at(&self.condition(state, at));
-        if self.inputs.enable { at.by_reference(state.tau) } else { at.off() }
+        if self.linked() {
+            return self.supplied(state, at);
+        }
+        self.point_of(&self.drive.at(&self.condition(state, at)), (state.tau, self.diodes))
     }
 
     /// The powers of a point at the mechanical `speed` (rad/s); the torque of a free shaft equals the load.
@@ -181,10 +210,44 @@ impl PmsmDriveMean {
         Powers { tau_shaft: self.inputs.tau_load, p_mech: self.inputs.tau_load * speed, ..point.powers }
     }
 
+    /// The drive in this state at its `point`.
+    fn at(&self, state: &State, point: &Point) -> At<'_> {
+        let condition = self.condition(state, self.temperatures());
+        self.drive.at(&Condition { u_dc: self.voltage(point.powers.p_in), ..condition })
+    }
+
+    /// Whether the torques of the interface apply at the shaft.
+    fn at_shaft(&self) -> bool {
+        self.torque.at == TorqueAt::Shaft
+    }
+
+    /// The torque reference (N.m) of the air gap under this condition.
+    fn reference(&self, at: &At<'_>) -> f64 {
+        if self.at_shaft() { at.reference_for(self.inputs.tau_ref) } else { self.inputs.tau_ref }
+    }
+
+    /// The limits (N.m) of a point in this state where the torques of the interface apply.
+    fn limits(&self, state: &State, point: &Point) -> [f64; 2] {
+        if !(self.at_shaft() && self.gates()) {
+            return point.limits;
+        }
+        self.at(state, point).at_shaft(point.limits)
+    }
+
     /// Whether the torque reference exceeds its limits.
     fn is_clipped(&self) -> bool {
-        let (tau_ref, [low, high]) = (self.inputs.tau_ref, self.point.limits);
+        let (tau_ref, [low, high]) = (self.inputs.tau_ref, self.limits(&self.state, &self.point));
         self.drive.controller.speed_loop.torque_mode && self.inputs.enable && (tau_ref > high || tau_ref < low)
+    }
+
+    /// The watch for a load above the torque of the drive after a step of `h` (s) to `state`.
+    fn watched(&self, h: f64, state: &State, point: &Point) -> Overload {
+        let speeds = [&self.state, state].map(|state| self.speed(state));
+        let error = state.speed_ref - speeds[1];
+        let speed_mode = self.gates() && !self.drive.controller.speed_loop.torque_mode;
+        let mut overload = self.overload;
+        overload.update(h, speed_mode && Overload::limited(state.tau, point.limits, error), state.speed_ref, speeds);
+        overload
     }
 
     /// A plant with these parameters and inputs, to validate them.
@@ -199,17 +262,22 @@ impl PmsmDriveMean {
 }
 
 /// Reason given for parameters without effect.
-const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no DC link, no limits of its current, no estimator, start, sensor, \
-                                 trip, short circuit or commissioning; use PmsmDrive";
+const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no capacitor, no estimator, start, sensor, \
+                                 trip by the current or commissioning; use PmsmDrive";
 
 /// Parameters and groups of parameters of the controller with an effect.
-const EFFECTIVE: [&str; 13] = [
+const EFFECTIVE: [&str; 18] = [
     "T_s",
     "estimator",
     "motor.",
     "mechanics.J",
     "initial.speed_est",
     "limit.",
+    "trip.use",
+    "trip.u_dc",
+    "trip.u_dc_min",
+    "trip.u_dc_restart",
+    "trip.asc",
     "speed_loop.",
     "current.bandwidth",
     "current.mtpa",
@@ -236,28 +304,33 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 3;
+    const STATE_VERSION: u16 = 6;
 
     const CONTINUOUS: bool = true;
 
     fn has_effect(parameter: &str) -> bool {
         if let Some(name) = parameter.strip_prefix("controller.") {
             let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
-            return !name.starts_with("limit.i_dc_") && EFFECTIVE.iter().any(listed);
+            return EFFECTIVE.iter().any(listed);
         }
         let elsewhere =
             ["dead_time", "i_zero", "mode", "update", "zero_sequence", "pulse_min", "open_switch", "open_phase"];
         let elsewhere = parameter.strip_prefix("plant.inverter.").is_some_and(|name| elsewhere.contains(&name));
-        !elsewhere && !parameter.starts_with("dc_link.") && !parameter.starts_with("chopper.")
+        !elsewhere && parameter != "dc_link.R_precharge"
     }
 
     fn idle(&self, name: &str) -> Option<&'static str> {
-        if !Self::has_effect(name) || ["asc", "sensor_valid", "commission_start"].contains(&name) {
+        let C_only_stores = name == "dc_link.C" && !self.link_parameters.dc_link.pulsates();
+        if C_only_stores || !Self::has_effect(name) || ["sensor_valid", "commission_start"].contains(&name) {
             return Some(ONLY_IN_THE_DRIVE);
         }
         let Steady { plant, controller, .. } = &self.drive;
         let DriveInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
-        idle::of_drive((plant, controller, &self.link_parameters), (u_dc, [speed_shaft, angle_shaft]), name)
+        idle::of_drive(
+            (plant, controller, &self.link_parameters, &self.drive.derating),
+            (u_dc, [speed_shaft, angle_shaft]),
+            name,
+        )
     }
 
     fn derive(&mut self) {
@@ -267,7 +340,11 @@ impl Model for PmsmDriveMean {
 
     fn validate(&self) -> Result<(), Fault> {
         self.plant().validate().map_err(|fault| in_part("plant", &fault))?;
-        same_pole_pairs(&self.drive.plant, &self.drive.controller)
+        same_pole_pairs(&self.drive.plant, &self.drive.controller)?;
+        self.drive.derating.validate()?;
+        let u_dc = if self.moved { 0.0 } else { self.inputs.u_dc };
+        self.drive.controller.validate_limits(u_dc).map_err(|fault| in_part("controller", &fault))?;
+        self.link_parameters.validate(u_dc)
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -283,10 +360,13 @@ impl Model for PmsmDriveMean {
         };
         self.state = State { speed, angle, speed_ref: controller.speed_est, ..State::default() };
         (self.energy, self.network, self.moved) = (Energy::default(), self.drive.start_temperatures(), false);
-        (self.clipped_for, self.impossible) = (0.0, Happened::default());
+        (self.clipped_for, self.impossible, self.link_energy) = (0.0, Happened::default(), LinkEnergy::default());
+        (self.known, self.point, self.trip) = (false, Point::default(), Trip::default());
+        (self.diodes, self.overload) = (Diodes::default(), Overload::default());
         let temperatures = self.temperatures();
         self.point = self.point_at(&self.state, temperatures);
         (self.asked, self.known) = (self.question(&self.state, temperatures), true);
+        self.settle();
         self.held = self.controller(&self.state, &self.point);
     }
 
@@ -313,6 +393,8 @@ impl Model for PmsmDriveMean {
         }
         let total = Energy::from(powers);
         self.energy.add(&Energy { r#in: total.r#in * step.h, mech: total.mech * step.h, loss: total.loss * step.h });
+        self.link_energy.add(&self.link_powers(powers.p_in).times(step.h));
+        self.overload = self.watched(step.h, &state, &point);
         (self.state, self.point, self.moved) = (state, point, true);
         (self.asked, self.known) = (self.question(&state, temperatures), true);
         self.impossible = self.impossible.followed_by(self.is_impossible());
@@ -323,39 +405,54 @@ impl Model for PmsmDriveMean {
             check_temperatures(&self.drive.plant, &next, ["T_winding", "T_magnet"], REMEDY)?;
             self.network = next;
         }
+        self.settle();
+        self.watch_voltage(self.voltage(self.point.powers.p_in));
         Ok(())
     }
 }
 
 impl PmsmDriveMean {
-    /// Whether no drive can operate like this: no current fits the voltage of the link, or diodes conduct.
+    /// Whether no drive can operate like this: no current fits the voltage of the link, or its source cannot supply the power.
     fn is_impossible(&self) -> bool {
-        let DriveInputs { u_dc, enable, .. } = self.inputs;
-        if enable {
-            return u_dc > 0.0 && self.point.u_share > FULL;
+        let p_in = self.point.powers.p_in;
+        let u_dc = self.voltage(p_in);
+        if self.linked() && self.link(p_in).overloaded {
+            return true;
         }
-        self.speed(&self.state).abs() > self.drive.diode_speed(u_dc, self.temperatures().magnet)
+        self.gates() && u_dc > 0.0 && self.point.u_share > FULL
     }
 }
 
 impl Warns for PmsmDriveMean {
     fn warn(&self, log: &mut Warnings<'_>) {
+        if self.trip.cause != Cause::None {
+            log.warn("tripped", || {
+                let what = self.trip.cause.what(&self.drive.controller.trip);
+                let stopped = if self.trip.shorts { "the machine is short-circuited" } else { "the gates are off" };
+                let ends = self.trip.cause.ends(&self.drive.controller.trip);
+                format!("{what} beyond its limit: {stopped} until {ends}")
+            });
+        }
         if self.impossible == Happened::Now {
-            let (speed, u_share, u_dc) = (self.speed(&self.state), self.point.u_share, self.inputs.u_dc);
+            let p_in = self.point.powers.p_in;
+            let (speed, u_share, u_dc) = (self.speed(&self.state), self.point.u_share, self.voltage(p_in));
+            if self.linked() && self.link(p_in).overloaded {
+                return log.warn("u_cap", || self.link_parameters.lack(self.inputs.u_dc, p_in));
+            }
             log.warn("u_share", || {
-                let why = if self.inputs.enable {
-                    format!("no current fits u_dc = {u_dc} V (u_share = {u_share:.3})")
-                } else {
-                    format!("the back EMF is above u_dc = {u_dc} V with the gates off")
-                };
                 format!(
-                    "{why} at {speed} rad/s: the diodes would conduct and the machine feed the link. PmsmDriveMean does not \
-                     model this, and its outputs are not those of a drive; use PmsmDrive"
+                    "no current fits u_dc = {u_dc} V (u_share = {u_share:.3}) at {speed} rad/s: the diodes would conduct and the \
+                     machine feed the link. With the gates on, PmsmDriveMean does not model this, and its outputs are not those \
+                     of a drive; use PmsmDrive, or set enable to false there"
                 )
             });
         }
+        if self.overload.reports() {
+            let speeds = [self.speed(&self.state), self.state.speed_ref];
+            log.warn("overload", || Overload::message(speeds, self.limits(&self.state, &self.point)));
+        }
         if self.clipped_for >= 1.0 {
-            log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.point.limits));
+            log.warn("tau_ref", || clipped(self.inputs.tau_ref, self.limits(&self.state, &self.point)));
         }
     }
 }
@@ -379,5 +476,7 @@ const TABLE: &Table<Block<PmsmDriveMean>> = table![
     V::part("plant.", &Part { table: plant::PARAMETERS, lens: |m| &mut m.model.drive.plant }),
     V::part("controller.", &Part { table: control::PARAMETERS, lens: |m| &mut m.model.drive.controller }),
     V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
+    V::part("", &Part { table: TORQUE, lens: |m| &mut m.model.torque }),
+    V::part("", &Part { table: DERATING, lens: |m| &mut m.model.drive.derating }),
     V::part("", &Part { table: STATES, lens: |m| &mut m.model.state }),
 ];

@@ -18,6 +18,7 @@
 //! the stages would miss the change of the kinetic energy by the error of the speed, which accumulates on a ramp.
 
 use super::{Passed, PmsmDriveMean, State};
+use crate::lag::{integrates, lagging};
 use crate::pmsm_drive::DriveInputs;
 use crate::steady::{Point, Steady, within};
 use drive_base::math::exp;
@@ -27,16 +28,19 @@ use fmu_core::{Dual, Fault};
 
 const GAMMA: f64 = 1.0 - std::f64::consts::FRAC_1_SQRT_2;
 
-/// Allowed errors of a part of a step: of torque and integral part relative to the maximum torque, of the speed relative to
-/// itself plus 1 rad/s.
+/// Allowed errors in a part of a step: torque and integral part relative to the maximum torque, speed relative to itself plus 1
+/// rad/s.
 const SMALL: [f64; 2] = [2e-3, 1e-4];
+
+/// Minimum torque to which errors refer, as a share of the full torque.
+const LEAST_SHARE: f64 = 1e-3;
 
 /// Minimum part in s, and maximum number of parts of a step.
 const SHORTEST: f64 = 1e-8;
 const MAX_PARTS: u32 = 100_000;
 
-/// Width of the band above the limit, as a share of it, over which the integrator is brought to a stop.
-const BAND: f64 = 0.01;
+/// Maximum number of rounds for the limits at the voltage of a step's end.
+const LIMIT_ROUNDS: u32 = 20;
 
 /// An instant: rates of torque (N.m/s), integral part (A/s) and speed (rad/s2), and the point.
 pub(super) struct Rates {
@@ -64,21 +68,24 @@ impl PmsmDriveMean {
             }
         };
         let lag = controller.current.bandwidth;
-        if !self.inputs.enable {
+        if !self.gates() {
             let (tau, integral) = (-lag * state.tau, -lag * state.integral);
             return Rates { tau, integral, speed: accelerate(&point), point, limited: true, highest: 0.0 };
         }
         let [low, high] = point.limits;
-        let highest = high.max(-low);
+        // Without any torque, errors still refer to a small share of the full torque.
+        let full = self.drive.settled().speed_loop().1 * controller.limit.i;
+        let highest = high.max(-low).max(LEAST_SHARE * full);
         let (wanted, integral, limited) = if controller.speed_loop.torque_mode {
-            (self.inputs.tau_ref, 0.0, true)
+            let at_shaft = self.at_shaft();
+            (if at_shaft { self.reference(&self.at(state, &point)) } else { self.inputs.tau_ref }, 0.0, true)
         } else {
             let (gains, k) = self.drive.settled().speed_loop();
             let error = state.speed_ref - speed;
             let wanted = k * gains.wanted(state.integral, state.speed_ref, speed);
             let cut = wanted - within(wanted, point.limits);
             let [_, k_i] = gains.slopes();
-            let share = if cut * error > 0.0 { (1.0 - cut.abs() / (BAND * highest.max(1e-9))).max(0.0) } else { 1.0 };
+            let share = integrates(cut, error, highest);
             let follow = if controller.weakening.used { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
             (wanted, share * k_i * error - follow, cut != 0.0)
         };
@@ -89,7 +96,7 @@ impl PmsmDriveMean {
     /// A step of `h` (s) with the temperatures `at` (K).
     pub(super) fn pass(&self, h: f64, at: Temperatures) -> Result<Passed, Fault> {
         let Steady { plant, controller, .. } = &self.drive;
-        if plant.mechanics.imposed && (controller.speed_loop.torque_mode || !self.inputs.enable) {
+        if plant.mechanics.imposed && (controller.speed_loop.torque_mode || !self.gates()) {
             return Ok(self.pass_imposed(h, at));
         }
         let (mut state, mut done, mut part, mut powers) = (self.state, 0.0, h, Powers::default());
@@ -118,15 +125,10 @@ impl PmsmDriveMean {
         )))
     }
 
-    /// Torque in N.m after `h` (s) from `start` (N.m) within these limits (N.m), with a constant torque reference; and the weight
-    /// of the start in its mean.
-    fn lagging(&self, start: f64, limits: [f64; 2], h: f64) -> (f64, f64) {
-        let target = within(self.inputs.tau_ref, limits);
-        let x = h * self.drive.controller.current.bandwidth;
-        let decay = exp(-x);
-        // mean = target + (start - target) (1 - decay) / x, end = target + (start - target) decay.
-        let share = if x > 1e-3 { 1.0 / x - decay / (1.0 - decay) } else { 0.5 - x * (1.0 / 12.0) };
-        (target + (start - target) * decay, share)
+    /// Torque in N.m after `h` (s) from `start` (N.m) with the constant torque reference `target` (N.m); and the weight of the
+    /// start in its mean.
+    fn lagging(&self, start: f64, target: f64, h: f64) -> (f64, f64) {
+        lagging(self.drive.controller.current.bandwidth, start, target, h)
     }
 
     /// `state` after a step of `h` (s) with the imposed shaft.
@@ -137,24 +139,47 @@ impl PmsmDriveMean {
 
     /// A step of `h` (s) in torque mode, or disabled, on an imposed shaft: no integration.
     fn pass_imposed(&self, h: f64, at: Temperatures) -> Passed {
+        if self.linked() {
+            return self.pass_imposed_on_link(h, at);
+        }
         let condition = self.condition(&self.state, at);
         let drive = self.drive.at(&condition);
-        let enable = self.inputs.enable;
-        let limits = if enable { drive.limits() } else { [0.0; 2] };
-        let (tau, share) = self.lagging(self.state.tau, limits, h);
+        let enable = self.gates();
+        let target = if enable { within(self.reference(&drive), drive.limits()) } else { 0.0 };
+        let (tau, share) = self.lagging(self.state.tau, target, h);
         let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
-        let point = if enable { drive.by_reference(tau) } else { drive.off() };
+        let point = self.point_of(&drive, (tau, self.diodes));
         // The powers change with the torque, from the end of the last step to the end of this one.
         Passed { state: self.on_the_shaft(state, h), powers: point.powers.with(self.point.powers, share), point }
+    }
+
+    /// [`pass_imposed`](Self::pass_imposed) on the DC link: the limits are those of the voltage at the end of the step.
+    fn pass_imposed_on_link(&self, h: f64, at: Temperatures) -> Passed {
+        let mut point = self.point_at(&self.state, at);
+        for round in 0.. {
+            let drive = self.at(&self.state, &point);
+            let target = if self.gates() { within(self.reference(&drive), point.limits) } else { 0.0 };
+            let (tau, share) = self.lagging(self.state.tau, target, h);
+            let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
+            let limits = point.limits;
+            point = self.point_at(&state, at);
+            let moved = (0..2).map(|k| (point.limits[k] - limits[k]).abs()).fold(0.0, f64::max);
+            if moved <= 1e-9 * limits[1].max(-limits[0]) || round >= LIMIT_ROUNDS {
+                let powers = point.powers.with(self.point.powers, share);
+                return Passed { state: self.on_the_shaft(state, h), powers, point };
+            }
+        }
+        unreachable!("the last round returns")
     }
 
     /// A part of a step, of `h` (s): the state after it, the mean powers, and the error relative to the allowed one.
     fn part(&self, start: &State, h: f64, at: Temperatures) -> (State, Powers, f64) {
         let free = |[low, high]: [f64; 2]| self.inputs.tau_ref >= low && self.inputs.tau_ref <= high;
-        if !self.inputs.enable {
+        if !self.gates() {
             return self.part_with(start, h, at, Some([0.0; 2])).1;
         }
-        if self.drive.controller.speed_loop.torque_mode {
+        // A reference at the shaft changes with the speed.
+        if self.drive.controller.speed_loop.torque_mode && !self.at_shaft() {
             let limits = self.point_at(start, at).limits;
             if free(limits) {
                 let (end, found) = self.part_with(start, h, at, Some(limits));
@@ -186,7 +211,7 @@ impl PmsmDriveMean {
         }
         let mut end_tau = 0.0;
         if let Some(limits) = limits {
-            let (end, share) = self.lagging(start.tau, limits, h);
+            let (end, share) = self.lagging(start.tau, within(self.inputs.tau_ref, limits), h);
             (end_tau, y.tau) = (end, end + (start.tau - end) * share);
         }
         let one = self.rates(&y, at);
@@ -208,7 +233,7 @@ impl PmsmDriveMean {
         };
         let lagging = |rate: f64| if exact { 0.0 } else { rate };
         // With the gates off, the integral part decays with the lag, unused.
-        let enable = self.inputs.enable;
+        let enable = self.gates();
         let of_loop = |rate: f64| if enable { rate } else { 0.0 };
         let k_1 = solve(lagging(one.tau), of_loop(one.integral), one.speed);
         let ahead =
@@ -235,14 +260,15 @@ impl PmsmDriveMean {
     }
 
     /// The mean `powers` of a part of a step of `h` (s) between two states, balanced with the power to the load and the change
-    /// of the kinetic energy: by the power from the link, or with the gates off by the losses.
+    /// of the kinetic energy: by the power from the link, or without such a power by the losses.
     fn balanced(&self, powers: Powers, [start, end]: [&State; 2], h: f64) -> Powers {
         let kept = 0.5 * self.drive.plant.mechanics.J * (end.speed * end.speed - start.speed * start.speed) / h;
         let p_mech = self.inputs.tau_load * 0.5 * (start.speed + end.speed);
-        if !self.inputs.enable {
+        if !self.gates() && powers.p_in == 0.0 {
             return Powers { p_mech, p_loss: -(p_mech + kept), ..powers };
         }
-        let (p_in, u_dc) = (p_mech + kept + powers.p_loss, self.inputs.u_dc);
+        let p_in = p_mech + kept + powers.p_loss;
+        let u_dc = self.voltage(p_in);
         Powers { p_mech, p_in, i_dc: if u_dc > 0.0 { p_in / u_dc } else { 0.0 }, ..powers }
     }
 }

@@ -1,7 +1,6 @@
 //! The outputs of `PmsmDriveMean`: the steady-state outputs of `PmsmDrive`.
 
 use super::{MeanOutputs, PmsmDriveMean, State};
-use crate::dc_link::LinkOutputs;
 use crate::pmsm_drive::Means;
 use crate::steady::{Point, Region, within};
 use drive_base::frame::{Axis, Phases, Rotor};
@@ -9,7 +8,7 @@ use drive_base::math::wrap;
 use drive_control::commission::{CommissionFault, CommissionState};
 use drive_control::signals::{ControllerOutputs, DqParts};
 use drive_control::start::StartState;
-use drive_control::trip::Cause;
+use drive_plant::inverter::Gates;
 use drive_plant::losses::efficiency;
 use drive_plant::power::Powers;
 use drive_plant::signals::PlantOutputs;
@@ -39,7 +38,7 @@ impl PmsmDriveMean {
             temperatures,
             heat: plant.thermal.heat_at(self.inputs.thermal.coolant, &temperatures, &losses),
         };
-        out.drive.link = LinkOutputs { i_source: powers.i_dc, ..LinkOutputs::none() };
+        out.drive.link = self.link_outputs(point, &powers, &axis);
         out.drive.means = if self.moved { Means { p_in, p_mech, p_loss, tau_shaft } } else { Means::default() };
     }
 
@@ -53,9 +52,10 @@ impl PmsmDriveMean {
 
     /// The outputs of a controller with exact estimates.
     pub(super) fn controller(&self, state: &State, point: &Point) -> ControllerOutputs {
-        let enabled = self.inputs.enable;
+        let enabled = self.gates();
         let (_, theta, axis) = self.angle(state);
-        let Point { i, u, u_share, region, limits: [tau_min, tau_max], tau_ref, weakens, .. } = *point;
+        let Point { i, u, u_share, region, limits: [_, highest], tau_ref, weakens, .. } = *point;
+        let [tau_min, tau_max] = self.limits(state, point);
         let parts = DqParts { d: i.d(), q: i.q() };
         let wanted = within(state.tau, point.limits).abs();
         ControllerOutputs {
@@ -66,15 +66,15 @@ impl PmsmDriveMean {
             i_ref: parts,
             lock_lost: 0.0,
             enabled,
-            voltage_limited: enabled && tau_ref.abs() < wanted - 1e-9 * tau_max,
+            voltage_limited: enabled && tau_ref.abs() < wanted - 1e-9 * highest,
             current_limited: enabled && matches!(region, Region::Limit | Region::Mtpv),
             tau_max,
             tau_min,
             u_share,
             weakens,
-            // Without samples there are no trips, and no sensor is lost.
-            short_circuit: false,
-            tripped: Cause::None,
+            short_circuit: self.bridge() == Gates::Short,
+            tripped: self.trip.cause,
+            // Without samples, no sensor is lost.
             sensor_lost: false,
             R_s_est: self.drive.controller.motor.R_s,
             commission_state: CommissionState::Idle,

@@ -1,5 +1,6 @@
 //! A drive whose steady state is computed, and its operating condition.
 
+use crate::derating::Derating;
 use drive_control::envelope::Envelope;
 use drive_control::settled::Settled;
 use drive_control::tables::ControllerParameters;
@@ -24,6 +25,8 @@ pub struct Steady {
     pub controller: ControllerParameters,
     /// Computed from the controller's parameters.
     pub(super) settled: Settled,
+    /// The maximum torque of a hot winding.
+    pub derating: Derating,
     /// The voltage is constant over the controller's sample period.
     pub(super) sampled: bool,
 }
@@ -42,7 +45,8 @@ pub struct Condition {
 impl Steady {
     /// For these parameters, without regard to the sample period.
     pub fn new(plant: PlantParameters, controller: ControllerParameters) -> Self {
-        let mut drive = Self { plant, controller, settled: Settled::default(), sampled: false };
+        let mut drive =
+            Self { plant, controller, settled: Settled::default(), derating: Derating::default(), sampled: false };
         drive.derive();
         drive
     }

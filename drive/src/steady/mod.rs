@@ -13,7 +13,8 @@
 //! [`Steady::new`] takes the parameters of plant and controller, [`Steady::at`] a [`Condition`]: speed, link voltage and
 //! temperatures. There, [`At::by_reference`] gives the [`Point`] of a torque reference, [`At::by_shaft`] the point of a shaft
 //! torque, [`At::by_current`] the point of a current, [`At::ends`] the points of minimum and maximum torque, which form the
-//! envelope over speed, and [`At::off`] the point with the gates off. [`Steady::warmed`] also computes the temperatures.
+//! envelope over speed, [`At::off`] the point with the gates off, and [`At::shorted`] that of a short circuit. [`Steady::warmed`]
+//! also computes the temperatures.
 //!
 //! The controller's estimates of angle and speed are exact, and nothing is injected. Dead time loses no power. The means of the
 //! inverter are computed for sinusoidal currents. [`Steady::new`] has a controller without a sample period; [`Steady::sampled`]
@@ -25,6 +26,7 @@ mod drive;
 mod flux;
 mod heat;
 mod operating;
+mod rest;
 mod sampling;
 mod search;
 mod voltage;
@@ -32,3 +34,4 @@ mod voltage;
 pub(crate) use drive::within;
 pub use drive::{Condition, Steady};
 pub use operating::{At, Point, Region};
+pub use rest::Diodes;

@@ -70,6 +70,8 @@ pub struct Point {
     pub region: Region,
     /// Field weakening lowers i_d.
     pub weakens: bool,
+    /// The gates are off and the diodes conduct: the flux linkage in Wb at the beginning of a sixth of a period.
+    pub diodes: Option<Dq>,
 }
 
 /// A drive under a condition.
@@ -78,16 +80,16 @@ pub struct At<'a> {
     pub(super) drive: &'a Steady,
     condition: Condition,
     /// The machine at its temperatures.
-    motor: Motor,
+    pub(super) motor: Motor,
     /// Electrical speed in rad/s.
-    w: f64,
+    pub(super) w: f64,
     /// Resistance in Ohm at this speed, and conductance of the iron in S.
-    R: f64,
-    G: f64,
+    pub(super) R: f64,
+    pub(super) G: f64,
     held: HeldVoltage,
     /// Switching loss in W per ampere of the amplitude.
     sw: f64,
-    friction: f64,
+    pub(super) friction: f64,
     settled: SettledAt<'a>,
 }
 
@@ -101,7 +103,7 @@ impl Steady {
 
 impl<'a> At<'a> {
     fn new(drive: &'a Steady, condition: &Condition) -> Self {
-        let Steady { plant, controller, settled, sampled } = drive;
+        let Steady { plant, controller, settled, derating, sampled } = drive;
         let &Condition { speed, u_dc, temperatures } = condition;
         let motor = plant.thermal.motor(&plant.motor, &temperatures);
         let w = f64::from(motor.n_p) * speed;
@@ -118,7 +120,7 @@ impl<'a> At<'a> {
             held: if *sampled { HeldVoltage::new(w * controller.T_s) } else { HeldVoltage::NOT },
             sw,
             friction: plant.mechanics.friction(speed),
-            settled: settled.at(controller, speed, u_dc, 0.0),
+            settled: settled.at(controller, (speed, u_dc), 0.0, derating.share(temperatures.winding)),
         }
     }
 
@@ -140,8 +142,10 @@ impl<'a> At<'a> {
 
     /// This condition, with the trim `trim` (V) of field weakening.
     pub(super) fn trimmed(&self, trim: f64) -> Self {
-        let (Steady { controller, settled, .. }, Condition { speed, u_dc, .. }) = (self.drive, self.condition);
-        Self { settled: settled.at(controller, speed, u_dc, trim), ..self.clone() }
+        let (Steady { controller, settled, derating, .. }, Condition { speed, u_dc, temperatures }) =
+            (self.drive, self.condition);
+        let derating = derating.share(temperatures.winding);
+        Self { settled: settled.at(controller, (speed, u_dc), trim, derating), ..self.clone() }
     }
 
     /// The point of the torque reference `tau` (N.m), which the limits clip.
@@ -252,24 +256,9 @@ impl<'a> At<'a> {
         (loss, drop)
     }
 
-    /// The point with the gates off and blocking diodes: iron and friction brake. Conduction of the diodes above the
-    /// [`diode_speed`](Steady::diode_speed) is not included.
-    pub fn off(&self) -> Point {
-        let Self { drive: Steady { plant, .. }, motor, w, G, .. } = self;
-        let i_m = plant.iron.idle_current(motor, *w);
-        let psi = machine::flux(motor, i_m);
-        let e = psi.turned() * *w;
-        let iron = 1.5 * G * e.dot(e);
-        let losses = Losses { iron, friction: self.friction * self.condition.speed, ..Losses::default() };
-        let tau_e = 1.5 * f64::from(motor.n_p) * psi.cross(i_m);
-        let point = self.point(Point { psi, u: e, tau_e, ..Point::default() }, losses);
-        // The link supplies exactly zero power.
-        Point { powers: Powers { p_in: 0.0, i_dc: 0.0, ..point.powers }, efficiency: 0.0, ..point }
-    }
-
     /// `point` with the powers of its torque and these losses.
     #[inline]
-    fn point(&self, point: Point, losses: Losses) -> Point {
+    pub(super) fn point(&self, point: Point, losses: Losses) -> Point {
         let Condition { speed, u_dc, .. } = self.condition;
         let tau_shaft = point.tau_e - self.friction;
         let (p_mech, p_loss) = (tau_shaft * speed, losses.sum());

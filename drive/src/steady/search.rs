@@ -5,6 +5,9 @@ use super::operating::{At, Point};
 /// Maximum number of evaluations.
 const MAX_EVALUATIONS: usize = 60;
 
+/// Maximum number of evaluations for a reference without a bracket.
+const MAX_CORRECTIONS: usize = 12;
+
 /// Allowed residue of the torque at the shaft, relative and in N.m.
 const SMALL: f64 = 1e-10;
 
@@ -32,6 +35,24 @@ impl At<'_> {
         }
         let bracket = [(low.tau_ref, off(&low)), (high.tau_ref, off(&high))];
         Some(self.by_reference(root(bracket, allowed, |tau_ref| off(&self.by_reference(tau_ref)))))
+    }
+}
+
+impl At<'_> {
+    /// The torque reference (N.m) for the torque `tau` (N.m) at the shaft; beyond the limits it is beyond them by the same excess.
+    pub fn reference_for(&self, tau: f64) -> f64 {
+        let mut reference = tau;
+        for _ in 0..MAX_CORRECTIONS {
+            let point = self.by_reference(reference);
+            // The difference between reference and shaft, which hardly depends on the torque.
+            let next = tau + (point.tau_ref - point.powers.tau_shaft);
+            let settled = (next - reference).abs() <= SMALL * (1.0 + tau.abs());
+            reference = next;
+            if settled {
+                break;
+            }
+        }
+        reference
     }
 }
 

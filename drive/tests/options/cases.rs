@@ -387,6 +387,23 @@ pub(super) const CASES: &[Case] = &[
         acts: |_, [runaway, _], [rest, error]| runaway > 5.0 && rest < 5.0 && error < 1.0,
     },
     Case {
+        option: "start.catch",
+        on: |kind| {
+            let mut pair = turning(drive(kind), SLOW);
+            pair.controller.model.parameters.speed_est = 0.0;
+            pair
+        },
+        ask: |p| p.start.catch = true,
+        // The gates are off until the rotor has been sought; then the drive runs at its angle.
+        figures: |mut pair| {
+            let mut gates = 1.0_f64;
+            run(&mut pair, 0.2, |t, p| gates = if t < 2.5 * T_S && !p.controller.out.enabled { 0.0 } else { gates });
+            [gates, off(&pair)]
+        },
+        // A sensor gives the rotor at once.
+        acts: |kind, [on, _], [gates, error]| on > 0.5 && (gates < 0.5 || kind == Kind::Sensored) && error < 10.0,
+    },
+    Case {
         option: "tracker.kind",
         on: |kind| {
             let mut pair = turning(drive(kind), 0.5 * SLOW);

@@ -86,7 +86,7 @@ const FAULTS: &[(&str, &[&str])] = &[
     ("CRASH", &["L00"]),
 ];
 
-/// Faults at run time that only these groups look at, of both standards.
+/// Faults at run time, for both standards, that only these groups look at.
 const RUNNING: &[(&str, &[&str])] = &[
     ("NONE", &[]),
     // Two in one call come in the wrong order.

@@ -34,7 +34,7 @@ const FAULTS: &[Row] = &[
     // A loop in a step with NaN or with an infinite step: these calls have 1 s.
     ("G07a", &["access"], 120, &["G07a"]),
     ("T02b", &["time"], 120, &["T02b"]),
-    // A loop in every run, of an FMU that is checked as a whole, and one that sleeps.
+    // An endless loop in every run of an FMU that is checked as a whole, and one that sleeps.
     ("HANG", &[], 4, &["L00"]),
     ("WAIT", &["L00"], 2, &["L00"]),
 ];

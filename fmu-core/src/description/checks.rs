@@ -1,9 +1,9 @@
 //! Refuses start values out of range, and ambiguous names, types and units.
 
-use super::{Variable, VariableKind, value};
+use super::{Variable, VariableKind};
 use crate::fault::Fault;
 use crate::row::Slot;
-use crate::unit::Exponents;
+use crate::unit::{Exponents, SECOND};
 use crate::variable::{Kind, Meta, Range};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,7 +23,7 @@ pub(super) fn check_start(name: &str, meta: &Meta, slot: &Slot<'_>) -> Result<()
     if let Kind::Binary { most, .. } = meta.kind {
         return Err(Fault::value(name, format!("{slot} at the start"), format_args!("at most {most} bytes")));
     }
-    Err(Fault::value(name, format!("{:?} at the start", value(slot)), Range::to_string(&meta.range)))
+    Err(Fault::value(name, format!("{slot} at the start"), Range::to_string(&meta.range)))
 }
 
 /// Checks that no two variables or aliases share a name.
@@ -36,10 +36,15 @@ pub(super) fn check_names(model: &str, variables: &[Variable]) -> Result<(), Fau
     }
 }
 
-/// Checks that no type definition has the name of a variable, that no unit has two meanings, and the units of derivatives.
+/// Checks that no type definition has the name of a variable, that type definitions, units and display units have one meaning each,
+/// and the units of derivatives.
 pub(super) fn check_types(variables: &[Variable]) -> Result<(), Fault> {
     let names: BTreeSet<&str> = variables.iter().map(|v| v.name.as_str()).collect();
-    let mut units: BTreeMap<&str, (&Variable, Exponents, f64)> = BTreeMap::new();
+    let mut types: BTreeMap<&str, &Variable> = BTreeMap::new();
+    let mut units: BTreeMap<&str, (&str, Exponents, f64)> = BTreeMap::new();
+    let mut displays: BTreeMap<(&str, &str), (&str, f64, f64)> = BTreeMap::new();
+    // Archives of FMI 3.0 have the unit of time.
+    units.insert(SECOND.unit.name, ("time", SECOND.unit.exponents, SECOND.unit.factor));
     for of in variables {
         let (VariableKind::Real { quantity: name, .. } | VariableKind::Enumeration { name, .. }) = &of.kind else {
             continue;
@@ -47,16 +52,41 @@ pub(super) fn check_types(variables: &[Variable]) -> Result<(), Fault> {
         if names.contains(name.as_str()) {
             return Err(Fault::new(format!("the type definition {name} has the name of a variable")));
         }
-        let VariableKind::Real { unit, exponents, factor, .. } = &of.kind else { continue };
-        let (first, others, another) = units.entry(unit).or_insert((of, *exponents, *factor));
+        let first = types.entry(name).or_insert(of);
+        if !same_type(&first.kind, &of.kind) {
+            let (first, of) = (&first.name, &of.name);
+            return Err(Fault::new(format!("the type definition {name} of {of} differs from that of {first}")));
+        }
+        let VariableKind::Real { unit, exponents, factor, display, .. } = &of.kind else { continue };
+        let (first, others, another) = units.entry(unit).or_insert((&of.name, *exponents, *factor));
         if (*others, *another) != (*exponents, *factor) {
             return Err(Fault::new(format!(
-                "the unit {unit} of {} differs from that of {}: other base units or another factor",
-                of.name, first.name
+                "the unit {unit} of {} differs from that of {first}: other base units or another factor",
+                of.name
             )));
+        }
+        for (shown, factor, offset) in of.aliases.iter().filter_map(|alias| alias.display.as_ref()).chain(display) {
+            let (first, others, another) = displays.entry((unit, shown)).or_insert((&of.name, *factor, *offset));
+            if (*others, *another) != (*factor, *offset) {
+                return Err(Fault::new(format!(
+                    "the display unit {shown} of {} differs from that of {first}: another factor or offset",
+                    of.name
+                )));
+            }
         }
     }
     check_rates(variables)
+}
+
+/// Whether two variables can share a type definition; single precision has a separate one.
+fn same_type(a: &VariableKind, b: &VariableKind) -> bool {
+    match (a, b) {
+        (
+            VariableKind::Real { unit, display, relative, .. },
+            VariableKind::Real { unit: of_b, display: shown, relative: difference, .. },
+        ) => (unit, display, relative) == (of_b, shown, difference),
+        _ => a == b,
+    }
 }
 
 /// Checks that the derivative of each state has its unit per second, if both have one.
@@ -89,7 +119,39 @@ mod tests {
     use super::*;
     use crate::description::variable;
     use crate::row::Row;
-    use crate::unit::{METER, METER_PER_S, METER_PER_S2, ONE, Quantity, Unit};
+    use crate::unit::{
+        DisplayUnit, JOULE, METER, METER_PER_S, METER_PER_S2, NEWTON_METER, ONE, PASCAL, Quantity, Unit,
+    };
+
+    #[test]
+    fn a_name_has_one_meaning() {
+        const BAR: DisplayUnit = DisplayUnit { name: "bar", factor: 1e-5, offset: 0.0 };
+        const GAUGE: DisplayUnit = DisplayUnit { offset: -1.0, ..BAR };
+        const TORQUE: Quantity = Quantity::new("Torque", METER.unit);
+        const LEVER: Quantity = Quantity::new("Lever", Unit::si("N.m", METER.unit.exponents));
+        const MINUTES: Quantity = Quantity::new("Minutes", Unit { factor: 60.0, ..SECOND.unit });
+        const SHOWN: Quantity = PASCAL.shown_in(BAR);
+        const OTHER: Quantity = PASCAL.shown_in(GAUGE);
+        const PRESSURE: Quantity = Quantity { name: "GaugePressure", ..OTHER };
+        let of = |name: &str, quantity| {
+            variable(name.into(), Row::<f64>::output(name.to_owned().leak(), quantity, "", |m| m).meta(), 1, None)
+        };
+        let why = |quantities: [&'static Quantity; 2]| {
+            let [a, b] = quantities.map(|quantity| of(quantity.name.to_lowercase().as_str(), quantity));
+            let b = Variable { name: format!("{}2", b.name), ..b };
+            check_types(&[a, b]).err().map_or_else(String::new, |fault| fault.to_string())
+        };
+        assert_eq!((why([&SHOWN, &SHOWN]), why([&NEWTON_METER, &JOULE])), (String::new(), String::new()));
+        for (pair, start) in [
+            ([&NEWTON_METER, &TORQUE], "the type definition Torque") as ([&'static Quantity; 2], &str),
+            ([&NEWTON_METER, &LEVER], "the unit N.m of lever2 differs from that of torque"),
+            ([&SHOWN, &OTHER], "the type definition Pressure of pressure2 differs"),
+            ([&SHOWN, &PRESSURE], "the display unit bar of gaugepressure2 differs from that of pressure"),
+            ([&METER, &MINUTES], "the unit s of minutes2 differs from that of time"),
+        ] {
+            assert!(why(pair).starts_with(start), "{pair:?}: {}", why(pair));
+        }
+    }
 
     #[test]
     fn a_derivative_has_the_unit_of_its_state_per_second() {

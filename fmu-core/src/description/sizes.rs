@@ -24,11 +24,9 @@ pub(super) fn exchange<M: Model>(can: &Capabilities<M>, states: &[usize]) -> Opt
 }
 
 /// Checks that every array has the length given by its sizes, from the start on.
-pub(super) fn check_sizes<M: Model>(fresh: &Block<M>) -> Result<(), Fault> {
-    if const { !M::TABLE.has_sizes() } {
-        return Ok(());
-    }
-    let mut started = fresh.clone();
+pub(super) fn check_sizes<M: Model>(can: &Capabilities<M>, fresh: &Block<M>) -> Result<(), Fault> {
+    let Some(saving) = can.saved.as_ref().filter(|_| M::TABLE.has_sizes()) else { return Ok(()) };
+    let mut started = saving.block(fresh);
     started.initialize();
     M::TABLE.check_sizes(&mut started)
 }

@@ -13,7 +13,7 @@ use std::ops::Range;
 ///
 /// ```ignore
 /// fn advance(&mut self, step: &Step) -> Result<(), Fault> {
-///     integrate::euler::<Self, 1>(self, step, 0.1)
+///     integrate::euler::<Self, { Self::SCALARS }>(self, step, 0.1)
 /// }
 /// ```
 ///

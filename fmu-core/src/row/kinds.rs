@@ -41,6 +41,8 @@ constructors! {
     output Output Continuous;
     /// A continuous real variable other than an output: a state that importers may read.
     state Local Continuous;
+    /// A continuous real variable, calculated as an output, that is neither an output nor a state.
+    local Local Continuous;
     /// A real output that changes at sample instants.
     discrete_output Output Discrete;
     /// A real variable that is not an output and changes at sample instants.

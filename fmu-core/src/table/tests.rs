@@ -1,4 +1,4 @@
-//! A table of thousands of rows, of which many are arrays.
+//! A table of thousands of rows, many of them arrays.
 #![expect(clippy::large_const_arrays, clippy::large_stack_arrays, reason = "only while compiling")]
 #![expect(clippy::float_cmp, reason = "values as they were set")]
 

@@ -4,6 +4,7 @@
 use super::pointer::{array, numbers, place, room, text};
 use super::types::{FmuState, References};
 use super::{Abi, Answer};
+use crate::instance::Instance;
 use crate::lifecycle::State;
 use crate::value::CValue;
 use crate::{blob, registry};
@@ -141,8 +142,7 @@ impl<E: Exported> Abi<'_, E> {
     }
 
     pub fn reset(&mut self) -> Answer {
-        self.0.reset();
-        Ok(())
+        Ok(self.0.reset()?)
     }
 
     /// `state` points to NULL, or to a state to be overwritten (FMI 2.0.5, 2.1.8; FMI 3.0.2, 2.2.7.4).
@@ -173,14 +173,16 @@ impl<E: Exported> Abi<'_, E> {
     pub unsafe fn serialized_size(&mut self, state: FmuState, size: *mut usize) -> Answer {
         // SAFETY: the importer's variable.
         let size = unsafe { place(size, "size")? };
-        size.write(registry::with::<E::Model, _>(state.addr(), |state| blob::size(state))?);
+        let storing = Instance::<E>::storing()?;
+        size.write(registry::with::<E::Model, _>(state.addr(), |state| blob::size(state, storing))?);
         Ok(())
     }
 
     pub unsafe fn serialize(&mut self, state: FmuState, bytes: *mut u8, size: usize) -> Answer {
         // SAFETY: the importer's array of this size.
         let out = unsafe { room(bytes, size, "serializedState")? };
-        let bytes = registry::with::<E::Model, _>(state.addr(), |state| blob::write(state))?;
+        let storing = Instance::<E>::storing()?;
+        let bytes = registry::with::<E::Model, _>(state.addr(), |state| blob::write(state, storing))?;
         if bytes.len() != size {
             return Err(Fault::value("size", size, format_args!("{} for this state", bytes.len())).into());
         }

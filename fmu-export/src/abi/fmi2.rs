@@ -136,15 +136,29 @@ macro_rules! export_fmi2 {
             guid: Text,
             resources: Text,
             callbacks: *const Fmi2Callbacks,
-            _visible: Fmi2Boolean,
+            visible: Fmi2Boolean,
             logging_on: Fmi2Boolean,
         ) -> InstancePointer {
             $crate::abi::quiet();
             const ENTRY: &Entry = &Entry::new(Standard::Fmi2, Call::Instantiate, "fmi2Instantiate");
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$exported>::fmi2_instantiate(
-                    ENTRY, name, fmu_type, guid, resources, callbacks, logging_on.0 != 0,
+                let (given, logger) = (!callbacks.is_null(), callbacks.as_ref().is_some_and(|c| c.logger.is_some()));
+                $crate::abi::record::open_logged::<$exported>(
+                    ENTRY,
+                    || vec![
+                        ("name", Argument::text(name)),
+                        ("type", fmu_type.argument()),
+                        ("token", Argument::text(guid)),
+                        ("resources", Argument::text(resources)),
+                        ("callbacks", Argument::given(given)),
+                        ("logger", Argument::given(logger)),
+                        ("visible", visible.argument()),
+                        ("logging_on", logging_on.argument()),
+                    ],
+                    || $crate::abi::Abi::<$exported>::fmi2_instantiate(
+                        ENTRY, name, fmu_type, guid, resources, callbacks, logging_on.0 != 0,
+                    ),
                 )
             }
         }
@@ -152,13 +166,13 @@ macro_rules! export_fmi2 {
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn fmi2FreeInstance(instance: InstancePointer) {
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
+            unsafe { $crate::abi::Abi::<$exported>::free_instance(instance, "fmi2FreeInstance") }
         }
 
         $crate::functions! { Fmi2 $exported;
             fmi2SetDebugLogging(on: Fmi2Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
-            fmi2SetupExperiment(_tolerance_defined: Fmi2Boolean, _tolerance: f64, start: f64, stop_defined: Fmi2Boolean, stop: f64)
+            fmi2SetupExperiment(tolerance_defined: Fmi2Boolean, tolerance: f64, start: f64, stop_defined: Fmi2Boolean, stop: f64)
                 => SetupExperiment: set_up(start, (stop_defined.0 != 0).then_some(stop));
             fmi2EnterInitializationMode() => EnterInitialization: enter_initialization();
             fmi2ExitInitializationMode() => ExitInitialization: exit_initialization();
@@ -182,13 +196,13 @@ macro_rules! export_fmi2 {
             fmi2DeSerializeFMUstate(bytes: *const u8, size: usize, state: *mut FmuState)
                 => UseState: deserialize(bytes, size, state);
 
-            fmi2DoStep(t: f64, h: f64, _no_set_state_prior: Fmi2Boolean) => DoStep: fmi2_do_step(t, h);
+            fmi2DoStep(t: f64, h: f64, no_set_state_prior: Fmi2Boolean) => DoStep: fmi2_do_step(t, h);
             fmi2CancelStep() => Unsupported: unsupported("no step is ever in progress");
-            fmi2GetStatus(kind: c_int, _value: *mut c_int) => Status: fmi2_no_status(kind);
+            fmi2GetStatus(kind: c_int, value: *mut c_int) => Status: fmi2_no_status(kind);
             fmi2GetRealStatus(kind: c_int, value: *mut f64) => Status: fmi2_real_status(kind, value);
-            fmi2GetIntegerStatus(kind: c_int, _value: *mut Fmi2Integer) => Status: fmi2_no_status(kind);
+            fmi2GetIntegerStatus(kind: c_int, value: *mut Fmi2Integer) => Status: fmi2_no_status(kind);
             fmi2GetBooleanStatus(kind: c_int, value: *mut Fmi2Boolean) => Status: fmi2_boolean_status(kind, value);
-            fmi2GetStringStatus(kind: c_int, _value: *mut Text) => Status: fmi2_no_status(kind);
+            fmi2GetStringStatus(kind: c_int, value: *mut Text) => Status: fmi2_no_status(kind);
             fmi2SetRealInputDerivatives(vr: References, n: usize, orders: *const c_int, values: *const f64)
                 => InputDerivatives: input_derivatives(vr, n, orders, values);
             fmi2GetRealOutputDerivatives(vr: References, n: usize, orders: *const c_int, values: *mut f64)
@@ -203,7 +217,7 @@ macro_rules! export_fmi2 {
             fmi2EnterEventMode() => EnterEvent: enter_event();
             fmi2NewDiscreteStates(info: *mut Fmi2EventInfo) => UpdateDiscrete: fmi2_new_discrete_states(info);
             fmi2EnterContinuousTimeMode() => EnterContinuous: leave_event();
-            fmi2CompletedIntegratorStep(_no_set_state_prior: Fmi2Boolean, event: *mut Fmi2Boolean, end: *mut Fmi2Boolean)
+            fmi2CompletedIntegratorStep(no_set_state_prior: Fmi2Boolean, event: *mut Fmi2Boolean, end: *mut Fmi2Boolean)
                 => CompletedStep: completed_step(event, end);
             fmi2SetTime(time: f64) => SetTime: set_time(time);
             fmi2SetContinuousStates(x: *const f64, n: usize) => SetStates: set_states(x, n);

@@ -75,6 +75,7 @@ impl<E: Exported> Abi<'_, E> {
     /// # Safety
     /// As [`enter`](Self::enter), and the importer's variables.
     #[inline]
+    #[expect(clippy::too_many_arguments, reason = "the arguments of the standard")]
     pub unsafe fn fmi3_do_step<F: Function>(
         instance: InstancePointer,
         t: f64,
@@ -83,29 +84,34 @@ impl<E: Exported> Abi<'_, E> {
         terminate: *mut Fmi3Boolean,
         early: *mut Fmi3Boolean,
         time: *mut f64,
+        unusual: impl Fn() -> c_int,
     ) -> c_int {
         if const { E::CAN.intermediate.is_none() } {
-            // SAFETY: the caller's promise.
-            return unsafe {
-                enter::<E, F>(instance, |mut abi| {
+            let step = |mut abi: Abi<'_, E>| {
+                // SAFETY: the caller's promise.
+                unsafe {
                     abi.report_step(event, terminate, early, time, |instance| instance.do_step(t, h).map(Then::Done))?;
-                    Ok(())
-                })
+                }
+                Ok(())
             };
+            // SAFETY: the caller's promise.
+            return unsafe { enter::<E, F>(instance, step, unusual) };
         }
         let mut under_way = None;
-        // SAFETY: the caller's promise.
-        unsafe {
-            enter_parts::<E, F>(instance, |mut abi, reply| {
-                let update = abi.report_step(event, terminate, early, time, |instance| {
+        let part = |mut abi: Abi<'_, E>, reply| {
+            // SAFETY: the caller's promise.
+            let update = unsafe {
+                abi.report_step(event, terminate, early, time, |instance| {
                     if instance.inside.is_none() {
                         return instance.do_step(t, h).map(Then::Done);
                     }
                     instance.step_part((t, h), &mut under_way, reply)
-                })?;
-                Ok(update.map(Request::Intermediate))
-            })
-        }
+                })
+            }?;
+            Ok(update.map(Request::Intermediate))
+        };
+        // SAFETY: the caller's promise.
+        unsafe { enter_parts::<E, F>(instance, part, unusual) }
     }
 
     /// Takes a step or a part of it and writes how it ended, or returns the update for the importer inside it.
@@ -146,21 +152,25 @@ impl<E: Exported> Abi<'_, E> {
     ///
     /// # Safety
     /// As [`enter`](Self::enter).
-    pub unsafe fn fmi3_activate<F: Function>(instance: InstancePointer, clock: u32, t: f64) -> c_int {
+    pub unsafe fn fmi3_activate<F: Function>(
+        instance: InstancePointer,
+        clock: u32,
+        t: f64,
+        unusual: impl Fn() -> c_int,
+    ) -> c_int {
         if const { !E::CAN.scheduled } {
             // SAFETY: the caller's promise.
-            return unsafe { enter::<E, F>(instance, |mut abi| abi.unsupported("Scheduled Execution")) };
+            return unsafe { enter::<E, F>(instance, |mut abi| abi.unsupported("Scheduled Execution"), unusual) };
         }
         let mut done = false;
+        let part = |mut abi: Abi<'_, E>, _| {
+            if std::mem::replace(&mut done, true) {
+                return Ok(None);
+            }
+            Ok(abi.activate_partition(clock, t).map_err(as_error)?.then_some(Request::Clocks))
+        };
         // SAFETY: the caller's promise.
-        unsafe {
-            enter_parts::<E, F>(instance, |mut abi, _| {
-                if std::mem::replace(&mut done, true) {
-                    return Ok(None);
-                }
-                Ok(abi.activate_partition(clock, t).map_err(as_error)?.then_some(Request::Clocks))
-            })
-        }
+        unsafe { enter_parts::<E, F>(instance, part, unusual) }
     }
 
     pub unsafe fn fmi3_get_clock(&mut self, vr: References, n: usize, values: *mut Fmi3Boolean) -> Answer {
@@ -325,7 +335,7 @@ macro_rules! export_fmi3 {
             name: Text,
             token: Text,
             resources: Text,
-            _visible: Fmi3Boolean,
+            visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             event_mode_used: Fmi3Boolean,
             early_return_allowed: Fmi3Boolean,
@@ -342,9 +352,25 @@ macro_rules! export_fmi3 {
             let (early, callbacks) = (early_return_allowed.0 != 0, Callbacks { environment, intermediate, ..Callbacks::NONE });
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, logger, interface, early, callbacks,
-                    (required, n_required), None,
+                $crate::abi::record::open_logged::<$exported>(
+                    ENTRY,
+                    || vec![
+                        ("name", Argument::text(name)),
+                        ("token", Argument::text(token)),
+                        ("resources", Argument::text(resources)),
+                        ("visible", visible.argument()),
+                        ("logging_on", logging_on.argument()),
+                        ("event_mode_used", event_mode_used.argument()),
+                        ("early_return_allowed", early_return_allowed.argument()),
+                        ("required", required.argument()),
+                        ("n", n_required.argument()),
+                        ("logger", Argument::given(logger.is_some())),
+                        ("intermediate", Argument::given(intermediate.is_some())),
+                    ],
+                    || $crate::abi::Abi::<$exported>::fmi3_instantiate(
+                        ENTRY, name, token, resources, logging_on, logger, interface, early, callbacks,
+                        (required, n_required), None,
+                    ),
                 )
             }
         }
@@ -354,7 +380,7 @@ macro_rules! export_fmi3 {
             name: Text,
             token: Text,
             resources: Text,
-            _visible: Fmi3Boolean,
+            visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             environment: *mut c_void,
             logger: Option<Fmi3Logger>,
@@ -364,8 +390,19 @@ macro_rules! export_fmi3 {
             let (interface, callbacks) = (Interface::ModelExchange, Callbacks { environment, ..Callbacks::NONE });
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), None,
+                $crate::abi::record::open_logged::<$exported>(
+                    ENTRY,
+                    || vec![
+                        ("name", Argument::text(name)),
+                        ("token", Argument::text(token)),
+                        ("resources", Argument::text(resources)),
+                        ("visible", visible.argument()),
+                        ("logging_on", logging_on.argument()),
+                        ("logger", Argument::given(logger.is_some())),
+                    ],
+                    || $crate::abi::Abi::<$exported>::fmi3_instantiate(
+                        ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), None,
+                    ),
                 )
             }
         }
@@ -375,7 +412,7 @@ macro_rules! export_fmi3 {
             name: Text,
             token: Text,
             resources: Text,
-            _visible: Fmi3Boolean,
+            visible: Fmi3Boolean,
             logging_on: Fmi3Boolean,
             environment: *mut c_void,
             logger: Option<Fmi3Logger>,
@@ -390,8 +427,22 @@ macro_rules! export_fmi3 {
             let callbacks = Callbacks { environment, clock_update, preemption, ..Callbacks::NONE };
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$exported>::fmi3_instantiate(
-                    ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), None,
+                $crate::abi::record::open_logged::<$exported>(
+                    ENTRY,
+                    || vec![
+                        ("name", Argument::text(name)),
+                        ("token", Argument::text(token)),
+                        ("resources", Argument::text(resources)),
+                        ("visible", visible.argument()),
+                        ("logging_on", logging_on.argument()),
+                        ("logger", Argument::given(logger.is_some())),
+                        ("clock_update", Argument::given(clock_update.is_some())),
+                        ("lock", Argument::given(lock.is_some())),
+                        ("unlock", Argument::given(unlock.is_some())),
+                    ],
+                    || $crate::abi::Abi::<$exported>::fmi3_instantiate(
+                        ENTRY, name, token, resources, logging_on, logger, interface, false, callbacks, (null(), 0), None,
+                    ),
                 )
             }
         }
@@ -399,7 +450,7 @@ macro_rules! export_fmi3 {
         #[unsafe(no_mangle)]
         pub(crate) unsafe extern "C" fn fmi3FreeInstance(instance: InstancePointer) {
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$exported>::free_instance(instance) }
+            unsafe { $crate::abi::Abi::<$exported>::free_instance(instance, "fmi3FreeInstance") }
         }
 
         #[unsafe(no_mangle)]
@@ -407,7 +458,7 @@ macro_rules! export_fmi3 {
             instance: InstancePointer,
             t: f64,
             h: f64,
-            _no_set_state_prior: Fmi3Boolean,
+            no_set_state_prior: Fmi3Boolean,
             event_handling_needed: *mut Fmi3Boolean,
             terminate_simulation: *mut Fmi3Boolean,
             early_return: *mut Fmi3Boolean,
@@ -421,6 +472,10 @@ macro_rules! export_fmi3 {
             unsafe {
                 $crate::abi::Abi::<$exported>::fmi3_do_step::<Here>(
                     instance, t, h, event_handling_needed, terminate_simulation, early_return, last_successful_time,
+                    $crate::unusual!($exported, fmi3DoStep(
+                        instance, t: f64, h: f64, no_set_state_prior: Fmi3Boolean, event_handling_needed: *mut Fmi3Boolean,
+                        terminate_simulation: *mut Fmi3Boolean, early_return: *mut Fmi3Boolean, last_successful_time: *mut f64
+                    )),
                 )
             }
         }
@@ -436,13 +491,18 @@ macro_rules! export_fmi3 {
                 );
             }
             // SAFETY: what the standard demands of the importer.
-            unsafe { $crate::abi::Abi::<$exported>::fmi3_activate::<Here>(instance, clock, t) }
+            unsafe {
+                $crate::abi::Abi::<$exported>::fmi3_activate::<Here>(
+                    instance, clock, t,
+                    $crate::unusual!($exported, fmi3ActivateModelPartition(instance, clock: u32, t: f64)),
+                )
+            }
         }
 
         $crate::functions! { Fmi3 $exported;
             fmi3SetDebugLogging(on: Fmi3Boolean, n: usize, categories: *const Text)
                 => SetDebugLogging: set_debug_logging(on.0 != 0, n, categories);
-            fmi3EnterInitializationMode(_tolerance_defined: Fmi3Boolean, _tolerance: f64, start: f64, stop_defined: Fmi3Boolean, stop: f64)
+            fmi3EnterInitializationMode(tolerance_defined: Fmi3Boolean, tolerance: f64, start: f64, stop_defined: Fmi3Boolean, stop: f64)
                 => EnterInitialization: set_up(start, (stop_defined.0 != 0).then_some(stop));
             fmi3ExitInitializationMode() => ExitInitialization: exit_initialization();
             fmi3Terminate() => Terminate: terminate();
@@ -511,11 +571,11 @@ macro_rules! export_fmi3 {
             ) => Sensitivity: directional(
                 (unknowns, n_unknowns), (knowns, n_knowns), (seed, n_seed), (sensitivity, n_sensitivity), true
             );
-            fmi3GetNumberOfVariableDependencies(_vr: u32, _n: *mut usize)
+            fmi3GetNumberOfVariableDependencies(vr: u32, n: *mut usize)
                 => Unsupported: unsupported("providesPerElementDependencies = false");
             fmi3GetVariableDependencies(
-                _dependent: u32, _elements: *mut usize, _independents: *mut u32, _of_independents: *mut usize,
-                _kinds: *mut c_int, _n: usize
+                dependent: u32, elements: *mut usize, independents: *mut u32, of_independents: *mut usize,
+                kinds: *mut c_int, n: usize
             ) => Unsupported: unsupported("providesPerElementDependencies = false");
             fmi3EnterConfigurationMode() => EnterConfiguration if resizable: enter_configuration();
             fmi3ExitConfigurationMode() => ExitConfiguration if resizable: exit_configuration();
@@ -531,15 +591,15 @@ macro_rules! export_fmi3 {
                 => Shift if clocked: fmi3_get_shift_fraction(vr, n, counters, resolutions);
             fmi3SetIntervalDecimal(vr: References, n: usize, intervals: *const f64)
                 => SetInterval if clocked: fmi3_set_interval(vr, n, intervals);
-            fmi3SetIntervalFraction(vr: References, n: usize, _counters: *const u64, _resolutions: *const u64)
+            fmi3SetIntervalFraction(vr: References, n: usize, counters: *const u64, resolutions: *const u64)
                 => SetInterval if clocked: fmi3_no_fraction(vr, n);
             fmi3SetShiftDecimal(vr: References, n: usize, shifts: *const f64)
                 => Shift if clocked: fmi3_set_shift(vr, n, shifts);
-            fmi3SetShiftFraction(vr: References, n: usize, _counters: *const u64, _resolutions: *const u64)
+            fmi3SetShiftFraction(vr: References, n: usize, counters: *const u64, resolutions: *const u64)
                 => Shift if clocked: fmi3_no_fraction(vr, n);
 
             fmi3EnterContinuousTimeMode() => EnterContinuous: leave_event();
-            fmi3CompletedIntegratorStep(_no_set_state_prior: Fmi3Boolean, event: *mut Fmi3Boolean, end: *mut Fmi3Boolean)
+            fmi3CompletedIntegratorStep(no_set_state_prior: Fmi3Boolean, event: *mut Fmi3Boolean, end: *mut Fmi3Boolean)
                 => CompletedStep: completed_step(event, end);
             fmi3SetTime(time: f64) => SetTime: set_time(time);
             fmi3SetContinuousStates(x: *const f64, n: usize) => SetStates: set_states(x, n);

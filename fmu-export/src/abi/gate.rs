@@ -2,30 +2,32 @@
 //! logs failures, and advances the lifecycle. Only this file dereferences an instance's pointer.
 
 use super::callbacks::{Callbacks, Lock, Request};
+use super::fault::panicked;
 use super::{Abi, Answer, Wanted};
-use crate::blob;
+use crate::call_log::CallLog;
 use crate::inside::Reply;
 use crate::instance::{Instance, Refusal};
 use crate::lifecycle::{Allowed, Call, Next, Standard};
 use crate::log::{Log, Status};
 use crate::message;
-use crate::preset::Made;
+use crate::origin::Origin;
 use crate::resources::folder;
 use crate::snapshot::Snapshot;
-use fmu_core::{Exported, Fault, Interface, Model};
-use std::any::Any;
+use fmu_core::call_log::{CallEnd, LogValue};
+use fmu_core::{Exported, Fault, Interface};
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::{CStr, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{
-    AtomicBool,
+    AtomicBool, AtomicU8,
     Ordering::{Acquire, Relaxed, Release},
 };
+use std::sync::{Mutex, PoisonError};
 
 /// The called function: its name in C and its row of the lifecycle table.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
-    name: &'static str,
+    pub(super) name: &'static str,
     pub(crate) standard: Standard,
     allowed: Allowed,
     next: Next,
@@ -45,37 +47,95 @@ pub trait Function {
     const ENTRY: Entry;
 }
 
-/// Target of the importer's pointer. `busy` during a call: a logger that calls back is refused. `calling` while a callback runs
-/// for a call in progress: the lifecycle table lists the calls that it may make.
-struct Handle<E: Exported> {
-    busy: AtomicBool,
+/// No call uses the instance.
+pub(super) const FREE: u8 = 0;
+/// A call uses it: a logger that calls back is refused.
+const BUSY: u8 = 1;
+/// No call uses it, and the next one is written into its call log. To a call, it is as unusual as a busy one, so that the log
+/// costs nothing where there is none.
+pub(super) const LOGGED: u8 = 2;
+
+/// Target of the importer's pointer. `calling` while a callback runs for a call in progress: the lifecycle table lists the calls
+/// that it may make.
+pub(super) struct Handle<E: Exported> {
+    /// [`FREE`], [`BUSY`] or [`LOGGED`].
+    usage: AtomicU8,
     calling: AtomicBool,
     callbacks: Callbacks,
+    /// The call log, if the importer asked for one.
+    pub(super) calls: Option<Box<Mutex<CallLog>>>,
     instance: UnsafeCell<Instance<E>>,
 }
 
 impl<E: Exported> Handle<E> {
-    /// Whether this call has exclusive access to the instance. In Scheduled Execution, calls of several threads interleave.
+    /// Whether this call now has the instance, which was used as stated. In Scheduled Execution, calls of several threads
+    /// interleave.
     #[inline]
-    fn take(&self) -> bool {
+    pub(super) fn take(&self, usage: u8) -> bool {
         if const { E::CAN.scheduled } {
-            return !self.busy.swap(true, Acquire);
+            return self.usage.compare_exchange(usage, BUSY, Acquire, Relaxed).is_ok();
         }
-        let busy = self.busy.load(Relaxed);
-        self.busy.store(true, Relaxed);
-        !busy
+        let found = self.usage.load(Relaxed) == usage;
+        if found {
+            self.usage.store(BUSY, Relaxed);
+        }
+        found
     }
 
     #[inline]
     fn give(&self) {
-        self.busy.store(false, if const { E::CAN.scheduled } { Release } else { Relaxed });
+        self.give_as(FREE);
+    }
+
+    #[inline]
+    pub(super) fn give_as(&self, usage: u8) {
+        self.usage.store(usage, if const { E::CAN.scheduled } { Release } else { Relaxed });
     }
 
     /// Locks the importer's scheduler for a call that it may interrupt, unless the call comes from a callback.
-    #[inline]
-    fn lock<F: Function>(&self) -> Option<Lock> {
-        let locks = const { E::CAN.scheduled && F::ENTRY.preempted };
-        if locks && CALLING.get() != self.address() { self.callbacks.lock() } else { None }
+    fn lock(&self) -> Option<Lock> {
+        if CALLING.get() == self.address() { None } else { self.callbacks.lock() }
+    }
+
+    /// Follows the importer's pointer.
+    ///
+    /// # Safety
+    /// As [`enter`], and the pointer is not NULL.
+    pub(super) unsafe fn behind<'a>(pointer: *mut c_void) -> &'a Self {
+        // SAFETY: the caller's promise.
+        unsafe { &*pointer.cast::<Self>() }
+    }
+
+    /// Gives the new instance behind a pointer a call log.
+    ///
+    /// # Safety
+    /// The pointer comes from [`open`] for the same `E`, and the importer has not got it yet.
+    pub(super) unsafe fn keep_log(pointer: *mut c_void, log: CallLog) {
+        // SAFETY: the caller's promise.
+        let handle = unsafe { &mut *pointer.cast::<Self>() };
+        handle.calls = Some(Box::new(Mutex::new(log)));
+        handle.give_as(LOGGED);
+    }
+
+    /// The instance, while this call has it.
+    ///
+    /// # Safety
+    /// [`take`](Self::take) has succeeded, and nothing gives the instance back during `'a`.
+    pub(super) unsafe fn taken(&self) -> &Instance<E> {
+        // SAFETY: no other call has it, and no other thread uses it.
+        unsafe { &*self.instance.get() }
+    }
+
+    /// Makes a call with the instance, now free, for a call that has the scheduler's lock already.
+    pub(super) fn free_for(&self, call: &dyn Fn() -> c_int) -> c_int {
+        self.give();
+        if const { !E::CAN.scheduled } {
+            return call();
+        }
+        let outer = CALLING.replace(self.address());
+        let code = call();
+        CALLING.set(outer);
+        code
     }
 
     fn address(&self) -> *const () {
@@ -88,7 +148,7 @@ thread_local! {
     static CALLING: Cell<*const ()> = const { Cell::new(std::ptr::null()) };
 }
 
-/// Passes a call to the instance.
+/// Passes a call to the instance; `unusual` answers if it is not free.
 ///
 /// # Safety
 /// `pointer` is NULL, or comes from [`open`] for the same `E` and was not closed; no other thread uses it now.
@@ -96,22 +156,35 @@ thread_local! {
 pub(crate) unsafe fn enter<E: Exported, F: Function>(
     pointer: *mut c_void,
     body: impl FnOnce(Abi<'_, E>) -> Answer,
+    unusual: impl FnOnce() -> c_int,
 ) -> c_int {
     if pointer.is_null() {
         return Status::Error as c_int;
     }
     // SAFETY: the caller's promise.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
-    let _lock = handle.lock::<F>();
-    pass_one::<E, F>(handle, body)
+    if const { !locks::<E, F>() } {
+        return pass_one::<E, F>(handle, body, unusual);
+    }
+    let _lock = handle.lock();
+    pass_one::<E, F>(handle, body, unusual)
+}
+
+/// Whether a call locks the importer's scheduler, which may interrupt it.
+const fn locks<E: Exported, F: Function>() -> bool {
+    E::CAN.scheduled && F::ENTRY.preempted
 }
 
 #[inline]
-fn pass_one<E: Exported, F: Function>(handle: &Handle<E>, body: impl FnOnce(Abi<'_, E>) -> Answer) -> c_int {
-    if !handle.take() {
-        return Status::Error as c_int;
+fn pass_one<E: Exported, F: Function>(
+    handle: &Handle<E>,
+    body: impl FnOnce(Abi<'_, E>) -> Answer,
+    unusual: impl FnOnce() -> c_int,
+) -> c_int {
+    if !handle.take(FREE) {
+        return unusual();
     }
-    // SAFETY: `busy` was false, so no other call of this thread holds the instance, and no other thread uses it.
+    // SAFETY: it was free, so no other call of this thread holds the instance, and no other thread uses it.
     let instance = unsafe { &mut *handle.instance.get() };
     let status =
         if const { calls_back::<E>() } && handle.calling.load(Relaxed) && !instance.current.life.state().calls_back() {
@@ -138,38 +211,40 @@ const fn calls_back<E: Exported>() -> bool {
 pub(crate) unsafe fn enter_parts<E: Exported, F: Function>(
     pointer: *mut c_void,
     mut part: impl FnMut(Abi<'_, E>, Reply) -> Result<Option<Request>, Refusal>,
+    unusual: impl Fn() -> c_int,
 ) -> c_int {
     if pointer.is_null() {
         return Status::Error as c_int;
     }
     // SAFETY: the caller's promise; the instance lives on, because `close` does not free an instance during a callback.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
-    let _lock = handle.lock::<F>();
+    let _lock = if const { locks::<E, F>() } { handle.lock() } else { None };
     let mut reply = None;
     loop {
         let mut request = None;
-        let status = pass_one::<E, F>(handle, |mut abi| {
+        let pass = |mut abi: Abi<'_, E>| {
             request = part(Abi(&mut *abi.0), reply)?;
             if request.is_some() {
                 abi.current.life.call_back();
             }
             Ok(())
-        });
+        };
+        let status = pass_one::<E, F>(handle, pass, &unusual);
         let Some(request) = request else { return status };
         handle.calling.store(true, Relaxed);
         if const { E::CAN.scheduled } {
             let outer = CALLING.replace(handle.address());
-            reply = handle.callbacks.call(request);
+            reply = handle.call_back(request);
             CALLING.set(outer);
         } else {
-            reply = handle.callbacks.call(request);
+            reply = handle.call_back(request);
         }
         handle.calling.store(false, Relaxed);
         // Another thread may be in a call, if the importer passed no lock.
-        while !handle.take() {
+        while !handle.take(FREE) && !handle.take(LOGGED) {
             std::thread::yield_now();
         }
-        // SAFETY: `busy` was false, as in `pass_one`.
+        // SAFETY: no call had it, as in `pass_one`.
         let instance = unsafe { &mut *handle.instance.get() };
         let waited = instance.current.life.called_back();
         if !waited {
@@ -231,12 +306,6 @@ fn misplaced<E: Exported>(entry: &'static Entry, instance: &Instance<E>) -> Faul
     Fault::new(format!("not allowed in the state {state}; allowed in: {allowed}"))
 }
 
-pub(super) fn panicked(payload: &(dyn Any + Send)) -> Fault {
-    let text = payload.downcast_ref::<&str>().copied();
-    let text = text.or_else(|| payload.downcast_ref::<String>().map(String::as_str));
-    Fault::new(format!("a fault in the model's code (panic): {}", text.unwrap_or("no message")))
-}
-
 /// How the importer makes communication steps.
 #[derive(Clone, Copy)]
 pub(crate) struct Steps<'a> {
@@ -262,25 +331,14 @@ pub(crate) fn open<E: Exported>(
     interface: Interface,
     steps: Steps<'_>,
 ) -> *mut c_void {
-    let make = |suffix: &str| {
-        let made = catch_unwind(|| {
-            let resources = folder(resources);
-            let mut block = Made::<E::Model>::asked(&E::CAN, resources.as_deref(), suffix)?.block;
-            block.model.load(resources.as_deref())?;
-            if const { E::Model::TABLE.has_sizes() } {
-                // The arrays of its outputs get their lengths.
-                block.initialize();
-            }
-            let shelf = blob::shelf(&block.model);
-            Ok((block, shelf))
-        });
+    let make = |suffix: String| {
+        let made = catch_unwind(|| Origin::open::<E>(folder(resources), suffix));
         made.unwrap_or_else(|payload| Err(panicked(payload.as_ref())))
     };
-    match wanted.and_then(|Wanted { name, suffix }| Ok((name, make(&suffix)?, suffix))) {
-        Ok((name, (block, shelf), suffix)) => {
-            let made = (!shelf.is_empty() || !suffix.is_empty()).then(|| Box::new(block.clone()));
+    match wanted.and_then(|Wanted { name, suffix }| Ok((name, make(suffix)?))) {
+        Ok((name, (origin, block, shelf))) => {
             let mut instance = Instance::<E>::new(entry.standard, name, log, Snapshot::of(interface, block));
-            (instance.shelf, instance.made, instance.early_return) = (shelf, made, steps.early_return);
+            (instance.shelf, instance.origin, instance.early_return) = (shelf, origin, steps.early_return);
             if const { E::CAN.intermediate.is_some() }
                 && steps.callbacks.intermediate.is_some()
                 && let Err(fault) = instance.look_inside(steps.required)
@@ -288,9 +346,9 @@ pub(crate) fn open<E: Exported>(
                 instance.log.error(&format!("{}: {fault}", entry.name));
                 return std::ptr::null_mut();
             }
-            let (busy, calling) = (AtomicBool::new(false), AtomicBool::new(false));
+            let (usage, calling) = (AtomicU8::new(FREE), AtomicBool::new(false));
             let instance = UnsafeCell::new(instance);
-            Box::into_raw(Box::new(Handle { busy, calling, callbacks: steps.callbacks, instance })).cast()
+            Box::into_raw(Box::new(Handle { usage, calling, callbacks: steps.callbacks, calls: None, instance })).cast()
         }
         Err(fault) => {
             log.error(&format!("{}: {fault}", entry.name));
@@ -303,14 +361,64 @@ pub(crate) fn open<E: Exported>(
 ///
 /// # Safety
 /// As [`enter`]; the pointer is not used again.
-pub(crate) unsafe fn close<E: Exported>(pointer: *mut c_void) {
+pub(crate) unsafe fn close<E: Exported>(pointer: *mut c_void, name: &'static str) {
     if pointer.is_null() {
         return;
     }
     // SAFETY: the caller's promise.
     let handle = unsafe { &*pointer.cast::<Handle<E>>() };
-    if !handle.busy.load(Acquire) && !handle.calling.load(Relaxed) {
-        // SAFETY: from `open`, closed once by the caller's promise, not in use. A panic in a model's drop stops here.
-        let _ = catch_unwind(AssertUnwindSafe(|| drop(unsafe { Box::from_raw(pointer.cast::<Handle<E>>()) })));
+    if handle.usage.load(Acquire) == BUSY || handle.calling.load(Relaxed) {
+        if let Some(calls) = &handle.calls {
+            write(calls, |log| {
+                log.begin(None, name, &[]);
+                log.end(&ended("ignored"));
+            });
+        }
+        return;
     }
+    // SAFETY: from `open`, closed once by the caller's promise, not in use.
+    let mut handle = unsafe { Box::from_raw(pointer.cast::<Handle<E>>()) };
+    let calls = handle.calls.take();
+    if let Some(calls) = &calls {
+        write(calls, |log| log.begin(Some(handle.instance.get_mut().current.end), name, &[]));
+    }
+    // A panic in a model's drop stops here.
+    let _ = catch_unwind(AssertUnwindSafe(|| drop(handle)));
+    if let Some(calls) = &calls {
+        write(calls, |log| log.end(&ended("done")));
+    }
+}
+
+impl<E: Exported> Handle<E> {
+    /// Calls the importer, and records that.
+    fn call_back(&self, request: Request) -> Reply {
+        let Some(calls) = &self.calls else { return self.callbacks.call(request) };
+        write(calls, |log| {
+            let (time, name, values) = match request {
+                Request::Intermediate(pause) => {
+                    let can_return =
+                        ("can_return".to_owned(), LogValue::Number(u8::from(pause.can_return).to_string()));
+                    (Some(pause.time), "intermediateUpdate", vec![can_return])
+                }
+                Request::Clocks => (None, "clockUpdate", Vec::new()),
+            };
+            log.begin(time, name, &values);
+        });
+        self.give_as(LOGGED);
+        let reply = self.callbacks.call(request);
+        write(calls, |log| {
+            let results = reply.map(|time| ("early_return".to_owned(), LogValue::Number(format!("{time:?}"))));
+            log.end(&CallEnd { status: "done".into(), results: results.into_iter().collect() });
+        });
+        reply
+    }
+}
+
+/// Writes into a log.
+pub(super) fn write<T>(calls: &Mutex<CallLog>, work: impl FnOnce(&mut CallLog) -> T) -> T {
+    work(&mut calls.lock().unwrap_or_else(PoisonError::into_inner))
+}
+
+pub(super) fn ended(how: &str) -> CallEnd {
+    CallEnd { status: how.into(), results: Vec::new() }
 }

@@ -1,6 +1,7 @@
 //! The C interface: the only place with `unsafe`. It only turns pointers into Rust values.
 //!
-//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `calls.rs` contains the calls that both
+//! Every call passes `gate.rs`, which also calls the importer back ([`callbacks`]); `record.rs` writes the calls of instances with a
+//! call log, from pointers to values by [`recorded`]; `calls.rs` contains the calls that both
 //! standards share; [`fmi2`] and [`fmi3`] are the tables of their functions, from which [`export!`](crate::export) generates C
 //! functions.
 
@@ -12,6 +13,9 @@ pub mod fmi3;
 mod gate;
 mod logger;
 mod pointer;
+pub mod record;
+pub mod recorded;
+mod structs;
 pub mod types;
 
 use crate::blob;
@@ -19,7 +23,7 @@ use crate::instance::{Instance, Refusal};
 use crate::preset::Made;
 use crate::snapshot::Snapshot;
 use fmu_core::description::Dependencies;
-use fmu_core::{Description, Exported, Fault, Interface, Model, preset};
+use fmu_core::{Capabilities, Description, Exported, Fault, Interface, Model, preset};
 use std::ffi::{CStr, c_int, c_void};
 use std::ops::{Deref, DerefMut};
 use std::panic::{catch_unwind, set_hook};
@@ -56,16 +60,19 @@ impl<E: Exported> Abi<'_, E> {
     pub unsafe fn enter<F: types::Function>(
         instance: InstancePointer,
         body: impl FnOnce(Abi<'_, E>) -> Answer,
+        unusual: impl FnOnce() -> c_int,
     ) -> c_int {
         // SAFETY: the caller's promise.
-        unsafe { gate::enter::<E, F>(instance, body) }
+        unsafe { gate::enter::<E, F>(instance, body, unusual) }
     }
 
+    /// Frees an instance in the function `name`.
+    ///
     /// # Safety
     /// The instance is NULL, or one that this binary made and has not freed; it is not in use now and not used again.
-    pub unsafe fn free_instance(instance: InstancePointer) {
+    pub unsafe fn free_instance(instance: InstancePointer, name: &'static str) {
         // SAFETY: the caller's promise.
-        unsafe { gate::close::<E>(instance) }
+        unsafe { gate::close::<E>(instance, name) }
     }
 
     /// Passes the model's description to `sink` as JSON and returns 0, or a message and 1. `resources` is the folder of the
@@ -84,7 +91,7 @@ impl<E: Exported> Abi<'_, E> {
         let resources = crate::resources::folder(unsafe { pointer::text(resources) });
         let json = catch_unwind(|| {
             let mut made = Made::<E::Model>::described(&E::CAN, resources.as_deref())?;
-            if changes_on_loading(&made, resources.as_deref())? {
+            if changes_on_loading(&E::CAN, &made, resources.as_deref())? {
                 return Err(Fault::new("load changes what a state saves: store what it reads in a Resource"));
             }
             made.block.model.load(resources.as_deref())?;
@@ -92,7 +99,7 @@ impl<E: Exported> Abi<'_, E> {
             description.token.push_str(&made.suffix);
             serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
         });
-        let json = json.unwrap_or_else(|payload| Err(gate::panicked(payload.as_ref())));
+        let json = json.unwrap_or_else(|payload| Err(fault::panicked(payload.as_ref())));
         let (text, status) = match json {
             Ok(text) => (text, 0),
             Err(fault) => (fault.to_string(), 1),
@@ -103,13 +110,18 @@ impl<E: Exported> Abi<'_, E> {
 }
 
 /// Whether `load` changes more than resources: a reset would undo the change, and a saved state would contain it.
-fn changes_on_loading<M: Model>(made: &Made<M>, resources: Option<&Path>) -> Result<bool, Fault> {
-    let fresh = || Snapshot::of(Interface::CoSimulation, made.block.clone());
+fn changes_on_loading<M: Model>(
+    can: &Capabilities<M>,
+    made: &Made<M>,
+    resources: Option<&Path>,
+) -> Result<bool, Fault> {
+    let (Some(saving), Some(storing)) = (&can.saved, &can.stored) else { return Ok(false) };
+    let fresh = || Snapshot::of(Interface::CoSimulation, saving.block(&made.block));
     let mut loaded = fresh();
     loaded.block.model.load(resources)?;
-    let before = blob::write(&fresh())?;
+    let before = blob::write(&fresh(), storing)?;
     // A model whose bytes vary from run to run, for example because of a hash map, cannot be compared.
-    Ok(before == blob::write(&fresh())? && before != blob::write(&loaded)?)
+    Ok(before == blob::write(&fresh(), storing)? && before != blob::write(&loaded, storing)?)
 }
 
 /// A panic becomes a log message, so the hook that would print it is silenced; where a panic ends the program, the hook keeps
@@ -177,13 +189,17 @@ macro_rules! functions {
             }
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::Abi::<$exported>::enter::<Here>(instance, |mut abi| {
-                    $(if const { <$exported as Exported>::CAN.$capability.is_none() } {
-                        return abi.unsupported($crate::abi::lacks(stringify!($capability)));
-                    })?
-                    abi.$function($($passed),*)?;
-                    Ok(())
-                })
+                $crate::abi::Abi::<$exported>::enter::<Here>(
+                    instance,
+                    |mut abi| {
+                        $(if const { <$exported as Exported>::CAN.$capability.is_none() } {
+                            return abi.unsupported($crate::abi::lacks(stringify!($capability)));
+                        })?
+                        abi.$function($($passed),*)?;
+                        Ok(())
+                    },
+                    $crate::unusual!($exported, $name(instance $(, $argument: $type)*)),
+                )
             }
         }
     )* };
@@ -239,7 +255,10 @@ macro_rules! functions {
 /// ```
 #[macro_export]
 macro_rules! export {
-    ($model:ty $(: $first:ident $(+ $more:ident)*)?) => {
+    ($model:ty: Unsaved $(+ $more:ident)*) => { $crate::export!(@ $model, unsaved $($more)*); };
+    ($model:ty: Unstored $(+ $more:ident)*) => { $crate::export!(@ $model, unstored $($more)*); };
+    ($model:ty $(: $first:ident $(+ $more:ident)*)?) => { $crate::export!(@ $model, stored $($first $($more)*)?); };
+    (@ $model:ty, $keeps:ident $($more:ident)*) => {
         #[allow(non_snake_case, unused_imports, clippy::wildcard_imports, clippy::too_many_arguments)]
         mod fmi {
             use super::*;
@@ -250,7 +269,7 @@ macro_rules! export {
             impl $crate::Exported for This {
                 type Model = $model;
                 const CAN: $crate::Capabilities<$model> =
-                    $crate::Capabilities::<$model>::NONE$(.$first()$(.$more())*)?;
+                    $crate::Capabilities::<$model>::$keeps()$(.$more())*;
             }
 
             const _: () = $crate::check::<This>();

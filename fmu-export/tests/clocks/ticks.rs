@@ -1,4 +1,4 @@
-//! Ticks in Event Mode, intervals, and what a saved state has of them.
+//! Ticks in Event Mode, intervals, and their place in a saved state.
 
 use super::*;
 

@@ -118,7 +118,9 @@ impl Model for Probe {
 
     fn initialize(&mut self) {
         assert!(self.n != 13, "thirteen is bad luck");
-        self.x = self.u / self.r * f64::from(self.n);
+        // Not a number with a map that `validate` refuses.
+        let inverted = 0.0 * (self.map[2] - self.map[0]).min(0.0).sqrt();
+        self.x = self.u / self.r * f64::from(self.n) + inverted;
         self.steps = 0;
     }
 

@@ -122,17 +122,17 @@ fn a_token_without_its_preset_is_refused_with_the_cause() {
     fs::create_dir(directory.0.join(preset::FILE)).unwrap();
     let large = Folder::new(&vec![b'x'; (1 << 20) + 1]);
     for way in WAYS {
-        let no_folder = "resources/fmu-preset.txt, the start values of this FMU, and the importer names no folder";
+        let no_folder = "resources/fmu-preset.json, the start values of this FMU, and the importer names no folder";
         let changed = "its hash is {";
         let names = [&empty, &other, &directory, &large].map(|folder| folder.name(way));
         for (resources, why) in [
             (None, no_folder),
             (Some(""), no_folder),
             (Some("http://example.org/resources"), no_folder),
-            (Some("/does/not/exist"), "/does/not/exist/fmu-preset.txt: No such file or directory"),
-            (Some(&names[0]), "fmu-preset.txt: No such file or directory (os error 2); this file of the archive has"),
+            (Some("/does/not/exist"), "/does/not/exist/fmu-preset.json: No such file or directory"),
+            (Some(&names[0]), "fmu-preset.json: No such file or directory (os error 2); this file of the archive has"),
             (Some(&names[1]), changed),
-            (Some(&names[2]), "fmu-preset.txt: is not a file"),
+            (Some(&names[2]), "fmu-preset.json: is not a file"),
             (Some(&names[3]), changed),
         ] {
             let said = open(way, &token, resources).unwrap_err();
@@ -154,49 +154,45 @@ fn a_token_without_its_preset_is_refused_with_the_cause() {
 #[test]
 fn names_and_values_that_are_not_allowed_are_refused_when_they_are_read() {
     for (name, value, why) in [
-        ("nothing", "1", "line 2: All has no variable nothing"),
-        ("", "1", "line 2: All has no variable "),
-        ("time", "1", "line 2: All has no variable time"),
-        ("weights", "1", "line 2: All has no variable weights"),
-        ("weights[3,1]", "1", "line 2: All has no variable weights[3,1]"),
-        ("y", "1", "line 2: y is an output and cannot be set"),
-        ("doubled", "1", "line 2: doubled is a calculated parameter and cannot be set"),
-        ("made", "x", "line 2: made is a constant and cannot be set"),
-        ("real", "0", "line 2: real = 0 is not allowed: greater than 0"),
-        ("real", "NaN", "line 2: real = NaN is not allowed: greater than 0"),
-        ("real", "inf", "line 2: real = inf is not allowed: greater than 0"),
-        ("real", "1e999", "line 2: real = 1e999 is not allowed: greater than 0"),
-        ("real", "", "line 2: real =  is not allowed: a number"),
-        ("real", " 1", "line 2: real =  1 is not allowed: a number"),
-        ("u", "1001", "line 2: u = 1001 is not allowed: at most 1000"),
-        ("single", "0.31", "line 2: single = 0.31 is not allowed: at most 0.3"),
-        ("single", "-1e39", "line 2: single = -1e39 is not allowed: at most 0.3"),
-        ("n", "2.5", "line 2: n = 2.5 is not allowed: an integer"),
-        ("n", "0", "line 2: n = 0 is not allowed: at least 1"),
-        ("n", "2147483648", "line 2: n = 2147483648 is not allowed: 1 to 2147483647"),
-        ("small", "201", "line 2: small = 201 is not allowed: 0 to 200"),
-        ("small", "-1", "line 2: small = -1 is not allowed: 0 to 200"),
-        (
-            "large",
-            "18446744073709551616",
-            "line 2: large = 18446744073709551616 is not allowed: 0 to 18446744073709551615",
-        ),
-        ("on", "1", "line 2: on = 1 is not allowed: true or false"),
-        ("fan", "3", "line 2: fan = 3 is not allowed: 1 (Off), 2 (On)"),
-        ("fan", "On", "line 2: fan = On is not allowed: 1 (Off), 2 (On)"),
+        ("nothing", "1", "All has no variable nothing"),
+        ("", "1", "All has no variable "),
+        ("time", "1", "All has no variable time"),
+        ("weights", "1", "All has no variable weights"),
+        ("weights[3,1]", "1", "All has no variable weights[3,1]"),
+        ("y", "1", "y is an output and cannot be set"),
+        ("doubled", "1", "doubled is a calculated parameter and cannot be set"),
+        ("made", "x", "made is a constant and cannot be set"),
+        ("real", "0", "real = 0 is not allowed: greater than 0"),
+        ("real", "NaN", "real = NaN is not allowed: greater than 0"),
+        ("real", "inf", "real = inf is not allowed: greater than 0"),
+        ("real", "1e999", "real = 1e999 is not allowed: greater than 0"),
+        ("real", "", "real =  is not allowed: a number"),
+        ("real", " 1", "real =  1 is not allowed: a number"),
+        ("u", "1001", "u = 1001 is not allowed: at most 1000"),
+        ("single", "0.31", "single = 0.31 is not allowed: at most 0.3"),
+        ("single", "-1e39", "single = -1e39 is not allowed: at most 0.3"),
+        ("n", "2.5", "n = 2.5 is not allowed: an integer"),
+        ("n", "0", "n = 0 is not allowed: at least 1"),
+        ("n", "2147483648", "n = 2147483648 is not allowed: 1 to 2147483647"),
+        ("small", "201", "small = 201 is not allowed: 0 to 200"),
+        ("small", "-1", "small = -1 is not allowed: 0 to 200"),
+        ("large", "18446744073709551616", "large = 18446744073709551616 is not allowed: 0 to 18446744073709551615"),
+        ("on", "1", "on = 1 is not allowed: true or false"),
+        ("fan", "3", "fan = 3 is not allowed: 1 (Off), 2 (On)"),
+        ("fan", "On", "fan = On is not allowed: 1 (Off), 2 (On)"),
     ] {
         for way in WAYS {
             let said = with(way, &[(name, value)]).unwrap_err();
-            assert!(said.contains(&format!("fmu-preset.txt: {why}")), "{name} = {value}: {said}");
+            assert!(said.contains(&format!("fmu-preset.json: {why}")), "{name} = {value}: {said}");
         }
         assert!(described(&[(name, value)]).unwrap_err().contains(why));
     }
     let twice = with(Way::Three, &[("n", "2"), ("u", "1"), ("n", "2")]).unwrap_err();
-    assert!(twice.ends_with("line 4: n already has a value"), "{twice}");
-    for bytes in [&b"nonsense"[..], b"fmu preset 1\nn\t2", b"fmu preset 9\n"] {
+    assert!(twice.ends_with("n already has a value"), "{twice}");
+    for bytes in [&b"nonsense"[..], b"fmu preset 1\nn\t2\n", br#"{"format": "fmu preset", "version": 9}"#] {
         let folder = Folder::new(bytes);
         let said = open(Way::Two, &token(bytes), Some(&folder.name(Way::Two))).unwrap_err();
-        assert!(said.contains("fmu-preset.txt: "), "{said}");
+        assert!(said.contains("fmu-preset.json: "), "{said}");
     }
 }
 

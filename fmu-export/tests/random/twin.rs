@@ -5,12 +5,12 @@ use crate::oracle::State;
 use crate::solver::{Kind, Stepped, Update};
 use State::{Continuous, Event, Initialization, Instantiated};
 use fmu_core::{
-    Block, Capabilities, Causality, Elapsed, Meta, Model, Next, SampleGrid, Slot, Step, Variability,
+    Block, Capabilities, Causality, Elapsed, Meta, Next, SampleGrid, Slot, Step, Stored, Variability,
     capability::ToEvent,
 };
 
 /// Facts about a model for the driver, in addition to its capabilities.
-pub trait Twin: Model + PartialEq {
+pub trait Twin: Stored + PartialEq {
     const CAN: Capabilities<Self>;
     /// Interfaces that the FMU has.
     const KINDS: &'static [Kind];

@@ -225,7 +225,7 @@ impl Reference {
                 }
             }
             for (heard, listed) in it.heard.iter_mut().zip(listed) {
-                // FMI 2.0: on means these and no others. FMI 3.0: the others stay.
+                // In FMI 2.0, `on` switches on the listed categories and no others; in FMI 3.0 the others keep their state.
                 *heard = if listed { on } else { *heard && !(it.version == 2 && on) };
             }
             Ok(OK)

@@ -76,8 +76,8 @@ impl Calls {
         let (e, log, Updates { intermediate, required, clocks, preemption: [lock, unlock] }) =
             (r.environment, r.logger, &r.updates);
         let (list, n) = (required.as_ptr(), required.len());
-        // SAFETY: of all: the standards' types; the texts are NULL or C strings that outlive the call, and so does the list of
-        // variables; the caller promises the rest.
+        // SAFETY: all calls pass the standards' types; the texts are NULL or C strings that outlive the call, and so does the
+        // list of variables; the caller promises the rest.
         unsafe {
             match (self.version, r.interface) {
                 (FmiVersion::V2, interface) => {
@@ -141,7 +141,7 @@ impl Calls {
     pub(super) fn experiment(&self, i: Given<'_>, tolerance: Option<f64>, start: f64, stop: Option<f64>) -> Answer {
         let (has, with) = (tolerance.is_some(), stop.is_some());
         let (tolerance, stop) = (tolerance.unwrap_or(0.0), stop.unwrap_or(0.0));
-        // SAFETY: of both: the standard's type.
+        // SAFETY: both calls pass the standard's type.
         unsafe {
             match self.version {
                 FmiVersion::V2 => {
@@ -168,7 +168,7 @@ impl Calls {
         n_values: usize,
     ) -> Answer {
         let (list, n) = (references.pointer(), references.1);
-        // SAFETY: of both: the standards' types for all values, which differ only in the target of the pointer.
+        // SAFETY: both calls pass the standards' types for all values, which differ only in the target of the pointer.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.transfer_2[kind][way as usize].call(|f| f(i.0, list, n, values)),
@@ -188,7 +188,7 @@ impl Calls {
         pointers: [bool; 4],
         before: StepResults,
     ) -> Answer<StepResults> {
-        // SAFETY: of both: the standard's type; the variables are ours or NULL.
+        // SAFETY: both calls pass the standard's type; the variables are ours or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.do_step_2.write(before, |f, _| f(i.0, t, h, c_int::from(no_prior))),
@@ -206,7 +206,7 @@ impl Calls {
     /// first.
     pub(super) fn step_status(&self, name: StepStatus, i: Given<'_>, kind: c_int, before: u64) -> Answer<u64> {
         let full = StepStatus::ALL[name as usize][0];
-        // SAFETY: of both: FMI 2.0's type except for the buffer, which is large enough for each of its values.
+        // SAFETY: both calls pass FMI 2.0's type except for the buffer, which is large enough for each of its values.
         unsafe {
             Function(full, self.function::<v2::GetStatus<u64>>(full)).write(before, |f, place| f(i.0, kind, place))
         }
@@ -223,7 +223,7 @@ impl Calls {
         let list: Vec<*const c_char> =
             categories.unwrap_or_default().iter().map(|c| c.map_or(ptr::null(), CStr::as_ptr)).collect();
         let list = Array::of(categories.map(|_| &list[..]), n).pointer();
-        // SAFETY: of both: the standard's type; as many strings as stated, or NULL.
+        // SAFETY: both calls pass the standard's type, and as many strings as stated, or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.debug_logging_2.call(|f| f(i.0, c_int::from(on), n, list)),
@@ -321,7 +321,7 @@ impl Calls {
         null: bool,
         (fill, time): (u8, f64),
     ) -> Answer<UpdateResults> {
-        // SAFETY: of both: the standard's type; the variables are ours or NULL.
+        // SAFETY: both calls pass the standard's type; the variables are ours or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => {
@@ -370,7 +370,7 @@ impl Calls {
     /// `CompletedIntegratorStep`: `enterEventMode` and `terminateSimulation`, which are `fill` before the call; with `null`,
     /// both get NULL.
     pub(super) fn completed(&self, i: Given<'_>, no_prior: bool, null: bool, fill: u8) -> Answer<[i32; 2]> {
-        // SAFETY: of both: the standard's type; the variables are ours or NULL.
+        // SAFETY: both calls pass the standard's type; the variables are ours or NULL.
         unsafe {
             match self.version {
                 FmiVersion::V2 => self.completed_2.write([c_int::from(fill); 2], |f, flags| {
@@ -456,7 +456,7 @@ impl Calls {
     ) -> Answer {
         let (r, n, orders) = (references.as_ptr(), references.len(), Array::from(orders).holding(references.len()));
         let mut values = ArrayMut::from(values);
-        // SAFETY: of both: the standard's type; the arrays are as long as stated.
+        // SAFETY: both calls pass the standard's type; the arrays are as long as stated.
         unsafe {
             match self.version {
                 FmiVersion::V2 => {

@@ -14,7 +14,7 @@ unsafe extern "C" {
     fn snprintf(text: *mut c_char, size: usize, format: *const c_char, ...) -> c_int;
 }
 
-/// Maximum of a width or of a precision.
+/// Maximum width, and maximum precision.
 const WIDEST: i32 = 4096;
 
 /// The arguments of a variadic call, where its caller has placed them.

@@ -28,6 +28,7 @@ calls! {
     Terminate = "the termination",
     Free = "freeing the instance or unloading the library",
     Write = "writing the results",
+    Describe = "describing the model (its outputs are computed with other values)",
 }
 
 /// The last action of a process.

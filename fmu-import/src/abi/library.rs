@@ -1,5 +1,6 @@
 //! Shared libraries: loading one, and finding its functions.
 
+use crate::abi::journal::{self, Call};
 use crate::error::Error;
 use crate::text::file_uri;
 use fmu_core::description::Dependencies;
@@ -66,6 +67,7 @@ pub fn describe(
         Error::file(path, "has no function fmu_description: not a library made with fmu_export::export!")
     })?;
     let dependencies = c_int::from(dependencies == Dependencies::Probed);
+    journal::note(journal::name(&path.to_string_lossy()), Call::Describe);
     // SAFETY: the function calls the sink with the context, before it returns; both live until then, and so does the text.
     let status = unsafe { describe(collect, (&raw mut json).cast(), resources, dependencies) };
     if status != 0 {

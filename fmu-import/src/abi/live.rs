@@ -221,7 +221,7 @@ impl Live {
         outcome
     }
 
-    /// With a category, only for it.
+    /// Applies to all categories, or only to the given one.
     pub(crate) fn set_debug_logging(&mut self, on: bool, category: Option<&CStr>) -> Outcome {
         let list = category.map(|category| [Some(category)]);
         let list = list.as_ref().map(<[_; 1]>::as_slice);

@@ -11,6 +11,7 @@ const KEPT: usize = 10_000;
 
 /// One message.
 #[derive(Clone, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Message {
     /// Status that it was logged with.
     pub status: Status,

@@ -11,6 +11,7 @@ pub(crate) mod live;
 pub(crate) mod log;
 mod logger;
 pub mod raw;
+pub mod replay;
 #[cfg(unix)]
 pub(crate) mod sandbox;
 mod signatures;

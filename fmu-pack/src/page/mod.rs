@@ -112,7 +112,7 @@ fn ranges_of(run: &PresetRun) -> Value {
     Value::Object(ranges)
 }
 
-/// Requires a module that a page can run, of the model with this token.
+/// Requires a module that a page can run and that contains the model with this token.
 fn fits(module: &[u8], plain: &Description) -> Result<()> {
     let has = |text: &str| module.windows(text.len()).any(|part| part == text.as_bytes());
     ensure!(module.starts_with(b"\0asm\x01\0\0\0"), "the module is not one of WebAssembly (version 1)");
@@ -299,7 +299,7 @@ fn default_experiment(of: &Description, stimuli: Option<&Path>) -> Result<Preset
         compare: false,
     };
     let Some(path) = stimuli.filter(|path| path.is_file()) else { return Ok(run) };
-    let fed = Sequence::read_csv(path).map_err(Error::Invalid)?;
+    let fed = Sequence::read_csv(path, |name| of.variable(name).is_some()).map_err(Error::Invalid)?;
     let reader = reader(of)?;
     for (name, texts) in fed {
         let wrong = |cause: String| invalid!("{}: {name}: {cause}", path.display());

@@ -8,8 +8,9 @@ mod sobol;
 mod vary;
 
 use crate::Error;
-use crate::definition::{Design, Kind, Ordered, Vary};
+use crate::definition::{Design, Kind, Vary};
 use crate::error::invalid;
+use crate::ordered::Ordered;
 use fmu_import::Number;
 use sobol::Dimension;
 use std::path::Path;
@@ -42,7 +43,8 @@ enum Column {
 }
 
 impl DesignRows {
-    /// `number` reads a text as the number of a variable: names of enumerations, `true`.
+    /// `known` is true for names of variables. `number` converts a text, such as `true` or the name of an enumeration item, to the
+    /// number that the variable takes.
     ///
     /// # Errors
     /// The design or a varied variable is invalid, or the design has no rows.
@@ -50,13 +52,14 @@ impl DesignRows {
         design: &Design,
         vary: &Ordered<Vary>,
         folder: &Path,
+        known: &dyn Fn(&str) -> bool,
         number: &dyn Fn(&str, &str) -> Result<Number, String>,
     ) -> Result<Self, Error> {
         let kind = design.kind;
         let mut rows = Self { columns: Vec::new(), count: 0, kind, seed: 0, dimensions: Vec::new(), list: Vec::new() };
         match (&design.file, kind) {
             (Some(file), Kind::List) => {
-                let (names, list) = list::read(&folder.join(file), number)?;
+                let (names, list) = list::read(&folder.join(file), known, number)?;
                 rows.columns = names.into_iter().enumerate().map(|(k, name)| (name, Column::Listed(k))).collect();
                 rows.list = list;
             }
@@ -65,7 +68,7 @@ impl DesignRows {
             (None, _) => {}
         }
         let mut free = 0;
-        for (name, vary) in &vary.0 {
+        for (name, vary) in vary {
             let column = rows.column(vary, &mut free, &|text| number(name, text));
             let column = column.map_err(|cause| Error::Invalid(format!("vary: {name}: {cause}")))?;
             if rows.columns.iter().any(|(other, _)| other == name) {
@@ -223,7 +226,7 @@ mod tests {
         let definition = Definition::parse(text).unwrap();
         let number =
             |_: &str, text: &str| text.parse().map(Number::Real).map_err(|_| format!("{text} is not a number"));
-        DesignRows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &number)
+        DesignRows::new(&definition.design.unwrap(), &definition.vary, Path::new(""), &|_| false, &number)
     }
 
     fn all(rows: &DesignRows) -> Vec<Vec<f64>> {

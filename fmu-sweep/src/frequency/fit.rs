@@ -24,7 +24,7 @@ pub(super) struct Periods {
 }
 
 impl Periods {
-    /// Sine and cosine at sample `k`, of an angle that is exact for any number of samples.
+    /// Sine and cosine at sample `k`; their angle is exact for any number of samples.
     pub(super) fn wave(self, k: u32) -> (f64, f64) {
         let turns = u64::from(k) * u64::from(self.periods) % u64::from(self.samples);
         #[expect(clippy::cast_precision_loss, reason = "below 2^32")]
@@ -88,7 +88,7 @@ mod tests {
             for k in 0..2 * samples {
                 let a = step * f64::from(k);
                 let drift = 1e3 + 0.07 * f64::from(k);
-                // The second harmonic, whose image is not the sine at 7 periods in 20 samples.
+                // The second harmonic: with 7 periods in 20 samples, its alias differs from the sine.
                 let y = drift + 2e-3 * (a - 1.1).sin() + 0.4 * (2.0 * a + 0.3).cos();
                 fits[usize::from(k >= samples)].add(window.wave(k), y);
             }

@@ -4,7 +4,7 @@ use super::grid::EARLY;
 use super::parts::Port;
 use super::schedule::SAME;
 use super::sequence::Held;
-use super::wiring::{Change, Feed, Record, Source, Wiring};
+use super::wiring::{Change, Feed, Record, Source, Wiring, converted};
 use super::{Schedule, loops};
 use fmu_import::{Error, Instance, Kind, Number, Values};
 use model_description::{BaseType, Conversion};
@@ -476,8 +476,8 @@ impl Exchange {
             Place::Single { instance, slot, change: None } => self.traffic[*instance].others[*slot].clone(),
             Place::Single { instance, slot, change: Some(Change::Linear(conversion)) } => {
                 let found = self.traffic[*instance].others[*slot].as_ref();
-                let numbers = found.map(|v| (0..v.len()).map(|k| conversion.apply(v.one(k).real())).collect());
-                numbers.map(Values::Reals)
+                let numbers = |v: &Values| (0..v.len()).map(|k| converted(conversion, v.one(k))).collect::<Vec<_>>();
+                found.map(|v| all_of(&numbers(v)))
             }
             Place::Single { instance, slot, change: Some(table) } => {
                 let Some(found) = &self.traffic[*instance].others[*slot] else { return Ok(None) };
@@ -491,6 +491,13 @@ impl Exchange {
         let fitting = found.map(|values| values.into_base(target.base)).transpose();
         fitting.map_err(|cause| Error::usage(&target.name, cause))
     }
+}
+
+/// Integers, or real numbers if one is.
+fn all_of(numbers: &[Number]) -> Values {
+    let whole = |number: &Number| if let Number::Integer(i) = number { Some(*i) } else { None };
+    let whole: Option<Vec<i128>> = numbers.iter().map(whole).collect();
+    whole.map_or_else(|| Values::Reals(numbers.iter().map(|number| number.real()).collect()), Values::Integers)
 }
 
 /// Whether values are equal to the last bit.

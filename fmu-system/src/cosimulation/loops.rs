@@ -27,7 +27,8 @@ pub(super) fn solve(exchange: &mut Exchange, instances: &mut [Instance], t: f64)
     }
     loop {
         newton(exchange, instances, t, &inputs)?;
-        // An input of the loop that the last pass happened to settle was not among them: without it, a step is one more pass.
+        // An input of the loop that was settled by chance in the last pass is added now; otherwise each Newton step would only
+        // be one more pass.
         let known = |new: &Unsettled| inputs.iter().any(|i| (i.index, i.reference) == (new.index, new.reference));
         let unsettled = exchange.unsettled(instances, t)?.into_iter();
         let more: Vec<_> = unsettled.filter(|new| new.source.is_some() && !known(new)).collect();

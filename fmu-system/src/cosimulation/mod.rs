@@ -61,4 +61,5 @@ pub use recording::{Column, Recording, TextColumn, item};
 pub use schedule::{Schedule, Sine};
 pub use sequence::Sequence;
 pub use system::System;
+pub(crate) use wiring::converted;
 pub use wiring::{Crossing, Outlet, Transformation, Units};

@@ -161,8 +161,7 @@ impl Parts {
     /// The variable of this name, or the array that contains the named element.
     pub(super) fn variable(&self, instance: usize, name: &str) -> Result<&ModelVariable, Error> {
         let part = &self.0[instance];
-        let names = || part.description().variables.iter().map(|v| v.name.as_str());
-        let none = || Error::usage(&part.name, format!("has no variable {name}{}", suggest(name, names())));
+        let none = || Error::variable(&part.name, name, part.description());
         part.description().variable(name).or_else(|| Some(part.element(name)?.0)).ok_or_else(none)
     }
 

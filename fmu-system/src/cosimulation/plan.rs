@@ -128,7 +128,7 @@ impl SystemPlan {
         Ok(PlanTarget { port, written: written.into(), conversion: None })
     }
 
-    /// Units and, of an enumeration, names of the values of a target.
+    /// Units of a target and, for an enumeration, the names of its values.
     pub fn column(&self, target: &PlanTarget) -> Column {
         self.parts.column(&target.port, target.name())
     }

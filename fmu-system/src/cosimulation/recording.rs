@@ -13,7 +13,7 @@ pub struct Column {
     pub name: String,
     /// Physical quantity in words, such as `Angular velocity`; empty if the description does not give it.
     pub quantity: String,
-    /// Unit, empty for none.
+    /// Unit; empty if there is none.
     pub unit: String,
     /// Display unit.
     pub display: Option<DisplayUnit>,

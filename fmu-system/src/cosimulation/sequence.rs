@@ -1,14 +1,14 @@
 //! User input of values over time, for an input of any type; each value is held from its time on.
 
 use super::schedule::{SAME, Schedule, last_before};
-use fmu_import::Values;
 use fmu_import::csv::{Heading, Table};
+use fmu_import::{Number, Values};
 use model_description::{ModelDescription, ModelVariable};
 use std::path::Path;
 use std::sync::Arc;
 
 /// Integers up to this one are doubles.
-const EXACT: f64 = 9_007_199_254_740_992.0;
+const EXACT: u128 = 1 << 53;
 
 /// Texts over time: values of a variable whose type is not yet known.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,25 +43,32 @@ impl Sequence {
         Self::new(points, String::new())
     }
 
-    /// The columns of a CSV file: the first is time in s, or in another unit as in `time [ms]`; the header of each other names its
-    /// input, as in `speed_ref` or `speed_ref [rpm]`. A cell may be in quotation marks (RFC 4180).
+    /// The columns of a CSV file: the first is time in s, or in another unit as in `time [ms]` or `time_ms`; the header of each
+    /// other names its input, as in `speed_ref` or `speed_ref [rpm]`. A header for which `known` is true is the name of a variable
+    /// and has no unit. A cell may be in quotation marks (RFC 4180).
     ///
     /// # Errors
-    /// The file cannot be read, has no header, or a row does not have as many cells as the header.
-    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
+    /// The file cannot be read, has no header, its first column is not time, or a row does not have as many cells as the header.
+    pub fn read_csv(path: &Path, known: impl Fn(&str) -> bool) -> Result<Vec<(String, Self)>, String> {
         let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
+        Self::parse_csv(&text, known).map_err(|cause| format!("{}: {cause}", path.display()))
     }
 
     /// [`read_csv`](Self::read_csv) of the content of a file.
-    pub(super) fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
+    fn parse_csv(text: &str, known: impl Fn(&str) -> bool) -> Result<Vec<(String, Self)>, String> {
         let Table { headings, rows } = Table::parse(text)?;
         let mut headings = headings.into_iter();
         let time = headings.next().ok_or("has no column")?;
-        let second = seconds(&time).map_err(|cause| format!("line 1: {cause}"))?;
-        if headings.len() == 0 {
+        let headings: Vec<Heading> = headings.map(|heading| heading.among(&known)).collect();
+        if headings.is_empty() {
             return Err("has no column but time".into());
         }
+        let other = headings.iter().find(|other| other.is_time() && !known(&other.name));
+        if !time.is_time() && (known(&time.text) || other.is_some()) {
+            let what = other.map_or("is a variable", |_| "is not time, and a later one is");
+            return Err(format!("line 1: the first column, {}, {what}: write time first", time.text));
+        }
+        let second = time.seconds().map_err(|cause| format!("line 1: {cause}"))?;
         let mut columns: Vec<Vec<(f64, String, String)>> = vec![Vec::new(); headings.len()];
         for (line, row) in rows {
             let at = format!("line {line}: ");
@@ -71,15 +78,12 @@ impl Sequence {
             columns.iter_mut().zip(row).for_each(|(column, cell)| column.push((t * second, cell, at.clone())));
         }
         let column = |(heading, points): (Heading, Vec<_>)| Ok((heading.name, Self::new(points, heading.unit)?));
-        headings.zip(columns).map(column).collect()
+        headings.into_iter().zip(columns).map(column).collect()
     }
 
-    /// The unit in s of a first column: `time`, `t [ms]`.
-    ///
-    /// # Errors
-    /// The unit is not one of time.
-    pub fn seconds(heading: &Heading) -> Result<f64, String> {
-        seconds(heading)
+    /// The last time (s).
+    pub fn end(&self) -> f64 {
+        self.points.last().map_or(0.0, |(t, ..)| *t)
     }
 
     fn new(points: Vec<(f64, String, String)>, unit: String) -> Result<Self, String> {
@@ -138,38 +142,17 @@ impl Sequence {
 
     /// The texts as values of this variable.
     pub(super) fn values(&self, variable: &ModelVariable, description: &ModelDescription) -> Result<Held, String> {
+        let unit = self.unit.as_str();
+        if !unit.is_empty() && !variable.base.is_float() {
+            return Err(format!("is a {} without a unit, and its column has the unit {unit}", variable.base));
+        }
         let value = |(t, text, at): &(f64, String, String)| {
-            let number = |_: &String| Values::from_number(text.trim().parse::<f64>().ok()?, variable.base).ok();
-            let read = Values::read(text, variable, description);
-            // Tools also write integers and truth values as 1.0.
-            let values = read.or_else(|cause| number(&cause).ok_or_else(|| format!("{at}{cause}")));
+            let with_unit = || text.split_whitespace().map(|x| format!("{x} {unit}")).collect::<Vec<_>>().join(",");
+            let text = if unit.is_empty() { text.clone() } else { with_unit() };
+            let values = Values::read(&text, variable, description).map_err(|cause| format!("{at}{cause}"));
             values.map(|values| (*t, values))
         };
         Ok(Held(self.points.iter().map(value).collect::<Result<_, _>>()?))
-    }
-}
-
-/// The unit of the first column in s.
-fn seconds(Heading { text, unit, .. }: &Heading) -> Result<f64, String> {
-    const UNITS: [(&str, f64); 7] =
-        [("", 1.0), ("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("min", 60.0), ("h", 3600.0)];
-    let known = UNITS.iter().find(|(name, _)| name == unit).map(|(_, second)| *second);
-    known.ok_or_else(|| format!("{text}: the first column is time, in s, ms, us, ns, min or h"))
-}
-
-impl Schedule {
-    /// The columns of a CSV file: the first is time (s), the header of each other names its input, as in `speed_ref` or
-    /// `speed_ref [rpm]`. Lines connect the points.
-    ///
-    /// # Errors
-    /// The file cannot be read, has no header, or a row does not have as many numbers as the header.
-    pub fn read_csv(path: &Path) -> Result<Vec<(String, Self)>, String> {
-        let text = std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
-        Self::parse_csv(&text).map_err(|cause| format!("{}: {cause}", path.display()))
-    }
-
-    fn parse_csv(text: &str) -> Result<Vec<(String, Self)>, String> {
-        Sequence::parse_csv(text)?.into_iter().map(|(name, texts)| Ok((name, texts.lines()?))).collect()
     }
 }
 
@@ -178,7 +161,7 @@ impl Schedule {
 pub(super) struct Held(Arc<[(f64, Values)]>);
 
 impl Held {
-    /// Number of the value at time `t` (s); before the first time, of the first value.
+    /// Number of the value at time `t` (s); before the first time, that of the first value.
     pub(super) fn index(&self, t: f64) -> usize {
         last_before(&self.0, t).saturating_sub(1)
     }
@@ -187,7 +170,13 @@ impl Held {
     pub(super) fn steps(&self) -> Option<Schedule> {
         let mut points: Vec<(f64, f64)> = Vec::new();
         for (t, values) in &*self.0 {
-            let x = values.number().filter(|x| values.len() == 1 && x.abs() <= EXACT)?;
+            let x = match values.one(0) {
+                Number::Missing => None,
+                // More digits than those of a double.
+                Number::Integer(i) if i.unsigned_abs() > EXACT => None,
+                number => Some(number.real()),
+            };
+            let x = x.filter(|_| values.len() == 1)?;
             // If several values have the same time, the last one applies.
             points.pop_if(|(last, _)| last.to_bits() == t.to_bits());
             points.push((*t, x));
@@ -218,6 +207,10 @@ impl Held {
 mod tests {
     use super::*;
 
+    fn csv(text: &str) -> Result<Vec<(String, Sequence)>, String> {
+        Sequence::parse_csv(text, |name| name.starts_with("known"))
+    }
+
     fn points(text: &str) -> Vec<(f64, String)> {
         Sequence::parse(text).unwrap().points.into_iter().map(|(t, x, _)| (t, x)).collect()
     }
@@ -232,7 +225,7 @@ mod tests {
 
     #[test]
     fn cells_may_be_quoted() {
-        let columns = Sequence::parse_csv("time,\"a\",P[1]\n0,\"x, \"\"y\"\"\",1 2\n1,,3\n").unwrap();
+        let columns = csv("time,\"a\",P[1]\n0,\"x, \"\"y\"\"\",1 2\n1,,3\n").unwrap();
         assert_eq!((columns[0].0.as_str(), columns[1].0.as_str()), ("a", "P[1]"));
         let texts: Vec<&str> = columns[0].1.points.iter().map(|(_, x, _)| x.as_str()).collect();
         assert_eq!(texts, ["x, \"y\"", ""]);
@@ -241,7 +234,11 @@ mod tests {
 
     #[test]
     fn a_table_has_a_column_for_each_input() {
-        let columns = Schedule::parse_csv("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
+        let lines = |text: &str| {
+            let columns = csv(text)?.into_iter().map(|(name, texts)| Ok((name, texts.lines()?)));
+            columns.collect::<Result<Vec<_>, String>>()
+        };
+        let columns = lines("\"time\",\"c.speed_ref\",p.tau_load\n0,0,0\n1,10,2\n").unwrap();
         assert_eq!(columns[0].0, "c.speed_ref");
         assert_eq!((columns[0].1.at(0.5), columns[1].1.at(0.5)), (5.0, 1.0));
         for (text, cause) in [
@@ -250,8 +247,21 @@ mod tests {
             ("time,a\n0,x\n", "line 2: \"x\" is not a number"),
             ("time,a\n0,\n", "line 2: a cell is empty"),
             ("time;a\n0;1,5\n", "line 1: has semicolons; write commas between columns and a decimal point"),
+            (
+                "time [kg],a\n0,1\n",
+                "line 1: time [kg]: the first column is time, in s, ms, us, ns, min, h or d, as in time [ms]",
+            ),
+            ("known,a\n0,1\n", "line 1: the first column, known, is a variable: write time first"),
+            ("a,time\n0,1\n", "line 1: the first column, a, is not time, and a later one is: write time first"),
         ] {
-            assert_eq!(Schedule::parse_csv(text).unwrap_err(), cause, "{text:?}");
+            assert_eq!(lines(text).unwrap_err(), cause, "{text:?}");
         }
+    }
+
+    #[test]
+    fn the_first_column_is_converted_and_a_known_name_keeps_its_brackets() {
+        let columns = csv("time_ms,known[mm],other [mm]\n0,1,2\n500,3,4\n").unwrap();
+        let of = |k: usize| (columns[k].0.as_str(), columns[k].1.unit.as_str(), columns[k].1.end());
+        assert_eq!((of(0), of(1)), (("known[mm]", "", 0.5), ("other", "mm", 0.5)));
     }
 }

@@ -13,6 +13,9 @@ use fmu_import::written::matches;
 use fmu_import::{Error, Fmu, Instance, Kind, Logging, Message, Values};
 use model_description::{BaseType, Causality, Interface, ModelVariable, Variability, parse_number};
 
+/// Integers below this one are doubles.
+const EXACT: f64 = 9_007_199_254_740_992.0;
+
 /// FMUs and their connections.
 #[derive(Default)]
 pub struct System {
@@ -258,6 +261,11 @@ impl System {
         let variable = self.parts.variable(target.instance, &target.name)?;
         let schedule = schedule.in_unit_of(variable, self.instances[target.instance].description());
         let schedule = schedule.map_err(|cause| Error::usage(self.instances[target.instance].name(), cause))?;
+        if !target.base.is_float() && schedule.magnitude() >= EXACT {
+            let cause =
+                format!("is a {}, and lines to integers of 2^53 and more would lose digits: give steps", target.base);
+            return Err(Error::usage(port, cause));
+        }
         self.feed(target, port, Source::Schedule(schedule))
     }
 
@@ -293,13 +301,27 @@ impl System {
         Ok(())
     }
 
+    /// Texts over time as [`sequence`](Self::sequence) feeds them to a real variable: lines, in its unit; `None` for other types.
+    ///
+    /// # Errors
+    /// The variable does not exist, a text is not a number, or the unit is not the variable's.
+    pub fn lines(&self, port: &str, texts: &Sequence) -> Result<Option<Schedule>, Error> {
+        if !self.is_real(port)? {
+            return Ok(None);
+        }
+        let (target, wrong) = (self.parts.port(port)?, |cause| Error::usage(port, cause));
+        let variable = self.parts.variable(target.instance, &target.name)?;
+        let schedule = texts.lines().map_err(wrong)?;
+        schedule.in_unit_of(variable, self.instances[target.instance].description()).map(Some).map_err(wrong)
+    }
+
     /// Feeds an input or a tunable parameter of any type over time; values that are not real numbers are held.
     ///
     /// # Errors
     /// The variable does not exist, a text is not a value of its type, or it is fed already.
     pub fn sequence(&mut self, port: &str, texts: &Sequence) -> Result<(), Error> {
-        if self.is_real(port)? {
-            return self.input(port, texts.lines().map_err(|cause| Error::usage(port, cause))?);
+        if let Some(schedule) = self.lines(port, texts)? {
+            return self.input(port, schedule);
         }
         let target = self.parts.port(port)?;
         let variable = self.parts.variable(target.instance, &target.name)?;

@@ -9,7 +9,11 @@ impl Parts {
     /// A column for a recorded variable, with its unit after the change.
     pub(super) fn outlet(&self, port: &Port, outlet: &Outlet) -> Column {
         let column = self.column(port, &outlet.name);
-        let Some(transformation) = &outlet.transformation else { return column };
+        let Some(transformation) = &outlet.transformation else {
+            // The connector of a system may have a unit that no file defines: numbers pass unchanged, and mean that unit.
+            let stated = outlet.unit.clone().filter(|unit| *unit != column.unit);
+            return stated.map(|unit| Column { unit, display: None, ..column.clone() }).unwrap_or(column);
+        };
         let unit = outlet.unit.clone().unwrap_or_default();
         let items = if let Transformation::Table(_) = transformation { outlet.items.clone() } else { Vec::new() };
         Column { unit, display: None, items, ..column }

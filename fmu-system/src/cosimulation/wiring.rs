@@ -89,12 +89,24 @@ impl Change {
     pub(super) fn apply(&self, number: Number) -> Number {
         match self {
             _ if number == Number::Missing => number,
-            Self::Linear(conversion) => Number::Real(conversion.apply(number.real())),
+            Self::Linear(conversion) => converted(conversion, number),
             Self::Table { entries, keeps } => {
                 let otherwise = if *keeps { number } else { Number::Missing };
                 entries.iter().find(|(sent, _)| *sent == number).map_or(otherwise, |(_, taken)| *taken)
             }
         }
+    }
+}
+
+/// A number after a conversion. An integer keeps its digits where factor and offset are integers.
+pub(crate) fn converted(conversion: &Conversion, number: Number) -> Number {
+    #[expect(clippy::cast_possible_truncation, reason = "an integer below 2^53")]
+    let whole = |x: f64| (x.fract() == 0.0 && x.abs() < 9e15).then_some(x as i128);
+    let (factor, offset) = (whole(conversion.factor), whole(conversion.offset));
+    let exact = |i: i128| i.checked_mul(factor?)?.checked_add(offset?);
+    match number {
+        Number::Integer(i) => exact(i).map_or_else(|| Number::Real(conversion.apply(number.real())), Number::Integer),
+        other => Number::Real(conversion.apply(other.real())),
     }
 }
 
@@ -189,5 +201,20 @@ impl Wiring {
 
     pub(super) fn feeds(&self, instance: usize, name: &str) -> bool {
         self.targets().any(|target| target.instance == instance && target.name == name)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn integers_keep_their_digits_through_whole_factors() {
+        let of = |factor, offset, number| converted(&Conversion { factor, offset }, number);
+        let wide = (1_i128 << 53) + 1;
+        assert_eq!(of(1.0, 0.0, Number::Integer(wide)), Number::Integer(wide));
+        assert_eq!(of(-2.0, 3.0, Number::Integer(wide)), Number::Integer(3 - 2 * wide));
+        assert_eq!(of(0.5, 0.0, Number::Integer(3)), Number::Real(1.5));
+        assert_eq!(of(2.0, 0.5, Number::Real(1.0)), Number::Real(2.5));
     }
 }

@@ -1,4 +1,4 @@
-//! Systems in plain Rust through the trait that the adapter of FMUs implements.
+//! Systems in plain Rust that implement the same trait as the adapter of FMUs.
 
 use super::*;
 use fmu_import::{CompletedStep, Error, Update};

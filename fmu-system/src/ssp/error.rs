@@ -4,6 +4,7 @@ use std::fmt::Display;
 
 /// One line that names the file, the location in it, and the cause.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// An FMU, or a feature that it lacks.
     #[error(transparent)]

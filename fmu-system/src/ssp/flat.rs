@@ -223,7 +223,7 @@ fn edge(around: &[&Level], c: &Connection) -> Result<Edge, String> {
             ));
         }
     };
-    if !side(&c.start) && !side(&c.end) {
+    if !side(&c.start) && !side(&c.end) && around.len() == 1 {
         return Err("connects the system with itself, which is not supported: remove it".into());
     }
     let from_kind = if allowed(ends) { &one_kind } else { &other_kind };

@@ -223,7 +223,7 @@ impl Loaded {
         Ok(())
     }
 
-    /// Sets a value: of an input of the system, or of `component.variable`.
+    /// Sets the value of an input of the system, or of `component.variable`.
     ///
     /// # Errors
     /// No variable has this name, or the FMU refuses the value.

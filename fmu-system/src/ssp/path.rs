@@ -1,6 +1,7 @@
 //! The path of a value through connectors: the units of each, and transformations.
 
-use crate::cosimulation::Transformation;
+use crate::cosimulation::{Transformation, converted};
+use fmu_import::Number;
 use fmu_import::quantity::split;
 use model_description::{BaseUnit, Measured, Passage, format_number, parse_number};
 use std::borrow::Cow;
@@ -89,12 +90,17 @@ pub(super) fn transformed<'a>(
     match transformation {
         None => Ok(text.into()),
         Some(Transformation::Linear(conversion)) => {
-            let numbers: Option<Vec<f64>> = text.split_whitespace().map(parse_number).collect();
-            match numbers {
-                Some(numbers) => {
-                    let words: Vec<_> = numbers.iter().map(|x| format_number(conversion.apply(*x))).collect();
-                    Ok(words.join(" ").into())
-                }
+            let number = |word: &str| {
+                let whole = word.parse::<i128>().map(Number::Integer).ok();
+                whole.or_else(|| parse_number(word).map(Number::Real))
+            };
+            let written = |number: Number| match converted(conversion, number) {
+                Number::Integer(i) => i.to_string(),
+                other => format_number(other.real()),
+            };
+            let words: Option<Vec<String>> = text.split_whitespace().map(|word| number(word).map(written)).collect();
+            match words {
+                Some(words) => Ok(words.join(" ").into()),
                 None if only_units && split(text).is_some() => Ok(text.into()),
                 None if split(text).is_some() => {
                     Err(format!("{text:?} has a unit, and a transformation follows: write the number alone"))
@@ -159,6 +165,7 @@ mod tests {
         assert_eq!(["1", "false"].map(|text| transformed(text, not.as_ref(), false).unwrap()), ["false", "true"]);
         let twice = Some(linear(2.0, 1.0));
         assert_eq!(transformed("1 2", twice.as_ref(), false).unwrap(), "3 5");
+        assert_eq!(transformed("9007199254740993 1.5", twice.as_ref(), false).unwrap(), "18014398509481987 4");
         assert_eq!(transformed("1 rpm", twice.as_ref(), true).unwrap(), "1 rpm");
         assert!(transformed("1 rpm", twice.as_ref(), false).unwrap_err().contains("write the number alone"));
         assert!(transformed("on", twice.as_ref(), true).unwrap_err().contains("\"on\" is not a number"));

@@ -13,8 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, Z, TOLERANCE, N };
-enum { OK, WARNING, DISCARD, ERROR };
+enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, Z, TOLERANCE, PRIOR, N };
+enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING };
 enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL, NO_SOLUTION };
 
 typedef void (*Log3)(void *, int, const char *, const char *);
@@ -171,8 +171,17 @@ int fmi2SetString(M *m, const uint32_t *vr, size_t n, const char *const *from) {
 int fmi2DoStep(M *m, double t, double h, int p) {
     bool event, early;
     double last;
+    m->v[PRIOR] = p;
+#ifdef ASYNCHRONOUS
+    /* It returns Pending, and is done when it has been asked three times. */
+    m->v[Y] = 3;
+    return step(m, t, h, &event, &early, &last) ? ERROR : PENDING;
+#endif
     return step(m, t, h, &event, &early, &last);
 }
+#ifdef ASYNCHRONOUS
+int fmi2GetStatus(M *m, int kind, int *to) { return kind == 0 ? (*to = m->v[Y]-- > 0 ? PENDING : OK, OK) : DISCARD; }
+#endif
 int fmi2GetFMUstate(M *m, M **to) { return *to = memcpy(*to ? *to : malloc(sizeof(M)), m, sizeof(M)), OK; }
 int fmi2SetFMUstate(M *m, M *from) { return memcpy(m, from, sizeof(M)), OK; }
 int fmi2FreeFMUstate(M *m, M **state) { return free(*state), *state = NULL, OK; }
@@ -219,7 +228,7 @@ int fmi3Reset(M *m) { return ERROR; }
 int fmi3GetFloat64(M *m, const uint32_t *vr, size_t n, double *to, size_t nv) { return get(m, vr, n, to); }
 int fmi3SetFloat64(M *m, const uint32_t *vr, size_t n, const double *from, size_t nv) { return set(m, vr, n, from); }
 int fmi3DoStep(M *m, double t, double h, bool p, bool *event, bool *terminate, bool *early, double *last) {
-    return *terminate = false, step(m, t, h, event, early, last);
+    return m->v[PRIOR] = p, *terminate = false, step(m, t, h, event, early, last);
 }
 int fmi3EnterEventMode(M *m) { return begin(m); }
 int fmi3EnterStepMode(M *m) { return leave(m); }

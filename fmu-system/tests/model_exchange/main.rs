@@ -2,6 +2,7 @@
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 #![allow(clippy::float_cmp)] // Counts, and numbers that nothing rounds.
 
+mod description;
 mod settings;
 mod ssp;
 mod workshop;

@@ -151,6 +151,26 @@ fn near(found: &[f64], expected: &[f64]) {
     assert!(found.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{found:?} {expected:?}");
 }
 
+/// An inner system may pass an input on to its output, with its own units: 3 km arrive as 3000, and after a factor of 2 as 6.
+#[test]
+fn an_inner_system_passes_values_through() {
+    let length = |unit: &str| format!("<c:Real unit='{unit}'/>");
+    let (km, m) = (length("km"), length("m"));
+    let inner = format!(
+        "<s:System name='in'><s:Connectors><s:Connector name='i' kind='input'>{km}</s:Connector>\
+         <s:Connector name='o' kind='output'>{m}</s:Connector><s:Connector name='d' kind='output'>{km}</s:Connector></s:Connectors>\
+         <s:Connections><s:Connection startConnector='i' endConnector='o'/><s:Connection startConnector='i' endConnector='d'>\
+         <c:LinearTransformation factor='2'/></s:Connection></s:Connections></s:System>"
+    );
+    let connections = "<s:Connection startConnector='x' endElement='in' endConnector='i'/>\
+        <s:Connection startElement='in' startConnector='o' endElement='a' endConnector='u'/>\
+        <s:Connection startElement='in' startConnector='d' endElement='b' endConnector='u'/>";
+    let connectors = format!("<s:Connector name='x' kind='input'>{km}</s:Connector>");
+    let mut loaded = open(&ssp(&description(&connectors, &inner, connections), &[])).unwrap();
+    loaded.set("x", "3").unwrap();
+    near(&last(&mut loaded, &["x", "a.u", "b.u"]), &[3.0, 3000.0, 6.0]);
+}
+
 /// Every connection converts from the unit of one connector to that of the next, and then transforms; a value for a connector
 /// is in the connector's unit.
 #[test]
@@ -449,7 +469,7 @@ fn the_rest_is_refused_or_noted() {
     ] {
         assert!(said.contains(cause), "{said:?}: {cause}");
     }
-    // Information for people, of any content and without a file.
+    // Information for readers only, with any content and without a file.
     let information =
         "<s:MetaData kind='general' type='text/plain' source='no.txt'><s:Content><a b='1'/></s:Content></s:MetaData>";
     assert_eq!(changed("<s:Elements>", &format!("{information}<s:Elements>"), ""), changed("", "", ""));

@@ -65,6 +65,7 @@ fn description(name: &str, version: u32) -> String {
         ("fault", "parameter", "fixed", "0"),
         ("z", "output", "continuous", ""),
         ("tolerance", "output", "continuous", ""),
+        ("prior", "output", "continuous", ""),
     ];
     let state = name == "plant";
     let variable = |(index, (name, causality, variability, start)): (usize, &(&str, &str, &str, &str))| {

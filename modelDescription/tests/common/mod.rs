@@ -150,6 +150,7 @@ pub(crate) fn sample() -> Description {
         terminals: terminals(),
         icon: Some(SVG.into()),
         model_exchange: None,
+        keeps: fmu_core::Keeps::Stored,
     }
 }
 

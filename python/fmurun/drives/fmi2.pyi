@@ -1,3 +1,4 @@
+MappedDrive: str
 PmsmDrive: str
 PmsmDriveMean: str
 PmsmPlant: str

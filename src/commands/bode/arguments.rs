@@ -2,8 +2,8 @@
 
 use super::coupling::Train;
 use super::loops::Loop;
-use crate::commands::system::{SteppingOptions, SystemOptions};
-use crate::commands::worker::ProcessOptions;
+use cargo_fmu::system::{SteppingOptions, SystemOptions};
+use cargo_fmu::worker::ProcessOptions;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -74,7 +74,7 @@ pub struct Bode {
     #[arg(long, value_name = "H", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Threads [default: all cores]
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", overrides_with = "jobs", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
     /// Write the responses as CSV; - for standard output
     #[arg(long, value_name = "FILE|-")]

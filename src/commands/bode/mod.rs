@@ -7,11 +7,11 @@ mod output;
 
 pub use arguments::Bode;
 
-use super::system::Events;
-use super::worker;
-use crate::Failed;
-use crate::message;
 use anyhow::{Context, Result, anyhow, bail};
+use cargo_fmu::Failed;
+use cargo_fmu::message;
+use cargo_fmu::system::EventOptions;
+use cargo_fmu::worker;
 use fmu_import::guard::Streams;
 use fmu_import::{Instance, journal, printable};
 use fmu_sweep::frequency::{Excitation, FrequencyOutcome};
@@ -51,7 +51,7 @@ fn frequencies(text: &str) -> Result<Vec<f64>> {
     }
 }
 
-/// The number that a variable starts with: set, or of the description.
+/// The start value of a variable: the one set, or that of the description.
 fn value(args: &Bode, instance: &Instance, name: &str) -> Option<f64> {
     let given = args.system.given(instance.name(), name).ok().flatten();
     let text = given.or_else(|| instance.description().variable(name)?.start.clone())?;
@@ -106,7 +106,7 @@ fn measure(args: &Bode, threads: usize, out: Box<dyn Write>) -> Result<()> {
     // An FMU may change the working directory; file names of the command are relative to this one.
     let home = std::env::current_dir()?;
     let streams = Streams::now();
-    let mut loaded = args.system.open(&args.stepping, Events::default(), false, |system| system)?;
+    let mut loaded = args.system.open(&args.stepping, EventOptions::default(), false, |system| system)?;
     let probe = probe(args, loaded.system.instances())?;
     let settings = loaded.settings(None, None, args.step.or(probe.sample), args.stepping.sequential);
     let settings = loaded.system.feasible(&settings)?;

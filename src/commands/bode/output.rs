@@ -2,8 +2,8 @@
 
 use super::arguments::Bode;
 use super::loops::{Meaning, Probe};
-use crate::message;
 use anyhow::{Context, Result, bail};
+use cargo_fmu::message;
 use fmu_core::digits;
 use fmu_import::csv::Writer;
 use fmu_import::printable;

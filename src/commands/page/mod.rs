@@ -2,14 +2,14 @@
 
 mod site;
 
-use super::build::choose;
-use crate::{Failed, message};
 use anyhow::{Context, Result, anyhow, ensure};
+use cargo_fmu::build::choose;
+use cargo_fmu::{Failed, message};
 use clap::Args;
 use fmu_core::Description;
 use fmu_core::description::{Dependencies, VariableKind};
 use fmu_import::describe;
-use fmu_pack::compile::{compile, module};
+use fmu_pack::compile::{Profile, compile, module};
 use fmu_pack::licenses::Licenses;
 use fmu_pack::page::{self, FILE, Source};
 use fmu_pack::preset::PresetFmu;
@@ -163,7 +163,7 @@ fn models(workspace: &Workspace, args: &Page) -> Result<Vec<Model>> {
     if names.is_empty() {
         return Ok(models);
     }
-    for (package, library) in compile(workspace, &names, &Tools::find()?.host())? {
+    for (package, library) in compile(workspace, &names, &Tools::find()?.host(), Profile::Release)? {
         let folder = workspace.package(&package).map_or(Path::new("."), Package::folder).to_owned();
         let description = describe(&library, None, Dependencies::Omitted).map_err(|e| reads_files(&folder, e))?;
         if let Some(clock) = description.variables.iter().find(|v| matches!(v.kind, VariableKind::Clock(_))) {

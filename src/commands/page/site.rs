@@ -2,11 +2,11 @@
 
 use super::{Model, archive, write};
 use crate::commands::atlas::{self, Atlas};
-use crate::commands::build::{self, Build};
+use crate::commands::build::{self, Models};
 use crate::commands::compare::{self, Compare};
 use crate::commands::preset;
-use crate::message;
 use anyhow::{Context, Result, bail};
+use cargo_fmu::message;
 use drive_tools::tune;
 use fmu_pack::compile::module;
 use fmu_pack::workspace::Workspace;
@@ -15,7 +15,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// The FMU whose presets for machines get pages.
+/// The FMU for whose machine presets pages are written.
 const DRIVE: &str = "PmsmDrive";
 
 /// A link of the first page: file, title, one sentence.
@@ -27,7 +27,8 @@ type Link = (String, String, String);
 /// An FMU cannot be built, or a file cannot be written.
 pub(super) fn run(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
     let built = tempfile::tempdir()?;
-    let archives = build::run(&Build { fmi: Some("3".into()), out: Some(built.path().into()), ..Build::default() })?;
+    let archives =
+        build::models(&Models { fmi: Some("3".into()), out: Some(built.path().into()), ..Models::default() })?;
     let mut sections: Vec<(&str, Vec<Link>)> = Vec::new();
     let (mut pages, mut documents, mut machines) = (Vec::new(), Vec::new(), Vec::new());
     for file in &archives {

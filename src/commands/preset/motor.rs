@@ -1,14 +1,17 @@
 //! The preset of a machine: the values of `fmu tune`, and the inputs of its reference result.
 
 use crate::commands::tune::place;
-use crate::message;
 use anyhow::{Result, bail};
+use cargo_fmu::message;
+use drive::MappedDrive;
+use drive_tools::datasheet::MappedSheet;
 use drive_tools::tune::{
     joined,
     setting::{Setting, Tuned, Value},
 };
-use fmu_core::Description;
+use fmu_core::{Description, Model};
 use fmu_pack::preset::{NewExperiment, PresetFmu};
+use std::fmt::Write as _;
 
 /// Sets the values of the machine, even those that equal the model's start values, because the FMU may be a preset for another
 /// machine. A note lists the values of that machine that remain. Returns the default experiment.
@@ -28,20 +31,56 @@ pub(super) fn set(preset: &mut PresetFmu, tuned: &Tuned) -> Result<NewExperiment
         ),
     };
     for (name, value) in values {
-        let text = match value {
-            Value::Real(x) => format!("{x:?}"),
-            Value::Reals(all) => all.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(","),
-            Value::Integer(x) => x.to_string(),
-            Value::Boolean(x) => x.to_string(),
-            Value::Item(item) => item,
-        };
-        preset.set(&name, &text, None)?;
+        preset.set(&name, &text(&value), None)?;
     }
     let stay = preset.earlier().join(", ");
     if !stay.is_empty() {
         message::note(&format!("values of the earlier preset that {} does not have remain: {stay}", tuned.name));
     }
     Ok(course(preset.own(), tuned))
+}
+
+/// A value as `--set` takes it.
+fn text(value: &Value) -> String {
+    match value {
+        Value::Real(x) => format!("{x:?}"),
+        Value::Reals(all) => all.iter().map(|x| format!("{x:?}")).collect::<Vec<_>>().join(","),
+        Value::Integer(x) => x.to_string(),
+        Value::Boolean(x) => x.to_string(),
+        Value::Item(item) => item.clone(),
+    }
+}
+
+/// Sets the values of a data sheet. Returns the default experiment: half of the maximum speed, then half of the continuous torque
+/// there.
+///
+/// # Errors
+/// The FMU is not `MappedDrive`.
+pub(super) fn set_sheet(preset: &mut PresetFmu, sheet: &MappedSheet) -> Result<NewExperiment> {
+    if preset.own().name != MappedDrive::INFO.name {
+        bail!("{}: a data sheet is for MappedDrive", preset.own().name);
+    }
+    for (name, value) in sheet.values() {
+        preset.set(name, &text(&value), None)?;
+    }
+    let half = 0.5 * sheet.map.last();
+    let torque = 0.5 * sheet.map.tau_continuous.iter().copied().fold(f64::INFINITY, f64::min);
+    let tenths = |t: f64| (10.0 * t).ceil() / 10.0;
+    let reached = tenths((0.5 + 2.0 * sheet.J * half / (2.0 * torque).max(1e-9)).min(60.0));
+    let stop = reached + 1.0;
+    let edge = preset.own().experiment.step;
+    let rows = [
+        (0.0, 0.0, 0.0),
+        (0.1, 0.0, 0.0),
+        (0.1 + edge, half, 0.0),
+        (reached, half, 0.0),
+        (reached + edge, half, torque),
+    ];
+    let mut stimuli = String::from("\"time\",\"speed_ref\",\"tau_load\"\n");
+    for (time, speed, load) in rows.into_iter().chain([(stop, half, torque)]) {
+        let _ = writeln!(stimuli, "{time},{speed},{load}");
+    }
+    Ok(NewExperiment { stimuli, stop, step: None })
 }
 
 /// The default experiment for this machine. The drive stays at rest until the rotor has aligned itself, then turns at half of

@@ -32,7 +32,7 @@ pub(super) struct Alignment {
     /// Current in A of an alignment where 0.4 I is too much, and about the flux linkage of the magnet in Wb; 0: it is not.
     pub(super) i_0: f64,
     pub(super) psi_1: f64,
-    /// Angle in rad of the smaller inductance from the current, of the last look.
+    /// Angle in rad from the current to the axis of the smaller inductance, at the last measurement.
     off: f64,
     looks: f64,
     /// No further look is needed.
@@ -111,7 +111,7 @@ mod tests {
             assert!((found.psi_1 / (20e-3 * i_1) - 1.0).abs() < 0.1, "{} Wb of {i_1} A", found.psi_1);
         }
         let (found, i) = looked(|_| 0.1);
-        assert!(found.over && found.i_0 == 0.0 && found.psi_1 == 0.0, "0.4 I is little enough: {found:?}, {i} A");
+        assert!(found.over && found.i_0 == 0.0 && found.psi_1 == 0.0, "0.4 I is small enough: {found:?}, {i} A");
     }
 
     /// An angle that stays: L_d > L_q, or a rotor that does not follow.

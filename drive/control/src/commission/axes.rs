@@ -70,7 +70,7 @@ impl Loops {
         });
     }
 
-    /// The axes, of an `inverse` machine with L_d > L_q.
+    /// The axes of an `inverse` machine, which has L_d > L_q.
     ///
     /// # Errors
     /// They are not separable, an inductance is negative, or the magnet has changed its axis.

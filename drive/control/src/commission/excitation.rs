@@ -209,7 +209,7 @@ impl Excitation {
         self.axis.to_stator(DqHat::new(d, q))
     }
 
-    /// Calls `each` with the flux linkage (Wb) along and across since the start, and the currents (A), of each row; `L` in H.
+    /// Calls `each` for each row with the flux linkage (Wb) along and across since the start and the currents (A); `L` in H.
     pub(super) fn flux(&self, bench: &Bench, record: &Record, L: f64, mut each: impl FnMut([f64; 4])) {
         let T = self.row_time(bench);
         let between = Between::new(bench.R * T / L);

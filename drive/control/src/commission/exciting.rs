@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// Amplitudes of the loops over I: axes, small and large.
 const SMALL: [f64; 2] = [0.3, 0.35];
 const LARGE: f64 = 0.9;
-/// Share of the flux linkage that the moving rotor may add: in small loops, and in loops whose fit accounts for it.
+/// Share of the flux linkage that the motion of the rotor may add in small loops, and in loops whose fit accounts for it.
 const MOTION: [f64; 2] = [0.004, 0.1];
 /// Square of time times rate of a turn by reluctance: in small loops, and in large ones.
 const GROWN: [f64; 2] = [0.1, 1.0];

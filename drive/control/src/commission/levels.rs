@@ -7,13 +7,15 @@
 //! level       speed PI of bandwidth b = min(rho / 6, 30 1/s, 20 / T_a); settles for max(0.3 s, 3 / b, 12 / w)
 //! measures    max(0.3 s, 4 turns, min(3.5 s, sqrt(300 T_a / w_r))), T_a = J w_r / (n_p K I / 2)
 //! rho         sqrt(0.3 w_r / (0.06 T_b)) of the PLL, 2 pi 15 at least, 0.08 / T at most
-//! flux        then max(0.2 s, 3 turns) with i_d = -0.06 I; i_d = 0 elsewhere
+//! flux        then max(0.2 s, 3 turns) with i_d = -0.06 I, or five times the ripple (`trial`); i_d = 0 elsewhere
 //! ```
 //!
 //! A machine without load needs so little current that noise and the dead zone of the legs would dominate u. With i_d,
 //! all legs carry current, and the error of their voltage loss points along d, where it turns the angle instead of changing the
 //! radius; the radius is psi_M + (L_d - L_q) i_d, where the saturation changes L_d: by 5 % at 0.06 I, or psi_M by 0.3 %. An
-//! error of 1 % of L_d changes psi_M by less than 0.1 %. The torque, however, is free of an error of the angle where i_d = 0.
+//! error of 1 % of L_d changes psi_M by less than 0.1 %. The torque, however, is free of an error of the angle where i_d = 0. With
+//! a [ripple](super::ripple), the radius without i_d is less exact than the current; the torque then is (psi_M + (L_d - L_q) i_d)
+//! i_q.
 //!
 //! J / (n_p K) of the speed control and of i_a is updated after each sweep, and i_f from the last two levels. psi_M is the mean
 //! radius at the highest level. Errors of the voltage change it by 1 / w: half of the difference between 0.15 and 0.45 w_r is
@@ -26,20 +28,24 @@ use super::identified::Identified;
 use super::mechanics::Mechanics;
 use super::results::Results;
 use super::status::CommissionFault as Fault;
+use super::trial::{Trial, Verdict};
 use super::turning::Turning;
-use drive_base::frame::{AlphaBeta, DqHat};
+use drive_base::frame::{AlphaBeta, DqHat, SQRT_3};
 use drive_base::math::within;
+use drive_base::motor::Motor;
 use serde::{Deserialize, Serialize};
 
 /// Speed of a level over the rated one, times the levels in their order; and where the braking ends.
 const LEVEL: f64 = 0.15;
 const ORDER: [f64; 9] = [3.0, 2.0, 1.0, 3.0, 1.0, 2.0, 3.0, 1.0, 3.0];
 const BRAKED: f64 = 0.1;
-/// Currents over I: of a sweep, and of the speed control.
+/// Currents over I, for a sweep and for the speed control.
 const SWEEP: f64 = 0.6;
 const CONTROL: f64 = 0.8;
 /// Current along the d-axis over I.
 const ALONG: f64 = -0.06;
+/// Relative error of what the dead time adds to the samples.
+const LATE: f64 = 0.3;
 /// Shortest part in turns, longest in s.
 const TURNS: f64 = 2.2;
 const LONGEST: f64 = 1.2;
@@ -56,6 +62,9 @@ const FAR: f64 = 0.1;
 const FADE: f64 = 0.05;
 /// Measurement of psi_M: s and turns, after the time in s in which the current changes.
 const FLUX: (f64, f64, f64) = (0.2, 3.0, 0.02);
+
+/// Change of the friction's current that means a load, in units of I and of the current.
+const LOAD: (f64, f64) = (0.02, 0.2);
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 enum Phase {
@@ -87,14 +96,19 @@ pub(super) struct Levels {
     inertia: f64,
     /// Current of the friction at the last level in A, its slope in A.s/rad, and the speed of that level in rad/s.
     friction: [f64; 3],
+    /// Current in A and speed in rad/s of the first level as first measured.
+    first: [f64; 2],
     /// Integral of the speed control in A.
     integral: f64,
     /// Current of the sweep in A, and its first speed in rad/s.
     i_a: f64,
     from: f64,
-    /// Current along the d-axis in A, and psi(i)/i - without the magnet - in H there.
+    /// Current along the d-axis in A; for the flux linkage, and psi(i)/i - without the magnet - in H there.
     i_d: f64,
+    i_flux: f64,
     L_d: f64,
+    /// The ripple.
+    trial: Trial,
     /// Sum of i_q in A over the level, and samples.
     sums: [f64; 2],
     points: Points,
@@ -139,8 +153,9 @@ impl Levels {
         let i_f = i_f.clamp(0.0, 0.1 * bench.I);
         let i_d = turning.current(sample).d();
         let inertia = bench.inertia();
-        let L_d = results.chord_d(turning.motor.L_d, ALONG * bench.I);
-        let mut levels = Self { inertia, friction: [i_f, 0.0, 0.0], i_d, L_d, ..Self::default() };
+        let i_flux = ALONG * bench.I;
+        let L_d = results.chord_d(turning.motor.L_d, i_flux);
+        let mut levels = Self { inertia, friction: [i_f, 0.0, 0.0], i_d, i_flux, L_d, ..Self::default() };
         levels.sweep(bench, turning);
         levels
     }
@@ -236,7 +251,7 @@ impl Levels {
                     (self.from, self.k) = (w, 0.0);
                     self.points.begin();
                 } else if t > 0.01 {
-                    self.take(bench, turning, sample, longest);
+                    self.take(bench, turning, longest);
                 }
                 self.i_f(w) + up * self.i_a
             }
@@ -248,6 +263,7 @@ impl Levels {
                 }
                 if t > wait && off < NEAR {
                     self.sums = [0.0; 2];
+                    self.trial.begin();
                     self.points.begin();
                     self.enter(Phase::Measure);
                 }
@@ -255,11 +271,13 @@ impl Levels {
             }
             Phase::Measure => {
                 let whole = self.measured(bench, target);
-                self.take(bench, turning, sample, whole / (whole / part(target, whole)).floor().max(1.0));
+                self.take(bench, turning, whole / (whole / part(target, whole)).floor().max(1.0));
+                self.trial.add(bench, turning, sample, false);
                 let [sum, samples] = &mut self.sums;
                 (*sum, *samples) = (*sum + turning.current(sample).q(), *samples + 1.0);
                 if t >= whole {
                     let (i, [last, slope, w_last]) = (*sum / *samples, self.friction);
+                    self.first = if self.first[1] == 0.0 { [i, target] } else { self.first };
                     let slope = if w_last > 0.0 { ((i - last) / (target - w_last)).max(0.0) } else { slope };
                     self.friction = [i, slope, target];
                     if (w / target - 1.0).abs() > FAR {
@@ -275,24 +293,30 @@ impl Levels {
                 let (time, turns, wait) = FLUX;
                 let whole = time.max(turns * std::f64::consts::TAU / target);
                 if t > wait {
-                    self.take(bench, turning, sample, part(target, whole));
+                    self.trial.add(bench, turning, sample, true);
+                    self.take(bench, turning, part(target, whole));
                 }
                 if t >= wait + whole {
                     self.part(bench, turning);
+                    if self.repeats(bench, turning, results) {
+                        self.enter(Phase::Settle);
+                        let i = DqHat::new(self.i_d, self.i_f(w));
+                        return Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, i)));
+                    }
                     self.follow(bench, turning);
                     self.at += 1;
                     if !self.brakes() && left < self.needed(bench, turning) {
                         self.at = ORDER.iter().fold(0, |n, _| n + 1);
                     }
                     if self.brakes() {
-                        self.show(bench, turning.motor.L_d, results)?;
+                        self.show(bench, turning.motor.L_d, turning.ripples, results)?;
                     }
                     self.sweep(bench, turning);
                 }
                 self.speed(bench, turning, target)
             }
         };
-        let along = if self.phase == Phase::Flux { ALONG * bench.I } else { 0.0 };
+        let along = if self.phase == Phase::Flux { self.i_flux } else { 0.0 };
         self.i_d += within(along - self.i_d, bench.I * T / FADE);
         Ok(Level::Voltage(turning.in_rotor_frame(bench, sample, DqHat::new(self.i_d, i_q))))
     }
@@ -313,8 +337,8 @@ impl Levels {
     }
 
     /// A sample of a part that lasts `longest` (s) at most.
-    fn take(&mut self, bench: &Bench, turning: &Turning, sample: &Sample, longest: f64) {
-        self.points.take(turning.delta, sample.i, turning.theta);
+    fn take(&mut self, bench: &Bench, turning: &Turning, longest: f64) {
+        self.points.take(turning.delta, turning.i, turning.theta);
         if self.points.time(bench.T) >= longest {
             self.part(bench, turning);
             self.points.begin();
@@ -330,6 +354,9 @@ impl Levels {
         let Part { acceleration, sigma, w, torque, radius, i_d, .. } = part;
         if self.phase != Phase::Flux {
             let each = 1.0 / bench.n_p;
+            let Motor { psi_M, L_d, L_q, .. } = turning.motor;
+            // The ripple's error of the radius is not one of the torque.
+            let torque = if turning.ripples { torque * (psi_M + (L_d - L_q) * i_d) / radius } else { torque };
             self.mechanics.add(acceleration * each, sigma * each, w * each, 1.5 * bench.n_p * torque);
             return;
         }
@@ -353,6 +380,22 @@ impl Levels {
         self.inertia = found.clamp(0.3 * self.inertia, 2.0 * self.inertia);
     }
 
+    /// Whether the level has to be repeated, with the ripple.
+    fn repeats(&mut self, bench: &Bench, turning: &mut Turning, results: &Results) -> bool {
+        let along = (self.L_d - turning.motor.L_q) * self.i_flux;
+        let verdict = self.trial.judge(bench, turning, self.at == 0, along);
+        if let Verdict::Again(i) = verdict {
+            self.i_flux = self.i_flux.min(-i);
+            self.L_d = results.chord_d(turning.motor.L_d, self.i_flux);
+            // The level is its own predecessor: no slope.
+            self.friction[2] = 0.0;
+        }
+        if verdict != Verdict::Over {
+            (self.radii, self.mechanics) = <_>::default();
+        }
+        matches!(verdict, Verdict::Again(_))
+    }
+
     /// The observer's flux linkage follows the value found at the levels.
     fn follow(&self, bench: &Bench, turning: &mut Turning) {
         let best = self.radii.iter().rev().find(|r| r.parts > 0.0);
@@ -362,7 +405,7 @@ impl Levels {
     }
 
     /// The results; `L_d` in H without current.
-    fn show(&self, bench: &Bench, L_d: f64, results: &mut Results) -> Result<(), Fault> {
+    fn show(&self, bench: &Bench, L_d: f64, ripples: bool, results: &mut Results) -> Result<(), Fault> {
         let [low, _, high] = self.radii;
         if low.parts < 1.0 || high.parts < 1.0 {
             return Err(Fault::Flux);
@@ -373,15 +416,27 @@ impl Levels {
         }
         let error = 0.5 * (low.sum / low.parts / psi - 1.0);
         let variance = (high.squares / high.parts - psi * psi).max(0.0) / (psi * psi);
-        let saturated = results.saturation[2] * L_d * ALONG * bench.I * L_d;
-        let inductance = (results.L_d.u.min(UNKNOWN) + saturated.abs()) * L_d * ALONG * bench.I / psi;
-        let u = (error * error + inductance * inductance + 4.0 * variance / high.parts + LEAST * LEAST).sqrt();
+        let saturated = results.saturation[2] * L_d * self.i_flux * L_d;
+        let inductance = (results.L_d.u.min(UNKNOWN) + saturated.abs()) * L_d * self.i_flux / psi;
+        let ripple = self.trial.rest / psi;
+        let u =
+            (error * error + ripple * ripple + inductance * inductance + 4.0 * variance / high.parts + LEAST * LEAST)
+                .sqrt();
+        // At w_f the samples differ from the mean current by this at most, in A.
+        let late = if ripples { LATE * bench.u_dead / (2.0 * SQRT_3 * bench.U) } else { 0.0 };
+        let sampled = 0.3 * bench.w_r() * psi * bench.T / L_d * (late + bench.R * bench.T / (96.0 * L_d));
         let K = 1.5 * bench.n_p * psi;
         let w_f = 0.3 * bench.w_r() / bench.n_p;
         let J = self.inertia * bench.n_p * K;
         results.show_flux(Identified { value: psi, u });
         let found = self.mechanics.solve(J, K * bench.I, w_f).ok_or(Fault::Mechanics)?;
-        results.show_mechanics(found);
+        // The friction of the first level is that of the others, or a load has come.
+        let [i, w] = self.first;
+        let expected = (found.B.value * w / bench.n_p + found.tau_coulomb.value) / K;
+        if (i - expected).abs() > LOAD.0 * bench.I + LOAD.1 * expected.abs() {
+            return Err(Fault::Mechanics);
+        }
+        results.show_mechanics(found.with(u, K * sampled, w_f));
         Ok(())
     }
 }
@@ -411,12 +466,12 @@ mod tests {
             levels.radii[n] = Radii { sum: 4.0 * psi, squares: 4.0 * psi * psi, parts: 4.0 };
         }
         let mut results = Results { L_d: Identified { value: 1e-3, u: 0.01 }, ..Results::default() };
-        assert_eq!(levels.show(&bench, 1e-3, &mut results), Err(Fault::Mechanics), "there are no parts");
+        assert_eq!(levels.show(&bench, 1e-3, false, &mut results), Err(Fault::Mechanics), "there are no parts");
         let error = results.psi_M.value / 0.15 - 1.0;
         assert!((error - 0.01).abs() < 1e-9 && results.psi_M.u > 0.0099 && results.psi_M.u < 0.0105, "{results:?}");
         levels.radii[2].sum *= 0.1;
         assert_eq!(
-            levels.show(&bench, 1e-3, &mut results),
+            levels.show(&bench, 1e-3, false, &mut results),
             Err(Fault::Flux),
             "0.015 Wb is not within 0.25 and 1.15 psi_r"
         );

@@ -41,6 +41,22 @@ pub(super) struct Found {
     pub(super) tau_friction: Identified,
 }
 
+impl Found {
+    /// Widens the intervals by the relative error `u` of the torque and an error of `tau` (N.m) at the speed `w_f` (rad/s).
+    pub(super) fn with(self, u: f64, tau: f64, w_f: f64) -> Self {
+        let of = |x: Identified, tau: f64| {
+            let share = tau / x.value.max(f64::MIN_POSITIVE);
+            Identified { u: (x.u * x.u + u * u + share * share).sqrt().min(1.0), ..x }
+        };
+        Self {
+            J: of(self.J, 0.0),
+            B: of(self.B, tau / w_f),
+            tau_coulomb: of(self.tau_coulomb, tau),
+            tau_friction: of(self.tau_friction, tau),
+        }
+    }
+}
+
 impl Mechanics {
     /// Stores a part; if the store is full, the part is discarded.
     pub(super) fn add(&mut self, acceleration: f64, sigma: f64, w: f64, tau: f64) {

@@ -15,7 +15,7 @@
 //! Axes         small triangles of current at 0, 45, 90 and 135 degrees               excitation, axes
 //! Saturation   large triangles along d and q, simulated until the currents fit       output_error
 //! Start        a rotating current takes the rotor to 0.12 of the rated speed         starting, turning
-//! Levels       levels of speed and sweeps between them, cut into parts               levels, circle, mechanics
+//! Levels       levels of speed and sweeps between them, cut into parts               levels, trial, circle, mechanics
 //! Done         the gates are off; a spun rotor coasts from 0.1 of the rated speed
 //! ```
 //!
@@ -51,6 +51,7 @@ mod probing;
 mod resistance;
 mod resting;
 mod results;
+mod ripple;
 mod sequence;
 mod setup;
 mod spinning;
@@ -58,6 +59,7 @@ mod starting;
 mod status;
 mod swing;
 mod tensor;
+mod trial;
 mod turning;
 
 pub use identified::Identified;

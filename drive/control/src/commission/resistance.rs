@@ -24,6 +24,8 @@ use serde::{Deserialize, Serialize};
 /// Controlled currents as shares of 0.95 I, then constant voltages for these shares of I.
 const HIGH: [f64; 9] = [1.0, 0.85, 0.7, 0.58, 0.46, 0.36, 0.27, 0.2, 0.14];
 const LOW: [f64; 9] = [0.11, 0.085, 0.065, 0.05, 0.036, 0.025, 0.016, 0.01, 0.005];
+/// Share of I up to which no current flows.
+const BLOCKED: f64 = 0.001;
 /// All steps.
 const STEPS: usize = 18;
 
@@ -139,9 +141,9 @@ impl Staircase {
     }
 
     /// f(i) = u - R i in V at the current `i` (A), with this `R` (Ohm): linear in ln i between the points.
-    fn lost(&self, R: f64, i: f64) -> f64 {
+    fn lost(&self, R: f64, i: f64, I: f64) -> f64 {
         let f = |n: usize| self.points[n][0] - R * self.points[n][1];
-        let last = STEPS - 1;
+        let last = self.carrying(I).max(1) - 1;
         let lowest = self.points[last][1];
         if i <= lowest {
             return f(last) * i / lowest;
@@ -155,9 +157,16 @@ impl Staircase {
         f(n) + (f(n - 1) - f(n)) * ln(i / below) / ln(above / below)
     }
 
-    /// Whether the points are in ascending order, as a curve requires.
-    fn is_ordered(&self) -> bool {
-        self.points[STEPS - 1][1] > 0.0 && self.points.windows(2).all(|p| p[0][1] > p[1][1])
+    /// Number of points from the largest current down to the smallest one that flows. At a voltage below the loss of legs that
+    /// block without current, none does.
+    fn carrying(&self, I: f64) -> usize {
+        let mut last = f64::INFINITY;
+        let flows = |p: &&[f64; 2]| {
+            let less = p[1] > BLOCKED * I && p[1] < last;
+            last = p[1];
+            less
+        };
+        self.points.iter().take_while(flows).count()
     }
 }
 
@@ -175,11 +184,11 @@ pub(super) fn adopt(bench: &mut Bench, staircases: &[Staircase]) -> Result<(), F
     let each = if staircases.len() == 2 { 0.5 } else { 1.0 };
     let mean = |get: &dyn Fn(&Line) -> f64| staircases.iter().map(|s| get(&s.line)).sum::<f64>() * each;
     (bench.R, bench.u_dead, bench.i_x) = (mean(&|l| l.R[0]), mean(&|l| l.u_dead[0]), mean(&|l| l.i_x[0]));
-    if !staircases.iter().all(Staircase::is_ordered) {
+    if !staircases.iter().all(|s| s.carrying(bench.I) >= HIGH.len()) {
         return Err(Fault::Resistance);
     }
     let R = bench.R;
-    let f = |i: f64| staircases.iter().map(|s| s.lost(R, i)).sum::<f64>() * each;
+    let f = |i: f64| staircases.iter().map(|s| s.lost(R, i, bench.I)).sum::<f64>() * each;
     let (mut up, mut down) = (Curve::new(1.024 * bench.I), Curve::new(1.024 * bench.I));
     for n in 0..POINTS {
         let i = up.current(n);

@@ -6,6 +6,7 @@ use super::identified::Identified;
 use super::mechanics::Found;
 use super::output_error::Magnetization;
 use super::resistance::Line;
+use drive_base::frame::SQRT_3;
 use serde::{Deserialize, Serialize};
 
 /// Maximum residual of a loop over its amplitude, along d and q.
@@ -64,7 +65,7 @@ pub struct Results {
     pub i_d: f64,
     /// Current in A of the q-axis chord.
     pub i_q: f64,
-    /// Angle of the d-axis in rad at the end; of a blocked rotor modulo pi unless `north`.
+    /// Angle of the d-axis in rad at the end; for a blocked rotor modulo pi, unless `north`.
     pub axis: f64,
     /// The rotor did not turn.
     pub blocked: bool,
@@ -73,7 +74,9 @@ pub struct Results {
 }
 
 impl Results {
-    /// R_s and the inverter: the mean half-width of both fits, and half of their difference.
+    /// R_s and the inverter: the mean half-width of both fits, and half of their difference. If the dead time delays the pulses by
+    /// t_d / 2, the samples exceed the mean current by its share R_s t_d / (2 L); between the pulses, the current is an exponential,
+    /// and the samples are too small by the share (R_s T / L)^2 / 96. R_s contains both.
     pub(super) fn show_resistance(&mut self, bench: &Bench, lines: [&Line; 2]) {
         let [a, b] = lines;
         let of = |a: [f64; 2], b: [f64; 2], value: f64, limit: f64| {
@@ -81,7 +84,9 @@ impl Results {
             let u = if value > 0.0 { half / value } else { 1.0 };
             Identified::within(value, u, limit)
         };
-        self.R_s = of(a.R, b.R, bench.R, LIMIT_R);
+        let (x, late) = (bench.R * bench.T / bench.L_c, bench.u_dead / (2.0 * SQRT_3 * bench.U));
+        let wider = |[R, half]: [f64; 2]| [R, half + bench.R * x * (1.5 * late + x / 96.0)];
+        self.R_s = of(wider(a.R), wider(b.R), bench.R, LIMIT_R);
         self.u_dead = of(a.u_dead, b.u_dead, bench.u_dead, LIMIT_DEAD);
         // The tails of dead time and threshold differ from 1/i: twice the half-width holds 95 % of the values.
         let double = |x: [f64; 2]| [2.0 * x[0], 4.0 * x[1]];

@@ -26,6 +26,7 @@
 
 use super::align::VOLTAGE;
 use super::bench::{Bench, Sample};
+use super::ripple::Ripple;
 use crate::current::{CurrentController, CurrentGains, CurrentLoop};
 use crate::estimator::gradient::{GradientObserver, GradientParameters};
 use crate::estimator::tracker::{TrackerKind, TrackerParameters};
@@ -55,6 +56,10 @@ pub(super) struct Turning {
     pub(super) w: f64,
     /// Step of the active flux at this sample in Wb.
     pub(super) delta: AlphaBeta,
+    /// Current at this sample in A, less what the dead time adds to the mean.
+    pub(super) i: AlphaBeta,
+    /// The [ripple](super::ripple) determines the zone of the dead time.
+    pub(super) ripples: bool,
 }
 
 impl Turning {
@@ -85,7 +90,9 @@ impl Turning {
     /// One sample: angle, speed and the step of the active flux.
     pub(super) fn observe(&mut self, bench: &Bench, sample: &Sample) {
         let resistive = (sample.i_last + sample.i) * (0.5 * bench.R);
-        let legs = self.legs(bench, sample);
+        let ripple = self.ripples.then(|| self.ripple(bench, sample, sample.u));
+        let legs = self.legs(bench, sample, ripple);
+        self.i = sample.i - ripple.map_or(AlphaBeta::ZERO, |ripple| ripple.late(&bench.curve, sample.i));
         let u = sample.u - legs;
         self.delta = (u - resistive) * bench.T - (sample.i - sample.i_last) * self.motor.L_q;
         let observed = Observed { i: sample.i, i_last: sample.i_last, u, ..Observed::default() };
@@ -100,13 +107,34 @@ impl Turning {
         Axis::at(self.theta + samples * bench.T * self.w)
     }
 
+    /// The ripple at the voltage `u` (V).
+    fn ripple(&self, bench: &Bench, sample: &Sample, u: AlphaBeta) -> Ripple {
+        Ripple::new(bench, u, sample.u_dc, 0.5 * (self.motor.L_d + self.motor.L_q))
+    }
+
+    /// Voltage in V along q that the legs took less since the last sample with a ripple than without.
+    pub(super) fn rippled(&self, bench: &Bench, sample: &Sample) -> f64 {
+        let i = (sample.i_last + sample.i) * 0.5;
+        let ripple = self.ripple(bench, sample, sample.u);
+        let less = bench.curve.loss(i) - ripple.loss_and_slope(&bench.curve, i).0;
+        self.ahead(bench, -0.5).from_stator(less).q()
+    }
+
+    /// Step of the active flux along q in Wb.
+    pub(super) fn along_q(&self, bench: &Bench) -> f64 {
+        self.ahead(bench, -0.5).from_stator(self.delta).q()
+    }
+
     /// Mean voltage in V that the legs took since the last sample.
-    fn legs(&self, bench: &Bench, sample: &Sample) -> AlphaBeta {
+    fn legs(&self, bench: &Bench, sample: &Sample, ripple: Option<Ripple>) -> AlphaBeta {
+        let lost = |i: AlphaBeta| {
+            ripple.map_or_else(|| bench.curve.loss_and_slope(i), |ripple| ripple.loss_and_slope(&bench.curve, i))
+        };
         let Motor { R_s, L_d, L_q, psi_M, .. } = self.motor;
         let h = bench.T / STEPS;
         let start = self.ahead(bench, 0.0);
         let (from, to) = (start.from_stator(sample.i_last), self.ahead(bench, 1.0).from_stator(sample.i));
-        let first = bench.curve.loss_and_slope(sample.i_last);
+        let first = lost(sample.i_last);
         let (mut missing, mut legs) = (DqHat::ZERO, AlphaBeta::ZERO);
         for _ in 0..PASSES {
             let (mut axis, mut i, mut sum) = (start, from, AlphaBeta::ZERO);
@@ -124,7 +152,7 @@ impl Turning {
                 let decay = each.map(|each| (1.0 - each * (R_s + slope)).max(0.0));
                 gain = DqHat::new(decay[0] * gain.d() + each[0], decay[1] * gain.q() + each[1]);
                 axis = axis.slightly_ahead(h * self.w);
-                (loss, slope) = bench.curve.loss_and_slope(axis.to_stator(i));
+                (loss, slope) = lost(axis.to_stator(i));
                 k += 1.0;
             }
             let off = to - i;
@@ -167,7 +195,13 @@ impl Turning {
         let i = Axis::<Estimated>::at(theta).from_stator(sample.i);
         let acts = Axis::<Estimated>::at(theta + (bench.delay + 0.5) * bench.T * w);
         let u = self.controller.command(&gains, motor, i_ref, i, w);
-        let asked = acts.to_stator(u) + bench.curve.loss(acts.to_stator(i_ref));
+        let (u, i_then) = (acts.to_stator(u), acts.to_stator(i_ref));
+        let legs = if self.ripples {
+            self.ripple(bench, sample, u).loss_and_slope(&bench.curve, i_then).0
+        } else {
+            bench.curve.loss(i_then)
+        };
+        let asked = u + legs;
         let (size, most) = (asked.magnitude(), VOLTAGE * bench.U);
         if size <= most {
             self.controller.integrate(&gains, i_ref - i, None, bench.T);
@@ -232,7 +266,7 @@ mod tests {
         let x = (bench.R + legs) * bench.T / L;
         let mean = 1.0 / (1.0 - exp(-x)) - 1.0 / x;
         let expected = (sample.i_last + (sample.i - sample.i_last) * mean) * legs;
-        let found = turning.legs(&bench, &sample);
+        let found = turning.legs(&bench, &sample, None);
         assert!((found - expected).magnitude() < 1e-3 * expected.magnitude(), "{found:?}, not {expected:?}");
     }
 
@@ -244,7 +278,7 @@ mod tests {
         let turning = Turning { w, ..Turning::new(&bench, [2e-3, 2e-3], 200.0) };
         let middle = Axis::<Estimated>::at(0.5 * w * bench.T);
         let u = middle.to_stator(DqHat::new(0.0, w * turning.motor.psi_M));
-        let found = middle.from_stator(turning.legs(&bench, &Sample { u, ..Sample::default() })).d();
+        let found = middle.from_stator(turning.legs(&bench, &Sample { u, ..Sample::default() }, None)).d();
         let turn = w * bench.T;
         let expected = -legs * (2.0 / 3.0) * turning.motor.psi_M * turn * turn / (8.0 * 2e-3);
         assert!((found / expected - 1.0).abs() < 0.03, "{found} V, not {expected} V");

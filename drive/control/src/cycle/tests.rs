@@ -199,7 +199,7 @@ fn the_estimators_see_what_is_left_of_an_injection() {
 fn the_next_sample_reads_references_and_output() {
     let (mut controller, frame) = turning(0.0, |_| ());
     let (i_ref, i) = (DqHat::new(-1.0, 3.0), DqHat::new(-0.5, 2.0));
-    controller.keep(&Sample::default(), i_ref, i);
+    controller.keep(Mode::ClosedLoop, &Sample::default(), i_ref, i);
     let (par, state) = (&controller.parameters, &controller.state);
     let expected = (i_ref - i) * (par.current.bandwidth * par.motor.L_d);
     assert!((state.u_pi - expected).magnitude() < 1e-9, "{:?}, not {expected:?}", state.u_pi);

@@ -36,7 +36,8 @@ fn period(commission: &mut Commission, bench: &mut Bench, gain: f64, u_dc: f64) 
     bench.tick(out.u, out.gates);
 }
 
-/// Runs to the end; returns the maximum speed relative to the rated one, in the swings at standstill and of the turning machine.
+/// Runs to the end; returns the maximum speed relative to the rated speed, during the swings at standstill and while the
+/// machine turns.
 fn run_fast(motor: &Motor, seed: u64) -> (Commission, Bench, [f64; 2]) {
     let mut fastest = [0.0_f64; 2];
     let (commission, bench) = run_with(motor, seed, |commission, bench| {
@@ -112,7 +113,11 @@ fn machines_commission_themselves() {
         let motor = Motor::draw(1, index);
         let (commission, bench, [_, turning]) = run_fast(&motor, index);
         assert_eq!(commission.state(), State::Done, "machine {index}: {:?}", commission.fault());
-        check(commission.results(), &motor, &[]);
+        // With a great R T/L, the samples of a switching inverter would differ from the mean current by up to 2 %, and its ripple is
+        // not known.
+        let slow = motor.R * motor.T > 0.3 * motor.L_d;
+        let refused: &[&str] = if slow { &["R_s", "psi_M", "J", "tau_friction"] } else { &[] };
+        check(commission.results(), &motor, refused);
         assert!(bench.most < 1.1 * motor.I && !commission.results().blocked, "machine {index}");
         let rated = motor.w_rated / motor.n_p;
         assert!(bench.w < 0.12 * rated && turning < 0.5, "machine {index}: {turning} of the rated speed");

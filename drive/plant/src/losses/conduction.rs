@@ -82,7 +82,7 @@ impl Devices {
 /// Maximum modulation m = 2 |u| / u_dc of a sinusoidal voltage: 2 / sqrt(3).
 const MAX_MODULATION: f64 = 1.154_700_538_379_251_5;
 
-/// c_3 over m cos(3 phi), of a common-mode voltage of (max + min)/2.
+/// c_3 divided by m cos(3 phi), for a common-mode voltage of (max + min)/2.
 const THIRD: f64 = -3.0 * 1.732_050_807_568_877_2 / (120.0 * PI * PI);
 
 /// Mean loss (W) of six switches over a period with a sinusoidal current of amplitude `i` (A), at the modulation

@@ -59,7 +59,7 @@ pub(crate) const CHECKS: &[Check] = &[
         tried: "Sets an input together with a reference that does not exist.", fix: "Check all references before assigning any." },
     Check { id: "G04", clause: GET, levels: Levels::MUST, run: Run::Any(round_trip),
         requirement: "A parameter or input that is set before the end of initialization reads back unchanged.",
-        tried: "Sets every parameter and input that is a number in Initialization Mode, then all before it, and reads them in it.",
+        tried: "Sets every numeric parameter and input in Initialization Mode, and in another run before it; reads them in that mode.",
         fix: "Store the value unchanged." },
     Check { id: "G05", clause: GET, levels: Levels::MUST, run: Run::Any(strings),
         requirement: "A string that is set reads back unchanged, at any length, after the importer has overwritten its own copy.",

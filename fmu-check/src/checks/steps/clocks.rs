@@ -99,7 +99,7 @@ fn activated(session: &Session) -> Result<(), NotDetermined> {
     let mut found = false;
     Served::start(session)?.run(EVENTS, &mut |served, moment, due| {
         for (i, clock) in served.clocks.iter().enumerate().filter(|_| matches!(moment, Moment::Active)) {
-            // A clock that is on another clock can be queried only while that one is active.
+            // A clock that depends on another clock can be queried only while the other is active.
             if !due.contains(&i) && !clock.v.clocks.is_empty() {
                 continue;
             }

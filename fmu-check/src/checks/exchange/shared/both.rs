@@ -12,7 +12,7 @@ use model_description::{BaseType, ModelVariable};
 
 /// Maximum number of communication points.
 const POINTS: u32 = 100;
-/// Integrator steps in a communication step: of the run, and of the one that shows its error.
+/// Integrator steps in a communication step: in the run, and in the finer run that shows its error.
 const PARTS: [u32; 2] = [40, 20];
 /// Share of the change over the run by which results may differ, and share of the largest value.
 const OF_CHANGE: f64 = 0.25;

@@ -1,7 +1,6 @@
 //! Dependencies proved by perturbation (FMI 2.0.5, 2.2.8; FMI 3.0.2, 2.4.8).
 
 use crate::checks::life::shared::kept::set_all;
-use crate::checks::process::instances::DISTURBED;
 use crate::deviation::differ;
 use crate::encoding::show;
 use crate::exchange::Importer;
@@ -9,6 +8,9 @@ use crate::session::{NotDetermined, Session};
 use crate::settable::settable;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, ModelVariable, Unknown, Variability};
+
+/// New, unchanged instances that confirm a finding.
+const CONTROLS: usize = 2;
 
 /// Reports that the unknown, if it could be read both times, changes with a known that is not among its dependencies.
 fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable, (old, new): (&[u64], &[u64])) {
@@ -21,20 +23,22 @@ fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable,
     }
 }
 
-/// Whether the values of a new, unchanged instance differ from the first one's.
-fn is_disturbed(
+/// Unmarks the variables whose values in a new instance, in which nothing was changed, differ from the first one's.
+fn keep_steady(
     session: &Session,
     moved: bool,
     variables: &[&ModelVariable],
     before: &[Vec<u64>],
-) -> Result<bool, NotDetermined> {
+    steady: &mut [bool],
+) -> Result<(), NotDetermined> {
     let control = session.initializing()?;
     if moved {
         set_all(&control, 3.0)?;
     }
     let found = control.snapshot(variables)?;
     control.free()?;
-    Ok(found != before)
+    steady.iter_mut().zip(found.iter().zip(before)).for_each(|(steady, (found, before))| *steady &= found == before);
+    Ok(())
 }
 
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
@@ -50,6 +54,8 @@ pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
         return session.not_applicable("no dependencies of initial unknowns are given");
     }
     let variables: Vec<_> = unknowns.iter().map(|(v, _)| *v).collect();
+    // An unknown that differs without a change shows no dependency.
+    let mut steady: Vec<bool> = variables.iter().map(|v| session.is_steady(v)).collect();
     let mut tried = 0;
     // Also where all knowns differ from their start values: a factor may be 0 there.
     for moved in [false, true] {
@@ -75,21 +81,30 @@ pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
             }
             tried += 1;
             let after = one.snapshot(&variables)?;
-            if before != after && is_disturbed(session, moved, &variables, &before)? {
-                return Err(NotDetermined(DISTURBED.into()));
-            }
-            for (((unknown, dependencies), old), new) in unknowns.iter().zip(&before).zip(&after) {
-                let named = dependencies
-                    .iter()
-                    .any(|d| session.description.referenced(*d).is_some_and(|v| v.name == known.name));
-                if !named && old != new {
-                    undeclared(session, unknown, known, (old, new));
+            let names = |d: &u32| session.description.referenced(*d).is_some_and(|v| v.name == known.name);
+            let changed: Vec<usize> = (0..unknowns.len())
+                .filter(|&k| steady[k] && before[k] != after[k] && !unknowns[k].1.iter().any(names))
+                .collect();
+            let _ = one.free();
+            if !changed.is_empty() {
+                for _ in 0..CONTROLS {
+                    keep_steady(session, moved, &variables, &before, &mut steady)?;
                 }
             }
-            let _ = one.free();
+            for k in changed.into_iter().filter(|&k| steady[k]) {
+                undeclared(session, unknowns[k].0, known, (&before[k], &after[k]));
+            }
         }
     }
+    if !steady.contains(&true) {
+        return session.not_applicable("every unknown differs between two instances in which nothing was changed");
+    }
     session.note(format!("{tried} knowns were changed"));
+    let unsteady = variables.iter().zip(&steady).filter(|(_, steady)| !**steady).map(|(v, _)| v.name.as_str());
+    let unsteady: Vec<&str> = unsteady.collect();
+    if !unsteady.is_empty() {
+        session.note(format!("not compared, because they differ without a change: {}", unsteady.join(", ")));
+    }
     Ok(())
 }
 

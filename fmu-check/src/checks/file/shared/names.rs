@@ -1,7 +1,7 @@
 //! The grammar of structured names.
 
 /// `name = identifier | "der(" identifier ["," order] ")"`, identifiers joined by dots, each with indices; FMI 2.0.5,
-/// 2.2.9. A part in single quotes may have anything, with backslash escapes.
+/// 2.2.9. A part in single quotes may contain any characters, with backslash escapes.
 pub(crate) fn grammar(name: &str) -> Result<(), String> {
     let inner = name.strip_prefix("der(").and_then(|rest| rest.strip_suffix(')'));
     let body = match inner {

@@ -1,0 +1,124 @@
+//! The values of `MappedDrive` for a drive that a data sheet describes: torque over speed, losses over speed and torque.
+//!
+//! [`mod@file`] reads the data sheet, [`losses`] brings its table of losses or efficiencies into one form, [`columns`] the map of
+//! `fmu map`, and [`reduce`] chooses the speeds of the tables.
+
+pub mod column;
+pub mod columns;
+pub mod file;
+pub mod losses;
+pub mod reduce;
+
+use crate::error::Result;
+use crate::tune::setting::Value;
+use drive::mapped_drive::map::{Map, SHARES, SPEEDS, share};
+use file::DataSheet;
+use serde_json::json;
+use std::path::Path;
+
+/// The drive of a data sheet.
+#[derive(Clone, Debug)]
+pub struct MappedSheet {
+    /// Name, for files.
+    pub name: String,
+    /// Source of the values.
+    pub source: String,
+    /// The tables.
+    pub map: Map,
+    /// Moment of inertia in kg.m2.
+    pub J: f64,
+    /// Bandwidth of the torque in rad/s.
+    pub bandwidth: f64,
+    /// Assumptions about what the data sheet does not say.
+    pub notes: Vec<String>,
+}
+
+/// The drive of the data sheet at `path`.
+///
+/// # Errors
+/// The file cannot be read, or a value is wrong; the message names the file, the value and what is allowed.
+pub fn read(path: &Path) -> Result<MappedSheet> {
+    let sheet = DataSheet::read(path)?;
+    let (columns, notes) = columns::of(&sheet)?;
+    let t_overload = sheet.t_overload(&columns)?;
+    let chosen = reduce::reduce(&columns);
+    let mut map = Map { u_dc: sheet.data.dc_link.u_dc, t_overload, ..Map::default() };
+    let [u_min, u_max] = sheet.voltages();
+    (map.u_min, map.u_max) = (u_min, u_max);
+    for (k, column) in chosen.iter().enumerate() {
+        map.speed[k] = column.speed;
+        [map.tau_motor[k], map.tau_generator[k]] = column.peak;
+        (map.tau_continuous[k], map.tau_drag[k], map.p_loss[k]) = (column.continuous, column.drag, column.losses);
+    }
+    Ok(MappedSheet {
+        name: sheet.data.name.clone(),
+        source: sheet.data.source.clone(),
+        map,
+        J: sheet.data.mechanics.J,
+        bandwidth: sheet.data.bandwidth.torque,
+        notes,
+    })
+}
+
+impl MappedSheet {
+    /// The values of `MappedDrive`.
+    pub fn values(&self) -> Vec<(&'static str, Value)> {
+        let Map { u_dc, u_min, u_max, speed, tau_motor, tau_generator, tau_continuous, tau_drag, p_loss, t_overload } =
+            &self.map;
+        let reals = |values: &[f64]| Value::Reals(values.to_vec());
+        vec![
+            ("u_dc", Value::Real(*u_dc)),
+            ("map.u_dc", Value::Real(*u_dc)),
+            ("map.u_min", Value::Real(*u_min)),
+            ("map.u_max", Value::Real(*u_max)),
+            ("map.speed", reals(speed)),
+            ("map.tau_motor", reals(tau_motor)),
+            ("map.tau_generator", reals(tau_generator)),
+            ("map.tau_continuous", reals(tau_continuous)),
+            ("map.tau_drag", reals(tau_drag)),
+            ("map.p_loss", reals(p_loss.as_flattened())),
+            ("map.t_overload", Value::Real(*t_overload)),
+            ("plant.mechanics.J", Value::Real(self.J)),
+            ("controller.current.bandwidth", Value::Real(self.bandwidth)),
+        ]
+    }
+
+    /// The greatest power at the shaft (W) with its speed (rad/s), and the best efficiency with its speed and torque (N.m), as a
+    /// motor, at the points of the tables.
+    pub fn best(&self) -> ([f64; 2], [f64; 3]) {
+        let (mut power, mut best) = ([0.0; 2], [0.0; 3]);
+        for k in 0..SPEEDS {
+            let (n, peak) = (self.map.speed[k], self.map.tau_motor[k]);
+            if n * peak > power[0] {
+                power = [n * peak, n];
+            }
+            for j in SHARES / 2 + 1..SHARES {
+                let tau = peak * share(j);
+                let efficiency = n * tau / (n * tau + self.map.p_loss[k][j]);
+                if efficiency > best[0] {
+                    best = [efficiency, n, tau];
+                }
+            }
+        }
+        (power, best)
+    }
+}
+
+/// The values of `MappedDrive` for the data sheet at `path`, as JSON.
+///
+/// # Errors
+/// Those of [`read`].
+pub fn values(path: &Path) -> Result<serde_json::Value> {
+    let mut all = serde_json::Map::new();
+    for (name, value) in read(path)?.values() {
+        let value = match value {
+            Value::Real(x) => json!(x),
+            Value::Reals(all) => json!(all),
+            Value::Integer(i) => json!(i),
+            Value::Boolean(b) => json!(b),
+            Value::Item(item) => json!(item),
+        };
+        all.insert(name.into(), value);
+    }
+    Ok(all.into())
+}

@@ -1,0 +1,189 @@
+//! Flying start (`start.catch`) of tuned drives: caught, started from rest, or refused.
+//!
+//! `CATCH_MACHINES=hub-36v,reference` and `CATCH_KINDS=Hybrid` select some; `CATCH_FOLDER=DIR` adds the machines of a folder.
+#![allow(missing_docs, non_snake_case)]
+
+use drive::control::start::StartState;
+use drive::estimator::Kind;
+use drive_tools::tune::motor::MotorFile;
+use drive_tools::tune::rules;
+use drive_tools::tune::setting::{Suited, Tuned};
+use std::f64::consts::TAU;
+use std::path::{Path, PathBuf};
+
+/// Speeds in units of the rated speed.
+const SPEEDS: [f64; 9] = [-1.0, -0.5, -0.2, -0.05, 0.05, 0.1, 0.2, 0.5, 1.0];
+
+/// Time in s after which a rotor is not caught.
+const WAIT: f64 = 4.0;
+
+#[derive(Debug)]
+struct Run {
+    /// Time in s until the controller works, angle error (rad) and speed error (share) then.
+    caught: Option<(f64, f64, f64)>,
+    /// Whether the start sequence ran.
+    started: bool,
+    /// Maximum phase current with gates on until 0.2 s after that, in units of `limit.i`.
+    peak: f64,
+    /// Speed at the end in units of the reference.
+    end: f64,
+    /// Maximum torque before the controller works, in units of the rated one.
+    torque: f64,
+}
+
+/// One start at `speed` (rad/s) with the rotor at `theta` (rad, electrical).
+fn run(tuned: &Tuned, rated: (f64, f64), speed: f64, theta: f64) -> Run {
+    let mut pair = tuned.pair();
+    pair.controller.model.parameters.start.catch = true;
+    pair.plant.model.parameters.initial.speed = speed;
+    pair.plant.model.parameters.initial.theta_e = theta;
+    pair.start().unwrap();
+    let (T_s, u_dc) = (pair.controller.model.parameters.T_s, pair.plant.model.inputs.u_dc);
+    let torque_mode = pair.controller.model.parameters.speed_loop.torque_mode;
+    let limit = pair.controller.model.parameters.limit.i;
+    let mut run = Run { caught: None, started: false, peak: 0.0, end: 0.0, torque: 0.0 };
+    let (mut k, mut end) = (0_u32, WAIT);
+    while f64::from(k) * T_s < end {
+        pair.set_inputs(if torque_mode { 0.0 } else { speed }, 0.0, u_dc);
+        pair.step(T_s).unwrap();
+        k += 1;
+        let (out, plant) = (&pair.controller.out, &pair.plant.out);
+        let t = f64::from(k) * T_s;
+        run.started |= matches!(out.start_state, StartState::Aligning | StartState::Ramping);
+        if out.start_state == StartState::Running && run.caught.is_none() {
+            let error = (out.theta_est - plant.theta_e + TAU + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+            run.caught = Some((t, error, (out.speed_est - plant.speed) / plant.speed.abs().max(1e-3 * rated.0)));
+            end = t + 1.0;
+        }
+        if run.caught.is_none_or(|(at, ..)| t < at + 0.2) {
+            let i = [plant.i.a, plant.i.b, plant.i.c].into_iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+            run.peak = run.peak.max(i / limit);
+        }
+        if run.caught.is_none() {
+            run.torque = run.torque.max((plant.tau_e / rated.1).abs());
+        }
+        run.end = plant.speed / speed;
+    }
+    run
+}
+
+fn machines() -> Vec<(String, MotorFile)> {
+    let chosen =
+        |name: &str| std::env::var("CATCH_MACHINES").map_or(true, |only| only.split(',').any(|one| one == name));
+    let motors = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors");
+    let mut files = Vec::new();
+    for folder in std::iter::once(motors).chain(std::env::var("CATCH_FOLDER").map(PathBuf::from)) {
+        files.extend(std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()));
+    }
+    files.sort();
+    files
+        .into_iter()
+        .filter_map(|path| Some((path.file_stem()?.to_str()?.to_owned(), MotorFile::read(&path).ok()?)))
+        .filter(|(name, _)| chosen(name))
+        .collect()
+}
+
+/// The machine with its estimator; none if it is refused.
+fn tuned(motor: &MotorFile, kind: Kind) -> Option<Box<Tuned>> {
+    let Ok(Suited::Tuned(tuned)) = rules::suited(motor, kind) else { return None };
+    Some(tuned)
+}
+
+fn rated(motor: &MotorFile) -> (f64, f64) {
+    (*motor.data.rating.speed.get_ref(), *motor.data.rating.torque.get_ref())
+}
+
+/// `cargo test --release -p drive-tools --test catch -- --ignored --nocapture`
+#[test]
+#[ignore = "a quarter of an hour: every estimator on every machine at 9 speeds and 24 angles"]
+fn every_method_catches_every_machine() {
+    let angles: u32 = std::env::var("CATCH_ANGLES").map_or(24, |n| n.parse().unwrap());
+    let (mut caught, mut ramped, mut refused) = (0, 0, 0);
+    for (name, motor) in machines() {
+        let chosen = |kind: &Kind| {
+            std::env::var("CATCH_KINDS").map_or(true, |only| only.split(',').any(|one| one == kind.name()))
+        };
+        for &kind in Kind::ALL.iter().filter(|kind| chosen(kind)) {
+            let Some(tuned) = tuned(&motor, kind) else { continue };
+            let mut pair = tuned.pair();
+            pair.controller.model.parameters.start.catch = true;
+            if let Err(fault) = pair.start() {
+                println!("{name:16} {:20} {fault}", kind.name());
+                refused += SPEEDS.len() * angles as usize;
+                continue;
+            }
+            for speed in SPEEDS {
+                let at = |k| TAU * f64::from(k) / f64::from(angles);
+                let runs: Vec<_> =
+                    (0..angles).map(|k| run(&tuned, rated(&motor), speed * rated(&motor).0, at(k))).collect();
+                let count = |of: &dyn Fn(&Run) -> bool| runs.iter().filter(|run| of(run)).count();
+                let most = |of: &dyn Fn(&Run) -> f64| runs.iter().map(of).fold(0.0, f64::max);
+                let counts = [
+                    count(&|run| run.caught.is_some() && !run.started),
+                    count(&|run| run.caught.is_some() && run.started),
+                    count(&|run| run.caught.is_none()),
+                ];
+                (caught, ramped, refused) = (caught + counts[0], ramped + counts[1], refused + counts[2]);
+                println!(
+                    "{name:16} {:20} {speed:5.2} pu: {} caught, {} by the ramp, {} refused; {} hold; at most {:.4} s, {:.1} deg, {:.3} of the \
+                     speed, i {:.2}, torque {:.3}",
+                    kind.name(),
+                    counts[0],
+                    counts[1],
+                    counts[2],
+                    count(&|run| (run.end - 1.0).abs() < 0.1),
+                    most(&|run| run.caught.map_or(0.0, |found| found.0)),
+                    most(&|run| run.caught.map_or(0.0, |found| found.1.abs().to_degrees())),
+                    most(&|run| run.caught.map_or(0.0, |found| found.2.abs())),
+                    most(&|run| run.peak),
+                    most(&|run| run.torque)
+                );
+            }
+        }
+    }
+    println!("{caught} caught, {ramped} by the ramp of the I-f start, {refused} refused");
+}
+
+/// A machine of each kind with a method of each family: the rotor is found in time, with little current and torque.
+#[test]
+fn a_turning_rotor_is_caught() {
+    for (name, kind) in [
+        ("reference", Kind::Rasmussen),
+        ("ipmsm-2.2kw", Kind::Hybrid),
+        ("pmsyrm-5.5kw", Kind::Sensored),
+        ("pmsyrm-5.5kw", Kind::KalmanFilter),
+        ("spindle-40krpm", Kind::ExtendedEmf),
+        ("traction-100kw", Kind::KalmanFilter),
+    ] {
+        let (_, motor) = machines().into_iter().find(|(one, _)| one == name).unwrap();
+        let tuned = tuned(&motor, kind).unwrap();
+        let data = &motor.data;
+        for speed in [-1.0, -0.2, 0.1, 0.5] {
+            for theta in [0.3, 2.4, -1.6] {
+                let w = speed * rated(&motor).0;
+                let run = run(&tuned, rated(&motor), w, theta);
+                println!("{name}, {} at {speed} pu, {theta} rad: {run:?}", kind.name());
+                let (time, angle, off) = run.caught.unwrap();
+                let quarter = 0.25 * TAU / (f64::from(*data.machine.n_p.get_ref()) * w.abs());
+                assert!(!run.started && time <= quarter.max(0.05), "{time} s");
+                assert!(angle.abs() < 0.12 && off.abs() < 0.1, "{angle} rad, {off} of the speed");
+                assert!(
+                    run.peak < 1.1 && (run.end - 1.0).abs() < 0.05,
+                    "{} of the limit, {} of the reference",
+                    run.peak,
+                    run.end
+                );
+            }
+        }
+    }
+}
+
+/// A rotor at rest goes on to its start sequence; an injection method waits with gates off until the rotor is slow enough.
+#[test]
+fn a_rotor_at_rest_starts_and_one_too_fast_is_waited_for() {
+    let (_, motor) = machines().into_iter().find(|(one, _)| one == "ipmsm-2.2kw").unwrap();
+    let rest = run(&tuned(&motor, Kind::ExtendedEmf).unwrap(), rated(&motor), 1e-9, 1.0);
+    assert!(rest.started && rest.caught.is_some() && rest.peak < 1.1, "{rest:?}");
+    let fast = run(&tuned(&motor, Kind::SquareWaveInjection).unwrap(), rated(&motor), rated(&motor).0, 1.0);
+    assert!(!fast.started && fast.caught.is_none() && fast.peak < 0.2, "{fast:?}");
+}

@@ -1,0 +1,152 @@
+//! The flying start in the controller: gates and voltage while the rotor is sought, and how estimator and loops begin at a rotor that
+//! turns.
+
+use crate::catch::{Catch, CatchStep, Refusal, Setup};
+use crate::estimator::{Class, Kind, Sample};
+use crate::model::SensorlessController;
+use crate::signals::ControllerOutputs;
+use crate::speed::SpeedController;
+use crate::start::{CurrentFrequencyStart, StartMode, StartState};
+use crate::state::{Command, Leader, context};
+use crate::tables::PARAMETERS;
+use crate::weakening::INVERSE_SQRT_3;
+use drive_base::frame::{AlphaBeta, Axis, Estimated, Phases};
+use drive_base::hexagon::within_hexagon;
+use drive_base::math::wrap;
+
+/// Minimum EMF of a rotor that turns, in units of R_s `limit.i`.
+const EMF: f64 = 0.08;
+
+/// Share of `start.speed` below which an estimator without standstill takes over after the ramp of the I-f start.
+const SLOW: f64 = 0.5;
+
+/// Maximum EMF in units of u_dc / sqrt(3) at which an estimator that injects at any speed takes over: it is one for low speed.
+const INJECTION: f64 = 0.2;
+
+impl SensorlessController {
+    /// One sample of the flying start; returns false once it is over and the controller works.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn catches(&mut self) -> bool {
+        let Some(mut catch) = self.state.catch else { return false };
+        if catch == Catch::default() {
+            self.state.i_last = self.currents().to_stator();
+        }
+        let sample = self.measure();
+        let step = self.caught(&mut catch, &sample);
+        self.state.i_last = sample.i;
+        let (u, gates) = match step {
+            CatchStep::Off => (AlphaBeta::ZERO, false),
+            CatchStep::Apply(u) => (within_hexagon(u, self.inputs.u_dc).0, true),
+            CatchStep::Turns { theta, w, gates } => {
+                self.begin_turning(&sample, (theta, w), gates);
+                return false;
+            }
+            CatchStep::Rests => {
+                (self.state.catch, self.state.slow, self.state.commands) = (None, catch.refusal, Default::default());
+                return false;
+            }
+        };
+        let commands = &mut self.state.commands;
+        commands.rotate_right(1);
+        commands[0] = Command { u, ..Command::default() };
+        self.state.catch = Some(catch);
+        self.state.computed = ControllerOutputs {
+            u: Phases::from_stator(u),
+            enabled: gates,
+            theta_est: wrap(self.parameters.theta_est),
+            sensor_lost: self.state.sensor_lost,
+            R_s_est: self.parameters.motor.R_s,
+            start_state: StartState::Catching,
+            ..ControllerOutputs::default()
+        };
+        true
+    }
+
+    /// The step of the flying start; a speed at which the estimator cannot work is refused.
+    fn caught(&self, catch: &mut Catch, sample: &Sample) -> CatchStep {
+        let Self { parameters: par, state, .. } = self;
+        let kind = par.estimator_with(state.sensor_lost);
+        if kind == Kind::Sensored {
+            return CatchStep::Turns { theta: sample.theta_meas, w: sample.w_meas, gates: false };
+        }
+        let set = Setup {
+            motor: &par.motor,
+            T_s: par.T_s,
+            delay: par.delay.try_into().unwrap_or(u8::MAX),
+            i_max: par.limit.i,
+            e_min: EMF * par.motor.R_s * par.limit.i,
+        };
+        match catch.update(&set, sample) {
+            CatchStep::Turns { w, .. }
+                if kind.class() == Class::Injection
+                    && w.abs() * par.motor.psi_M > INJECTION * INVERSE_SQRT_3 * sample.u_dc =>
+            {
+                catch.refuse(Refusal::Estimator(w))
+            }
+            step => step,
+        }
+    }
+
+    /// The rotor is at `theta` (rad) and turns at `w` (rad/s): estimator, speed loop and current loop begin there, without torque.
+    fn begin_turning(&mut self, sample: &Sample, (theta, w): (f64, f64), gates: bool) {
+        let Self { inputs, parameters: par, gains, state, .. } = self;
+        let speed = w / f64::from(par.motor.n_p);
+        (state.catch, state.found, state.w_ref) = (None, Some((theta, w)), speed);
+        let w_ref = par.speed_loop.ramped(speed, inputs.speed_ref, par.T_s);
+        state.speed = SpeedController::take_over(&gains.speed, w_ref, speed, 0.0);
+        state.leader = Leader::Estimator;
+        let kind = par.estimator_with(state.sensor_lost);
+        let slow = speed.abs() < SLOW * par.start.speed;
+        if par.start.mode == StartMode::CurrentFrequency && kind.class() == Class::BackEmf && slow {
+            let context = context(par, &par.estimators, &par.motor);
+            state.leader = Leader::Start(CurrentFrequencyStart::turning(&par.start, &context, theta, w));
+        }
+        if gates {
+            return;
+        }
+        // Without current, the machine has the voltage of its EMF until the first command acts.
+        for (k, command) in state.commands.iter_mut().enumerate() {
+            #[expect(clippy::cast_precision_loss, reason = "at most 2")]
+            let ahead = f64::from(par.delay) - k as f64 - 0.5;
+            let axis = Axis::<Estimated>::at(theta + ahead * par.T_s * w);
+            *command = Command { u: axis.along(w * par.motor.psi_M).turned(), ..Command::default() };
+        }
+        state.i_last = sample.i;
+    }
+
+    /// Why the flying start has not caught the rotor, for the log.
+    pub(super) fn not_caught(&self) -> Option<String> {
+        let Self { parameters: par, inputs, state, .. } = self;
+        let refusal = state.catch.map_or(state.slow, |catch| catch.refusal)?;
+        let n_p = f64::from(par.motor.n_p);
+        let off = "the gates stay off, and the rotor is tried again";
+        Some(match refusal {
+            Refusal::Diodes(i) => format!(
+                "start.catch: with the gates off, {i:.3} A flow through the diodes: the EMF of the rotor is above u_dc / sqrt(3) = {:.1} V; \
+                 the gates stay off until it slows down",
+                inputs.u_dc * INVERSE_SQRT_3
+            ),
+            Refusal::Sampling(turn) => format!(
+                "start.catch: the current of a short circuit shows a rotor that turns by about {turn:.2} rad in {}, too fast to be seen; {off}",
+                PARAMETERS.tell(par, |p| &mut p.T_s)
+            ),
+            Refusal::Contradiction(w, expected) => format!(
+                "start.catch: the rotor seems to turn at {:.4} rad/s, but the EMF has the magnitude of {:.4} rad/s: motor.psi_M, motor.L_q or \
+                 the sensors do not fit; {off}",
+                w / n_p,
+                expected / n_p
+            ),
+            Refusal::Estimator(w) => format!(
+                "start.catch: the rotor turns at {:.4} rad/s, and {} takes over up to {:.4} rad/s (an EMF of {INJECTION} u_dc / sqrt(3)); {off}",
+                w / n_p,
+                par.estimator_with(state.sensor_lost).name(),
+                INJECTION * INVERSE_SQRT_3 * inputs.u_dc / (par.motor.psi_M * n_p)
+            ),
+            Refusal::Slow(e) => format!(
+                "start.catch: the EMF of {e:.4} V is below {:.4} V ({EMF} motor.R_s limit.i), too low to find the rotor: it starts as if at rest",
+                EMF * par.motor.R_s * par.limit.i
+            ),
+        })
+    }
+}

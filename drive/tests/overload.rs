@@ -1,0 +1,58 @@
+//! A load that the drive cannot hold is reported in speed control by every drive; a start, a reversal and a load within its torque are
+//! not.
+#![allow(missing_docs)]
+
+use drive::control::estimator::Kind;
+use drive::{MappedDrive, PmsmDrive, PmsmDriveMean};
+use fmu_core::log::{Said, Warnings};
+use fmu_core::{Block, Elapsed, Model, Step, Warns};
+
+/// The first message about the load in 4 s with the speed references 50 rad/s, -50 rad/s after 2 s and the load `tau` (N.m) from 0.8 s on.
+fn message<M: Model + Warns>(mut block: Block<M>, tau: f64, set: fn(&mut M, f64, f64)) -> Option<String> {
+    let (mut now, mut said) = (Elapsed::ZERO, None);
+    for k in 0..4000 {
+        set(&mut block.model, if k < 2000 { 50.0 } else { -50.0 }, if k < 800 { 0.0 } else { tau });
+        if k == 0 {
+            block.initialize();
+            block.model.validate().unwrap();
+        }
+        let step = Step { start: now, h: 1e-3 };
+        block.step(&step).unwrap();
+        now = step.end();
+        let mut sink = |(_, key, text): Said<'_>| {
+            if key == "overload" {
+                said.get_or_insert_with(text);
+            }
+        };
+        block.model.warn(&mut Warnings::to(&mut sink));
+    }
+    said
+}
+
+fn check(name: &str, tau_max: &str, message: impl Fn(f64) -> Option<String>) {
+    for (tau, reported) in [(8.0, true), (-8.0, true), (3.0, false), (-3.0, false)] {
+        let said = message(tau);
+        println!("{name}, {tau} N.m: {said:?}");
+        assert_eq!(said.is_some(), reported, "{name}, {tau} N.m: {said:?}");
+        assert!(said.is_none_or(|text| text.contains(tau_max) && text.contains("speed_ref = 50")), "{name}, {tau} N.m");
+    }
+}
+
+#[test]
+fn a_load_above_the_torque_is_reported() {
+    for estimator in [Kind::Rasmussen, Kind::Sensored] {
+        check(&format!("{estimator:?}"), "tau_max = 4.05", |tau| {
+            let mut block = Block::<PmsmDrive>::default();
+            block.model.pair.controller.model.parameters.estimator = estimator;
+            message(block, tau, |m, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau))
+        });
+    }
+    check("mean", "tau_max = 4.05", |tau| {
+        let set = |m: &mut PmsmDriveMean, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
+        message(Block::<PmsmDriveMean>::default(), tau, set)
+    });
+    check("mapped", "tau_max = 6.0", |tau| {
+        let set = |m: &mut MappedDrive, speed, tau| (m.inputs.speed_ref, m.inputs.tau_load) = (speed, tau);
+        message(Block::<MappedDrive>::default(), tau, set)
+    });
+}

@@ -1,0 +1,150 @@
+//! What a description says of an FMU, and what the importer does with it.
+
+use crate::workshop::Workshop;
+use fmu_import::Fmu;
+use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, System};
+use fmu_system::ssp::load::Loaded;
+use std::ops::ControlFlow;
+use std::path::Path;
+
+/// The last values of variables after 1 s in steps of 0.1 s.
+fn last(fmu: &Fmu, method: Method, set: &[(&str, &str)], variables: &[&str]) -> Vec<f64> {
+    let mut system = System::new(method);
+    system.add("p", fmu, false).unwrap();
+    for (name, value) in set {
+        system.set(name, value).unwrap();
+    }
+    for name in variables {
+        system.record(name).unwrap();
+    }
+    let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    recording.columns.iter().map(|column| *column.values.last().unwrap()).collect()
+}
+
+/// canRunAsynchronuously: the state is read when the step is over, which takes three more questions each.
+#[test]
+fn a_step_that_is_pending_is_awaited() {
+    let xml = |xml: String| xml.replace("<CoSimulation ", "<CoSimulation canRunAsynchronuously='true' ");
+    let workshop = Workshop::new();
+    let fmu = workshop.fmu("plant", 2, &["-DASYNCHRONOUS"], xml);
+    let found = last(&fmu, Method::default(), &[], &["x", "y"]);
+    assert!((found[0] - f64::exp(-1.0)).abs() < 1e-12, "{found:?}");
+    assert_eq!(found[1], -1.0, "not asked until the step was over");
+}
+
+/// noSetFMUStatePriorToCurrentPoint is true until a state is saved, and again when it is freed.
+#[test]
+fn an_fmu_knows_whether_the_importer_may_go_back() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let xml = |xml: String| xml.replace("<CoSimulation ", "<CoSimulation canGetAndSetFMUstate='true' ");
+        let xml = |text: String| if version == 2 { xml(text) } else { xml(text).replace("FMUstate", "FMUState") };
+        let fmu = workshop.fmu("plant", version, &[], xml);
+        assert_eq!(last(&workshop.plain("plant", version), Method::default(), &[], &["prior"]), [1.0]);
+        let mut p = fmu.instantiate("p", false).unwrap();
+        p.setup(0.0, None).unwrap();
+        p.enter_initialization().unwrap();
+        p.exit_initialization().unwrap();
+        let prior = |t: f64, p: &mut fmu_import::Instance| {
+            let _ = p.do_step(t, 0.5).unwrap();
+            p.get("prior").unwrap().number().unwrap()
+        };
+        assert_eq!(prior(0.0, &mut p), 1.0);
+        let state = p.get_state().unwrap();
+        assert_eq!(prior(0.5, &mut p), 0.0);
+        p.free_state(state).unwrap();
+        assert_eq!(prior(1.0, &mut p), 1.0);
+    }
+}
+
+/// completedIntegratorStepNotNeeded, needsCompletedIntegratorStep: the plant counts the calls, with `fault` 7.
+#[test]
+fn completed_steps_are_told_to_an_fmu_that_needs_them() {
+    let workshop = Workshop::new();
+    let exchange = || Method::ModelExchange(Integration::default());
+    for version in [2, 3] {
+        let (need, not) = match version {
+            2 => ("", "completedIntegratorStepNotNeeded='true'"),
+            _ => ("needsCompletedIntegratorStep='true'", ""),
+        };
+        let with = |flag: &str| {
+            let flag = format!("<ModelExchange {flag} modelIdentifier='x'/>");
+            let one = "<ModelExchange modelIdentifier='x' needsCompletedIntegratorStep='true'/>";
+            workshop.fmu("plant", version, &[], |xml| {
+                xml.replace(one, &flag).replace("<ModelExchange modelIdentifier='x' />", &flag)
+            })
+        };
+        let count = |fmu: &Fmu| last(fmu, exchange(), &[("p.fault", "7")], &["p.count"])[0];
+        assert!(count(&with(need)) >= 10.0, "FMI {version}");
+        assert_eq!(count(&with(not)), 0.0, "FMI {version}");
+    }
+}
+
+/// startTime, stopTime and stepSize apply where the user gives none; a start after the default stop keeps the duration.
+#[test]
+fn the_default_experiment_gives_the_times() {
+    let workshop = Workshop::new();
+    let times = "<DefaultExperiment startTime='1' stopTime='3' stepSize='0.25' ";
+    let archive = workshop.archive("plant", 3, &[], |xml| xml.replace("<DefaultExperiment ", times));
+    let loaded = Loaded::open_files(&[archive.to_str().unwrap().to_owned()], Path::new(""), false).unwrap();
+    let of = |start, stop, step| {
+        let settings = loaded.settings(start, stop, step, false);
+        [settings.start, settings.stop, settings.step]
+    };
+    assert_eq!(of(None, None, None), [1.0, 3.0, 0.25]);
+    assert_eq!(of(Some(2.0), None, None), [2.0, 3.0, 0.25]);
+    assert_eq!(of(Some(5.0), None, None), [5.0, 7.0, 0.25]);
+    assert_eq!(of(None, Some(1.5), Some(0.1)), [1.0, 1.5, 0.1]);
+    let plain = workshop.archive("plant", 3, &[], |xml| xml);
+    let loaded = Loaded::open_files(&[plain.to_str().unwrap().to_owned()], Path::new(""), false).unwrap();
+    let settings = loaded.settings(None, None, None, false);
+    assert_eq!([settings.start, settings.stop, settings.step], [0.0, 1.0, 1e-3]);
+}
+
+/// maxOutputDerivativeOrder, canInterpolateInputs, providesIntermediateUpdate: an input keeps its value over a step.
+#[test]
+fn inputs_hold_over_a_step() {
+    let workshop = Workshop::new();
+    for (version, flags) in [
+        (2, "maxOutputDerivativeOrder='1' canInterpolateInputs='true'"),
+        (
+            3,
+            "maxOutputDerivativeOrder='1' recommendedIntermediateInputSmoothness='1' providesIntermediateUpdate='true'",
+        ),
+    ] {
+        let xml = |xml: String| xml.replace("<CoSimulation ", &format!("<CoSimulation {flags} "));
+        let mut system = System::default();
+        system.add("p", &workshop.fmu("plant", version, &[], xml), false).unwrap();
+        system.input("p.u", Schedule::parse("0:0~1:1").unwrap()).unwrap();
+        system.record("p.x").unwrap();
+        let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+        let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+        let held = (0..10).fold(1.0, |x, k| {
+            let u = f64::from(k) * 0.1;
+            u + (x - u) * f64::exp(-0.1)
+        });
+        let x = recording.columns[0].values[10];
+        assert!((x - held).abs() < 1e-12, "FMI {version}: {x}, expected {held}");
+    }
+}
+
+/// An alias of FMI 3.0 is a name like others; other versions of FMI are refused with their number.
+#[test]
+fn aliases_are_names_and_other_versions_are_refused() {
+    let workshop = Workshop::new();
+    let xml = |xml: String| {
+        let x = "<Float64 name='x' valueReference='2' causality='output' variability='continuous'  ";
+        assert!(xml.contains(x), "{xml}");
+        xml.replace(&format!("{x}/>"), &format!("{x}><Alias name='position'/></Float64>"))
+    };
+    let fmu = workshop.fmu("plant", 3, &[], xml);
+    let found = last(&fmu, Method::default(), &[], &["p.position", "x"]);
+    assert_eq!(found[0].to_bits(), found[1].to_bits());
+    for version in ["1.0", "4.0"] {
+        let old = workshop
+            .archive("plant", 3, &[], |xml| xml.replace("fmiVersion='3.0'", &format!("fmiVersion='{version}'")));
+        let error = Fmu::open(old).err().unwrap().to_string();
+        assert!(error.contains(version), "{error}");
+    }
+}

@@ -1,0 +1,3 @@
+//! The FMU MappedDrive.
+
+fmu_export::export!(drive::MappedDrive: ContinuousTime + Events + Warns);

@@ -1,0 +1,29 @@
+//! Packages of this workspace as FMUs.
+
+use fmu::commands::build::{self, Models};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The archives of the package in `folder` of this workspace, of FMI 2.0 and of FMI 3.0, in `out`. The library is built with the
+/// profile of the tests, whose dependencies are compiled already; resources are those of `folder`.
+pub fn packed(folder: &str, package: &str, out: &Path) -> Vec<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
+    let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
+    let mut cargo = Command::new(env!("CARGO"));
+    cargo.args(["build", "--quiet", "--locked", "--package", package, "--target-dir"]).arg(target);
+    if profile == "release" {
+        cargo.arg("--release");
+    }
+    assert!(cargo.current_dir(root).status().unwrap().success(), "{package} compiles");
+    let library = target.join(profile).join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_")));
+    let resources = root.join(folder).join("resources");
+    let build = Models {
+        library: vec![library.display().to_string()],
+        resources: resources.is_dir().then_some(resources),
+        out: Some(out.into()),
+        ..Models::default()
+    };
+    build::models(&build).unwrap()
+}
