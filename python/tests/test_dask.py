@@ -92,10 +92,17 @@ def test_a_worker_that_dies_with_its_number(archives, client, tmp_path, monkeypa
     def after_a_death(futures, **more):
         for future in list(as_completed(futures, **more)):
             if future.status == "finished":
-                for pid in client.run(os.getpid).values():
-                    os.kill(pid, signal.SIGKILL)
+                holder, *_ = client.who_has([future])[future.key]
+                pids = client.run(os.getpid)
+                # The other worker waits: it would compute the part again before this process sees that the number is gone.
+                others = [pid for address, pid in pids.items() if address != holder]
+                for pid in others:
+                    os.kill(pid, signal.SIGSTOP)
+                os.kill(pids[holder], signal.SIGKILL)
                 while future.status == "finished":
                     time.sleep(0.001)
+                for pid in others:
+                    os.kill(pid, signal.SIGCONT)
             yield future
 
     monkeypatch.setattr(distributed, "as_completed", after_a_death)
