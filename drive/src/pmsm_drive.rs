@@ -9,6 +9,7 @@
 //! of the last sample to the plant and the plant's currents to the controller, in the order of [`Pair::step`]. Means over
 //! T_s are the same in both interfaces ([`Means`]).
 
+mod begin;
 mod exchange;
 mod period;
 #[cfg(test)]
@@ -16,6 +17,7 @@ mod tests;
 
 pub use period::Means;
 
+use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::ripple::ripple;
 use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::derating::{DERATING, Derating};
@@ -29,6 +31,7 @@ use drive_control::commissioning::IDENTIFIED;
 #[cfg(doc)]
 use drive_control::model::SensorlessController;
 use drive_control::model::TAU_REF;
+use drive_control::modes::{MODE_INPUTS, ModeInputs};
 use drive_control::signals::ControllerOutputs;
 use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
 #[cfg(doc)]
@@ -72,6 +75,8 @@ pub struct DriveInputs {
     pub sensor_valid: bool,
     /// The self-commissioning runs, unless `controller.commission.mode` is Off.
     pub commission_start: bool,
+    /// Brake, coast and the limits of the torque.
+    pub modes: ModeInputs,
     /// Temperatures in K.
     pub thermal: ThermalInputs,
 }
@@ -89,6 +94,7 @@ impl Default for DriveInputs {
             asc: false,
             sensor_valid: true,
             commission_start: false,
+            modes: ModeInputs::default(),
             thermal: ThermalInputs::default(),
         }
     }
@@ -120,6 +126,13 @@ pub struct PmsmDrive {
     pub derating: Derating,
     /// Where the torques of the interface apply.
     pub torque: TorqueParameters,
+    /// The state in which the drive begins.
+    pub beginning: BeginningParameters,
+    /// The steady state in which the drive should begin was not found.
+    unsettled: bool,
+    /// It runs only some samples before a start in a steady state, which shows the same dependencies.
+    #[serde(skip)]
+    short: bool,
     /// Their conversion to torques of the air gap, unless they apply there.
     calibration: Option<Box<Calibration>>,
     /// The DC link.
@@ -164,7 +177,7 @@ impl PmsmDrive {
         (plant.speed_shaft, plant.angle_shaft, plant.thermal) =
             (inputs.speed_shaft, inputs.angle_shaft, inputs.thermal);
         let controller = &mut pair.controller.model.inputs;
-        (controller.tau_ref, controller.asc) = (inputs.tau_ref, inputs.asc);
+        (controller.tau_ref, controller.asc, controller.modes) = (inputs.tau_ref, inputs.asc, inputs.modes);
         // During the precharge no voltage is available for control.
         controller.enable = inputs.enable && !link.precharges;
         controller.sensor_valid = inputs.sensor_valid;
@@ -180,7 +193,7 @@ impl PmsmDrive {
     #[inline]
     fn convert_reference(&mut self) {
         if let Some(calibration) = &self.calibration {
-            calibration.ask(&mut self.pair, self.inputs.tau_ref);
+            calibration.ask(&mut self.pair, &self.inputs);
         }
     }
 
@@ -256,7 +269,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 26;
+    const STATE_VERSION: u16 = 27;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
@@ -287,7 +300,8 @@ impl Model for PmsmDrive {
         same_pole_pairs(plant, controller)?;
         self.derating.validate()?;
         let starts = self.pair.controller.model.samples() == 0;
-        self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })
+        self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })?;
+        if starts { self.validate_beginning() } else { Ok(()) }
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -297,6 +311,9 @@ impl Model for PmsmDrive {
 
     fn initialize(&mut self) {
         self.link = Link::new(&self.link_parameters, self.inputs.u_dc);
+        if self.begins_steadily() && self.link_parameters.dc_link.used {
+            self.link.charge(self.inputs.u_dc);
+        }
         self.set_inputs();
         self.pair.initialize();
         self.convert_reference();
@@ -304,6 +321,12 @@ impl Model for PmsmDrive {
         self.period = Period::new(self.pair.plant.out.powers);
         self.overload = Happened::default();
         self.before = self.pair.plant.model.inputs.commanded();
+        self.unsettled = self.begins_steadily() && !self.begin_steady();
+        self.convert_limits();
+    }
+
+    fn shorten(&mut self) {
+        self.short = true;
     }
 
     fn output(&self, _now: Elapsed, out: &mut DriveOutputs) {
@@ -360,7 +383,7 @@ impl Model for PmsmDrive {
                 pair.exchange_present();
             }
             if let Some(calibration) = calibration {
-                calibration.ask(pair, inputs.tau_ref);
+                calibration.ask(pair, inputs);
             }
             pair.advance(h)?;
             at_sample = ends;
@@ -429,6 +452,9 @@ impl Warns for PmsmDrive {
                 )
             });
         }
+        if self.unsettled && self.pair.now.seconds() <= 1.0 {
+            log.warn("initial.steady", || self.unsettled_message());
+        }
         if self.pair.now.seconds() <= 1.0
             && let Some(message) = self.pair.skips_commands()
         {
@@ -494,6 +520,7 @@ pub(crate) const INPUTS: &Table<DriveInputs> = table![
                 |i| &mut i.commission_start,
             )
             .optional(),
+            I::part("", &Part { table: MODE_INPUTS, lens: |i| &mut i.modes }),
             I::input(
                 "u_dc",
                 &VOLT,
@@ -527,6 +554,7 @@ const TABLE: &Table<Block<PmsmDrive>> = table![
     V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
     V::part("", &Part { table: TORQUE, lens: |m| &mut m.model.torque }),
     V::part("", &Part { table: DERATING, lens: |m| &mut m.model.derating }),
+    V::part("", &Part { table: BEGINNING, lens: |m| &mut m.model.beginning }),
 ];
 
 type D = Row<DriveOutputs>;

@@ -14,8 +14,11 @@
 //! voltage lost in a dead time, and the delay of the current loop. A free shaft has this torque for its inertia and its load.
 
 use crate::pair::Pair;
+use crate::pmsm_drive::DriveInputs;
 use crate::steady::{At, Condition, Steady};
+use drive_control::modes::ModeInputs;
 use drive_control::signals::ControllerOutputs;
+use drive_control::tables::ControllerParameters;
 use fmu_core::{Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +49,11 @@ pub const TORQUE: &Table<TorqueParameters> = table![P::enumeration_parameter(
 )];
 
 impl At<'_> {
+    /// Torque limits of the air gap in N.m, 0 or less and 0 or more, for limits at the shaft in N.m.
+    pub(crate) fn references_for(&self, [low, high]: [f64; 2]) -> [f64; 2] {
+        [self.reference_for(low).min(0.0), self.reference_for(high).max(0.0)]
+    }
+
     /// Torques at the shaft in N.m for torque references at the air gap in N.m.
     pub(crate) fn at_shaft(&self, limits: [f64; 2]) -> [f64; 2] {
         limits.map(|tau| self.by_reference(tau).powers.tau_shaft)
@@ -66,11 +74,18 @@ impl Calibration {
         Self { drive: drive.sampled(), limits }
     }
 
-    /// Sets the controller's reference for the torque `tau_ref` (N.m) at the shaft.
+    /// Sets the controller's reference and limits for those of the `inputs`, at the shaft.
     #[inline(never)]
-    pub(crate) fn ask(&self, pair: &mut Pair, tau_ref: f64) {
-        if self.drive.controller.speed_loop.torque_mode {
-            pair.controller.model.inputs.tau_ref = self.drive.at(&condition(pair)).reference_for(tau_ref);
+    pub(crate) fn ask(&self, pair: &mut Pair, inputs: &DriveInputs) {
+        let ControllerParameters { speed_loop, modes, .. } = &self.drive.controller;
+        if speed_loop.torque_mode {
+            pair.controller.model.inputs.tau_ref = self.drive.at(&condition(pair)).reference_for(inputs.tau_ref);
+        }
+        if modes.tau_used {
+            let ModeInputs { tau_max, tau_min, .. } = inputs.modes;
+            let [low, high] = self.drive.at(&condition(pair)).references_for([tau_min, tau_max]);
+            let limits = &mut pair.controller.model.inputs.modes;
+            (limits.tau_min, limits.tau_max) = (low, high);
         }
     }
 

@@ -190,6 +190,10 @@ pub trait Model: Default + Send + 'static {
     /// The state at the start time, from parameters and inputs.
     fn initialize(&mut self);
 
+    /// Makes [`initialize`](Model::initialize) short in a copy whose dependencies are found by many runs, without another dependency: for a
+    /// model that simulates something before its start.
+    fn shorten(&mut self) {}
+
     /// Computes the outputs from parameters and state at time `now`, and leaves everything else unchanged.
     fn output(&self, now: Elapsed, outputs: &mut Self::Outputs);
 

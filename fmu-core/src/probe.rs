@@ -28,7 +28,11 @@ pub(crate) type Dependencies = Vec<Option<Vec<usize>>>;
 /// The dependencies of initial values, and those between two events.
 pub(crate) fn dependencies<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> [Dependencies; 2] {
     match &can.saved {
-        Some(saving) => [at_the_start(can, saving, fresh, states), between_events(can, saving, fresh, states)],
+        Some(saving) => {
+            let mut fresh = saving.block(fresh);
+            fresh.model.shorten();
+            [at_the_start(can, saving, &fresh, states), between_events(can, saving, &fresh, states)]
+        }
         None => all_dependencies(can, states),
     }
 }
@@ -60,6 +64,7 @@ pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, st
     for (index, meta) in metas::<M>().into_iter().enumerate().filter(|(_, meta)| meta.exact) {
         let index = wide::<M>().index(index);
         let mut block = saving.block(fresh);
+        block.model.shorten();
         change(can, &mut block, states, index, &mut draw);
         let set = can.place(&mut block, states, index).map(|(_, slot)| slot.bits());
         block.initialize();

@@ -17,6 +17,9 @@ use drive_base::math::wrap;
 /// Minimum EMF of a rotor that turns, in units of R_s `limit.i`.
 const EMF: f64 = 0.08;
 
+/// Time in s in which the torque limits rise from 0 once the rotor is found.
+const RISE: f64 = 0.1;
+
 /// Share of `start.speed` below which an estimator without standstill takes over after the ramp of the I-f start.
 const SLOW: f64 = 0.5;
 
@@ -96,6 +99,13 @@ impl SensorlessController {
         let w_ref = par.speed_loop.ramped(speed, inputs.speed_ref, par.T_s);
         state.speed = SpeedController::take_over(&gains.speed, w_ref, speed, 0.0);
         state.leader = Leader::Estimator;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "T_s is at least some microseconds"
+        )]
+        let rise = (RISE / par.T_s).ceil() as u64;
+        state.rise = rise;
         let kind = par.estimator_with(state.sensor_lost);
         let slow = speed.abs() < SLOW * par.start.speed;
         if par.start.mode == StartMode::CurrentFrequency && kind.class() == Class::BackEmf && slow {
@@ -113,6 +123,34 @@ impl SensorlessController {
             *command = Command { u: axis.along(w * par.motor.psi_M).turned(), ..Command::default() };
         }
         state.i_last = sample.i;
+    }
+
+    /// Begins at a rotor at the electrical angle `theta` (rad) that turns at the mechanical `speed` (rad/s), without a start sequence.
+    pub fn begin_at(&mut self, theta: f64, speed: f64) {
+        let w = f64::from(self.parameters.motor.n_p) * speed;
+        let sample = Sample { theta_meas: theta, w_meas: w, ..Sample::default() };
+        self.begin_turning(&sample, (theta, w), false);
+        (self.state.leader, self.state.rise) = (Leader::Estimator, 0);
+    }
+
+    /// Begins anew with all that it knows: the next sample is the first one, and the speed loop holds the torque at `speed_ref` (rad/s).
+    pub fn begin_here(&mut self, speed_ref: f64) {
+        let Self { parameters: par, gains, state, .. } = self;
+        state.samples = 0;
+        (state.limited_for, state.stands, state.overload) = (0.0, Default::default(), Default::default());
+        state.w_ref = speed_ref;
+        state.speed = if par.speed_loop.torque_mode {
+            SpeedController::default()
+        } else {
+            SpeedController::take_over(
+                &gains.speed,
+                speed_ref,
+                state.computed.speed_est,
+                gains.loop_output(par, state.i_ref),
+            )
+        };
+        self.last_gains.clone_from(&self.gains);
+        self.tuned = false;
     }
 
     /// Why the flying start has not caught the rotor, for the log.

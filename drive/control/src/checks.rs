@@ -224,7 +224,14 @@ impl ControllerParameters {
 /// # Errors
 /// The reluctance torque cancels most of the magnet's torque.
 pub(crate) fn zero_speed(par: &ControllerParameters) -> Result<(), Fault> {
-    let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, .. } = par;
+    let ControllerParameters { current, weakening, speed_loop, motor, zero_speed, estimator, estimators, .. } = par;
+    if zero_speed.by_need && !estimators.adaptation.resistance {
+        return Err(Fault::new(format!(
+            "{}: needs {}: with a resistance that was not measured, the load turns the frame, and i_q does not show it",
+            PARAMETERS.tell(par, |p| &mut p.zero_speed.by_need),
+            "adaptation.resistance = true"
+        )));
+    }
     let by_torque = current.mtpa || weakening.used || speed_loop.torque_mode;
     let share = (motor.L_q - motor.L_d) / motor.psi_M;
     if estimator.class() != Class::FluxObserver || !by_torque || zero_speed.i_0 * share <= 1.0 - LEAST_TORQUE {

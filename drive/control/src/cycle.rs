@@ -8,7 +8,9 @@ use crate::estimator::{Estimate, Estimating, Estimator, EstimatorParameters, Inj
 use crate::gains::Gains;
 use crate::lock::Lock;
 use crate::model::SensorlessController;
+use crate::modes::Follows;
 use crate::signals::{ControllerInputs, ControllerOutputs};
+use crate::speed::SpeedController;
 use crate::start::{StartMode, StartState};
 use crate::state::{Command, Leader, Mode, References, context};
 use crate::tables::{Compensation, ControllerParameters};
@@ -51,8 +53,9 @@ impl SensorlessController {
     /// One sample: currents in, voltage references out.
     #[inline]
     pub(super) fn control(&mut self) {
-        let Self { tuned, state, .. } = self;
-        let steady = state.k > 0 && !*tuned && matches!(state.leader, Leader::Estimator);
+        let Self { inputs, tuned, state, .. } = self;
+        let follows = !inputs.modes.brake && !inputs.modes.coast && state.follows == Follows::Reference;
+        let steady = state.k > state.rise && !*tuned && follows && matches!(state.leader, Leader::Estimator);
         if steady && matches!(state.estimator, Estimator::Rasmussen(_)) && !self.measures_resistance() {
             self.state.computed = self.cycle(true);
         } else {
@@ -79,9 +82,17 @@ impl SensorlessController {
 
     #[inline(never)]
     fn any_cycle(&mut self) {
-        let ControllerInputs { speed_ref, tau_ref, .. } = self.inputs;
-        let release = self.parameters.zero_speed.release;
+        let ControllerInputs { speed_ref, tau_ref, modes, derating, .. } = self.inputs;
+        let ControllerParameters { speed_loop, zero_speed, modes: limits, .. } = &self.parameters;
+        let (ramp, torque_mode, release, tau_used) =
+            (speed_loop.ramp, speed_loop.torque_mode, zero_speed.release, limits.tau_used);
         let measures = self.measures_resistance();
+        self.follow(modes.follows());
+        if self.state.k < self.state.rise {
+            #[expect(clippy::cast_precision_loss, reason = "some hundreds")]
+            let share = self.state.k as f64 / self.state.rise as f64;
+            self.inputs.derating *= share;
+        }
         if measures {
             (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
         }
@@ -89,8 +100,41 @@ impl SensorlessController {
         if measures {
             self.state.computed.start_state = StartState::Aligning;
         }
-        (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) =
-            (speed_ref, tau_ref, release);
+        (self.inputs.speed_ref, self.inputs.tau_ref, self.inputs.modes) = (speed_ref, tau_ref, modes);
+        self.inputs.derating = derating;
+        let ControllerParameters { speed_loop, zero_speed, modes: limits, .. } = &mut self.parameters;
+        (speed_loop.ramp, speed_loop.torque_mode, zero_speed.release, limits.tau_used) =
+            (ramp, torque_mode, release, tau_used);
+    }
+
+    /// Sets the references and limits of this sample for what the loops follow; a change of that begins at the present speed and torque.
+    fn follow(&mut self, follows: Follows) {
+        let Self { inputs, parameters: par, gains, state, .. } = self;
+        let before = std::mem::replace(&mut state.follows, follows);
+        if before != follows {
+            let speed = state.computed.speed_est;
+            state.speed = SpeedController::default();
+            if follows == Follows::Reference && !par.speed_loop.torque_mode {
+                state.w_ref = speed;
+                let w_ref = par.speed_loop.ramped(speed, inputs.speed_ref, par.T_s);
+                state.speed = SpeedController::take_over(&gains.speed, w_ref, speed, state.tau_ref / gains.k);
+            }
+        }
+        match follows {
+            Follows::Reference => {}
+            Follows::Brake => {
+                if par.modes.frees(follows) {
+                    state.speed = SpeedController::default();
+                }
+                [inputs.modes.tau_min, inputs.modes.tau_max] = par.modes.torques(&inputs.modes);
+                (inputs.speed_ref, par.speed_loop.ramp) = (0.0, 0.0);
+                (par.speed_loop.torque_mode, par.modes.tau_used) = (false, true);
+            }
+            Follows::Coast => {
+                inputs.tau_ref = 0.0;
+                (par.speed_loop.torque_mode, par.zero_speed.release) = (true, true);
+            }
+        }
     }
 
     /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default
@@ -302,7 +346,9 @@ impl SensorlessController {
             }
             Mode::AfterStart | Mode::ClosedLoop => {
                 let n_p = f64::from(par.motor.n_p);
-                let w_ref = (!par.speed_loop.torque_mode).then_some(n_p * state.w_ref);
+                // A brake that does not hold lets a load turn the shaft.
+                let follows_speed = !par.speed_loop.torque_mode && !par.modes.frees(state.follows);
+                let w_ref = follows_speed.then_some(n_p * state.w_ref);
                 state.lock.update(&gains.lock, &par.motor, R_s, sample, frame.axis, (frame.w, w_ref, tau))
             }
         }

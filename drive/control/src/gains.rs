@@ -79,6 +79,12 @@ impl Gains {
         Law { share, i_d, limit: at_least(at_most(most, self.i_tau), f64::MIN_POSITIVE) }
     }
 
+    /// Output of the speed loop in A for the references `i` (A) without field weakening.
+    pub(crate) fn loop_output(&self, par: &ControllerParameters, i: DqHat) -> f64 {
+        let by_i_q = self.observes_flux && !Self::exact(par);
+        if by_i_q { i.q() } else { par.motor.torque(i.d(), i.q()) / self.k }
+    }
+
     /// Whether the torque includes the reluctance torque, also with the i_d of the low-speed law.
     #[inline]
     fn exact(par: &ControllerParameters) -> bool {

@@ -26,6 +26,7 @@ pub mod idle;
 pub mod limits;
 pub mod lock;
 pub mod model;
+pub mod modes;
 pub mod overload;
 pub mod polarity;
 pub mod reference;

@@ -7,6 +7,7 @@ use crate::estimator::{Class, Estimator, Kind, Sample, Setup, options, tracker};
 use crate::gains::Gains;
 use crate::idle;
 use crate::lock::{LOST, Lock};
+use crate::modes::{Follows, MODE_INPUTS};
 use crate::overload::Overload;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::stands;
@@ -66,7 +67,8 @@ impl SensorlessController {
             self.stop();
             return;
         }
-        if (self.parameters.trip.used || !self.inputs.sensor_valid) && self.protect() {
+        let watches = self.parameters.trip.used || !self.inputs.sensor_valid || self.state.sensor_lost;
+        if watches && self.protect() {
             return;
         }
         if self.commissioning.is_some() && self.commissions() {
@@ -104,6 +106,11 @@ impl SensorlessController {
         }
     }
 
+    /// Whether a lost sensor takes over again.
+    fn resumes(&self) -> bool {
+        self.parameters.resume && self.inputs.sensor_valid
+    }
+
     /// Watches the limits of the trips and the sensor; returns whether the controller rests.
     #[cold]
     #[inline(never)]
@@ -113,6 +120,8 @@ impl SensorlessController {
         }
         if !self.inputs.sensor_valid && self.parameters.has_fallback() {
             self.lose_sensor(true);
+        } else if self.resumes() {
+            self.lose_sensor(false);
         }
         false
     }
@@ -170,7 +179,7 @@ impl SensorlessController {
     /// Not enabled, short-circuited, or before and after a self-commissioning: resets everything except the sample grid and the displayed outputs.
     #[cold]
     fn rest(&mut self) -> ControllerOutputs {
-        let sensor_lost = self.inputs.enable && self.state.sensor_lost;
+        let sensor_lost = self.inputs.enable && self.state.sensor_lost && !self.resumes();
         self.lose_sensor(sensor_lost);
         let Self { inputs, parameters: par, state, .. } = self;
         let new = State::new(par, false);
@@ -243,6 +252,7 @@ impl SensorlessController {
             reference_feed_forward: par.current.reference_feed_forward,
             active_resistance: par.current.active_resistance,
             starts_by_injection: start.mode == StartMode::Injection,
+            by_need: zero_speed.by_need,
             weakens: par.weakening.used,
             tell: &tell,
         };
@@ -295,7 +305,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 21;
+    const STATE_VERSION: u16 = 22;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -428,8 +438,9 @@ impl SensorlessController {
         if out.enabled && out.speed_est.abs() < par.zero_speed.w_0 && checks::lowers_i_0(par, self.inputs.u_dc) {
             log.warn("limit.i_dc_max", || checks::lowered_i_0(par, self.inputs.u_dc));
         }
-        let beyond = tau_ref > out.tau_max || tau_ref < out.tau_min;
-        if par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
+        let beyond = (tau_ref > out.tau_max || tau_ref < out.tau_min) && par.modes.allows(&self.inputs.modes, tau_ref);
+        let follows = self.state.follows == Follows::Reference;
+        if follows && par.speed_loop.torque_mode && self.state.limited_for >= 1.0 && beyond {
             log.warn("tau_ref", || clipped(asked, limits));
         }
         if !par.speed_loop.torque_mode && self.state.overload.reports() {
@@ -497,6 +508,7 @@ pub(crate) const ROWS: &[V] = rows![
         |m| &mut m.model.inputs.asc,
     )
     .optional(),
+    V::part("", &Part { table: MODE_INPUTS, lens: |m| &mut m.model.inputs.modes }),
     V::input("i_a", &AMPERE, "Measured stator current of phase a", |m| &mut m.model.inputs.i.a),
     V::input("i_b", &AMPERE, "Measured stator current of phase b", |m| &mut m.model.inputs.i.b),
     V::input("i_c", &AMPERE, "Measured stator current of phase c", |m| &mut m.model.inputs.i.c),

@@ -7,6 +7,7 @@
 use crate::gains::{Gains, Law};
 use crate::tables::ControllerParameters;
 use crate::weakening::Weakening;
+use crate::zero_speed::ZeroSpeed;
 use drive_base::frame::DqHat;
 use drive_base::math::at_most;
 use serde::{Deserialize, Serialize};
@@ -57,7 +58,8 @@ impl Settled {
         let derated = law.limit * derating;
         let (low, high): (f64, f64) = (low, high);
         let (low, high) = (low.min(derated), high.min(derated));
-        let at = SettledAt { gains, par, law, w, weakening, limits: [-gains.k * low, gains.k * high] };
+        let limits = [-gains.k * low, gains.k * high];
+        let at = SettledAt { gains, par, law, i_0, w, weakening, limits, frees: false };
         if par.dc.used { at.within_the_battery(u_dc, speed) } else { at }
     }
 }
@@ -68,10 +70,14 @@ pub struct SettledAt<'a> {
     gains: &'a Gains,
     par: &'a ControllerParameters,
     law: Law,
+    /// Current of the law at standstill in A.
+    i_0: f64,
     /// Electrical speed in rad/s.
     w: f64,
     weakening: Weakening,
     limits: [f64; 2],
+    /// No current of the law flows.
+    frees: bool,
 }
 
 impl SettledAt<'_> {
@@ -85,6 +91,17 @@ impl SettledAt<'_> {
         self
     }
 
+    /// Without the current of the low-speed law, if the shaft is to be free.
+    #[must_use]
+    pub fn freed(self, frees: bool) -> Self {
+        Self { frees, ..self }
+    }
+
+    /// Whether no current of the low-speed law flows.
+    pub fn frees(&self) -> bool {
+        self.frees
+    }
+
     /// Minimum and maximum torque in N.m that the references may request: the outputs `tau_min` and `tau_max`.
     #[inline]
     pub fn limits(&self) -> [f64; 2] {
@@ -94,11 +111,16 @@ impl SettledAt<'_> {
     /// Currents (A) for the torque `tau` (N.m) within the limits, and whether field weakening lowers i_d.
     #[inline]
     pub fn currents(&self, tau: f64) -> (DqHat, bool) {
-        let &Self { gains, par, ref law, w, ref weakening, .. } = self;
+        let &Self { gains, par, ref law, i_0, w, ref weakening, frees, .. } = self;
         // A torque that decays to 0 ends here.
         let asked = if tau.abs() > RELEASED * gains.k * par.zero_speed.i_0 { tau } else { 0.0 };
-        let released = par.speed_loop.torque_mode && par.zero_speed.releases(asked);
-        let law = if released { law.released() } else { *law };
+        let law = if frees || par.speed_loop.torque_mode && par.zero_speed.releases(asked) {
+            law.released()
+        } else if par.zero_speed.by_need {
+            gains.law(par, ZeroSpeed::i_0_for(i_0, tau.abs() / gains.k), w / f64::from(par.motor.n_p))
+        } else {
+            *law
+        };
         let plain = || gains.currents(par, &law, tau / gains.k);
         if !par.weakening.used {
             return (plain(), false);

@@ -1,6 +1,7 @@
 //! Inputs and outputs of the controller.
 
 use crate::commission::{CommissionFault, CommissionState};
+use crate::modes::ModeInputs;
 use crate::start::StartState;
 use crate::trip::Cause;
 use drive_base::connection::{Commanded, Measured};
@@ -32,6 +33,8 @@ pub struct ControllerInputs {
     pub sensor_valid: bool,
     /// The self-commissioning runs, unless `commission.mode` is Off.
     pub commission_start: bool,
+    /// Brake, coast and the limits of the torque.
+    pub modes: ModeInputs,
     /// Share of the full torque that a drive with a hot winding allows, 0..1; no variable of the controller.
     pub derating: f64,
 }
@@ -45,8 +48,9 @@ impl ControllerInputs {
 
     /// Whether all values are finite.
     pub fn is_finite(&self) -> bool {
-        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, .. } = self;
-        all_finite([i.a, i.b, i.c, *u_dc, *speed_ref, *theta_meas, *speed_meas, *tau_ref])
+        let Self { i, u_dc, speed_ref, theta_meas, speed_meas, tau_ref, modes, .. } = self;
+        let references = [*speed_ref, *tau_ref, modes.tau_max, modes.tau_min];
+        all_finite([i.a, i.b, i.c, *u_dc, *theta_meas, *speed_meas]) && all_finite(references)
     }
 }
 
@@ -63,6 +67,7 @@ impl Default for ControllerInputs {
             asc: false,
             sensor_valid: true,
             commission_start: false,
+            modes: ModeInputs::default(),
             derating: 1.0,
         }
     }

@@ -119,6 +119,22 @@ fn limited(wanted: f64, low: f64, high: f64) -> f64 {
 }
 
 impl SpeedController {
+    /// The integral part in A.
+    #[inline]
+    pub fn integral(&self) -> f64 {
+        self.integral
+    }
+
+    /// Integrates the speed `error` (rad/s) over one sample of `T_s` (s).
+    pub fn integrate(&mut self, gains: &SpeedGains, error: f64, T_s: f64) {
+        self.integral += T_s * gains.k_i * error;
+    }
+
+    /// Lets the integral part decay at the rate `bandwidth` (rad/s).
+    pub fn fade(&mut self, bandwidth: f64, T_s: f64) {
+        self.integral -= T_s * bandwidth * self.integral;
+    }
+
     /// Moves the integral part by the `cut` (A) of a limit, at the rate `bandwidth` (rad/s).
     #[inline]
     pub fn follow(&mut self, bandwidth: f64, cut: f64, T_s: f64) {

@@ -7,6 +7,7 @@ use crate::current_limit::Fresh;
 use crate::estimator::{Context, Estimate, Estimator, EstimatorParameters, Injection, Kind, Sample};
 use crate::gains::{Gains, Law};
 use crate::lock::Lock;
+use crate::modes::Follows;
 use crate::overload::Overload;
 use crate::polarity::{PolaritySearch, SearchStep};
 use crate::sensor::Offset;
@@ -17,6 +18,7 @@ use crate::start::{CurrentFrequencyStart, StartMode, StartState, StartStep};
 use crate::tables::ControllerParameters;
 use crate::trip::Trip;
 use crate::weakening::Weakening;
+use crate::zero_speed::ZeroSpeed;
 use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated};
 use drive_base::math::{at_most, within, wrap};
 use drive_base::motor::Motor;
@@ -120,6 +122,13 @@ pub(super) struct State {
     pub(super) catch: Option<Catch>,
     /// Angle (rad) and electrical speed (rad/s) at which the flying start has found the rotor.
     pub(super) found: Option<(f64, f64)>,
+    /// Need of i_q in A at standstill, with `zero_speed.by_need`.
+    pub(super) need: f64,
+    /// What the loops have followed at the last sample.
+    pub(super) follows: Follows,
+    /// Samples in which the torque limits rise after a flying start.
+    #[serde(with = "fixed_size")]
+    pub(super) rise: u64,
     /// Why the flying start took the rotor to be at rest although it seemed to turn.
     pub(super) slow: Option<Refusal>,
     pub(super) speed: SpeedController,
@@ -219,6 +228,7 @@ impl State {
             estimate
         });
         let first = first.or_else(|| self.fall_back(kind, &context, sample));
+        let first = first.or_else(|| self.come_back(gains, kind, &context, sample));
         let reference = if par.speed_loop.torque_mode { inputs.tau_ref } else { inputs.speed_ref };
         match &mut self.leader {
             Leader::Start(start) => match start.update(&par.start, &context, par.theta_est, reference, sample) {
@@ -257,6 +267,23 @@ impl State {
         Some(Estimate::new(theta, w, sample))
     }
 
+    /// The estimate of the sensor, if it takes over again at this sample: with the voltage and the torque of its fallback.
+    fn come_back(&mut self, gains: &Gains, kind: Kind, context: &Context, sample: &Sample) -> Option<Estimate> {
+        if kind != Kind::Sensored || matches!(self.estimator, Estimator::Sensored(_)) {
+            return None;
+        }
+        let (estimator, estimate) = Estimator::start(kind, context, sample, 0.0, 0.0);
+        let motor = context.motor;
+        let turn = self.computed.theta_est - sample.theta_meas;
+        self.current = self.current.in_frame_behind(turn);
+        let i = Axis::<Estimated>::at(sample.theta_meas).from_stator(sample.i);
+        let speed = sample.w_meas / f64::from(motor.n_p);
+        let i_q = motor.torque(i.d(), i.q()) / gains.k;
+        self.speed = SpeedController::take_over(&gains.speed, self.w_ref, speed, i_q);
+        (self.estimator, self.leader) = (estimator, Leader::Estimator);
+        Some(estimate)
+    }
+
     /// The references at the estimated mechanical `speed` (rad/s) in addition to an `injection`; `old` are the gains of a speed loop
     /// that is retuned at this sample.
     #[inline(always)]
@@ -279,17 +306,26 @@ impl State {
         if par.dc.used {
             i_0 = at_most(i_0, par.dc.i_0(&par.motor, inputs.u_dc));
         }
+        if par.zero_speed.by_need {
+            self.need = ZeroSpeed::need(self.need, self.i_ref.q(), par.T_s);
+            i_0 = ZeroSpeed::i_0_for(i_0, self.need);
+        }
         let mut law = gains.law(par, i_0, speed);
-        if par.speed_loop.torque_mode && par.zero_speed.releases(inputs.tau_ref) {
+        if par.speed_loop.torque_mode && par.zero_speed.releases(inputs.tau_ref) || par.modes.frees(self.follows) {
             law = law.released();
         }
         let limit = law.limit * inputs.derating;
-        if par.weakening.used || par.dc.used {
+        if par.weakening.used || par.dc.used || par.modes.tau_used {
             return self.limited(gains, par, inputs, (speed, w_ref), &law, injection);
         }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
-            (within(requested, limit), requested)
+            let limited = if par.modes.speed.used {
+                self.in_range(gains, par, (speed, requested), (-limit, limit))
+            } else {
+                within(requested, limit)
+            };
+            (limited, requested)
         } else {
             self.speed.update(&gains.speed, w_ref, speed, (-limit, limit), par.T_s)
         };
@@ -298,7 +334,14 @@ impl State {
         References { i, limited: requested.abs() > limit, tau: (tau, tau), weakens: false }
     }
 
-    /// [`references`](Self::references) with field weakening or with limits of the DC link.
+    /// The reference of i_q (A) in torque mode for the `requested` one (A), within the range of the speed.
+    #[cold]
+    #[inline(never)]
+    fn in_range(&mut self, gains: &Gains, par: &ControllerParameters, at: (f64, f64), limits: (f64, f64)) -> f64 {
+        self.speed.within_range((&gains.speed, par.speed_loop.bandwidth), &par.modes.speed, at, limits, par.T_s)
+    }
+
+    /// [`references`](Self::references) with field weakening or with limits of the DC link or by the inputs.
     #[inline(never)]
     fn limited(
         &mut self,
@@ -322,9 +365,17 @@ impl State {
         }
         let derated = law.limit * inputs.derating;
         (low, high) = (low.min(derated), high.min(derated));
+        if par.modes.tau_used {
+            (low, high) = (low.min(-inputs.modes.tau_min / gains.k), high.min(inputs.modes.tau_max / gains.k));
+        }
         let (i_q_ref, requested) = if par.speed_loop.torque_mode {
             let requested = inputs.tau_ref / gains.k;
-            (requested.clamp(-low, high), requested)
+            let limited = if par.modes.speed.used {
+                self.in_range(gains, par, (speed, requested), (-low, high))
+            } else {
+                requested.clamp(-low, high)
+            };
+            (limited, requested)
         } else {
             let (limited, wanted) = self.speed.update(&gains.speed, w_ref, speed, (-low, high), par.T_s);
             self.speed.follow(par.speed_loop.bandwidth, limited - wanted, par.T_s);

@@ -8,6 +8,7 @@ use crate::estimator::Kind;
 use crate::estimator::tables::{ESTIMATOR_PARAMETERS, EstimatorParameters};
 use crate::limits::Limits;
 use crate::lock::{LOCK, LockParameters};
+use crate::modes::{MODES, Modes};
 use crate::polarity::{POLARITY, PolarityParameters};
 use crate::sensor::{SENSOR, Sensor};
 use crate::signals::ControllerOutputs;
@@ -102,6 +103,8 @@ pub struct ControllerParameters {
     pub limit: Limits,
     /// Limits of the current of the DC link.
     pub dc: DcLimits,
+    /// Brake, coast and limits of speed and torque.
+    pub modes: Modes,
     /// The speed loop.
     pub speed_loop: SpeedLoop,
     /// The current loop.
@@ -122,6 +125,8 @@ pub struct ControllerParameters {
     pub sensor: Sensor,
     /// Estimator that replaces a lost sensor; `Sensored`: none.
     pub fallback: Kind,
+    /// The sensor takes over again once it works.
+    pub resume: bool,
     /// Dead-time compensation.
     pub compensation: Compensation,
     /// Self-commissioning.
@@ -145,6 +150,7 @@ impl Default for ControllerParameters {
             speed_est: 0.0,
             limit: Limits { i_q: 6.0, i: 7.5, tau: 1000.0 },
             dc: DcLimits::default(),
+            modes: Modes::default(),
             speed_loop: SpeedLoop::default(),
             current: CurrentLoop::default(),
             zero_speed: ZeroSpeed::default(),
@@ -155,6 +161,7 @@ impl Default for ControllerParameters {
             trip: TripParameters::default(),
             sensor: Sensor::default(),
             fallback: Kind::Sensored,
+            resume: false,
             compensation: Compensation::default(),
             commission: CommissionParameters::default(),
             estimators: EstimatorParameters::default(),
@@ -238,6 +245,7 @@ pub(crate) const PARAMETER_ROWS: &[P] = rows![
         .above(0.0)
         .tunable(),
     P::part("limit.", &Part { table: DC_LIMITS, lens: |p| &mut p.dc }),
+    P::part("", &Part { table: MODES, lens: |p| &mut p.modes }),
     P::part("speed_loop.", &Part { table: SPEED_LOOP, lens: |p| &mut p.speed_loop }),
     P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
     P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
@@ -249,8 +257,13 @@ pub(crate) const PARAMETER_ROWS: &[P] = rows![
     P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
     P::enumeration_parameter(
         "sensor.fallback",
-        "Estimator that takes over when sensor_valid becomes false, until enable falls; Sensored: none",
+        "Estimator that takes over when sensor_valid becomes false, until enable falls or with sensor.resume; Sensored: none",
         &Field(|p| &mut p.fallback),
+    ),
+    P::boolean_parameter(
+        "sensor.resume",
+        "The sensor takes over again once sensor_valid is true; false: sensor.fallback leads until enable falls",
+        |p| &mut p.resume,
     ),
     P::part("compensation.", &Part { table: COMPENSATION, lens: |p| &mut p.compensation }),
     P::part("commission.", &Part { table: COMMISSION, lens: |p| &mut p.commission }),
@@ -298,7 +311,7 @@ pub const STATUS: &Table<ControllerOutputs> = table![
     ),
     O::boolean_output(
         "current_limited",
-        "limit.i_q, limit.i, limit.tau, limit.i_dc_max, limit.i_dc_min or field weakening limited current references or voltage of the last sample",
+        "A limit (limit.*, tau_limit_max, tau_limit_min, brake.tau) or field weakening limited current references or voltage of the last sample",
         |o| &mut o.current_limited,
     ),
     O::boolean_output("weakens", "Field weakening lowers i_d_ref", |o| &mut o.weakens),

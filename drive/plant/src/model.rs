@@ -283,6 +283,14 @@ impl Model for PmsmPlant {
     }
 }
 
+impl PmsmPlant {
+    /// Begins anew where it is, with the rotor at the mechanical `angle` (rad): the counters are 0, the machine goes on as it was.
+    pub fn begin_here(&mut self, angle: f64) {
+        self.state = State::new(&self.warm.motor, self.state.psi, self.state.speed, angle);
+        (self.energy, self.point, self.kept) = (Energy::default(), Accepted::default(), Kept::default());
+    }
+}
+
 impl Warns for PmsmPlant {
     fn warn(&self, log: &mut Warnings<'_>) {
         let (map, psi) = (&self.parameters.flux_map, self.state.psi);

@@ -80,6 +80,18 @@ impl Link {
         link
     }
 
+    /// Charged to `u` (V), at the end of a precharge.
+    pub fn charge(&mut self, u: f64) {
+        (self.u, self.precharges, self.point.u) = (u, false, u);
+    }
+
+    /// Begins anew where it is, on a source of `u_dc` (V): the counters are 0.
+    #[must_use]
+    pub fn begun(self, u_dc: f64) -> Self {
+        let point = Counted { u: self.u, source: u_dc, ..Counted::default() };
+        Self { u: self.u, precharges: self.precharges, chops: self.chops, point, ..Self::default() }
+    }
+
     /// Resistance (Ohm) between the source and the capacitor.
     fn resistance(&self, par: &LinkParameters) -> f64 {
         let DcLink { R_source, R_precharge, .. } = par.dc_link;

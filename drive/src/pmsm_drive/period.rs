@@ -40,6 +40,11 @@ impl Period {
         Self { last: powers, ..Self::default() }
     }
 
+    /// Begins anew with the means of the last period.
+    pub(super) fn begun(self) -> Self {
+        Self { last: self.last, over: true, ..Self::default() }
+    }
+
     /// Adds the `powers` of a step of `h` (s), at whose end a period may end.
     pub(super) fn add(&mut self, powers: Powers, h: f64, ends: bool) {
         self.time += h;

@@ -17,8 +17,8 @@ const NEWTON_METER_PER_S: Quantity = Quantity::new("TorqueRate", Unit::si("N.m/s
 impl PmsmDriveMean {
     /// The state with the speed reference of the loop, ramped if a ramp is set.
     fn referred(&self) -> State {
-        let ramp = self.drive.controller.speed_loop.ramp > 0.0;
-        State { speed_ref: if ramp { self.state.speed_ref } else { self.inputs.speed_ref }, ..self.state }
+        let (speed_ref, ramp) = self.speed_ref();
+        State { speed_ref: if ramp > 0.0 { self.state.speed_ref } else { speed_ref }, ..self.state }
     }
 }
 
@@ -44,8 +44,9 @@ impl ContinuousTime for PmsmDriveMean {
         let powers = self.powers_of(&rates.point, speed);
         let (energy, link) = (Energy::from(powers), self.link_powers(powers.p_in));
         let par = &self.drive.controller;
-        let to = par.current.bandwidth * (self.inputs.speed_ref - self.state.speed_ref);
-        let ramp = if par.speed_loop.ramp > 0.0 { to.clamp(-par.speed_loop.ramp, par.speed_loop.ramp) } else { to };
+        let (speed_ref, ramp) = self.speed_ref();
+        let to = par.current.bandwidth * (speed_ref - self.state.speed_ref);
+        let ramp = if ramp > 0.0 { to.clamp(-ramp, ramp) } else { to };
         let [source, resistor, chopper] = [link.source, link.resistor, link.chopper];
         let energies = [energy.r#in, energy.mech, energy.loss, source, resistor, chopper];
         let [a, b, c, d, e, f] = energies;
@@ -72,6 +73,7 @@ impl ContinuousTime for PmsmDriveMean {
 
 impl Events for PmsmDriveMean {
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        self.follow();
         let state = self.referred();
         self.leave(&state);
         self.point = self.point_at(&state, self.temperatures());

@@ -23,12 +23,15 @@
 //!
 //! [`advance`]: Model::advance
 
+mod begin;
 mod bridge;
 mod exchange;
+mod follow;
 mod motion;
 mod show;
 mod supply;
 
+use crate::beginning::{BEGINNING, BeginningParameters};
 use crate::dc_link::{LINK, LinkEnergy, LinkParameters};
 use crate::derating::DERATING;
 use crate::idle;
@@ -39,9 +42,10 @@ use drive_base::frame::Dq;
 use drive_base::math::all_finite;
 use drive_control::commissioning::{Held, IDENTIFIED};
 use drive_control::model::clipped;
+use drive_control::modes::Follows;
 use drive_control::overload::Overload;
 use drive_control::signals::ControllerOutputs;
-use drive_control::tables as control;
+use drive_control::tables::{self as control, ControllerParameters};
 use drive_control::trip::{Cause, Trip};
 use drive_plant::PmsmPlant;
 use drive_plant::inverter::Gates;
@@ -68,6 +72,8 @@ pub struct PmsmDriveMean {
     pub link_parameters: LinkParameters,
     /// Where the torques of the interface apply.
     pub torque: TorqueParameters,
+    /// The state in which the drive begins.
+    pub beginning: BeginningParameters,
     state: State,
     /// Energies in J.
     energy: Energy,
@@ -84,6 +90,8 @@ pub struct PmsmDriveMean {
     trip: Trip,
     /// The diodes at the end of the last step.
     diodes: Diodes,
+    /// What the loops have followed.
+    follows: Follows,
     /// Whether a step was taken.
     moved: bool,
     /// Model Exchange: outputs of the controller since the last event.
@@ -107,6 +115,7 @@ impl Default for PmsmDriveMean {
             drive,
             link_parameters: LinkParameters::default(),
             torque: TorqueParameters::default(),
+            beginning: BeginningParameters::default(),
             state: State::default(),
             energy: Energy::default(),
             link_energy: LinkEnergy::default(),
@@ -116,6 +125,7 @@ impl Default for PmsmDriveMean {
             known: false,
             trip: Trip::default(),
             diodes: Diodes::default(),
+            follows: Follows::default(),
             moved: false,
             held: ControllerOutputs::default(),
             impossible: Happened::default(),
@@ -199,7 +209,7 @@ impl PmsmDriveMean {
         if self.linked() {
             return self.supplied(state, at);
         }
-        self.point_of(&self.drive.at(&self.condition(state, at)), (state.tau, self.diodes))
+        self.point_of(&self.under(&self.condition(state, at)), (state.tau, self.diodes))
     }
 
     /// The powers of a point at the mechanical `speed` (rad/s); the torque of a free shaft equals the load.
@@ -213,7 +223,7 @@ impl PmsmDriveMean {
     /// The drive in this state at its `point`.
     fn at(&self, state: &State, point: &Point) -> At<'_> {
         let condition = self.condition(state, self.temperatures());
-        self.drive.at(&Condition { u_dc: self.voltage(point.powers.p_in), ..condition })
+        self.under(&Condition { u_dc: self.voltage(point.powers.p_in), ..condition })
     }
 
     /// Whether the torques of the interface apply at the shaft.
@@ -223,30 +233,33 @@ impl PmsmDriveMean {
 
     /// The torque reference (N.m) of the air gap under this condition.
     fn reference(&self, at: &At<'_>) -> f64 {
-        if self.at_shaft() { at.reference_for(self.inputs.tau_ref) } else { self.inputs.tau_ref }
+        let tau_ref = self.tau_ref();
+        if self.at_shaft() && self.follows == Follows::Reference { at.reference_for(tau_ref) } else { tau_ref }
     }
 
     /// The limits (N.m) of a point in this state where the torques of the interface apply.
     fn limits(&self, state: &State, point: &Point) -> [f64; 2] {
-        if !(self.at_shaft() && self.gates()) {
-            return point.limits;
-        }
-        self.at(state, point).at_shaft(point.limits)
+        let limits = self.narrowed(state, point);
+        if self.at_shaft() && self.gates() { self.at(state, point).at_shaft(limits) } else { limits }
     }
 
     /// Whether the torque reference exceeds its limits.
     fn is_clipped(&self) -> bool {
         let (tau_ref, [low, high]) = (self.inputs.tau_ref, self.limits(&self.state, &self.point));
-        self.drive.controller.speed_loop.torque_mode && self.inputs.enable && (tau_ref > high || tau_ref < low)
+        let ControllerParameters { speed_loop, modes, .. } = &self.drive.controller;
+        let follows =
+            speed_loop.torque_mode && self.follows == Follows::Reference && modes.allows(&self.inputs.modes, tau_ref);
+        follows && self.inputs.enable && (tau_ref > high || tau_ref < low)
     }
 
     /// The watch for a load above the torque of the drive after a step of `h` (s) to `state`.
     fn watched(&self, h: f64, state: &State, point: &Point) -> Overload {
         let speeds = [&self.state, state].map(|state| self.speed(state));
         let error = state.speed_ref - speeds[1];
-        let speed_mode = self.gates() && !self.drive.controller.speed_loop.torque_mode;
+        let speed_mode = self.gates() && !self.torque_mode();
         let mut overload = self.overload;
-        overload.update(h, speed_mode && Overload::limited(state.tau, point.limits, error), state.speed_ref, speeds);
+        let limited = speed_mode && Overload::limited(state.tau, self.narrowed(state, point), error);
+        overload.update(h, limited, state.speed_ref, speeds);
         overload
     }
 
@@ -266,13 +279,14 @@ const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no capaci
                                  trip by the current or commissioning; use PmsmDrive";
 
 /// Parameters and groups of parameters of the controller with an effect.
-const EFFECTIVE: [&str; 18] = [
+const EFFECTIVE: [&str; 19] = [
     "T_s",
     "estimator",
     "motor.",
     "mechanics.J",
     "initial.speed_est",
     "limit.",
+    "brake.",
     "trip.use",
     "trip.u_dc",
     "trip.u_dc_min",
@@ -304,7 +318,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 6;
+    const STATE_VERSION: u16 = 7;
 
     const CONTINUOUS: bool = true;
 
@@ -344,7 +358,8 @@ impl Model for PmsmDriveMean {
         self.drive.derating.validate()?;
         let u_dc = if self.moved { 0.0 } else { self.inputs.u_dc };
         self.drive.controller.validate_limits(u_dc).map_err(|fault| in_part("controller", &fault))?;
-        self.link_parameters.validate(u_dc)
+        self.link_parameters.validate(u_dc)?;
+        if self.moved { Ok(()) } else { self.validate_beginning() }
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
@@ -363,6 +378,8 @@ impl Model for PmsmDriveMean {
         (self.clipped_for, self.impossible, self.link_energy) = (0.0, Happened::default(), LinkEnergy::default());
         (self.known, self.point, self.trip) = (false, Point::default(), Trip::default());
         (self.diodes, self.overload) = (Diodes::default(), Overload::default());
+        self.follows = self.inputs.modes.follows();
+        self.begin_steadily();
         let temperatures = self.temperatures();
         self.point = self.point_at(&self.state, temperatures);
         (self.asked, self.known) = (self.question(&self.state, temperatures), true);
@@ -376,6 +393,7 @@ impl Model for PmsmDriveMean {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        self.follow();
         let temperatures = self.temperatures();
         let thermal = &self.drive.plant.thermal;
         if thermal.mode == ThermalMode::Imposed {
@@ -478,5 +496,6 @@ const TABLE: &Table<Block<PmsmDriveMean>> = table![
     V::part("", &Part { table: LINK, lens: |m| &mut m.model.link_parameters }),
     V::part("", &Part { table: TORQUE, lens: |m| &mut m.model.torque }),
     V::part("", &Part { table: DERATING, lens: |m| &mut m.model.drive.derating }),
+    V::part("", &Part { table: BEGINNING, lens: |m| &mut m.model.beginning }),
     V::part("", &Part { table: STATES, lens: |m| &mut m.model.state }),
 ];

@@ -72,31 +72,37 @@ impl PmsmDriveMean {
             let (tau, integral) = (-lag * state.tau, -lag * state.integral);
             return Rates { tau, integral, speed: accelerate(&point), point, limited: true, highest: 0.0 };
         }
+        let limits = self.narrowed(state, &point);
         let [low, high] = point.limits;
         // Without any torque, errors still refer to a small share of the full torque.
         let full = self.drive.settled().speed_loop().1 * controller.limit.i;
         let highest = high.max(-low).max(LEAST_SHARE * full);
-        let (wanted, integral, limited) = if controller.speed_loop.torque_mode {
+        let (wanted, integral, limited) = if self.torque_mode() {
             let at_shaft = self.at_shaft();
-            (if at_shaft { self.reference(&self.at(state, &point)) } else { self.inputs.tau_ref }, 0.0, true)
+            let asked = if at_shaft { self.reference(&self.at(state, &point)) } else { self.tau_ref() };
+            let (wanted, integral, bounded) = self.in_range(state, speed, asked, limits);
+            (wanted, integral, !bounded)
         } else {
             let (gains, k) = self.drive.settled().speed_loop();
             let error = state.speed_ref - speed;
             let wanted = k * gains.wanted(state.integral, state.speed_ref, speed);
-            let cut = wanted - within(wanted, point.limits);
+            let cut = wanted - within(wanted, limits);
             let [_, k_i] = gains.slopes();
-            let share = integrates(cut, error, highest);
+            let frees = controller.modes.frees(self.follows);
+            let share = if frees { 0.0 } else { integrates(cut, error, highest) };
             let follow = if controller.weakening.used { controller.speed_loop.bandwidth * cut / k } else { 0.0 };
+            let follow = if frees { lag * state.integral } else { follow };
             (wanted, share * k_i * error - follow, cut != 0.0)
         };
-        let tau = lag * (within(wanted, point.limits) - state.tau);
+        let tau = lag * (within(wanted, limits) - state.tau);
         Rates { tau, integral, speed: accelerate(&point), point, limited, highest }
     }
 
     /// A step of `h` (s) with the temperatures `at` (K).
     pub(super) fn pass(&self, h: f64, at: Temperatures) -> Result<Passed, Fault> {
         let Steady { plant, controller, .. } = &self.drive;
-        if plant.mechanics.imposed && (controller.speed_loop.torque_mode || !self.gates()) {
+        let (torque, range) = (self.torque_mode(), controller.modes.speed.used);
+        if plant.mechanics.imposed && (torque && !range || !self.gates()) {
             return Ok(self.pass_imposed(h, at));
         }
         let (mut state, mut done, mut part, mut powers) = (self.state, 0.0, h, Powers::default());
@@ -143,9 +149,10 @@ impl PmsmDriveMean {
             return self.pass_imposed_on_link(h, at);
         }
         let condition = self.condition(&self.state, at);
-        let drive = self.drive.at(&condition);
+        let drive = self.under(&condition);
         let enable = self.gates();
-        let target = if enable { within(self.reference(&drive), drive.limits()) } else { 0.0 };
+        let limits = Point { limits: drive.limits(), ..Point::default() };
+        let target = if enable { within(self.reference(&drive), self.narrowed(&self.state, &limits)) } else { 0.0 };
         let (tau, share) = self.lagging(self.state.tau, target, h);
         let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
         let point = self.point_of(&drive, (tau, self.diodes));
@@ -158,7 +165,8 @@ impl PmsmDriveMean {
         let mut point = self.point_at(&self.state, at);
         for round in 0.. {
             let drive = self.at(&self.state, &point);
-            let target = if self.gates() { within(self.reference(&drive), point.limits) } else { 0.0 };
+            let allowed = self.narrowed(&self.state, &point);
+            let target = if self.gates() { within(self.reference(&drive), allowed) } else { 0.0 };
             let (tau, share) = self.lagging(self.state.tau, target, h);
             let state = State { tau, integral: 0.0, speed_ref: self.inputs.speed_ref, ..self.state };
             let limits = point.limits;
@@ -174,13 +182,15 @@ impl PmsmDriveMean {
 
     /// A part of a step, of `h` (s): the state after it, the mean powers, and the error relative to the allowed one.
     fn part(&self, start: &State, h: f64, at: Temperatures) -> (State, Powers, f64) {
-        let free = |[low, high]: [f64; 2]| self.inputs.tau_ref >= low && self.inputs.tau_ref <= high;
+        let tau_ref = self.tau_ref();
+        let free = |[low, high]: [f64; 2]| tau_ref >= low && tau_ref <= high;
         if !self.gates() {
             return self.part_with(start, h, at, Some([0.0; 2])).1;
         }
         // A reference at the shaft changes with the speed.
-        if self.drive.controller.speed_loop.torque_mode && !self.at_shaft() {
-            let limits = self.point_at(start, at).limits;
+        let exact = self.torque_mode() && !self.at_shaft() && !self.drive.controller.modes.speed.used;
+        if exact {
+            let limits = self.narrowed(start, &self.point_at(start, at));
             if free(limits) {
                 let (end, found) = self.part_with(start, h, at, Some(limits));
                 if free(end) {
@@ -206,12 +216,12 @@ impl PmsmDriveMean {
         let lag = controller.current.bandwidth;
         if !exact {
             // The ramp is a straight line; the part uses its middle.
-            let reached = controller.speed_loop.ramped(start.speed_ref, self.inputs.speed_ref, h);
-            y.speed_ref = 0.5 * (if controller.speed_loop.ramp > 0.0 { start.speed_ref } else { reached } + reached);
+            let reached = self.ramped(start.speed_ref, h);
+            y.speed_ref = 0.5 * (if self.speed_ref().1 > 0.0 { start.speed_ref } else { reached } + reached);
         }
         let mut end_tau = 0.0;
         if let Some(limits) = limits {
-            let (end, share) = self.lagging(start.tau, within(self.inputs.tau_ref, limits), h);
+            let (end, share) = self.lagging(start.tau, within(self.tau_ref(), limits), h);
             (end_tau, y.tau) = (end, end + (start.tau - end) * share);
         }
         let one = self.rates(&y, at);
@@ -249,14 +259,14 @@ impl PmsmDriveMean {
         let state = State {
             tau: if exact { end_tau } else { y.tau + step(0) },
             integral: if enable { y.integral + step(1) } else { y.integral * exp(-lag * h) },
-            speed_ref: controller.speed_loop.ramped(start.speed_ref, self.inputs.speed_ref, h),
+            speed_ref: self.ramped(start.speed_ref, h),
             speed,
             angle: start.angle + 0.5 * h * (start.speed + speed),
         };
         let powers =
             self.powers_of(&one.point, self.speed(&y)).with(self.powers_of(&two.point, self.speed(&ahead)), 0.5);
         let powers = if imposed { powers } else { self.balanced(powers, [start, &state], h) };
-        (two.point.limits, (state, powers, error))
+        (self.narrowed(&ahead, &two.point), (state, powers, error))
     }
 
     /// The mean `powers` of a part of a step of `h` (s) between two states, balanced with the power to the load and the change

@@ -42,7 +42,7 @@ impl PmsmDriveMean {
         let (mut diodes, off) = (self.diodes, self.bridge() == Gates::Off);
         let small = if off { SMALL_WITH_DIODES } else { SMALL };
         let mut of = |u_dc: f64| {
-            let point = self.point_of(&self.drive.at(&Condition { u_dc, ..source }), (state.tau, diodes));
+            let point = self.point_of(&self.under(&Condition { u_dc, ..source }), (state.tau, diodes));
             // The next voltage is near this one, and so is the current of the diodes.
             diodes = point.diodes.map_or(diodes, Diodes::Conducted);
             point

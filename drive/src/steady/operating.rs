@@ -124,6 +124,12 @@ impl<'a> At<'a> {
         }
     }
 
+    /// Without the current of the low-speed law, if the shaft is to be free.
+    #[must_use]
+    pub(crate) fn freed(self, frees: bool) -> Self {
+        Self { settled: self.settled.freed(frees), ..self }
+    }
+
     /// The condition.
     pub fn condition(&self) -> &Condition {
         &self.condition
@@ -145,7 +151,8 @@ impl<'a> At<'a> {
         let (Steady { controller, settled, derating, .. }, Condition { speed, u_dc, temperatures }) =
             (self.drive, self.condition);
         let derating = derating.share(temperatures.winding);
-        Self { settled: settled.at(controller, (speed, u_dc), trim, derating), ..self.clone() }
+        let settled = settled.at(controller, (speed, u_dc), trim, derating).freed(self.settled.frees());
+        Self { settled, ..self.clone() }
     }
 
     /// The point of the torque reference `tau` (N.m), which the limits clip.

@@ -546,6 +546,82 @@ pub(super) const CASES: &[Case] = &[
         acts: |_, without, with| are(without, [false, true]) && are(with, [true, false]),
     },
     Case {
+        option: "limit.tau_use",
+        on: |kind| {
+            let mut pair = slow(kind);
+            (pair.controller.model.inputs.modes.tau_max, pair.controller.model.inputs.modes.tau_min) = (2.0, -1.0);
+            pair
+        },
+        ask: |p| p.modes.tau_used = true,
+        figures: |pair| [0.0, references(pair)[1]],
+        acts: |_, [_, most], [_, limited]| most > 10.0 && (limited - 2.0).abs() < 1e-9,
+    },
+    Case {
+        option: "limit.speed_use",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.parameters.modes.speed.max = 0.5 * SLOW;
+            pair
+        },
+        ask: |p| p.modes.speed.used = true,
+        // Above its bound, the drive brakes.
+        figures: |mut pair| {
+            pair.controller.model.inputs.tau_ref = 3.0;
+            run(&mut pair, 0.3, |_, _| ());
+            [pair.controller.out.i_ref.q, 0.0]
+        },
+        acts: |_, [without, _], [with, _]| without > 1.0 && with < -1.0,
+    },
+    Case {
+        option: "brake.hold",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.inputs.modes.brake = true;
+            pair.controller.model.parameters.modes.brake.hold = false;
+            pair
+        },
+        ask: |p| p.modes.brake.hold = true,
+        // On a shaft that keeps turning, its integral part grows.
+        figures: |mut pair| {
+            let mut early = 0.0;
+            run(&mut pair, 0.3, |t, p| {
+                if t < 0.1 {
+                    early = p.controller.out.i_ref.q
+                }
+            });
+            [early, pair.controller.out.i_ref.q]
+        },
+        acts: |_, [early, late], [_, held]| early < -1.0 && (late / early - 1.0).abs() < 0.05 && held < 1.2 * late,
+    },
+    Case {
+        option: "sensor.resume",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.parameters.fallback = Kind::RotatingInjection;
+            pair
+        },
+        ask: |p| p.resume = true,
+        figures: |mut pair| {
+            run(&mut pair, 0.2, |t, p| p.controller.model.inputs.sensor_valid = !(0.05..0.1).contains(&t));
+            [f64::from(u8::from(pair.controller.out.sensor_lost)), 0.0]
+        },
+        acts: |kind, without, with| are(without, [kind == Kind::Sensored, false]) && are(with, [false, false]),
+    },
+    Case {
+        option: "zero_speed.by_need",
+        on: |kind| {
+            let mut pair = drive(kind);
+            pair.controller.model.parameters.estimators.adaptation.resistance = kind == Kind::Rasmussen;
+            pair
+        },
+        ask: |p| p.zero_speed.by_need = true,
+        figures: |mut pair| {
+            run(&mut pair, 3.0, |_, _| ());
+            [pair.controller.out.i_ref.d, 0.0]
+        },
+        acts: |_, [i_0, _], [least, _]| (i_0 - 5.0).abs() < 1e-6 && (least - 0.35 * 5.0).abs() < 1e-6,
+    },
+    Case {
         option: "zero_speed.release",
         on: |kind| {
             let mut pair = drive(kind);

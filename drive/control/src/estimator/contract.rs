@@ -204,6 +204,8 @@ pub struct SetupOf<'a, All> {
     pub active_resistance: bool,
     /// The start locates the rotor by injection.
     pub starts_by_injection: bool,
+    /// Whether the current at standstill follows the torque.
+    pub by_need: bool,
     /// Field weakening is in use.
     pub weakens: bool,
     /// Name, value and unit of the controller's variable with this name.

@@ -32,6 +32,8 @@ const FRAME_TERM: &[Kind] = &[DirectEmf, EmfObserver, ExtendedEmf, VoltageFeedba
 const CHOICES: &[Choice] = &[
     Choice { name: "start.mode", asked: |s, _| s.starts_by_injection, has: |kind| kind.class().injects(),
         why: "the start by injection needs an estimator that injects", off: "set start.mode = CurrentFrequency or Direct" },
+    Choice { name: "zero_speed.by_need", asked: |s, _| s.by_need, has: |kind| kind == Kind::Rasmussen,
+        why: "its i_q does not show a load at standstill, or it needs no current there", off: "set it to false" },
     Choice { name: "weakening.use", asked: |s, _| s.weakens, has: |kind| kind.class() != Class::Injection,
         why: "injection leaves no voltage for field weakening", off: "set it to false" },
     Choice { name: "tracker.kind", asked: |s, _| s.par.tracker.kind != TrackerKind::Pll, has: |kind| !NO_TRACKER.contains(&kind),
