@@ -141,12 +141,13 @@ fn the_closed_loop_as_an_ssp() {
         assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
     };
     let path = |name: &str| folder.join(name).to_str().expect("UTF-8").to_owned();
+    let archives = common::archives().to_str().expect("UTF-8");
     let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
     for (name, more, u_dc) in
         [("fmi2", &[][..], 325), ("fmi3", &["--fmi", "3"], 325), ("motor", &["--motor", motor], 540)]
     {
         let ssp = path(&format!("{name}.ssp"));
-        fmu(&[&["ssp", "--out", &ssp], more].concat());
+        fmu(&[&["ssp", "--fmus", archives, "--out", &ssp], more].concat());
         let inputs = ["speed_ref=0:0,0.1001:50", "tau_load=0:0,0.4001:1", &format!("u_dc=0:0,0.0001:{u_dc}")];
         let inputs: Vec<&str> = inputs.into_iter().flat_map(|input| ["--input", input]).collect();
         fmu(&[&["simulate", &ssp, "--stop", "0.6", "--csv", &path(&format!("{name}.csv"))], &inputs[..]].concat());

@@ -11,11 +11,14 @@ use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
 
 const OWN: &str = include_str!("../fmus/pmsm-drive/page.toml");
 
+/// The description of the drive, found once: its dependencies take a second of the processor.
 fn drive() -> Description {
-    Description::of::<PmsmDrive>().unwrap()
+    static DRIVE: LazyLock<Description> = LazyLock::new(|| Description::of::<PmsmDrive>().unwrap());
+    DRIVE.clone()
 }
 
 fn presets() -> Vec<PresetRun> {

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 
 import fmurun
 import numpy as np
@@ -23,4 +24,17 @@ class Full(fmurun.Plan):
         if more.get("first_run"):
             with open("/dev/full", "wb") as file:
                 file.write(bytes(1 << 20))
+        return super().run_many(table, **more)
+
+
+class Held(fmurun.Plan):
+    """On a worker, after five parts of $FMURUN_HELD/out: tells its process in $FMURUN_HELD, and waits for $FMURUN_HELD/go."""
+
+    def run_many(self, table, **more):
+        folder = os.environ["FMURUN_HELD"]
+        out = os.path.join(folder, "out")
+        if "first_run" in more and sum(name.startswith("part-") for name in os.listdir(out)) >= 5:
+            open(os.path.join(folder, str(os.getpid())), "w").close()
+            while not os.path.exists(os.path.join(folder, "go")):
+                time.sleep(0.005)
         return super().run_many(table, **more)

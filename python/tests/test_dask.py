@@ -14,13 +14,21 @@ import pytest
 from distributed import Client, LocalCluster, as_completed
 from fmurun import FmuError, Plan
 from fmurun.dask import sweep
-from poison import Full, Poisoned
+from poison import Full, Held, Poisoned
 
 ROWS = 4000
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def held(tmp_path_factory):
+    """The folder of `Held`, which the processes of the cluster know."""
+    folder = tmp_path_factory.mktemp("held")
+    os.environ["FMURUN_HELD"] = str(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def cluster(held):
     dask.config.set({"distributed.scheduler.allowed-failures": 1, "distributed.logging.distributed": "critical"})
     with (
         LocalCluster(2, processes=True, threads_per_worker=1, dashboard_address=None, silence_logs=50) as cluster,
@@ -61,28 +69,29 @@ def same(one, other):
         assert np.array_equal(one[name], other[name], equal_nan=name != "error"), name
 
 
-def test_a_killed_worker_loses_no_row(archives, client, tmp_path):
-    """Every row once, equal to one process, and nothing left behind."""
-    plan, killed, pids = drive(archives), [], list(client.run(os.getpid).values())
+def test_a_killed_worker_loses_no_row(archives, client, held):
+    """Every row once, equal to one process, and nothing left behind. The worker is killed at its runs, after five parts."""
+    plan, out, killed, pids = drive(archives, Held), held / "out", [], list(client.run(os.getpid).values())
 
     def kill():
-        while (parts := sum(name.startswith("part-") for name in os.listdir(tmp_path))) < 5:
+        while not (held / str(pids[0])).exists():
             time.sleep(0.005)
+        killed.append(sum(name.startswith("part-") for name in os.listdir(out)))
         os.kill(pids[0], signal.SIGKILL)
-        killed.append(parts)
+        (held / "go").touch()
 
-    thread = threading.Thread(target=kill)
+    thread = threading.Thread(target=kill, daemon=True)
     thread.start()
-    report = sweep(plan, table(ROWS), tmp_path, client, chunk=50)
+    report = sweep(plan, table(ROWS), out, client, chunk=50)
     thread.join()
     assert 5 <= killed[0] < ROWS // 50
     assert report["rows"] == ROWS
     assert report["failed"] == 0
-    results = read(tmp_path)
+    results = read(out)
     assert results["run"].tolist() == list(range(ROWS))
     same(results, plan.run_many(table(ROWS), threads=2))
-    assert not [name for name in os.listdir(tmp_path) if name.startswith(".")]
-    again = sweep(plan, table(ROWS), tmp_path, client)
+    assert not [name for name in os.listdir(out) if name.startswith(".")]
+    again = sweep(plan, table(ROWS), out, client)
     assert again["skipped"] == again["parts"] == ROWS // 50
 
 

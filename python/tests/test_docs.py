@@ -18,7 +18,7 @@ def pages(tmp_path_factory):
     """Name -> text of each page; a warning is an error: a link that leads nowhere, a name that does not exist."""
     out = tmp_path_factory.mktemp("docs")
     command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", "-d", out / "doctrees", DOCS, out / "html"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=200)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     return {page.name: page.read_text() for page in (out / "html").glob("*.html")}
 

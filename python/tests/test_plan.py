@@ -7,7 +7,6 @@ import subprocess
 import sys
 import textwrap
 import threading
-import time
 
 import numpy as np
 import pyarrow as pa
@@ -265,34 +264,30 @@ def test_bad_input_is_told_before_the_first_run(archives, case):
         call(pair(archives / "fmi3"))
 
 
-def ticks(plan):
-    """Number of sleeps of 1 ms that another thread completes during the runs, relative to those without runs."""
-    done, stop = [], threading.Event()
+class EnoughError(Exception):
+    """Ends runs from their progress."""
 
-    def tick():
-        while not stop.is_set():
-            time.sleep(1e-3)
-            done.append(time.perf_counter())
 
-    thread = threading.Thread(target=tick)
+def test_python_goes_on_while_runs_do(standard, monkeypatch):
+    """Another thread gets its turn during the runs, and they end: with Python's lock held it would wait for the last of them."""
+    plan, begun, turns = pair(standard, stop_time=0.2), threading.Event(), []
+
+    def progress(done, rows):
+        if turns:
+            raise EnoughError
+
+    thread = threading.Thread(target=lambda: begun.wait() and turns.append(True))
     thread.start()
-    time.sleep(0.1)
-    begin = time.perf_counter()
-    plan.run_many({"p.motor.R_s": np.linspace(2.9, 3.1, 100)}, threads=1)
-    end = time.perf_counter()
-    time.sleep(0.1)
-    stop.set()
+    # A thread that computes keeps the lock, so that the other one has no turn before the runs.
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e3)
+    try:
+        begun.set()
+        with pytest.raises(EnoughError):
+            plan.run_many({"p.motor.R_s": np.linspace(2.9, 3.1, 20_000)}, threads=1, progress=progress)
+    finally:
+        sys.setswitchinterval(interval)
     thread.join()
-    during = sum(begin < t < end for t in done) / (end - begin)
-    before = sum(begin - 0.1 < t < begin for t in done) / 0.1
-    assert end - begin > 0.05
-    return during / before
-
-
-def test_python_goes_on_while_runs_do(standard):
-    """With Python's lock held there would be no tick. A machine under load may need more than one try."""
-    plan = pair(standard, stop_time=0.2)
-    assert any(ticks(plan) >= 0.5 for _ in range(5))
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
@@ -310,7 +305,7 @@ def test_a_fork_leaves_the_parent_intact(standard, resistances):
 
 
 def test_an_interrupt_ends_it(standard, tmp_path):
-    """Ctrl-C: KeyboardInterrupt within a second, though the runs would take minutes."""
+    """Ctrl-C: KeyboardInterrupt at once, though the runs would take more than ten minutes."""
     script = tmp_path / "long.py"
     script.write_text(textwrap.dedent(f"""
         import signal, threading, time, os
@@ -318,14 +313,14 @@ def test_an_interrupt_ends_it(standard, tmp_path):
         # A shell lets what it starts in the background ignore Ctrl-C.
         signal.signal(signal.SIGINT, signal.default_int_handler)
         plan = Plan({str(standard / "PmsmDrive.fmu")!r}, stop_time=0.2, step_size=1e-3, measures={{"x": "speed"}})
-        threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
         begin = time.time()
         try:
+            threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
             plan.run_many({{"speed_ref": [1.0] * 1000000}}, threads=2)
         except KeyboardInterrupt:
-            print("interrupted", time.time() - begin < 5)
+            print("interrupted", time.time() - begin < 60)
     """))
-    said = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=60)
+    said = subprocess.run([sys.executable, script], capture_output=True, text=True, timeout=600)
     assert said.stdout == "interrupted True\n", said.stderr
 
 

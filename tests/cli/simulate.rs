@@ -2,7 +2,7 @@
 
 use super::{archive, common, fails, fmu, text};
 use std::fs::File;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
 use std::process::Command;
 
@@ -488,19 +488,24 @@ fn an_interrupted_run_keeps_its_results() {
         std::fs::create_dir(&temporary).unwrap();
         let drive = archive("fmi3", "PmsmDrive");
         let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
-        command.args(["simulate", drive.to_str().unwrap(), "--stop", "1e5", "--record", "speed", "--csv"]);
-        command.arg(&csv).args(how).env("TMPDIR", &temporary).stderr(std::process::Stdio::piped());
-        let child = command.stdout(std::process::Stdio::null()).spawn().unwrap();
-        std::thread::sleep(std::time::Duration::from_secs(2));
+        let arguments = ["--set", "u_dc=0", "--step", "1e-3", "--stop", "1e5", "--record", "speed", "--csv"];
+        command.arg("simulate").arg(&drive).args(arguments).arg(&csv).args(how).env("TMPDIR", &temporary);
+        command.stdout(std::process::Stdio::null()).stderr(std::process::Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        // The drive warns after its first step: the run has begun.
+        let (mut lines, mut printed) = (BufReader::new(child.stderr.take().unwrap()), String::new());
+        while !printed.contains("the DC link has no voltage") {
+            assert!(lines.read_line(&mut printed).unwrap() > 0, "{how:?}: {printed}");
+        }
         assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
-        let output = child.wait_with_output().unwrap();
-        let printed = text(&output.stderr);
-        assert_eq!(output.status.code(), Some(1), "{printed}");
-        assert!(
-            printed.contains("error: interrupted at ") && printed.contains(" s, where the results end"),
-            "{printed}"
-        );
-        assert!(std::fs::read_to_string(&csv).unwrap().lines().count() > 10);
+        lines.read_to_string(&mut printed).unwrap();
+        assert_eq!(child.wait().unwrap().code(), Some(1), "{printed}");
+        let (_, end) = printed.split_once("error: interrupted at ").unwrap_or_else(|| panic!("{printed}"));
+        let (end, _) = end.split_once(" s, where the results end").unwrap_or_else(|| panic!("{printed}"));
+        let rows = end.parse::<f64>().unwrap() / 1e-3;
+        // With the names and the row of the start.
+        let found = f64::from(u32::try_from(std::fs::read_to_string(&csv).unwrap().lines().count()).unwrap()) - 2.0;
+        assert!(rows > 0.5 && (found - rows).abs() < 0.5, "{found} rows: {printed}");
         let left: Vec<_> = std::fs::read_dir(&temporary).unwrap().collect();
         assert!(left.is_empty(), "{how:?}: {left:?}");
     }

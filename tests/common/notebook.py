@@ -49,7 +49,7 @@ def check(name, tmp_path, monkeypatch):
     kept, now = (nbformat.read(path, as_version=4) for _ in range(2))
     # Lines that a slow machine prints more than 0.2 s apart are two outputs, unless they are joined.
     options = {"resources": {"metadata": {"path": str(EXAMPLES)}}, "record_timing": False, "coalesce_streams": True}
-    NotebookClient(now, timeout=120, kernel_name="python3", **options).execute()
+    NotebookClient(now, timeout=600, startup_timeout=600, kernel_name="python3", **options).execute()
     if "UPDATE_GOLDEN" in os.environ:
         keep(now, path)
         return

@@ -4,6 +4,7 @@ Jacobi exchange: at a communication point all outputs are read, then all inputs 
 of one instant give the voltages that act from the next one on, which is what `timing.delay` = 1 (the start value) means.
 """
 
+from ctypes import byref, c_bool, c_double, c_uint32
 from pathlib import Path
 from shutil import rmtree
 
@@ -55,6 +56,47 @@ class Unit:
         """Value references."""
         return [self.references[name] for name in names]
 
+    def _access(self, way, names):
+        """FMPy's call for these real variables, its arguments and their values."""
+        n = len(names)
+        references, values = (c_uint32 * n)(*self.of(*names)), (c_double * n)()
+        call = getattr(self.slave, f"fmi2{way}Real" if self.fmi2 else f"fmi3{way}Float64")
+        return call, (self.slave.component, references, n, values, *(() if self.fmi2 else (n,))), values
+
+    def reader(self, *names):
+        """A function that gets these real variables: `get_reals` with arrays that are made once."""
+        call, arguments, values = self._access("Get", names)
+
+        def read():
+            call(*arguments)
+            return values[:]
+
+        return read
+
+    def writer(self, *names):
+        """A function that sets these real variables: `set_reals` with arrays that are made once."""
+        call, arguments, values = self._access("Set", names)
+
+        def write(*new):
+            values[:] = new
+            call(*arguments)
+
+        return write
+
+    def stepper(self, h):
+        """A function that steps by `h` (s) from a time: `doStep` with arguments that are made once."""
+        it, slave = self.slave.component, self.slave
+        if self.fmi2:
+            return lambda t: slave.fmi2DoStep(it, t, h, 1)
+        flags, reached = (c_bool(), c_bool(), c_bool()), c_double()
+        places = *map(byref, flags), byref(reached)
+
+        def step(t):
+            slave.fmi3DoStep(it, t, h, True, *places)
+            assert not any(flag.value for flag in flags), f"event, end or early return at {t} s"
+
+        return step
+
     def close(self):
         """Ends the simulation and removes the unpacked files."""
         self.slave.terminate()
@@ -70,22 +112,23 @@ def simulate(folder, scenario, h):
     plant = Unit(f"{folder}/PmsmPlant.fmu", scenario.plant)
     controller = Unit(f"{folder}/SensorlessController.fmu", scenario.controller)
     currents, voltages = ("i_a", "i_b", "i_c"), ("u_a", "u_b", "u_c")
-    from_plant = plant.of(*currents, *RECORDED["plant"])
-    from_controller = controller.of(*voltages, *RECORDED["controller"])
-    to_plant, to_controller = plant.of(*voltages, "tau_load"), controller.of(*currents, "speed_ref")
+    from_plant = plant.reader(*currents, *RECORDED["plant"])
+    from_controller = controller.reader(*voltages, *RECORDED["controller"])
+    to_plant, to_controller = plant.writer(*voltages, "tau_load"), controller.writer(*currents, "speed_ref")
+    step_plant, step_controller = plant.stepper(h), controller.stepper(h)
 
     every = max(1, round(scenario.T_s / h))  # between its samples the controller holds theta_est
     rows = []
     for k in range(round(scenario.duration / h) + 1):
         t = k * h
-        i_abc_and_more = plant.get_reals(from_plant)
-        u_abc_and_more = controller.get_reals(from_controller)
+        i_abc_and_more = from_plant()
+        u_abc_and_more = from_controller()
         if k % every == 0:
             rows.append((t, *i_abc_and_more[3:], *u_abc_and_more[3:]))
-        plant.set_reals(to_plant, [*u_abc_and_more[:3], scenario.load(t)])
-        controller.set_reals(to_controller, [*i_abc_and_more[:3], scenario.speed_ref(t)])
-        plant.slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
-        controller.slave.doStep(currentCommunicationPoint=t, communicationStepSize=h)
+        to_plant(*u_abc_and_more[:3], scenario.load(t))
+        to_controller(*i_abc_and_more[:3], scenario.speed_ref(t))
+        step_plant(t)
+        step_controller(t)
     plant.close()
     controller.close()
     names = ("t", *RECORDED["plant"], *RECORDED["controller"])

@@ -49,17 +49,17 @@ BOOLEANS |= {"controller.weakening.use": True, "controller.current.active_resist
 def run(archive, speed, torque, names, correct):
     """Steps the drive on a shaft of this speed (rad/s) with the torque reference (N.m), and returns the outputs."""
     drive = Unit(archive, PARAMETERS, INTEGERS, BOOLEANS)
-    inputs, outputs = drive.of("speed_shaft", "angle_shaft", "tau_ref"), drive.of(*names)
+    write, read, step = drive.writer("speed_shaft", "angle_shaft", "tau_ref"), drive.reader(*names), drive.stepper(H)
     angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * H)])
-    rows, more = np.empty((len(speed) - 1, len(names))), 0.0
-    for k, row in enumerate(rows):
-        drive.set_reals(inputs, [speed[k], angle[k], torque[k] + more])
-        drive.slave.doStep(k * H, H)
-        row[:] = drive.get_reals(outputs)
+    rows, more = [], 0.0
+    for k, (w, angle_of_shaft, wanted) in enumerate(zip(speed.tolist()[:-1], angle.tolist(), torque.tolist())):
+        write(w, angle_of_shaft, wanted + more)
+        step(k * H)
+        rows.append(row := read())
         if correct:
-            more += 0.02 * (torque[k] - row[0])
+            more += 0.02 * (wanted - row[0])
     drive.close()
-    return dict(zip(names, rows.T))
+    return dict(zip(names, np.array(rows).T))
 
 
 def heated(loss, held_for=0.1):

@@ -22,7 +22,7 @@ EXAMPLES = notebook.EXAMPLES
 def test_the_script(archives, standard, tmp_path):
     command = [sys.executable, EXAMPLES / "drive.py", archives / standard]
     done = subprocess.run(
-        command, capture_output=True, text=True, timeout=300, cwd=tmp_path, env={**os.environ, "MPLBACKEND": "Agg"}
+        command, capture_output=True, text=True, timeout=600, cwd=tmp_path, env={**os.environ, "MPLBACKEND": "Agg"}
     )
     assert done.returncode == 0, done.stderr
     motor, generator = (float(re.search(r"efficiency ([\d.]+) %", line)[1]) for line in done.stdout.splitlines())

@@ -16,7 +16,7 @@ EXAMPLES = {"pump": (120, 102.4), "axis": (1.4, 0.325)}
 def run(script, *words):
     """The output of the script."""
     command = [sys.executable, ROOT / "examples/drive-train" / f"{script}.py", *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "MPLBACKEND": "Agg"})
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env={**os.environ, "MPLBACKEND": "Agg"})
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -27,10 +27,11 @@ def split(parameters):
     return {"parameters": reals, "integers": integers, "booleans": booleans}
 
 
-def at(schedule, t):
-    """Value of an input that holds each entry from its time on."""
-    index = bisect_right([start - 1e-9 for start, _ in schedule], t)
-    return schedule[index - 1][1] if index else 0.0
+def at(schedule):
+    """An input that holds each entry from its time on, as a function of time."""
+    starts = [start - 1e-9 for start, _ in schedule]
+    values = [0.0, *(value for _, value in schedule)]
+    return lambda t: values[bisect_right(starts, t)]
 
 
 def test_every_estimator_is_here(archives):
@@ -47,23 +48,28 @@ def test_every_estimator_is_here(archives):
 def test_as_native(archives, standard, experiment):
     plant = Unit(archives / standard / "PmsmPlant.fmu", **split(experiment["plant"]))
     controller = Unit(archives / standard / "SensorlessController.fmu", **split(experiment["controller"]))
-    from_plant, from_controller = plant.of(*CURRENTS, "theta_e", "speed"), controller.of(*VOLTAGES, "theta_est")
-    to_plant = plant.of(*VOLTAGES, "tau_load")
-    to_controller = controller.of(*CURRENTS, "theta_meas", "speed_meas", "speed_ref")
+    from_plant, from_controller = plant.reader(*CURRENTS, "theta_e", "speed"), controller.reader(*VOLTAGES, "theta_est")
+    to_plant = plant.writer(*VOLTAGES, "tau_load")
+    to_controller = controller.writer(*CURRENTS, "theta_meas", "speed_meas", "speed_ref")
+    step_plant, step_controller = plant.stepper(T_S), controller.stepper(T_S)
+    enable, enabled = controller.of("enable"), None
     plant.set_reals(plant.of("u_dc"), [experiment["u_dc"]])
     controller.set_reals(controller.of("u_dc"), [experiment["u_dc"]])
     speed, theta_est = [], []
+    load, speed_ref = at(experiment["load"]), at(experiment["speed_ref"])
     for k in range(experiment["steps"] + 1):
         t = k * T_S
-        out, command = plant.get_reals(from_plant), controller.get_reals(from_controller)
+        out, command = from_plant(), from_controller()
         if k % experiment["every"] == 0:
             speed.append(out[4])
             theta_est.append(command[3])
-        plant.set_reals(to_plant, [*command[:3], at(experiment["load"], t)])
-        controller.set_reals(to_controller, [*out, at(experiment["speed_ref"], t)])
-        controller.slave.setBoolean(controller.of("enable"), [t >= experiment["on"] - 1e-9])
-        plant.slave.doStep(currentCommunicationPoint=t, communicationStepSize=T_S)
-        controller.slave.doStep(currentCommunicationPoint=t, communicationStepSize=T_S)
+        to_plant(*command[:3], load(t))
+        to_controller(*out, speed_ref(t))
+        if (on := t >= experiment["on"] - 1e-9) is not enabled:
+            controller.slave.setBoolean(enable, [on])
+            enabled = on
+        step_plant(t)
+        step_controller(t)
     plant.close()
     controller.close()
     assert speed == experiment["speed"]

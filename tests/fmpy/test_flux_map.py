@@ -67,7 +67,7 @@ def tuned(tmp_path_factory):
     np.savetxt(folder / "map.csv", np.transpose(columns), delimiter=",", header="i_d,i_q,psi_d,psi_q", comments="")
     (folder / "m.toml").write_text(MOTOR)
     command = [os.environ["FMU_COMMAND"], "tune", folder / "m.toml", "--integers", "--out", folder]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     root = ET.parse(next(folder.glob("*.PmsmDrive.ssv"))).getroot()
     return {one.get("name"): one[0].get("value") for one in root.iter() if one.tag.endswith("}Parameter")}

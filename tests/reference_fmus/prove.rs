@@ -3,7 +3,6 @@
 use super::{archive, packed};
 use model_description::FmiVersion::V3;
 use std::collections::BTreeMap;
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -13,9 +12,7 @@ use std::process::{Command, Output};
 fn fed(package: &str, stimuli: &str, folder: &Path, change: (&str, &str)) -> PathBuf {
     let (plain, file) = (archive(package, V3), folder.join("stimuli.csv"));
     fs::write(&file, stimuli).unwrap();
-    let library =
-        super::python::scratch().parent().unwrap().join(if cfg!(debug_assertions) { "debug" } else { "release" });
-    let library = library.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_")));
+    let library = super::package::library(package);
     let description = fmu_import::describe(&library, None, fmu_core::description::Dependencies::Omitted).unwrap();
     let more = fmu_pack::reference::files(&plain, &description, &file, None).unwrap();
     let (_, files) = fmu_import::contents(&plain).unwrap();

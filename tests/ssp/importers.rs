@@ -8,7 +8,7 @@ fn what_not_every_importer_takes_is_an_option() {
     let folder = folder();
     let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
     let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
-    done(&["ssp", "--motor", motor, "--names", "--gates", "--geometry", "--out", &path("all.ssp")]);
+    packed(&["--motor", motor, "--names", "--gates", "--geometry", "--out", &path("all.ssp")]);
     let (plain, all) = (ssp("motor.ssp"), ssp("all.ssp"));
     let structure = |path: &str| entry(path, "SystemStructure.ssd");
     for part in ["<ssd:SystemGeometry ", "startConnector=\"enabled\" endElement=\"plant\" endConnector=\"enable\""] {
@@ -22,7 +22,7 @@ fn what_not_every_importer_takes_is_an_option() {
     let values = |path: &str| entry(path, "resources/controller.ssv");
     assert!(values(&all).contains("<ssv:Parameter name=\"estimator\"><ssv:Enumeration value=\"ExtendedEmf\"/>"));
     assert!(values(&plain).contains("<ssv:Parameter name=\"estimator\"><ssv:Integer value=\"4\"/>"));
-    done(&["ssp", "--motor", motor, "--integers", "--out", &path("integers.ssp")]);
+    packed(&["--motor", motor, "--integers", "--out", &path("integers.ssp")]);
     assert!(values(&path("integers.ssp")) == values(&plain), "the default");
     // None of this changes the results.
     let run = |path: &str| {
@@ -33,7 +33,7 @@ fn what_not_every_importer_takes_is_an_option() {
     let slower = std::fs::read_to_string(motor).unwrap().replace("[control]\n", "[control]\nT_s = 2e-4\n");
     let slower = if slower.contains("T_s") { slower } else { slower + "\n[control]\nT_s = 2e-4\n" };
     std::fs::write(folder.join("slower.toml"), slower).unwrap();
-    done(&["ssp", "--motor", &path("slower.toml"), "--out", &path("slower.ssp")]);
+    packed(&["--motor", &path("slower.toml"), "--out", &path("slower.ssp")]);
     assert!(structure(&ssp("slower.ssp")).contains("stepSize=\"0.0002\""));
 }
 
@@ -48,8 +48,8 @@ fn omsimulator_runs_it_as_it_is() {
     let of = |component: &str, fmu: &str| format!("{component}={}/ipmsm-2.2kw.{fmu}.ssv", tuned.display());
     let given = [of("plant", "PmsmPlant"), of("controller", "SensorlessController")];
     let (bound, geometry) = (folder.join("bound.ssp"), folder.join("geometry.ssp"));
-    done(&["ssp", "--parameters", &given[0], "--parameters", &given[1], "--out", bound.to_str().unwrap()]);
-    done(&["ssp", "--geometry", "--out", geometry.to_str().unwrap()]);
+    packed(&["--parameters", &given[0], "--parameters", &given[1], "--out", bound.to_str().unwrap()]);
+    packed(&["--geometry", "--out", geometry.to_str().unwrap()]);
     for name in ["fmi2.ssp", "fmi3.ssp", "motor.ssp", "bound.ssp"] {
         assert_eq!(refusals(&ssp(name)), Vec::<String>::new(), "{name}");
     }

@@ -38,7 +38,12 @@ fn fails(arguments: &[&str], status: i32, parts: &[&str]) {
     }
 }
 
-/// A folder with `fmi2.ssp` and `fmi3.ssp` without values, and `motor.ssp` of FMI 2.0 with a machine's values.
+/// `fmu ssp` with the packed FMUs: it compiles nothing.
+fn packed(arguments: &[&str]) {
+    done(&[&["ssp", "--fmus", common::archives().to_str().unwrap()], arguments].concat());
+}
+
+/// A folder with `fmi2.ssp`, from the sources, and `fmi3.ssp` without values, and `motor.ssp` of FMI 2.0 with a machine's values.
 fn folder() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
@@ -46,9 +51,9 @@ fn folder() -> &'static Path {
         std::fs::create_dir_all(&folder).unwrap();
         let path = |name: &str| folder.join(name).to_str().unwrap().to_owned();
         done(&["ssp", "--out", &path("fmi2.ssp")]);
-        done(&["ssp", "--fmi", "3", "--out", &path("fmi3.ssp")]);
+        packed(&["--fmi", "3", "--out", &path("fmi3.ssp")]);
         let motor = concat!(env!("CARGO_MANIFEST_DIR"), "/motors/ipmsm-2.2kw.toml");
-        done(&["ssp", "--motor", motor, "--out", &path("motor.ssp")]);
+        packed(&["--motor", motor, "--out", &path("motor.ssp")]);
         folder
     })
 }

@@ -85,6 +85,7 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
     };
     let out = folder().join("never.ssp");
     let out = out.to_str().unwrap();
+    let fmus = common::archives().to_str().unwrap();
     for (old, new, status, part) in [
         ("motor.R_s", "motor.R", 2, "PmsmPlant has no variable motor.R: correct the name, or remove the parameter"),
         ("value=\"3.6\"", "value=\"3.6\" unit=\"mOhm\"", 2, "motor.R_s is given in mOhm, but PmsmPlant uses Ohm"),
@@ -92,11 +93,12 @@ fn wrong_values_are_told_with_file_line_and_remedy() {
         ("value=\"3.6\"", "value=\"-1\"", 1, "motor.R_s = -1 is not allowed"),
     ] {
         let (_dir, path) = parameters(old, new);
-        fails(&["ssp", "--parameters", &format!("plant={path}"), "--out", out], status, &["p.ssv: line ", part]);
+        let arguments = ["ssp", "--fmus", fmus, "--parameters", &format!("plant={path}"), "--out", out];
+        fails(&arguments, status, &["p.ssv: line ", part]);
     }
     let (_dir, path) = parameters("motor.R_s", "motor.R_s");
     fails(
-        &["ssp", "--parameters", &format!("p={path}"), "--out", out],
+        &["ssp", "--fmus", fmus, "--parameters", &format!("p={path}"), "--out", out],
         2,
         &["no component p; available: controller, plant"],
     );

@@ -13,7 +13,7 @@ fn systems_of_several_fmus_and_ssp_files_are_swept() {
     let folder = Folder::new();
     let archives = common::archives().join("fmi2");
     let ssp = folder.path("drive.ssp");
-    ends(fmu().args(["ssp", "--out"]).arg(&ssp), 0);
+    ends(fmu().args(["ssp", "--fmus"]).arg(&archives).arg("--out").arg(&ssp), 0);
     let design = "stop = 0.02\nstep = 1e-4\ndesign = { kind = 'lhs', runs = 20, seed = 3 }\n";
     let measure = |p: &str| format!("[measure]\nlast = {{ of = '{p}', is = 'final' }}\n");
     let pair = format!(

@@ -292,5 +292,5 @@ class Instance:
     def recall(self, data, state=None):
         """A saved state from bytes: status and state."""
         state = c.c_void_p() if state is None else state
-        array = (c.c_uint8 * len(data))(*data)
+        array = (c.c_uint8 * len(data)).from_buffer_copy(data)
         return self.state_call("DeserializeFMUState", array, len(data), c.byref(state)), state
