@@ -17,7 +17,7 @@ enumeration! {
     #[derive(Default, Serialize, Deserialize)]
     pub enum Beginning("Beginning", "State in which the drive begins") {
         #[default]
-        1 Off "As the other initial values say, without current, with the start of the controller";
+        1 Off "Without current, at the other initial values, with the start of the controller";
         2 Electrical "In the steady state of speed and torque, at the temperature thermal.T_start";
         3 Thermal "In the steady state of speed and torque with its temperatures";
     }

@@ -193,7 +193,7 @@ impl PmsmDrive {
     #[inline]
     fn convert_reference(&mut self) {
         if let Some(calibration) = &self.calibration {
-            calibration.ask(&mut self.pair, &self.inputs);
+            calibration.ask(&mut self.pair, (self.inputs.tau_ref, self.inputs.modes));
         }
     }
 
@@ -383,7 +383,7 @@ impl Model for PmsmDrive {
                 pair.exchange_present();
             }
             if let Some(calibration) = calibration {
-                calibration.ask(pair, inputs);
+                calibration.ask(pair, (inputs.tau_ref, inputs.modes));
             }
             pair.advance(h)?;
             at_sample = ends;

@@ -14,7 +14,6 @@
 //! voltage lost in a dead time, and the delay of the current loop. A free shaft has this torque for its inertia and its load.
 
 use crate::pair::Pair;
-use crate::pmsm_drive::DriveInputs;
 use crate::steady::{At, Condition, Steady};
 use drive_control::modes::ModeInputs;
 use drive_control::signals::ControllerOutputs;
@@ -74,15 +73,15 @@ impl Calibration {
         Self { drive: drive.sampled(), limits }
     }
 
-    /// Sets the controller's reference and limits for those of the `inputs`, at the shaft.
+    /// Sets the controller's reference and limits for the torque `tau_ref` (N.m) and the limits at the shaft.
     #[inline(never)]
-    pub(crate) fn ask(&self, pair: &mut Pair, inputs: &DriveInputs) {
+    pub(crate) fn ask(&self, pair: &mut Pair, (tau_ref, limits): (f64, ModeInputs)) {
         let ControllerParameters { speed_loop, modes, .. } = &self.drive.controller;
         if speed_loop.torque_mode {
-            pair.controller.model.inputs.tau_ref = self.drive.at(&condition(pair)).reference_for(inputs.tau_ref);
+            pair.controller.model.inputs.tau_ref = self.drive.at(&condition(pair)).reference_for(tau_ref);
         }
         if modes.tau_used {
-            let ModeInputs { tau_max, tau_min, .. } = inputs.modes;
+            let ModeInputs { tau_max, tau_min, .. } = limits;
             let [low, high] = self.drive.at(&condition(pair)).references_for([tau_min, tau_max]);
             let limits = &mut pair.controller.model.inputs.modes;
             (limits.tau_min, limits.tau_max) = (low, high);

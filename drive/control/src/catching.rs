@@ -4,8 +4,10 @@
 use crate::catch::{Catch, CatchStep, Refusal, Setup};
 use crate::estimator::{Class, Kind, Sample};
 use crate::model::SensorlessController;
+use crate::overload::Overload;
 use crate::signals::ControllerOutputs;
 use crate::speed::SpeedController;
+use crate::stands::Stands;
 use crate::start::{CurrentFrequencyStart, StartMode, StartState};
 use crate::state::{Command, Leader, context};
 use crate::tables::PARAMETERS;
@@ -137,7 +139,7 @@ impl SensorlessController {
     pub fn begin_here(&mut self, speed_ref: f64) {
         let Self { parameters: par, gains, state, .. } = self;
         state.samples = 0;
-        (state.limited_for, state.stands, state.overload) = (0.0, Default::default(), Default::default());
+        (state.limited_for, state.stands, state.overload) = (0.0, Stands::default(), Overload::default());
         state.w_ref = speed_ref;
         state.speed = if par.speed_loop.torque_mode {
             SpeedController::default()

@@ -23,7 +23,8 @@ fn is(par: &Par, kinds: &[Kind]) -> bool {
 pub const ACTS: &[Acts<Par>] = &[
     Acts { names: &[
         "T_s", "timing.delay", "estimator", "motor.n_p", "motor.R_s", "motor.L_d", "motor.L_q", "motor.psi_M", "mechanics.J",
-        "initial.theta_est", "initial.speed_est", "limit.i_q", "limit.i", "limit.tau", "limit.i_dc_use", "limit.tau_use", "zero_speed.by_need", "brake.tau", "brake.hold", "speed_loop.torque_mode",
+        "initial.theta_est", "initial.speed_est", "limit.i_q", "limit.i", "limit.tau", "limit.i_dc_use", "limit.tau_use",
+        "zero_speed.by_need", "brake.tau", "brake.hold", "speed_loop.torque_mode",
         "current.bandwidth", "current.active_resistance", "current.integral", "current.reference_feed_forward", "current.mtpa",
         "weakening.use", "start.mode", "start.catch", "lock.u", "lock.angle", "lock.time", "trip.use", "sensor.gain_a", "sensor.gain_b",
         "sensor.gain_c", "sensor.offset_a", "sensor.offset_b", "sensor.offset_c", "sensor.noise", "sensor.resolution",

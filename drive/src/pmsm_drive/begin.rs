@@ -36,14 +36,14 @@ const STEP: f64 = 4.0;
 
 /// Range and mean of a signal.
 #[derive(Clone, Copy, Debug, Default)]
-struct Mean {
+struct Swing {
     count: f64,
     mean: f64,
     least: f64,
     greatest: f64,
 }
 
-impl Mean {
+impl Swing {
     fn add(&mut self, x: f64) {
         (self.least, self.greatest) =
             if self.count == 0.0 { (x, x) } else { (self.least.min(x), self.greatest.max(x)) };
@@ -59,8 +59,8 @@ impl Mean {
 /// A drive that has run up, with the torque (N.m) of its shaft and its estimated speed (rad/s) in the end.
 struct RunUp {
     drive: PmsmDrive,
-    tau: Mean,
-    speed_est: Mean,
+    tau: Swing,
+    speed_est: Swing,
 }
 
 impl RunUp {
@@ -155,8 +155,7 @@ impl PmsmDrive {
     /// A copy that has run for [`TIME`] at the mechanical `speed` (rad/s) up to the angle at which this one begins, with the torque
     /// reference `tau_ref` (N.m).
     fn run_up(&self, temperatures: Temperatures, speed: f64, tau_ref: f64) -> Option<RunUp> {
-        let mut block = Block::<Self>::default();
-        block.model = self.clone();
+        let mut block = Block { model: self.clone(), ..Block::default() };
         let model = &mut block.model;
         model.beginning.steady = Beginning::Off;
         let (angle, T_s) = (self.pair.plant.out.angle, model.pair.controller.model.parameters.T_s);
@@ -176,7 +175,7 @@ impl PmsmDrive {
         model.initialize();
         model.link.clone_from(&self.link);
         model.pair.controller.model.begin_at(n_p * begins, speed);
-        let (mut now, [mut tau, mut speed_est]) = (Elapsed::ZERO, [Mean::default(); 2]);
+        let (mut now, [mut tau, mut speed_est]) = (Elapsed::ZERO, [Swing::default(); 2]);
         for k in 0..num_of(steps) {
             let model = &mut block.model;
             model.inputs.angle_shaft = begins + speed * now.seconds();

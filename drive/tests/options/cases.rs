@@ -577,7 +577,8 @@ pub(super) const CASES: &[Case] = &[
         on: |kind| {
             let mut pair = slow(kind);
             pair.controller.model.inputs.modes.brake = true;
-            pair.controller.model.parameters.modes.brake.hold = false;
+            let par = &mut pair.controller.model.parameters;
+            (par.modes.brake.hold, par.speed_loop.bandwidth) = (false, TAU);
             pair
         },
         ask: |p| p.modes.brake.hold = true,
@@ -591,7 +592,7 @@ pub(super) const CASES: &[Case] = &[
             });
             [early, pair.controller.out.i_ref.q]
         },
-        acts: |_, [early, late], [_, held]| early < -1.0 && (late / early - 1.0).abs() < 0.05 && held < 1.2 * late,
+        acts: |_, [early, late], [_, held]| early < -0.3 && (late / early - 1.0).abs() < 0.05 && held < 1.2 * late,
     },
     Case {
         option: "sensor.resume",
