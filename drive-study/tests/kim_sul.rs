@@ -40,7 +40,7 @@ fn steady_error_at_rated_load() {
 #[test]
 fn rated_load_is_held_down_to() {
     let held = |kind, ideal, compensated| {
-        for (pair, speed) in vec![(preset(kind), ideal), (with_dead_time(preset(kind), true), compensated)] {
+        for (pair, speed) in [(preset(kind), ideal), (with_dead_time(preset(kind), true), compensated)] {
             let steady = slowed_down(pair, speed);
             assert!(steady.holds(), "{} at {speed} pu: {steady:?}", kind.name());
         }

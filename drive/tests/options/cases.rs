@@ -587,7 +587,7 @@ pub(super) const CASES: &[Case] = &[
             let mut early = 0.0;
             run(&mut pair, 0.3, |t, p| {
                 if t < 0.1 {
-                    early = p.controller.out.i_ref.q
+                    early = p.controller.out.i_ref.q;
                 }
             });
             [early, pair.controller.out.i_ref.q]
