@@ -8,8 +8,8 @@ SWING = 20.0  # V, A, rad/s or N.m: enough to turn the rotor and to move the est
 
 
 def excite(it, k):
-    """Sets every real input, except the DC-link voltage and the temperatures, to a different sine at step `k`."""
-    inputs = [v for v in it.fmu.of("input") if v.name != "u_dc" and not v.name.startswith("T_")]
+    """Sets every real input, except those with a range of one sign, to a different sine at step `k`."""
+    inputs = [v for v in it.fmu.of("input") if not v.name.startswith(("u_dc", "T_", "tau_limit_"))]
     it.reals("Set", inputs, [SWING * math.sin(0.01 * k * (n + 2) + n) for n in range(len(inputs))])
 
 
