@@ -54,3 +54,12 @@ def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
     labels = [re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text())
               for path in (tmp_path / "plot.svg", ROOT / f"docs/drive-train-{script}.svg")]  # fmt: skip
     assert labels[0] == labels[1] and "time [s]" in labels[0]
+
+
+@pytest.mark.parametrize("standard", ["fmi2", "fmi3"])
+def test_the_pump_restarts_after_a_brown_out(archives, standard):
+    """The numbers of docs/modes.md, in both standards."""
+    text = run("brownout", archives / standard / "PmsmDrive.fmu")
+    page = (ROOT / "docs/modes.md").read_text()
+    shown = page[page.index("energy in kJ") :].split("```")[0]
+    assert numbers(shown) == pytest.approx(numbers(text), rel=2e-3, abs=2e-3), text
