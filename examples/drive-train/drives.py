@@ -39,7 +39,7 @@ class Fmu:
         self.set, self.get = getattr(self.fmu, f"set{real}"), getattr(self.fmu, f"get{real}")
         reference = {v.name: v.valueReference for v in description.modelVariables}
         self.inputs, self.outputs = [[reference[name] for name in names] for names in (inputs, outputs)]
-        self.enable = [reference["enable"]]
+        self.reference = reference
         if description.fmiVersion == "2.0":
             self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
@@ -52,9 +52,9 @@ class Fmu:
         self.steps += 1
         return self.get(self.outputs)
 
-    def switch(self, on):
-        """The gates from the next step on."""
-        self.fmu.setBoolean(self.enable, [on])
+    def switch(self, **switches):
+        """Boolean inputs by their names, from the next step on: `enable` for the gates."""
+        self.fmu.setBoolean([self.reference[name] for name in switches], list(switches.values()))
 
     def close(self):
         self.fmu.terminate()

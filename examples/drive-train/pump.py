@@ -35,7 +35,7 @@ def run(file, stop):
     rows, speed = [], 0.0
     for t in time:
         demand = DEMAND[int(t // 20.0)]
-        drive.switch(demand > 0.0)  # without demand, the gates are off and the pump coasts
+        drive.switch(enable=demand > 0.0)  # without demand, the gates are off and the pump coasts
         row = drive.step(H, RATED * demand, TORQUE * (speed / RATED) * abs(speed / RATED))
         speed = row[0]
         rows.append(row)

@@ -57,9 +57,10 @@ def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
 
 
 @pytest.mark.parametrize("standard", ["fmi2", "fmi3"])
-def test_the_pump_restarts_after_a_brown_out(archives, standard):
+@pytest.mark.parametrize("script", ["brownout", "scooter"])
+def test_modes(archives, standard, script):
     """The numbers of docs/modes.md, in both standards."""
-    text = run("brownout", archives / standard / "PmsmDrive.fmu")
+    text = run(script, archives / standard / "PmsmDrive.fmu")
     page = (ROOT / "docs/modes.md").read_text()
-    shown = page[page.index("energy in kJ") :].split("```")[0]
+    shown = page[page.index("energy in kJ", page.index(f"{script}.py")) :].split("```")[0]
     assert numbers(shown) == pytest.approx(numbers(text), rel=2e-3, abs=2e-3), text
