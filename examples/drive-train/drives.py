@@ -54,7 +54,7 @@ class Fmu:
 
     def switch(self, **switches):
         """Boolean inputs by their names, from the next step on: `enable` for the gates."""
-        self.fmu.setBoolean([self.reference[name] for name in switches], list(switches.values()))
+        self.fmu.setBoolean([self.reference[name] for name in switches], list(map(bool, switches.values())))
 
     def close(self):
         self.fmu.terminate()
