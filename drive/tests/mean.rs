@@ -17,6 +17,7 @@ use drive::pmsm_drive::{DriveInputs, DriveOutputs};
 use drive::steady::{Condition, Steady};
 use drive::{PmsmDrive, PmsmDriveMean};
 use drive_control::battery::DcLimits;
+use drive_control::modes::SpeedRange;
 use drive_control::tables::ControllerParameters;
 use fmu_core::log::Warnings;
 use fmu_core::{Block, Causality, ContinuousTime, Description, Elapsed, Model, Slot, Step, Warns};
@@ -426,7 +427,8 @@ const UNDER: usize = 7;
 const FAST: usize = 8;
 const BATTERY: usize = 9;
 const RECTIFIER: usize = 10;
-const CASES: usize = 11;
+const MODES: usize = 11;
+const CASES: usize = 12;
 
 /// Link and trips of a case with a DC link.
 fn link_of(case: usize, model: &mut PmsmDriveMean) {
@@ -452,7 +454,7 @@ fn link_of(case: usize, model: &mut PmsmDriveMean) {
 /// All outputs as bits after a run with the parameter `index` changed, or `None` if the value is refused.
 fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     let (mut plant, mut controller) = traction();
-    let linked = case >= LINKED;
+    let linked = (LINKED..MODES).contains(&case);
     if linked {
         // Machine c on its link: limits of the battery, a chopper, over-voltage, under-voltage.
         controller.dc = DcLimits { used: true, max: 80.0, min: -50.0 };
@@ -463,7 +465,12 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
         plant.mechanics.imposed = false;
         (controller.speed_loop.ramp, controller.speed_est) = (300.0, 5.0);
         (controller.zero_speed.i_0, controller.current.mtpa) = (2.0, case == 2);
-        controller.speed_loop.torque_mode = case == 4;
+        controller.speed_loop.torque_mode = case == 4 || case == MODES;
+        if case == MODES {
+            plant.initial.speed = 19.0;
+            controller.modes.speed = SpeedRange { used: true, max: 20.0, min: -5.0 };
+            (controller.modes.tau_used, controller.modes.brake.tau) = (true, 0.9);
+        }
         if case == 2 {
             controller.limit.tau = 1.5;
         }
@@ -525,6 +532,9 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
     if case == FAST {
         inputs.speed_shaft = 1300.0;
     }
+    if case == MODES {
+        (inputs.modes.tau_max, inputs.modes.tau_min) = (1.0, -1.0);
+    }
     block.initialize();
     block.model.validate().ok()?;
     let mut now = Elapsed::ZERO;
@@ -533,8 +543,10 @@ fn with_moved(index: Option<usize>, case: usize) -> Option<Vec<u64>> {
         if k == 20 {
             // The chopper is always on at first, and switches later.
             let later = if case == LINKED { -45.0 } else { -70.0 };
-            block.model.inputs.tau_ref = if case == LINKED || case == OVER || case == BATTERY { later } else { 60.0 };
+            let back = [LINKED, OVER, BATTERY, MODES].contains(&case);
+            block.model.inputs.tau_ref = if back { later } else { 60.0 };
         }
+        block.model.inputs.modes.brake = case == MODES && k >= 40;
         let step = Step { start: now, h: 3e-3 };
         block.step(&step).ok()?;
         now = step.end();
