@@ -28,7 +28,7 @@ class Full(fmurun.Plan):
 
 
 class Held(fmurun.Plan):
-    """On a worker, after five parts of $FMURUN_HELD/out: tells its process in $FMURUN_HELD, and waits for $FMURUN_HELD/go."""
+    """After five parts in $FMURUN_HELD/out, a worker writes its process ID to $FMURUN_HELD and waits for $FMURUN_HELD/go."""
 
     def run_many(self, table, **more):
         folder = os.environ["FMURUN_HELD"]

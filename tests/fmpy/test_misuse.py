@@ -26,7 +26,7 @@ MEASURING = ["load_and_unload", "instances_are_freed"]
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Runs a case in a process of its own; returns its exit code and what it prints."""
+    """Runs a case in a separate process; returns its exit code and output."""
     here, folder = Path(__file__).parent, tmp_path_factory.mktemp("printed")
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1", **({} if ASAN is None else SANITIZED)}
     command = [sys.executable, "-m", "misuse"]

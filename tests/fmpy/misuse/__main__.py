@@ -37,7 +37,7 @@ def main(name, folder):
 
 
 def serve():
-    """Returns the case and the folder of each line in a process of its own, and None here, at the end."""
+    """In a forked process, returns the case and the folder of a line; in this process, returns None after the last line."""
     for line in iter(sys.stdin.readline, ""):
         name, folder, path = line.rstrip("\n").split("\t")
         child = os.fork()
