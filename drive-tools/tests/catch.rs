@@ -1,6 +1,7 @@
 //! Flying start (`start.catch`) of tuned drives: caught, started from rest, or refused.
 //!
-//! `CATCH_MACHINES=hub-36v,reference` and `CATCH_KINDS=Hybrid` select some; `CATCH_FOLDER=DIR` adds the machines of a folder.
+//! `CATCH_MACHINES=hub-36v,reference` and `CATCH_KINDS=Hybrid` select some, `CATCH_SPEEDS=0.02,1.5` other speeds;
+//! `CATCH_FOLDER=DIR` adds the machines of a folder.
 #![allow(missing_docs, non_snake_case)]
 
 use drive::control::start::StartState;
@@ -98,6 +99,8 @@ fn rated(motor: &MotorFile) -> (f64, f64) {
 #[ignore = "a quarter of an hour: every estimator on every machine at 9 speeds and 24 angles"]
 fn every_method_catches_every_machine() {
     let angles: u32 = std::env::var("CATCH_ANGLES").map_or(24, |n| n.parse().unwrap());
+    let speeds: Vec<f64> = std::env::var("CATCH_SPEEDS")
+        .map_or(SPEEDS.to_vec(), |list| list.split(',').map(|one| one.parse().unwrap()).collect());
     let (mut caught, mut ramped, mut refused) = (0, 0, 0);
     for (name, motor) in machines() {
         let chosen = |kind: &Kind| {
@@ -109,10 +112,10 @@ fn every_method_catches_every_machine() {
             pair.controller.model.parameters.start.catch = true;
             if let Err(fault) = pair.start() {
                 println!("{name:16} {:20} {fault}", kind.name());
-                refused += SPEEDS.len() * angles as usize;
+                refused += speeds.len() * angles as usize;
                 continue;
             }
-            for speed in SPEEDS {
+            for &speed in &speeds {
                 let at = |k| TAU * f64::from(k) / f64::from(angles);
                 let runs: Vec<_> =
                     (0..angles).map(|k| run(&tuned, rated(&motor), speed * rated(&motor).0, at(k))).collect();
@@ -175,6 +178,40 @@ fn a_turning_rotor_is_caught() {
                 );
             }
         }
+    }
+}
+
+/// A heavy rotor turns against the reference: it is braked, and the I-f start takes it through standstill, where the EMF would be lost.
+#[test]
+fn a_heavy_rotor_is_turned_back() {
+    for (name, J, kind) in [
+        ("ipmsm-2.2kw", 1.5, Kind::ExtendedEmf),
+        ("reference", 0.05, Kind::VoltageModel),
+        ("servo-6.6kw", 0.2, Kind::KalmanFilter),
+    ] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../motors").join(format!("{name}.toml"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        let light = text.lines().find(|line| line.starts_with("J = ")).unwrap();
+        let motor = MotorFile::parse(&text.replace(light, &format!("J = {J}")), &path).unwrap();
+        let mut pair = tuned(&motor, kind).unwrap().pair();
+        let speed = rated(&motor).0;
+        pair.controller.model.parameters.start.catch = true;
+        pair.plant.model.parameters.initial.speed = -0.3 * speed;
+        pair.start().unwrap();
+        let (T_s, u_dc) = (pair.controller.model.parameters.T_s, pair.plant.model.inputs.u_dc);
+        let (limit, mut peak) = (pair.controller.model.parameters.limit.i, 0.0_f64);
+        let (mut now, mut ramps) = (0.0, false);
+        while now < 20.0 {
+            pair.set_inputs(0.4 * speed, 0.0, u_dc);
+            pair.step(T_s).unwrap();
+            now += T_s;
+            let (out, plant) = (&pair.controller.out, &pair.plant.out);
+            ramps |= out.start_state == StartState::Ramping && plant.speed < 0.0;
+            peak = [plant.i.a, plant.i.b, plant.i.c].into_iter().fold(peak, |most, x| most.max(x.abs() / limit));
+        }
+        let end = pair.plant.out.speed / speed;
+        println!("{name}, {}: ends at {end} pu, i {peak}", kind.name());
+        assert!(ramps && (end - 0.4).abs() < 2e-3 && peak < 1.1, "{end} pu, {peak}");
     }
 }
 

@@ -243,11 +243,12 @@ impl PmsmDrive {
         PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, asc, thermal }
     }
 
-    /// Watches the load after a step; a start sequence and a drive at rest have no torque limits.
+    /// Watches the load after a step; a start sequence and a drive at rest have no torque limits, and those after a flying start rise.
     fn watch_load(&mut self) {
         let Self { inputs: DriveInputs { tau_load, .. }, pair, overload, .. } = self;
         let ControllerOutputs { tau_max, tau_min, .. } = pair.controller.out;
-        let acts = !pair.plant.model.parameters.mechanics.imposed && tau_max > 0.0 && tau_min < 0.0;
+        let limited = tau_max > 0.0 && tau_min < 0.0 && !pair.controller.model.rises();
+        let acts = limited && !pair.plant.model.parameters.mechanics.imposed;
         *overload = overload.followed_by(acts && (*tau_load > FAR * tau_max || *tau_load < FAR * tau_min));
     }
 }
@@ -269,7 +270,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 27;
+    const STATE_VERSION: u16 = 28;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);

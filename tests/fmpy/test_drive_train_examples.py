@@ -57,10 +57,10 @@ def test_the_page_has_what_the_script_prints(archives, script, tmp_path):
 
 
 @pytest.mark.parametrize("standard", ["fmi2", "fmi3"])
-@pytest.mark.parametrize("script", ["brownout", "scooter"])
-def test_modes(archives, standard, script):
+@pytest.mark.parametrize(("script", "drives"), [("brownout", ["PmsmDrive", "PmsmDriveMean"]), ("scooter", ["PmsmDrive"])])
+def test_modes(archives, standard, script, drives):
     """The numbers of docs/modes.md, in both standards."""
-    text = run(script, archives / standard / "PmsmDrive.fmu")
+    text = run(script, *(archives / standard / f"{drive}.fmu" for drive in drives))
     page = (ROOT / "docs/modes.md").read_text()
     shown = page[page.index("energy in kJ", page.index(f"{script}.py")) :].split("```")[0]
     assert numbers(shown) == pytest.approx(numbers(text), rel=2e-3, abs=2e-3), text

@@ -80,6 +80,12 @@ impl SensorlessController {
             }
     }
 
+    /// Whether the torque limits still rise after a flying start.
+    #[inline]
+    pub fn rises(&self) -> bool {
+        self.state.k <= self.state.rise && self.state.rise > 0
+    }
+
     #[inline(never)]
     fn any_cycle(&mut self) {
         let ControllerInputs { speed_ref, tau_ref, modes, derating, .. } = self.inputs;
@@ -88,7 +94,7 @@ impl SensorlessController {
             (speed_loop.ramp, speed_loop.torque_mode, zero_speed.release, limits.tau_used);
         let measures = self.measures_resistance();
         self.follow(modes.follows());
-        if self.state.k < self.state.rise {
+        if self.rises() {
             #[expect(clippy::cast_precision_loss, reason = "some hundreds")]
             let share = self.state.k as f64 / self.state.rise as f64;
             self.inputs.derating *= share;

@@ -74,6 +74,9 @@ impl SensorlessController {
         if self.commissioning.is_some() && self.commissions() {
             return;
         }
+        if self.state.against && self.state.k > 0 {
+            self.turn_back();
+        }
         if self.state.catch.is_some() && self.catches() {
             return;
         }
@@ -305,7 +308,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 22;
+    const STATE_VERSION: u16 = 23;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {

@@ -127,6 +127,8 @@ pub struct CurrentFrequencyStart {
     i: DqHat,
     /// Angle of the rotor behind the frame, while the current changes to that of the hand-over.
     behind: Option<f64>,
+    /// Direction of the ramp, 1 or -1; 0 before it.
+    side: f64,
 }
 
 /// Requests of the start at a sample; angles in rad and speeds in rad/s, electrical.
@@ -153,11 +155,12 @@ pub enum StartStep {
 }
 
 impl CurrentFrequencyStart {
-    /// On the ramp, with a rotor at `theta` (rad) that turns at `w` (rad/s).
-    pub(crate) fn turning(par: &StartParameters, context: &Context, theta: f64, w: f64) -> Self {
+    /// On the ramp, with a rotor at `theta` (rad) that turns at `w` (rad/s); a `reference` against it turns the frame back through 0.
+    pub(crate) fn turning(par: &StartParameters, context: &Context, (theta, w): (f64, f64), reference: f64) -> Self {
+        let side = if w * reference < 0.0 { -w.signum() } else { w.signum() };
         let i = Line::of(context.motor, context.J, par.i).map_or(DqHat::ZERO, |line| DqHat::new(0.5 * line.i_0(), 0.0));
         let e = DqHat::new(0.0, w * context.motor.psi_M);
-        Self { stage: Stage::Ramp, theta: theta - context.T_s * w, w, e, i, ..Self::default() }
+        Self { stage: Stage::Ramp, theta: theta - context.T_s * w, w, e, i, side, ..Self::default() }
     }
 
     /// What it does.
@@ -208,11 +211,11 @@ impl CurrentFrequencyStart {
             Stage::On if t >= par.t_align && reference != 0.0 => self.enter(Stage::Ramp),
             Stage::Ramp => {
                 // The direction is set once, at the first sample of the ramp.
-                let side = if self.w == 0.0 { side } else { self.w.signum() };
+                self.side = if self.side == 0.0 { side } else { self.side };
                 let share = if line.is_some() { share(t) } else { 1.0 };
-                self.w = side * (self.w.abs() + T_s * n_p * par.acceleration * share).min(rated);
+                self.w = self.side * (self.side * self.w + T_s * n_p * par.acceleration * share).min(rated);
                 let risen = share >= 1.0;
-                if self.w.abs() >= rated && risen {
+                if self.side * self.w >= rated && risen {
                     self.enter(Stage::Hold);
                 }
             }
@@ -247,7 +250,7 @@ impl CurrentFrequencyStart {
         (side, grown): (f64, f64),
     ) -> DqHat {
         let (aligned, most) = (DqHat::new(0.5 * line.i_0(), 0.0), line.i_q(par.i));
-        let (t, side) = (self.n * T_s, if self.w == 0.0 { side } else { self.w.signum() });
+        let (t, side) = (self.n * T_s, if self.side == 0.0 { side } else { self.side });
         let left = (par.settle - t) / CHANGE;
         match self.stage {
             Stage::Behind | Stage::On => {
@@ -259,7 +262,7 @@ impl CurrentFrequencyStart {
                 return Line::leaving(self.i, behind, left);
             }
             Stage::Ramp => {
-                let acceleration = if self.w.abs() < n_p * par.speed { side * n_p * par.acceleration } else { 0.0 };
+                let acceleration = if side * self.w < n_p * par.speed { side * n_p * par.acceleration } else { 0.0 };
                 self.i = line.accelerating(share(t), side * most, acceleration);
             }
             Stage::Hold => self.i = line.accelerating(1.0, side * most, 0.0),

@@ -80,6 +80,8 @@ impl Events for PmsmDriveMean {
         self.known = false;
         self.settle();
         self.watch_voltage(self.voltage(self.point.powers.p_in));
+        self.follow();
+        let state = self.referred();
         self.held = self.controller(&state, &self.point_at(&state, self.temperatures()));
         Ok(Outcome::default())
     }

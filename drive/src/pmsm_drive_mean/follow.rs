@@ -80,10 +80,12 @@ impl PmsmDriveMean {
         (tau, integrates(cut, error, highest) * gains.slopes()[1] * error, cut == 0.0)
     }
 
-    /// After a change of what is followed: both loops begin at the present speed and torque.
+    /// After a change of what is followed, or once the gates switch: both loops begin at the present speed and torque, as those of
+    /// `PmsmDrive` with `start.catch`.
     pub(super) fn follow(&mut self) {
-        let follows = self.inputs.modes.follows();
-        if std::mem::replace(&mut self.follows, follows) == follows {
+        let (follows, gates) = (self.inputs.modes.follows(), self.gates());
+        let before = (std::mem::replace(&mut self.follows, follows), std::mem::replace(&mut self.gates_on, gates));
+        if before.0 == follows && (before.1 || !gates) {
             return;
         }
         let speed = self.speed(&self.state);

@@ -92,6 +92,8 @@ pub struct PmsmDriveMean {
     diodes: Diodes,
     /// What the loops have followed.
     follows: Follows,
+    /// Whether the gates have switched.
+    gates_on: bool,
     /// Whether a step was taken.
     moved: bool,
     /// Model Exchange: outputs of the controller since the last event.
@@ -126,6 +128,7 @@ impl Default for PmsmDriveMean {
             trip: Trip::default(),
             diodes: Diodes::default(),
             follows: Follows::default(),
+            gates_on: false,
             moved: false,
             held: ControllerOutputs::default(),
             impossible: Happened::default(),
@@ -318,7 +321,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 7;
+    const STATE_VERSION: u16 = 8;
 
     const CONTINUOUS: bool = true;
 
@@ -378,7 +381,7 @@ impl Model for PmsmDriveMean {
         (self.clipped_for, self.impossible, self.link_energy) = (0.0, Happened::default(), LinkEnergy::default());
         (self.known, self.point, self.trip) = (false, Point::default(), Trip::default());
         (self.diodes, self.overload) = (Diodes::default(), Overload::default());
-        self.follows = self.inputs.modes.follows();
+        (self.follows, self.gates_on) = (self.inputs.modes.follows(), self.gates());
         self.begin_steadily();
         let temperatures = self.temperatures();
         self.point = self.point_at(&self.state, temperatures);

@@ -7,7 +7,7 @@
 //! theta~) / L_q. A low-pass smooths the speed; the angle is corrected as in the voltage model
 //! ([`follower`](crate::estimator::follower)).
 //! Correction to the paper: the q row of (30) is psi_M T_s (w^ - w_r cos theta~) / L_q, with the speed error in the
-//! fraction.
+//! fraction. The turn of the rotor in a sample counts ([`Interval::turn`]).
 //!
 //! Limits: the same as for the voltage model, because the two models are equivalent and differ only in form. It holds rated load
 //! down to 0.010 of the rated speed, 0.010 with a compensated dead time.
@@ -29,10 +29,13 @@ impl<All: AsRef<MatsuiParameters>> Rows<All> for CurrentRows {
     #[inline]
     fn rows(w: &mut f64, context: &ContextOf<All>, x: &Interval, slip: f64) -> f64 {
         let ContextOf { motor, T_s, .. } = *context;
-        let r_d = x.v.d() - motor.R_s * x.i.d() + (*w * motor.L_q + slip * motor.L_d) * x.i.q();
-        let r_q = x.v.q() - motor.R_s * x.i.q() - (*w * motor.L_d + slip * motor.L_q) * x.i.d() - *w * motor.psi_M;
-        let di_d = x.i_now.d() - (x.i_last.d() + T_s / motor.L_d * r_d);
-        let di_q = x.i_now.q() - (x.i_last.q() + T_s / motor.L_q * r_q);
+        let (speeds, changes) = x.turn(T_s);
+        let (w_x, slip) = (speeds * *w, speeds * slip);
+        let r_d = x.v.d() - motor.R_s * x.i.d() + (w_x * motor.L_q + slip * motor.L_d) * x.i.q();
+        let r_q = x.v.q() - motor.R_s * x.i.q() - (w_x * motor.L_d + slip * motor.L_q) * x.i.d() - w_x * motor.psi_M;
+        let change = (x.i_now - x.i_last) * changes;
+        let di_d = change.d() - T_s / motor.L_d * r_d;
+        let di_q = change.q() - T_s / motor.L_q * r_q;
         *w -= (1.0 - pole(context.of::<MatsuiParameters>().filter, T_s)) * di_q * motor.L_q / (T_s * motor.psi_M);
         -di_d * motor.L_d / T_s
     }

@@ -37,4 +37,13 @@ impl Interval {
             w_frame: (theta - theta_last) / T_s,
         }
     }
+
+    /// What turning by a wide angle in `T_s` (s) changes, to fourth order: with phi = w_f T_s / 2, the factor sin(phi) / phi of the terms with
+    /// a speed, and cos(phi) of p i. For x in the frame, (x_now e^{j phi} - x_last e^{-j phi}) / T_s = cos(phi) p x + j w_f sin(phi) / phi x_mean
+    /// seen from the middle.
+    #[inline]
+    pub fn turn(&self, T_s: f64) -> (f64, f64) {
+        let turn = self.w_frame * T_s;
+        (1.0 - turn * turn * (1.0 / 24.0), 1.0 - turn * turn * (1.0 / 8.0))
+    }
 }
