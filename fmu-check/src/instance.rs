@@ -8,6 +8,9 @@ use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Sim
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
+/// Number of variables from which on a snapshot is one entry of the journal.
+const MANY: usize = 100;
+
 /// An instance. Dropping it does not free it: a separate probe checks freeing.
 pub(super) struct Instance<'b> {
     pub(super) session: &'b Session,
@@ -118,10 +121,14 @@ impl Instance<'_> {
         call: &str,
         function: impl FnOnce(&Raw) -> Option<(Status, T)>,
     ) -> Result<(Status, T), NotDetermined> {
-        let name = self.session.raw.name(call);
-        self.session.record_call(&format!("{}{name}", mark(self.number)));
+        let name = || self.session.raw.name(call);
+        if self.session.silent.get() {
+            self.session.show_progress();
+        } else {
+            self.session.record_call(&format!("{}{}", mark(self.number), name()));
+        }
         let missing =
-            || NotDetermined(format!("the function {} is missing", name.split('(').next().unwrap_or_default()));
+            || NotDetermined(format!("the function {} is missing", name().split('(').next().unwrap_or_default()));
         let (status, value) = function(&self.session.raw).ok_or_else(missing)?;
         self.session.record_result(&status);
         Ok((status, value))
@@ -248,9 +255,9 @@ impl Instance<'_> {
         let n = self.session.elements(v);
         let version = self.session.description.version;
         let mut buffer = Buffer::room(v.base, version, n);
-        let status = self.call(&format!("Get({})", v.name), |raw| {
-            raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n)
-        })?;
+        let call = if self.session.silent.get() { "Get".into() } else { format!("Get({})", v.name) };
+        let status =
+            self.call(&call, |raw| raw.get(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), n))?;
         let not_written = status.is_ok() && buffer.is_unwritten();
         self.session.unwritten.set(self.session.unwritten.get() || not_written);
         if !self.session.silent.get() && status.is_ok() {
@@ -283,17 +290,21 @@ impl Instance<'_> {
     /// Sets a variable's values.
     pub(super) fn set(&self, v: &ModelVariable, values: &[u64]) -> Result<Status, NotDetermined> {
         let mut buffer = Buffer::of(v.base, self.session.description.version, values);
-        let call = format!("Set({} = {})", v.name, show(v, self.session.description.version, values));
+        let shown = || format!("Set({} = {})", v.name, show(v, self.session.description.version, values));
+        let call = if self.session.silent.get() { "Set".into() } else { shown() };
         self.call(&call, |raw| {
             raw.set(self.handle, v.base, Some(&[v.value_reference]), 1, Some(&mut buffer), values.len())
         })
     }
 
-    /// The values of several variables; those that cannot be read are left out.
+    /// The values of several variables; those that cannot be read are left out. Many are one entry of the journal.
     pub(super) fn snapshot(&self, variables: &[&ModelVariable]) -> Result<Vec<Vec<u64>>, NotDetermined> {
-        let read =
-            |v: &&ModelVariable| self.get(v).map(|(status, bits)| if status.is_ok() { bits } else { Vec::new() });
-        variables.iter().map(read).collect()
+        let one = |v: &&ModelVariable| self.get(v).map(|(status, bits)| if status.is_ok() { bits } else { Vec::new() });
+        let read = || variables.iter().map(one).collect();
+        if variables.len() < MANY || self.session.silent.get() {
+            return read();
+        }
+        self.session.record_calls(&format!("getting {} variables, one by one", variables.len()), read)
     }
 
     /// The values of scalars of the type Float64; NaN for those that cannot be read.

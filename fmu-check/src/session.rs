@@ -56,6 +56,8 @@ pub(super) struct Session {
     /// Names of the variables in which two plain runs differ.
     pub(super) varying: HashSet<String>,
     log: RefCell<File>,
+    /// Lines of the log that are not written yet: the results of the last call.
+    results: RefCell<String>,
     trace: bool,
     /// Number of lines left: every call is recorded up to the first finding or a maximum number of lines.
     full: Cell<Option<usize>>,
@@ -151,6 +153,7 @@ impl Session {
             integrator: Cell::new(None),
             varying: HashSet::new(),
             log: RefCell::new(log),
+            results: RefCell::default(),
             trace: false,
             full: Cell::new(None),
             from: 0,
@@ -295,6 +298,10 @@ impl Session {
         if !call.starts_with('(') {
             self.note_call(&format!("\n{call}"));
         }
+        // One write per call: with the results of the last one, before this one is made.
+        let mut results = self.results.borrow_mut();
+        let _ = self.log.borrow_mut().write_all(results.as_bytes());
+        results.clear();
         let mut journal = self.journal.borrow_mut();
         let mark = match (self.preparing.get(), self.lower.get()) {
             (true, _) => "P",
@@ -319,7 +326,7 @@ impl Session {
             })),
             None => {}
         }
-        let _ = self.log.borrow_mut().write_all(text.as_bytes());
+        self.results.borrow_mut().push_str(text);
         if self.trace {
             print!("{}", printable_lines(text));
             let _ = std::io::stdout().flush();
@@ -328,6 +335,9 @@ impl Session {
 
     /// Adds the result of the last call.
     pub(super) fn record_result(&self, result: &dyn std::fmt::Display) {
+        if self.silent.get() {
+            return;
+        }
         self.note_call(&format!(" -> {result}"));
     }
 
@@ -348,7 +358,7 @@ impl Session {
     }
 
     /// Shows the parent, from time to time, that calls without separate journal entries return.
-    fn show_progress(&self) {
+    pub(super) fn show_progress(&self) {
         if self.shown.get().elapsed() < Duration::from_millis(100) {
             return;
         }
