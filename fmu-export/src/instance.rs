@@ -179,7 +179,7 @@ impl<E: Exported> Instance<E> {
 
     /// Ends the simulation.
     pub fn terminate(&mut self) {
-        self.log.event(|| format!("{}: terminated at {} s", self.name, self.current.end));
+        self.log.event(|| format!("{}: terminated {}", self.name, message::at(self.current.end)));
     }
 
     /// Restores the state after instantiation; name and logger stay. A model that cannot be copied is made again.
@@ -324,7 +324,7 @@ impl<E: Exported> Instance<E> {
         let heard = self.log.hears_model(&[]);
         if heard && !self.warned.iter().any(|&(other, _)| other == key) {
             self.warned.push((key, now));
-            self.log.said(WARNING, &[], &format!("{}: at {} s: {}", self.name, self.current.end, message()));
+            self.log.said(WARNING, &[], &format!("{}: {}: {}", self.name, message::at(self.current.end), message()));
         }
     }
 
@@ -335,7 +335,7 @@ impl<E: Exported> Instance<E> {
         if self.forgiven & bit == 0 && self.log.hears_model(&[]) {
             self.forgiven |= bit;
             let Self { name, current, .. } = &*self;
-            self.log.said(WARNING, &[], &format!("{name}: at {} s: {}", current.end, habit.tell()));
+            self.log.said(WARNING, &[], &format!("{name}: {}: {}", message::at(current.end), habit.tell()));
         }
     }
 
@@ -392,13 +392,15 @@ impl<E: Exported> Instance<E> {
         let Self { current, log, warned, watch, name, .. } = self;
         let (now, end) = (current.elapsed.seconds(), current.end);
         if log.hears(WARNING, own) {
-            watch.look(&mut current.block, |said| log.said(WARNING, own, &format!("{name}: at {end} s: {said}")));
+            watch.look(&mut current.block, |said| {
+                log.said(WARNING, own, &format!("{name}: {}: {said}", message::at(end)))
+            });
         }
         warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
         let mut sink = |(category, key, message): Said<'_>| {
             if log.hears(category, own) && !warned.iter().any(|&(other, _)| other == key) {
                 warned.push((key, now));
-                log.said(category, own, &format!("{name}: at {} s: {}", current.end, message()));
+                log.said(category, own, &format!("{name}: {}: {}", message::at(current.end), message()));
             }
         };
         warn(&current.block.model, &mut Warnings::to(&mut sink));

@@ -3,6 +3,7 @@
 use crate::lifecycle::{self, Standard};
 use crate::snapshot::Snapshot;
 use fmu_core::description::TIME;
+use fmu_core::digits::rounded;
 use fmu_core::variable::position;
 use fmu_core::{Block, Causality, Exported, Fault, IntegerType, Interface, Kind, Meta, Model, State, Variability};
 use std::fmt::Display;
@@ -162,9 +163,14 @@ pub(crate) fn lacks(flag: &str, kept: &str) -> Fault {
     Fault::new(format!("not supported: the state of this model cannot be {kept}, and the description has no {flag}"))
 }
 
+/// A time in s without its rounding errors.
+pub(crate) fn at(time: f64) -> String {
+    format!("at {} s", rounded(time, 12))
+}
+
 /// The start of an instance: the values that differ from the start values, if these are known.
 pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, starts: Option<Block<M>>) -> String {
-    let Some(mut fresh) = starts else { return format!("{instance}: initialized at {} s", current.end) };
+    let Some(mut fresh) = starts else { return format!("{instance}: initialized {}", at(current.end)) };
     fresh.initialize();
     let mut changes = Vec::new();
     for index in M::TABLE.indices() {
@@ -179,7 +185,7 @@ pub(crate) fn start<M: Model>(instance: &str, current: &mut Snapshot<M>, starts:
         }
     }
     let changes = if changes.is_empty() { "all start values unchanged".into() } else { changes.join(", ") };
-    format!("{instance}: initialized at {} s with {changes}", current.end)
+    format!("{instance}: initialized {} with {changes}", at(current.end))
 }
 
 /// A real number that no setter changes, requested with another type.
@@ -225,5 +231,15 @@ pub(crate) fn made_for(interface: Interface) -> &'static str {
         Interface::EventMode => "for Co-Simulation with Event Mode",
         Interface::ModelExchange => "for Model Exchange",
         Interface::ScheduledExecution => "for Scheduled Execution",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_time_has_no_rounding_errors() {
+        assert_eq!([0.1 + 0.2, 0.826_000_000_000_000_1, 1e-7].map(at), ["at 0.3 s", "at 0.826 s", "at 0.0000001 s"]);
     }
 }
