@@ -79,7 +79,7 @@ fn check(case: &Case, parts: u32, mut save: Option<Draw>) {
     let settings = Settings { start, stop, step: step / f64::from(parts), sequential: false };
     let (mut hash, mut saved) = (0, 0);
     let each = |point: &mut CommunicationPoint<'_>| {
-        if point.index % parts == 0 {
+        if point.index.is_multiple_of(parts) {
             hash = point.values.iter().fold(hash, |hash, x| mix(hash ^ x.real().to_bits()));
         }
         if save.as_mut().is_some_and(|draw| draw.below(10) == 0) {
