@@ -11,6 +11,7 @@
 
 #[path = "../common/mod.rs"]
 mod common;
+mod from_bytes;
 mod operation;
 mod perform;
 mod reference;
@@ -35,14 +36,7 @@ fn asked(name: &str, otherwise: u64) -> u64 {
 #[test]
 fn random_calls() {
     common::loud();
-    // Panics of the model are intended.
-    let hook = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |info| {
-        let text = info.payload().downcast_ref::<&str>().copied().unwrap_or_default();
-        if !["thirteen is bad luck", "the model panicked"].contains(&text) {
-            hook(info);
-        }
-    }));
+    from_bytes::quiet();
     let calls = asked("FMU_CALLS", 100_000);
     let config = Config { cases: 100, failure_persistence: None, ..Config::default() };
     let seed = asked("FMU_SEED", 1);
@@ -74,4 +68,18 @@ fn random_calls() {
     // 44 and 75 functions of the standards, without GetVersion and GetTypesPlatform.
     assert_eq!(tally.functions(), 44 + 75 - 3);
     assert!(tally.share_of_success() > 0.5, "most sequences end in errors");
+}
+
+/// The sequences that the fuzz target `calls` has found to matter.
+#[test]
+fn sequences_of_the_corpus() {
+    common::loud();
+    from_bytes::quiet();
+    let corpus = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus/calls");
+    let files: Vec<_> = std::fs::read_dir(corpus).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(files.len() > 5, "{} sequences", files.len());
+    for file in files {
+        println!("{}", file.display());
+        from_bytes::sequence(&std::fs::read(file).unwrap());
+    }
 }
