@@ -268,8 +268,9 @@ fn both_begin_again_at_the_speed_that_is_left() {
             assert!(said.is_empty(), "{what:?}, {name}: {said:?}");
             let most = span(&seen, 2.05, 4.0).iter().map(|at| at.tau / case.torque).fold(0.0, f64::max);
             let least = span(&seen, 2.0, 4.0).iter().map(|at| at.speed / speed).fold(1.0, f64::min);
-            let away = span(&seen, 2.1, 4.0).iter().rposition(|at| (at.speed / speed - 1.0).abs() > 0.01).unwrap_or(0);
-            (most, least, 0.1 + H * away as f64)
+            let back = |t: f64| span(&seen, t, 4.0).iter().all(|at| (at.speed / speed - 1.0).abs() < 0.01);
+            let away = (100..2000).map(|k| H * f64::from(k)).find(|t| back(2.0 + t)).unwrap();
+            (most, least, away)
         });
         println!("{what:?}: PmsmDrive {drive:?}, PmsmDriveMean {mean:?} of the rated torque, of the speed, s");
         let off = [mean.0 - drive.0, mean.1 - drive.1, mean.2 - drive.2].map(f64::abs);

@@ -393,7 +393,7 @@ impl<E: Exported> Instance<E> {
         let (now, end) = (current.elapsed.seconds(), current.end);
         if log.hears(WARNING, own) {
             watch.look(&mut current.block, |said| {
-                log.said(WARNING, own, &format!("{name}: {}: {said}", message::at(end)))
+                log.said(WARNING, own, &format!("{name}: {}: {said}", message::at(end)));
             });
         }
         warned.retain(|&(_, at)| (now - 1.0..=now).contains(&at));
