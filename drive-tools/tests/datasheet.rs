@@ -111,6 +111,41 @@ fn another_voltage_changes_the_energy_little() {
     assert!((mapped / mean - 1.0).abs() < 5e-3, "{mean} J and {mapped} J");
 }
 
+/// Gates off and on under load: the drive accelerates on its ramp from the speed that is left, without a jerk.
+#[test]
+fn it_begins_again_at_the_speed_that_is_left() {
+    let sheet = of_map("traction-63kw", (21, 21), "");
+    let (ramp, load) = (100.0, 10.0);
+    for by_voltage in [false, true] {
+        let mut block = mapped(&sheet);
+        block.model.speed_loop.ramp = ramp;
+        let (u_dc, mut now, mut most, mut before) = (sheet.map.u_dc, Elapsed::ZERO, 0.0_f64, 0.0);
+        block.model.map.u_min = 0.8 * u_dc;
+        (block.model.inputs.speed_ref, block.model.inputs.tau_load) = (300.0, load);
+        block.initialize();
+        while now.seconds() < 8.0 {
+            let off = (4.0..4.5).contains(&now.seconds());
+            let inputs = &mut block.model.inputs;
+            if by_voltage {
+                inputs.u_dc = if off { 0.5 * u_dc } else { u_dc };
+            } else {
+                inputs.enable = !off;
+            }
+            let (step, speed) = (Step { start: now, h: 1e-3 }, block.out.speed);
+            block.step(&step).unwrap();
+            now = step.end();
+            if now.seconds() > 4.5005 {
+                most = most.max((block.out.speed - speed) / step.h);
+            } else {
+                before = block.out.speed;
+            }
+        }
+        println!("{before} rad/s are left; at most {most} rad/s2, then {} rad/s", block.out.speed);
+        assert!(before < 200.0 && (block.out.speed - 300.0).abs() < 0.1, "{before}, {} rad/s", block.out.speed);
+        assert!(most < 1.3 * ramp, "{most} rad/s2 on a ramp of {ramp} rad/s2");
+    }
+}
+
 /// A start in speed control with a load, coasting, and the balance of energies and kinetic energy at any step.
 #[test]
 fn a_free_shaft_balances() {

@@ -55,6 +55,7 @@ impl ContinuousTime for MappedDrive {
 
 impl Events for MappedDrive {
     fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        self.take_up();
         Ok(Outcome::default())
     }
 

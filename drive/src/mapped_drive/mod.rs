@@ -117,7 +117,7 @@ impl Model for MappedDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 2;
+    const STATE_VERSION: u16 = 3;
 
     const CONTINUOUS: bool = true;
 
@@ -136,7 +136,7 @@ impl Model for MappedDrive {
             (self.shaft.speed, 0.0)
         };
         self.state = State { speed, angle, speed_ref: speed, ..State::default() };
-        self.energy = Energy::default();
+        (self.energy, self.active) = (Energy::default(), self.is_active());
         self.last = self.instant(&self.state, &self.point(&self.state));
         (self.overspeed, self.off_voltage, self.clipped_for) = (Happened::default(), Happened::default(), 0.0);
         self.load = Overload::default();
@@ -147,6 +147,7 @@ impl Model for MappedDrive {
     }
 
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        self.take_up();
         let Passed { state, energy } = self.pass(step.h)?;
         if !all_finite([state.tau, state.integral, state.speed, state.angle, energy.r#in, energy.loss]) {
             return Err(Fault::new(format!("the drive's state is no longer finite after a step of {} s", step.h)));

@@ -83,6 +83,19 @@ impl MappedDrive {
         SpeedGains::new(&self.speed_loop, self.shaft.J, 1.0)
     }
 
+    /// When the drive starts to operate, its speed loop begins at the present speed and torque, as in
+    /// [`PmsmDriveMean`](crate::PmsmDriveMean).
+    pub(super) fn take_up(&mut self) {
+        let active = self.is_active();
+        let before = std::mem::replace(&mut self.active, active);
+        if active && !before && !self.speed_loop.torque_mode {
+            let speed = self.speed(&self.state);
+            let w_ref = if self.speed_loop.ramp > 0.0 { speed } else { self.inputs.speed_ref };
+            let integral = self.state.tau - self.gains().wanted(0.0, w_ref, speed);
+            (self.state.speed_ref, self.state.integral) = (speed, integral);
+        }
+    }
+
     /// The rates in this state.
     pub(super) fn rates(&self, state: &State) -> Rates {
         let (speed, point) = (self.speed(state), self.point(state));

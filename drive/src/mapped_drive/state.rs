@@ -25,6 +25,8 @@ pub struct MappedDrive {
     pub(super) energy: Energy,
     /// Powers and torque at the end of the last step.
     pub(super) last: Last,
+    /// Whether it has operated.
+    pub(super) active: bool,
     pub(super) overspeed: Happened,
     pub(super) off_voltage: Happened,
     /// Time in s for which the torque reference has exceeded its limits.
@@ -87,6 +89,7 @@ impl Default for MappedDrive {
             state: State::default(),
             energy: Energy::default(),
             last: Last::default(),
+            active: false,
             overspeed: Happened::default(),
             off_voltage: Happened::default(),
             clipped_for: 0.0,
