@@ -156,6 +156,8 @@ fn a_turning_rotor_is_caught() {
         ("pmsyrm-5.5kw", Kind::Sensored),
         ("pmsyrm-5.5kw", Kind::KalmanFilter),
         ("spindle-40krpm", Kind::ExtendedEmf),
+        ("spindle-40krpm", Kind::VoltageModel),
+        ("drone-22v", Kind::CurrentModel),
         ("traction-100kw", Kind::KalmanFilter),
     ] {
         let (_, motor) = machines().into_iter().find(|(one, _)| one == name).unwrap();
@@ -215,12 +217,20 @@ fn a_heavy_rotor_is_turned_back() {
     }
 }
 
-/// A rotor at rest goes on to its start sequence; an injection method waits with gates off until the rotor is slow enough.
+/// A rotor at rest goes on to its start sequence; a method that does not work at the speed of the rotor waits with gates off.
 #[test]
 fn a_rotor_at_rest_starts_and_one_too_fast_is_waited_for() {
     let (_, motor) = machines().into_iter().find(|(one, _)| one == "ipmsm-2.2kw").unwrap();
     let rest = run(&tuned(&motor, Kind::ExtendedEmf).unwrap(), rated(&motor), 1e-9, 1.0);
     assert!(rest.started && rest.caught.is_some() && rest.peak < 1.1, "{rest:?}");
-    let fast = run(&tuned(&motor, Kind::SquareWaveInjection).unwrap(), rated(&motor), rated(&motor).0, 1.0);
-    assert!(!fast.started && fast.caught.is_none() && fast.peak < 0.2, "{fast:?}");
+    for (name, kind, speed) in [
+        ("ipmsm-2.2kw", Kind::SquareWaveInjection, 1.0),
+        ("traction-63kw", Kind::VoltageFeedback, 1.0),
+        ("traction-60kw", Kind::RotatingInjection, 0.45),
+    ] {
+        let (_, motor) = machines().into_iter().find(|(one, _)| one == name).unwrap();
+        let fast = run(&tuned(&motor, kind).unwrap(), rated(&motor), speed * rated(&motor).0, 1.0);
+        let waits = fast.caught.is_none_or(|(t, ..)| t > 1.0);
+        assert!(!fast.started && waits && fast.peak < 0.2, "{name}, {}: {fast:?}", kind.name());
+    }
 }

@@ -28,13 +28,13 @@ const SLOW: f64 = 0.5;
 /// Maximum EMF in units of u_dc / sqrt(3) at which an estimator that injects at any speed takes over: it is one for low speed.
 const INJECTION: f64 = 0.2;
 
-/// Maximum speed in units of the carrier's frequency at which one with a sinusoidal carrier takes over: its filters separate the carrier
-/// from the fundamental. Of six machines, 0.06 is held by all, 0.085 by some.
+/// Maximum electrical speed at which an estimator with a sinusoidal carrier takes over, in units of the carrier frequency: its filters must
+/// separate the carrier from the fundamental. Measured on six machines: all hold 0.06, some lose the rotor at 0.085.
 const CARRIER: f64 = 0.0625;
 
-/// Minimum bandwidth of the current loop in units of the speed at which VoltageFeedback takes over: its estimate lags with the integrators.
-/// On two machines 0.7 holds, and with 0.58 the drive swings.
-const FEEDBACK: f64 = 0.7;
+/// Maximum electrical speed at which VoltageFeedback takes over, in units of the bandwidth of the current loop: the estimate lags with the
+/// integrators of that loop. Measured on two machines: both hold 1.4, both oscillate at 1.7.
+const FEEDBACK: f64 = 1.4;
 
 impl SensorlessController {
     /// One sample of the flying start; returns false once it is over and the controller works.
@@ -96,17 +96,18 @@ impl SensorlessController {
         }
     }
 
-    /// The highest electrical speed (rad/s) at which the estimator takes over, and what sets it.
-    fn fastest(&self, kind: Kind) -> (f64, &'static str) {
+    /// The maximum electrical speed (rad/s) at which the estimator takes over, and its meaning: a share of a quantity.
+    fn fastest(&self, kind: Kind) -> (f64, f64, &'static str) {
         let par = &self.parameters;
-        let by_emf =
-            (INJECTION * INVERSE_SQRT_3 * self.inputs.u_dc / par.motor.psi_M, "n_p psi_M w = 0.2 u_dc / sqrt(3)");
-        let by_carrier = (CARRIER * par.estimators.carrier.frequency, "n_p w = carrier.frequency / 16");
+        let by_emf = INJECTION * INVERSE_SQRT_3 * self.inputs.u_dc / par.motor.psi_M;
+        let by_carrier = CARRIER * par.estimators.carrier.frequency;
         match kind {
-            Kind::VoltageFeedback => (par.current.bandwidth / FEEDBACK, "n_p w = current.bandwidth / 0.7"),
-            Kind::RotatingInjection | Kind::PulsatingInjection if by_carrier.0 < by_emf.0 => by_carrier,
-            _ if kind.class() == Class::Injection => by_emf,
-            _ => (f64::INFINITY, ""),
+            Kind::VoltageFeedback => (FEEDBACK * par.current.bandwidth, FEEDBACK, "current.bandwidth / motor.n_p"),
+            Kind::RotatingInjection | Kind::PulsatingInjection if by_carrier < by_emf => {
+                (by_carrier, CARRIER, "carrier.frequency / motor.n_p")
+            }
+            _ if kind.class() == Class::Injection => (by_emf, INJECTION, "u_dc / (sqrt(3) motor.n_p motor.psi_M)"),
+            _ => (f64::INFINITY, f64::INFINITY, ""),
         }
     }
 
@@ -150,8 +151,9 @@ impl SensorlessController {
         state.i_last = sample.i;
     }
 
-    /// A rotor caught turning against the speed reference: an estimator by the EMF brakes it. Below half of `start.speed` it is sought again,
-    /// without current, and the I-f start takes it through standstill: a heavy rotor takes long there, and the EMF would be lost.
+    /// Reverses a rotor that was caught turning against the speed reference. A back-EMF estimator brakes it; below half of `start.speed`, a
+    /// second flying start finds it without current, and the I-f start takes it through standstill. Without that, a rotor with a large
+    /// inertia would spend too long near standstill, where there is no EMF.
     #[cold]
     pub(super) fn turn_back(&mut self) {
         let Self { inputs, parameters: par, state, .. } = self;
@@ -215,9 +217,9 @@ impl SensorlessController {
             ),
             Refusal::Estimator(w) => {
                 let kind = par.estimator_with(state.sensor_lost);
-                let (most, why) = self.fastest(kind);
+                let (most, share, of) = self.fastest(kind);
                 format!(
-                    "start.catch: the rotor turns at {:.4} rad/s, and {} takes over up to {:.4} rad/s ({why}); {off}",
+                    "start.catch: the rotor turns at {:.4} rad/s, and {} takes over up to {:.4} rad/s ({share} {of}); {off}",
                     w / n_p,
                     kind.name(),
                     most / n_p

@@ -122,7 +122,7 @@ pub(super) struct State {
     pub(super) catch: Option<Catch>,
     /// Angle (rad) and electrical speed (rad/s) at which the flying start has found the rotor.
     pub(super) found: Option<(f64, f64)>,
-    /// The flying start has found a rotor that turns against the speed reference, and the I-f start will turn it back.
+    /// The rotor was caught turning against the speed reference, and the I-f start will reverse it.
     pub(super) against: bool,
     /// Need of i_q in A at standstill, with `zero_speed.by_need`.
     pub(super) need: f64,
