@@ -1,8 +1,8 @@
 //! Instructions that the processor executes for a call, counted by callgrind: repeatable, unlike times. A count above its budget in
 //! `golden/instructions.csv` by more than 1 % fails.
 //!
-//! A subject runs in a process of its own, `n` and 2 `n` times: the difference has neither the start of the process nor the first call.
-//! Counts are those of the profile of the tests, which optimizes the drive, and of the packed FMUs.
+//! A separate process runs a subject `n` times, another one 2 `n` times: their difference excludes the start of the process and the first
+//! call. The native drive is compiled with the optimized test profile; the FMUs are the packed ones.
 #![allow(missing_docs)]
 #![cfg(all(target_os = "linux", target_arch = "x86_64"))]
 

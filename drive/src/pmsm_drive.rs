@@ -194,7 +194,8 @@ impl PmsmDrive {
         PlantInputs { u, u_dc, tau_load, speed_shaft, angle_shaft, enable, asc, thermal }
     }
 
-    /// Watches the load after a step; a start sequence and a drive at rest have no torque limits, and those after a flying start rise.
+    /// Watches the load after a step. A start sequence and a drive at rest have no torque limits; after a flying start, the limits are still
+    /// rising.
     fn watch_load(&mut self) {
         let Self { inputs: DriveInputs { tau_load, .. }, pair, overload, .. } = self;
         let ControllerOutputs { tau_max, tau_min, .. } = pair.controller.out;

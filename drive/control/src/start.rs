@@ -155,7 +155,8 @@ pub enum StartStep {
 }
 
 impl CurrentFrequencyStart {
-    /// On the ramp, with a rotor at `theta` (rad) that turns at `w` (rad/s); a `reference` against it turns the frame back through 0.
+    /// On the ramp, with a rotor at `theta` (rad) that turns at `w` (rad/s). If the `reference` has the opposite sign, the frame decelerates and
+    /// reverses.
     pub(crate) fn turning(par: &StartParameters, context: &Context, (theta, w): (f64, f64), reference: f64) -> Self {
         let side = if w * reference < 0.0 { -w.signum() } else { w.signum() };
         let i = Line::of(context.motor, context.J, par.i).map_or(DqHat::ZERO, |line| DqHat::new(0.5 * line.i_0(), 0.0));

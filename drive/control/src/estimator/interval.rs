@@ -38,9 +38,10 @@ impl Interval {
         }
     }
 
-    /// What turning by a wide angle in `T_s` (s) changes, to fourth order: with phi = w_f T_s / 2, the factor sin(phi) / phi of the terms with
-    /// a speed, and cos(phi) of p i. For x in the frame, (x_now e^{j phi} - x_last e^{-j phi}) / T_s = cos(phi) p x + j w_f sin(phi) / phi x_mean
-    /// seen from the middle.
+    /// Factors of the terms with a speed and of p x for the finite rotation of the frame in `T_s` (s): sin(phi)/phi and cos(phi), with
+    /// phi = w_f T_s / 2, as series up to phi^2. The change of a stator vector, seen from the middle of the interval, is
+    ///
+    /// (x_now e^{j phi} - x_last e^{-j phi}) / T_s = cos(phi) p x + j w_f (sin(phi) / phi) x_mean,   p x = (x_now - x_last) / T_s
     #[inline]
     pub fn turn(&self, T_s: f64) -> (f64, f64) {
         let turn = self.w_frame * T_s;
