@@ -88,6 +88,9 @@ pub struct Models {
     /// Pack no reference result: do not run the default experiment, whose failure is an error otherwise
     #[arg(long)]
     pub no_reference: bool,
+    /// How the libraries are compiled without `dev` and `keep_symbols`.
+    #[arg(skip)]
+    pub profile: Profile,
     #[command(flatten)]
     /// The process of the model.
     pub process: ProcessOptions,
@@ -235,7 +238,7 @@ fn compiled(workspace: &Workspace, args: &Models) -> Result<Vec<Model>> {
     let profile = match (args.dev, args.keep_symbols) {
         (true, _) => Profile::Development,
         (false, true) => Profile::Symbols,
-        (false, false) => Profile::Release,
+        (false, false) => args.profile,
     };
     let targets = match &args.target[..] {
         [] => vec![host()],

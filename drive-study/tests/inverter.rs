@@ -1,7 +1,12 @@
 //! The pictures of `docs/inverter.md` match a run of the present code.
 #![allow(missing_docs)]
 
+use drive::Pair;
+use drive::control::tables::ControllerParameters;
+use drive::estimator::Kind;
 use drive::frame::{AlphaBeta, Phases};
+use drive::motor::Motor;
+use drive::overmodulation::ModulationMode;
 use drive::plant::PmsmPlant;
 use drive::plant::inverter::Inverter;
 use drive::plant::pwm::InverterMode;
@@ -117,4 +122,51 @@ fn the_dead_time() {
     ];
     let title = "1000 rpm, voltages for i_q = 4 A, 325 V, carrier of 100 us".into();
     keep("inverter-dead-time.svg", &Figure { title, x: "time", columns: 1, panels });
+}
+
+/// Electrical angle of the rotor in degrees over two turns, and phase a of the voltage references in units of u_dc and of the current in
+/// A: the 2.2 kW machine of Kim & Sul, imposed at 2500 rpm with its maximum torque, and the mean of the torque in N.m.
+fn weakened(mode: ModulationMode) -> (Vec<[f64; 3]>, f64) {
+    let (mut pair, u_dc, speed) = (Pair::default(), 540.0, 2500.0 * std::f64::consts::PI / 30.0);
+    let plant = &mut pair.plant.model.parameters;
+    (plant.motor, plant.mechanics.J, plant.mechanics.imposed) = (Motor::IPMSM_2_2_KW, 0.015, true);
+    let mut par = ControllerParameters { motor: plant.motor.clone(), estimator: Kind::Sensored, ..Default::default() };
+    (par.limit.i, par.limit.i_q, par.current.mtpa) = (15.0, 15.0, true);
+    (par.speed_loop.torque_mode, par.weakening.used, par.modulation.mode) = (true, true, mode);
+    pair.controller.model.parameters = par;
+    pair.controller.model.inputs.tau_ref = 30.0;
+    pair.set_inputs(0.0, 0.0, u_dc);
+    pair.start().unwrap();
+    let (h, n_p, mut seen, mut tau, mut count) = (1e-4, f64::from(Motor::IPMSM_2_2_KW.n_p), Vec::new(), 0.0, 0.0);
+    let turn = std::f64::consts::TAU / (n_p * speed);
+    for k in 0..10_000 {
+        let inputs = &mut pair.plant.model.inputs;
+        (inputs.speed_shaft, inputs.angle_shaft) = (speed, speed * h * f64::from(k));
+        pair.step(h).unwrap();
+        let left = h * f64::from(10_000 - k - 1);
+        if left < 10.0 * turn {
+            (tau, count) = (tau + pair.plant.out.tau_e, count + 1.0);
+        }
+        if left < 2.0 * turn {
+            seen.push([720.0 - 360.0 * left / turn, pair.controller.out.u.a / u_dc, pair.plant.out.i.a]);
+        }
+    }
+    (seen, tau / count)
+}
+
+#[test]
+fn the_overmodulation() {
+    let runs = ModulationMode::ALL.iter().map(|&mode| weakened(mode)).collect::<Vec<_>>();
+    let all = |column: usize| {
+        let named = ModulationMode::ALL.iter().zip(&runs).enumerate();
+        named
+            .map(|(k, (mode, (seen, tau)))| curve(&format!("{}: {tau:.1} N.m", mode.name()), k, seen, column))
+            .collect()
+    };
+    let panels = vec![
+        panel("voltage reference of phase a over u_dc", "1", (0.0, 720.0), all(1)),
+        panel("current of phase a", "A", (0.0, 720.0), all(2)),
+    ];
+    let title = "maximum torque at 2500 rpm, 2.2 kW machine, 540 V, samples of 100 us".into();
+    keep("inverter-overmodulation.svg", &Figure { title, x: "electrical angle in degrees", columns: 1, panels });
 }

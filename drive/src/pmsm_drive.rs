@@ -30,6 +30,7 @@ use crate::steady::Steady;
 use crate::torque::{Calibration, TORQUE, TorqueAt, TorqueParameters};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
+use drive_base::overmodulation::ModulationMode;
 use drive_control::commissioning::IDENTIFIED;
 #[cfg(doc)]
 use drive_control::model::SensorlessController;
@@ -180,10 +181,16 @@ impl PmsmDrive {
         if self.link_parameters.dc_link.used { self.link.u.max(0.0) } else { self.inputs.u_dc }
     }
 
+    /// What the plant's modulator does beyond the hexagon.
+    #[inline]
+    fn modulation(&self) -> ModulationMode {
+        self.pair.plant.model.parameters.inverter.pwm.modulation.mode
+    }
+
     /// Ripple current (A, rms) of the capacitor with the `currents` (A) of the machine and the power `p_in` (W).
     fn ripple(&self, currents: Phases, p_in: f64) -> f64 {
-        let inputs = &self.pair.plant.model.inputs;
-        ripple(inputs.voltage(), currents.to_stator(), p_in, inputs.u_dc)
+        let (inputs, mode) = (&self.pair.plant.model.inputs, self.modulation());
+        ripple(inputs.voltage(mode), currents.to_stator(), p_in, inputs.u_dc)
     }
 
     /// The plant's inputs: the drive's inputs and the controller's voltages.
@@ -222,7 +229,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 28;
+    const STATE_VERSION: u16 = 29;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);

@@ -17,9 +17,11 @@ pub type Library = (String, PathBuf);
 /// How a library is compiled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Profile {
-    /// Cargo's profile `release`, the whole program optimized as one, without symbols.
+    /// Cargo's profile `release`, each crate optimized as one, without symbols.
     #[default]
     Release,
+    /// The same for the files of a release and for modules of pages: the whole program is optimized as one, in twice the time.
+    Distribution,
     /// The profile `release` with the names of functions and with line numbers.
     Symbols,
     /// Cargo's profile `dev`, for this computer: compiled in seconds after a change, with the paths of its sources for a debugger.
@@ -30,7 +32,7 @@ impl Profile {
     /// Its name in variables of the environment.
     const fn name(self) -> &'static str {
         match self {
-            Self::Release | Self::Symbols => "RELEASE",
+            Self::Release | Self::Distribution | Self::Symbols => "RELEASE",
             Self::Development => "DEV",
         }
     }
@@ -38,9 +40,10 @@ impl Profile {
     /// Settings that apply unless the caller's environment has others.
     const fn settings(self) -> &'static [(&'static str, &'static str)] {
         match self {
-            Self::Release => &[("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")],
+            Self::Release => &[("LTO", "off"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")],
+            Self::Distribution => &[("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "symbols")],
             Self::Symbols => {
-                &[("LTO", "fat"), ("CODEGEN_UNITS", "1"), ("STRIP", "none"), ("DEBUG", "line-tables-only")]
+                &[("LTO", "off"), ("CODEGEN_UNITS", "1"), ("STRIP", "none"), ("DEBUG", "line-tables-only")]
             }
             Self::Development => &[],
         }
@@ -91,7 +94,7 @@ pub fn compile(workspace: &Workspace, packages: &[String], target: &Target, prof
 /// Those of [`compile`].
 pub fn module(workspace: &Workspace, package: &str) -> Result<PathBuf> {
     let packages = [package.to_owned()];
-    let mut rustc = with_options(cargo(), "rustc", workspace, &packages, MODULE, Profile::Release);
+    let mut rustc = with_options(cargo(), "rustc", workspace, &packages, MODULE, Profile::Distribution);
     rustc.args(["--target", MODULE, "--lib"]);
     // A panic ends the call in the host; `fmu_fault` has its text.
     rustc.env("CARGO_PROFILE_RELEASE_PANIC", "abort");
@@ -115,7 +118,7 @@ pub fn module(workspace: &Workspace, package: &str) -> Result<PathBuf> {
 /// The compiler cannot be run or fails.
 pub fn program(workspace: &Workspace, package: &str, name: &str, target: &Target) -> Result<PathBuf> {
     let packages = [package.to_owned()];
-    let mut build = build("build", workspace, &packages, target, Profile::Release);
+    let mut build = build("build", workspace, &packages, target, Profile::Distribution);
     build.args(["--bin", name]);
     let program = build.get_program().to_string_lossy().into_owned();
     let status = build.stdin(Stdio::null()).stdout(Stdio::null()).status();
@@ -285,6 +288,7 @@ mod tests {
         for (verb, profile) in [
             ("build", Profile::Release),
             ("rustc", Profile::Release),
+            ("build", Profile::Distribution),
             ("build", Profile::Symbols),
             ("build", Profile::Development),
         ] {

@@ -9,7 +9,7 @@ use cargo_fmu::message;
 use clap::Args;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_pack::archive::GenerationTime;
-use fmu_pack::compile::program;
+use fmu_pack::compile::{Profile, program};
 use fmu_pack::release;
 use fmu_pack::target::{Tools, ZIG, has_modules};
 use fmu_pack::workspace::Workspace;
@@ -72,7 +72,15 @@ fn release(args: &Models, folder: &Path) -> Result<Vec<PathBuf>> {
     let target = if args.target.is_empty() { available(&tools) } else { args.target.clone() };
     let (fmus, fmi, linux64) = (args.fmus.clone(), args.fmi.clone(), args.linux64);
     let mut packages: Vec<String> = choose(&workspace.fmus(), &fmus)?.iter().map(|p| p.name.clone()).collect();
-    let mut written = models(&Models { fmus, fmi, target, linux64, out: Some(folder.into()), ..Models::default() })?;
+    let mut written = models(&Models {
+        fmus,
+        fmi,
+        target,
+        linux64,
+        out: Some(folder.into()),
+        profile: Profile::Distribution,
+        ..Models::default()
+    })?;
     for (package, name) in PROGRAMS {
         if !workspace.package(package).is_some_and(|p| workspace.is_member(p)) {
             continue;

@@ -267,7 +267,11 @@ impl<F: Rotating, S> Axis<F, S> {
 
 impl<F: Rotating, S: Scalar> Axis<F, S> {
     /// The frame at the electrical angle `theta` (rad).
-    #[inline]
+    #[expect(
+        clippy::inline_always,
+        reason = "a crate is compiled apart from those that use it, and they would call it"
+    )]
+    #[inline(always)]
     pub fn at(theta: S) -> Self {
         let (sin, cos) = sin_cos(theta.value());
         Axis::<F>::new(cos, sin).with(theta)

@@ -24,6 +24,7 @@ pub mod integrate;
 pub mod math;
 pub mod modulation;
 pub mod motor;
+pub mod overmodulation;
 
 /// Information common to all models of a drive; each adds its name, description and documentation.
 pub const PROJECT: fmu_core::Info = fmu_core::Info {

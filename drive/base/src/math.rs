@@ -134,7 +134,8 @@ pub fn tanh(x: f64) -> f64 {
 /// Sine and cosine of a small angle `d` (rad), by their series; larger angles go to [`sin_cos`].
 ///
 /// For |d| <= 0.3, the first omitted term is below 3e-17.
-#[inline]
+#[expect(clippy::inline_always, reason = "a crate is compiled apart from those that use it, and they would call it")]
+#[inline(always)]
 pub fn sin_cos_small(d: f64) -> (f64, f64) {
     if d.abs() > 0.3 {
         return large(d);

@@ -25,7 +25,7 @@ pub fn limit_span<S: Scalar>(u: Vector<Stator, S>, span: S, u_dc: S) -> Vector<S
 
 /// `x`, or 0 if it is negative.
 #[inline]
-fn positive<S: Scalar>(x: S) -> S {
+pub(crate) fn positive<S: Scalar>(x: S) -> S {
     x.chain(x.value().max(0.0), f64::from(u8::from(x.value() >= 0.0)))
 }
 

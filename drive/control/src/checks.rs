@@ -93,8 +93,15 @@ pub(crate) fn weakening(par: &ControllerParameters, u_dc: f64) -> Result<(), Fau
     if *estimator == Kind::Hybrid && u_dc > 0.0 {
         // Above this speed the references may need field weakening; an injection leaves them less voltage.
         let mtpa = par.current.mtpa;
-        let gains = WeakeningGains::new(motor, limit, max_torque(motor, limit, mtpa), mtpa, par.least_tracker());
-        let onset = gains.onset(own.k_u * u_dc * INVERSE_SQRT_3 - par.estimators.square_wave.voltage);
+        let gains = WeakeningGains::new(
+            motor,
+            limit,
+            max_torque(motor, limit, mtpa),
+            mtpa,
+            par.modulation.mode.reach(),
+            par.least_tracker(),
+        );
+        let onset = gains.onset(own.k_u * gains.highest(u_dc) - par.estimators.square_wave.voltage);
         if par.estimators.hybrid.w_high > onset {
             let injected = table.tell(par, |p| &mut p.estimators.square_wave.voltage);
             let allowed = format!(

@@ -20,6 +20,7 @@ use drive_base::frame::{AlphaBeta, Axis, DqHat, Estimated, Phases, Turn};
 use drive_base::hexagon::within_hexagon;
 use drive_base::math::{at_most, wrap};
 use drive_base::modulation::dead_time_loss;
+use drive_base::overmodulation::Applied;
 use fmu_core::Elapsed;
 
 /// The estimated rotor frame at a sample and the quantities controlled in it.
@@ -295,7 +296,7 @@ impl SensorlessController {
         let magnitude = requested.magnitude();
         let u_share = share(magnitude, inputs.u_dc);
         if par.weakening.used && matches!(mode, Mode::ClosedLoop) {
-            state.weakening.integrate(&par.weakening, magnitude, inputs.u_dc, T_s);
+            state.weakening.integrate(&gains.weakening, &par.weakening, (magnitude, inputs.u_dc), T_s);
         }
         // The command acts from `delay` to `delay + 1` samples from now, so rotate it to the middle of that interval.
         let mut acting = frame.axis.ahead(frame.half);
@@ -322,10 +323,13 @@ impl SensorlessController {
             }
         }
         let injected = injected.unwrap_or_default();
-        let (mut command, limited) = within_hexagon(whole, inputs.u_dc);
-        let limitation = (limited || cut).then(|| acting.from_stator(command - injected) - requested);
+        let Applied { u: mut command, limited } = par.modulation.mode.apply(whole, inputs.u_dc);
+        // The fundamental: what overmodulation adds to it is no limitation.
+        let fundamental = limited.unwrap_or(whole);
+        let limited = limited.is_some();
+        let limitation = (limited || cut).then(|| acting.from_stator(fundamental - injected) - requested);
         state.current.integrate(own, i_ref - frame.i, limitation, T_s);
-        let injected = if limited { injected * (command.magnitude() / whole.magnitude()) } else { injected };
+        let injected = if limited { injected * (fundamental.magnitude() / whole.magnitude()) } else { injected };
         let (mut output, mut beyond) = (command, false);
         if par.compensation.u_dead > 0.0 {
             let legs = Phases::from_stator(acting.to_stator(i_ref));

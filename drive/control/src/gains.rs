@@ -47,7 +47,8 @@ impl Gains {
         // With i_d of the low-speed law, the current limits are computed at each sample.
         let by_law = observes_flux && !current.mtpa;
         let tau = if by_law { limit.tau } else { max_torque(motor, limit, current.mtpa) };
-        let weakening = WeakeningGains::new(motor, limit, tau, current.mtpa, par.least_tracker());
+        let weakening =
+            WeakeningGains::new(motor, limit, tau, current.mtpa, par.modulation.mode.reach(), par.least_tracker());
         let speed = SpeedGains::new(speed_loop, *J, k);
         let (i, n_p) = ((tau / k).min(limit.i).min(limit.i_q), f64::from(motor.n_p));
         let reach = Reach { integral: n_p * speed.error_integral(i), acceleration: n_p / J, lag: speed_loop.lag() };

@@ -26,7 +26,7 @@ pub const ACTS: &[Acts<Par>] = &[
         "initial.theta_est", "initial.speed_est", "limit.i_q", "limit.i", "limit.tau", "limit.i_dc_use", "limit.tau_use",
         "zero_speed.by_need", "brake.tau", "brake.hold", "speed_loop.torque_mode",
         "current.bandwidth", "current.active_resistance", "current.integral", "current.reference_feed_forward", "current.mtpa",
-        "weakening.use", "start.mode", "start.catch", "lock.u", "lock.angle", "lock.time", "trip.use", "sensor.gain_a", "sensor.gain_b",
+        "weakening.use", "modulation.mode", "start.mode", "start.catch", "lock.u", "lock.angle", "lock.time", "trip.use", "sensor.gain_a", "sensor.gain_b",
         "sensor.gain_c", "sensor.offset_a", "sensor.offset_b", "sensor.offset_c", "sensor.noise", "sensor.resolution",
         "compensation.u_dead", "compensation.calibrate", "commission.mode", "adaptation.k_a",
         "adaptation.tracking", "flux_observer.magnet", "tracker.kind", "emf.frame_term", "emf.hold_reversal", "matsui.integral",

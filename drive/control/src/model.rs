@@ -19,6 +19,7 @@ use crate::zero_speed::ZeroSpeed;
 use drive_base::frame::Phases;
 use drive_base::hexagon::within_hexagon;
 use drive_base::motor::Motor;
+use drive_base::overmodulation::ModulationMode;
 use fmu_core::idle::why;
 use fmu_core::log::Warnings;
 use fmu_core::unit::{AMPERE, NEWTON_METER, RADIAN, SPEED, VOLT};
@@ -257,6 +258,7 @@ impl SensorlessController {
             starts_by_injection: start.mode == StartMode::Injection,
             by_need: zero_speed.by_need,
             weakens: par.weakening.used,
+            overmodulates: par.modulation.mode != ModulationMode::Linear,
             tell: &tell,
         };
         tracker::validate(&setup)?;
@@ -308,7 +310,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 23;
+    const STATE_VERSION: u16 = 24;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -354,20 +356,24 @@ impl Model for SensorlessController {
         out.clone_from(&self.state.shown);
     }
 
+    #[inline]
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         integrate::sampled(self, step)
     }
 }
 
 impl Sampled for SensorlessController {
+    #[inline]
     fn period(&self) -> f64 {
         self.parameters.T_s
     }
 
+    #[inline]
     fn samples(&self) -> u64 {
         self.state.samples
     }
 
+    #[inline]
     fn show(&mut self) {
         if std::mem::take(&mut self.state.hidden) {
             self.state.shown.clone_from(&self.state.computed);

@@ -20,6 +20,7 @@ use crate::weakening::{WEAKENING, WeakeningParameters};
 use crate::zero_speed::{ZERO_SPEED, ZeroSpeed};
 use drive_base::motor::A_PER_WB2;
 use drive_base::motor::{MOTOR, Motor};
+use drive_base::overmodulation::{MODULATION, Modulation};
 use fmu_core::unit::{AMPERE, KG_M2, NEWTON_METER, OHM, ONE, RADIAN, SECOND, SPEED, VOLT};
 use fmu_core::{Field, Part, Row, Table, rows, table};
 use serde::{Deserialize, Serialize};
@@ -113,6 +114,8 @@ pub struct ControllerParameters {
     pub zero_speed: ZeroSpeed,
     /// Field weakening.
     pub weakening: WeakeningParameters,
+    /// Voltage beyond the hexagon.
+    pub modulation: Modulation,
     /// The start.
     pub start: StartParameters,
     /// The start by injection.
@@ -155,6 +158,7 @@ impl Default for ControllerParameters {
             current: CurrentLoop::default(),
             zero_speed: ZeroSpeed::default(),
             weakening: WeakeningParameters::default(),
+            modulation: Modulation::default(),
             start: StartParameters::default(),
             polarity: PolarityParameters::default(),
             lock: LockParameters::default(),
@@ -250,6 +254,7 @@ pub(crate) const PARAMETER_ROWS: &[P] = rows![
     P::part("current.", &Part { table: CURRENT_LOOP, lens: |p| &mut p.current }),
     P::part("zero_speed.", &Part { table: ZERO_SPEED, lens: |p| &mut p.zero_speed }),
     P::part("weakening.", &Part { table: WEAKENING, lens: |p| &mut p.weakening }),
+    P::part("modulation.", &Part { table: MODULATION, lens: |p| &mut p.modulation }),
     P::part("start.", &Part { table: START, lens: |p| &mut p.start }),
     P::part("polarity.", &Part { table: POLARITY, lens: |p| &mut p.polarity }),
     P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),

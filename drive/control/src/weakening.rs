@@ -1,10 +1,11 @@
 //! Field weakening: the torque and the current references that the DC link allows, by feed-forward with a bounded trim.
 //!
-//! The voltage that the references may use is U = k_u u_dc / sqrt 3 - y. From U, the estimated speed and the machine
+//! The voltage that the references may use is U = k_u u_max - y, u_max = u_dc / sqrt 3, or the maximum fundamental of overmodulation
+//! ([`overmodulation`](drive_base::overmodulation)). From U, the estimated speed and the machine
 //! estimates, [`Envelope`] gives the limits of the torque and, for the torque within them, the minimum current. Where
 //! the plain reference (maximum torque per ampere, i_d = 0 or the low-speed law) fits the voltage, nothing is changed.
 //!
-//! The trim y corrects wrong estimates: dy/dt = w_t (|u| - k_t u_dc / sqrt 3), 0 <= y <= 0.3 u_dc / sqrt 3, with the voltage
+//! The trim y corrects wrong estimates: dy/dt = w_t (|u| - k_t u_max), 0 <= y <= 0.3 u_max, with the voltage
 //! |u| that the current loop requests, before the hexagon. It changes U, never i_d, so that MTPV and the current limit remain
 //! valid; it also changes while the current error is large, where wrong estimates would otherwise saturate the loop
 //! permanently.
@@ -30,10 +31,10 @@ use serde::{Deserialize, Serialize};
 const SQRT_3: f64 = 1.732_050_807_568_877_2;
 pub(crate) const INVERSE_SQRT_3: f64 = 1.0 / SQRT_3;
 
-/// Minimum share of u_dc / sqrt 3 that the references may use.
+/// Minimum share of u_max that the references may use.
 const LEAST_SHARE: f64 = 0.05;
 
-/// Maximum trim, as a share of u_dc / sqrt 3.
+/// Maximum trim, as a share of u_max.
 pub const GREATEST_TRIM: f64 = 0.3;
 
 /// Samples after which a limit that does not act is computed again, and the change of the voltage, as a share, after which
@@ -52,9 +53,9 @@ const LEAST_SPEED: f64 = 1e-3;
 pub struct WeakeningParameters {
     /// Field weakening is in use.
     pub used: bool,
-    /// Share of u_dc / sqrt 3 that the references use, 0.5..1.
+    /// Share of u_max that the references use, 0.5..1.
     pub k_u: f64,
-    /// Share of u_dc / sqrt 3 above which the trim acts, k_u..1.1.
+    /// Share of u_max above which the trim acts, k_u..1.1.
     pub k_t: f64,
     /// Bandwidth w_t of the trim in rad/s, >= 0; 0: no trim.
     pub bandwidth: f64,
@@ -76,13 +77,16 @@ pub struct WeakeningGains {
     per_torque: f64,
     /// Upper bounds of the parts of |u|^2 for all its currents: constant, in w, in w^2.
     voltage: [f64; 3],
+    /// u_max in units of u_dc / sqrt 3.
+    reach: f64,
     /// Minimum bandwidth of the tracker.
     pub(super) tracker: LeastTracker,
 }
 
 impl WeakeningGains {
-    /// For a reference of up to `tau` (N.m), with maximum torque per ampere (`mtpa`) or i_d = 0.
-    pub fn new(motor: &Motor, limit: &Limits, tau: f64, mtpa: bool, tracker: LeastTracker) -> Self {
+    /// For a reference of up to `tau` (N.m), with maximum torque per ampere (`mtpa`) or i_d = 0, and a voltage of up to `reach`
+    /// u_dc / sqrt 3.
+    pub fn new(motor: &Motor, limit: &Limits, tau: f64, mtpa: bool, reach: f64, tracker: LeastTracker) -> Self {
         let end = if mtpa {
             max_torque_per_ampere(motor, tau)
         } else {
@@ -96,12 +100,19 @@ impl WeakeningGains {
             end,
             per_torque: 1.0 / motor.torque_constant(),
             voltage: [R * R * end.dot(end), 2.0 * R * t, psi.dot(psi).max(motor.psi_M * motor.psi_M)],
+            reach,
             tracker,
         }
     }
 }
 
 impl WeakeningGains {
+    /// Maximum fundamental voltage in V on a link of `u_dc` (V).
+    #[inline]
+    pub fn highest(&self, u_dc: f64) -> f64 {
+        u_dc * INVERSE_SQRT_3 * self.reach
+    }
+
     /// Minimum bandwidth in rad/s of the tracker with the currents `i` (A).
     #[inline]
     pub fn tracker(&self, i: DqHat) -> f64 {
@@ -204,7 +215,7 @@ impl Weakening {
         par: &WeakeningParameters,
         (w, u_dc, injected): (f64, f64, f64),
     ) -> bool {
-        let highest = u_dc * INVERSE_SQRT_3;
+        let highest = gains.highest(u_dc);
         self.U = (par.k_u * highest - self.trim - injected).max(LEAST_SHARE * highest);
         let ([copper, cross, flux], speed) = (gains.voltage, w.abs());
         copper + speed * (cross + speed * flux) <= self.U * self.U
@@ -292,8 +303,8 @@ impl Weakening {
 
     /// Integrates the trim over one sample of `T_s` (s) with the voltage `u` (V) that the current loop requests.
     #[inline]
-    pub fn integrate(&mut self, par: &WeakeningParameters, u: f64, u_dc: f64, T_s: f64) {
-        let highest = u_dc * INVERSE_SQRT_3;
+    pub fn integrate(&mut self, gains: &WeakeningGains, par: &WeakeningParameters, (u, u_dc): (f64, f64), T_s: f64) {
+        let highest = gains.highest(u_dc);
         self.trim = (self.trim + T_s * par.bandwidth * (u - par.k_t * highest)).min(GREATEST_TRIM * highest).max(0.0);
     }
 }
@@ -316,7 +327,7 @@ pub const WEAKENING: &Table<WeakeningParameters> = table![
     P::parameter(
         "k_u",
         &ONE,
-        "Share of u_dc / sqrt(3) that field weakening uses in steady state; the rest is for changes",
+        "Share of u_max that field weakening uses in steady state; u_max = u_dc/sqrt(3), or that of modulation.mode",
         |p| &mut p.k_u,
     )
     .at_least(0.5)
@@ -324,7 +335,7 @@ pub const WEAKENING: &Table<WeakeningParameters> = table![
     P::parameter(
         "k_t",
         &ONE,
-        "Share of u_dc / sqrt(3) above which the trim reduces the voltage of field weakening; at least k_u",
+        "Share of u_max above which the trim reduces the voltage of field weakening; at least k_u",
         |p| &mut p.k_t,
     )
     .at_least(0.5)
@@ -340,7 +351,7 @@ mod tests {
     use crate::tables::ControllerParameters;
 
     fn gains(par: &ControllerParameters, tau: f64, mtpa: bool) -> WeakeningGains {
-        WeakeningGains::new(&par.motor, &par.limit, tau, mtpa, LeastTracker::default())
+        WeakeningGains::new(&par.motor, &par.limit, tau, mtpa, 1.0, LeastTracker::default())
     }
 
     /// A request above k_t lowers the voltage of the references at the rate `bandwidth`, one below it raises it again, within
@@ -349,18 +360,18 @@ mod tests {
     fn the_trim_lowers_the_voltage_while_too_much_is_requested() {
         let (par, u_dc) = (WeakeningParameters { used: true, ..WeakeningParameters::default() }, 540.0);
         let (highest, mut weakening) = (u_dc * INVERSE_SQRT_3, Weakening::default());
-        weakening.integrate(&par, (par.k_t + 0.02) * highest, u_dc, 1e-4);
+        let gains = gains(&ControllerParameters::default(), 3.0, false);
+        weakening.integrate(&gains, &par, ((par.k_t + 0.02) * highest, u_dc), 1e-4);
         let expected = 1e-4 * par.bandwidth * 0.02 * highest;
         assert!((weakening.trim - expected).abs() < 1e-9, "{} V, not {expected} V", weakening.trim);
-        let gains = gains(&ControllerParameters::default(), 3.0, false);
         weakening.limits(&gains, &par, (1.0, u_dc, 10.0), 5.0, 0);
         assert!((weakening.U - (par.k_u * highest - expected - 10.0)).abs() < 1e-9, "{} V", weakening.U);
         for _ in 0..200_000 {
-            weakening.integrate(&par, 1.2 * highest, u_dc, 1e-4);
+            weakening.integrate(&gains, &par, (1.2 * highest, u_dc), 1e-4);
         }
         assert!((weakening.trim - GREATEST_TRIM * highest).abs() < 1e-9, "{} V", weakening.trim);
         for _ in 0..200_000 {
-            weakening.integrate(&par, 0.5 * highest, u_dc, 1e-4);
+            weakening.integrate(&gains, &par, (0.5 * highest, u_dc), 1e-4);
         }
         assert!(weakening.trim.abs() < 1e-12, "{} V", weakening.trim);
     }

@@ -54,7 +54,7 @@ fn the_currents() {
         let (par, U, motor) = (machine.parameters(), machine.U(0.95), &machine.motor);
         let envelope = machine.envelope();
         let most = envelope.settled(1e-3, 1.0, 1e9).tau;
-        let gains = WeakeningGains::new(&par.motor, &par.limit, most, true, LeastTracker::default());
+        let gains = WeakeningGains::new(&par.motor, &par.limit, most, true, 1.0, LeastTracker::default());
         let i_most = most / motor.torque_constant();
         let base = envelope.base_speed(U);
         let at = |w: f64| brute(&machine, w).limit(1.0).0 / most;

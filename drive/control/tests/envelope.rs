@@ -96,8 +96,14 @@ fn an_injected_voltage_is_taken_off() {
     let (machine, rpm, injected) = (a(), 1500.0, 40.0);
     let (par, w) = (machine.parameters(), machine.w(rpm));
     let k = par.motor.torque_constant();
-    let gains =
-        WeakeningGains::new(&par.motor, &par.limit, machine.limit(100.0, 1.0)[1].tau, true, LeastTracker::default());
+    let gains = WeakeningGains::new(
+        &par.motor,
+        &par.limit,
+        machine.limit(100.0, 1.0)[1].tau,
+        true,
+        1.0,
+        LeastTracker::default(),
+    );
     let mut state = Weakening::default();
     let both =
         (0..9).map(|n| state.limits(&gains, &par.weakening, (w, machine.u_dc, injected), 1e3, n)).last().unwrap();

@@ -78,7 +78,7 @@ impl PmsmPlant {
             return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
         }
         let path = Path {
-            u: inputs.voltage(),
+            u: inputs.voltage(self.parameters.inverter.pwm.modulation.mode),
             dissipation: self.parameters.dissipation(machine.resistance(), machine.electrical(at.speed)),
             drops: self.switches(inputs, self.legs(inputs)),
         };

@@ -13,7 +13,7 @@ pub const ACTS: &[Acts<Par>] = &[
         "motor.n_p", "motor.R_s", "motor.L_d", "motor.L_q", "motor.psi_M", "flux_map.use", "mechanics.B", "mechanics.tau_coulomb",
         "mechanics.k_w", "mechanics.imposed", "inverter.dead_time", "inverter.u_transistor", "inverter.r_transistor",
         "inverter.u_diode", "inverter.r_diode", "inverter.E_sw", "iron.G_e", "iron.G_h", "winding.k_ac", "winding.alpha",
-        "magnet.alpha", "thermal.mode", "thermal.T_start", "inverter.mode",
+        "magnet.alpha", "thermal.mode", "thermal.T_start", "inverter.mode", "modulation.mode",
         "u_a", "u_b", "u_c", "u_dc", "enable", "asc",
     ], when: |_| true, why: "" },
     Acts { names: &["saturation.s_2", "saturation.s_3", "saturation.s_dq"], when: |p| !p.flux_map.used,

@@ -75,7 +75,8 @@ const LARGEST_CHANGE: f64 = 0.25;
 impl Mechanics {
     /// A shorter length (s) for a step of `h` (s) between these speeds (rad/s) that was too long for a Coulomb torque that
     /// changes its sign: the step then ends at the zone's edge, or covers a small part of the zone. `None` if it was short enough.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
+    #[inline(always)]
     pub fn shorter(&self, h: f64, from: f64, to: f64) -> Option<f64> {
         let (edge, small) = (RESOLVED * self.w_coulomb, LARGEST_CHANGE * self.w_coulomb);
         let (beyond, change) = (from.min(to) > edge || from.max(to) < -edge, (to - from).abs());

@@ -205,7 +205,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 14;
+    const STATE_VERSION: u16 = 15;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
@@ -274,6 +274,7 @@ impl Model for PmsmPlant {
         *out = self.shown(&self.inputs, &at, at.i, self.warm.at, self.powers);
     }
 
+    #[inline]
     fn advance(&mut self, step: &Step) -> Result<(), Fault> {
         if self.parameters.thermal.mode == ThermalMode::Constant {
             self.advance_at_temperature(step)

@@ -1,7 +1,8 @@
 //! Parameters of the modulator of the switched inverter, and of its faults; [`switched`](crate::switched) has the model.
 
+use drive_base::overmodulation::{MODULATION, Modulation};
 use fmu_core::unit::SECOND;
-use fmu_core::{Field, Row, Table, enumeration, table};
+use fmu_core::{Field, Part, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 
 enumeration! {
@@ -71,7 +72,7 @@ impl OpenPhase {
     }
 }
 
-/// Parameters of the modulator, for `inverter.mode` = Switched.
+/// Parameters of the modulator, for `inverter.mode` = Switched except `modulation`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pwm {
     /// Model of the inverter.
@@ -86,13 +87,16 @@ pub struct Pwm {
     pub open_switch: OpenSwitch,
     /// A phase that carries no current.
     pub open_phase: OpenPhase,
+    /// References beyond the hexagon.
+    pub modulation: Modulation,
 }
 
 impl Default for Pwm {
     fn default() -> Self {
         let (mode, update, zero_sequence) = (InverterMode::Average, PwmUpdate::Single, ZeroSequence::MinMax);
         let (open_switch, open_phase) = (OpenSwitch::None, OpenPhase::None);
-        Self { mode, update, zero_sequence, pulse_min: 0.0, open_switch, open_phase }
+        let modulation = Modulation::default();
+        Self { mode, update, zero_sequence, pulse_min: 0.0, open_switch, open_phase, modulation }
     }
 }
 
@@ -124,4 +128,5 @@ pub const PWM: &Table<Pwm> = table![
         "Fault: a phase that carries no current",
         &Field(|p| &mut p.open_phase)
     ),
+    P::part("modulation.", &Part { table: MODULATION, lens: |p| &mut p.modulation }),
 ];

@@ -7,7 +7,7 @@ use crate::power::{Energy, Powers};
 use crate::thermal::{Heat, Temperatures, ThermalInputs};
 use drive_base::connection::{Commanded, Measured};
 use drive_base::frame::{Phases, Stator, Vector};
-use drive_base::modulation::limit_to_hexagon;
+use drive_base::overmodulation::ModulationMode;
 use fmu_core::{Dual, Scalar};
 use serde::{Deserialize, Serialize};
 
@@ -58,11 +58,11 @@ impl<S: Scalar> PlantInputs<S> {
         !(self.enable || self.asc)
     }
 
-    /// Voltage (V) of the legs before any drop.
+    /// Voltage (V) of the legs before any drop, of a modulator in this `mode`.
     #[inline]
-    pub fn voltage(&self) -> Vector<Stator, S> {
+    pub fn voltage(&self, mode: ModulationMode) -> Vector<Stator, S> {
         match self.gates() {
-            Gates::Switch => limit_to_hexagon(self.u, self.u_dc),
+            Gates::Switch => mode.limit(self.u, self.u_dc),
             Gates::Short | Gates::Off => Vector::fixed(Vector::ZERO),
         }
     }

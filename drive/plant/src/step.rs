@@ -145,11 +145,17 @@ impl PmsmPlant {
         }
     }
 
+    /// Voltage (V) of the legs before any drop, under the inputs.
+    #[inline]
+    fn voltage(&self) -> AlphaBeta {
+        self.inputs.voltage(self.parameters.inverter.pwm.modulation.mode)
+    }
+
     /// A communication step of `h` (s) with ideal legs, which switch or short-circuit the machine.
     #[expect(clippy::inline_always, reason = "as for `integrate`")]
     #[inline(always)]
     fn pass_ideal(&self, h: f64) -> Result<(State, Passed), Fault> {
-        let u = self.inputs.voltage();
+        let u = self.voltage();
         let mechanics = &self.parameters.mechanics;
         let is_one = Self::is_one_step(h, self.machine::<true>().electrical(self.state.speed));
         if is_one && self.parameters.is_linear() && !mechanics.imposed {
@@ -202,7 +208,7 @@ impl PmsmPlant {
         let count = self.substeps(h, state.speed, &legs, &switches)?;
         let (mut lost, mut by_iron) = (None, Dq::ZERO);
         if conducts {
-            let (step, current) = self.pass_kinks(&mut state, h, self.inputs.voltage(), &legs, switches);
+            let (step, current) = self.pass_kinks(&mut state, h, self.voltage(), &legs, switches);
             passed.add(&step);
             by_iron = current;
         } else {

@@ -39,7 +39,8 @@ impl PmsmPlant {
     }
 
     /// The machine at its temperatures.
-    #[inline]
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
+    #[inline(always)]
     pub(crate) fn machine<const LINEAR: bool>(&self) -> Machine<'_, f64, LINEAR> {
         Machine::with(&self.warm.motor, self.parameters.magnetics(), self.warm.inverse)
     }

@@ -35,6 +35,8 @@ fn is_elsewhere(name: &str) -> bool {
     switched || name.starts_with("thermal.") && !matches!(name, "thermal.T_ref")
         // flux_map.rs tests the map.
         || name.starts_with("flux_map.")
+        // Acts beyond the hexagon only; drive/tests/overmodulation.rs.
+        || name == "modulation.mode"
         || name == "mechanics.imposed"
         || name == "motor.n_p"
 }

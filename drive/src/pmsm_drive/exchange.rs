@@ -39,7 +39,7 @@ impl PmsmDrive {
             // The state keeps its set value.
             return LinkOutputs { u, i_source: plant.powers.i_dc, ..LinkOutputs::none() };
         }
-        let i_rms = ripple(inputs.voltage(), plant.i.to_stator(), plant.powers.p_in, inputs.u_dc);
+        let i_rms = ripple(inputs.voltage(self.modulation()), plant.i.to_stator(), plant.powers.p_in, inputs.u_dc);
         LinkOutputs { i_rms, ..self.link.shown(&self.link_parameters, u, U) }
     }
 }

@@ -282,7 +282,7 @@ const ONLY_IN_THE_DRIVE: &str = "no effect in PmsmDriveMean, which has no capaci
                                  trip by the current or commissioning; use PmsmDrive";
 
 /// Parameters and groups of parameters of the controller with an effect.
-const EFFECTIVE: [&str; 19] = [
+const EFFECTIVE: [&str; 20] = [
     "T_s",
     "estimator",
     "motor.",
@@ -302,6 +302,7 @@ const EFFECTIVE: [&str; 19] = [
     "weakening.use",
     "weakening.k_",
     "weakening.bandwidth",
+    "modulation.mode",
 ];
 
 impl Model for PmsmDriveMean {
@@ -321,7 +322,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 8;
+    const STATE_VERSION: u16 = 9;
 
     const CONTINUOUS: bool = true;
 
@@ -333,7 +334,7 @@ impl Model for PmsmDriveMean {
         let elsewhere =
             ["dead_time", "i_zero", "mode", "update", "zero_sequence", "pulse_min", "open_switch", "open_phase"];
         let elsewhere = parameter.strip_prefix("plant.inverter.").is_some_and(|name| elsewhere.contains(&name));
-        !elsewhere && parameter != "dc_link.R_precharge"
+        !elsewhere && !["dc_link.R_precharge", "plant.modulation.mode"].contains(&parameter)
     }
 
     fn idle(&self, name: &str) -> Option<&'static str> {

@@ -75,7 +75,7 @@ impl Steady {
     /// without field weakening, with the full voltage of the link.
     pub fn base_speed(&self, u_dc: f64) -> f64 {
         let par = &self.controller;
-        let share = if par.weakening.used { par.weakening.k_u } else { 1.0 };
+        let share = if par.weakening.used { par.weakening.k_u } else { 1.0 } * par.modulation.mode.reach();
         let envelope = Envelope::new(&par.motor, par.limit.i);
         envelope.base_speed(share * u_dc / SQRT_3) / f64::from(par.motor.n_p)
     }

@@ -141,9 +141,9 @@ impl<'a> At<'a> {
         self.settled.limits()
     }
 
-    /// u_dc / sqrt 3 in V.
+    /// Maximum fundamental voltage in V.
     pub(super) fn highest(&self) -> f64 {
-        self.condition.u_dc / SQRT_3
+        self.condition.u_dc / SQRT_3 * self.drive.controller.modulation.mode.reach()
     }
 
     /// This condition, with the trim `trim` (V) of field weakening.

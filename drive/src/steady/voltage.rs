@@ -1,8 +1,8 @@
 //! The controller's response to references that need more voltage than the link has.
 //!
-//! With field weakening, the trim y lowers the voltage of the references until the requested voltage is k_t u_dc / sqrt 3: the
+//! With field weakening, the trim y lowers the voltage of the references until the requested voltage is k_t u_max: the
 //! drive settles there, or at the maximum trim. Without it, the current loop saturates; the torque is lowered until the voltage
-//! is u_dc / sqrt 3, the maximum of a sinusoid, and to 0 if no torque of its sign needs less. Both are equations in one
+//! is u_max = u_dc / sqrt 3, or the maximum fundamental of overmodulation, and to 0 if no torque of its sign needs less. Both are equations in one
 //! unknown.
 
 use super::operating::{At, Point, Region};

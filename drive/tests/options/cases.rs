@@ -13,6 +13,7 @@ use drive::estimator::tracker::TrackerKind;
 use drive::estimator::{Class, Kind};
 use drive::math::wrap;
 use drive::motor::Motor;
+use drive_base::overmodulation::ModulationMode;
 use std::f64::consts::TAU;
 
 /// Figures of a run that an option changes.
@@ -30,6 +31,17 @@ pub(super) struct Case {
     pub(super) figures: fn(Pair) -> Figures,
     /// Whether the figures without and with it are as expected.
     pub(super) acts: fn(Kind, Figures, Figures) -> bool,
+}
+
+/// Field weakening, with what some estimators need for it.
+fn weaken(p: &mut Par) {
+    p.weakening.used = true;
+    if p.estimator == Kind::VoltageModel {
+        (p.limit.i, p.limit.i_q) = (10.5, 10.5);
+    }
+    if p.estimator == Kind::VoltageFeedback {
+        (p.weakening.k_u, p.weakening.k_t) = (0.9, 0.9);
+    }
 }
 
 /// Integral in A.s of the error of i_q after a step of the torque, with a wrong resistance in the controller.
@@ -210,21 +222,31 @@ pub(super) const CASES: &[Case] = &[
     Case {
         option: "weakening.use",
         on: |kind| imposed(drive(kind), RATED),
-        ask: |p| {
-            p.weakening.used = true;
-            if p.estimator == Kind::VoltageModel {
-                (p.limit.i, p.limit.i_q) = (10.5, 10.5);
-            }
-            if p.estimator == Kind::VoltageFeedback {
-                (p.weakening.k_u, p.weakening.k_t) = (0.9, 0.9);
-            }
-        },
+        ask: weaken,
         figures: |mut pair| {
             pair.controller.model.inputs.tau_ref = 24.0;
             run(&mut pair, 0.3, |_, _| ());
             [pair.controller.out.i_ref.d, pair.controller.out.tau_max]
         },
         acts: |_, [i_d, most], [weakened, less]| i_d.abs() < 1e-4 && weakened < -1.0 && less < most,
+    },
+    // A share of 0.9 of six-step is below u_dc/sqrt(3): VoltageFeedback has no more.
+    Case {
+        option: "modulation.mode",
+        on: |kind| {
+            let mut pair = imposed(drive(kind), RATED);
+            if kind.class() != Class::Injection {
+                weaken(&mut pair.controller.model.parameters);
+            }
+            pair
+        },
+        ask: |p| p.modulation.mode = ModulationMode::SixStep,
+        figures: |mut pair| {
+            pair.controller.model.inputs.tau_ref = 24.0;
+            run(&mut pair, 0.3, |_, _| ());
+            [pair.controller.out.tau_max, 0.0]
+        },
+        acts: |_, [linear, _], [six_step, _]| six_step > 1.03 * linear,
     },
     Case {
         option: "compensation.u_dead",

@@ -208,6 +208,8 @@ pub struct SetupOf<'a, All> {
     pub by_need: bool,
     /// Field weakening is in use.
     pub weakens: bool,
+    /// Overmodulation is in use.
+    pub overmodulates: bool,
     /// Name, value and unit of the controller's variable with this name.
     pub tell: &'a dyn Fn(&str) -> String,
 }

@@ -36,6 +36,8 @@ const CHOICES: &[Choice] = &[
         why: "its i_q does not show a load at standstill, or it needs no current there", off: "set it to false" },
     Choice { name: "weakening.use", asked: |s, _| s.weakens, has: |kind| kind.class() != Class::Injection,
         why: "injection leaves no voltage for field weakening", off: "set it to false" },
+    Choice { name: "modulation.mode", asked: |s, _| s.overmodulates, has: |kind| kind.class() != Class::Injection,
+        why: "injection leaves no voltage for overmodulation", off: "set it to Linear" },
     Choice { name: "tracker.kind", asked: |s, _| s.par.tracker.kind != TrackerKind::Pll, has: |kind| !NO_TRACKER.contains(&kind),
         why: "it has no tracker", off: "set it to Pll" },
     Choice { name: "adaptation.resistance", asked: |s, kind| s.par.adaptation.resistance && kind != Sensored,

@@ -95,7 +95,7 @@ impl Machine {
 pub(crate) fn currents(machine: &Machine, rpm: f64, tau: f64) -> (DqHat, Weakening) {
     let par = machine.parameters();
     let most = machine.limit(100.0, 1.0)[1].tau;
-    let gains = WeakeningGains::new(&par.motor, &par.limit, most, true, LeastTracker::default());
+    let gains = WeakeningGains::new(&par.motor, &par.limit, most, true, 1.0, LeastTracker::default());
     let (w, mut state) = (machine.w(rpm), Weakening::default());
     let plain = max_torque_per_ampere(&par.motor, tau);
     let mut i = DqHat::ZERO;

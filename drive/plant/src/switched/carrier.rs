@@ -12,6 +12,7 @@
 use crate::inverter::Inverter;
 use crate::pwm::{PwmUpdate, ZeroSequence};
 use drive_base::frame::Phases;
+use drive_base::overmodulation::ModulationMode;
 use fmu_core::{Elapsed, SampleGrid};
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +30,12 @@ pub(super) struct Carrier {
 
 /// Duty cycles of the legs for the references `u` (V) on a link of `u_dc` (V).
 fn duties(Inverter { T_pwm, pwm, .. }: &Inverter, u: Phases, u_dc: f64) -> [f64; 3] {
-    let Phases { a, b, c } = u;
+    let Phases { a, b, c } = match pwm.modulation.mode {
+        // Each leg is clamped: the nearest point of the hexagon, if the zero sequence is min-max.
+        ModulationMode::Linear | ModulationMode::MinimumMagnitude => u,
+        mode if u.span() > u_dc => Phases::from_stator(mode.limit(u, u_dc)),
+        _ => u,
+    };
     let (max, min) = (a.max(b).max(c), a.min(b).min(c));
     let (high, low) = (0.5 * u_dc - max, -0.5 * u_dc - min);
     let common = match pwm.zero_sequence {
