@@ -31,6 +31,7 @@ pub mod pwm;
 pub mod rectifier;
 pub mod rules;
 pub mod saturation;
+pub mod sensors;
 pub mod signals;
 mod state;
 mod step;
