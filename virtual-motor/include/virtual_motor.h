@@ -106,8 +106,9 @@ typedef struct vm_terminal_voltages {
 
 /* Creates the motor with the start values of PmsmPlant: 3 pole pairs, 2 Ohm, 6 mH, 0.15 Wb, 325 V. As in every function of this
  * section, the inverter is switched (inverter.mode = 2), its carrier has the period inverter.T_pwm and no zero sequence
- * (inverter.zero_sequence = 2). The converter has 12 bits, with a full scale of 1.5 times the maximum current in both directions
- * (here 7.5 A), and of 1.5 times u_dc; the encoder has 4096 counts. */
+ * (inverter.zero_sequence = 2). A motor with iron loss has the average inverter (inverter.mode = 1): the switched one excludes iron
+ * loss. The converter has 12 bits, with a full scale of 1.5 times the maximum current in both directions (here 7.5 A), and of 1.5
+ * times u_dc; the encoder has 4096 counts. */
 vm_status vm_create(vm_motor *motor);
 
 /* Creates the motor of a motor file, as `fmu tune` reads it; `path` in UTF-8. */

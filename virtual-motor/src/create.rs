@@ -45,7 +45,7 @@ impl VirtualMotor {
             set.push(variable);
             motor.set(variable, number(name, value)?).map_err(of_name)?;
         }
-        motor.scale();
+        motor.settle_start_values(values.iter().any(|value| value.name == "inverter.mode"));
         Ok(motor)
     }
 }

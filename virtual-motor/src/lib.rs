@@ -13,7 +13,7 @@
 //! for k in 1..=200_u32 {
 //!     let counts = motor.adc()?;
 //!     assert!(counts.i[0] < 4096);
-//!     motor.advance_duties(50e-6 * f64::from(k), [0.52, 0.49, 0.49], true)?;
+//!     motor.advance_duties(50e-6 * f64::from(k), [0.5, 0.52, 0.48], true)?;
 //! }
 //! assert!(motor.get(speed)?.abs() > 0.0 && motor.encoder().count < 4096);
 //! let refused = motor.advance_duties(1.0, [0.5, 1.5, 0.5], true).unwrap_err();

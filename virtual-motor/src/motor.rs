@@ -9,6 +9,7 @@ use crate::sensing::{AdcCounts, AdcSetup, EncoderCount, EncoderSetup, Sensors, T
 use crate::variables;
 use drive::PmsmPlant;
 use drive::frame::Phases;
+use drive::plant::iron::Iron;
 use drive::plant::pwm::{InverterMode, ZeroSequence};
 use drive::plant::switched::bridge::Command;
 use fmu_core::{Block, Elapsed, Fault, Interface, Model, Step};
@@ -16,8 +17,8 @@ use fmu_core::{Block, Elapsed, Fault, Interface, Model, Step};
 /// Maximum current in A of the start values' machine.
 const REFERENCE_CURRENT: f64 = 7.5;
 
-/// A motor with inverter and sensors. Its start values are those of `PmsmPlant`, with the switched inverter and without a zero
-/// sequence.
+/// A motor with inverter and sensors. Its start values are those of `PmsmPlant`, without a zero sequence and with the switched
+/// inverter, or with the average one if the machine has iron loss, which the switched one does not model.
 #[derive(Clone)]
 pub struct VirtualMotor {
     block: Block<PmsmPlant>,
@@ -39,10 +40,10 @@ impl Default for VirtualMotor {
 }
 
 impl VirtualMotor {
-    /// A motor with this plant, of this maximum current (A): switched, without a zero sequence.
+    /// A motor with this plant, of this maximum current (A): switched, unless it has iron loss, and without a zero sequence.
     pub(crate) fn with(mut block: Block<PmsmPlant>, i_max: f64) -> Self {
-        let pwm = &mut block.model.parameters.inverter.pwm;
-        (pwm.mode, pwm.zero_sequence) = (InverterMode::Switched, ZeroSequence::None);
+        let par = &mut block.model.parameters;
+        (par.inverter.pwm.mode, par.inverter.pwm.zero_sequence) = (Self::mode(&par.iron), ZeroSequence::None);
         // The names are built once, so that no later call allocates them.
         variables::names();
         let sensors = Sensors::of(i_max, block.model.inputs.u_dc);
@@ -50,9 +51,18 @@ impl VirtualMotor {
         Self { block, before, elapsed: Elapsed::ZERO, time: 0.0, begun: false, dirty: true, sensors }
     }
 
-    /// Scales the converter to the present link voltage.
-    pub(crate) fn scale(&mut self) {
+    /// Scales the converter to the link voltage; if no mode of the inverter `is_given`, iron loss determines it.
+    pub(crate) fn settle_start_values(&mut self, is_given: bool) {
         self.sensors = Sensors::of(REFERENCE_CURRENT, self.block.model.inputs.u_dc);
+        let par = &mut self.block.model.parameters;
+        if !is_given {
+            par.inverter.pwm.mode = Self::mode(&par.iron);
+        }
+    }
+
+    /// The switched inverter excludes iron loss.
+    fn mode(iron: &Iron) -> InverterMode {
+        if iron.is_none() { InverterMode::Switched } else { InverterMode::Average }
     }
 
     /// Sets the variable with this number, see [`find`](variables::find): any input at any time, parameters before the first
