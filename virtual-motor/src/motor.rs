@@ -22,8 +22,6 @@ const REFERENCE_CURRENT: f64 = 7.5;
 #[derive(Clone)]
 pub struct VirtualMotor {
     block: Block<PmsmPlant>,
-    /// Copy from before an advance, for one that fails.
-    before: Block<PmsmPlant>,
     elapsed: Elapsed,
     time: f64,
     /// The first advance has taken place.
@@ -47,8 +45,7 @@ impl VirtualMotor {
         // The names are built once, so that no later call allocates them.
         variables::names();
         let sensors = Sensors::of(i_max, block.model.inputs.u_dc);
-        let before = block.clone();
-        Self { block, before, elapsed: Elapsed::ZERO, time: 0.0, begun: false, dirty: true, sensors }
+        Self { block, elapsed: Elapsed::ZERO, time: 0.0, begun: false, dirty: true, sensors }
     }
 
     /// Scales the converter to the link voltage; if no mode of the inverter `is_given`, iron loss determines it.
@@ -154,7 +151,7 @@ impl VirtualMotor {
             let allowed = format_args!("a finite time from the present one, {} s, on", self.time);
             return Err(Error::value(ErrorCode::BadTime, "t", format_args!("{t} s"), allowed));
         }
-        self.before.clone_from(&self.block);
+        let before = self.block.model.moment();
         let advanced = self.adopt().and_then(|()| {
             let step = Step { start: self.elapsed, h: t - self.time };
             let step = (step.h >= f64::MIN_POSITIVE).then_some(step);
@@ -168,7 +165,9 @@ impl VirtualMotor {
                 Ok(())
             }
             Err(error) => {
-                self.block.clone_from(&self.before);
+                self.block.model.restore(before);
+                // Before the first advance, the outputs may belong to the state at the start.
+                self.dirty |= !self.begun;
                 Err(error)
             }
         }

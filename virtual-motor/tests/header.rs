@@ -173,20 +173,45 @@ fn library() -> PathBuf {
     library
 }
 
+/// Compiles these sources with the library and runs the program, in the folder of the workspace; returns what it prints.
+fn run(name: &str, sources: &[&Path]) -> String {
+    let (program, library) = (scratch(name), library());
+    // The library follows the sources that need it.
+    let mut command = Command::new("cc");
+    command.args(["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"]);
+    command.arg("-I").arg(root().join("include")).arg("-I").arg(root().join("tests"));
+    command.args(sources).arg(library).args(["-lm", "-lpthread", "-ldl", "-o"]).arg(&program);
+    let compiled = command.output().unwrap();
+    assert!(compiled.status.success(), "{name}: {}", String::from_utf8_lossy(&compiled.stderr));
+    let run = Command::new(program).current_dir(root().join("..")).output().unwrap();
+    let text = String::from_utf8(run.stdout).unwrap();
+    assert!(run.status.success(), "{name}: {text}{}", String::from_utf8_lossy(&run.stderr));
+    text
+}
+
+/// The programs of the documentation, by the names in their first lines.
+#[test]
+fn the_programs_of_the_page_run() {
+    let page = std::fs::read_to_string(root().join("../docs/virtual-motor.md")).unwrap();
+    let mut names = Vec::new();
+    for block in page.split("```c\n").skip(1) {
+        let code = block.split_once("```").unwrap().0;
+        let name = code.strip_prefix("/* ").unwrap().split_once(" */").unwrap().0;
+        std::fs::write(scratch(name), code).unwrap();
+        names.push(name);
+    }
+    assert_eq!(names, ["spin.c", "host.c"]);
+    let text = run("spin", &[&scratch("spin.c")]);
+    let lines: Vec<Vec<u32>> = text.lines().map(|line| line.split(' ').map(|x| x.parse().unwrap()).collect()).collect();
+    // No current and the angle 0 at first; then 3.25 V over 2 Ohm in phase b, 182 counts per A.
+    assert_eq!((lines.len(), &lines[0][..]), (5, &[2048, 2048, 0][..]));
+    assert!(lines[4][1].abs_diff(2048 + 296) < 12 && lines[4][2] > 100, "{text}");
+    assert_eq!(run("host", &[&scratch("host.c"), &root().join("tests/firmware.c")]), "");
+}
+
 #[test]
 fn the_foc_loop_reaches_its_speed() {
-    let (program, library) = (scratch("foc"), library());
-    let (program, library) = (program.to_str().unwrap(), library.to_str().unwrap());
-    let source = root().join("examples/foc.c");
-    // The library follows the source that needs it.
-    let strict = ["-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-I"];
-    let mut command = Command::new("cc");
-    command.args(strict).arg(root().join("include")).arg(&source).arg(library);
-    let compiled = command.args(["-lm", "-lpthread", "-ldl", "-o", program]).output().unwrap();
-    assert!(compiled.status.success(), "{}", String::from_utf8_lossy(&compiled.stderr));
-    let run = Command::new(program).output().unwrap();
-    let text = String::from_utf8(run.stdout).unwrap();
-    assert!(run.status.success(), "{text}{}", String::from_utf8_lossy(&run.stderr));
+    let text = run("foc", &[&root().join("examples/foc.c")]);
     let after = |what: &str| -> f64 {
         let rest = text.split_once(what).unwrap_or_else(|| panic!("{what}: {text}")).1.trim_start();
         rest.split(' ').next().unwrap().parse().unwrap()

@@ -26,6 +26,7 @@ pub mod losses;
 pub mod machine;
 pub mod mechanics;
 pub mod model;
+pub mod moment;
 pub mod power;
 pub mod pwm;
 pub mod rectifier;
