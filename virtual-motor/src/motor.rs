@@ -166,8 +166,6 @@ impl VirtualMotor {
             }
             Err(error) => {
                 self.block.model.restore(before);
-                // Before the first advance, the outputs may belong to the state at the start.
-                self.dirty |= !self.begun;
                 Err(error)
             }
         }

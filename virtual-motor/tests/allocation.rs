@@ -1,5 +1,5 @@
 //! After its creation, a motor allocates nothing. A separate test program: it replaces the allocator.
-#![allow(missing_docs, non_snake_case)]
+#![allow(missing_docs, non_snake_case, clippy::undocumented_unsafe_blocks)]
 
 mod common;
 #[path = "../../fmu-export/tests/counting/mod.rs"]

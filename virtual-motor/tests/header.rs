@@ -97,7 +97,7 @@ fn the_header_is_clean_in_c_and_in_cpp() {
 fn the_declarations_are_those_of_the_rust_functions() {
     let exports = exports();
     assert!(exports.len() > 20, "{exports:?}");
-    let declared: String = exports.iter().map(|(_, declaration)| format!("{declaration}\n")).collect();
+    let declared = exports.iter().map(|(_, declaration)| declaration.as_str()).collect::<Vec<_>>().join("\n") + "\n";
     let source = scratch("declared.c");
     std::fs::write(&source, format!("#include \"virtual_motor.h\"\n{declared}")).unwrap();
     compiles("cc", &["-std=c99", "-fsyntax-only"], &source);

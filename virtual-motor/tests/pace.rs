@@ -1,5 +1,5 @@
 //! How much faster than its own time a motor runs, called as a firmware at 20 kHz calls it.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::undocumented_unsafe_blocks)]
 
 mod common;
 

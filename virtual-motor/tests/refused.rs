@@ -1,6 +1,6 @@
 //! Wrong arguments of the C functions: the code, a text that names the argument, its value and what is allowed, and a motor that has
 //! not changed. And what right ones give.
-#![allow(missing_docs, non_snake_case)]
+#![allow(missing_docs, non_snake_case, clippy::undocumented_unsafe_blocks)]
 
 mod common;
 
@@ -110,7 +110,7 @@ fn gates_terminals_and_shunts_need_the_switched_inverter() {
 fn a_null_pointer_is_named() {
     let id = create().unwrap();
     let mut some = MotorId::default();
-    for (status, name) in unsafe {
+    let statuses = unsafe {
         [
             (vm_create(null_mut()), "motor"),
             (vm_create_from_motor_file(null(), &raw mut some), "path"),
@@ -130,9 +130,8 @@ fn a_null_pointer_is_named() {
             (vm_get_encoder(id, null_mut()), "setup"),
             (vm_set_encoder(id, null()), "setup"),
         ]
-    }
-    .into_iter()
-    {
+    };
+    for (status, name) in statuses {
         // The text is that of the last call: each of them has the same code.
         assert_eq!(status, NullPointer as i32, "{name}");
     }

@@ -36,7 +36,9 @@ impl Tuned {
 /// As [`Tuned::pair`].
 pub(super) fn block<M: Model>(settings: &[Setting]) -> Block<M> {
     let mut block = Block::default();
-    settings.iter().for_each(|setting| set(&mut block, setting));
+    for setting in settings {
+        set(&mut block, setting);
+    }
     block
 }
 

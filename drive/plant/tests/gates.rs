@@ -59,14 +59,13 @@ fn by_gates(block: &mut Block<PmsmPlant>, now: &mut Elapsed, d: [f64; 3], dead: 
 fn the_gate_signals_of_the_carrier_give_its_currents() {
     for dead in [0.0, 1e-6] {
         let (mut carrier, mut gates) = (plant(dead), plant(dead));
-        let (mut draw, mut now, mut at) = (Draw(7), Elapsed::ZERO, Elapsed::ZERO);
-        let mut largest: f64 = 0.0;
+        let (mut draw, mut largest) = (Draw(7), 0.0_f64);
         // Before the first period, the carrier's lower switches wait for a dead time.
-        let first = Step { start: now, h: T };
+        let first = Step { start: Elapsed::ZERO, h: T };
         for block in [&mut carrier, &mut gates] {
             block.step(&first).unwrap();
         }
-        (now, at) = (first.end(), first.end());
+        let (mut now, mut at) = (first.end(), first.end());
         for k in 0..400 {
             // No change at the ends of a period, where the dead time would reach into the next one.
             let d = [0, 1, 2].map(|_| draw.between(0.3, 0.7));

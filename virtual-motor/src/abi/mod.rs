@@ -118,7 +118,7 @@ pub extern "C" fn vm_advance_gates(motor: MotorId, t: f64, gates: u32) -> i32 {
 pub unsafe extern "C" fn vm_adc(motor: MotorId, counts: *mut AdcCounts) -> i32 {
     // SAFETY: what C promises.
     let counts = unsafe { pointer::out(counts, "counts") };
-    give(counts, || pool::with(motor, |motor| motor.adc()))
+    give(counts, || pool::with(motor, VirtualMotor::adc))
 }
 
 /// The reading of the encoder.
@@ -142,7 +142,7 @@ pub unsafe extern "C" fn vm_hall(motor: MotorId, bits: *mut u32) -> i32 {
 pub unsafe extern "C" fn vm_terminals(motor: MotorId, terminals: *mut TerminalVoltages) -> i32 {
     // SAFETY: what C promises.
     let terminals = unsafe { pointer::out(terminals, "terminals") };
-    give(terminals, || pool::with(motor, |motor| motor.terminals()))
+    give(terminals, || pool::with(motor, VirtualMotor::terminals))
 }
 
 /// The channels of the converter.

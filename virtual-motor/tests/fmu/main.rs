@@ -1,6 +1,6 @@
 //! Random calls on the C functions beside the FMU `PmsmPlant`, called as an importer calls it: the same state, bit for bit, and
 //! refused calls change nothing. `VM_CALLS` sets the number of calls, 1e5 by default, `VM_SEED` selects others.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::undocumented_unsafe_blocks)]
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -32,6 +32,7 @@ fn number(name: &str, otherwise: u64) -> u64 {
 }
 
 /// A motor with its FMU.
+#[expect(clippy::struct_excessive_bools, reason = "independent properties")]
 struct Twin {
     id: MotorId,
     plant: Plant,
@@ -360,9 +361,9 @@ impl World {
         twin.plant.get(&references, &mut shown);
         let (setup, counts) = (get_adc(twin.id).unwrap(), adc(twin.id).unwrap());
         let count = |gain: f64, offset: f64, x: f64| (offset + gain * x).round().clamp(0.0, 4095.0);
-        for x in 0..3 {
-            let expected = count(setup.current_gain, setup.current_offset, shown[x]);
-            assert!((expected - f64::from(counts.i[x])).abs() < 1e-9, "phase {x}: {expected}, not {counts:?}");
+        for (i, found) in shown.into_iter().zip(counts.i) {
+            let expected = count(setup.current_gain, setup.current_offset, i);
+            assert!((expected - f64::from(found)).abs() < 1e-9, "{i} A: {expected}, not {counts:?}");
         }
         let expected = count(setup.voltage_gain, setup.voltage_offset, shown[3]);
         assert!((expected - f64::from(counts.u_dc)).abs() < 1e-9, "{expected}, not {counts:?}");
