@@ -34,7 +34,7 @@ enum {
     VM_BAD_TIME = 8,         /* the time is not finite, or before the present time */
     VM_SHOOT_THROUGH = 9,    /* both gates of a leg are on */
     VM_NEEDS_SWITCHED = 10,  /* the function needs inverter.mode = 2 (Switched) */
-    VM_INCONSISTENT = 11,    /* the parameters contradict each other */
+    VM_INCONSISTENT = 11,    /* the parameters contradict each other: set others, and advance again */
     VM_FAILED = 12,          /* the motor has no state at this time: too fast, or not finite */
     VM_PANICKED = 13         /* a bug of this library; the motor can only be destroyed */
 };
@@ -167,7 +167,8 @@ vm_status vm_encoder(vm_motor motor, vm_encoder_count *count);
 /* The Hall sensors: bit 0 is sensor a, bit 1 sensor b, bit 2 sensor c. Forward: 5, 1, 3, 2, 6, 4. */
 vm_status vm_hall(vm_motor motor, uint32_t *bits);
 
-/* The terminals of the motor; needs inverter.mode = 2. */
+/* The terminals of the motor, as they were up to the present time: gates that change at this time show their effect after the next
+ * advance. Needs inverter.mode = 2. */
 vm_status vm_terminals(vm_motor motor, vm_terminal_voltages *terminals);
 
 /* The channels of the converter, before or after a change. */
@@ -183,7 +184,7 @@ vm_status vm_set_hall(vm_motor motor, double offset);
 
 /* Errors --------------------------------------------------------------------------------------------------------------------- */
 
-/* Copies the text of the last error of this thread, at most `size` bytes with the final 0, and returns its length. */
+/* Copies the text of the last error of this thread, at most `size` bytes with the final 0, and returns its length, at most 1024. */
 size_t vm_error_text(char *text, size_t size);
 
 #ifdef __cplusplus

@@ -151,7 +151,7 @@ impl VirtualMotor {
             let allowed = format_args!("a finite time from the present one, {} s, on", self.time);
             return Err(Error::value(ErrorCode::BadTime, "t", format_args!("{t} s"), allowed));
         }
-        let before = self.block.model.moment();
+        let before = self.block.model.checkpoint();
         let advanced = self.adopt().and_then(|()| {
             let step = Step { start: self.elapsed, h: t - self.time };
             let step = (step.h >= f64::MIN_POSITIVE).then_some(step);

@@ -10,6 +10,7 @@
 #[cfg(test)]
 extern crate self as drive_plant;
 
+pub mod checkpoint;
 mod circuit;
 pub mod counters;
 mod damping;
@@ -26,7 +27,6 @@ pub mod losses;
 pub mod machine;
 pub mod mechanics;
 pub mod model;
-pub mod moment;
 pub mod power;
 pub mod pwm;
 pub mod rectifier;

@@ -1,4 +1,5 @@
-//! The gate: every exported function passes through it. It catches panics, and keeps the text of the thread's last error.
+//! The gate: every exported function that can fail passes through it. It catches panics, and keeps the text of the thread's last
+//! error.
 
 use crate::error::{Error, ErrorCode, Result};
 use std::any::Any;

@@ -154,6 +154,14 @@ impl World {
             }
             self.set(k, "winding.alpha", 3.93e-3);
         }
+        if self.draw.below(2) == 0 {
+            self.set(k, "motor.L_q", 9e-3);
+            self.set(k, "mechanics.k_w", 1e-6);
+        }
+        if self.draw.below(4) == 0 {
+            self.set(k, "saturation.s_3", 500.0);
+            self.set(k, "saturation.s_dq", 100.0);
+        }
         let (speed, theta) = (self.draw.around(200.0), self.draw.around(3.0));
         self.set(k, "initial.speed", speed);
         self.set(k, "initial.theta_e", theta);

@@ -10,7 +10,7 @@ use drive_base::frame::Dq;
 
 /// Inputs and state of a plant in Co-Simulation. The parameters are not in it: a step never changes them.
 #[derive(Clone, Debug)]
-pub struct Moment {
+pub struct Checkpoint {
     inputs: PlantInputs,
     state: State,
     blocked: bool,
@@ -22,13 +22,13 @@ pub struct Moment {
 }
 
 impl PmsmPlant {
-    /// The present moment.
-    pub fn moment(&self) -> Moment {
+    /// A checkpoint of the present state.
+    pub fn checkpoint(&self) -> Checkpoint {
         // Every field is named, so a new one does not compile until it is considered here. Model Exchange alone uses `point` and
         // `kept`.
         let Self { inputs, parameters: _, state, blocked, powers, energy, point: _, kept: _, warm, by_iron, bridge } =
             self;
-        Moment {
+        Checkpoint {
             inputs: inputs.clone(),
             state: *state,
             blocked: *blocked,
@@ -40,9 +40,9 @@ impl PmsmPlant {
         }
     }
 
-    /// Goes back to a `moment`.
-    pub fn restore(&mut self, moment: Moment) {
-        let Moment { inputs, state, blocked, powers, energy, warm, by_iron, bridge } = moment;
+    /// Goes back to a checkpoint.
+    pub fn restore(&mut self, checkpoint: Checkpoint) {
+        let Checkpoint { inputs, state, blocked, powers, energy, warm, by_iron, bridge } = checkpoint;
         (self.inputs, self.state, self.blocked, self.powers) = (inputs, state, blocked, powers);
         (self.energy, self.warm, self.by_iron, self.bridge) = (energy, warm, by_iron, bridge);
     }
@@ -57,7 +57,7 @@ mod tests {
     use drive_base::frame::Phases;
     use fmu_core::{Block, Elapsed, Step};
 
-    /// A plant at a moment is the one that it was.
+    /// A restored plant equals the one that it was, whatever its parameters.
     #[test]
     fn a_restored_plant_goes_on_as_it_was() {
         for kind in 0..8 {
@@ -85,10 +85,10 @@ mod tests {
                 now = step.end();
             };
             (0..20).for_each(|k| go(&mut block, k));
-            let (moment, before) = (block.model.moment(), block.model.clone());
+            let (checkpoint, before) = (block.model.checkpoint(), block.model.clone());
             (0..9).for_each(|k| go(&mut block, k));
             assert!(block.model != before, "{kind}");
-            block.model.restore(moment);
+            block.model.restore(checkpoint);
             assert!(block.model == before, "{kind}");
         }
     }
