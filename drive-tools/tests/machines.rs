@@ -225,3 +225,26 @@ fn lock_and_emf_are_scaled_to_the_machine() {
     let w_sign = value(&tuned("traction-63kw"), "emf.w_sign");
     assert!((w_sign - 18.85).abs() < 0.01, "{w_sign} rad/s");
 }
+
+/// The plant alone has the values of the plant beside its tuned controller.
+#[test]
+fn the_plant_alone_is_that_of_the_tuned_drive() {
+    let mut files = 0;
+    for entry in std::fs::read_dir(file("reference").parent().unwrap()).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            let motor = MotorFile::read(&path).unwrap();
+            let (mut plant, pair) = (rules::plant_of(&motor).unwrap(), rules::fixed(&motor).unwrap().pair());
+            plant.initialize();
+            let mut tuned = pair.plant;
+            tuned.initialize();
+            assert!(plant.model == tuned.model, "{}", path.display());
+            files += 1;
+        }
+    }
+    assert!(files > 10);
+    // A machine that suits no controller is still a machine.
+    let text = std::fs::read_to_string(file("reference")).unwrap() + "\n[control]\nT_s = 5e-3\n";
+    let slow = MotorFile::parse(&text, &file("reference")).unwrap();
+    assert!(rules::fixed(&slow).is_err() && rules::plant_of(&slow).is_ok());
+}

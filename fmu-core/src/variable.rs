@@ -193,6 +193,22 @@ pub struct Meta {
 }
 
 impl Meta {
+    /// The allowed values, for messages.
+    pub fn allowed(&self) -> String {
+        let enumeration = match self.kind {
+            Kind::Enumeration(enumeration) => enumeration,
+            Kind::Integer(of) if of != IntegerType::Int32 => {
+                let (min, max) = of.within(&self.range);
+                return format!("{min} to {max}");
+            }
+            Kind::Binary { most, .. } => return format!("at most {most} bytes"),
+            _ => return self.range.to_string(),
+        };
+        let items: Vec<String> =
+            enumeration.items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
+        items.join(", ")
+    }
+
     /// Whether the importer sets it before the simulation starts.
     pub fn takes_start(&self) -> bool {
         self.causality.is_settable() || self.exact

@@ -30,21 +30,6 @@ pub(crate) fn sized_name<M: Model>(block: &mut Block<M>, index: usize) -> String
     }
 }
 
-/// The allowed values of a variable.
-pub(crate) fn allowed(meta: &Meta) -> String {
-    let enumeration = match meta.kind {
-        Kind::Enumeration(enumeration) => enumeration,
-        Kind::Integer(of) if of != IntegerType::Int32 => {
-            let (min, max) = of.within(&meta.range);
-            return format!("{min} to {max}");
-        }
-        Kind::Binary { most, .. } => return format!("at most {most} bytes"),
-        _ => return meta.range.to_string(),
-    };
-    let items: Vec<String> = enumeration.items.iter().map(|item| format!("{} ({})", item.value, item.name)).collect();
-    items.join(", ")
-}
-
 fn kind(kind: &Kind) -> String {
     match kind {
         Kind::Real(_) => "a real number".into(),
@@ -148,7 +133,7 @@ pub(crate) fn kept<M: Model>(
 /// The value is of the right type, and out of range.
 #[cold]
 pub(crate) fn range<M: Model>(block: &mut Block<M>, index: usize, meta: &Meta, value: impl Display) -> Fault {
-    Fault::value(&sized_name(block, index), value, allowed(meta))
+    Fault::value(&sized_name(block, index), value, meta.allowed())
 }
 
 /// The number of values does not match the references.

@@ -132,7 +132,7 @@ fn apply<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, entries: &[Prese
 /// # Errors
 /// What is allowed instead.
 fn write(meta: &Meta, mut slot: Slot<'_>, text: &str) -> Result<(), String> {
-    let allowed = || message::allowed(meta);
+    let allowed = || meta.allowed();
     match &mut slot {
         Slot::Real(x) => **x = parsed(text, "a number")?,
         Slot::Float32(x) => **x = parsed(text, "a number")?,

@@ -180,7 +180,7 @@ impl<M: Model> Snapshot<M> {
                 _ => false,
             };
             if refused {
-                let allowed = if set { message::allowed(meta) } else { "a number".into() };
+                let allowed = if set { meta.allowed() } else { "a number".into() };
                 let value = slot.to_string();
                 return Err(Fault::value(&message::sized_name(&mut self.block, index), value, allowed));
             }

@@ -10,10 +10,7 @@ impl Tuned {
     /// # Panics
     /// If a value has no variable; [`check`](super::check) refuses such values first.
     pub fn pair(&self) -> Pair {
-        let mut pair = Pair::default();
-        self.plant.iter().for_each(|setting| set(&mut pair.plant, setting));
-        self.controller.iter().for_each(|setting| set(&mut pair.controller, setting));
-        pair
+        Pair { plant: block(&self.plant), controller: block(&self.controller), ..Pair::default() }
     }
 
     /// A real value of the controller, if it is set.
@@ -31,6 +28,18 @@ impl Tuned {
         other.controller.push(Setting { name, value, rule: String::new(), origin: None });
         other
     }
+}
+
+/// A model with these values.
+///
+/// # Panics
+/// As [`Tuned::pair`].
+pub(super) fn block<M: Model>(settings: &[Setting]) -> Block<M> {
+    let mut block = Block::default();
+    for setting in settings {
+        set(&mut block, setting);
+    }
+    block
 }
 
 fn set<M: Model>(block: &mut Block<M>, setting: &Setting) {

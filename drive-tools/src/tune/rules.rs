@@ -17,10 +17,12 @@ use super::check::check;
 use super::motor::{Data, Located, MotorFile, estimators, swing};
 use super::setting::{LEVELS, Setting, Suited, Tuned, Unsuited, Value, given, real, set};
 use super::voltage::{self, Voltage};
-use super::{adaptation, flux_map, iron, loops, losses, method, plausible, rasmussen, saturation};
+use super::{adaptation, flux_map, iron, loops, losses, method, native, plausible, rasmussen, saturation};
 use crate::error::{Error, Result, bail};
+use drive::PmsmPlant;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::{Class, Kind};
+use fmu_core::Block;
 use fmu_core::digits::rounded;
 use std::f64::consts::TAU;
 
@@ -90,15 +92,9 @@ fn suits(
 ) -> Result<Tuned> {
     let (data, mut notes) = (&motor.data, Vec::new());
     fits(motor, estimator, bandwidths, &mut notes)?;
-    plant.extend(iron::fit(motor)?);
-    plant.extend(losses::settings(motor, bandwidths.T_s.value)?);
+    let fitted = complete(&mut plant, motor, bandwidths.T_s.value)?;
     controller.extend(losses::compensation(motor, estimator));
-    let fitted = flux_map::fit(motor)?;
-    if let Some(fitted) = &fitted {
-        plant.retain(|setting| setting.name != "motor.psi_M");
-        plant.extend(fitted.settings.iter().cloned());
-        notes.extend(fitted.notes.iter().cloned());
-    }
+    notes.extend(fitted.iter().flat_map(|fitted| fitted.notes.iter().cloned()));
     controller.extend(method::settings(motor, estimator, bandwidths, &mut notes)?);
     let class = estimator.class();
     if class != Class::FluxObserver {
@@ -144,6 +140,34 @@ fn suits(
         .start()
         .map_err(|e| Error::new(format!("{}: these values do not fit together: {e}", motor.place_at(0))))?;
     Ok(tuned)
+}
+
+/// Adds the losses and the flux map to the settings of the `plant`.
+fn complete(plant: &mut Vec<Setting>, motor: &MotorFile, T_s: f64) -> Result<Option<flux_map::Fitted>> {
+    plant.extend(iron::fit(motor)?);
+    plant.extend(losses::settings(motor, T_s)?);
+    let fitted = flux_map::fit(motor)?;
+    if let Some(fitted) = &fitted {
+        plant.retain(|setting| setting.name != "motor.psi_M");
+        plant.extend(fitted.settings.iter().cloned());
+    }
+    Ok(fitted)
+}
+
+/// The plant with the values of the file: those of [`tune`], for a controller of any kind.
+///
+/// # Errors
+/// States the value of the file that is wrong, and its position.
+pub fn plant_of(motor: &MotorFile) -> Result<Block<PmsmPlant>> {
+    let (data, T_s) = (&motor.data, Bandwidths::of(&motor.data, estimator(motor)?).T_s.value);
+    let mut settings = plant(data);
+    check(&settings, &[], motor)?;
+    ratings(motor)?;
+    plausible::check(motor)?;
+    saturation::check(motor)?;
+    complete(&mut settings, motor, T_s)?;
+    check(&settings, &[], motor)?;
+    Ok(native::block(&settings))
 }
 
 /// Time in s at rest that every drive needs before the first speed reference.

@@ -10,6 +10,7 @@
 #[cfg(test)]
 extern crate self as drive_plant;
 
+pub mod checkpoint;
 mod circuit;
 pub mod counters;
 mod damping;
@@ -31,6 +32,7 @@ pub mod pwm;
 pub mod rectifier;
 pub mod rules;
 pub mod saturation;
+pub mod sensors;
 pub mod signals;
 mod state;
 mod step;

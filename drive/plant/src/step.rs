@@ -249,13 +249,23 @@ impl PmsmPlant {
     /// A communication step of `h` (s) with changing temperatures.
     #[inline(never)]
     pub(super) fn advance_with_temperatures(&mut self, step: &Step) -> Result<(), Fault> {
+        self.with_temperatures(step.h, |plant| plant.advance_at_temperature(step))
+    }
+
+    /// Applies the imposed temperatures, makes a step of `h` (s) by `advance`, and warms up the network.
+    #[inline]
+    pub(super) fn with_temperatures(
+        &mut self,
+        h: f64,
+        advance: impl FnOnce(&mut Self) -> Result<(), Fault>,
+    ) -> Result<(), Fault> {
         let mode = self.parameters.thermal.mode;
         if mode == ThermalMode::Imposed {
             self.impose()?;
         }
-        self.advance_at_temperature(step)?;
+        advance(self)?;
         if mode == ThermalMode::Network {
-            self.warm_up(step.h)?;
+            self.warm_up(h)?;
         }
         Ok(())
     }

@@ -65,6 +65,12 @@ impl Leg {
         new
     }
 
+    /// Commands the leg without a dead time.
+    #[inline]
+    pub(super) fn command_at_once(&mut self, command: Command) {
+        (self.command, self.wait) = (command, 0.0);
+    }
+
     /// Present state of a leg.
     #[inline]
     pub(super) fn on(&self) -> Command {

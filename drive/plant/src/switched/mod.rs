@@ -7,6 +7,7 @@
 //! | `segment` | the machine between two instants |
 //! | [`state`] | the state of carrier and legs |
 //! | `run` | a communication step: from instant to instant |
+//! | [`terminals`] | voltages of the terminals, and the rail of each leg's current |
 //!
 //! `inverter.mode` = Average replaces all this by the mean over a PWM period ([`inverter`](crate::inverter)).
 
@@ -15,3 +16,4 @@ pub mod carrier;
 mod run;
 mod segment;
 pub mod state;
+pub mod terminals;

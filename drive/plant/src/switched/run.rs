@@ -1,9 +1,12 @@
 //! A communication step of the switched inverter: from instant to instant.
 
-use super::bridge::{DIRECTIONS, Way, Ways};
+use super::bridge::{Command, DIRECTIONS, Way, Ways};
 use super::segment::{Point, Voltages};
+use super::state::Signals;
 use crate::losses::switching;
 use crate::model::PmsmPlant;
+use crate::tables::PARAMETERS;
+use crate::thermal::ThermalMode;
 use drive_base::frame::AlphaBeta;
 use fmu_core::{Fault, Step};
 
@@ -26,7 +29,7 @@ impl PmsmPlant {
 
     /// The voltages of the legs at a point, where some depend on the current.
     #[inline(never)]
-    fn dependent(&self, ways: [[Way; 2]; 3], at: &Point, tiny: f64) -> Voltages {
+    pub(super) fn dependent(&self, ways: [[Way; 2]; 3], at: &Point, tiny: f64) -> Voltages {
         // The drop of the other legs, from the signs of their currents.
         let i = self.current_at(at);
         let signs = DIRECTIONS.map(|n| if n.dot(i) < 0.0 { -1 } else { 1 });
@@ -35,16 +38,45 @@ impl PmsmPlant {
         Voltages::watched(ways, response.sides(bounds, depends, tiny))
     }
 
-    /// A communication step with the switched inverter. An instant at which no leg changes its voltage does not interrupt the
+    /// A communication step with the switched inverter.
+    pub(crate) fn advance_switched(&mut self, step: &Step) -> Result<(), Fault> {
+        self.advance_bridge(step, Signals::Inputs(self.inputs.gates()))
+    }
+
+    /// Advances by a step in which the gates are given instead of the voltage references: the commands of the legs last for the
+    /// step. `inverter.dead_time` has no effect: the dead time is what the commands leave. The inputs `u_a`, `u_b`, `u_c`,
+    /// `enable` and `asc` have no effect either.
+    ///
+    /// # Errors
+    /// `inverter.mode` is not Switched; or those of [`advance`](fmu_core::Model::advance).
+    pub fn advance_gates(&mut self, step: &Step, commands: [Command; 3]) -> Result<(), Fault> {
+        if !self.parameters.is_switched() {
+            let allowed = "2 (Switched) with gate signals";
+            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.inverter.pwm.mode, allowed));
+        }
+        let advance = |plant: &mut Self| plant.advance_bridge(step, Signals::Given(commands));
+        if self.parameters.thermal.mode == ThermalMode::Constant {
+            advance(self)
+        } else {
+            self.with_temperatures(step.h, advance)
+        }
+    }
+
+    /// Current (A) that counts as zero.
+    pub(super) fn tiny(&self) -> f64 {
+        TINY * self.inputs.u_dc * self.parameters.inverter.T_pwm / self.warm.least_inductance
+    }
+
+    /// A step with the switched inverter and these signals. An instant at which no leg changes its voltage does not interrupt the
     /// integration: with a dead time, half of them.
     #[inline(never)]
-    pub(crate) fn advance_switched(&mut self, step: &Step) -> Result<(), Fault> {
+    fn advance_bridge(&mut self, step: &Step, signals: Signals) -> Result<(), Fault> {
         let (state, mut passed) = self.at_the_shaft();
-        let (inverter, gates) = (&self.parameters.inverter, self.inputs.gates());
+        let inverter = &self.parameters.inverter;
         let (u, u_dc, half) = (self.inputs.u, self.inputs.u_dc, 0.5 * inverter.T_pwm);
         self.count(step.h, 0.25 * half, state.speed)?;
         let (mut bridge, mut at) = (self.bridge.clone(), self.point(&state));
-        let (same, tiny) = (SAME * half, TINY * u_dc * inverter.T_pwm / self.warm.least_inductance);
+        let (same, tiny) = (SAME * half, self.tiny());
         if let Some(x) = inverter.pwm.open_phase.leg() {
             let lost = self.end_current(&mut at, x);
             passed.energy.loss += lost;
@@ -66,7 +98,7 @@ impl PmsmPlant {
                 time = bridge.carrier.pass(inverter, time, u, u_dc);
                 due = [0.0; 3];
             }
-            let next = if over { 0.0 } else { bridge.command(inverter, gates, time, &mut due).min(half - time) };
+            let next = if over { 0.0 } else { bridge.command(inverter, signals, time, &mut due).min(half - time) };
             let h = if next > left - same { left } else { next };
             let mut found = ways.numbers(&bridge.legs, i, steepest * (pending + h));
             if pending > 0.0 && (over || found != numbers) {

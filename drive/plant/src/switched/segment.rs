@@ -58,7 +58,7 @@ pub(super) struct Voltages {
 
 /// Legs without current.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Blocked {
+pub(super) enum Blocked {
     None,
     One(usize),
     All,
@@ -81,7 +81,7 @@ impl Voltages {
 
     /// The legs that block.
     #[inline]
-    fn blocked(&self) -> Blocked {
+    pub(super) fn blocked(&self) -> Blocked {
         let mut found = Blocked::None;
         for x in 0..3 {
             if self.watched[x] && self.sides[x] == 0 {
@@ -104,9 +104,15 @@ impl Voltages {
         stator([a.rail, b.rail, c.rail])
     }
 
+    /// Voltage (V) of the leg `x` with the current `i` (A); `None` if it blocks.
+    pub(super) fn leg(&self, x: usize, i: f64) -> Option<f64> {
+        let blocks = self.watched[x] && self.sides[x] == 0;
+        (!blocks).then(|| self.ways[x].u - self.ways[x].r * i)
+    }
+
     /// Stator voltage (V) of the legs without current.
     #[inline]
-    fn stator(&self) -> AlphaBeta {
+    pub(super) fn stator(&self) -> AlphaBeta {
         stator(self.ways.map(|way| way.u))
     }
 

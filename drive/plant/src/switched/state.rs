@@ -6,6 +6,15 @@ use crate::inverter::{Gates, Inverter};
 use drive_base::frame::AlphaBeta;
 use serde::{Deserialize, Serialize};
 
+/// What commands the legs during a communication step.
+#[derive(Clone, Copy)]
+pub(super) enum Signals {
+    /// The carrier, or the inputs that turn the gates off or short-circuit the machine.
+    Inputs(Gates),
+    /// A timer outside the model, whose commands last for the step. It leaves the dead time itself.
+    Given([Command; 3]),
+}
+
 /// State of carrier and legs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Bridge {
@@ -19,17 +28,22 @@ impl Bridge {
     /// Commands the legs whose command is due, at the time `at` (s) since the carrier's last extreme; `due` has the times (s) until
     /// the command of each leg is due. Returns the time (s) until a leg changes its state.
     #[inline]
-    pub(super) fn command(&mut self, inverter: &Inverter, gates: Gates, at: f64, due: &mut [f64; 3]) -> f64 {
+    pub(super) fn command(&mut self, inverter: &Inverter, signals: Signals, at: f64, due: &mut [f64; 3]) -> f64 {
         let mut next = f64::INFINITY;
         for (x, due) in due.iter_mut().enumerate() {
             if *due <= 0.0 {
-                let (command, left) = match gates {
-                    Gates::Switch => {
+                let (command, left) = match signals {
+                    Signals::Inputs(Gates::Switch) => {
                         let (on, left) = self.carrier.command(x, at, 0.5 * inverter.T_pwm);
                         (if on { Command::Upper } else { Command::Lower }, left)
                     }
-                    Gates::Short => (Command::Lower, f64::INFINITY),
-                    Gates::Off => (Command::Off, f64::INFINITY),
+                    Signals::Inputs(Gates::Short) => (Command::Lower, f64::INFINITY),
+                    Signals::Inputs(Gates::Off) => (Command::Off, f64::INFINITY),
+                    Signals::Given(commands) => {
+                        // Then it is no new command.
+                        self.legs[x].command_at_once(commands[x]);
+                        (commands[x], f64::INFINITY)
+                    }
                 };
                 self.legs[x].command(command, inverter.dead_time);
                 *due = left;
