@@ -52,7 +52,9 @@ fn instances(standard: &str, count: u32) {
     let expected = alone(&fmu);
     let run = || {
         let mut all: Vec<Instance> = (0..count).map(|number| started(&fmu, number)).collect();
-        all.iter_mut().for_each(|it| drop(stepped(it, 0, 2)));
+        for it in &mut all {
+            let _ = stepped(it, 0, 2);
+        }
         let most = resident();
         for (number, it) in all.iter_mut().enumerate().rev() {
             assert_eq!(stepped(it, 2, 2), expected[number % 97], "{standard}, instance {number} of {count}");
@@ -67,7 +69,7 @@ fn instances(standard: &str, count: u32) {
         resident().saturating_sub(before)
     });
     let grown: Vec<u64> = grown.collect();
-    let each = (most - least) / u64::from(count) >> 10;
+    let each = ((most - least) / u64::from(count)) >> 10;
     println!("{standard}: {count} instances, {each} KiB each, bytes more after each round: {grown:?}");
     assert!(grown.iter().min().unwrap() < &SLACK, "{standard}: {grown:?} bytes more after {count} instances");
 }
@@ -142,13 +144,17 @@ fn some_instances_threads_and_minutes() {
 #[test]
 #[ignore = "takes minutes and gigabytes"]
 fn ten_thousand_instances() {
-    ["fmi2", "fmi3"].into_iter().for_each(|standard| instances(standard, 10_000));
+    for standard in ["fmi2", "fmi3"] {
+        instances(standard, 10_000);
+    }
 }
 
 #[test]
 #[ignore = "takes a minute"]
 fn a_thousand_threads() {
-    ["fmi2", "fmi3"].into_iter().for_each(|standard| threads(standard, 1000, 10));
+    for standard in ["fmi2", "fmi3"] {
+        threads(standard, 1000, 10);
+    }
 }
 
 #[test]
@@ -159,6 +165,4 @@ fn a_day() {
     long("fmi3", "PmsmDriveMean", 0.1, 864_000);
     day(1e-2, 8_640_000);
     long("fmi2", "MappedDrive", 1e-2, 8_640_000);
-    day(1e-3, 86_400_000);
-    long("fmi3", "PmsmDrive", 1e-3, 86_400_000);
 }

@@ -1,12 +1,14 @@
 //! Random models as sources in Rust: a function of the seed. Each has a table of variables of every type, causality, variability and unit,
 //! and arrays; some have states, events, clocks and sizes.
 
+#![allow(clippy::format_collect, reason = "lines of a source")]
+
 use fmu_core::draw::Draw;
 use std::fmt::Write;
 
 /// What a model can do beyond Co-Simulation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Sort {
+pub(crate) enum Sort {
     /// A discrete state that each communication step advances.
     Plain,
     /// States.
@@ -20,13 +22,13 @@ pub enum Sort {
 }
 
 /// The sort of the model of a seed.
-pub fn sort(seed: u64) -> Sort {
+pub(crate) fn sort(seed: u64) -> Sort {
     [Sort::Plain, Sort::Continuous, Sort::TimeEvents, Sort::StateEvents, Sort::Clocked]
         [usize::try_from(seed % 5).unwrap()]
 }
 
 /// The name of the model of a seed.
-pub fn name(seed: u64) -> String {
+pub(crate) fn name(seed: u64) -> String {
     format!("Random{seed}")
 }
 
@@ -366,7 +368,7 @@ impl Source {
 }
 
 /// The source of a model.
-pub fn source(seed: u64) -> String {
+pub(crate) fn source(seed: u64) -> String {
     let sort = sort(seed);
     let mut s = Source {
         draw: Draw(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0xd1ff),
@@ -417,7 +419,7 @@ pub fn source(seed: u64) -> String {
         s.array(None);
     }
     if let Some(size) = &size {
-        for _ in 0..1 + s.draw.below(2) {
+        for _ in 0..=s.draw.below(2) {
             s.array(Some(size));
         }
     }
@@ -453,7 +455,7 @@ pub fn source(seed: u64) -> String {
     // Its outputs.
     let (held, on) = (s.out("f64", "self.held"), s.on);
     s.row(&format!("V::discrete_output(\"held\", &ONE, \"The discrete state\", |m| &mut m.out.{held}){on}"));
-    for _ in 0..1 + s.draw.below(4) {
+    for _ in 0..=s.draw.below(4) {
         s.real_out();
     }
     for _ in 0..s.draw.below(4) {

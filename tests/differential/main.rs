@@ -22,6 +22,7 @@ use fmu_import::{BaseType, Causality, FmiVersion, Fmu, Instance, ModelVariable, 
 use fmu_system::cosimulation::{CommunicationPoint, Method, Settings, System};
 use generator::{Sort, name, sort, source};
 use serde_json::{Value, json};
+use std::fmt::Write;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -40,7 +41,8 @@ fn compiled(folder: &Path, seeds: &[u64]) -> Vec<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     fs::create_dir_all(folder.join("src")).unwrap();
     fs::write(folder.join("src/lib.rs"), "").unwrap();
-    let crates = ["fmu-core", "fmu-export"].map(|name| format!("{name} = {{ path = {:?} }}\n", root.join(name)));
+    let crates =
+        ["fmu-core", "fmu-export"].map(|name| format!("{name} = {{ path = \"{}\" }}\n", root.join(name).display()));
     let mut manifest = format!(
         "[workspace]\n[package]\nname = \"differential\"\nedition = \"2024\"\n[profile.dev]\ndebug = 0\n[dependencies]\n{}\
          serde = {{ version = \"1\", features = [\"derive\"] }}\n",
@@ -49,8 +51,8 @@ fn compiled(folder: &Path, seeds: &[u64]) -> Vec<PathBuf> {
     for &seed in seeds {
         let file = format!("{}.rs", name(seed));
         fs::write(folder.join("src").join(&file), source(seed)).unwrap();
-        manifest +=
-            &format!("[[example]]\nname = \"{}\"\npath = \"src/{file}\"\ncrate-type = [\"cdylib\"]\n", name(seed));
+        let name = name(seed);
+        let _ = write!(manifest, "[[example]]\nname = \"{name}\"\npath = \"src/{file}\"\ncrate-type = [\"cdylib\"]\n");
     }
     fs::write(folder.join("Cargo.toml"), manifest).unwrap();
     fs::copy(root.join("Cargo.lock"), folder.join("Cargo.lock")).unwrap();
@@ -77,7 +79,9 @@ fn packed(folder: &Path, seeds: &[u64]) -> Vec<(u64, PathBuf)> {
             all.extend(seeds.iter().copied().filter(|seed| of(*seed)).map(file));
         }
     }
-    libraries.iter().for_each(|library| fs::remove_file(library).unwrap());
+    for library in &libraries {
+        fs::remove_file(library).unwrap();
+    }
     all
 }
 
@@ -183,7 +187,9 @@ fn clocked(fmu: &Fmu) -> Value {
     let number = |v: &&ModelVariable| !matches!(v.base, BaseType::Clock | BaseType::String);
     let all = fmu.description().variables.iter();
     let outputs: Vec<ModelVariable> = all.filter(scalar).filter(number).cloned().collect();
-    outputs.iter().for_each(|v| system.record(&format!("it.{}", v.name)).unwrap());
+    for v in &outputs {
+        system.record(&format!("it.{}", v.name)).unwrap();
+    }
     let mut rows = Vec::new();
     let settings = Settings { start: 0.0, stop: f64::from(STEPS) * STEP, step: STEP, sequential: false };
     let each = |point: &mut CommunicationPoint<'_>| {

@@ -90,7 +90,7 @@ const FAULTS: [Fault; 10] = [
 ];
 
 /// Seeds all faults; returns their number.
-pub fn all(seed: u64, file: &Path, folder: &Path) -> u64 {
+pub(crate) fn all(seed: u64, file: &Path, folder: &Path) -> u64 {
     let mut seeded = 0;
     for (fault, ids, change) in FAULTS {
         let to = folder.join(format!("seeded-{seeded}.fmu"));

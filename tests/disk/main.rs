@@ -158,7 +158,9 @@ impl Case {
             let chosen = |at: &usize| calls <= most || from_end(*at) || at.is_multiple_of(calls.div_ceil(most / 3));
             let all: Vec<usize> = (1..=calls).filter(chosen).collect();
             println!("{} {kind}: {} of {calls} calls", self.arguments[0], all.len());
-            all.into_iter().for_each(|at| self.fault(kind, at));
+            for at in all {
+                self.fault(kind, at);
+            }
         }
     }
 }
