@@ -1,5 +1,5 @@
 //! Outputs in a `Vec` that has no elements before they are computed: the first getter finds all of them.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::float_cmp)]
 #![allow(clippy::undocumented_unsafe_blocks, clippy::borrow_as_ptr, reason = "an importer calls C functions")]
 
 use fmu_core::unit::VOLT;
