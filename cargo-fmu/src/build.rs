@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use fmu_core::Description;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
-use fmu_import::printable;
+use fmu_import::{Folder, printable};
 use fmu_pack::archive::{self, GenerationTime, PackedFile};
 use fmu_pack::compile::{Library, Profile, compile};
 use fmu_pack::icons;
@@ -213,7 +213,7 @@ fn reference(
         message::note(&printable(&format!("{}: the archive gets no reference result: {why}", description.name)));
         return Ok(BTreeMap::new());
     }
-    let dir = tempfile::tempdir()?;
+    let dir = Folder::new()?;
     let archive = dir.path().join("reference.fmu");
     let mut files = archive::contents(description, &model.own, &model.licenses, version, moment, Platform::host())?;
     files.extend(model.resources.clone());
@@ -362,6 +362,12 @@ fn given(libraries: &[String], resources: Option<&Path>, process: &ProcessOption
         None => Ok((Platform::host(), PathBuf::from(text))),
     };
     let libraries = libraries.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    for (i, (platform, file)) in libraries.iter().enumerate() {
+        if let Some((_, other)) = libraries[..i].iter().find(|(of, _)| of == platform) {
+            let (other, file) = (other.display(), file.display());
+            bail!("--library {file}: {other} is for {platform} too; PLATFORM={file} names another platform");
+        }
+    }
     let own = libraries.iter().find(|(platform, _)| *platform == Platform::host());
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())

@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 use fmu_core::Description;
 use fmu_core::description::Dependencies;
+use fmu_import::Folder;
 use fmu_pack::archive::PackedFile;
 use fmu_pack::reference;
 use std::collections::BTreeMap;
@@ -79,7 +80,7 @@ pub fn describe(library: &Path, resources: Option<&Path>, options: &ProcessOptio
     if !worker::guards(options) {
         return Ok(fmu_import::describe(library, resources, Dependencies::Probed)?);
     }
-    let folder = tempfile::tempdir()?;
+    let folder = Folder::new()?;
     let out = folder.path().join("description.json");
     let positional = [Some(library), Some(&out), resources];
     guarded("describe", positional.into_iter().flatten(), &[], options)?;
@@ -101,7 +102,7 @@ pub fn reference(
         let parameters = parameters.map(|(name, text)| (name.as_str(), text.as_str()));
         return Ok(reference::files(archive, description, stimuli, parameters)?);
     }
-    let folder = tempfile::tempdir()?;
+    let folder = Folder::new()?;
     let (json, out) = (folder.path().join("description.json"), folder.path().join("out"));
     fs::create_dir(&out)?;
     fs::write(&json, serde_json::to_vec(description)?)?;

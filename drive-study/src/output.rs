@@ -21,7 +21,6 @@ impl<'a> Folder<'a> {
     /// # Errors
     /// It cannot be written.
     pub(crate) fn write(&self, name: &str, text: &str) -> Result<()> {
-        let path = self.0.join(name);
-        std::fs::write(&path, text).with_context(|| format!("writing {}", path.display()))
+        Ok(fmu_import::whole::write(&self.0.join(name), text.as_bytes())?)
     }
 }

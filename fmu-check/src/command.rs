@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::report::Report;
 use crate::{self as check, Options, formats, replay, report};
 use clap::{Args, ValueEnum};
-use fmu_import::{guard, printable_lines};
+use fmu_import::{guard, printable_lines, whole};
 use std::fmt::Write;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -177,7 +177,7 @@ pub fn run(args: &CheckArguments) -> Result<bool, Error> {
         (Format::Sarif, reports) => println!("{}", serde_json::to_string_pretty(&formats::sarif(reports))?),
     }
     if let Some(path) = &args.write_baseline {
-        std::fs::write(path, Baseline::text(&reports)).map_err(|e| Error(format!("{}: {e}", path.display())))?;
+        whole::write(path, Baseline::text(&reports).as_bytes()).map_err(|e| Error(e.to_string()))?;
     }
     let holds = |report: &Report| match (args.strict, &baseline) {
         (true, _) => report.is_clean(),

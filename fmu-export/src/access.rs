@@ -100,9 +100,29 @@ impl<E: Exported> Instance<E> {
 
     #[inline(never)]
     fn get_counted<T: CValue>(&mut self, references: &[u32], out: &mut [MaybeUninit<T>]) -> Result<(), Refusal> {
-        self.check_count(references, out.len())?;
+        if let Err(refusal) = self.check_count(references, out.len()) {
+            self.computed_count(references, out.len(), refusal)?;
+        }
         self.refresh();
         self.get_each(references, out)
+    }
+
+    /// Whether the number of values is right once the outputs are computed: an array of them may get its length then. Otherwise nothing
+    /// has changed, and the refusal is the result.
+    #[cold]
+    fn computed_count(&mut self, references: &[u32], given: usize, refusal: Fault) -> Result<(), Fault> {
+        if !self.arrays || !self.current.dirty {
+            return Err(refusal);
+        }
+        let before = E::CAN.saved.as_ref().map(|saving| (saving.block(&self.current.block), self.current.stated));
+        self.refresh();
+        let counted = self.check_count(references, given);
+        if counted.is_err()
+            && let Some((block, stated)) = before
+        {
+            (self.current.block, self.current.stated, self.current.dirty) = (block, stated, true);
+        }
+        counted.map_err(|_| refusal)
     }
 
     /// Gets variables of a type that the model does not have: an error, if there is a value to get.

@@ -200,6 +200,15 @@ fn time_that_is_multiplied() {
     each(Clock::Multiplies, &[1e-4, 5e-5]);
 }
 
+/// Where the number of samples fits an Integer of FMI 2.0.
+#[test]
+#[ignore = "takes minutes with optimization"]
+fn a_billion_steps() {
+    for (version, start, fraction) in [(2, 0.0, FRACTIONS[0]), (3, -3.0, FRACTIONS[1]), (2, 1e6, FRACTIONS[2])] {
+        run(version, Clock::Accumulates, start, 1e-4, fraction, 1_000_000_000);
+    }
+}
+
 /// The step sizes themselves are rounded as the times are: at 1e6 s to 1.2e-10 s.
 #[test]
 fn steps_that_are_differences_of_times() {

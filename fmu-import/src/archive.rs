@@ -12,6 +12,7 @@ use std::io::{self, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use zip::ZipArchive;
+use zip::result::ZipError;
 
 /// Source of an archive: a file, or memory.
 trait Source: Read + Seek + Send {}
@@ -72,8 +73,10 @@ impl Archive {
 
     fn read(path: &Path, source: Box<dyn Source>) -> Result<Self, Error> {
         let wrong = |cause: &dyn std::fmt::Display| Error::file(path, cause);
-        let mut zip =
-            ZipArchive::new(source).map_err(|e| Error::file_from(path, "not a ZIP archive, or cut short: ", e))?;
+        let mut zip = ZipArchive::new(source).map_err(|e| match e {
+            ZipError::Io(e) if e.raw_os_error().is_some() => Error::file_from(path, "", e),
+            e => Error::file_from(path, "not a ZIP archive, or cut short: ", e),
+        })?;
         let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
         let xml = document(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
         let xml = xml.ok_or_else(|| wrong(&no_description(&names)))?;
@@ -103,13 +106,13 @@ impl Archive {
             let has = interfaces(&description);
             return Err(wrong(&format!("has neither Co-Simulation nor Model Exchange; it has {has}")));
         }
-        let folder = Folder::new().map_err(|e| Error::file_from(&self.path, "", e))?;
+        let folder = Folder::new().map_err(|e| self.not_unpacked(e))?;
         // The FMU is given the path of the resources folder, so it is created even if the archive has none.
-        fs::create_dir(folder.path().join("resources")).map_err(|e| Error::file_from(&self.path, "", e))?;
+        fs::create_dir(folder.path().join("resources")).map_err(|e| self.not_unpacked(e))?;
         let found = co_simulation.iter().chain(model_exchange.iter().flatten());
         let mut prefixes: Vec<String> = found.map(|(folder, _)| format!("binaries/{folder}/")).collect();
         prefixes.push("resources/".into());
-        let files = self.extract_into(folder.path(), &prefixes).map_err(|e| Error::file_from(&self.path, "", e))?;
+        let files = self.extract_into(folder.path(), &prefixes)?;
         let place = |(of, name): (&str, String)| folder.path().join("binaries").join(of).join(name);
         Ok(Extracted {
             co_simulation: co_simulation.map(place),
@@ -179,28 +182,41 @@ impl Archive {
     }
 
     /// Extracts the entries that begin with one of the prefixes; returns the number of files.
-    fn extract_into(&mut self, dir: &Path, prefixes: &[String]) -> io::Result<usize> {
+    fn extract_into(&mut self, dir: &Path, prefixes: &[String]) -> Result<usize, Error> {
         let mut files = 0;
+        let mut buffer = vec![0; 1 << 16];
         for (index, name) in self.names.iter().enumerate() {
             if !prefixes.iter().any(|p| name.starts_with(p.as_str())) {
                 continue;
             }
-            let mut entry = self.zip.by_index(index)?;
+            let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
+            let full = |e| not_unpacked(&self.path, e);
+            let mut entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
             let target = dir.join(name);
             if entry.is_dir() {
-                fs::create_dir_all(&target)?;
+                fs::create_dir_all(&target).map_err(full)?;
                 continue;
             }
             if let Some(parent) = target.parent() {
-                fs::create_dir_all(parent)?;
+                fs::create_dir_all(parent).map_err(full)?;
             }
-            let mut out = io::BufWriter::new(File::create(&target)?);
+            let mut out = File::create(&target).map_err(full)?;
             // Reading stops if it contains more than its headers claim, which is within the limits.
-            io::copy(&mut entry, &mut out).map_err(|e| io::Error::other(format!("{name}: {e}")))?;
-            out.flush()?;
+            loop {
+                match entry.read(&mut buffer) {
+                    Ok(0) => break,
+                    Ok(len) => out.write_all(&buffer[..len]).map_err(full)?,
+                    Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
+                    Err(e) => return Err(wrong(&e)),
+                }
+            }
             files += 1;
         }
         Ok(files)
+    }
+
+    fn not_unpacked(&self, cause: io::Error) -> Error {
+        not_unpacked(&self.path, cause)
     }
 
     fn missing_binary<'a>(&'a self, folder: &str, name: &str) -> String {
@@ -287,6 +303,12 @@ fn leads_outside(name: &str) -> bool {
     let mut parts = name.split(['/', '\\']);
     let first = parts.clone().next().unwrap_or_default();
     first.is_empty() || (first.len() == 2 && first.ends_with(':')) || parts.any(|part| part == "..")
+}
+
+/// The folder for temporary files is full or cannot be written.
+fn not_unpacked(archive: &Path, cause: io::Error) -> Error {
+    let what = format!("cannot be unpacked into {}: ", std::env::temp_dir().display());
+    Error::file_from(archive, &what, cause)
 }
 
 #[cfg(test)]

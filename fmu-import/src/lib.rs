@@ -49,6 +49,7 @@ pub mod threads;
 pub mod trace;
 mod typed;
 mod value;
+pub mod whole;
 pub mod written;
 
 pub use abi::journal;

@@ -36,8 +36,17 @@ fn commands(c: char) -> bool {
 /// A message that names each thing once: `--record x: x: is not there` becomes `--record x: is not there`. A name is the text
 /// between colons; it is already present if the part before ends with it, or with it and a value.
 pub fn once(text: &str) -> String {
-    let mut kept: Vec<&str> = Vec::new();
-    for part in text.split(": ") {
+    let (parts, mut kept) = (text.split(": ").collect::<Vec<_>>(), Vec::<&str>::new());
+    let mut next = 0;
+    while next < parts.len() {
+        // An error and its cause may have the same text of several parts.
+        let repeats = |&len: &usize| kept.len() > len && parts[next..].starts_with(&kept[kept.len() - len..]);
+        if let Some(len) = [3, 2].into_iter().find(repeats) {
+            next += len;
+            continue;
+        }
+        let part = parts[next];
+        next += 1;
         let is_named = kept.last().is_some_and(|before| {
             let mut ends = before.match_indices(part).map(|(at, _)| (at, &before[at + part.len()..]));
             let begins = |at: usize| at == 0 || before[..at].ends_with(' ');
@@ -82,6 +91,7 @@ mod tests {
             ("--record p.x: x: is no variable", "--record p.x: x: is no variable"),
             ("a.ssp: line 3: x has 3: y", "a.ssp: line 3: x has 3: y"),
             ("a: b: a", "a: b: a"),
+            ("a.fmu: i/o error: full: i/o error: full", "a.fmu: i/o error: full"),
             ("", ""),
         ] {
             assert_eq!(once(text), expected);

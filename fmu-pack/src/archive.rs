@@ -5,8 +5,8 @@ use crate::documentation;
 use crate::error::{Context, Result, ensure, invalid};
 use crate::licenses::Licenses;
 use fmu_core::Description;
-use fmu_import::machine;
 use fmu_import::platform::Platform;
+use fmu_import::{machine, whole};
 use model_description::{FmiVersion, Generation, date_from_epoch};
 use std::collections::BTreeMap;
 use std::fs;
@@ -194,24 +194,12 @@ pub fn archive(files: &BTreeMap<String, PackedFile>, moment: GenerationTime) -> 
     Ok(zip.finish()?.into_inner())
 }
 
-/// Writes a file atomically, so that no reader sees a partial file.
+/// Writes a file atomically, so that no reader sees a partial file: [`whole::write`].
 ///
 /// # Errors
 /// The file cannot be written.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    let of = || path.display().to_string();
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::create_dir_all(folder).with_context(of)?;
-    let mut file = tempfile::Builder::new().prefix(".fmu-").tempfile_in(folder).with_context(of)?;
-    file.write_all(bytes).with_context(of)?;
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        // Temporary files are private, but an FMU must be readable by everyone.
-        file.as_file().set_permissions(fs::Permissions::from_mode(0o644)).with_context(of)?;
-    }
-    file.persist(path).map_err(|e| e.error).with_context(of)?;
-    Ok(())
+    Ok(whole::write(path, bytes)?)
 }
 
 #[cfg(test)]

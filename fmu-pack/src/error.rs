@@ -42,6 +42,26 @@ impl Error {
         if let Self::Fmu(error) = self { Some(error) } else { None }
     }
 
+    /// Whether a call of the operating system failed, because the disk is full or cannot be read, for example, or whether an FMU makes no
+    /// instance, for which a file that it cannot read is a reason.
+    pub(crate) fn is_before_the_run(&self) -> bool {
+        let failed = |e: &std::io::Error| e.raw_os_error().is_some();
+        let refused = |e: &fmu_import::Error| matches!(e, fmu_import::Error::Call { function, .. } if function.contains("nstantiate"));
+        let mut is = match self {
+            Self::Io(e) => failed(e),
+            Self::Fmu(e) => refused(e),
+            _ => false,
+        };
+        let mut next = self.source();
+        while let Some(cause) = next {
+            is |= cause.downcast_ref().is_some_and(failed)
+                || cause.downcast_ref().is_some_and(refused)
+                || cause.downcast_ref::<Self>().is_some_and(Self::is_before_the_run);
+            next = cause.source();
+        }
+        is
+    }
+
     /// The text with all causes, separated by colons.
     pub(crate) fn whole(&self) -> String {
         let (mut text, mut next) = (self.to_string(), self.source());

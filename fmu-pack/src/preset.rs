@@ -10,7 +10,7 @@ use fmu_core::description::{Dependencies, Value, Variable, VariableKind};
 use fmu_core::preset::{self, FILE, FORMER_FILE};
 use fmu_core::variable::{Causality, position};
 use fmu_core::{Bytes, Description};
-use fmu_import::{Fmu, Kind, Unpacked, Values, describe, suggest};
+use fmu_import::{Fmu, Folder, Kind, Unpacked, Values, describe, suggest};
 use model_description::{FmiVersion, Generation, ModelDescription};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -200,12 +200,14 @@ impl PresetFmu {
         put(&format!("resources/{FILE}"), self.text());
         let documentation = documentation::preset::preset(&description, &self.own);
         put(PAGE, documentation::page(&Description { documentation, ..description.clone() }, version));
-        let dir = tempfile::tempdir()?;
+        let dir = Folder::new()?;
         let first = dir.path().join("preset.fmu");
         archive::write(&first, &archive::archive(&files, moment)?)?;
         let mut notes: Vec<String> = self.starts(&first)?.into_iter().collect();
         match self.reference(&first, &description, course, dir.path()) {
             Ok(more) => files.extend(more),
+            // A disk that is full is no reason for an FMU without its reference result: an instance was made before.
+            Err(why) if why.is_before_the_run() => return Err(why),
             Err(why) => {
                 notes.push(format!("{}: the archive gets no reference result: {}", self.file.display(), why.whole()));
             }
@@ -222,7 +224,8 @@ impl PresetFmu {
     /// The description that the binary returns with the preset: it checks every name and value.
     fn described(&self, title: Option<&str>) -> Result<Description> {
         let (name, text) = (self.file.display(), self.text());
-        fs::write(self.unpacked.resources().join(FILE), &text)?;
+        let file = self.unpacked.resources().join(FILE);
+        fs::write(&file, &text).with_context(|| file.display().to_string())?;
         let mut description =
             described(&self.unpacked).map_err(|e| invalid!("{name}: {}", cause(&e.to_string(), &self.unpacked)))?;
         let token = self.own.token.clone() + &preset::suffix(text.as_bytes());
@@ -264,7 +267,7 @@ impl PresetFmu {
         let stimuli = dir.join(reference::STIMULI);
         // Without a file, the inputs keep their start values.
         if let Some(bytes) = course.map(|course| course.stimuli.as_bytes()).or(self.stimuli()) {
-            fs::write(&stimuli, bytes)?;
+            fs::write(&stimuli, bytes).with_context(|| stimuli.display().to_string())?;
         }
         reference::files(archive, description, &stimuli, None)
     }

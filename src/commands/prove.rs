@@ -6,7 +6,7 @@ use cargo_fmu::message;
 use clap::Args;
 use fmu_core::Experiment;
 use fmu_import::platform::Platform;
-use fmu_import::printable;
+use fmu_import::{Folder, printable};
 use fmu_pack::TOOL;
 use fmu_pack::archive;
 use fmu_pack::reference::{self, FOLDER};
@@ -68,7 +68,7 @@ struct Example {
 /// # Errors
 /// The FMUs do not build, an archive has no reference files, or a folder cannot be written.
 pub fn run(args: &Prove) -> Result<(Vec<PathBuf>, bool)> {
-    let dir = tempfile::tempdir()?;
+    let dir = Folder::new()?;
     let files = match &args.files[..] {
         [] => build::models(&Models { out: Some(dir.path().into()), ..Models::default() })?,
         files => files.to_vec(),

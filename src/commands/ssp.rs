@@ -6,6 +6,7 @@ use crate::ssv;
 use anyhow::{Context, Result, anyhow, bail};
 use clap::Args;
 use drive_tools::tune;
+use fmu_import::Folder;
 use fmu_pack::archive::{self, GenerationTime};
 use model_description::FmiVersion;
 use std::path::{Path, PathBuf};
@@ -65,7 +66,7 @@ pub struct Ssp {
 pub fn run(args: &Ssp) -> Result<()> {
     let moment = GenerationTime::of_environment()?;
     let values = values(args)?;
-    let dir = tempfile::tempdir()?;
+    let dir = Folder::new()?;
     if values.is_empty() && args.names {
         bail!("--names has no values to write: add --motor or --parameters");
     }

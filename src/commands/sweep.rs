@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 use clap::Args;
+use fmu_import::whole;
 use fmu_sweep::isolate::Isolation;
 use fmu_sweep::{Options, Progress, Report, Sweep as Definition, threads_here};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -105,7 +106,8 @@ fn report(report: &Report, sweep: &Definition, args: &Sweep) -> Result<bool> {
         }
         other => {
             if let Some(path) = other {
-                std::fs::copy(results, path).with_context(|| path.display().to_string())?;
+                let of = || results.display().to_string();
+                whole::write(path, &std::fs::read(results).with_context(of)?)?;
             }
             println!("{of} rows: {}", results.display());
         }

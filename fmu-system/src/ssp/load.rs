@@ -12,7 +12,7 @@ use super::structure::{Connection, ConnectionEnd, Connector, Structure};
 use super::values::{self, Given};
 use crate::cosimulation::{Crossing, Method, Outlet, Schedule, Sequence, Settings, System, Units, incompatible};
 use fmu_import::written::{is_pattern, matches};
-use fmu_import::{Fmu, Instance, check_entries, limits};
+use fmu_import::{Fmu, Folder, Instance, check_entries, limits};
 use model_description::{BaseType, Experiment, ModelVariable, Variability};
 use std::fs::File;
 use std::path::Path;
@@ -127,7 +127,7 @@ impl Loaded {
         let structure = Structure::read_with(&text, &mut files).map_err(in_description)?;
         let mut fmus = Vec::new();
         let temporary = |e: std::io::Error| within(format!("no temporary folder: {e}"));
-        let dir = tempfile::tempdir().map_err(temporary)?;
+        let dir = Folder::new().map_err(temporary)?;
         for (index, component) in structure.components.iter().enumerate() {
             let fmu = dir.path().join(format!("{index}.fmu"));
             std::fs::write(&fmu, package.bytes(&component.source)?).map_err(temporary)?;

@@ -8,7 +8,7 @@ use cargo_fmu::{Failed, message};
 use clap::Args;
 use fmu_core::Description;
 use fmu_core::description::{Dependencies, VariableKind};
-use fmu_import::describe;
+use fmu_import::{Folder, describe};
 use fmu_pack::compile::{Profile, compile, module};
 use fmu_pack::licenses::Licenses;
 use fmu_pack::page::{self, FILE, Source};
@@ -114,7 +114,7 @@ pub fn run(args: &Page) -> Result<Vec<PathBuf>> {
 
 /// Writes the page of a model.
 fn write(workspace: &Workspace, model: &Model, module: &[u8], out: &Path) -> Result<()> {
-    let dir = tempfile::tempdir()?;
+    let dir = Folder::new()?;
     let mut stimuli = model.folder.join(STIMULI);
     if let Some(text) = &model.stimuli {
         stimuli = dir.path().join(STIMULI);

@@ -8,6 +8,7 @@ use crate::commands::preset;
 use anyhow::{Context, Result, bail};
 use cargo_fmu::message;
 use drive_tools::tune;
+use fmu_import::Folder;
 use fmu_pack::compile::module;
 use fmu_pack::workspace::Workspace;
 use fmu_plot::page::{escape, page};
@@ -26,7 +27,7 @@ type Link = (String, String, String);
 /// # Errors
 /// An FMU cannot be built, or a file cannot be written.
 pub(super) fn run(workspace: &Workspace, out: &Path) -> Result<PathBuf> {
-    let built = tempfile::tempdir()?;
+    let built = Folder::new()?;
     let archives =
         build::models(&Models { fmi: Some("3".into()), out: Some(built.path().into()), ..Models::default() })?;
     let mut sections: Vec<(&str, Vec<Link>)> = Vec::new();
@@ -93,7 +94,7 @@ fn of_machines(workspace: &Workspace, drive: &Path, module: &[u8], out: &Path) -
     };
     files.retain(|file| file.extension().is_some_and(|e| e == "toml"));
     files.sort();
-    let dir = tempfile::tempdir()?;
+    let dir = Folder::new()?;
     let mut links = Vec::new();
     for file in files {
         let tuned = tune::tune(&file)?;

@@ -267,12 +267,15 @@ fn base_names(fmu: &FmuFile) -> Verdict {
         Ok(description) => description,
         Err(cause) => return Verdict::NotDetermined(cause.clone()),
     };
-    let identifiers: Vec<&str> =
+    let mut identifiers: Vec<&str> =
         [&description.model_exchange, &description.scheduled_execution, &description.co_simulation]
             .into_iter()
             .flatten()
             .map(|interface| interface.model_identifier.as_str())
             .collect();
+    identifiers.sort_unstable();
+    // Interfaces may share a library.
+    identifiers.dedup();
     let folders: Vec<String> = fmu.zip.names();
     let folder = folders.iter().find(|n| {
         let parts: Vec<_> = n.split('/').collect();
