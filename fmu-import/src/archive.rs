@@ -134,7 +134,8 @@ impl Archive {
             let wrong = |e: &dyn std::fmt::Display| Error::file(&self.path, format!("{entry}: {e}"));
             let mut head = Vec::new();
             let file = self.zip.by_index(index).map_err(|e| wrong(&e))?;
-            file.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
+            let unread = |e| Error::file_from(&self.path, &format!("{entry}: "), e);
+            file.take(machine::HEAD).read_to_end(&mut head).map_err(unread)?;
             let platforms = machine::platforms(&head);
             // The loader reports the fault of a file that is not a library.
             if platforms.is_empty() || platforms.contains(&host) {
@@ -207,7 +208,7 @@ impl Archive {
                     Ok(0) => break,
                     Ok(len) => out.write_all(&buffer[..len]).map_err(full)?,
                     Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                    Err(e) => return Err(wrong(&e)),
+                    Err(e) => return Err(Error::file_from(&self.path, &format!("{name}: "), e)),
                 }
             }
             files += 1;

@@ -4,7 +4,8 @@ use crate::findings::{check, listed};
 use crate::musts;
 use std::path::Path;
 
-/// A fault: its name, the checks of which one reports it, in FMI 2.0 or in FMI 3.0, and the change of an entry of the archive, its name and its contents; `None` if
+/// A fault: its name, the checks of which one reports it, in FMI 2.0 or in FMI 3.0, and the change of an entry of the archive, its
+/// name and its contents; `None` if
 /// nothing was changed.
 type Fault = (&'static str, &'static [&'static str], fn(&str, &str) -> Option<(String, String)>);
 
