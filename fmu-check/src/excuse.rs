@@ -4,9 +4,9 @@
 
 use crate::check::{Check, Conclusion, Verdict};
 use crate::checks::GROUPS;
-use crate::lines::{PROBE_FOLDER, SAID};
+use crate::lines::SAID;
 use crate::runner::{Conditions, OUT_OF_TIME, Runner};
-use fmu_import::limits;
+use fmu_import::{Folder, limits};
 use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
@@ -81,7 +81,7 @@ impl Runner {
         let temporary = env::temp_dir();
         let others = [Some(PathBuf::from("/var/tmp")), env::home_dir(), env::current_dir().ok()];
         others.into_iter().flatten().filter(|folder| *folder != temporary).find_map(|folder| {
-            let copy = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir_in(&folder).ok()?;
+            let copy = tempfile::Builder::new().prefix(Folder::PROBE).tempdir_in(&folder).ok()?;
             let mut moved = conditions.clone();
             moved.allowance.memory = 0;
             moved.dir = copy.path().into();

@@ -6,9 +6,6 @@ use clap::Args;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// Start of the names of the temporary folders of probes.
-pub(super) const PROBE_FOLDER: &str = "fmu-probe-";
-
 /// One line of a probe's output.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

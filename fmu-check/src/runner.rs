@@ -8,9 +8,10 @@ use crate::check::{Check, Conclusion, Options, Run, Verdict};
 use crate::checks::GROUPS;
 use crate::evidence::{calls, conclude, is_after_free, is_of_second, panic, printed, read, script, side_effects};
 use crate::fmu_file::FmuFile;
-use crate::lines::{Line, PROBE_FOLDER};
+use crate::lines::Line;
 use crate::probe::NOT_WRITTEN;
 use crate::watch::{Pace, Watch};
+use fmu_import::Folder;
 use fmu_import::guard::{self, Allowance, End, Guarded};
 use fmu_import::limits;
 use model_description::Interface;
@@ -213,7 +214,7 @@ impl Runner {
     }
 
     fn try_attempt(&self, check: &Check, conditions: &Conditions) -> io::Result<Conclusion> {
-        let folder = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir()?;
+        let folder = Folder::of_probe()?;
         let (out, working_directory) = (folder.path().join("out"), folder.path().join("home"));
         fs::create_dir(&working_directory)?;
         let (mut crashes, mut slow) = (Vec::new(), None);
@@ -303,7 +304,7 @@ impl Runner {
             let first = GROUPS.iter().flat_map(|g| g.checks).find(|c| c.id == first && c.id != check.id);
             let _ = first.map(|first| self.run(first));
         }
-        let folder = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir()?;
+        let folder = Folder::of_probe()?;
         fs::create_dir(folder.path().join("home"))?;
         let out = folder.path().join("out");
         let conditions = Conditions { dir: self.dir.clone(), binary: binary.into(), allowance: self.allowance };
@@ -411,7 +412,7 @@ impl Runner {
 
     /// All calls of a check up to its first finding, one by one, from one more run of it.
     fn full(&self, check: &Check, conditions: &Conditions) -> io::Result<Vec<String>> {
-        let folder = tempfile::Builder::new().prefix(PROBE_FOLDER).tempdir()?;
+        let folder = Folder::of_probe()?;
         fs::create_dir(folder.path().join("home"))?;
         let console = File::create(folder.path().join("console"))?;
         let mut command = self.command(check, conditions, folder.path(), 0)?;

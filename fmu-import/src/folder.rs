@@ -18,15 +18,30 @@ pub struct Folder {
 }
 
 impl Folder {
+    /// Start of the names of the folders of the checker's probes.
+    pub const PROBE: &str = "fmu-probe-";
+
     /// Creates a folder, and removes those left by killed processes.
     ///
     /// # Errors
     /// The system cannot create it.
     pub fn new() -> io::Result<Self> {
+        Self::named(PREFIX)
+    }
+
+    /// Creates a folder for a probe of the checker, whose name tells it from the files of an FMU.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn of_probe() -> io::Result<Self> {
+        Self::named(Self::PROBE)
+    }
+
+    fn named(prefix: &str) -> io::Result<Self> {
         remove_abandoned();
         let owner = process::id();
         loop {
-            let dir = tempfile::Builder::new().prefix(&format!("{PREFIX}{owner}-")).tempdir()?;
+            let dir = tempfile::Builder::new().prefix(&format!("{prefix}{owner}-")).tempdir()?;
             let name = dir.path().join(LOCK);
             let lock = match File::create_new(&name) {
                 // Another process mistook the empty folder for an abandoned one.
@@ -89,9 +104,10 @@ fn remove_abandoned() {
     }
 }
 
-/// Whether it is the name of such a folder; other names, such as those of the checker's probes, may begin the same way.
+/// Whether it is the name of such a folder; other names may begin the same way.
 fn is_ours(name: &str) -> bool {
-    let owner = name.strip_prefix(PREFIX).and_then(|rest| rest.split_once('-'));
+    let rest = name.strip_prefix(Folder::PROBE).or_else(|| name.strip_prefix(PREFIX));
+    let owner = rest.and_then(|rest| rest.split_once('-'));
     owner.is_some_and(|(owner, _)| owner.parse::<u32>().is_ok())
 }
 
@@ -103,19 +119,20 @@ mod tests {
     #[test]
     fn only_unused_folders_are_removed() {
         let used = Folder::new().unwrap();
-        let mut abandoned = Folder::new().unwrap();
-        let path = abandoned.path().to_owned();
-        // The effect of a kill: the lock is gone, the folder remains.
-        abandoned.lock = None;
-        abandoned.owner = 0;
-        drop(abandoned);
+        let paths = [Folder::new(), Folder::of_probe()].map(|abandoned| {
+            let mut abandoned = abandoned.unwrap();
+            // The effect of a kill: the lock is gone, the folder remains.
+            abandoned.lock = None;
+            abandoned.owner = 0;
+            abandoned.path().to_owned()
+        });
         // A process that is killed before it has created the lock, and unrelated folders.
         let temporary = |prefix| tempfile::Builder::new().prefix(prefix).tempdir().unwrap();
         let (empty, full, of_probe) = (temporary("fmu-0-"), temporary("fmu-0-"), temporary("fmu-probe-"));
         fs::write(full.path().join("x"), "").unwrap();
         let later = Folder::new().unwrap();
         assert!(
-            !path.exists()
+            paths.iter().all(|path| !path.exists())
                 && !empty.path().exists()
                 && full.path().is_dir()
                 && of_probe.path().is_dir()

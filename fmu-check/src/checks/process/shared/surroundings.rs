@@ -1,10 +1,9 @@
 //! State that an FMU must leave unchanged: settings of the process, the folder of the FMU, and everything that outlives a run.
 
 use crate::checks::process::shared::copies::{Files, MANY, failed, list, second_binary};
-use crate::lines::PROBE_FOLDER;
 use crate::session::{NotDetermined, Session};
 use fmu_import::raw::{armed_timers, locale};
-use fmu_import::{guard, limits};
+use fmu_import::{Folder, guard, limits};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
@@ -119,7 +118,7 @@ fn stray_files() -> Vec<(String, Option<SystemTime>)> {
         folders.into_iter().flatten().filter(|f| f.parent().is_some()).filter_map(|f| fs::read_dir(f).ok()).flatten();
     entries
         .flatten()
-        .filter(|e| !e.file_name().to_string_lossy().starts_with(PROBE_FOLDER))
+        .filter(|e| !e.file_name().to_string_lossy().starts_with(Folder::PROBE))
         .filter_map(|e| Some((e.path().display().to_string().replace(&own, "PID"), e.metadata().ok()?.modified().ok())))
         .collect()
 }
