@@ -149,7 +149,7 @@ fn the_commands_alone_depend_on_anyhow() {
 }
 
 /// Dependencies that are not named in the code: they choose a feature of another crate.
-const FEATURES: &[(&str, &str)] = &[("fmu-import", "flate2")];
+const FEATURES: &[(&str, &str)] = &[("cargo-fmu", "once_cell"), ("fmu-import", "flate2")];
 
 #[test]
 fn every_dependency_is_used() {

@@ -20,7 +20,7 @@ pub enum Profile {
     /// Cargo's profile `release`, each crate optimized as one, without symbols.
     #[default]
     Release,
-    /// The same for the files of a release and for modules of pages: the whole program is optimized as one, in twice the time.
+    /// [`Release`](Self::Release) with the whole program optimized as one, in twice the time: a distributed file, or the module of a page.
     Distribution,
     /// The profile `release` with the names of functions and with line numbers.
     Symbols,
