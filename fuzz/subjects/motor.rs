@@ -37,7 +37,7 @@ impl Bytes<'_> {
 /// Runs the calls; a refused one must change nothing.
 pub(crate) fn run(bytes: &[u8]) {
     let Some((kind, rest)) = bytes.split_first() else { return };
-    let (text, rest) = if kind % 3 == 0 {
+    let (text, rest) = if kind.is_multiple_of(3) {
         (None, rest)
     } else {
         let end = rest.iter().position(|b| *b == 0).unwrap_or(rest.len());
@@ -74,7 +74,7 @@ fn call(motor: &mut VirtualMotor, bytes: &mut Bytes<'_>) -> Result<()> {
         0 => {
             let t = time(motor, bytes);
             let duties = [bytes.number(), bytes.number(), bytes.number()];
-            let enable = bytes.byte() % 2 == 0;
+            let enable = bytes.byte().is_multiple_of(2);
             motor.advance_duties(t, duties, enable)
         }
         1 => {
