@@ -23,7 +23,7 @@ fn open(standard: &str, name: &str) -> Fmu {
     Fmu::open(common::archives().join(standard).join(name).with_extension("fmu")).unwrap()
 }
 
-/// An instance of its own speed; its bits depend on the number.
+/// An instance whose speed, and so every bit of its results, depends on its number.
 fn started(fmu: &Fmu, number: u32) -> Instance {
     let mut it = fmu.instantiate(&format!("instance {number}"), false).unwrap();
     it.set("initial.speed", vec![f64::from(number % 97)]).unwrap();

@@ -24,7 +24,7 @@ const BEYOND: [ModulationMode; 3] =
 struct Means {
     tau: f64,
     u_share: f64,
-    /// Greatest current in A.
+    /// Maximum current in A.
     i: f64,
     /// Share of the samples with the output `voltage_limited`.
     limited: f64,

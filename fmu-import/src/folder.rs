@@ -29,7 +29,7 @@ impl Folder {
         Self::named(PREFIX)
     }
 
-    /// Creates a folder for a probe of the checker, whose name tells it from the files of an FMU.
+    /// Creates a folder for a probe of the checker. Its name distinguishes it from files that an FMU writes.
     ///
     /// # Errors
     /// As [`new`](Self::new).

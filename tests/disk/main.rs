@@ -1,8 +1,7 @@
-//! A full disk, a write that fails or is short, a read that fails, and a kill, at each of the calls with which a command writes and reads
-//! its files: `shim.c`, preloaded, makes them fail. The command names the file, leaves no part of one and no temporary file, and then
-//! runs as if nothing had happened.
+//! The library `shim.c` is preloaded into a command. It makes one of the command's reads or writes fail, fills the disk, shortens a write or
+//! kills the process. The command must then name the file, and leave neither a partial nor a temporary one; the next run must succeed.
 //!
-//! The crate `tempfile` renames without the C library, so that its renames do not fail here.
+//! The crate `tempfile` renames without the C library, so its renames do not fail here.
 #![allow(missing_docs)]
 #![cfg(target_os = "linux")]
 

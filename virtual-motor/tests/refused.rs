@@ -287,7 +287,7 @@ fn threads_share_the_pool() {
 
 /// The number of motors is limited. Alone in its process: other tests would lack the places.
 #[test]
-#[ignore = "the next test runs it in a process of its own"]
+#[ignore = "the next test runs it in a separate process"]
 fn the_pool_is_full() {
     let all: Vec<MotorId> = (0..MOST).map(|_| create().unwrap()).collect();
     refused(create(), TooMany, "there are 256 motors, the maximum number: destroy one first");

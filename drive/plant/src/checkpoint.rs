@@ -57,7 +57,7 @@ mod tests {
     use drive_base::frame::Phases;
     use fmu_core::{Block, Elapsed, Step};
 
-    /// A restored plant equals the one that it was, whatever its parameters.
+    /// Restoring a checkpoint gives back the same plant, with any parameters.
     #[test]
     fn a_restored_plant_goes_on_as_it_was() {
         for kind in 0..8 {
