@@ -226,6 +226,15 @@ mod tests {
         assert!((grid.instant(10, -1.0) - 5.55e-17).abs() < 1e-19, "{}", grid.instant(10, -1.0));
     }
 
+    /// Both of two times count with all their digits.
+    #[test]
+    fn the_time_between_two_is_exact() {
+        let (start, time) = (1e6, 1e-9);
+        assert_eq!(Elapsed::between(start, start), Elapsed::ZERO);
+        assert!((Elapsed::between(-start, time).since(Elapsed::ZERO.plus(start)) - time).abs() < 1e-24);
+        assert!((Elapsed::between(start, time).seconds() + start - time).abs() < 1e-9);
+    }
+
     #[test]
     fn naive_sum_would_lose_the_grid() {
         let mut t = 0.0;
