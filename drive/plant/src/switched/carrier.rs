@@ -13,7 +13,7 @@ use crate::inverter::Inverter;
 use crate::pwm::{PwmUpdate, ZeroSequence};
 use drive_base::frame::Phases;
 use drive_base::overmodulation::ModulationMode;
-use fmu_core::{Elapsed, SampleGrid};
+use fmu_core::{Elapsed, Next, SampleGrid};
 use serde::{Deserialize, Serialize};
 
 /// Instants closer than this share of half a carrier period are the same instant.
@@ -94,6 +94,16 @@ impl Carrier {
     /// Whether the present half of the period is the first one.
     fn rises(&self) -> bool {
         self.extremes % 2 == 1
+    }
+
+    /// The instant `time` (s) after the last extreme.
+    pub(super) fn instant(&self, half: f64, time: f64) -> Option<Elapsed> {
+        time.is_finite().then(|| Elapsed::periods(self.extremes.saturating_sub(1), half).plus(time))
+    }
+
+    /// The next extreme.
+    pub(super) fn next(&self, half: f64) -> Next {
+        Next::Grid { k: self.extremes, period: half }
     }
 
     /// Whether the upper switch of the leg `x` is commanded on at the time `at` (s) since the last extreme, and the time (s) until
