@@ -322,7 +322,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 9;
+    const STATE_VERSION: u16 = 10;
 
     const CONTINUOUS: bool = true;
 
