@@ -345,6 +345,26 @@ mod tests {
     }
 
     #[test]
+    fn a_tracking_loop_too_fast_for_the_samples_is_refused() {
+        let mut controller = crate::SensorlessController::default();
+        let par = &mut controller.parameters;
+        (par.estimator, par.position.bandwidth) = (crate::estimator::Kind::Sensored, 5001.0);
+        for (kind, refused) in [
+            (PositionSensor::Ideal, false),
+            (PositionSensor::Encoder, true),
+            (PositionSensor::Hall, false),
+            (PositionSensor::Resolver, true),
+        ] {
+            controller.parameters.position.kind = kind;
+            let error = fmu_core::Model::validate(&controller).err().map(|fault| fault.message().to_owned());
+            assert_eq!(error.is_some(), refused, "{kind:?}: {error:?}");
+            let names =
+                |e: &String| e.contains("sensor.bandwidth = 5001 rad/s") && e.contains("5000") && e.contains("T_s");
+            assert!(error.is_none_or(|e| names(&e)), "{kind:?}");
+        }
+    }
+
+    #[test]
     fn an_ideal_sensor_has_only_its_mounting() {
         let par = PositionParameters { angle_offset: 0.2, ..sensor(PositionSensor::Ideal) };
         let (most, mean) = errors(&par, 300.0, 100);
