@@ -167,7 +167,7 @@ fn a_switched_inverter_is_integrated_to_the_same_currents() {
         (
             "double update",
             |inverter| {
-                inverter.dead_time = 3e-6;
+                (inverter.dead_time, inverter.pwm.carrier_delay) = (3e-6, 1.3e-5);
                 (inverter.pwm.update, inverter.pwm.zero_sequence) = (PwmUpdate::Double, ZeroSequence::DpwmAlternating);
             },
             |_| (),

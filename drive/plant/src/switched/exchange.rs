@@ -121,7 +121,7 @@ impl PmsmPlant {
             let due = due + same;
             if leg.wait > 0.0 { leg.wait.min(due) } else { due }
         });
-        bridge.next = bridge.carrier.instant(half, time + next.fold(f64::INFINITY, f64::min));
+        bridge.next = bridge.carrier.instant(inverter, time + next.fold(f64::INFINITY, f64::min));
         bridge.reached = now;
         let mut at = self.point(state);
         let i = self.current_at(&at);
@@ -161,7 +161,7 @@ impl PmsmPlant {
 
     /// When the next leg is commanded, or its dead time ends, or the carrier has its next extreme.
     pub(crate) fn next_instant(&self, now: Elapsed) -> Next {
-        let extreme = self.bridge.carrier.next(0.5 * self.parameters.inverter.T_pwm);
+        let extreme = self.bridge.carrier.next(&self.parameters.inverter);
         extreme.or(self.bridge.next.map_or(Next::Never, Next::At), now)
     }
 
