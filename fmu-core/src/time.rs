@@ -218,6 +218,15 @@ mod tests {
     }
 
     #[test]
+    fn an_instant_is_its_periods_after_the_start() {
+        let grid = SampleGrid { period: 0.1 };
+        assert_eq!(grid.instant(0, 2.5).to_bits(), 2.5_f64.to_bits());
+        assert_eq!(grid.instant(3, 0.0).to_bits(), (3.0_f64 * 0.1).to_bits());
+        // 0.1 as a double is above 0.1 by 5.55e-18, which a product rounded on its own would lose.
+        assert!((grid.instant(10, -1.0) - 5.55e-17).abs() < 1e-19, "{}", grid.instant(10, -1.0));
+    }
+
+    #[test]
     fn naive_sum_would_lose_the_grid() {
         let mut t = 0.0;
         for _ in 0..10_000_000 {
