@@ -137,6 +137,17 @@ fn from_a_name_to_a_checked_fmu_in_fmpy() {
     assert!(fmu_import::contents(&folder.join(archives[1])).unwrap().1.keys().all(|name| !name.contains("fmi-ls-ref")));
     fs::write(&stimuli, right).unwrap();
 
+    // The description of an unchanged library is kept: the model does not run again.
+    let files = walk(&folder.join("target/fmu-build"));
+    let kept = files.iter().find(|file| file.ends_with("release/libmy_model.description.json")).unwrap();
+    let description = fs::read_to_string(kept).unwrap();
+    let other = description.replacen("\"description\":\"", "\"description\":\"Kept: ", 1);
+    assert_ne!(other, description);
+    fs::write(kept, other).unwrap();
+    succeeds(command("fmu", &folder).args(["build", "--no-reference"]));
+    let files = fmu_import::contents(&folder.join(archives[1])).unwrap().1;
+    assert!(String::from_utf8_lossy(&files["modelDescription.xml"]).contains("description=\"Kept: "));
+
     // A build for development has the paths of the sources, for a debugger, and no reference result.
     let lines = ("CARGO_PROFILE_DEV_DEBUG", "line-tables-only");
     succeeds(command("fmu", &folder).args(["build", "--dev"]).env(lines.0, lines.1));

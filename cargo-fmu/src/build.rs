@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use fmu_core::Description;
 use fmu_import::elf::{FLOOR, Needs};
 use fmu_import::platform::Platform;
-use fmu_import::{Folder, printable};
+use fmu_import::{Folder, printable, whole};
 use fmu_pack::archive::{self, GenerationTime, PackedFile};
 use fmu_pack::compile::{Library, Profile, compile};
 use fmu_pack::icons;
@@ -18,6 +18,7 @@ use fmu_pack::workspace::{Package, Workspace, output_folder};
 use model_description::FmiVersion;
 use std::collections::BTreeMap;
 use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Compiles FMUs and packs them for both standards.
@@ -276,7 +277,9 @@ fn compiled(workspace: &Workspace, args: &Models) -> Result<Vec<Model>> {
         let resources = Some(folder.join("resources")).filter(|folder| folder.is_dir());
         let binaries = built.get(package).map(Vec::as_slice).unwrap_or_default();
         let stimuli = folder.join(reference::STIMULI);
-        load(own, binaries, Licenses::of_package(workspace, package), resources.as_deref(), stimuli, &args.process)
+        let describe =
+            |library: &Path, folder: Option<&Path>, files: &_| described(library, folder, files, &args.process);
+        load(own, binaries, Licenses::of_package(workspace, package), resources.as_deref(), stimuli, describe)
     };
     describing.iter().map(model).collect()
 }
@@ -372,7 +375,31 @@ fn given(libraries: &[String], resources: Option<&Path>, process: &ProcessOption
     let (_, own) = own.ok_or_else(|| {
         anyhow!("one library must be for this machine ({}): it describes the model", Platform::host())
     })?;
-    load(own, &libraries, Licenses::default(), resources, PathBuf::new(), process)
+    let describe = |library: &Path, folder: Option<&Path>, _: &_| model::describe(library, folder, process);
+    load(own, &libraries, Licenses::default(), resources, PathBuf::new(), describe)
+}
+
+/// The description of a compiled `library` with the resources in `folder`: the one kept beside it, unless the library or one of
+/// these `files` has changed. To find its dependencies, a model runs for seconds.
+fn described(
+    library: &Path,
+    folder: Option<&Path>,
+    files: &BTreeMap<String, PackedFile>,
+    process: &ProcessOptions,
+) -> Result<Description> {
+    let mut hasher = DefaultHasher::new();
+    (env!("CARGO_PKG_VERSION"), read(library)?, files).hash(&mut hasher);
+    let (now, kept) = (hasher.finish(), library.with_extension("description.json"));
+    if let Ok(bytes) = fs::read(&kept)
+        && let Ok((of, description)) = serde_json::from_slice::<(u64, Description)>(&bytes)
+        && of == now
+    {
+        return Ok(description);
+    }
+    let description = model::describe(library, folder, process)?;
+    // Without the file, the next build takes longer.
+    let _ = whole::write(&kept, &serde_json::to_vec(&(now, &description))?);
+    Ok(description)
 }
 
 /// The model of these libraries, described by the one for this computer.
@@ -382,12 +409,12 @@ fn load(
     licenses: Licenses,
     resources: Option<&Path>,
     stimuli: PathBuf,
-    process: &ProcessOptions,
+    describe: impl Fn(&Path, Option<&Path>, &BTreeMap<String, PackedFile>) -> Result<Description>,
 ) -> Result<Model> {
     let folder =
         resources.map(|folder| folder.canonicalize().with_context(|| folder.display().to_string())).transpose()?;
     let files = folder.as_deref().map_or_else(|| Ok(BTreeMap::new()), archive::resources)?;
-    let description = model::describe(own, folder.as_deref(), process)?;
+    let description = describe(own, folder.as_deref(), &files)?;
     if !icons::ARE_DRAWN && (description.icon.is_some() || description.terminals.iter().any(|t| t.picture.is_some())) {
         message::note(&printable(&format!(
             "{}: without its icon and pictures, which the command fmu draws",

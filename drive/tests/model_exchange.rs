@@ -5,6 +5,8 @@
 
 use drive::control::signals::ControllerInputs;
 use drive::frame::{AlphaBeta, Phases};
+use drive::plant::inverter::Inverter;
+use drive::plant::pwm::{InverterMode, OpenPhase, OpenSwitch, PwmUpdate, ZeroSequence};
 use drive::plant::signals::PlantOutputs;
 use drive::{PmsmDrive, PmsmPlant, SensorlessController};
 use fmu_core::events::grid;
@@ -143,6 +145,90 @@ fn an_enabled_plant_is_integrated_to_the_same_currents() {
         println!("{name}: {:e} A, {:e} rad/s apart, up to {highest} A", largest.0, largest.1);
         assert!(largest.0 < allowed && largest.1 < allowed_speed, "{name}: {largest:?}");
         assert!(highest > 0.5, "{name}: {highest} A");
+    }
+}
+
+/// A switched inverter, with these settings of the inverter and other parameters.
+type Switching = (&'static str, fn(&mut Inverter), fn(&mut PmsmPlant));
+
+#[test]
+fn a_switched_inverter_is_integrated_to_the_same_currents() {
+    let dead = |inverter: &mut Inverter| inverter.dead_time = 2e-6;
+    let lossy = |inverter: &mut Inverter| {
+        inverter.dead_time = 2e-6;
+        let devices = &mut inverter.devices;
+        (devices.u_transistor, devices.r_transistor, devices.u_diode, devices.r_diode) = (0.9, 0.06, 0.7, 0.05);
+    };
+    let cases: [Switching; 7] = [
+        ("ideal", |_| (), |_| ()),
+        ("dead time", dead, |_| ()),
+        ("devices", lossy, |_| ()),
+        ("saturation", dead, |plant| plant.parameters.saturation.s_2 = 40.0),
+        (
+            "double update",
+            |inverter| {
+                (inverter.dead_time, inverter.pwm.carrier_delay) = (3e-6, 1.3e-5);
+                (inverter.pwm.update, inverter.pwm.zero_sequence) = (PwmUpdate::Double, ZeroSequence::DpwmAlternating);
+            },
+            |_| (),
+        ),
+        ("open switch", |inverter| inverter.pwm.open_switch = OpenSwitch::UpperB, |_| ()),
+        ("open phase", |inverter| inverter.pwm.open_phase = OpenPhase::C, |_| ()),
+    ];
+    for (name, inverter, set) in cases {
+        let w = 300.0 * RPM;
+        let mut plant = Both::<PmsmPlant, 4>::new(|plant| {
+            (plant.parameters.initial.speed, plant.parameters.mechanics.J) = (w, 0.05);
+            plant.parameters.inverter.pwm.mode = InverterMode::Switched;
+            inverter(&mut plant.parameters.inverter);
+            set(plant);
+        });
+        let (mut largest, mut highest, mut blocked) = ((0.0_f64, 0.0_f64), 0.0_f64, 0);
+        for k in 0..300 {
+            let theta = 3.0 * w * T_S * f64::from(k) + PI / 2.0;
+            // Up to 7 A; small ones change sign within a period.
+            let u = 0.15 * 3.0 * w + 14.0 * f64::from(k % 40) / 39.0;
+            plant.set(|plant| {
+                plant.inputs.u = Phases::from_stator(AlphaBeta::new(u * theta.cos(), u * theta.sin()));
+                plant.inputs.enable = !(200..230).contains(&k);
+            });
+            // Every second time, to points within a period.
+            for h in if k % 2 == 0 { vec![T_S] } else { vec![0.37 * T_S, 0.63 * T_S] } {
+                plant.step(h, 2.0 * FINE);
+                let (di, dw) = apart(&plant.stepped.out, &plant.integrated.out);
+                largest = (largest.0.max(di), largest.1.max(dw));
+                highest = highest.max(plant.stepped.out.i_q);
+                blocked += u32::from(plant.integrated.out.i == Phases::default());
+            }
+        }
+        println!("{name}: {:e} A, {:e} rad/s apart, up to {highest} A, {blocked} times blocked", largest.0, largest.1);
+        assert!(largest.0 < 2e-6 && largest.1 < 1e-6, "{name}: {largest:?}");
+        assert!(highest > 0.5 && blocked > 10, "{name}: {highest} A, {blocked}");
+    }
+}
+
+/// In a dead time, the voltages amplify a difference of the currents, so those of the integration grow in a closed loop.
+#[test]
+fn a_drive_with_a_switched_inverter_takes_the_same_load_step() {
+    for (dead_time, allowed) in [(0.0, 1e-5), (2e-6, 5e-3)] {
+        let mut drive = Both::<PmsmDrive, 5>::new(|drive| {
+            let inverter = &mut drive.pair.plant.model.parameters.inverter;
+            (inverter.pwm.mode, inverter.dead_time) = (InverterMode::Switched, dead_time);
+            drive.inputs.speed_ref = 500.0 * RPM;
+        });
+        let (mut current, mut speed, mut highest) = (0.0_f64, 0.0_f64, 0.0_f64);
+        for k in 0..6000 {
+            if k == 4000 {
+                drive.set(|drive| drive.inputs.tau_load = 2.0);
+            }
+            drive.step(T_S, 5.0 * FINE);
+            let (di, dw) = apart(&drive.stepped.out.plant, &drive.integrated.out.plant);
+            (current, speed) = (current.max(di), speed.max(dw));
+            highest = highest.max(drive.stepped.out.plant.i_q.abs());
+        }
+        println!("dead time {dead_time}: {current:e} A, {speed:e} rad/s apart; i_q up to {highest} A");
+        assert!(current < allowed && speed < allowed, "{dead_time} s: {current} A, {speed} rad/s");
+        assert!(highest > 3.0, "the run is not trivial: {highest} A");
     }
 }
 

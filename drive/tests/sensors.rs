@@ -7,8 +7,12 @@
 mod machines;
 
 use drive::PmsmDrive;
+use drive::control::position::PositionSensor;
 use drive::control::sensor::Sensor;
-use fmu_core::{Block, ContinuousTime, Elapsed, Step, integrate};
+use drive::control::start::StartMode;
+use drive::control::tables::ControllerParameters;
+use drive::estimator::Kind;
+use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, integrate};
 use machines::b;
 use std::f64::consts::TAU;
 
@@ -16,6 +20,11 @@ const T_S: f64 = 1e-4;
 
 /// Mean and amplitudes at w and 2 w of the torque (N.m) for the reference `tau` (N.m), with the sensor errors of `set`.
 fn torque(tau: f64, exchange: bool, set: impl FnOnce(&mut Sensor)) -> [f64; 3] {
+    with_sensors(tau, exchange, |par| set(&mut par.sensor))
+}
+
+/// [`torque`] with other parameters of the controller.
+fn with_sensors(tau: f64, exchange: bool, set: impl FnOnce(&mut ControllerParameters)) -> [f64; 3] {
     let machine = b();
     let mut drive = Block::<PmsmDrive>::default();
     let plant = &mut drive.model.pair.plant.model.parameters;
@@ -23,7 +32,7 @@ fn torque(tau: f64, exchange: bool, set: impl FnOnce(&mut Sensor)) -> [f64; 3] {
     let par = &mut drive.model.pair.controller.model.parameters;
     *par = machine.parameters();
     par.speed_loop.torque_mode = true;
-    set(&mut par.sensor);
+    set(par);
     // 5 Hz, far below the 200 Hz of the current loop.
     let w = TAU * 5.0;
     let inputs = &mut drive.model.inputs;
@@ -79,6 +88,58 @@ fn a_gain_error_makes_a_torque_at_twice_the_electrical_speed() {
             assert!((at_2w / expected - 1.0).abs() < 0.025, "{at_2w} N.m, not {expected} N.m");
             assert!(((mean - tau) / -expected - 1.0).abs() < 0.025, "{} N.m, not {expected} N.m", mean - tau);
             assert!(at_w < 0.01 * expected, "{at_w} N.m");
+        }
+    }
+}
+
+/// A position sensor mounted with the error d: the d-axis current is 0 in its frame, and i_q cos d makes torque.
+#[test]
+fn a_mounting_error_costs_its_cosine() {
+    for exchange in [false, true] {
+        for d in [0.3, -0.3_f64] {
+            let [mean, at_w, _] = with_sensors(2.0, exchange, |par| {
+                (par.estimator, par.position.angle_offset) = (Kind::Sensored, d);
+                (par.start.mode, par.current.mtpa) = (StartMode::Direct, false);
+            });
+            assert!((mean / (2.0 * d.cos()) - 1.0).abs() < 1e-3 && at_w < 1e-3, "{d}: {mean} N.m, {at_w} N.m");
+        }
+    }
+}
+
+/// From rest at any angle to 60 rad/s, then a load: every position sensor holds the speed.
+#[test]
+fn every_position_sensor_starts_and_holds_the_drive() {
+    for (kind, allowed) in [
+        (PositionSensor::Ideal, 1e-4),
+        (PositionSensor::Encoder, 0.01),
+        (PositionSensor::Hall, 1e-3),
+        (PositionSensor::Resolver, 0.01),
+    ] {
+        for theta_e in [0.1, 1.6, 3.0, -2.0] {
+            let machine = b();
+            let mut drive = Block::<PmsmDrive>::default();
+            let plant = &mut drive.model.pair.plant.model.parameters;
+            (plant.motor, plant.mechanics.J, plant.initial.theta_e) = (machine.motor.clone(), machine.J, theta_e);
+            let par = &mut drive.model.pair.controller.model.parameters;
+            *par = machine.parameters();
+            (par.estimator, par.position.kind, par.start.mode) = (Kind::Sensored, kind, StartMode::Direct);
+            drive.model.inputs.speed_ref = 60.0;
+            drive.model.validate().unwrap();
+            drive.initialize();
+            let (mut now, mut most) = (Elapsed::ZERO, 0.0_f64);
+            for k in 0..12_000 {
+                if k == 6000 {
+                    drive.model.inputs.tau_load = 1.5;
+                }
+                let step = Step { start: now, h: T_S };
+                drive.step(&step).unwrap();
+                now = step.end();
+                if (5000..6000).contains(&k) || k > 11_000 {
+                    most = most.max((drive.out.plant.speed - 60.0).abs());
+                }
+            }
+            println!("{kind:?} from {theta_e}: within {most} rad/s");
+            assert!(most < allowed, "{kind:?} from {theta_e}: {most} rad/s");
         }
     }
 }

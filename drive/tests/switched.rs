@@ -8,7 +8,7 @@ use drive::plant::inverter::Inverter;
 use drive::plant::pwm::{InverterMode, OpenPhase, OpenSwitch, PwmUpdate, ZeroSequence};
 use drive::{Pair, PmsmDrive};
 use fmu_core::log::Warnings;
-use fmu_core::{Block, Elapsed, Interface, Model, Step, Warns};
+use fmu_core::{Block, Elapsed, Model, Step, Warns};
 use std::f64::consts::{PI, TAU};
 
 const RPM: f64 = PI / 30.0;
@@ -529,12 +529,56 @@ fn the_diodes_are_a_bridge() {
     }
 }
 
+/// A delayed carrier is the same one, later; and samples between its extremes contain the ripple.
+#[test]
+fn a_delayed_carrier_is_the_same_one_later() {
+    let (T, delay, n) = (1e-4, 2.3e-5, 40_u32);
+    let run = |delay: f64, dead_time: f64| {
+        let mut block = plant(0.0, |inverter| (inverter.pwm.carrier_delay, inverter.dead_time) = (delay, dead_time));
+        block.initialize();
+        let (mut now, mut seen) = (Elapsed::ZERO, Vec::new());
+        let mut pass = |block: &mut Block<PmsmPlant>, h: f64| {
+            let step = Step { start: now, h };
+            block.step(&step).unwrap();
+            now = step.end();
+            block.out.i.a
+        };
+        if delay > 0.0 {
+            pass(&mut block, delay);
+        }
+        for k in 0..n {
+            let angle = 0.07 * f64::from(k);
+            block.model.inputs.u = Phases::from_stator(AlphaBeta::new(20.0 * angle.cos(), 20.0 * angle.sin()));
+            // At the middle and the end of what was a quarter before.
+            seen.push([pass(&mut block, T - delay.max(2.3e-5)), pass(&mut block, delay.max(2.3e-5))]);
+        }
+        seen
+    };
+    for dead_time in [0.0, 2e-6] {
+        let (at_once, later) = (run(0.0, dead_time), run(delay, dead_time));
+        let apart =
+            at_once.iter().flatten().zip(later.iter().flatten()).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(apart < 1e-9, "{dead_time} s: {apart} A apart");
+    }
+    // The reference of the mean: samples at the extremes agree with the average inverter, others do not.
+    let sampled = |delay: f64| {
+        let mut switched = plant(0.0, |inverter| inverter.pwm.carrier_delay = delay);
+        let mut average = plant(0.0, |inverter| inverter.pwm.mode = InverterMode::Average);
+        let (mut found, mut expected) = (Vec::new(), Vec::new());
+        rotate(&mut switched, (40.0, 300.0), (T, 300), |block| found.push(block.out.i.a));
+        rotate(&mut average, (40.0, 300.0), (T, 300), |block| expected.push(block.out.i.a));
+        let pairs = found.iter().zip(&expected).skip(100);
+        pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let (at_extremes, between) = (sampled(0.0), sampled(0.25 * T));
+    println!("{at_extremes} A at the extremes, {between} A between them");
+    assert!(at_extremes < 2e-3 && between > 0.03, "{at_extremes} A, {between} A");
+}
+
 #[test]
 fn what_is_not_modelled_is_refused_by_name() {
     let mut block = plant(0.0, |_| ());
     let message = |fault: Result<(), fmu_core::Fault>| fault.unwrap_err().message().to_owned();
-    let error = message(block.model.validate_for(Interface::ModelExchange));
-    assert!(error.starts_with("inverter.mode = 2 (Switched) is not allowed: 1 (Average) in Model Exchange"), "{error}");
     block.model.parameters.iron.G_e = 1e-4;
     let error = message(block.model.validate());
     assert!(error.contains("inverter.mode = 2 (Switched)") && error.contains("iron.G_e = 0.0001 S"), "{error}");
@@ -542,6 +586,9 @@ fn what_is_not_modelled_is_refused_by_name() {
     block.initialize();
     let error = message(block.model.validate());
     assert!(error.contains("inverter.pulse_min = 0.00006 s") && error.contains("T_pwm"), "{error}");
+    let block = plant(0.0, |inverter| inverter.pwm.carrier_delay = 6e-5);
+    let error = message(block.model.validate());
+    assert!(error.contains("inverter.carrier_delay = 0.00006 s") && error.contains("T_pwm"), "{error}");
 }
 
 /// A carrier that takes over fewer commands than the controller gives loses some: the first second says so.

@@ -2,6 +2,8 @@
 #![allow(missing_docs)]
 
 use drive::motor::Motor;
+use drive::plant::pwm::{InverterMode, OpenPhase};
+use drive::plant::saturation::Saturation;
 use drive::plant::thermal::{Temperatures, ThermalMode};
 use drive::{PmsmDrive, PmsmPlant};
 use fmu_core::{Block, Causality, ContinuousTime, Differentiable, Elapsed, Events, Kind, Model, Slot, Variability};
@@ -125,7 +127,12 @@ struct Kinds {
     no_link: u32,
     lossy: u32,
     warm: u32,
+    open: u32,
 }
+
+/// Number of points with the average inverter, and of all: the others switch.
+const AVERAGE: u32 = 100;
+const ALL: u32 = 140;
 
 fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
     let mut block = Block::<PmsmPlant>::default();
@@ -146,6 +153,15 @@ fn draw(draw: &mut Draw, point: u32, kinds: &mut Kinds) -> Block<PmsmPlant> {
         (devices.u_transistor, devices.r_transistor, devices.u_diode, devices.r_diode) = (0.9, 0.06, 0.7, 0.05);
         (devices.E_sw, devices.i_sw, devices.u_sw) = (2.5e-3, 15.0, 600.0);
         kinds.lossy += 1;
+    }
+    if point >= AVERAGE {
+        par.inverter.pwm.mode = InverterMode::Switched;
+        (par.iron.G_e, par.iron.G_h) = (0.0, 0.0);
+        if draw.often() {
+            // One leg blocks; d i / d psi counts as constant then.
+            (par.inverter.pwm.open_phase, par.saturation) = (OpenPhase::B, Saturation::default());
+            kinds.open += 1;
+        }
     }
     par.mechanics.imposed = point % 4 == 1;
     kinds.imposed += u32::from(par.mechanics.imposed);
@@ -211,7 +227,7 @@ fn the_tangent_of_the_plant_is_its_derivative() {
     let mut marked = Block::<PmsmPlant>::default();
     marked.out.efficiency = 0.123;
     let efficiency = unknowns(&[0.0; 4], &mut marked).iter().position(|x| x.to_bits() == 0.123_f64.to_bits()).unwrap();
-    for point in 0..100 {
+    for point in 0..ALL {
         let base = draw(&mut numbers, point, &mut kinds);
         let value = evaluate(&base);
         let no_link = base.model.inputs.u_dc == 0.0;
@@ -229,8 +245,9 @@ fn the_tangent_of_the_plant_is_its_derivative() {
         let exact: Vec<Vec<f64>> = seeds.iter().map(|seed| tangent(&base, &knowns, seed)).collect();
         // The steps stay clear of the nearest kinks at these points.
         let near: Vec<Vec<f64>> = seeds.iter().map(|seed| difference(&base, &knowns, seed, 1e-5)).collect();
-        // Without power at the shaft the efficiency has a kink: it is 0, and p_mech / p_in on one side.
-        let kink = (base.out.powers.p_mech.abs() < 1e-6).then_some(efficiency);
+        // Without power at the shaft or from the link the efficiency has a kink: it is 0, and p_mech / p_in on one side.
+        let powers = &base.out.powers;
+        let kink = (powers.p_mech.abs().min(powers.p_in.abs()) < 1e-6).then_some(efficiency);
         for row in (0..value.len()).filter(|row| kink != Some(*row)) {
             let size = exact.iter().map(|column| column[row].abs()).fold(0.0, f64::max);
             for (exact, near) in exact.iter().zip(&near) {
@@ -250,15 +267,16 @@ fn the_tangent_of_the_plant_is_its_derivative() {
         }
     }
     println!("worst relative error {worst:e}; points: {kinds:?}");
-    let Kinds { standstill, limited, zone, blocked, conducting, imposed, saturated, no_link, lossy, warm } = kinds;
-    let all = [standstill, limited, zone, blocked, conducting, imposed, saturated, no_link, lossy, warm];
+    let Kinds { standstill, limited, zone, blocked, conducting, imposed, saturated, no_link, lossy, warm, open } =
+        kinds;
+    let all = [standstill, limited, zone, blocked, conducting, imposed, saturated, no_link, lossy, warm, open];
     assert!(all.iter().all(|&count| count > 3), "{kinds:?}");
 }
 
 #[test]
 fn tangents_are_linear() {
     let (knowns, mut numbers, mut kinds) = (knowns(), Draw(0x2545_f491_4f6c_dd1d), Kinds::default());
-    for point in 0..100 {
+    for point in 0..ALL {
         let base = draw(&mut numbers, point, &mut kinds);
         let mut seed = || -> Vec<f64> { knowns.iter().map(|known| numbers.around(known.size)).collect() };
         let (v, w) = (seed(), seed());

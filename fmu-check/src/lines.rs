@@ -43,6 +43,9 @@ pub struct ProbeArguments {
     /// The binary.
     #[arg(long)]
     pub binary: PathBuf,
+    /// File with the description as the checker has read it; without it, the probe reads the one in the folder.
+    #[arg(long)]
+    pub description: Option<PathBuf>,
     /// File that the findings go to.
     #[arg(long)]
     pub out: PathBuf,

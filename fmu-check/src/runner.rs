@@ -33,6 +33,8 @@ const INSTANCE_ALONE: [&str; 5] = ["X04", "L01a", "G-L2a", "G-L2b", "G-L3c"];
 /// The check that processes which outlive a probe count for.
 const LEFT_BEHIND: &str = "B08p";
 pub(super) const OUT_OF_TIME: &str = "the run reached its time limit (see --timeout)";
+/// File with the description for the probes.
+const DESCRIPTION: &str = "description";
 /// After this time, a clock that counts seconds shows a different value.
 const ANOTHER_SECOND: Duration = Duration::from_millis(1050);
 /// Maximum number of restarts of a probe whose cases crash it.
@@ -42,6 +44,8 @@ const MAX_RESTARTS: usize = 12;
 pub(super) struct Runner {
     program: PathBuf,
     dir: PathBuf,
+    /// The description as this process has read it, for the probes.
+    description: Folder,
     /// Findings come with all their calls.
     scripts: bool,
     /// The attribute generationTool.
@@ -115,10 +119,14 @@ impl Runner {
         if simulation.is_none() && exchange.is_none() && scheduled.is_none() {
             return Err("the description has no interface".into());
         }
+        let kept = Folder::of_probe().map_err(|e| e.to_string())?;
+        let bytes = postcard::to_stdvec(description).map_err(|e| e.to_string())?;
+        fs::write(kept.path().join(DESCRIPTION), bytes).map_err(|e| e.to_string())?;
         let program = options.program.clone().map_or_else(std::env::current_exe, Ok).map_err(|e| e.to_string())?;
         Ok(Self {
             program,
             dir: fmu.dir().to_owned(),
+            description: kept,
             scripts: options.scripts,
             tool: description.generation_tool.clone(),
             simulation,
@@ -279,6 +287,8 @@ impl Runner {
             .arg(&conditions.dir)
             .arg("--binary")
             .arg(&conditions.binary)
+            .arg("--description")
+            .arg(self.description.path().join(DESCRIPTION))
             .arg("--out")
             .arg(folder.join("out"))
             .current_dir(folder.join("home"));

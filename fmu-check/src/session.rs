@@ -100,13 +100,21 @@ fn of_other(binary: &Path) -> Option<String> {
     Some(format!("it is for {}, and this computer is {}", first.tuple(), host.tuple()))
 }
 
+/// The description: a hundred probes of a large FMU spend most of their time on its XML.
+fn description(args: &ProbeArguments) -> Result<ModelDescription, String> {
+    let read = |path: &Path| std::fs::read(path).map_err(|e| e.to_string());
+    match &args.description {
+        Some(file) => postcard::from_bytes(&read(file)?).map_err(|e| e.to_string()),
+        None => model_description::read(read(&args.dir.join("modelDescription.xml"))?).map_err(|e| e.to_string()),
+    }
+}
+
 impl Session {
     /// Loads the FMU.
     pub(super) fn open(args: &ProbeArguments) -> Result<Self, NotOpened> {
         let lost = |e: &dyn std::fmt::Display| NotOpened::Here(e.to_string());
         let home = std::env::current_dir().map_err(|e| lost(&e))?;
-        let xml = std::fs::read(args.dir.join("modelDescription.xml")).map_err(|e| lost(&e))?;
-        let description = model_description::read(&xml).map_err(|e| lost(&e))?;
+        let description = description(args).map_err(|e| lost(&e))?;
         let create = |path: &Path| File::options().create(true).append(true).open(path).map_err(|e| lost(&e));
         let lines = create(&args.out)?;
         let calls = args.out.with_extension("call");

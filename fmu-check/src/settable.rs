@@ -7,10 +7,14 @@ use std::collections::HashSet;
 /// Which variables are further names of a value (FMI 2.0): an earlier variable has the same value reference and can be set, or
 /// cannot be set, as well. V02b looks at the names; the other checks would find one fault several times.
 pub(super) fn aliases(description: &ModelDescription) -> Vec<bool> {
+    let all = &description.variables;
+    // Ascending references, as most files have them, are no names of the same value.
+    if description.version == FmiVersion::V3 || all.is_sorted_by(|a, b| a.value_reference < b.value_reference) {
+        return vec![false; all.len()];
+    }
     let mut seen = HashSet::new();
     let key = |v: &ModelVariable| (type_name(v.base, description.version), v.value_reference, settable(v));
-    let v2 = description.version == FmiVersion::V2;
-    description.variables.iter().map(|v| v2 && !seen.insert(key(v))).collect()
+    all.iter().map(|v| !seen.insert(key(v))).collect()
 }
 
 /// Whether a variable can be set before initialization mode ends.

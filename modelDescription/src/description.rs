@@ -5,9 +5,10 @@ use crate::units::{DisplayUnit, TypeDefinition, Unit};
 use crate::variable::{Dimension, ModelVariable};
 use crate::version::FmiVersion;
 use fmu_core::variable::element;
+use serde::{Deserialize, Serialize};
 
 /// A modelDescription.xml.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelDescription {
     /// The standard.
     pub version: FmiVersion,
@@ -149,7 +150,7 @@ impl ModelDescription {
 /// One of the interfaces: its model identifier and the capabilities it claims.
 ///
 /// Capabilities are kept as written, so that a checker can find misspelled ones; [`flag`](Self::flag) reads them.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Interface {
     /// Base name of the binaries.
     pub model_identifier: String,
@@ -224,7 +225,7 @@ impl Interface {
 }
 
 /// The default experiment as given in the file: times in the unit of the independent variable, usually s.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Experiment {
     /// Start time.
     pub start: Option<f64>,
@@ -237,7 +238,7 @@ pub struct Experiment {
 }
 
 /// A log category.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LogCategory {
     /// Name that messages and `SetDebugLogging` use.
     pub name: String,
@@ -246,7 +247,7 @@ pub struct LogCategory {
 }
 
 /// An entry of the model structure. Its numbers are as written; [`ModelDescription::referenced`] finds the variables.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Unknown {
     /// The variable.
     pub reference: u32,

@@ -1,9 +1,10 @@
 //! Units and type definitions as in a file (FMI 2.0.5, 2.2.2 and 2.2.3; FMI 3.0.2, 2.4.3 and 2.4.4).
 
 use crate::variable::BaseType;
+use serde::{Deserialize, Serialize};
 
 /// A unit with its display units.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Unit {
     /// Name, for example `N.m`.
     pub name: String,
@@ -23,7 +24,7 @@ impl Unit {
 }
 
 /// Exponents of the SI base units and of the radian: `base value = factor * value + offset`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BaseUnit {
     /// Exponents of kg, m, s, A, K, mol, cd and rad, in this order.
     pub exponents: [i32; 8],
@@ -39,7 +40,7 @@ impl BaseUnit {
 }
 
 /// A display unit: `shown = factor * value + offset`, or `factor / value` when inverse.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DisplayUnit {
     /// Name, for example `rpm`.
     pub name: String,
@@ -69,7 +70,7 @@ impl DisplayUnit {
 }
 
 /// A type definition: the common properties of the variables that refer to it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TypeDefinition {
     /// Name that `declaredType` refers to.
     pub name: String,
@@ -98,7 +99,7 @@ pub struct TypeDefinition {
 }
 
 /// One value of an enumeration.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Item {
     /// Name that tools show.
     pub name: String,

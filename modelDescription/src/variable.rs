@@ -1,10 +1,12 @@
 //! Variables as in a file (FMI 2.0.5, 2.2.7; FMI 3.0.2, 2.4.7).
 
+use serde::{Deserialize, Serialize};
+
 /// Declares an enumeration of words of the XML, with conversions in both directions.
 macro_rules! words {
     ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $word:literal),* $(,)? }) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
         pub enum $name { $($(#[$variant_doc])* $variant),* }
 
         impl $name {
@@ -146,7 +148,7 @@ words! {
 }
 
 /// When a clock ticks, as in the file (FMI 3.0 only).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ClockTiming {
     /// The source of its ticks.
     pub ticks: IntervalVariability,
@@ -159,7 +161,7 @@ pub struct ClockTiming {
 }
 
 /// One extent of an array (FMI 3.0 only).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Dimension {
     /// A number.
     Fixed(u64),
@@ -168,7 +170,7 @@ pub enum Dimension {
 }
 
 /// Another name of a variable (FMI 3.0 only).
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Alias {
     /// Structured name, unique in the FMU.
     pub name: String,
@@ -179,7 +181,7 @@ pub struct Alias {
 }
 
 /// A variable. Missing properties come from its type definition, then from the standard's default.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelVariable {
     /// Full name.
     pub name: String,

@@ -150,6 +150,29 @@ def test_drive(archives, standard):
 
 
 @STANDARDS
+@pytest.mark.parametrize("solver", ["CVode", "Euler"])
+def test_switched_inverter(archives, standard, solver):
+    """Time events of the carrier, state events of the diodes, energy lost in each commutation."""
+    losses = {"r_transistor": 0.06, "u_transistor": 0.9, "r_diode": 0.05, "u_diode": 0.7, "E_sw": 2.5e-3}
+    inverter = {"mode": 2, "dead_time": 2e-6, **losses}
+    stop, step = (0.05, 1e-4) if solver == "CVode" else (0.01, 1e-6)  # Euler's step is the output interval
+    start = {f"plant.inverter.{name}": value for name, value in inverter.items()}
+    arguments = {"start_values": {"speed_ref": 50.0, "tau_load": 1.0, **start}, "stop_time": stop, "record_events": False}
+    archive = archives / f"fmi{standard}" / "PmsmDrive.fmu"
+    exchange = {"solver": solver, "step_size": step, "output_interval": step, "relative_tolerance": 1e-8}
+    output = ["speed", *CURRENTS, *MEANS]
+    result = simulate_fmu(archive, fmi_type="ModelExchange", output=output, **exchange, **arguments)
+    reference = simulate_fmu(archive, fmi_type="CoSimulation", output=output, step_size=1e-4, output_interval=1e-4, **arguments)
+    result = result[:: round(1e-4 / step)]
+    bound = 1e-3 if solver == "CVode" else 2e-2
+    for name in ("speed", *CURRENTS):
+        assert np.abs(result[name] - reference[name]).max() < bound, name
+    assert np.abs(reference["i_q"]).max() > 2.0
+    for name in MEANS:
+        assert np.abs(result[name] - reference[name]).max() < max(2e-4, bound) * np.abs(reference[name]).max(), name
+
+
+@STANDARDS
 def test_pair(archives, standard):
     """Plant and controller connected: the same."""
     folder = archives / f"fmi{standard}"

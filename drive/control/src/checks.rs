@@ -3,6 +3,7 @@
 use crate::battery::DcLimits;
 use crate::commission::CommissionMode;
 use crate::estimator::{Class, Kind};
+use crate::position;
 use crate::reference::max_torque;
 use crate::tables::{ControllerParameters, PARAMETERS};
 use crate::weakening::{INVERSE_SQRT_3, WeakeningGains};
@@ -158,6 +159,20 @@ pub(crate) fn catch(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> 
         table.tell(par, |p| &mut p.T_s),
         table.tell(par, |p| &mut p.limit.i)
     )))
+}
+
+/// Checks that the tracking loop of the position sensor is stable.
+///
+/// # Errors
+/// Its pole is too fast for the sample period.
+pub(crate) fn position(par: &ControllerParameters) -> Result<(), Fault> {
+    let most = position::FASTEST / par.T_s;
+    if par.estimator != Kind::Sensored || !par.position.tracks() || par.position.bandwidth <= most {
+        return Ok(());
+    }
+    let (kind, T_s) = (PARAMETERS.tell(par, |p| &mut p.position.kind), PARAMETERS.tell(par, |p| &mut p.T_s));
+    let allowed = format!("at most {most} rad/s with {kind} and {T_s}: {} / T_s", position::FASTEST);
+    Err(PARAMETERS.fault(par, |p| &mut p.position.bandwidth, allowed))
 }
 
 /// Checks the limits of the trips, on a DC link of `u_dc` (V) at the start, or 0 later.

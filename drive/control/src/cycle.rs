@@ -216,6 +216,7 @@ impl SensorlessController {
     pub(super) fn measure(&self) -> Sample {
         let Self { inputs, parameters: par, gains, state, .. } = self;
         let i = self.currents().to_stator();
+        let (theta_meas, w_meas) = self.measured_position();
         // The command applied since the last sample: the newest one if there is no delay.
         let [newest, older, oldest] = &state.commands;
         let Command { mut u, injected } = *match par.delay {
@@ -239,8 +240,8 @@ impl SensorlessController {
             i_ref: state.i_ref,
             tau_ref: state.tau_ref,
             rho: if state.weakening.weakens { gains.weakening.tracker(state.i_ref) } else { 0.0 },
-            theta_meas: inputs.theta_meas,
-            w_meas: f64::from(par.motor.n_p) * inputs.speed_meas,
+            theta_meas,
+            w_meas,
             u_dc: inputs.u_dc,
             speed_ref: (!par.speed_loop.torque_mode).then_some(inputs.speed_ref),
         }

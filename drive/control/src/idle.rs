@@ -5,6 +5,8 @@
 
 use crate::commissioning::CommissionMode;
 use crate::estimator::{Class, Kind};
+use crate::position::PositionSensor;
+use crate::sensor::MeasuredPhases;
 use crate::start::StartMode;
 use crate::tables::ControllerParameters as Par;
 use fmu_core::idle::Acts;
@@ -27,7 +29,7 @@ pub const ACTS: &[Acts<Par>] = &[
         "zero_speed.by_need", "brake.tau", "brake.hold", "speed_loop.torque_mode",
         "current.bandwidth", "current.active_resistance", "current.integral", "current.reference_feed_forward", "current.mtpa",
         "weakening.use", "modulation.mode", "start.mode", "start.catch", "lock.u", "lock.angle", "lock.time", "trip.use", "sensor.gain_a", "sensor.gain_b",
-        "sensor.gain_c", "sensor.offset_a", "sensor.offset_b", "sensor.offset_c", "sensor.noise", "sensor.resolution",
+        "sensor.offset_a", "sensor.offset_b", "sensor.noise", "sensor.resolution", "sensor.phases",
         "compensation.u_dead", "compensation.calibrate", "commission.mode", "adaptation.k_a",
         "adaptation.tracking", "flux_observer.magnet", "tracker.kind", "emf.frame_term", "emf.hold_reversal", "matsui.integral",
         "pulsating.demodulation", "gradient.clamped",
@@ -52,9 +54,21 @@ pub const ACTS: &[Acts<Par>] = &[
     Acts { names: &["polarity.t_find", "polarity.voltage", "polarity.samples", "saturation.s_2"],
         when: |p| p.start.mode == StartMode::Injection, why: "no effect unless start.mode = Injection" },
     Acts { names: &["trip.i", "trip.u_dc", "trip.u_dc_min", "trip.u_dc_restart", "trip.asc"], when: |p| p.trip.used, why: "no effect without trip.use" },
+    Acts { names: &["sensor.gain_c", "sensor.offset_c"], when: |p| p.sensor.phases == MeasuredPhases::Three,
+        why: "no effect with sensor.phases = Two" },
     Acts { names: &["sensor.seed"], when: |p| p.sensor.noise > 0.0, why: "no effect without sensor.noise" },
     Acts { names: &["sensor.fallback", "theta_meas", "speed_meas"], when: |p| p.estimator == Kind::Sensored,
         why: "no effect unless estimator = Sensored" },
+    Acts { names: &["sensor.position", "sensor.angle_offset"], when: |p| p.estimator == Kind::Sensored,
+        why: "no effect unless estimator = Sensored" },
+    Acts { names: &["sensor.counts"], when: |p| p.senses(PositionSensor::Encoder),
+        why: "no effect unless estimator = Sensored and sensor.position = Encoder" },
+    Acts { names: &["sensor.bandwidth"], when: |p| p.estimator == Kind::Sensored && p.position.tracks(),
+        why: "no effect unless estimator = Sensored and sensor.position = Encoder or Resolver" },
+    Acts { names: &["sensor.hall_b", "sensor.hall_c"], when: |p| p.senses(PositionSensor::Hall),
+        why: "no effect unless estimator = Sensored and sensor.position = Hall" },
+    Acts { names: &["sensor.cos_gain", "sensor.quadrature", "sensor.bits"], when: |p| p.senses(PositionSensor::Resolver),
+        why: "no effect unless estimator = Sensored and sensor.position = Resolver" },
     Acts { names: &["sensor.resume"], when: Par::has_fallback,
         why: "no effect unless estimator = Sensored and sensor.fallback is another one" },
     Acts { names: &["sensor_valid"], when: Par::has_fallback, why: "no effect unless estimator = Sensored and sensor.fallback is another one" },

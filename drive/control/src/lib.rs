@@ -29,6 +29,7 @@ pub mod model;
 pub mod modes;
 pub mod overload;
 pub mod polarity;
+pub mod position;
 pub mod reference;
 mod reluctance;
 pub mod sensor;

@@ -9,6 +9,7 @@ use crate::idle;
 use crate::lock::{LOST, Lock};
 use crate::modes::{Follows, MODE_INPUTS};
 use crate::overload::Overload;
+use crate::position::{Position, PositionSensor};
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::stands;
 use crate::start::StartMode;
@@ -47,6 +48,8 @@ pub struct SensorlessController {
     pub(super) in_use: InUse,
     pub(super) state: State,
     commissioning: Held,
+    /// The position sensor.
+    pub(super) position: Position,
 }
 
 impl SensorlessController {
@@ -110,6 +113,30 @@ impl SensorlessController {
         }
     }
 
+    /// Whether angle and speed come from a position sensor that is not ideal.
+    #[inline]
+    pub(super) fn has_position_sensor(&self) -> bool {
+        let position = &self.parameters.position;
+        position.kind != PositionSensor::Ideal || position.angle_offset != 0.0
+    }
+
+    /// Reads the position sensor.
+    #[cold]
+    #[inline(never)]
+    fn read_position(&mut self) {
+        let par = &self.parameters;
+        self.position.read(&par.position, &self.inputs, par.motor.n_p, par.T_s);
+    }
+
+    /// Measured electrical angle (rad) and speed (rad/s).
+    #[inline]
+    pub(super) fn measured_position(&self) -> (f64, f64) {
+        if self.has_position_sensor() {
+            return self.position.seen;
+        }
+        (self.inputs.theta_meas, f64::from(self.parameters.motor.n_p) * self.inputs.speed_meas)
+    }
+
     /// Whether a lost sensor takes over again.
     fn resumes(&self) -> bool {
         self.parameters.resume && self.inputs.sensor_valid
@@ -143,9 +170,11 @@ impl SensorlessController {
             self.state.trip = Trip::default();
             return false;
         }
+        let (_, w) = self.measured_position();
         let Self { inputs, parameters: par, state, .. } = self;
         let sensor = par.estimator == Kind::Sensored && inputs.sensor_valid && !state.sensor_lost;
-        state.trip.update(&par.trip, &par.motor, inputs.u_dc, sensor.then_some(inputs.speed_meas));
+        let speed = sensor.then(|| w / f64::from(par.motor.n_p));
+        state.trip.update(&par.trip, &par.motor, inputs.u_dc, speed);
         self.stop();
         true
     }
@@ -276,6 +305,7 @@ impl SensorlessController {
         checks::weakening(par, u_dc)?;
         checks::trip(par, u_dc)?;
         checks::catch(par, u_dc)?;
+        checks::position(par)?;
         checks::commissioning(par)?;
         checks::dc_limits(par)?;
         // The start value is accepted with an estimator that does not read it.
@@ -310,7 +340,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 24;
+    const STATE_VERSION: u16 = 25;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -349,7 +379,7 @@ impl Model for SensorlessController {
         let waits = self.parameters.start.catch || commissions && commission_start;
         self.state = State::new(&self.parameters, enable && !asc && !waits);
         self.state.shown.short_circuit = asc;
-        self.tuned = false;
+        (self.tuned, self.position) = (false, Position::default());
     }
 
     fn output(&self, _now: Elapsed, out: &mut ControllerOutputs) {
@@ -385,6 +415,9 @@ impl Sampled for SensorlessController {
 
     fn sample(&mut self) -> Result<(), Fault> {
         self.finite()?;
+        if self.has_position_sensor() {
+            self.read_position();
+        }
         self.compute();
         if let Some(commissioning) = &self.commissioning {
             let out = &mut self.state.computed;

@@ -11,9 +11,19 @@ use drive_base::frame::Phases;
 use drive_base::math::{ln, sin_cos};
 use fmu_core::draw::{GOLDEN, mix};
 use fmu_core::unit::{AMPERE, ONE};
-use fmu_core::{Row, Table, table};
+use fmu_core::{Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+
+enumeration! {
+    /// The phases with a current sensor; values never change.
+    #[derive(Default, Serialize, Deserialize)]
+    pub enum MeasuredPhases("MeasuredPhases", "Phases with a current sensor") {
+        #[default]
+        1 Three "All three phases";
+        2 Two "Phases a and b: i_c = -i_a - i_b, with the errors of both";
+    }
+}
 
 /// Parameters; by default the sensors are ideal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -28,12 +38,14 @@ pub struct Sensor {
     pub seed: i32,
     /// Step of the converter in A, >= 0; 0: none.
     pub resolution: f64,
+    /// The phases that have one.
+    pub phases: MeasuredPhases,
 }
 
 impl Default for Sensor {
     fn default() -> Self {
         let gain = Phases { a: 1.0, b: 1.0, c: 1.0 };
-        Self { gain, offset: Phases::default(), noise: 0.0, seed: 1, resolution: 0.0 }
+        Self { gain, offset: Phases::default(), noise: 0.0, seed: 1, resolution: 0.0, phases: MeasuredPhases::Three }
     }
 }
 
@@ -53,6 +65,9 @@ impl Sensor {
         if self.resolution > 0.0 {
             let step = |x: f64| (x / self.resolution).round() * self.resolution;
             i = Phases { a: step(i.a), b: step(i.b), c: step(i.c) };
+        }
+        if self.phases == MeasuredPhases::Two {
+            i.c = -i.a - i.b;
         }
         i
     }
@@ -112,6 +127,7 @@ pub const SENSOR: &Table<Sensor> = table![
     P::integer_parameter("seed", "Seed of the noise: the same seed gives the same noise", |p| &mut p.seed),
     P::parameter("resolution", &AMPERE, "Step of the current measurement; 0: none", |p| &mut p.resolution)
         .at_least(0.0),
+    P::enumeration_parameter("phases", "Phases with a current sensor", &Field(|p| &mut p.phases)),
 ];
 
 #[cfg(test)]
@@ -157,6 +173,14 @@ mod tests {
         let sensor = Sensor { resolution: 40.0 / 4096.0, ..Sensor::default() };
         let measured = sensor.measure(Phases { a: 1.0, b: 0.004, c: -0.006 }, 0);
         assert!((measured.a - 1.0).abs() <= 0.5 * 40.0 / 4096.0 && measured.b.abs() < 1e-12 && measured.c < -0.009);
+    }
+
+    #[test]
+    fn two_sensors_leave_the_third_current_to_the_sum() {
+        let mut sensor = Sensor { offset: Phases { a: 0.1, b: 0.0, c: 9.0 }, ..Sensor::default() };
+        sensor.phases = MeasuredPhases::Two;
+        let Phases { a, b, c } = sensor.measure(Phases { a: 1.0, b: 2.0, c: -3.0 }, 0);
+        assert!((a - 1.1).abs() < 1e-15 && (b - 2.0).abs() < 1e-15 && (c + 3.1).abs() < 1e-15, "{a} {b} {c}");
     }
 
     /// The mean is exact at once, and forgets currents that were still flowing at first.

@@ -10,6 +10,7 @@ use crate::limits::Limits;
 use crate::lock::{LOCK, LockParameters};
 use crate::modes::{MODES, Modes};
 use crate::polarity::{POLARITY, PolarityParameters};
+use crate::position::{POSITION, PositionParameters, PositionSensor};
 use crate::sensor::{SENSOR, Sensor};
 use crate::signals::ControllerOutputs;
 use crate::speed::{SPEED_LOOP, SpeedLoop};
@@ -126,6 +127,8 @@ pub struct ControllerParameters {
     pub trip: TripParameters,
     /// Current sensors.
     pub sensor: Sensor,
+    /// Position sensor of the estimator `Sensored`.
+    pub position: PositionParameters,
     /// Estimator that replaces a lost sensor; `Sensored`: none.
     pub fallback: Kind,
     /// The sensor takes over again once it works.
@@ -166,6 +169,7 @@ impl Default for ControllerParameters {
             sensor: Sensor::default(),
             fallback: Kind::Sensored,
             resume: false,
+            position: PositionParameters::default(),
             compensation: Compensation::default(),
             commission: CommissionParameters::default(),
             estimators: EstimatorParameters::default(),
@@ -197,6 +201,11 @@ impl ControllerParameters {
             speed: f64::from(self.motor.n_p) * self.commission.speed,
             t_max: self.commission.t_max,
         }
+    }
+
+    /// Whether a position sensor of this `kind` is in use.
+    pub(crate) fn senses(&self, kind: PositionSensor) -> bool {
+        self.estimator == Kind::Sensored && self.position.kind == kind
     }
 
     /// Whether a fallback estimator exists for the shaft sensor.
@@ -260,6 +269,7 @@ pub(crate) const PARAMETER_ROWS: &[P] = rows![
     P::part("lock.", &Part { table: LOCK, lens: |p| &mut p.lock }),
     P::part("trip.", &Part { table: TRIP, lens: |p| &mut p.trip }),
     P::part("sensor.", &Part { table: SENSOR, lens: |p| &mut p.sensor }),
+    P::part("", &Part { table: POSITION, lens: |p| &mut p.position }),
     P::enumeration_parameter(
         "sensor.fallback",
         "Estimator that takes over when sensor_valid becomes false, until enable falls or with sensor.resume; Sensored: none",

@@ -72,7 +72,7 @@ impl PmsmPlant {
         let psi = self.machine::<false>().to_stator(axis_at(motor, angle), state.psi);
         let speeds = if imposed { [inputs.speed_shaft, end.speed_shaft] } else { [state.speed, self.state.speed] };
         let speed = speeds[0].abs().max(speeds[1].abs());
-        let mut left = if self.blocked && inputs.is_off() {
+        let mut left = if self.parameters.is_switched() || self.idles(inputs) {
             self.count(h, LONGEST_STEP, speed)?
         } else {
             let legs = self.legs(inputs);
@@ -102,7 +102,7 @@ impl PmsmPlant {
     fn rates_at(&self, inputs: &PlantInputs, psi: AlphaBeta, speed: f64, angle: f64) -> Rates {
         let motor = self.motor(inputs);
         let (machine, axis) = (self.machine_of(&motor), axis_at(&motor, angle));
-        let idle = self.blocked && inputs.is_off();
+        let idle = self.idles(inputs);
         let (psi, i) = if idle {
             let i = self.idle_current(&motor, speed);
             (machine::flux(&motor, i), i)

@@ -46,7 +46,7 @@ impl PmsmPlant {
         } else {
             (speed, angle, self.state.axis.with(theta(angle)))
         };
-        let idle = self.blocked && inputs.is_off();
+        let idle = self.idles(inputs);
         // The flux linkage then follows the speed, through the iron, and the temperature of the magnets.
         let follows = idle && !(iron.is_none() && thermal.mode != ThermalMode::Imposed);
         let psi = if follows { self.idle_flux(motor, speed) } else { psi };
@@ -77,6 +77,9 @@ impl PmsmPlant {
         if at.idle {
             return blocked_rates(&machine, &shaft, at.psi, at.i, at.speed);
         }
+        if self.parameters.is_switched() {
+            return self.switched_rates(inputs, (machine, shaft), at);
+        }
         let path = Path {
             u: inputs.voltage(self.parameters.inverter.pwm.modulation.mode),
             dissipation: self.parameters.dissipation(machine.resistance(), machine.electrical(at.speed)),
@@ -91,7 +94,7 @@ impl PmsmPlant {
     fn slopes<S: Scalar>(&self, inputs: &PlantInputs<S>, at: &Instant<S>) -> [S; 4] {
         let rates = self.rates(inputs, at);
         let w = at.speed * f64::from(self.parameters.motor.n_p);
-        let d_psi = if self.blocked && inputs.is_off() {
+        let d_psi = if at.idle {
             Vector::fixed(Vector::ZERO)
         } else {
             at.axis.from_stator(rates.d_psi) - at.psi.turned().scaled(w)
@@ -156,8 +159,11 @@ impl PmsmPlant {
 
     /// [`Events::indicators`] under these `inputs`.
     pub fn indicators_under(&self, inputs: &PlantInputs, z: &mut [f64]) {
+        if self.parameters.is_switched() {
+            return self.leg_indicators(inputs, &self.present(inputs), z);
+        }
+        z.fill(1.0);
         if !inputs.is_off() {
-            z.fill(1.0);
             return;
         }
         let shift = if self.blocked { -SHIFT } else { SHIFT };
@@ -165,6 +171,12 @@ impl PmsmPlant {
             let shifted = excess + shift;
             *z = if shifted == 0.0 { shift } else { shifted };
         }
+    }
+
+    /// Whether no current flows at the terminals.
+    #[inline]
+    pub(super) fn idles<S: Scalar>(&self, inputs: &PlantInputs<S>) -> bool {
+        if self.parameters.is_switched() { self.rests(inputs.u_dc.value()) } else { self.blocked && inputs.is_off() }
     }
 
     /// Whether the gates are off and the diodes block the current of the flux linkage.
@@ -230,19 +242,22 @@ impl Events for PmsmPlant {
     const INDICATORS: &'static [Indicator] = &[
         Indicator {
             name: "block_1",
-            description: "Gates off: maximum phase current divided by the zone in which diodes can block, minus 1; otherwise 1",
+            description: "Gates off: maximum phase current divided by the zone in which diodes can block, minus 1; otherwise 1. With \
+                          inverter.mode = Switched, leg a: margin of its current or voltage, if a diode decides",
         },
         Indicator {
             name: "block_2",
-            description: "Gates off: maximum line-to-line back EMF divided by the DC-link voltage, minus 1; otherwise 1",
+            description: "Gates off: maximum line-to-line back EMF divided by the DC-link voltage, minus 1; otherwise 1. With \
+                          inverter.mode = Switched, leg b",
         },
+        Indicator { name: "block_3", description: "With inverter.mode = Switched, leg c; otherwise 1" },
     ];
 
     fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
         self.indicators_under(&self.inputs, z);
     }
 
-    fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
         if self.parameters.thermal.mode == ThermalMode::Imposed {
             self.check_temperatures(&self.inputs)?;
         }
@@ -250,6 +265,9 @@ impl Events for PmsmPlant {
         let mut state = crate::state::State { psi, speed, angle, axis };
         if !state.is_finite() {
             return Err(Fault::new(format!("the machine's state is not finite: {}", state.described())));
+        }
+        if self.parameters.is_switched() {
+            return Ok(self.switch(now, &state));
         }
         self.blocked = self.blocks(&self.inputs);
         if self.blocked {
@@ -264,7 +282,7 @@ impl Events for PmsmPlant {
         Ok(Outcome { states_changed, ..Outcome::default() })
     }
 
-    fn next(&self, _now: Elapsed) -> Next {
-        Next::Never
+    fn next(&self, now: Elapsed) -> Next {
+        if self.parameters.is_switched() { self.next_instant(now) } else { Next::Never }
     }
 }

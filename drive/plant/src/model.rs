@@ -205,7 +205,7 @@ impl Model for PmsmPlant {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_plant.svg"));
 
-    const STATE_VERSION: u16 = 15;
+    const STATE_VERSION: u16 = 16;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let PlantInputs { u_dc, speed_shaft, angle_shaft, .. } = self.inputs;
@@ -233,10 +233,6 @@ impl Model for PmsmPlant {
     }
 
     fn validate_for(&self, interface: Interface) -> Result<(), Fault> {
-        if interface == Interface::ModelExchange && self.parameters.is_switched() {
-            let allowed = "1 (Average) in Model Exchange; use Co-Simulation";
-            return Err(PARAMETERS.fault(&self.parameters, |p| &mut p.inverter.pwm.mode, allowed));
-        }
         self.validate_network(interface)
     }
 

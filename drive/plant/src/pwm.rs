@@ -83,6 +83,8 @@ pub struct Pwm {
     pub zero_sequence: ZeroSequence,
     /// Minimum width of a pulse in s, >= 0.
     pub pulse_min: f64,
+    /// Time in s from the start to the first extreme, 0 to half a carrier period.
+    pub carrier_delay: f64,
     /// A switch that no longer conducts.
     pub open_switch: OpenSwitch,
     /// A phase that carries no current.
@@ -96,7 +98,7 @@ impl Default for Pwm {
         let (mode, update, zero_sequence) = (InverterMode::Average, PwmUpdate::Single, ZeroSequence::MinMax);
         let (open_switch, open_phase) = (OpenSwitch::None, OpenPhase::None);
         let modulation = Modulation::default();
-        Self { mode, update, zero_sequence, pulse_min: 0.0, open_switch, open_phase, modulation }
+        Self { mode, update, zero_sequence, pulse_min: 0.0, carrier_delay: 0.0, open_switch, open_phase, modulation }
     }
 }
 
@@ -116,6 +118,13 @@ pub const PWM: &Table<Pwm> = table![
         &SECOND,
         "Minimum width of a pulse; shorter ones are left out, shorter gaps filled; 0: none",
         |p| { &mut p.pulse_min }
+    )
+    .at_least(0.0),
+    P::parameter(
+        "inverter.carrier_delay",
+        &SECOND,
+        "Time from the start, and so from the samples of a controller, to the extremes of the carrier; 0: samples at the extremes",
+        |p| { &mut p.carrier_delay }
     )
     .at_least(0.0),
     P::enumeration_parameter(

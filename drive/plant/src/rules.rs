@@ -26,6 +26,10 @@ fn check_switched(par: &PlantParameters) -> Result<(), Fault> {
         let allowed = format!("at most half of {}", PARAMETERS.tell(par, |p| &mut p.inverter.T_pwm));
         return Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.pulse_min, allowed));
     }
+    if 2.0 * par.inverter.pwm.carrier_delay > par.inverter.T_pwm {
+        let allowed = format!("at most half of {}", PARAMETERS.tell(par, |p| &mut p.inverter.T_pwm));
+        return Err(PARAMETERS.fault(par, |p| &mut p.inverter.pwm.carrier_delay, allowed));
+    }
     if !par.iron.is_none() {
         let allowed = format!(
             "1 (Average) with iron loss ({}, {}): under switched voltages, its conductance would also draw the PWM frequency",

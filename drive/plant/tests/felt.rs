@@ -30,7 +30,7 @@ const MOVED: &[(&str, f64)] = &[
 
 /// Parameters of the network, which Model Exchange refuses and `temperature.rs` tests, and switches.
 fn is_elsewhere(name: &str) -> bool {
-    let switched = ["mode", "update", "zero_sequence", "pulse_min", "open_switch", "open_phase"];
+    let switched = ["mode", "update", "zero_sequence", "pulse_min", "carrier_delay", "open_switch", "open_phase"];
     let switched = name.strip_prefix("inverter.").is_some_and(|name| switched.contains(&name));
     switched || name.starts_with("thermal.") && !matches!(name, "thermal.T_ref")
         // flux_map.rs tests the map.

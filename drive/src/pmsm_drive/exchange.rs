@@ -142,6 +142,7 @@ impl Events for PmsmDrive {
     const INDICATORS: &'static [Indicator] = &[
         PmsmPlant::INDICATORS[0],
         PmsmPlant::INDICATORS[1],
+        PmsmPlant::INDICATORS[2],
         Indicator {
             name: "chopper",
             description: "Voltage of the capacitor divided by that at which the chopper switches next, minus 1; without a chopper 1",
@@ -193,6 +194,7 @@ impl Events for PmsmDrive {
     }
 
     fn next(&self, now: Elapsed) -> Next {
-        self.pair.controller.model.next(now)
+        let Pair { plant, controller, .. } = &self.pair;
+        controller.model.next(now).or(plant.model.next(now), now)
     }
 }

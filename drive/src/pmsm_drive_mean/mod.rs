@@ -322,7 +322,7 @@ impl Model for PmsmDriveMean {
 
     const ICON: Option<&'static str> = Some(include_str!("../../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 9;
+    const STATE_VERSION: u16 = 10;
 
     const CONTINUOUS: bool = true;
 
@@ -331,8 +331,17 @@ impl Model for PmsmDriveMean {
             let listed = |of: &&str| name == *of || (of.ends_with(['.', '_']) && name.starts_with(*of));
             return EFFECTIVE.iter().any(listed);
         }
-        let elsewhere =
-            ["dead_time", "i_zero", "mode", "update", "zero_sequence", "pulse_min", "open_switch", "open_phase"];
+        let elsewhere = [
+            "dead_time",
+            "i_zero",
+            "mode",
+            "update",
+            "zero_sequence",
+            "pulse_min",
+            "carrier_delay",
+            "open_switch",
+            "open_phase",
+        ];
         let elsewhere = parameter.strip_prefix("plant.inverter.").is_some_and(|name| elsewhere.contains(&name));
         !elsewhere && !["dc_link.R_precharge", "plant.modulation.mode"].contains(&parameter)
     }

@@ -12,8 +12,12 @@ use drive_control::weakening::GREATEST_TRIM;
 /// Relative error of the voltage at which the equation is solved.
 const SMALL: f64 = 1e-10;
 
-/// Steps to the minimum voltage; each reduces the interval to two thirds.
-const THIRDS: u32 = 40;
+/// Share of the torque by which the slope of the voltage at 0 is judged.
+const NEAR: f64 = 1e-6;
+
+/// Steps to the minimum voltage, and the share of the interval that each leaves.
+const SECTIONS: u32 = 34;
+const GOLDEN: f64 = 0.618_033_988_749_894_8;
 
 impl At<'_> {
     /// Voltage in V that the current loop may request in steady state.
@@ -46,24 +50,55 @@ impl At<'_> {
             return trimmed(root(bracket, small, |trim| excess(&trimmed(trim))));
         }
         let of = |tau: f64| excess(&self.of_reference(tau));
-        let fits = |tau: f64| Some((tau, of(tau))).filter(|(_, excess)| *excess < 0.0);
-        let inside = fits(0.0).or_else(|| fits(self.lowest_voltage(at_once.tau_ref)));
-        let tau_ref = inside.map_or(0.0, |inside| root([(at_once.tau_ref, excess(&at_once)), inside], small, of));
+        let tau_ref = inside(at_once.tau_ref, of)
+            .map_or(0.0, |inside| root([(at_once.tau_ref, excess(&at_once)), inside], small, of));
         Point { region: Region::Limit, ..self.of_reference(tau_ref) }
     }
+}
 
-    /// The torque reference between 0 and `tau` (N.m) with the minimum voltage: the R i of a generator opposes the EMF.
-    fn lowest_voltage(&self, tau: f64) -> f64 {
-        let requested = |tau: f64| self.of_reference(tau).requested;
-        let (mut low, mut high) = (0.0, tau);
-        for _ in 0..THIRDS {
-            let third = (high - low) / 3.0;
-            if requested(low + third) < requested(high - third) {
-                high -= third;
-            } else {
-                low += third;
+/// A torque between 0 and `tau` (N.m) whose `excess` (V) is negative, and this excess; `None` if there is none. The R i of a generator
+/// opposes the EMF, so the excess may first fall; it has one minimum, which a golden-section search approaches.
+fn inside(tau: f64, excess: impl Fn(f64) -> f64) -> Option<(f64, f64)> {
+    let of = |tau: f64| (tau, excess(tau));
+    let [at_0, near_0] = [0.0, NEAR * tau].map(of);
+    if at_0.1 < 0.0 || near_0.1 >= at_0.1 {
+        return Some(at_0).filter(|at| at.1 < 0.0);
+    }
+    let (mut low, mut high) = (0.0, tau);
+    let [mut a, mut b] = [1.0 - GOLDEN, GOLDEN].map(|share| of(share * tau));
+    for _ in 0..SECTIONS {
+        if let Some(found) = [a, b].into_iter().find(|at| at.1 < 0.0) {
+            return Some(found);
+        }
+        if a.1 < b.1 {
+            (high, b) = (b.0, a);
+            a = of(high - GOLDEN * (high - low));
+        } else {
+            (low, a) = (a.0, b);
+            b = of(low + GOLDEN * (high - low));
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A parabola that falls from 1 V to `least` (V) at the share `at` of the torque, for torques of both signs.
+    #[test]
+    fn a_torque_with_less_voltage_is_found() {
+        for tau in [-3.0, 5.0] {
+            for at in [0.01, 0.4, 0.99] {
+                for least in [-0.5, -1e-6, 1e-6, 0.3] {
+                    let excess = |x: f64| least + (1.0 - least) * (x / (tau * at) - 1.0) * (x / (tau * at) - 1.0);
+                    let found = inside(tau, excess);
+                    assert_eq!(found.is_some(), least < 0.0, "{tau} {at} {least}: {found:?}");
+                    assert!(found.is_none_or(|(x, y)| y < 0.0 && y.to_bits() == excess(x).to_bits() && x / tau <= 1.0));
+                }
             }
         }
-        0.5 * (low + high)
+        assert_eq!(inside(2.0, |x| x + 1.0), None);
+        assert_eq!(inside(2.0, |x| x - 1.0), Some((0.0, -1.0)));
     }
 }

@@ -4,7 +4,9 @@ use super::{RATED, SLOW, T_S, U_DEAD, command, drive, imposed, off, run, turning
 use drive::Pair;
 use drive::control::commission::CommissionState;
 use drive::control::commissioning::CommissionMode;
+use drive::control::position::PositionSensor;
 use drive::control::reference::{max_torque, max_torque_per_ampere};
+use drive::control::sensor::MeasuredPhases;
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters as Par;
 use drive::control::trip::Cause;
@@ -615,6 +617,45 @@ pub(super) const CASES: &[Case] = &[
             [early, pair.controller.out.i_ref.q]
         },
         acts: |_, [early, late], [_, held]| early < -0.3 && (late / early - 1.0).abs() < 0.05 && held < 1.2 * late,
+    },
+    Case {
+        option: "sensor.phases",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.parameters.sensor.offset.c = 0.3;
+            pair
+        },
+        ask: |p| p.sensor.phases = MeasuredPhases::Two,
+        // The ripple of the torque that an offset makes.
+        figures: |mut pair| {
+            let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+            run(&mut pair, 0.5, |t, p| {
+                if t > 0.25 {
+                    (low, high) = (low.min(p.plant.out.tau_e), high.max(p.plant.out.tau_e));
+                }
+            });
+            [high - low, 0.0]
+        },
+        acts: |_, [three, _], [two, _]| two < 0.8 * three,
+    },
+    Case {
+        option: "sensor.position",
+        on: |kind| {
+            let mut pair = slow(kind);
+            pair.controller.model.parameters.position.counts = 64;
+            pair
+        },
+        ask: |p| p.position.kind = PositionSensor::Encoder,
+        // The greatest error of the angle in a count of 17 degrees.
+        figures: |mut pair| {
+            let mut most = 0.0_f64;
+            run(&mut pair, 0.3, |t, p| most = if t > 0.2 { most.max(off(p)) } else { most });
+            [most, 0.0]
+        },
+        acts: |kind, [without, _], [with, _]| {
+            let changed = (with - without).abs() > 1e-9;
+            changed == (kind == Kind::Sensored) && (!changed || without < 1.0 && (4.0..20.0).contains(&with))
+        },
     },
     Case {
         option: "sensor.resume",

@@ -1,6 +1,6 @@
 //! The measured angle and speed (Kim & Sul, Fig. 1a): the reference for all estimators.
 //!
-//! Limits: only the sensor's, which is ideal unless the importer adds errors.
+//! Limits: only those of the sensor, [`position`](crate::position).
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
 use drive_base::math::wrap;

@@ -84,9 +84,15 @@ impl Tracker {
             self.w += T_s * ((sample.tau_ref - self.tau_load) / inertia + 3.0 * rho * rho * e);
             self.tau_load -= T_s * inertia * rho * rho * rho * e;
         } else {
-            self.w_frame = self.w + 2.0 * rho * e;
-            self.w += T_s * rho * rho * e;
+            self.pull(rho, e, T_s);
         }
+    }
+
+    /// Corrects the state as the PLL does.
+    #[inline]
+    pub(crate) fn pull(&mut self, rho: f64, e: f64, T_s: f64) {
+        self.w_frame = self.w + 2.0 * rho * e;
+        self.w += T_s * rho * rho * e;
     }
 }
 

@@ -109,9 +109,9 @@ pub struct Affine {
 impl Affine {
     /// At the current `i` (A).
     #[inline]
-    pub fn at(&self, i: AlphaBeta) -> AlphaBeta {
-        let Self { at_0, by: [x, y, z] } = self;
-        *at_0 + AlphaBeta::new(x * i.alpha() + y * i.beta(), y * i.alpha() + z * i.beta())
+    pub fn at<S: Scalar>(&self, i: Vector<Stator, S>) -> Vector<Stator, S> {
+        let &Self { at_0, by: [x, y, z] } = self;
+        Vector::fixed(at_0) + Vector::new(i.alpha() * x + i.beta() * y, i.alpha() * y + i.beta() * z)
     }
 }
 

@@ -49,8 +49,6 @@ pub struct Leg {
     command: Command,
     /// Time in s until the commanded switch is on.
     pub(super) wait: f64,
-    /// Sign of the current, where the voltage depends on it; 0: it blocks.
-    pub(super) side: i8,
 }
 
 impl Leg {

@@ -7,13 +7,14 @@
 //!
 //! A period begins at an extreme of the carrier with all lower switches on, and has its other extreme in the middle, with
 //! all upper ones on. The duty cycles of the references are taken over at the first, or at both. The extremes are counted
-//! from the start of the simulation on. u in V, times in s.
+//! from the start of the simulation on; the first comes after `inverter.carrier_delay`, with all lower switches on until then. u in V,
+//! times in s.
 
 use crate::inverter::Inverter;
 use crate::pwm::{PwmUpdate, ZeroSequence};
 use drive_base::frame::Phases;
 use drive_base::overmodulation::ModulationMode;
-use fmu_core::{Elapsed, SampleGrid};
+use fmu_core::{Elapsed, Next, SampleGrid};
 use serde::{Deserialize, Serialize};
 
 /// Instants closer than this share of half a carrier period are the same instant.
@@ -64,6 +65,7 @@ impl Carrier {
     /// Time since the last extreme in s, at the time `now`. A carrier of another period takes `u` (V) over at once.
     pub(super) fn locate(&mut self, inverter: &Inverter, now: Elapsed, u: Phases, u_dc: f64) -> f64 {
         let grid = SampleGrid { period: 0.5 * inverter.T_pwm };
+        let now = now.plus(-inverter.pwm.carrier_delay);
         let at = grid.period + now.minus_periods(self.extremes, grid.period);
         // At an extreme, the time is exact: the rounding of the communication steps has no effect.
         if at.abs() <= grid.width() {
@@ -94,6 +96,19 @@ impl Carrier {
     /// Whether the present half of the period is the first one.
     fn rises(&self) -> bool {
         self.extremes % 2 == 1
+    }
+
+    /// The instant `time` (s) after the last extreme.
+    pub(super) fn instant(&self, inverter: &Inverter, time: f64) -> Option<Elapsed> {
+        let half = 0.5 * inverter.T_pwm;
+        let next = Elapsed::periods(self.extremes, half).plus(inverter.pwm.carrier_delay);
+        time.is_finite().then(|| next.plus(time - half))
+    }
+
+    /// The next extreme.
+    pub(super) fn next(&self, inverter: &Inverter) -> Next {
+        let (k, period, delay) = (self.extremes, 0.5 * inverter.T_pwm, inverter.pwm.carrier_delay);
+        if delay == 0.0 { Next::Grid { k, period } } else { Next::At(Elapsed::periods(k, period).plus(delay)) }
     }
 
     /// Whether the upper switch of the leg `x` is commanded on at the time `at` (s) since the last extreme, and the time (s) until

@@ -7,12 +7,14 @@
 //! | `segment` | the machine between two instants |
 //! | [`state`] | the state of carrier and legs |
 //! | `run` | a communication step: from instant to instant |
+//! | `exchange` | Model Exchange: from event to event |
 //! | [`terminals`] | voltages of the terminals, and the rail of each leg's current |
 //!
 //! `inverter.mode` = Average replaces all this by the mean over a PWM period ([`inverter`](crate::inverter)).
 
 pub mod bridge;
 pub mod carrier;
+mod exchange;
 mod run;
 mod segment;
 pub mod state;

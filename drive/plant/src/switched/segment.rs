@@ -20,7 +20,8 @@ use crate::machine::{magnetic_energy, slope};
 use crate::mechanics::{Coulomb, Shaft, Standstill, Whole};
 use crate::model::PmsmPlant;
 use crate::state::{State, axis_at};
-use drive_base::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Turn};
+use drive_base::frame::{AlphaBeta, Axis, Dq, Phases, Rotor, Stator, Turn, Vector};
+use fmu_core::Scalar;
 
 /// Longest integration step in s.
 const LONGEST: f64 = 50e-6;
@@ -97,6 +98,16 @@ impl Voltages {
         [rail(0), rail(1), rail(2)]
     }
 
+    /// The sides of the legs whose voltage depends on them.
+    pub(super) fn watched_sides(&self) -> [Option<i8>; 3] {
+        [0, 1, 2].map(|x| self.watched[x].then_some(self.sides[x]))
+    }
+
+    /// Stator voltage of the legs at the upper rail, as a share of the link's.
+    pub(super) fn upper(&self) -> AlphaBeta {
+        stator(self.ways.map(|way| if way.rail > 0.0 { 1.0 } else { 0.0 }))
+    }
+
     /// Stator voltage (V) of the rails.
     #[inline]
     fn rails(&self) -> AlphaBeta {
@@ -125,21 +136,21 @@ impl Voltages {
 
 /// Devices, each carrying current of one sign.
 #[derive(Clone, Copy)]
-struct OneWay(Option<Affine>);
+pub(super) struct OneWay(pub(super) Option<Affine>);
 
-impl Drops<f64> for OneWay {
+impl<S: Scalar> Drops<S> for OneWay {
     #[inline]
-    fn legs(&self, u: AlphaBeta, _steady: impl FnOnce() -> AlphaBeta) -> AlphaBeta {
+    fn legs(&self, u: Vector<Stator, S>, _steady: impl FnOnce() -> Vector<Stator, S>) -> Vector<Stator, S> {
         u
     }
 
     #[inline]
-    fn devices(&self, _u: AlphaBeta, i: AlphaBeta) -> Option<AlphaBeta> {
+    fn devices(&self, _u: Vector<Stator, S>, i: Vector<Stator, S>) -> Option<Vector<Stator, S>> {
         self.0.map(|drop| drop.at(i))
     }
 
     #[inline]
-    fn switching(&self, _i: AlphaBeta) -> Option<f64> {
+    fn switching(&self, _i: Vector<Stator, S>) -> Option<S> {
         None
     }
 }
@@ -210,7 +221,7 @@ impl PmsmPlant {
     }
 
     /// Magnetic energy (J) at a point.
-    fn stored(&self, at: &Point) -> f64 {
+    pub(super) fn stored(&self, at: &Point) -> f64 {
         let psi = self.machine::<false>().from_stator(at.axis, at.psi);
         magnetic_energy(&self.warm.motor, self.parameters.magnetics(), psi)
     }
@@ -224,14 +235,17 @@ impl PmsmPlant {
                 least = least.min(f64::from(voltages.sides[x]) * n.dot(i));
             }
         }
-        let within = |[low, high]: [f64; 2], u: f64| (u - low).min(high - u);
+        least.min(self.blocking(at, voltages))
+    }
+
+    /// Margin (V) by which legs without current block.
+    pub(super) fn blocking(&self, at: &Point, voltages: &Voltages) -> f64 {
         match voltages.blocked() {
-            Blocked::None => {}
+            Blocked::None => f64::INFINITY,
             Blocked::One(x) => {
-                least = least.min(within(
-                    voltages.bounds[x],
-                    self.response_at(at, Some(&voltages.drop())).floating(x, voltages.stator()),
-                ));
+                let ([low, high], drop) = (voltages.bounds[x], voltages.drop());
+                let u = self.response_at(at, Some(&drop)).floating(x, voltages.stator());
+                (u - low).min(high - u)
             }
             Blocked::All => {
                 let (rest, bounds) = (self.response_at(at, None).resting(), voltages.bounds);
@@ -239,10 +253,9 @@ impl PmsmPlant {
                 for (bounds, rest) in bounds.into_iter().zip(rest) {
                     (low, high) = (low.max(bounds[0] - rest), high.min(bounds[1] - rest));
                 }
-                least = least.min(high - low);
+                high - low
             }
         }
-        least
     }
 
     /// Advances `at` by `h` (s) under the `voltages`, or up to the instant at which a leg has another side; returns the time

@@ -4,6 +4,7 @@ use super::bridge::{Command, DIRECTIONS, Leg};
 use super::carrier::Carrier;
 use crate::inverter::{Gates, Inverter};
 use drive_base::frame::AlphaBeta;
+use fmu_core::Elapsed;
 use serde::{Deserialize, Serialize};
 
 /// What commands the legs during a communication step.
@@ -22,6 +23,11 @@ pub struct Bridge {
     pub(super) legs: [Leg; 3],
     /// The current of a leg flows from or to the upper rail.
     upper: [bool; 3],
+    /// Model Exchange, since the last event: the sign of each current, where a voltage depends on it; 0: the leg blocks.
+    pub(super) sides: Option<[i8; 3]>,
+    /// Model Exchange: the time of the last event, and of the next change of a leg within this half of the carrier period.
+    pub(super) reached: Elapsed,
+    pub(super) next: Option<Elapsed>,
 }
 
 impl Bridge {

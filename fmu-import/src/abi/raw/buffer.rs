@@ -48,13 +48,18 @@ impl Buffer {
 
     /// The bits of the values.
     pub fn bits(&self) -> Vec<u64> {
-        let byte = |at: usize| self.words[at / 8] >> (8 * (at % 8)) & 0xff;
-        (0..self.count).map(|i| (0..self.width).map(|k| byte(i * self.width + k) << (8 * k)).sum()).collect()
+        (0..self.count).map(|i| self.value(i)).collect()
+    }
+
+    /// The bits of a value. Its width divides that of a word.
+    fn value(&self, i: usize) -> u64 {
+        let at = i * self.width;
+        self.words[at / 8] >> (8 * (at % 8)) & u64::MAX >> (64 - 8 * self.width)
     }
 
     /// Whether a value was not written. Bytes and 16-bit numbers may have the bits of the pattern: of these, none was.
     pub fn is_unwritten(&self) -> bool {
-        let mut untouched = self.bits().into_iter().map(|bits| bits == CANARY >> (64 - 8 * self.width));
+        let mut untouched = (0..self.count).map(|i| self.value(i) == CANARY >> (64 - 8 * self.width));
         if self.width < 4 { self.count > 0 && untouched.all(|u| u) } else { untouched.any(|u| u) }
     }
 

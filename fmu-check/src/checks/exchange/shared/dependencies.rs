@@ -8,9 +8,13 @@ use crate::session::{NotDetermined, Session};
 use crate::settable::settable;
 use fmu_import::raw::Simple;
 use model_description::{BaseType, ModelVariable, Unknown, Variability};
+use std::collections::HashSet;
 
 /// New, unchanged instances that confirm a finding.
 const CONTROLS: usize = 2;
+
+/// Values to read in each round: knowns times unknowns. With more of both, every n-th known is changed.
+const READ: usize = 5_000_000;
 
 /// Reports that the unknown, if it could be read both times, changes with a known that is not among its dependencies.
 fn undeclared(session: &Session, unknown: &ModelVariable, known: &ModelVariable, (old, new): (&[u64], &[u64])) {
@@ -43,12 +47,13 @@ fn keep_steady(
 
 /// Changes every known that is not a dependency of an initial unknown and requires that the unknown stays the same.
 pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> {
+    let numeric: HashSet<&str> = session.numeric().map(|v| v.name.as_str()).collect();
     let unknowns: Vec<_> = session
         .description
         .initial_unknowns
         .iter()
         .filter_map(|u| Some((session.description.referenced(u.reference)?, u.dependencies.as_ref()?)))
-        .filter(|(v, _)| session.numeric().any(|n| n.name == v.name) && v.clocks.is_empty())
+        .filter(|(v, _)| numeric.contains(v.name.as_str()) && v.clocks.is_empty())
         .collect();
     if unknowns.is_empty() {
         return session.not_applicable("no dependencies of initial unknowns are given");
@@ -57,6 +62,8 @@ pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
     // An unknown that differs without a change shows no dependency.
     let mut steady: Vec<bool> = variables.iter().map(|v| session.is_steady(v)).collect();
     let mut tried = 0;
+    let knowns: Vec<_> = session.numeric().filter(|v| settable(v)).collect();
+    let stride = knowns.len().div_ceil((READ / variables.len()).max(1));
     // Also where all knowns differ from their start values: a factor may be 0 there.
     for moved in [false, true] {
         let instance = session.initializing()?;
@@ -64,7 +71,7 @@ pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
             break;
         }
         let before = instance.snapshot(&variables)?;
-        for known in session.numeric().filter(|v| settable(v)) {
+        for known in knowns.iter().step_by(stride.max(1)) {
             let Some(values) = session.different_value(known, 1.0) else { continue };
             if session.half_time_used() {
                 break;
@@ -113,12 +120,13 @@ pub(crate) fn dependencies_hold(session: &Session) -> Result<(), NotDetermined> 
 pub(crate) fn exchange_dependencies(session: &Session) -> Result<(), NotDetermined> {
     let d = &session.description;
     let given = |u: &'_ Unknown| Some((d.referenced(u.reference)?, u.dependencies.clone()?));
+    let numeric: HashSet<&str> = session.numeric().map(|v| v.name.as_str()).collect();
     let unknowns: Vec<(&ModelVariable, Vec<u32>)> = d
         .outputs
         .iter()
         .chain(&d.derivatives)
         .filter_map(given)
-        .filter(|(v, _)| session.numeric().any(|n| n.name == v.name) && v.clocks.is_empty())
+        .filter(|(v, _)| numeric.contains(v.name.as_str()) && v.clocks.is_empty())
         .collect();
     if unknowns.is_empty() {
         return session.not_applicable("no dependencies of outputs and derivatives are given");

@@ -343,18 +343,25 @@ pub(crate) fn tunable(session: &Session) -> Result<(), NotDetermined> {
     })
 }
 
+/// Maximum number of times that all outputs are read while values are set.
+const READINGS: usize = 100;
+
 /// Sets values in one instance directly; in another, sets other values, reads the outputs, then sets the same values.
 pub(crate) fn iterated_initialization(session: &Session) -> Result<(), NotDetermined> {
     let watched = session.watched();
     let settable: Vec<_> = session.numeric().filter(|v| settable(v) && v.base.is_float()).collect();
     let (plain, iterated) = (session.initializing()?, session.initializing()?);
-    for v in settable.iter().take_while(|_| !session.half_time_used()) {
+    // Reading all outputs after each of thousands of variables would take the square of their number.
+    let stride = settable.len().div_ceil(READINGS);
+    for (k, v) in settable.iter().enumerate().take_while(|_| !session.half_time_used()) {
         let (Some(first), Some(last)) = (session.different_value(v, 3.0), session.different_value(v, 1.0)) else {
             continue;
         };
         // Refusals are not the subject of this check.
         if iterated.set(v, &first)?.is_ok() && iterated.set(v, &last)?.is_ok() {
-            let _ = iterated.snapshot(&watched)?;
+            if k % stride == 0 {
+                let _ = iterated.snapshot(&watched)?;
+            }
             let _ = plain.set(v, &last)?;
         } else {
             return Err(NotDetermined(format!("{} cannot be set", v.name)));
