@@ -399,7 +399,7 @@ fn what_cannot_be_is_refused() {
     (drive.link_parameters.dc_link.C, drive.link_parameters.chopper.u_off) = (0.0, 1e3);
     drive.derive();
     drive.validate().unwrap();
-    assert_eq!(PmsmDrive::INDICATORS.len(), 4);
+    assert_eq!(PmsmDrive::INDICATORS.len(), 5);
 }
 
 /// Dependencies are found by probing; the chopper is on at some of the points.

@@ -4,7 +4,7 @@
 #![allow(non_snake_case, reason = "the papers' symbols")]
 
 use drive::control::signals::ControllerInputs;
-use drive::frame::{AlphaBeta, Phases};
+use drive::frame::{AlphaBeta, Dq, Phases};
 use drive::plant::inverter::Inverter;
 use drive::plant::pwm::{InverterMode, OpenPhase, OpenSwitch, PwmUpdate, ZeroSequence};
 use drive::plant::signals::PlantOutputs;
@@ -204,6 +204,41 @@ fn a_switched_inverter_is_integrated_to_the_same_currents() {
         println!("{name}: {:e} A, {:e} rad/s apart, up to {highest} A, {blocked} times blocked", largest.0, largest.1);
         assert!(largest.0 < 2e-6 && largest.1 < 1e-6, "{name}: {largest:?}");
         assert!(highest > 0.5 && blocked > 10, "{name}: {highest} A, {blocked}");
+    }
+}
+
+/// All currents of a dead time end one after the other: each indicator is above 0 after an event, and one falls below 0 at the next.
+#[test]
+fn the_legs_indicators_are_positive_after_each_event() {
+    let mut plant = Block::<PmsmPlant>::default();
+    let inverter = &mut plant.model.parameters.inverter;
+    (inverter.pwm.mode, inverter.devices.u_diode) = (InverterMode::Switched, 0.7);
+    plant.model.inputs.enable = false;
+    let z = |plant: &PmsmPlant| {
+        let mut z = [0.0; 3];
+        plant.indicators(Elapsed::ZERO, &mut z);
+        z
+    };
+    for signs in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0], [2.0, -1.0]] {
+        plant.initialize();
+        let model = &mut plant.model;
+        *model.flux_mut() = Dq::new(model.parameters.motor.psi_M + 1e-3 * signs[0], 2e-3 * signs[1]);
+        model.event(Elapsed::ZERO).unwrap();
+        let (mut events, mut now) = (0, 0.0);
+        while plant.model.flux_mut().q() != 0.0 && now < 1e-3 {
+            assert!(z(&plant.model).iter().all(|&z| z > 0.0), "{signs:?} after {events} events: {:?}", z(&plant.model));
+            let mut dx = [0.0; 4];
+            while z(&plant.model).iter().all(|&z| z > 0.0) && now < 1e-3 {
+                plant.model.derivatives(Elapsed::ZERO, &mut dx).unwrap();
+                let psi = plant.model.flux_mut();
+                *psi = Dq::new(psi.d() + 1e-9 * dx[0], psi.q() + 1e-9 * dx[1]);
+                now += 1e-9;
+            }
+            plant.model.event(Elapsed::ZERO).unwrap();
+            events += 1;
+        }
+        assert!(events >= 2 && now < 1e-4, "{signs:?}: {events} events in {now} s");
+        assert_eq!(z(&plant.model).map(|z| z > 0.0), [true; 3]);
     }
 }
 

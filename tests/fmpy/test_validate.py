@@ -61,7 +61,7 @@ def test_header(archive, description):
     assert exchange.modelIdentifier == archive.stem
     assert exchange.canGetAndSetFMUstate
     assert description.numberOfContinuousStates == states
-    assert description.numberOfEventIndicators == {0: 0, 4: 2, 5: 4}[states]
+    assert description.numberOfEventIndicators == {0: 0, 4: 3, 5: 5}[states]
     names = ["psi_d", "psi_q", "speed", "angle", "u_cap"][:states]
     assert [d.variable.derivative.name for d in description.derivatives] == names
     if description.fmiVersion == "2.0":  # FMPy looks for this name in FMI 3.0 too, where it ends with s

@@ -1,6 +1,6 @@
 //! The measured angle and speed (Kim & Sul, Fig. 1a): the reference for all estimators.
 //!
-//! Limits: only those of the sensor, [`position`](crate::position).
+//! Limits: only those of the sensor that the controller reads (`sensor.position`).
 
 use crate::estimator::contract::{ContextOf, Estimate, Estimating, Sample};
 use drive_base::math::wrap;

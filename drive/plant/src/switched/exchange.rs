@@ -133,11 +133,18 @@ impl PmsmPlant {
             };
             ended = true;
         };
-        for (x, side) in voltages.watched_sides().into_iter().enumerate() {
-            let passed = side.is_some_and(|side| f64::from(side) * DIRECTIONS[x].dot(i) <= 0.0);
-            if passed && was_off[x] && self.bridge.sides.is_some() || open == Some(x) {
-                end(&mut at, Some(x));
-            }
+        let sides = voltages.watched_sides();
+        let ends = |x: usize| {
+            let passed = sides[x].is_some_and(|side| f64::from(side) * DIRECTIONS[x].dot(i) <= 0.0);
+            passed && was_off[x] && self.bridge.sides.is_some() || open == Some(x)
+        };
+        // Two currents of zero leave none.
+        match [ends(0), ends(1), ends(2)] {
+            [false, false, false] => {}
+            [true, false, false] => end(&mut at, Some(0)),
+            [false, true, false] => end(&mut at, Some(1)),
+            [false, false, true] => end(&mut at, Some(2)),
+            _ => end(&mut at, None),
         }
         let ways = Ways::new(inverter, u_dc).at(&bridge.legs);
         let voltages = self.dependent(ways, &at, 4.0 * SHIFT * self.driven(&self.inputs));
