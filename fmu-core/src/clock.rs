@@ -155,12 +155,9 @@ impl<W: 'static> Row<W> {
     /// At compile time: an interval or a fraction that is not greater than 0.
     #[track_caller]
     pub const fn clock(name: &'static str, description: &'static str, clock: Clock<W>) -> Self {
-        let Timing { interval, fraction, .. } = clock.timing;
-        if let Some(interval) = interval {
+        if let Some(interval) = clock.timing.interval {
+            // A fraction with a 0 is 0, infinite or not a number.
             demand(interval > 0.0 && interval.is_finite(), name, "the interval of a clock is greater than 0");
-        }
-        if let Some((counter, resolution)) = fraction {
-            demand(counter > 0 && resolution > 0, name, "counter and resolution of a clock are greater than 0");
         }
         Self::new(name, description, Kind::Clock(clock.timing), Access::Clock(clock.interval))
             .with(Causality::Input, Variability::Discrete)
@@ -320,4 +317,84 @@ pub(crate) const fn word(text: &str, number: usize) -> &str {
         n += 1;
     }
     ""
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::unit::ONE;
+
+    #[test]
+    fn periodic_and_aperiodic_clocks() {
+        let all = [Ticks::Constant, Ticks::Fixed, Ticks::Tunable, Ticks::Changing, Ticks::Countdown, Ticks::Triggered];
+        assert_eq!(all.map(Ticks::is_periodic), [true, true, true, false, false, false]);
+        assert_eq!(all.map(Ticks::is_aperiodic), [false, false, false, true, true, false]);
+    }
+
+    type V = Row<[f64; 2]>;
+
+    fn timing(row: &V) -> Timing {
+        let Kind::Clock(timing) = row.meta.kind else { panic!("not a clock") };
+        timing
+    }
+
+    /// A shift is a whole number of resolutions: the nearest one.
+    #[test]
+    fn intervals_and_shifts() {
+        let audio = timing(&V::clock("audio", "", Clock::fraction(147, 44_100)).shift(0.25));
+        assert_eq!((audio.fraction, audio.shift_counter()), (Some((147, 44_100)), Some(11_025)));
+        assert!(audio.interval.is_some_and(|s| (s - 1.0 / 300.0).abs() < 1e-15));
+        let shift = |s| timing(&V::clock("c", "", Clock::fraction(1, 10)).shift(s)).shift_counter();
+        assert_eq!([0.0, 0.14, 0.16, 0.3].map(shift), [Some(0), Some(1), Some(2), Some(3)]);
+        let slow = timing(&V::clock("slow", "", Clock::constant(0.1)).shift(0.05).priority(3));
+        assert_eq!((slow.interval, slow.shift.to_bits(), slow.priority), (Some(0.1), 0.05_f64.to_bits(), Some(3)));
+        assert_eq!(slow.shift_counter(), None, "only a fraction has a resolution");
+    }
+
+    #[test]
+    fn each_constructor_has_its_ticks() {
+        let own = [Clock::constant(1.0), Clock::fixed(|m: &mut [f64; 2]| &mut m[0]), Clock::tunable(|m| &mut m[1])];
+        let others = [Clock::changing(), Clock::countdown(), Clock::triggered()];
+        let rows = own.into_iter().chain(others).map(|clock| V::clock("c", "", clock));
+        let found: Vec<_> = rows.map(|row| timing(&row).ticks).collect();
+        let all = [Ticks::Constant, Ticks::Fixed, Ticks::Tunable, Ticks::Changing, Ticks::Countdown, Ticks::Triggered];
+        assert_eq!(found, all);
+        let out = V::clock_output("out", "");
+        assert_eq!((timing(&out).ticks, out.meta.causality), (Ticks::Triggered, Causality::Output));
+    }
+
+    fn refused(make: impl FnOnce() -> V + std::panic::UnwindSafe) -> bool {
+        std::panic::catch_unwind(make).is_err()
+    }
+
+    #[test]
+    fn impossible_clocks_are_refused() {
+        for interval in [0.0, -1.0, f64::INFINITY, f64::NAN] {
+            assert!(refused(move || V::clock("c", "", Clock::constant(interval))), "{interval}");
+        }
+        for (counter, resolution) in [(0, 1), (1, 0), (0, 0)] {
+            assert!(refused(move || V::clock("c", "", Clock::fraction(counter, resolution))));
+        }
+        for shift in [-1e-9, f64::INFINITY] {
+            assert!(refused(move || V::clock("c", "", Clock::constant(1.0)).shift(shift)), "{shift}");
+        }
+        assert!(refused(|| V::clock("c", "", Clock::changing()).shift(1.0)), "no period");
+        assert!(refused(|| V::clock_output("c", "").priority(1)), "the model ticks it");
+        assert!(refused(|| V::input("u", &ONE, "", |m| &mut m[0]).shift(1.0)), "no clock");
+        assert!(refused(|| V::parameter("p", &ONE, "", |m| &mut m[0]).on("c")), "a fixed parameter never changes");
+    }
+
+    #[test]
+    fn a_clocked_variable_is_discrete() {
+        let u = V::input("u", &ONE, "", |m| &mut m[0]).on("a b");
+        assert_eq!((u.meta.clocks, u.meta.variability), ("a b", Variability::Discrete));
+    }
+
+    #[test]
+    fn words_of_a_list() {
+        let words = |text| [0, 1, 2, 3].map(|number| word(text, number));
+        assert_eq!(words("a bc  def"), ["a", "bc", "def", ""]);
+        assert_eq!(words("  a "), ["a", "", "", ""]);
+        assert_eq!(words(""), [""; 4]);
+    }
 }

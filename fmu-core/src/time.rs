@@ -226,6 +226,31 @@ mod tests {
         assert!((grid.instant(10, -1.0) - 5.55e-17).abs() < 1e-19, "{}", grid.instant(10, -1.0));
     }
 
+    /// Both of two times count with all their digits.
+    #[test]
+    fn the_time_between_two_is_exact() {
+        let (start, time) = (1e6, 1e-9);
+        assert_eq!(Elapsed::between(start, start), Elapsed::ZERO);
+        assert!((Elapsed::between(-start, time).since(Elapsed::ZERO.plus(start)) - time).abs() < 1e-24);
+        assert!((Elapsed::between(start, time).seconds() + start - time).abs() < 1e-9);
+    }
+
+    #[test]
+    fn periods_are_a_sum_of_periods() {
+        let sum = (0..3).fold(Elapsed::ZERO, |now, _| now.plus(0.1));
+        assert!(Elapsed::periods(3, 0.1).since(sum).abs() < 1e-30);
+        assert!((sum.plus(1e-20).minus_periods(3, 0.1) - 1e-20).abs() < 1e-30);
+        let end = Step { start: sum, h: 0.1 }.end();
+        assert!(end.since(Elapsed::periods(4, 0.1)).abs() < 1e-30);
+    }
+
+    /// Below 1, doubles are half as far apart as above.
+    #[test]
+    fn seconds_are_the_nearest_double() {
+        let now = Elapsed::ZERO.plus(1.0).plus(f64::EPSILON / 2.0);
+        assert_eq!(now.seconds().to_bits(), 1.0_f64.to_bits());
+    }
+
     #[test]
     fn naive_sum_would_lose_the_grid() {
         let mut t = 0.0;

@@ -14,7 +14,7 @@ pub fn format(x: f64) -> String {
         return "NaN".into();
     }
     if x.is_infinite() {
-        return if x > 0.0 { "INF" } else { "-INF" }.into();
+        return if x.is_sign_positive() { "INF" } else { "-INF" }.into();
     }
     let text = format!("{x:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)

@@ -122,4 +122,11 @@ mod tests {
         let per_second = DisplayUnit { name: "1/s".into(), factor: 1.0, offset: 0.0, inverse: true };
         assert!((per_second.unshow(per_second.show(4.0)) - 4.0).abs() < 1e-15);
     }
+
+    /// A band of 10 K is one of 18 degrees Fahrenheit.
+    #[test]
+    fn a_difference_has_no_offset() {
+        let fahrenheit = DisplayUnit { name: "degF".into(), factor: 1.8, offset: -459.67, inverse: false };
+        assert!((fahrenheit.of_differences().show(10.0) - 18.0).abs() < 1e-12);
+    }
 }
