@@ -82,9 +82,12 @@ impl PositionParameters {
     /// Angle of edge `k` in rad.
     fn edge(&self, k: f64) -> f64 {
         let [b, c] = self.hall;
-        let of = [0.0, c, b];
-        let error = of.iter().zip(0_u8..).find(|(_, n)| k.rem_euclid(3.0).round() == f64::from(*n));
-        k * FRAC_PI_3 + error.map_or(0.0, |(error, _)| *error)
+        k * FRAC_PI_3
+            + match k.rem_euclid(3.0) {
+                n if n < 0.5 => 0.0,
+                n if n < 1.5 => c,
+                _ => b,
+            }
     }
 }
 
