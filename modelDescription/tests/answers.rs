@@ -85,7 +85,7 @@ fn capabilities() {
     assert_eq!((cs.has_directional_derivatives(), me.has_directional_derivatives()), (true, false));
     assert!(!cs.can_get_and_set_state() && !cs.can_serialize_state() && !cs.has_event_mode());
     assert_eq!(cs.attribute("canSerializeFMUState"), None);
-    // The defaults are opposite: FMI 2.0 calls after each step unless told not to.
+    // The two standards have opposite defaults: an importer of FMI 2.0 calls after each step unless the description says otherwise.
     let needs = |version| me.needs_completed_integrator_step(version);
     assert_eq!((needs(FmiVersion::V2), needs(FmiVersion::V3)), (true, false));
     let of_none = read(THREE.replace("canReturnEarlyAfterIntermediateUpdate='true' ", "")).unwrap();

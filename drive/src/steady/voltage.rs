@@ -12,7 +12,7 @@ use drive_control::weakening::GREATEST_TRIM;
 /// Relative error of the voltage at which the equation is solved.
 const SMALL: f64 = 1e-10;
 
-/// Share of the torque by which the slope of the voltage at 0 is judged.
+/// Share of the torque at which the voltage is compared with that at zero torque, to find the sign of its slope there.
 const NEAR: f64 = 1e-6;
 
 /// Steps to the minimum voltage, and the share of the interval that each leaves.
