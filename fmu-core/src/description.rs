@@ -240,7 +240,15 @@ impl Description {
     /// # Errors
     /// As [`exported`](Self::exported).
     pub fn of<M: Stored>() -> Result<Self, Fault> {
-        Self::with(&Capabilities::<M>::NONE, fresh()?, Dependencies::Probed)
+        Self::probed(&Capabilities::<M>::NONE, fresh()?, Dependencies::Probed)
+    }
+
+    /// Describes the variables of a model: without dependencies, capabilities and derivatives. Nothing is run but `initialize`.
+    ///
+    /// # Errors
+    /// As [`exported`](Self::exported).
+    pub fn variables<M: Model>() -> Result<Self, Fault> {
+        Self::with(&Capabilities::<M>::unsaved(), fresh()?, &[], probe::no_dependencies::<M>(&[]))
     }
 
     /// Describes a model as it is exported; start values come from its `Default`, dependencies from probing it.
@@ -252,19 +260,36 @@ impl Description {
         Self::instantiated::<E>(fresh()?, Dependencies::Probed)
     }
 
+    /// The description as JSON.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn json(&self) -> Result<String, Fault> {
+        serde_json::to_string(self).map_err(|e| Fault::new(e.to_string()))
+    }
+
     /// Describes an instance like [`exported`](Self::exported), with the start values and resources of `block`.
     ///
     /// # Errors
     /// As [`exported`](Self::exported).
     pub fn instantiated<E: Exported>(block: Block<E::Model>, dependencies: Dependencies) -> Result<Self, Fault> {
-        Self::with(&E::CAN, block, dependencies)
+        Self::probed(&E::CAN, block, dependencies)
     }
 
-    fn with<M: Model>(can: &Capabilities<M>, mut block: Block<M>, dependencies: Dependencies) -> Result<Self, Fault> {
+    fn probed<M: Model>(can: &Capabilities<M>, block: Block<M>, dependencies: Dependencies) -> Result<Self, Fault> {
         let states = can.rows()?;
         check_sizes(can, &block)?;
         probe::keeps_starts(can, &block, &states)?;
-        let [initial, between] = dependencies.of(can, &block, &states);
+        let dependencies = dependencies.of(can, &block, &states);
+        Self::with(can, block, &states, dependencies)
+    }
+
+    fn with<M: Model>(
+        can: &Capabilities<M>,
+        mut block: Block<M>,
+        states: &[usize],
+        [initial, between]: [probe::Dependencies; 2],
+    ) -> Result<Self, Fault> {
         block.initialize();
         let reference = |index: usize| if index == probe::NOW { TIME } else { can.reference(index) };
         let references = |of: &Option<Vec<usize>>| of.as_ref().map(|d| d.iter().map(|&i| reference(i)).collect());
@@ -359,7 +384,7 @@ impl Description {
             variables,
             terminals,
             icon: M::ICON.map(Into::into),
-            model_exchange: exchange(can, &states),
+            model_exchange: exchange(can, states),
             keeps: can.keeps(),
         })
     }

@@ -4,15 +4,15 @@ use super::motor::MotorFile;
 use super::setting::{Setting, Value};
 use crate::error::{Error, Result, bail};
 use drive::{PmsmPlant, SensorlessController};
-use fmu_core::description::{Dependencies, VariableKind};
-use fmu_core::{Block, Description, Plain, Stored};
+use fmu_core::description::VariableKind;
+use fmu_core::{Description, Model};
 
-/// The variables of a model, without their dependencies: to find those takes longer than to tune.
+/// The variables of a model.
 ///
 /// # Errors
 /// The model cannot be described.
-pub fn variables<M: Stored>() -> Result<Description> {
-    Description::instantiated::<Plain<M>>(Block::default(), Dependencies::Omitted).map_err(Error::new)
+pub fn variables<M: Model>() -> Result<Description> {
+    Description::variables::<M>().map_err(Error::new)
 }
 
 /// Checks both lists against the descriptions of the models.

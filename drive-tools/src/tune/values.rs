@@ -7,7 +7,7 @@ use super::rules;
 use super::setting::{Setting, Tuned, Value};
 use crate::error::Result;
 use drive::{PmsmPlant, SensorlessController};
-use fmu_core::Stored;
+use fmu_core::Model;
 use fmu_core::description::{self, Variable, VariableKind};
 use serde_json::{Map, Value as Json, json};
 use std::path::Path;
@@ -74,7 +74,7 @@ pub fn joined(plant: &[Setting], controller: &[Setting]) -> Vec<(String, Value)>
     of_plant.chain(of_controller).collect()
 }
 
-fn of_model<M: Stored>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
+fn of_model<M: Model>(settings: &[Setting], integers: bool) -> Result<Vec<Setting>> {
     let description = variables::<M>()?;
     let one = |setting: &Setting| {
         let variable = description.variable(setting.name);

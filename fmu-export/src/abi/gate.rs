@@ -15,6 +15,7 @@ use crate::resources::folder;
 use crate::snapshot::Snapshot;
 use fmu_core::call_log::{CallEnd, LogValue};
 use fmu_core::{Exported, Fault, Interface};
+use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::ffi::{CStr, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -265,7 +266,7 @@ fn pass<E: Exported>(
 ) -> Status {
     let life = instance.current.life;
     if instance.standard != entry.standard || !entry.allowed.of_interface(life.interface()).contains(life.state()) {
-        return fail(entry, instance, Refusal::Error(misplaced(entry, instance)));
+        return misplaced(entry, instance);
     }
     // A panic can leave a half-done step; only Reset, SetFMUState and Free leave the Error state.
     match catch_unwind(AssertUnwindSafe(|| body(Abi(instance)))) {
@@ -273,6 +274,20 @@ fn pass<E: Exported>(
             instance.current.life.after(true, entry.next);
             Status::Ok
         }
+        unsuccessful => judge(entry, instance, unsuccessful),
+    }
+}
+
+/// The status of a call that was refused or panicked.
+#[cold]
+#[inline(never)]
+fn judge<E: Exported>(
+    entry: &'static Entry,
+    instance: &mut Instance<E>,
+    ended: Result<Answer, Box<dyn Any + Send>>,
+) -> Status {
+    match ended {
+        Ok(Ok(())) => Status::Ok,
         Ok(Err(refusal)) => fail(entry, instance, refusal),
         Err(payload) => fail(entry, instance, Refusal::Error(panicked(payload.as_ref()))),
     }
@@ -293,17 +308,20 @@ fn fail<E: Exported>(entry: &'static Entry, instance: &mut Instance<E>, refusal:
     }
 }
 
+/// The status of a call that the instance's standard or state does not allow.
 #[cold]
-fn misplaced<E: Exported>(entry: &'static Entry, instance: &Instance<E>) -> Fault {
-    if instance.standard != entry.standard {
-        return Fault::new("the instance was made by the other standard's function");
-    }
+#[inline(never)]
+fn misplaced<E: Exported>(entry: &'static Entry, instance: &mut Instance<E>) -> Status {
     let (state, interface) = (instance.current.life.state(), instance.current.life.interface());
     let allowed = entry.allowed.of_interface(interface);
-    if allowed.is_empty() {
-        return Fault::new(format!("not allowed: the instance is one {}", message::made_for(interface)));
-    }
-    Fault::new(format!("not allowed in the state {state}; allowed in: {allowed}"))
+    let why = if instance.standard != entry.standard {
+        "the instance was made by the other standard's function".into()
+    } else if allowed.is_empty() {
+        format!("not allowed: the instance is one {}", message::made_for(interface))
+    } else {
+        format!("not allowed in the state {state}; allowed in: {allowed}")
+    };
+    fail(entry, instance, Refusal::Error(Fault::new(why)))
 }
 
 /// How the importer makes communication steps.

@@ -97,7 +97,7 @@ impl<E: Exported> Abi<'_, E> {
             made.block.model.load(resources.as_deref())?;
             let mut description = Description::instantiated::<E>(made.block, dependencies)?;
             description.token.push_str(&made.suffix);
-            serde_json::to_string(&description).map_err(|e| Fault::new(e.to_string()))
+            description.json()
         });
         let json = json.unwrap_or_else(|payload| Err(fault::panicked(payload.as_ref())));
         let (text, status) = match json {

@@ -1,7 +1,7 @@
 //! Instances with a call log: the gate finds them not free, and their calls pass here. The call is written, made again on the
 //! instance, now free, and its end is written.
 
-use super::gate::{Entry, FREE, Function, Handle, LOGGED, ended, write};
+use super::gate::{Entry, FREE, Handle, LOGGED, ended, write};
 use super::recorded::{Passed, arguments, results};
 use crate::call_log::{CallLog, IS_POSSIBLE};
 use crate::lifecycle::Standard;
@@ -54,15 +54,17 @@ pub unsafe fn open_logged<E: Exported>(
 ///
 /// # Safety
 /// As [`Abi::enter`](super::Abi::enter); the arguments follow the standard.
-pub unsafe fn record<E: Exported, F: Function>(
+#[inline(never)]
+pub unsafe fn record<E: Exported>(
     pointer: *mut c_void,
-    passed: &dyn Fn() -> Vec<Passed>,
+    entry: &Entry,
+    passed: &[Passed],
     again: &dyn Fn() -> c_int,
 ) -> c_int {
     // SAFETY: the caller's promise; the gate refuses NULL.
     let handle = unsafe { Handle::<E>::behind(pointer) };
     match &handle.calls {
-        Some(calls) if IS_POSSIBLE => handle.record(calls, &F::ENTRY, &passed(), again),
+        Some(calls) if IS_POSSIBLE => handle.record(calls, entry, passed, again),
         _ => Status::Error as c_int,
     }
 }
@@ -77,9 +79,10 @@ macro_rules! unusual {
         unsafe extern "C" fn unusual($instance: InstancePointer $(, $argument: $type)*) -> c_int {
             // SAFETY: what the standard demands of the importer.
             unsafe {
-                $crate::abi::record::record::<$exported, Here>(
+                $crate::abi::record::record::<$exported>(
                     $instance,
-                    &|| vec![$((stringify!($argument), CArgument::argument($argument))),*],
+                    const { &<Here as $crate::abi::types::Function>::ENTRY },
+                    &[$((stringify!($argument), CArgument::argument($argument))),*],
                     &|| $name($instance $(, $argument)*),
                 )
             }
