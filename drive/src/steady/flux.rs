@@ -16,6 +16,9 @@ const STEPS: usize = 12;
 /// Residue at which they end, as a share of the current.
 const SMALL: f64 = 1e-14;
 
+/// Residue, as a share of the current, that falls no more because of rounding.
+const ROUNDED: f64 = 1e-10;
+
 /// The flux linkage (Wb) with the current `i_s` (A) at the terminals.
 #[inline]
 pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): (f64, f64)) -> Dq {
@@ -24,12 +27,15 @@ pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): 
     if linear && g == 0.0 {
         return psi;
     }
+    let mut last = f64::INFINITY;
     for _ in 0..if linear { 1 } else { STEPS } {
         let rest =
             if linear { Dq::ZERO } else { machine::current(motor, magnetics, psi) - i_s } + psi * h + psi.turned() * g;
-        if !linear && rest.magnitude() <= SMALL * (1.0 + i_s.magnitude()) {
+        let size = rest.magnitude() / (1.0 + i_s.magnitude());
+        if !linear && (size <= SMALL || size <= ROUNDED && size >= last) {
             break;
         }
+        last = size;
         let [d, cross, q] = machine::slope(motor, magnetics, psi);
         let (d, q, above, below) = (d + h, q + h, cross - g, cross + g);
         let by = 1.0 / (d * q - above * below);
