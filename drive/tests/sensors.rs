@@ -8,13 +8,14 @@ mod machines;
 
 use drive::PmsmDrive;
 use drive::control::position::PositionSensor;
-use drive::control::sensor::Sensor;
+use drive::control::sensor::{MeasuredPhases, Sensor};
 use drive::control::start::StartMode;
 use drive::control::tables::ControllerParameters;
 use drive::estimator::Kind;
+use drive::motor::Motor;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Step, integrate};
 use machines::b;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 const T_S: f64 = 1e-4;
 
@@ -90,6 +91,63 @@ fn a_gain_error_makes_a_torque_at_twice_the_electrical_speed() {
             assert!(at_w < 0.01 * expected, "{at_w} N.m");
         }
     }
+}
+
+/// One shunt with the offset d: +d in the phase of the largest voltage and -d in that of the smallest, a vector of 2 d / sqrt 3 in the
+/// middle of the sector of the voltage, which the current loop subtracts; its mean is 3/pi of that, in the direction of the voltage.
+#[test]
+fn an_offset_of_one_shunt_takes_torque() {
+    let Motor { R_s, L_q, psi_M, n_p, .. } = b().motor;
+    for exchange in [false, true] {
+        for d in [0.1, -0.1] {
+            let tau = 2.0;
+            let k = 1.5 * f64::from(n_p) * psi_M;
+            let (w, i_q) = (TAU * 5.0, tau / k);
+            let (u_d, u_q) = (-w * L_q * i_q, R_s * i_q + w * psi_M);
+            let expected = -k * d * 2.0 / 3.0_f64.sqrt() * 3.0 / PI * u_q / u_d.hypot(u_q);
+            let [mean, ..] = torque(tau, exchange, |s| (s.phases, s.offset.a) = (MeasuredPhases::One, d));
+            println!("{} N.m, not {expected} N.m", mean - tau);
+            assert!(((mean - tau) / expected - 1.0).abs() < 0.003, "{} N.m, not {expected} N.m", mean - tau);
+        }
+    }
+}
+
+/// With a window of 3 us, a vector of less than 6 % of the period is not read: the drive still turns, with a ripple. A window that no
+/// vector fills leaves the controller without currents, and it is refused what needs currents at 0 V.
+#[test]
+fn one_shunt_needs_its_window() {
+    let ripple = |window: f64| {
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        let machine = b();
+        let mut drive = Block::<PmsmDrive>::default();
+        let plant = &mut drive.model.pair.plant.model.parameters;
+        (plant.motor, plant.mechanics.J) = (machine.motor.clone(), machine.J);
+        let par = &mut drive.model.pair.controller.model.parameters;
+        *par = machine.parameters();
+        (par.estimator, par.start.mode) = (Kind::Sensored, StartMode::Direct);
+        (par.sensor.phases, par.sensor.window) = (MeasuredPhases::One, window);
+        (drive.model.inputs.speed_ref, drive.model.inputs.tau_load) = (100.0, 1.0);
+        drive.model.validate().unwrap();
+        drive.initialize();
+        for k in 0..10_000 {
+            let start = Elapsed::ZERO.plus(f64::from(k) * T_S);
+            drive.step(&Step { start, h: T_S }).unwrap();
+            if k > 8000 {
+                let plant = &drive.out.plant;
+                (least, most) = (least.min(plant.tau_e), most.max(plant.tau_e));
+                assert!((plant.speed - 100.0).abs() < 3.0, "{window} s, {} rad/s", plant.speed);
+            }
+        }
+        most - least
+    };
+    let [all, some] = [0.0, 3e-6].map(ripple);
+    println!("ripple {all} N.m, {some} N.m");
+    assert!(all < 0.05 && some > 2.0 * all, "{all} N.m, {some} N.m");
+    let mut drive = PmsmDrive::default();
+    let par = &mut drive.pair.controller.model.parameters;
+    (par.sensor.phases, par.compensation.calibrate) = (MeasuredPhases::One, true);
+    let error = drive.validate().unwrap_err().to_string();
+    assert!(error.contains("compensation.calibrate") && error.contains("sensor.phases"), "{error}");
 }
 
 /// A position sensor mounted with the error d: the d-axis current is 0 in its frame, and i_q cos d makes torque.

@@ -5,6 +5,7 @@ use crate::commission::CommissionMode;
 use crate::estimator::{Class, Kind};
 use crate::position;
 use crate::reference::max_torque;
+use crate::sensor::MeasuredPhases;
 use crate::tables::{ControllerParameters, PARAMETERS};
 use crate::weakening::{INVERSE_SQRT_3, WeakeningGains};
 use drive_base::math::sin_cos;
@@ -201,6 +202,28 @@ pub(crate) fn trip(par: &ControllerParameters, u_dc: f64) -> Result<(), Fault> {
         return Err(table.fault(par, |p| &mut p.trip.u_dc_restart, allowed));
     }
     Ok(())
+}
+
+/// Checks that one shunt sees the currents that the drive needs.
+///
+/// # Errors
+/// Self-commissioning, a flying start or a calibration is in use: they need currents without a voltage.
+pub(crate) fn shunt(par: &ControllerParameters) -> Result<(), Fault> {
+    let needs = [
+        (par.commission.mode != CommissionMode::Off, "commission.mode", "Off"),
+        (par.start.catch && par.estimator != Kind::Sensored, "start.catch", "false"),
+        (par.compensation.calibrate, "compensation.calibrate", "false"),
+    ];
+    let Some((_, name, allowed)) =
+        needs.into_iter().find(|(used, ..)| *used && par.sensor.phases == MeasuredPhases::One)
+    else {
+        return Ok(());
+    };
+    let (phases, is) =
+        (PARAMETERS.tell(par, |p| &mut p.sensor.phases), PARAMETERS.tell_name(par, name).unwrap_or_default());
+    Err(Fault::new(format!(
+        "{is} needs currents at 0 V, which {phases} does not see: set {name} = {allowed}, or measure two phases"
+    )))
 }
 
 /// Checks that the parameters fit together.

@@ -206,6 +206,9 @@ impl SensorlessController {
     /// Measured currents in A, less the offsets measured at rest.
     #[inline(always)]
     pub(super) fn currents(&self) -> Phases {
+        if self.has_one_shunt() {
+            return self.shunt.currents();
+        }
         let Phases { a, b, c } = self.parameters.sensor.measure(self.inputs.i, self.state.samples);
         let zero = self.state.offset.i;
         Phases { a: a - zero.a, b: b - zero.b, c: c - zero.c }

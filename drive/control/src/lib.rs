@@ -27,6 +27,7 @@ pub mod limits;
 pub mod lock;
 pub mod model;
 pub mod modes;
+mod one_shunt;
 pub mod overload;
 pub mod polarity;
 pub mod position;

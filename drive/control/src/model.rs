@@ -8,8 +8,10 @@ use crate::gains::Gains;
 use crate::idle;
 use crate::lock::{LOST, Lock};
 use crate::modes::{Follows, MODE_INPUTS};
+use crate::one_shunt::OneShunt;
 use crate::overload::Overload;
 use crate::position::{Position, PositionSensor};
+use crate::sensor::MeasuredPhases;
 use crate::signals::{ControllerInputs, ControllerOutputs};
 use crate::stands;
 use crate::start::StartMode;
@@ -50,6 +52,7 @@ pub struct SensorlessController {
     commissioning: Held,
     /// The position sensor.
     pub(super) position: Position,
+    pub(super) shunt: OneShunt,
 }
 
 impl SensorlessController {
@@ -126,6 +129,22 @@ impl SensorlessController {
     fn read_position(&mut self) {
         let par = &self.parameters;
         self.position.read(&par.position, &self.inputs, par.motor.n_p, par.T_s);
+    }
+
+    /// Whether the currents come from one shunt in the DC link.
+    #[inline]
+    pub(super) fn has_one_shunt(&self) -> bool {
+        self.parameters.sensor.phases == MeasuredPhases::One
+    }
+
+    /// Reads the shunt under the command applied since the last sample.
+    #[cold]
+    #[inline(never)]
+    fn read_shunt(&mut self) {
+        let Self { inputs, parameters: par, state, .. } = self;
+        let command = state.commands[usize::try_from(par.delay).unwrap_or(0).min(state.commands.len() - 1)];
+        let applied = state.shown.enabled.then(|| (Phases::from_stator(command.u), inputs.u_dc));
+        self.shunt.read(&par.sensor, inputs.i, state.samples, par.T_s, applied);
     }
 
     /// Measured electrical angle (rad) and speed (rad/s).
@@ -306,6 +325,7 @@ impl SensorlessController {
         checks::trip(par, u_dc)?;
         checks::catch(par, u_dc)?;
         checks::position(par)?;
+        checks::shunt(par)?;
         checks::commissioning(par)?;
         checks::dc_limits(par)?;
         // The start value is accepted with an estimator that does not read it.
@@ -340,7 +360,7 @@ impl Model for SensorlessController {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/sensorless_controller.svg"));
 
-    const STATE_VERSION: u16 = 25;
+    const STATE_VERSION: u16 = 26;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         if name == "u_dc" && self.inputs.u_dc == 0.0 {
@@ -379,7 +399,7 @@ impl Model for SensorlessController {
         let waits = self.parameters.start.catch || commissions && commission_start;
         self.state = State::new(&self.parameters, enable && !asc && !waits);
         self.state.shown.short_circuit = asc;
-        (self.tuned, self.position) = (false, Position::default());
+        (self.tuned, self.position, self.shunt) = (false, Position::default(), OneShunt::default());
     }
 
     fn output(&self, _now: Elapsed, out: &mut ControllerOutputs) {
@@ -417,6 +437,9 @@ impl Sampled for SensorlessController {
         self.finite()?;
         if self.has_position_sensor() {
             self.read_position();
+        }
+        if self.has_one_shunt() {
+            self.read_shunt();
         }
         self.compute();
         if let Some(commissioning) = &self.commissioning {

@@ -10,7 +10,7 @@
 use drive_base::frame::Phases;
 use drive_base::math::{ln, sin_cos};
 use fmu_core::draw::{GOLDEN, mix};
-use fmu_core::unit::{AMPERE, ONE};
+use fmu_core::unit::{AMPERE, ONE, SECOND};
 use fmu_core::{Field, Row, Table, enumeration, table};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -22,6 +22,7 @@ enumeration! {
         #[default]
         1 Three "All three phases";
         2 Two "Phases a and b: i_c = -i_a - i_b, with the errors of both";
+        3 One "None: one shunt in the DC link, read while an active vector lasts";
     }
 }
 
@@ -40,12 +41,15 @@ pub struct Sensor {
     pub resolution: f64,
     /// The phases that have one.
     pub phases: MeasuredPhases,
+    /// Minimum duration in s of an active vector in which one shunt is read, >= 0.
+    pub window: f64,
 }
 
 impl Default for Sensor {
     fn default() -> Self {
         let gain = Phases { a: 1.0, b: 1.0, c: 1.0 };
-        Self { gain, offset: Phases::default(), noise: 0.0, seed: 1, resolution: 0.0, phases: MeasuredPhases::Three }
+        let (offset, phases) = (Phases::default(), MeasuredPhases::Three);
+        Self { gain, offset, noise: 0.0, seed: 1, resolution: 0.0, phases, window: 0.0 }
     }
 }
 
@@ -128,6 +132,13 @@ pub const SENSOR: &Table<Sensor> = table![
     P::parameter("resolution", &AMPERE, "Step of the current measurement; 0: none", |p| &mut p.resolution)
         .at_least(0.0),
     P::enumeration_parameter("phases", "Phases with a current sensor", &Field(|p| &mut p.phases)),
+    P::parameter(
+        "window",
+        &SECOND,
+        "Minimum duration of an active vector in which the shunt of phases = One is read",
+        |p| { &mut p.window }
+    )
+    .at_least(0.0),
 ];
 
 #[cfg(test)]
