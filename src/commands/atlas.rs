@@ -4,6 +4,7 @@ use super::{bar_of_cells, numbers};
 use anyhow::{Result, anyhow, bail};
 use clap::Args;
 use drive::estimator::Kind;
+use drive::plant::pwm::InverterMode;
 use drive_study::atlas::cell::{Course, Grid};
 use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, report};
@@ -62,6 +63,9 @@ pub struct Atlas {
     /// Set a parameter of the controller (repeatable)
     #[arg(long, value_name = "NAME=VALUE")]
     pub set: Vec<String>,
+    /// Inverter of the plant: Average or Switched, with a carrier period of one sample [default: Average]
+    #[arg(long, value_name = "MODE")]
+    pub inverter: Option<String>,
     /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
@@ -116,6 +120,7 @@ fn grid(args: &Atlas) -> Result<Grid> {
 }
 
 fn drives(args: &Atlas) -> Result<Vec<Drive>> {
+    let mode = args.inverter.as_deref().map_or(Ok(InverterMode::Average), mode)?;
     let mut drives: Vec<Drive> = Vec::new();
     for name in args.estimator.iter().filter(|name| !name.is_empty()) {
         let mut drive = if let Some(path) = &args.motor {
@@ -124,12 +129,18 @@ fn drives(args: &Atlas) -> Result<Vec<Drive>> {
             Drive::compared(Entry::find(name).ok_or_else(|| unknown(name, Entry::all().iter().map(|e| e.name)))?)
         };
         args.set.iter().try_for_each(|text| drive.set(text))?;
-        drives.push(drive);
+        drives.push(drive.on_inverter(mode));
     }
     if drives.is_empty() {
         bail!("--estimator has no value: an atlas needs at least one estimator; omit the option for Rasmussen");
     }
     Ok(drives)
+}
+
+fn mode(name: &str) -> Result<InverterMode> {
+    let known = || InverterMode::ALL.iter().map(|mode| mode.name()).collect::<Vec<_>>().join(", ");
+    let found = InverterMode::ALL.iter().find(|mode| mode.name().eq_ignore_ascii_case(name));
+    found.copied().ok_or_else(|| anyhow!("--inverter {name}: unknown mode; available: {}", known()))
 }
 
 fn tuned(path: &Path, name: &str) -> Result<Drive> {

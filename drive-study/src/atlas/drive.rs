@@ -5,6 +5,7 @@ use crate::runner::{Bench, REFERENCE_SPEED};
 use drive::SensorlessController;
 use drive::control::start::StartMode;
 use drive::estimator::Kind;
+use drive::plant::pwm::InverterMode;
 use drive_tools::error::{Error, Result, WithContext, bail};
 use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
@@ -77,6 +78,18 @@ impl Drive {
             bench: Bench { pair, speed: *file.data.rating.speed.get_ref(), torque: *file.data.rating.torque.get_ref() },
             approach: if rest { Approach::Rest } else { Approach::Turning },
         })
+    }
+
+    /// The drive on this inverter. Switched has a carrier period of one sample, whose extremes are the sampling instants.
+    #[must_use]
+    pub fn on_inverter(mut self, mode: InverterMode) -> Self {
+        let (plant, controller) = (&mut self.bench.pair.plant.model, &self.bench.pair.controller.model);
+        if mode == InverterMode::Switched {
+            plant.parameters.inverter.T_pwm = controller.parameters.T_s;
+            self.machine.push_str(", switched inverter");
+        }
+        plant.parameters.inverter.pwm.mode = mode;
+        self
     }
 
     /// Sets a parameter of the controller from the text `name=value`.
