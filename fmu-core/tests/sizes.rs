@@ -154,23 +154,22 @@ fn an_array_of_another_length_is_named() {
     assert_eq!(wrong(|m| m.map.values.push(0.0)), "values has 7 elements, and rows is 6");
 }
 
+/// A tunable parameter that is no size.
+const GAIN: &Table<Load> = table![L::parameter("gain", &ONE, "", |m| &mut m.gain).tunable()];
+
+/// The sizes of a part are those of the whole.
+const WHOLE: &Table<Grid> = table![
+    Row::<Grid>::parameter("b", &ONE, "", |m| &mut m.b),
+    Row::<Grid>::part("map.", &Part { table: MAP, lens: |m: &mut Grid| &mut m.map }),
+    Row::<Grid>::parameter("a", &ONE, "", |m| &mut m.a),
+];
+
 #[test]
 fn a_table_knows_whether_it_has_sizes() {
-    let of = |has: bool, tunable: bool| (has, tunable);
-    assert_eq!(of(Grid::TABLE.has_sizes(), Grid::TABLE.has_tunable_sizes()), (true, true));
-    assert_eq!(of(MAP.has_sizes(), MAP.has_tunable_sizes()), (true, false));
-    assert_eq!(of(LOAD.has_sizes(), LOAD.has_tunable_sizes()), (false, false));
-    // A tunable parameter that is no size.
-    const GAIN: &Table<Load> = table![L::parameter("gain", &ONE, "", |m| &mut m.gain).tunable()];
-    assert_eq!(of(GAIN.has_sizes(), GAIN.has_tunable_sizes()), (false, false));
-    // The sizes of a part are those of the whole.
-    const PART: Part<Grid, Map> = Part { table: MAP, lens: |m: &mut Grid| &mut m.map };
-    const WHOLE: &Table<Grid> = table![
-        Row::<Grid>::parameter("b", &ONE, "", |m| &mut m.b),
-        Row::<Grid>::part("map.", &PART),
-        Row::<Grid>::parameter("a", &ONE, "", |m| &mut m.a),
-    ];
-    assert_eq!(of(WHOLE.has_sizes(), WHOLE.has_tunable_sizes()), (true, false));
+    let has = [Grid::TABLE.has_sizes(), MAP.has_sizes(), LOAD.has_sizes(), GAIN.has_sizes(), WHOLE.has_sizes()];
+    assert_eq!(has, [true, true, false, false, true]);
+    let tunable = [Grid::TABLE.has_tunable_sizes(), MAP.has_tunable_sizes(), WHOLE.has_tunable_sizes()];
+    assert_eq!((tunable, GAIN.has_tunable_sizes()), ([true, false, false], false));
 }
 
 /// A number is counted with the maximum sizes: `a` is 0, `x` is 1 to 5, `y` is 6 to 9 and `b` is 10.
@@ -233,7 +232,7 @@ fn impossible_sizes_are_refused() {
         M::array_parameter("values", &ONE, "", count, |m| &mut m.values).sized(sized)
     }
     fn refusal<const N: usize>(rows: impl FnOnce() -> [M; N] + UnwindSafe) -> Option<String> {
-        let build = move || drop(Table::new(Box::leak(Box::new(numbered(rows())))));
+        let build = move || Table::new(Box::leak(Box::new(numbered(rows())))).len();
         catch_unwind(build).err().map(|panic| panic.downcast_ref::<String>().unwrap().clone())
     }
     assert_eq!(refusal(|| [n(3.0), array(3, &["n"])]), None);
