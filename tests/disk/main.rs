@@ -303,7 +303,12 @@ fn every_call() {
     for case in [merge(), tune(), identify(), sweep()] {
         case.faults(&KINDS, usize::MAX / 2);
     }
-    // Of their 2000 calls, most unpack a library.
+}
+
+/// Of their hundreds of calls, most unpack a library.
+#[test]
+#[ignore = "runs the commands hundreds of times, in minutes"]
+fn many_calls() {
     preset().faults(&KINDS, 60);
     page().faults(&KINDS, 60);
 }
