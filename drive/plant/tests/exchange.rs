@@ -3,6 +3,7 @@
 
 use drive_base::frame::Phases;
 use drive_plant::PmsmPlant;
+use drive_plant::pwm::InverterMode;
 use fmu_core::{Block, ContinuousTime, Elapsed, Events, Step};
 
 const U: Phases = Phases { a: 40.0, b: -20.0, c: -20.0 };
@@ -46,4 +47,45 @@ fn blocked_diodes_leave_the_voltage_to_the_switches() {
     block.model.inputs.enable = true;
     let (_, [d, q]) = electrical(&mut block, Elapsed::ZERO);
     assert!((d.hypot(q) - 40.0).abs() < 1.0, "{d} V, {q} V");
+}
+
+/// On the switched inverter, an event that ends no current leaves all of them.
+#[test]
+fn an_event_of_the_switches_leaves_the_currents() {
+    let mut block = Block::<PmsmPlant>::default();
+    block.model.parameters.inverter.pwm.mode = InverterMode::Switched;
+    (block.model.inputs.enable, block.model.inputs.u) = (true, U);
+    block.initialize();
+    block.model.event(Elapsed::ZERO).unwrap();
+    *PmsmPlant::STATES[0].at(&mut block.model) += 0.02;
+    let (before, _) = electrical(&mut block, Elapsed::ZERO);
+    assert!(before[0] > 1.0, "{before:?} A");
+    for at in [0.0, 2e-5, 5e-5] {
+        let now = Elapsed::ZERO.plus(at);
+        block.model.event(now).unwrap();
+        assert_eq!(electrical(&mut block, now).0, before, "{at} s");
+    }
+}
+
+/// A step at a high speed is taken in parts of a small turn.
+#[test]
+fn a_long_step_is_as_exact_as_short_ones() {
+    let run = |parts: u32| {
+        let mut block = Block::<PmsmPlant>::default();
+        let parameters = &mut block.model.parameters;
+        (parameters.inverter.pwm.mode, parameters.inverter.T_pwm) = (InverterMode::Switched, 1.0);
+        (parameters.mechanics.imposed, block.model.inputs.speed_shaft) = (true, 5000.0);
+        (block.model.inputs.enable, block.model.inputs.u) = (true, U);
+        block.initialize();
+        let (h, mut now) = (2e-3 / f64::from(parts), Elapsed::ZERO);
+        for _ in 0..parts {
+            block.model.inputs.angle_shaft = 5000.0 * now.seconds();
+            let step = Step { start: now, h };
+            block.step(&step).unwrap();
+            now = step.end();
+        }
+        [block.out.i_d, block.out.i_q]
+    };
+    let (one, many) = (run(1), run(200));
+    assert!(one.iter().zip(many).all(|(a, b)| (a - b).abs() < 1e-6), "{one:?} A, not {many:?} A");
 }

@@ -20,7 +20,7 @@ fn a_jump_of_the_angle_takes_its_work_from_the_field() {
     let mut step = Step { start: Elapsed::ZERO, h: 2e-3 };
     block.step(&step).unwrap();
     for jump in [0.2, -0.3] {
-        let (before, energy) = (stored(&block), block.out.energy.clone());
+        let (before, energy) = (stored(&block), block.out.energy);
         assert!(before > 0.01, "{before} J");
         block.model.inputs.angle_shaft += jump;
         // So short that only the jump transfers energy.
