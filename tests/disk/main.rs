@@ -305,11 +305,16 @@ fn every_call() {
     }
 }
 
-/// Of their hundreds of calls, most unpack a library.
+/// Of its hundreds of calls, most unpack a library.
 #[test]
-#[ignore = "runs the commands hundreds of times, in minutes"]
-fn many_calls() {
+#[ignore = "runs the command hundreds of times, in minutes"]
+fn many_calls_of_preset() {
     preset().faults(&KINDS, 60);
+}
+
+#[test]
+#[ignore = "runs the command hundreds of times, in minutes"]
+fn many_calls_of_page() {
     page().faults(&KINDS, 60);
 }
 

@@ -1,5 +1,5 @@
 //! The plant in Model Exchange when its gates switch off and on: the diodes block a current only once it has ended.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::float_cmp)]
 
 use drive_base::frame::Phases;
 use drive_plant::PmsmPlant;

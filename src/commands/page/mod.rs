@@ -118,7 +118,7 @@ fn write(workspace: &Workspace, model: &Model, module: &[u8], out: &Path) -> Res
     let mut stimuli = model.folder.join(STIMULI);
     if let Some(text) = &model.stimuli {
         stimuli = dir.path().join(STIMULI);
-        fs::write(&stimuli, text)?;
+        fs::write(&stimuli, text).with_context(|| stimuli.display().to_string())?;
     }
     let own = own(model)?;
     let source = Source {
