@@ -167,3 +167,16 @@ fn an_fmu_of_one_instance_in_a_process_is_named() {
     assert_eq!(named(Method::default(), &[("a", &plain), ("b", &once)]).as_deref(), Some("b"));
     assert_eq!(named(Method::ModelExchange(Integration::default()), &[("b", &once)]), None);
 }
+
+#[test]
+fn the_numeric_outputs_of_all_instances_have_their_names() {
+    let workshop = Workshop::new();
+    let (plant, sampler) = (workshop.plain("plant", 3), workshop.plain("sampler", 3));
+    let mut system = System::default();
+    system.add("a", &plant, false).unwrap();
+    system.add("b", &sampler, false).unwrap();
+    let outputs = system.outputs();
+    assert!(["a.x", "b.x"].iter().all(|name| outputs.iter().any(|output| output == name)), "{outputs:?}");
+    assert!(!outputs.iter().any(|output| output.ends_with(".u")), "{outputs:?}");
+    assert!(!system.is_size("a.u").unwrap(), "an input is no size");
+}
