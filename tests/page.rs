@@ -3,6 +3,7 @@
 
 mod common;
 
+use common::pages::module;
 use drive::PmsmDrive;
 use fmu_core::{Block, Capabilities, Description, Elapsed, Exported, Model, Slot, Step};
 use fmu_pack::page::own::{Own, PresetRun};
@@ -159,11 +160,6 @@ fn what_is_wrong_in_a_page_toml_is_named() {
     assert!(Own::read(&" ".repeat(1 << 21)).unwrap_err().contains("; the maximum is "));
 }
 
-/// A module with the parts that a page checks.
-fn module(of: &Description) -> Vec<u8> {
-    [b"\0asm\x01\0\0\0", "fmi3DoStep __indirect_function_table ".as_bytes(), of.token.as_bytes()].concat()
-}
-
 fn source<'a>(of: &'a Description, plain: &'a Description, module: &'a [u8]) -> Source<'a> {
     let own = Some((Path::new("page.toml"), OWN));
     Source { description: of, plain, module, own, stimuli: None, licenses: "MIT" }
@@ -172,7 +168,7 @@ fn source<'a>(of: &'a Description, plain: &'a Description, module: &'a [u8]) -> 
 #[test]
 fn a_page_stands_alone_and_knows_the_model() {
     let of = drive();
-    let module = module(&of);
+    let module = module(&of.token);
     let html = page(&source(&of, &of, &module)).unwrap();
     assert_eq!(html, page(&source(&of, &of, &module)).unwrap(), "two pages of one model differ");
     common::pages::stands_alone(&html, |_| false);
@@ -213,7 +209,7 @@ impl Exported for Alone {
 #[test]
 fn another_module_is_refused() {
     let of = drive();
-    let good = module(&of);
+    let good = module(&of.token);
     for (module, why) in [
         (b"\x7fELF".to_vec(), "not one of WebAssembly"),
         (good[..8].to_vec(), "no function fmi3DoStep"),
@@ -229,7 +225,7 @@ fn another_module_is_refused() {
 #[test]
 fn the_default_experiment_has_names_and_units() {
     let of = drive();
-    let module = module(&of);
+    let module = module(&of.token);
     let dir = tempfile::tempdir().unwrap();
     let stimuli = dir.path().join("stimuli.csv");
     let made = |text: &str| {

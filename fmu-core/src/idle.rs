@@ -107,3 +107,38 @@ fn number(slot: &Slot<'_>) -> Option<f64> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::row::Row;
+    use crate::unit::ONE;
+
+    type V = Row<[f64; 4]>;
+
+    const TABLE: &Table<[f64; 4]> = crate::table![
+        V::parameter("a", &ONE, "", |m| &mut m[0]),
+        V::input("b", &ONE, "", |m| &mut m[1]),
+        V::parameter("c", &ONE, "", |m| &mut m[2]),
+        V::output("y", &ONE, "", |m| &mut m[3]),
+    ];
+
+    fn acts(names: &'static [&'static str], why: &'static str) -> Acts<bool> {
+        Acts { names, when: |on| *on, why }
+    }
+
+    #[test]
+    fn each_parameter_and_input_is_stated_once() {
+        assert_eq!(unstated(&[acts(&["a", "b"], ""), acts(&["c"], "")], TABLE), [""; 0]);
+        assert_eq!(unstated(&[acts(&["a"], "")], TABLE), ["b", "c"]);
+        assert_eq!(unstated(&[acts(&["a", "b"], ""), acts(&["c", "a"], "")], TABLE), ["a"], "twice");
+        assert_eq!(unstated(&[acts(&["a", "b", "c", "y", "z"], "")], TABLE), ["y", "z"], "neither of them");
+    }
+
+    #[test]
+    fn what_does_not_act_has_its_reason() {
+        let all = [acts(&["a"], "first"), acts(&["b", "c"], "second")];
+        assert_eq!([why(&all, &false, "a"), why(&all, &false, "c")], [Some("first"), Some("second")]);
+        assert_eq!([why(&all, &true, "a"), why(&all, &false, "d")], [None, None]);
+    }
+}

@@ -121,3 +121,53 @@ impl Drop for InUse {
         drop(take(&mut *data));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    type Pair = (Resource<Vec<u8>>, Resource<String>);
+
+    fn stored(pair: &Pair) -> String {
+        serde_json::to_string(pair).unwrap()
+    }
+
+    fn read(text: &str) -> Pair {
+        serde_json::from_str(text).unwrap()
+    }
+
+    #[test]
+    fn clones_share_what_was_read() {
+        let map = Resource::from(vec![1, 2]);
+        assert!(std::ptr::eq(map.as_slice(), map.clone().as_slice()));
+    }
+
+    /// The bytes contain nothing of it; a shelf gives it back, in order and by type.
+    #[test]
+    fn a_shelf_restores_what_is_not_stored() {
+        let pair: Pair = (vec![1, 2].into(), "map".to_owned().into());
+        let (mut text, mut other) = (String::new(), String::new());
+        let shelf = Shelf::of(|| text = stored(&pair));
+        assert_eq!(text, "[null,null]");
+        let alone = read(&text);
+        assert!(alone.0.is_empty() && alone.1.is_empty(), "without a shelf, the defaults");
+        let again = shelf.attach(|| read(&text));
+        assert!(std::ptr::eq(again.0.as_slice(), pair.0.as_slice()) && *again.1 == "map");
+        // After its use, the thread has no shelf: neither one that collects nor one that gives.
+        assert!(Shelf::of(|| ()).is_empty() && read(&text).0.is_empty());
+        assert!(!shelf.is_empty() && shelf.attach(|| read(&text)).1.len() == 3, "a second time");
+        let swapped: (Resource<String>, Resource<Vec<u8>>) = shelf.attach(|| serde_json::from_str(&text).unwrap());
+        assert!(swapped.0.is_empty() && swapped.1.is_empty(), "another type");
+        let empty = Shelf::of(|| other.push('x'));
+        assert!(empty.is_empty() && empty.attach(|| read(&text)).0.is_empty());
+    }
+
+    #[test]
+    fn a_panic_leaves_no_shelf_behind() {
+        let pair: Pair = (vec![1, 2].into(), "map".to_owned().into());
+        let shelf = Shelf::of(|| drop(stored(&pair)));
+        let failed =
+            std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| shelf.attach(|| panic!("in the middle"))));
+        assert!(failed.is_err() && read("[null,null]").0.is_empty());
+    }
+}

@@ -289,3 +289,6 @@ impl<W: 'static> Row<W> {
         &self.meta
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -228,3 +228,75 @@ impl Member {
         self
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::panic::{UnwindSafe, catch_unwind};
+
+    /// The refusal of a terminal, made at run time.
+    fn refusal(make: impl FnOnce() -> Terminal + UnwindSafe) -> Option<String> {
+        let text = |panic: Box<dyn std::any::Any + Send>| match panic.downcast::<String>() {
+            Ok(text) => *text,
+            Err(other) => (*other.downcast::<&str>().unwrap()).to_owned(),
+        };
+        catch_unwind(make).err().map(text)
+    }
+
+    #[test]
+    fn a_terminal_has_members_of_different_names() {
+        const TWICE: &[Member] = &[Member::signal("a"), Member::inflow("b"), Member::outflow("a")];
+        const LATE: &[Member] = &[Member::signal("a"), Member::inflow("b"), Member::outflow("b")];
+        assert_eq!(refusal(|| Terminal::plug("t", "", TWICE.split_at(2).0)), None);
+        for make in [|| Terminal::plug("t", "", TWICE), || Terminal::bus("t", "", LATE)] {
+            assert_eq!(refusal(make).as_deref(), Some("two members have the same name"));
+        }
+        assert_eq!(refusal(|| Terminal::bus("t", "", &[])).as_deref(), Some("a terminal needs a member"));
+    }
+
+    #[test]
+    fn a_transceiver_has_its_four_members_in_order() {
+        const fn four(names: [&'static str; 4]) -> [Member; 4] {
+            let [a, b, c, d] = names;
+            [Member::signal(a), Member::signal(b), Member::signal(c), Member::signal(d)]
+        }
+        const RIGHT: [Member; 4] = four(["Tx_Data", "Tx_Clock", "Rx_Data", "Rx_Clock"]);
+        const LAST: [Member; 4] = four(["Tx_Data", "Tx_Clock", "Rx_Data", "Rx_Clocks"]);
+        const SWAPPED: [Member; 4] = four(["Rx_Data", "Tx_Clock", "Tx_Data", "Rx_Clock"]);
+        let rule = "a transceiver has Tx_Data, Tx_Clock, Rx_Data and Rx_Clock";
+        assert_eq!(refusal(|| Terminal::transceiver("can", "", &RIGHT)), None);
+        assert_eq!(refusal(|| Terminal::transceiver("can", "", &LAST)), Some(format!("Rx_Clocks: {rule}")));
+        assert_eq!(refusal(|| Terminal::transceiver("can", "", &SWAPPED)), Some(format!("Rx_Data: {rule}")));
+    }
+
+    fn map<const N: usize>(members: [Member; N]) -> Option<String> {
+        let members: &'static [Member] = Box::leak(Box::new(members));
+        refusal(move || Terminal::map("map", "", members))
+    }
+
+    #[test]
+    fn a_map_has_its_members_in_order() {
+        use Member as M;
+        let (x, x_in) = (M::domain("x"), M::domain_input("x_in"));
+        let (z, z_out) = (M::codomain("z"), M::codomain_output("z_out"));
+        assert_eq!((map([x, x_in, z, z_out]), map([x, z])), (None, None));
+        let input = Some("x_in: a domain_input follows its domain".to_owned());
+        assert_eq!((map([x_in, x]), map([x, z, x_in])), (input.clone(), input));
+        let output = Some("z_out: a codomain_output follows its codomain".to_owned());
+        assert_eq!((map([z_out]), map([z, x, z_out])), (output.clone(), output));
+        let both = Some("map: a map has a domain and a codomain".to_owned());
+        assert_eq!((map([x]), map([z])), (both.clone(), both));
+        assert_eq!(map([x, z, M::signal("s")]).as_deref(), Some("s: a map has domains and codomains"));
+    }
+
+    #[test]
+    fn layered_rules_and_places() {
+        const ICON: Icon = Icon { name: "shaft", svg: "", color: [0, 0, 0] };
+        const OTHER: &[Member] = &[Member::signal("a").of("b")];
+        let rules = [MatchingRule::Plug, MatchingRule::Bus, MatchingRule::Transceiver, MatchingRule::Map];
+        assert_eq!(rules.map(MatchingRule::is_layered), [false, false, true, true]);
+        let drawn = Terminal::plug("t", "", OTHER).drawn(&ICON, 1.0, -2.0);
+        assert_eq!((drawn.members[0].name, drawn.members[0].variable), ("a", "b"));
+        assert!(drawn.picture.is_some_and(|at| (at.x, at.y, at.icon.name) == (1.0, -2.0, "shaft")));
+    }
+}

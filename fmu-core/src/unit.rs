@@ -287,6 +287,7 @@ pub const HENRY_PER_M: Quantity = Quantity::new("Permeability", Unit::si("H/m", 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::PI;
 
     /// Exponents of a product.
     fn product(factors: &[(&Quantity, i8)]) -> Exponents {
@@ -300,9 +301,59 @@ mod tests {
     }
 
     #[test]
+    fn quantities_are_shown_in_their_display_units() {
+        let shown = |of: Quantity, value: f64| of.display.map(|unit| (unit.name, unit.factor * value + unit.offset));
+        let [deg, celsius, rpm] = [shown(RADIAN, PI / 2.0), shown(KELVIN, 300.0), shown(SPEED, 10.0 * PI)];
+        let near = |found: Option<(&str, f64)>, unit: &str, value: f64| {
+            assert!(found.is_some_and(|(name, x)| name == unit && (x - value).abs() < 1e-12), "{found:?}");
+        };
+        near(deg, "deg", 90.0);
+        near(celsius, "degC", 26.85);
+        near(rpm, "rpm", 300.0);
+        let band = KELVIN.relative("TemperatureDifference");
+        assert_eq!((band.name, band.unit, band.display), ("TemperatureDifference", KELVIN.unit, KELVIN.display));
+        assert_eq!((band.relative, KELVIN.relative, VOLT.display), (true, false, None));
+    }
+
+    /// The products below do not see a base unit that is missing everywhere.
+    #[test]
+    fn each_exponent_is_that_of_its_base_unit() {
+        let all = |of: &Quantity| {
+            let Exponents { kg, m, s, ampere, kelvin, mol, cd, rad } = of.unit.exponents;
+            [kg, m, s, ampere, kelvin, mol, cd, rad]
+        };
+        assert_eq!(all(&KILOGRAM), [1, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(all(&METER), [0, 1, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(all(&SECOND), [0, 0, 1, 0, 0, 0, 0, 0]);
+        assert_eq!(all(&AMPERE), [0, 0, 0, 1, 0, 0, 0, 0]);
+        assert_eq!(all(&KELVIN), [0, 0, 0, 0, 1, 0, 0, 0]);
+        assert_eq!(all(&RADIAN), [0, 0, 0, 0, 0, 0, 0, 1]);
+    }
+
+    #[test]
     fn units_fit_together() {
         for (quantity, factors) in [
-            (METER2, &[(&METER, 2)][..]),
+            (ONE, &[][..]),
+            (VOLT, &[(&JOULE, 1), (&COULOMB, -1)]),
+            (OHM, &[(&VOLT, 1), (&AMPERE, -1)]),
+            (SIEMENS, &[(&OHM, -1)]),
+            (WEBER, &[(&VOLT, 1), (&SECOND, 1)]),
+            (HENRY, &[(&WEBER, 1), (&AMPERE, -1)]),
+            (PER_HENRY, &[(&HENRY, -1)]),
+            (FARAD, &[(&COULOMB, 1), (&VOLT, -1)]),
+            (VOLT_PER_S, &[(&VOLT, 1), (&SECOND, -1)]),
+            (NEWTON_METER, &[(&NEWTON, 1), (&METER, 1)]),
+            (PER_KELVIN, &[(&KELVIN, -1)]),
+            (JOULE_PER_KELVIN, &[(&JOULE, 1), (&KELVIN, -1)]),
+            (WATT_PER_KELVIN, &[(&WATT, 1), (&KELVIN, -1)]),
+            (SPEED, &[(&RADIAN, 1), (&SECOND, -1)]),
+            (RAD_PER_S, &[(&SPEED, 1)]),
+            (RAD_PER_S2, &[(&SPEED, 1), (&SECOND, -1)]),
+            (NM_S_PER_RAD, &[(&NEWTON_METER, 1), (&SPEED, -1)]),
+            (NM_S2_PER_RAD2, &[(&NEWTON_METER, 1), (&SPEED, -2)]),
+            (S2_PER_RAD2, &[(&SPEED, -2)]),
+            (PER_SECOND, &[(&SECOND, -1)]),
+            (METER2, &[(&METER, 2)]),
             (METER3, &[(&METER, 3)]),
             (METER_PER_S, &[(&METER, 1), (&SECOND, -1)]),
             (METER_PER_S2, &[(&METER, 1), (&SECOND, -2)]),

@@ -11,6 +11,7 @@ struct Both {
     x: f64,
     n: i32,
     samples: u64,
+    shown: i32,
 }
 
 type V = Row<Block<Both>>;
@@ -42,7 +43,9 @@ impl Sampled for Both {
     fn samples(&self) -> u64 {
         self.samples
     }
-    fn show(&mut self) {}
+    fn show(&mut self) {
+        self.shown = self.n;
+    }
     fn sample(&mut self) -> Result<(), Fault> {
         self.samples += 1;
         self.n += 1;
@@ -68,6 +71,22 @@ fn samples_and_states_advance_together() {
     }
     // Samples at 0, 0.5, ... 2.5 s: 0.5 s each with 1, 2, ... 5, and 0.3 s with 6.
     assert!(both.samples == 6 && (both.x - (7.5 + 1.8)).abs() < 1e-12, "{} {}", both.samples, both.x);
+}
+
+/// Its one clock: when it becomes active, the outputs of the last sample become visible; its tick is the next sample.
+#[test]
+fn a_sampled_model_acts_on_its_clock() {
+    let clock = const { NONE.Clocked().clocked }.unwrap();
+    let (mut both, now) = (Both { n: 3, ..Both::default() }, Elapsed::ZERO);
+    (clock.activate)(&mut both, 0, now);
+    assert_eq!((both.shown, both.samples), (3, 0));
+    (clock.tick)(&mut both, 0, now).unwrap();
+    assert_eq!((both.shown, both.samples, both.n), (3, 1, 4));
+    // The importer alone determines its ticks.
+    assert_eq!(
+        ((clock.interval)(&both, 0, now), (clock.ticked)(&mut both, 0), clock.feedthrough),
+        (None, false, false)
+    );
 }
 
 #[test]

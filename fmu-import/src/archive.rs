@@ -1,6 +1,6 @@
 //! Opens the archive of an FMU: reads its description and extracts the files needed to run it.
 
-use crate::error::Error;
+use crate::error::{EntryError, Error};
 use crate::folder::Folder;
 use crate::limits::{self, UNPACKED, XML};
 use crate::machine;
@@ -77,8 +77,8 @@ impl Archive {
             ZipError::Io(e) if e.raw_os_error().is_some() => Error::file_from(path, "", e),
             e => Error::file_from(path, "not a ZIP archive, or cut short: ", e),
         })?;
-        let names = check_entries(&mut zip).map_err(|cause| wrong(&cause))?;
-        let xml = document(&mut zip, "modelDescription.xml").map_err(|cause| wrong(&cause))?;
+        let names = check_entries(&mut zip).map_err(|e| e.of(path))?;
+        let xml = document(&mut zip, "modelDescription.xml").map_err(|e| e.of(path))?;
         let xml = xml.ok_or_else(|| wrong(&no_description(&names)))?;
         let description =
             model_description::read(&xml).map_err(|e| Error::file_from(path, "modelDescription.xml: ", e))?;
@@ -88,8 +88,7 @@ impl Archive {
     /// Terminals and icons, if there are any.
     pub(super) fn terminals(&mut self) -> Result<Option<TerminalsAndIcons>, Error> {
         const NAME: &str = "terminalsAndIcons/terminalsAndIcons.xml";
-        let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, cause);
-        let xml = document(&mut self.zip, NAME).map_err(|cause| wrong(&cause))?;
+        let xml = document(&mut self.zip, NAME).map_err(|e| e.of(&self.path))?;
         let of = format!("{NAME}: ");
         let read = |xml| model_description::read_terminals(xml).map_err(|e| Error::file_from(&self.path, &of, e));
         xml.map(read).transpose()
@@ -154,9 +153,8 @@ impl Archive {
         for (index, name) in self.names.iter().enumerate().filter(|(_, name)| !name.ends_with('/')) {
             let mut head = Vec::new();
             if name.starts_with("binaries/") {
-                let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
-                let entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
-                entry.take(machine::HEAD).read_to_end(&mut head).map_err(|e| wrong(&e))?;
+                let entry = self.zip.by_index(index).map_err(|e| unreadable(&self.path, name, e))?;
+                entry.take(machine::HEAD).read_to_end(&mut head).map_err(|e| unreadable(&self.path, name, e))?;
             }
             files.insert(name.clone(), head);
         }
@@ -167,16 +165,15 @@ impl Archive {
     pub(super) fn files(&mut self) -> Result<BTreeMap<String, Vec<u8>>, Error> {
         let mut files = BTreeMap::new();
         for (index, name) in self.names.iter().enumerate() {
-            let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
-            let entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
+            let entry = self.zip.by_index(index).map_err(|e| unreadable(&self.path, name, e))?;
             if entry.is_dir() {
                 continue;
             }
             let (mut entry, mut bytes) = (entry, Vec::new());
             // Reading stops if it contains more than its headers claim, which is within the limits.
-            entry.read_to_end(&mut bytes).map_err(|e| wrong(&e))?;
+            entry.read_to_end(&mut bytes).map_err(|e| unreadable(&self.path, name, e))?;
             if files.insert(name.clone(), bytes).is_some() {
-                return Err(wrong(&"occurs twice in the archive"));
+                return Err(Error::file(&self.path, format!("{name}: occurs twice in the archive")));
             }
         }
         Ok(files)
@@ -190,9 +187,8 @@ impl Archive {
             if !prefixes.iter().any(|p| name.starts_with(p.as_str())) {
                 continue;
             }
-            let wrong = |cause: &dyn std::fmt::Display| Error::file(&self.path, format!("{name}: {cause}"));
             let full = |e| not_unpacked(&self.path, e);
-            let mut entry = self.zip.by_index(index).map_err(|e| wrong(&e))?;
+            let mut entry = self.zip.by_index(index).map_err(|e| unreadable(&self.path, name, e))?;
             let target = dir.join(name);
             if entry.is_dir() {
                 fs::create_dir_all(&target).map_err(full)?;
@@ -208,7 +204,7 @@ impl Archive {
                     Ok(0) => break,
                     Ok(len) => out.write_all(&buffer[..len]).map_err(full)?,
                     Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
-                    Err(e) => return Err(Error::file_from(&self.path, &format!("{name}: "), e)),
+                    Err(e) => return Err(unreadable(&self.path, name, e)),
                 }
             }
             files += 1;
@@ -246,7 +242,7 @@ fn no_description(names: &[String]) -> String {
 ///
 /// # Errors
 /// The entry cannot be read, or is larger than [`limits::XML`].
-pub fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<Option<Vec<u8>>, String> {
+pub fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<Option<Vec<u8>>, EntryError> {
     let mut bytes = Vec::new();
     // Some tools write ./ before each name.
     let written = format!("./{name}");
@@ -256,12 +252,12 @@ pub fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<O
         name
     };
     match zip.by_name(name) {
-        Ok(entry) => entry.take(XML.most + 1).read_to_end(&mut bytes).map_err(|e| format!("{name}: {e}"))?,
+        Ok(entry) => entry.take(XML.most + 1).read_to_end(&mut bytes).map_err(|e| EntryError::from_source(name, e))?,
         Err(zip::result::ZipError::FileNotFound) => return Ok(None),
-        Err(e) => return Err(format!("{name}: {e}")),
+        Err(e) => return Err(EntryError::from_source(name, e)),
     };
     if bytes.len() as u64 > XML.most {
-        return Err(format!("{name}: {}", XML.exceeded(format!("more than {}", XML.most))));
+        return Err(format!("{name}: {}", XML.exceeded(format!("more than {}", XML.most))).into());
     }
     Ok(Some(bytes))
 }
@@ -270,27 +266,28 @@ pub fn document<R: Read + Seek>(zip: &mut ZipArchive<R>, name: &str) -> Result<O
 ///
 /// # Errors
 /// A name leads outside, an entry is a link, or there are more entries or bytes than [`limits`] allow.
-pub fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<String>, String> {
+pub fn check_entries<R: Read + Seek>(zip: &mut ZipArchive<R>) -> Result<Vec<String>, EntryError> {
     limits::ENTRIES.check(zip.len() as u64)?;
     let (mut names, mut size) = (Vec::new(), 0_u64);
     for index in 0..zip.len() {
-        let entry = zip.by_index_raw(index).map_err(|e| format!("entry {index}: {e}"))?;
-        let name = entry.name().map_err(|e| format!("entry {index}: {e}"))?.into_owned();
+        let unreadable = |e| EntryError::from_source(&format!("entry {index}"), e);
+        let entry = zip.by_index_raw(index).map_err(unreadable)?;
+        let name = entry.name().map_err(unreadable)?.into_owned();
         if leads_outside(&name) {
-            return Err(format!("entry {name:?} leads outside of the archive"));
+            return Err(format!("entry {name:?} leads outside of the archive").into());
         }
         if name.contains('\\') {
             let remedy = "a ZIP archive has slashes; pack it with another tool";
-            return Err(format!("entry {name:?} has backslashes between its folders: {remedy}"));
+            return Err(format!("entry {name:?} has backslashes between its folders: {remedy}").into());
         }
         if cfg!(windows) && name.contains(':') {
-            return Err(format!("entry {name:?} has a colon, which no file name of Windows has"));
+            return Err(format!("entry {name:?} has a colon, which no file name of Windows has").into());
         }
         if name.contains('\0') || (cfg!(windows) && entry.enclosed_name().is_none()) {
-            return Err(format!("entry {name:?} has no valid name"));
+            return Err(format!("entry {name:?} has no valid name").into());
         }
         if entry.is_symlink() {
-            return Err(format!("entry {name:?} is a link"));
+            return Err(format!("entry {name:?} is a link").into());
         }
         size = size.saturating_add(entry.size());
         names.push(name.trim_start_matches("./").to_owned());
@@ -304,6 +301,11 @@ fn leads_outside(name: &str) -> bool {
     let mut parts = name.split(['/', '\\']);
     let first = parts.clone().next().unwrap_or_default();
     first.is_empty() || (first.len() == 2 && first.ends_with(':')) || parts.any(|part| part == "..")
+}
+
+/// An entry that cannot be read.
+fn unreadable(archive: &Path, name: &str, cause: impl std::error::Error + Send + Sync + 'static) -> Error {
+    EntryError::from_source(name, cause).of(archive)
 }
 
 /// The folder for temporary files is full or cannot be written.

@@ -50,6 +50,44 @@ pub enum Error {
     },
 }
 
+/// A fault in an archive whose path is not known here.
+#[derive(Clone, Debug)]
+pub struct EntryError {
+    cause: String,
+    /// The error behind it, if there is one: its text is part of `cause`.
+    source: Option<Arc<dyn StdError + Send + Sync>>,
+}
+
+impl EntryError {
+    /// An entry that cannot be read: `what` and the text of the error.
+    pub(crate) fn from_source(what: &str, source: impl StdError + Send + Sync + 'static) -> Self {
+        Self { cause: format!("{what}: {source}"), source: Some(Arc::new(source)) }
+    }
+
+    /// The error of the archive with this path.
+    pub(crate) fn of(self, path: &Path) -> Error {
+        Error::File { path: path.into(), cause: one_line(&self.cause), source: self.source }
+    }
+}
+
+impl From<String> for EntryError {
+    fn from(cause: String) -> Self {
+        Self { cause, source: None }
+    }
+}
+
+impl fmt::Display for EntryError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.cause)
+    }
+}
+
+impl StdError for EntryError {
+    fn source(&self) -> Option<&(dyn StdError + 'static)> {
+        self.source.as_ref().map(|source| &**source as &(dyn StdError + 'static))
+    }
+}
+
 impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

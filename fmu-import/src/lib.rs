@@ -58,7 +58,7 @@ pub use abi::log::{Logging, Message, Status};
 pub use abi::raw;
 pub use abi::replay;
 pub use archive::{check_entries, document};
-pub use error::Error;
+pub use error::{EntryError, Error};
 pub use fmu::{Fmu, Outline, Unpacked, contents, outline};
 pub use folder::Folder;
 pub use instance::{FmuState, Instance};

@@ -33,3 +33,8 @@ pub fn figures(page: &str) -> Vec<serde_json::Value> {
     let data = page.split("<script type=\"application/json\">").skip(1);
     data.map(|rest| serde_json::from_str(rest.split("</script>").next().unwrap()).unwrap()).collect()
 }
+
+/// A module with the parts that a page checks, of the model with this token.
+pub fn module(token: &str) -> Vec<u8> {
+    [b"\0asm\x01\0\0\0", "fmi3DoStep __indirect_function_table ".as_bytes(), token.as_bytes()].concat()
+}

@@ -8,15 +8,30 @@
 #[path = "../common/mod.rs"]
 mod common;
 
-use std::collections::BTreeMap;
+use fmu_core::draw::Draw;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
+use std::thread;
+use std::time::{Duration, Instant};
 
 /// The ways in which a call fails.
 const KINDS: [&str; 5] = ["full", "once", "short", "kill", "read"];
+
+/// What is in `out/` before a run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Files {
+    None,
+    /// A file of each name, with the content [`OLD`].
+    Old,
+    /// What the kill before, or the whole run after it, has left.
+    OfTheLastKill,
+}
+
+const OLD: &[u8] = b"an older file";
 
 /// A command, with the files that it reads in `in/` and those that it writes in `out/`.
 struct Case {
@@ -24,6 +39,15 @@ struct Case {
     arguments: Vec<String>,
     /// All files of `out/` after a run without faults.
     expected: BTreeMap<String, Vec<u8>>,
+    /// Its folders.
+    folders: BTreeSet<String>,
+    /// The duration of that run.
+    lasts: Duration,
+}
+
+/// Whether a file has a temporary name.
+fn is_hidden(name: &str) -> bool {
+    Path::new(name).file_name().unwrap().to_string_lossy().starts_with('.')
 }
 
 /// The library that makes calls fail.
@@ -54,10 +78,13 @@ impl Case {
             text.replace("IN/", &below("in")).replace("OUT/", &below("out"))
         };
         let arguments = arguments.iter().map(place).collect();
-        let mut case = Self { folder, arguments, expected: BTreeMap::new() };
+        let (expected, folders, lasts) = (BTreeMap::new(), BTreeSet::new(), Duration::ZERO);
+        let mut case = Self { folder, arguments, expected, folders, lasts };
+        let begin = Instant::now();
         let output = case.command().output().unwrap();
         assert!(output.status.success(), "{output:?}");
-        case.expected = case.written();
+        case.lasts = begin.elapsed();
+        (case.expected, case.folders) = case.content();
         assert!(!case.expected.is_empty());
         case
     }
@@ -69,22 +96,35 @@ impl Case {
         command
     }
 
-    /// The files of `out/` and their bytes; a log has times.
+    /// The files of `out/` and their bytes.
     fn written(&self) -> BTreeMap<String, Vec<u8>> {
-        let mut files = BTreeMap::new();
+        self.content().0
+    }
+
+    /// The files of `out/` and their bytes, and its folders; a log has times.
+    fn content(&self) -> (BTreeMap<String, Vec<u8>>, BTreeSet<String>) {
+        let (mut files, mut folders) = (BTreeMap::new(), BTreeSet::new());
         let out = self.folder.path().join("out");
-        let mut folders = vec![out.clone()];
-        while let Some(folder) = folders.pop() {
+        let mut left = vec![out.clone()];
+        while let Some(folder) = left.pop() {
             for entry in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+                let name = entry.strip_prefix(&out).unwrap().display().to_string();
                 if entry.is_dir() {
-                    folders.push(entry);
+                    folders.insert(name);
+                    left.push(entry);
                 } else if !entry.ends_with("log.txt") {
-                    let name = entry.strip_prefix(&out).unwrap().display().to_string();
                     files.insert(name, fs::read(&entry).unwrap());
                 }
             }
         }
-        files
+        (files, folders)
+    }
+
+    /// An empty folder `out/`.
+    fn empty(&self) {
+        let out = self.folder.path().join("out");
+        fs::remove_dir_all(&out).unwrap();
+        fs::create_dir(&out).unwrap();
     }
 
     fn temporary(&self) -> Vec<PathBuf> {
@@ -93,9 +133,7 @@ impl Case {
 
     /// Runs the command with the fault `kind` in call number `at`, in an empty folder `out/`.
     fn faulty(&self, kind: &str, at: Option<usize>) -> Output {
-        let out = self.folder.path().join("out");
-        fs::remove_dir_all(&out).unwrap();
-        fs::create_dir(&out).unwrap();
+        self.empty();
         let mut command = self.command();
         command.env("LD_PRELOAD", shim()).env("FAULT_BELOW", self.folder.path()).env("FAULT_KIND", kind);
         command.env("FAULT_COUNT", self.folder.path().join("count"));
@@ -119,9 +157,8 @@ impl Case {
         let place = format!("{} {kind} {at}: {:?} {said}", self.arguments[0], output.status);
         let (written, killed) = (self.written(), kind == "kill");
         for (name, bytes) in &written {
-            let hidden = Path::new(name).file_name().unwrap().to_string_lossy().starts_with('.');
-            assert!(killed || !hidden, "{place}: leaves {name}");
-            assert!(hidden || self.expected.get(name) == Some(bytes), "{place}: {name} is not whole");
+            assert!(killed || !is_hidden(name), "{place}: leaves {name}");
+            assert!(is_hidden(name) || self.expected.get(name) == Some(bytes), "{place}: {name} is not whole");
         }
         match (output.status.code(), kind) {
             (None, "kill") => assert_eq!(output.status.signal(), Some(9), "{place}"),
@@ -137,6 +174,11 @@ impl Case {
             _ => panic!("{place}"),
         }
         assert!(killed || self.temporary().is_empty(), "{place}: leaves {:?}", self.temporary());
+        self.succeeds(&place);
+    }
+
+    /// The next run succeeds, and what the one before has left is gone.
+    fn succeeds(&self, place: &str) {
         let output = self.command().output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(output.status.success(), "{place} and then {said}");
@@ -147,6 +189,47 @@ impl Case {
         );
         assert!(self.written() == self.expected, "{place}, and then other bytes");
         assert!(self.temporary().is_empty(), "{place}: leaves {:?} after the next run", self.temporary());
+    }
+
+    /// SIGKILL at a random instant of the run: each file is whole or as it was before, and no new folder stays.
+    fn kill(&self, draw: &mut Draw, files: Files) -> bool {
+        if files != Files::OfTheLastKill {
+            self.empty();
+        }
+        if files == Files::Old {
+            for name in self.expected.keys().filter(|name| !name.contains('/')) {
+                fs::write(self.folder.path().join("out").join(name), OLD).unwrap();
+            }
+        }
+        let before = self.written();
+        let mut child = self.command().stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let after = self.lasts.mul_f64(1.1 * draw.share());
+        thread::sleep(after);
+        child.kill().unwrap();
+        let killed = child.wait().unwrap().signal() == Some(9);
+        let place = format!("{} killed after {after:?}, {files:?}", self.arguments[0]);
+        let (written, folders) = self.content();
+        for (name, bytes) in &written {
+            let whole = self.expected.get(name) == Some(bytes) || before.get(name) == Some(bytes);
+            assert!(whole || is_hidden(name) && killed, "{place}: {name} is not whole");
+        }
+        let gone = before.keys().find(|name| !is_hidden(name) && !written.contains_key(*name));
+        assert_eq!(gone, None, "{place}: a file is gone");
+        assert!(folders.is_subset(&self.folders), "{place}: leaves {folders:?}");
+        killed
+    }
+
+    /// `times` kills, and a whole run after most of them.
+    fn kills(&self, draw: &mut Draw, times: u32) {
+        let mut inside = 0;
+        for time in 0..times {
+            let files = [Files::None, Files::Old, Files::OfTheLastKill][time as usize % 3];
+            inside += u32::from(self.kill(draw, files));
+            if files == Files::OfTheLastKill || draw.share() < 0.5 {
+                self.succeeds(&format!("{} killed, {files:?}", self.arguments[0]));
+            }
+        }
+        println!("{}: {inside} of {times} killed before the end, a run lasts {:.0?}", self.arguments[0], self.lasts);
     }
 
     /// Every call, or about `most` of them: the first and the last ones, and some between.
@@ -198,6 +281,13 @@ fn identify() -> Case {
     Case::new(&[("bench.csv", record)], &text.split(' ').collect::<Vec<_>>())
 }
 
+fn page() -> Case {
+    let (description, _) = fmu_import::contents(&common::archives().join("fmi3/PmsmPlant.fmu")).unwrap();
+    let module = common::pages::module(&description.token);
+    let arguments = ["page", "IN/PmsmPlant.fmu", "--module", "IN/m.wasm", "--out", "OUT/P.html"];
+    Case::new(&[("PmsmPlant.fmu", plant()), ("m.wasm", module)], &arguments)
+}
+
 /// The commands that take tenths of a second have fewer faults.
 #[test]
 fn some_calls() {
@@ -213,6 +303,29 @@ fn every_call() {
     for case in [merge(), tune(), identify(), sweep()] {
         case.faults(&KINDS, usize::MAX / 2);
     }
-    // Of its 2000 calls, most unpack a library.
+}
+
+/// Of its hundreds of calls, most unpack a library.
+#[test]
+#[ignore = "runs the command hundreds of times, in minutes"]
+fn many_calls_of_preset() {
     preset().faults(&KINDS, 60);
+}
+
+#[test]
+#[ignore = "runs the command hundreds of times, in minutes"]
+fn many_calls_of_page() {
+    page().faults(&KINDS, 60);
+}
+
+/// `KILLS` of each command instead of 60, `FMU_SEED` for other instants.
+#[test]
+#[ignore = "kills the commands hundreds of times, in minutes"]
+fn random_instants() {
+    let number = |name| std::env::var(name).ok().map(|n| n.parse().unwrap_or_else(|_| panic!("{name} = {n:?}")));
+    let (times, seed) = (number("KILLS").unwrap_or(60), number("FMU_SEED").unwrap_or(1));
+    let mut draw = Draw(seed.into());
+    for case in [sweep(), preset(), merge(), tune(), identify(), page()] {
+        case.kills(&mut draw, times);
+    }
 }

@@ -65,7 +65,7 @@ fn command(arguments: &[&str], most: usize) {
     let run = |at: Option<usize>| -> Output {
         let mut command = Command::new(env!("CARGO_BIN_EXE_fmu"));
         command.args(arguments.iter().map(place)).env("TMPDIR", &temporary).stdin(Stdio::null());
-        command.env("RUST_BACKTRACE", "0");
+        command.env("RUST_BACKTRACE", "0").env("SOURCE_DATE_EPOCH", "0");
         match at {
             Some(at) => command.env("LD_PRELOAD", &shim).env("FAULT_AT", at.to_string()),
             None => &mut command,

@@ -228,4 +228,25 @@ mod tests {
         }
         assert!(!legs.block(&motor, axis, Dq::new(2.0 * legs.i_zone(), 0.0), 0.0), "the diodes carry a current");
     }
+    /// The ripple where a leg switches, beside the sum over the pieces of a period between the switching instants of all legs.
+    #[test]
+    fn the_ripple_is_that_of_the_switching_pattern() {
+        let (u_dc, by_L) = (300.0, 50.0);
+        let inverter = Inverter { dead_time: 1e-12, ..Inverter::default() };
+        let T = inverter.T_pwm;
+        for u in [[60.0, -10.0, -50.0], [-70.0, 90.0, -20.0], [20.0, 20.0, -40.0], [0.0, 0.0, 0.0]] {
+            let [a, b, c] = u;
+            let legs = Legs::<f64>::rippled(&inverter, Phases { a, b, c }, u_dc, by_L);
+            let Ripple { on, off, .. } = legs.ripple.unwrap();
+            let middle = 0.5 * (a.max(b).max(c) + a.min(b).min(c));
+            let begins = u.map(|u| 0.5 * T * (0.5 - (u - middle) / u_dc));
+            for (x, (on, off)) in [(on.a, off.a), (on.b, off.b), (on.c, off.c)].into_iter().enumerate() {
+                // Until leg x switches on at t, the legs that are on drive its current, less the mean voltage u.
+                let t = begins[x];
+                let others: f64 = begins.iter().map(|begin| (t - begin).max(0.0)).sum();
+                let current = by_L * (-u_dc / 3.0 * others - (u[x] - (a + b + c) / 3.0) * t);
+                assert!((on + current).abs() < 1e-6 && (off - current).abs() < 1e-6, "{u:?}, leg {x}: {on}, {current}");
+            }
+        }
+    }
 }

@@ -106,7 +106,7 @@ impl Loaded {
         let file = File::open(path).map_err(unreadable)?;
         limits::ARCHIVE.check(file.metadata().map_err(unreadable)?.len()).map_err(within)?;
         let mut zip = ZipArchive::new(file).map_err(|e| within(format!("not a ZIP archive, or cut short: {e}")))?;
-        check_entries(&mut zip).map_err(within)?;
+        check_entries(&mut zip).map_err(|e| within(e.to_string()))?;
         let names = zip.file_names().filter_map(Result::ok).map(std::borrow::Cow::into_owned);
         let mut variants: Vec<String> =
             names.filter(|name| Path::new(name).extension().is_some_and(|e| e == "ssd")).collect();

@@ -40,7 +40,7 @@ impl Package<'_> {
 
     pub(super) fn text(&mut self, name: &str) -> Result<String, Error> {
         let of = |cause: String| Error::Invalid(format!("{}: {cause}", self.path.display()));
-        let bytes = document(&mut self.zip, name).map_err(of)?;
+        let bytes = document(&mut self.zip, name).map_err(|e| of(e.to_string()))?;
         let bytes = bytes.ok_or_else(|| of(format!("has no {name}")))?;
         let text = decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?;
         Ok(text.to_owned())
@@ -51,7 +51,8 @@ impl Package<'_> {
         let bytes = self.bytes(fmu)?;
         let of = |cause: String| Error::Invalid(format!("{}: {fmu}: {cause}", self.path.display()));
         let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(|e| of(e.to_string()))?;
-        let bytes = document(&mut zip, name).map_err(of)?.ok_or_else(|| of(format!("has no {name}")))?;
+        let bytes = document(&mut zip, name).map_err(|e| of(e.to_string()))?;
+        let bytes = bytes.ok_or_else(|| of(format!("has no {name}")))?;
         Ok(decode(&bytes).map_err(|e| of(format!("{name}: {e}")))?.to_owned())
     }
 

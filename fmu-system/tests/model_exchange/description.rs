@@ -148,3 +148,35 @@ fn aliases_are_names_and_other_versions_are_refused() {
         assert!(error.contains(version), "{error}");
     }
 }
+
+/// canBeInstantiatedOnlyOncePerProcess, of the interface that the run uses: a sweep then has one thread.
+#[test]
+fn an_fmu_of_one_instance_in_a_process_is_named() {
+    let workshop = Workshop::new();
+    let once = workshop.fmu("plant", 3, &[], |xml| {
+        xml.replace("<CoSimulation ", "<CoSimulation canBeInstantiatedOnlyOncePerProcess='true' ")
+    });
+    let named = |method, fmus: &[(&str, &Fmu)]| {
+        let mut system = System::new(method);
+        fmus.iter().for_each(|(name, fmu)| system.add(name, fmu, false).map(drop).unwrap());
+        let plan = system.into_plan(&Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false }).unwrap();
+        plan.only_one_instance().map(str::to_owned)
+    };
+    let plain = workshop.plain("plant", 3);
+    assert_eq!(named(Method::default(), &[("a", &plain)]), None);
+    assert_eq!(named(Method::default(), &[("a", &plain), ("b", &once)]).as_deref(), Some("b"));
+    assert_eq!(named(Method::ModelExchange(Integration::default()), &[("b", &once)]), None);
+}
+
+#[test]
+fn the_numeric_outputs_of_all_instances_have_their_names() {
+    let workshop = Workshop::new();
+    let (plant, sampler) = (workshop.plain("plant", 3), workshop.plain("sampler", 3));
+    let mut system = System::default();
+    system.add("a", &plant, false).unwrap();
+    system.add("b", &sampler, false).unwrap();
+    let outputs = system.outputs();
+    assert!(["a.x", "b.x"].iter().all(|name| outputs.iter().any(|output| output == name)), "{outputs:?}");
+    assert!(!outputs.iter().any(|output| output.ends_with(".u")), "{outputs:?}");
+    assert!(!system.is_size("a.u").unwrap(), "an input is no size");
+}

@@ -114,11 +114,11 @@ pub fn run(args: &Page) -> Result<Vec<PathBuf>> {
 
 /// Writes the page of a model.
 fn write(workspace: &Workspace, model: &Model, module: &[u8], out: &Path) -> Result<()> {
-    let dir = Folder::new()?;
+    let dir = Folder::new().with_context(|| std::env::temp_dir().display().to_string())?;
     let mut stimuli = model.folder.join(STIMULI);
     if let Some(text) = &model.stimuli {
         stimuli = dir.path().join(STIMULI);
-        fs::write(&stimuli, text)?;
+        fs::write(&stimuli, text).with_context(|| stimuli.display().to_string())?;
     }
     let own = own(model)?;
     let source = Source {
