@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 /// the machine does not suit is listed with the reason.
 ///
 ///   fmu compare --out target/compare
-///   fmu compare motors/servo-750w.toml --only Rasmussen,ExtendedEmf
+///   fmu compare motors/servo-48v.toml --only Rasmussen,ExtendedEmf
 #[derive(Debug, Default, Args)]
 #[command(verbatim_doc_comment)]
 pub struct Compare {
