@@ -7,17 +7,9 @@ use drive_study::atlas::drive::Drive;
 use drive_study::atlas::{self, run::Verdict};
 use drive_study::compare::candidate::Entry;
 
-/// The verdicts of a drive about these cells, on both inverters; the compensation of the dead time falls to 0 below the share `i_zero` of
-/// `limit.i`, or keeps its start value with 0.
-fn verdicts(entry: Entry, cells: &[Cell], i_zero: f64) -> Vec<(Cell, [Verdict; 2])> {
-    let drives = [InverterMode::Average, InverterMode::Switched].map(|mode| {
-        let mut drive = Drive::compared(entry).on_inverter(mode);
-        let par = &mut drive.bench.pair.controller.model.parameters;
-        if i_zero > 0.0 {
-            par.compensation.i_zero = i_zero * par.limit.i;
-        }
-        drive
-    });
+/// The verdicts of a drive about these cells, on both inverters.
+fn verdicts(entry: Entry, cells: &[Cell]) -> Vec<(Cell, [Verdict; 2])> {
+    let drives = [InverterMode::Average, InverterMode::Switched].map(|mode| Drive::compared(entry).on_inverter(mode));
     let [average, switched] = atlas::run(&drives, cells, 2, || ()).unwrap().try_into().ok().unwrap();
     average.runs.iter().zip(&switched.runs).map(|(a, b)| (a.0, [a.1, b.1])).collect()
 }
@@ -27,7 +19,7 @@ fn verdicts(entry: Entry, cells: &[Cell], i_zero: f64) -> Vec<(Cell, [Verdict; 2
 fn every_estimator_holds_a_load_on_both_inverters() {
     let grid = Grid { R: vec![1.0], psi: vec![1.0], load: vec![0.5], speed: vec![0.2], ..Grid::default() };
     for entry in Entry::all() {
-        for (_, [average, switched]) in verdicts(entry, &grid.cells(1).unwrap(), 0.0) {
+        for (_, [average, switched]) in verdicts(entry, &grid.cells(1).unwrap()) {
             println!("{}: angle errors {:.2} and {:.2} deg", entry.name, average.angle_error, switched.angle_error);
             assert!(average.lost.is_none() && switched.lost.is_none(), "{}: {average:?} {switched:?}", entry.name);
             assert!(
@@ -46,12 +38,12 @@ fn the_atlas_on_both_inverters() {
     println!("| estimator | scenario | cells | lost on Average | on Switched | only on Average | only on Switched |");
     println!("|---|---|---|---|---|---|---|");
     for entry in Entry::all() {
-        for (scenario, i_zero) in [(Course::Load, 0.0), (Course::Inverter, 0.0), (Course::Inverter, 0.04)] {
+        for scenario in [Course::Load, Course::Inverter] {
             let grid = Grid { scenarios: vec![scenario], R: vec![0.8, 1.0, 1.2], psi: vec![1.0], ..Grid::default() };
-            let all = verdicts(entry, &grid.cells(1).unwrap(), i_zero);
+            let all = verdicts(entry, &grid.cells(1).unwrap());
             let lost = |k: usize| all.iter().filter(|(_, v)| v[k].lost.is_some()).count();
             let only = |k: usize| all.iter().filter(|(_, v)| v[k].lost.is_some() && v[1 - k].lost.is_none()).count();
-            let (name, title) = (entry.name, format!("{} {i_zero}", scenario.name()));
+            let (name, title) = (entry.name, scenario.name());
             println!("| {name} | {title} | {} | {} | {} | {} | {} |", all.len(), lost(0), lost(1), only(0), only(1));
         }
     }
