@@ -283,6 +283,7 @@ const COMMANDS: &[Options] = &[
             ("speed", "0.02"),
             ("angle", "90"),
             ("every", "2"),
+            ("inverter", "Switched"),
             ("set", "adaptation.k_a=0.02"),
             ("jobs", "1"),
             ("out", "other"),

@@ -274,23 +274,15 @@ fn pass<E: Exported>(
             instance.current.life.after(true, entry.next);
             Status::Ok
         }
-        unsuccessful => judge(entry, instance, unsuccessful),
+        Ok(Err(refusal)) => fail(entry, instance, refusal),
+        Err(payload) => fail_by_panic(entry, instance, payload.as_ref()),
     }
 }
 
-/// The status of a call that was refused or panicked.
 #[cold]
 #[inline(never)]
-fn judge<E: Exported>(
-    entry: &'static Entry,
-    instance: &mut Instance<E>,
-    ended: Result<Answer, Box<dyn Any + Send>>,
-) -> Status {
-    match ended {
-        Ok(Ok(())) => Status::Ok,
-        Ok(Err(refusal)) => fail(entry, instance, refusal),
-        Err(payload) => fail(entry, instance, Refusal::Error(panicked(payload.as_ref()))),
-    }
+fn fail_by_panic<E: Exported>(entry: &'static Entry, instance: &mut Instance<E>, payload: &(dyn Any + Send)) -> Status {
+    fail(entry, instance, Refusal::Error(panicked(payload)))
 }
 
 #[cold]
