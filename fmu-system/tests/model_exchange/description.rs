@@ -158,7 +158,9 @@ fn an_fmu_of_one_instance_in_a_process_is_named() {
     });
     let named = |method, fmus: &[(&str, &Fmu)]| {
         let mut system = System::new(method);
-        fmus.iter().for_each(|(name, fmu)| system.add(name, fmu, false).map(drop).unwrap());
+        for (name, fmu) in fmus {
+            system.add(name, fmu, false).unwrap();
+        }
         let plan = system.into_plan(&Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false }).unwrap();
         plan.only_one_instance().map(str::to_owned)
     };
@@ -177,6 +179,6 @@ fn the_numeric_outputs_of_all_instances_have_their_names() {
     system.add("b", &sampler, false).unwrap();
     let outputs = system.outputs();
     assert!(["a.x", "b.x"].iter().all(|name| outputs.iter().any(|output| output == name)), "{outputs:?}");
-    assert!(!outputs.iter().any(|output| output.ends_with(".u")), "{outputs:?}");
+    assert!(!outputs.iter().any(|output| ["a.u", "b.u"].contains(&output.as_str())), "{outputs:?}");
     assert!(!system.is_size("a.u").unwrap(), "an input is no size");
 }
