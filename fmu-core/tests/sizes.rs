@@ -7,7 +7,7 @@ use fmu_core::*;
 use serde::{Deserialize, Serialize};
 use std::panic::{UnwindSafe, catch_unwind};
 
-/// A part with a size of its own.
+/// A part that has its own size.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Map {
     rows: u64,
