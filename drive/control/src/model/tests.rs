@@ -21,3 +21,27 @@ fn a_calibrated_sensor_has_no_offset() {
         }
     }
 }
+
+/// One shunt is read under the voltage that the estimators take as applied since the last sample: an offset shows its largest phase.
+#[test]
+fn one_shunt_is_read_under_the_applied_voltage() {
+    for delay in 0..3 {
+        let mut controller = SensorlessController::default();
+        let par = &mut controller.parameters;
+        (par.delay, par.sensor.phases, par.sensor.offset.a) = (delay, MeasuredPhases::One, 0.1);
+        controller.inputs.u_dc = 300.0;
+        controller.state.shown.enabled = true;
+        for (command, angle) in controller.state.commands.iter_mut().zip([0.1, 2.2, 4.3_f64]) {
+            command.u = drive_base::frame::AlphaBeta::new(90.0 * angle.cos(), 90.0 * angle.sin());
+        }
+        controller.read_shunt();
+        let largest = |Phases { a, b, c }: Phases| [a, b, c].iter().position(|x| *x == a.max(b).max(c));
+        let (seen, applied) = (controller.shunt.currents(), Phases::from_stator(controller.measure().u));
+        assert!((seen.a.max(seen.b).max(seen.c) - 0.1).abs() < 1e-12, "{seen:?}");
+        assert_eq!(
+            (largest(seen), largest(seen)),
+            (largest(applied), usize::try_from(delay).ok()),
+            "{seen:?} {applied:?}"
+        );
+    }
+}
