@@ -105,7 +105,7 @@ mod tests {
         }
         // d = 0.8, 0.4, 0.2: read at the shares 0.7 for c and 0.9 for a.
         let mut shunt = at(constant);
-        let u = Phases { a: 90.0, b: -30.0, c: -90.0 };
+        let u = Phases { a: 100.0, b: -20.0, c: -80.0 };
         shunt.read(&sensor(0.0), Phases { a: 4.0, b: 0.0, c: -4.0 }, 0, T_S, Some((u, 300.0)));
         near(shunt.currents(), [3.9, -0.5, -3.4]);
     }

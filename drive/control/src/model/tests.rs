@@ -35,7 +35,10 @@ fn one_shunt_is_read_under_the_applied_voltage() {
             command.u = drive_base::frame::AlphaBeta::new(90.0 * angle.cos(), 90.0 * angle.sin());
         }
         controller.read_shunt();
-        let largest = |Phases { a, b, c }: Phases| [a, b, c].iter().position(|x| *x == a.max(b).max(c));
+        let largest = |Phases { a, b, c }: Phases| {
+            let i = [a, b, c];
+            (0..3).max_by(|&x, &y| i[x].total_cmp(&i[y]))
+        };
         let (seen, applied) = (controller.shunt.currents(), Phases::from_stator(controller.measure().u));
         assert!((seen.a.max(seen.b).max(seen.c) - 0.1).abs() < 1e-12, "{seen:?}");
         assert_eq!(
