@@ -26,7 +26,7 @@ use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::derating::{DERATING, Derating};
 use crate::idle;
 use crate::pair::Pair;
-use crate::steady::Steady;
+use crate::steady::{Steady, check_saturation};
 use crate::torque::{Calibration, TORQUE, TorqueAt, TorqueParameters};
 use drive_base::connection::Commanded;
 use drive_base::frame::Phases;
@@ -258,6 +258,7 @@ impl Model for PmsmDrive {
         self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))?;
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
         same_pole_pairs(plant, controller)?;
+        check_saturation(plant, controller.limit.i).map_err(|fault| in_part("plant", &fault))?;
         self.derating.validate()?;
         let starts = self.pair.controller.model.samples() == 0;
         self.link_parameters.validate(if starts { self.inputs.u_dc } else { 0.0 })?;

@@ -10,7 +10,12 @@ use crate::beginning::{Beginning, Operating};
 use crate::steady::Steady;
 use crate::torque::TorqueParameters;
 use drive_base::math::wrap;
+use drive_plant::model::PmsmPlant;
 use drive_plant::thermal::{Temperatures, ThermalMode};
+use fmu_core::continuous::ContinuousTime;
+use fmu_core::draw::{Draw, mix};
+use fmu_core::row::Slot;
+use fmu_core::variable::Causality;
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 
 /// Time in s that a run takes before the start, and the part of it at the end whose mean torque counts.
@@ -175,6 +180,12 @@ impl PmsmDrive {
         model.initialize();
         model.link.clone_from(&self.link);
         model.pair.controller.model.begin_at(n_p * begins, speed);
+        if self.short {
+            let share = shown_by_inputs(&mut block);
+            for state in &PmsmPlant::STATES[..2] {
+                *state.at(&mut block.model.pair.plant.model) *= 1.0 + share;
+            }
+        }
         let (mut now, [mut tau, mut speed_est]) = (Elapsed::ZERO, [Swing::default(); 2]);
         for k in 0..num_of(steps) {
             let model = &mut block.model;
@@ -220,6 +231,19 @@ impl PmsmDrive {
              as with initial.steady = 1 (Off); begin at another speed or torque"
         )
     }
+}
+
+/// A number from 0 to below 1 that changes with each input of the drive: a short run shows by it that the steady state depends on all.
+fn shown_by_inputs(block: &mut Block<PmsmDrive>) -> f64 {
+    let mut hash = 0;
+    for index in 0..PmsmDrive::TABLE.len() {
+        match PmsmDrive::TABLE.entry(block, index).filter(|(meta, _)| meta.causality == Causality::Input) {
+            Some((_, Slot::Real(x))) => hash = mix(hash ^ x.to_bits()),
+            Some((_, Slot::Boolean(x))) => hash = mix(hash ^ (2 + u64::from(*x))),
+            _ => (),
+        }
+    }
+    Draw(hash).share()
 }
 
 /// A number of steps.

@@ -36,7 +36,7 @@ use crate::dc_link::{LINK, LinkEnergy, LinkParameters};
 use crate::derating::DERATING;
 use crate::idle;
 use crate::pmsm_drive::{DriveInputs, DriveOutputs, Happened, INPUTS, OUTPUTS, in_part, same_pole_pairs};
-use crate::steady::{At, Condition, Diodes, Point, Steady};
+use crate::steady::{At, Condition, Diodes, Point, Steady, check_saturation};
 use crate::torque::{TORQUE, TorqueAt, TorqueParameters};
 use drive_base::frame::Dq;
 use drive_base::math::all_finite;
@@ -367,7 +367,9 @@ impl Model for PmsmDriveMean {
 
     fn validate(&self) -> Result<(), Fault> {
         self.plant().validate().map_err(|fault| in_part("plant", &fault))?;
-        same_pole_pairs(&self.drive.plant, &self.drive.controller)?;
+        let Steady { plant, controller, .. } = &self.drive;
+        same_pole_pairs(plant, controller)?;
+        check_saturation(plant, controller.limit.i).map_err(|fault| in_part("plant", &fault))?;
         self.drive.derating.validate()?;
         let u_dc = if self.moved { 0.0 } else { self.inputs.u_dc };
         self.drive.controller.validate_limits(u_dc).map_err(|fault| in_part("controller", &fault))?;

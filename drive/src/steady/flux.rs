@@ -7,11 +7,14 @@
 //! g and h in 1/H.
 
 use drive_base::frame::Dq;
+use drive_base::math::sin_cos;
 use drive_base::motor::Motor;
 use drive_plant::machine::{self, Magnetics};
+use drive_plant::tables::{PARAMETERS, PlantParameters};
+use fmu_core::Fault;
 
-/// Maximum number of Newton steps for a nonlinear machine.
-const STEPS: usize = 12;
+/// Maximum number of flux linkages that are tried for a nonlinear machine.
+const TRIALS: usize = 24;
 
 /// Residue at which they end, as a share of the current.
 const SMALL: f64 = 1e-14;
@@ -19,7 +22,10 @@ const SMALL: f64 = 1e-14;
 /// Residue, as a share of the current, that falls no more because of rounding.
 const ROUNDED: f64 = 1e-10;
 
-/// The flux linkage (Wb) with the current `i_s` (A) at the terminals.
+/// Angles (deg) from the d-axis at which [`check_saturation`] asks for the maximum current.
+const ANGLES: [f64; 7] = [90.0, 105.0, 120.0, 135.0, 150.0, 165.0, 180.0];
+
+/// The flux linkage (Wb) with the current `i_s` (A) at the terminals; NaN for a polynomial that gives none.
 #[inline]
 pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): (f64, f64)) -> Dq {
     let mut psi = machine::flux(motor, i_s);
@@ -27,22 +33,58 @@ pub(super) fn linkage(motor: &Motor, magnetics: Magnetics<'_>, i_s: Dq, (h, g): 
     if linear && g == 0.0 {
         return psi;
     }
-    let mut last = f64::INFINITY;
-    for _ in 0..if linear { 1 } else { STEPS } {
+    let (mut last, mut before) = (f64::INFINITY, Dq::new(motor.psi_M, 0.0));
+    for _ in 0..TRIALS {
         let rest =
             if linear { Dq::ZERO } else { machine::current(motor, magnetics, psi) - i_s } + psi * h + psi.turned() * g;
         let size = rest.magnitude() / (1.0 + i_s.magnitude());
         if !linear && (size <= SMALL || size <= ROUNDED && size >= last) {
-            break;
+            return psi;
         }
-        last = size;
         let [d, cross, q] = machine::slope(motor, magnetics, psi);
+        // More flux needs more current in a machine, and Newton's step then lowers the residue; too long a step is halved.
+        if !(d > 0.0 && d * q > cross * cross && size < last) {
+            psi = (psi + before) * 0.5;
+            continue;
+        }
+        (last, before) = (size, psi);
         let (d, q, above, below) = (d + h, q + h, cross - g, cross + g);
         let by = 1.0 / (d * q - above * below);
         let step = Dq::new(q * rest.d() - above * rest.q(), d * rest.q() - below * rest.d()) * by;
         psi = psi - step;
+        if linear {
+            return psi;
+        }
     }
-    psi
+    Dq::new(f64::NAN, f64::NAN)
+}
+
+/// Refuses a saturation that describes no machine at currents of `limit` (A).
+///
+/// # Errors
+/// A current that no flux linkage gives, because more flux would need less current.
+pub(crate) fn check_saturation(plant: &PlantParameters, limit: f64) -> Result<(), Fault> {
+    if plant.saturation.is_none() {
+        return Ok(());
+    }
+    let motor = &plant.motor;
+    for angle in ANGLES {
+        let (sin, cos) = sin_cos(if motor.L_d > motor.L_q { 180.0 - angle } else { angle }.to_radians());
+        let i = Dq::new(limit * cos, limit * sin);
+        if linkage(motor, plant.magnetics(), i, (0.0, 0.0)).d().is_nan() {
+            let tell = |get: fn(&mut PlantParameters) -> &mut f64| PARAMETERS.tell(plant, get);
+            return Err(Fault::new(format!(
+                "{} with {} and {}: these describe no machine up to controller.limit.i = {limit} A, because at i_d = {:.3} A and i_q = \
+                 {:.3} A, more flux needs less current; use coefficients closer to 0, or a lower limit",
+                tell(|p| &mut p.saturation.s_2),
+                tell(|p| &mut p.saturation.s_3),
+                tell(|p| &mut p.saturation.s_dq),
+                i.d(),
+                i.q()
+            )));
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
@@ -50,6 +92,32 @@ mod tests {
     use super::*;
     use drive_plant::flux_map;
     use drive_plant::saturation::Saturation;
+
+    /// The flux linkage is found where Newton's first step goes to a flux linkage of no machine, and there is none beyond the
+    /// current at which d i_d / d psi_d = 1 / L_d + 2 s_2 x is 0: x / (2 L_d) at x = -1 / (2 L_d s_2).
+    #[test]
+    fn no_flux_linkage_beyond_the_last_current() {
+        let motor = Motor { L_d: 6e-3, L_q: 6e-3, ..Motor::default() };
+        let plant = |s_2| PlantParameters {
+            motor: motor.clone(),
+            saturation: Saturation { s_2, ..Saturation::default() },
+            ..PlantParameters::default()
+        };
+        let last = 1.0 / (4.0 * 6e-3 * 6e-3 * 1000.0);
+        for (share, exists) in [(0.9, true), (0.999, true), (1.001, false), (1.5, false)] {
+            let (plant, i) = (plant(1000.0), Dq::new(-share * last, 0.0));
+            let psi = linkage(&motor, plant.magnetics(), i, (0.0, 0.0));
+            assert_eq!(psi.d().is_finite(), exists, "{share}: {psi:?}");
+            assert!(!exists || (machine::current(&motor, plant.magnetics(), psi) - i).magnitude() < 1e-10);
+            assert_eq!(check_saturation(&plant, share * last).is_ok(), exists, "{share}");
+        }
+        let refused = check_saturation(&plant(1000.0), 10.0).unwrap_err().to_string();
+        assert!(
+            refused.starts_with("saturation.s_2 = 1000") && refused.contains("controller.limit.i = 10 A"),
+            "{refused}"
+        );
+        assert_eq!(check_saturation(&plant(-1000.0), 10.0), Ok(()), "saturates with more negative current");
+    }
 
     #[test]
     fn current_of_flux_and_iron_is_that_of_the_terminals() {

@@ -33,5 +33,6 @@ mod voltage;
 
 pub(crate) use drive::within;
 pub use drive::{Condition, Steady};
+pub(crate) use flux::check_saturation;
 pub use operating::{At, Point, Region};
 pub use rest::Diodes;

@@ -63,7 +63,7 @@ pub(super) fn root([mut a, mut b]: [(f64, f64); 2], small: f64, f: impl Fn(f64) 
         let x = (a.0 * b.1 - b.0 * a.1) / (b.1 - a.1);
         let y = f(x);
         let resolved = (b.0 - a.0).abs() <= 4.0 * f64::EPSILON * x.abs();
-        if y.abs() <= small || resolved {
+        if y.abs() <= small || resolved || y.is_nan() {
             return x;
         }
         if (y > 0.0) == (b.1 > 0.0) {
