@@ -5,7 +5,7 @@ use drive::Pair;
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Identified, Results};
 use drive::control::commissioning::CommissionMode;
 use drive::plant::iron::Iron;
-use drive::plant::pwm::InverterMode;
+use drive::plant::pwm::{InverterMode, PwmUpdate};
 use drive_tools::tune::motor::MotorFile;
 use drive_tools::tune::rules;
 use std::path::{Path, PathBuf};
@@ -170,10 +170,10 @@ fn all_machines_find_their_values() {
     }
 }
 
-/// Accepted values are inside their intervals. `pmsyrm-5.5kw` is refused as with an average inverter; `elevator-5kw` and
+/// Accepted values are inside their intervals. `pmsyrm-5.5kw` is refused as with an average inverter; with Single, `elevator-5kw` and
 /// `traction-80kw` are lost at the lowest level with dead time, where it takes a fifth of the EMF.
 #[test]
-#[ignore = "all machines on switching legs without dead time, with 1 % and with 2 %, two minutes: \
+#[ignore = "all machines on switching legs, updated once and twice a period, without dead time, with 1 % and with 2 % of T_s, two minutes: \
             cargo test --release -p drive-tools --test commissioning -- --ignored --nocapture switching; \
             COMMISSION_MOTORS=FOLDER takes other machines"]
 fn all_machines_on_switching_legs_find_true_values() {
@@ -183,9 +183,10 @@ fn all_machines_on_switching_legs_find_true_values() {
     paths.retain(|path| path.extension().is_some_and(|x| x == "toml"));
     paths.sort();
     let (mut accepted, mut runs, mut outside, mut refused) = (0, 0, vec![], vec![]);
+    let settings = [PwmUpdate::Single, PwmUpdate::Double].map(|update| [0.0, 0.01, 0.02].map(|share| (update, share)));
     for path in &paths {
         let name = path.file_stem().unwrap().to_str().unwrap();
-        for share in [0.0, 0.01, 0.02] {
+        for (update, share) in settings.into_iter().flatten() {
             let mut pair = match tuned(path, Rotor::Turning, true) {
                 Ok(pair) => pair,
                 Err(why) if other.is_some() => {
@@ -198,13 +199,19 @@ fn all_machines_on_switching_legs_find_true_values() {
             let plant = &mut pair.plant.model.parameters;
             plant.iron = Iron::default();
             plant.inverter.pwm.mode = InverterMode::Switched;
-            (plant.inverter.T_pwm, plant.inverter.dead_time) = (T_s, share * T_s);
+            (plant.inverter.pwm.update, plant.inverter.dead_time) = (update, share * T_s);
+            plant.inverter.T_pwm = update.each_period() * T_s;
+            pair.controller.model.parameters.commission.update = update;
             let (r, most) = run(&mut pair);
             let out = &pair.controller.out;
-            print!("{name:15} {share:4} {:?} {:4.1} s {most:.2} I", out.commission_state, pair.now.seconds());
+            print!(
+                "{name:15} {update:?} {share:4} {:?} {:4.1} s {most:.2} I",
+                out.commission_state,
+                pair.now.seconds()
+            );
             runs += 1;
             if out.commission_fault != Fault::None {
-                refused.push(format!("{name} {share} {:?}", out.commission_fault));
+                refused.push(format!("{name} {update:?} {share} {:?}", out.commission_fault));
             }
             for (quantity, found, truth, _) in compared(&pair, &r) {
                 if found.u >= 1.0 {
@@ -215,7 +222,11 @@ fn all_machines_on_switching_legs_find_true_values() {
                 let error = found.value / truth - 1.0;
                 print!(", {quantity} {:+.3} % +-{:.2}", 100.0 * error, 100.0 * found.u);
                 if error.abs() > found.u + 1e-4 {
-                    outside.push(format!("{name} {share} {quantity} {:+.3} % +-{:.3}", 100.0 * error, 100.0 * found.u));
+                    outside.push(format!(
+                        "{name} {update:?} {share} {quantity} {:+.3} % +-{:.3}",
+                        100.0 * error,
+                        100.0 * found.u
+                    ));
                 }
             }
             println!();
@@ -223,5 +234,5 @@ fn all_machines_on_switching_legs_find_true_values() {
     }
     println!("{accepted} values of {runs} runs, outside of their intervals {outside:?}; runs refused {refused:?}");
     assert!(outside.len() * 50 <= accepted, "more than 2 % are outside: {outside:?}");
-    assert!(other.is_some() || refused.len() <= 8, "{refused:?}");
+    assert!(other.is_some() || refused.len() <= 10, "{refused:?}");
 }

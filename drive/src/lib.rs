@@ -21,6 +21,7 @@ pub mod mapped_drive;
 pub mod pair;
 pub mod pmsm_drive;
 pub mod pmsm_drive_mean;
+mod rules;
 pub mod steady;
 mod terminals;
 pub mod torque;

@@ -26,6 +26,7 @@ use crate::dc_link::{LINK, LINK_OUTPUTS, Link, LinkOutputs, LinkParameters};
 use crate::derating::{DERATING, Derating};
 use crate::idle;
 use crate::pair::Pair;
+use crate::rules::{known_carrier, same_pole_pairs};
 use crate::steady::{Steady, check_saturation};
 use crate::torque::{Calibration, TORQUE, TorqueAt, TorqueParameters};
 use drive_base::connection::Commanded;
@@ -35,11 +36,11 @@ use drive_control::commissioning::IDENTIFIED;
 #[cfg(doc)]
 use drive_control::model::SensorlessController;
 use drive_control::signals::ControllerOutputs;
-use drive_control::tables::{self as control, ControllerParameters, ESTIMATES, STATUS, VOLTAGES};
+use drive_control::tables::{self as control, ESTIMATES, STATUS, VOLTAGES};
 #[cfg(doc)]
 use drive_plant::PmsmPlant;
 use drive_plant::signals::{PlantInputs, PlantOutputs};
-use drive_plant::tables::{self as plant, PlantParameters};
+use drive_plant::tables as plant;
 use fmu_core::log::Warnings;
 use fmu_core::unit::AMPERE;
 use fmu_core::{
@@ -229,7 +230,7 @@ impl Model for PmsmDrive {
 
     const ICON: Option<&'static str> = Some(include_str!("../icons/pmsm_drive.svg"));
 
-    const STATE_VERSION: u16 = 31;
+    const STATE_VERSION: u16 = 32;
 
     fn idle(&self, name: &str) -> Option<&'static str> {
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
@@ -258,6 +259,7 @@ impl Model for PmsmDrive {
         self.pair.controller.model.validate_on(self.inputs.u_dc).map_err(|fault| in_part("controller", &fault))?;
         let (plant, controller) = (&self.pair.plant.model.parameters, &self.pair.controller.model.parameters);
         same_pole_pairs(plant, controller)?;
+        known_carrier(plant, controller)?;
         check_saturation(plant, controller.limit.i).map_err(|fault| in_part("plant", &fault))?;
         self.derating.validate()?;
         let starts = self.pair.controller.model.samples() == 0;
@@ -378,19 +380,6 @@ fn supply(link: &mut Link, par: &LinkParameters, inputs: &DriveInputs, pair: &mu
         link.sample(inputs.u_dc);
     }
     pair.supply(link.u, inputs.enable && !link.precharges);
-}
-
-/// Refuses a controller whose number of pole pairs differs from the machine's.
-pub(crate) fn same_pole_pairs(plant: &PlantParameters, controller: &ControllerParameters) -> Result<(), Fault> {
-    if plant.motor.n_p == controller.motor.n_p {
-        return Ok(());
-    }
-    Err(Fault::new(format!(
-        "plant.{} and controller.{}: the speed of the drive would differ from its reference; set both to the same number of pole \
-         pairs",
-        plant::PARAMETERS.tell(plant, |p| &mut p.motor.n_p),
-        control::PARAMETERS.tell(controller, |p| &mut p.motor.n_p)
-    )))
 }
 
 pub(crate) fn in_part(part: &str, fault: &Fault) -> Fault {

@@ -4,10 +4,12 @@
 
 use drive::control::commission::{CommissionFault as Fault, CommissionState as State, Results};
 use drive::control::commissioning::{CommissionMode, CommissionParameters};
+use drive::control::tables::ControllerParameters;
 use drive::control::trip::Cause;
+use drive::modulation::PwmUpdate;
 use drive::motor::Motor;
-use drive::plant::inverter::Gates;
-use drive::plant::pwm::InverterMode;
+use drive::plant::inverter::{Gates, Inverter};
+use drive::plant::pwm::{InverterMode, ZeroSequence};
 use drive::{Pair, PmsmDrive, SensorlessController};
 use fmu_core::log::Warnings;
 use fmu_core::{Block, ContinuousTime, Elapsed, Model, Slot, Step, Warns, integrate};
@@ -402,4 +404,51 @@ fn a_restored_drive_is_the_same_drive() {
 fn the_default_is_small() {
     let (with, without) = (size_of::<drive::control::commission::Commission>(), size_of::<SensorlessController>());
     assert!(with > 20_000 && 10 * without < with, "{with} and {without} bytes");
+}
+
+/// A self-commissioning that takes the carrier for another than it is, or whose samples contain the ripple.
+#[test]
+fn another_carrier_is_refused_by_name() {
+    let said = |set: fn(&mut Inverter, &mut ControllerParameters)| {
+        let mut drive = Block::<PmsmDrive>::default();
+        let Pair { plant, controller, .. } = &mut drive.model.pair;
+        plant.model.parameters.inverter.pwm.mode = InverterMode::Switched;
+        plant.model.parameters.inverter.dead_time = 1e-6;
+        controller.model.parameters.commission.mode = CommissionMode::Spin;
+        set(&mut plant.model.parameters.inverter, &mut controller.model.parameters);
+        drive.model.validate().map_err(|fault| fault.message().to_owned())
+    };
+    assert_eq!(said(|_, _| ()), Ok(()));
+    assert_eq!(
+        said(|inverter, par| {
+            (inverter.T_pwm, inverter.pwm.update) = (2e-4, PwmUpdate::Double);
+            par.commission.update = PwmUpdate::Double;
+        }),
+        Ok(())
+    );
+    let refused: [(fn(&mut Inverter, &mut ControllerParameters), _); 6] = [
+        (
+            |inverter, _| (inverter.T_pwm, inverter.pwm.update) = (2e-4, PwmUpdate::Double),
+            "plant.inverter.update = 2 (Double)",
+        ),
+        (|_, par| par.commission.update = PwmUpdate::Double, "controller.commission.update = 2 (Double): with"),
+        (|inverter, _| inverter.T_pwm = 5e-5, "plant.inverter.T_pwm = 0.00005 s"),
+        (|inverter, _| inverter.pwm.carrier_delay = 1e-6, "plant.inverter.carrier_delay = 0.000001 s"),
+        (
+            |inverter, _| inverter.pwm.zero_sequence = ZeroSequence::DpwmLow,
+            "plant.inverter.zero_sequence = 4 (DpwmLow)",
+        ),
+        (|inverter, _| inverter.pwm.zero_sequence = ZeroSequence::DpwmHigh, "controller.commission.mode = 3 (Spin)"),
+    ];
+    for (set, named) in refused {
+        let why = said(set).expect_err(named);
+        assert!(why.contains(named) && !why.contains("plant.plant"), "{named}: {why}");
+        println!("{why}");
+    }
+    // Without a dead time or a commissioning, nothing depends on it.
+    assert_eq!(
+        said(|inverter, _| (inverter.dead_time, inverter.pwm.zero_sequence) = (0.0, ZeroSequence::DpwmLow)),
+        Ok(())
+    );
+    assert_eq!(said(|inverter, par| (inverter.T_pwm, par.commission.mode) = (2e-4, CommissionMode::Off)), Ok(()));
 }

@@ -13,10 +13,10 @@ use crate::variable::{Causality, Kind, Meta, Variability};
 use crate::{Elapsed, Fault};
 
 /// Minimum and maximum number of operating points, the start values included.
-const POINTS: (usize, usize) = (192, 3000);
+const POINTS: (usize, usize) = (192, 2000);
 
 /// Runs of the model that the maximum number of points may take.
-const RUNS: usize = 60_000;
+const RUNS: usize = 45_000;
 
 /// The index used for `time`.
 pub(crate) const NOW: usize = usize::MAX;

@@ -6,7 +6,28 @@
 //! i_zero below i_zero: the usual mean-value model, which neither paper contains. u in V, i in A.
 
 use crate::frame::{Phases, Stator, Vector};
-use fmu_core::Scalar;
+use fmu_core::{Scalar, enumeration};
+use serde::{Deserialize, Serialize};
+
+enumeration! {
+    /// Instants at which the carrier takes over the voltage references; values never change.
+    #[derive(Serialize, Deserialize)]
+    pub enum PwmUpdate("PwmUpdate", "When new voltage references take effect") {
+        1 Single "At the beginning of each carrier period";
+        2 Double "At the beginning and in the middle of each carrier period";
+    }
+}
+
+impl PwmUpdate {
+    /// Number of updates in a carrier period.
+    #[inline]
+    pub fn each_period(self) -> f64 {
+        match self {
+            Self::Single => 1.0,
+            Self::Double => 2.0,
+        }
+    }
+}
 
 /// Stator voltage (V) that an inverter on `u_dc` (V, >= 0) applies for the references `u` (V).
 ///

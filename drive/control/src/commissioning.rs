@@ -13,6 +13,7 @@
 pub use crate::commission::CommissionMode;
 use crate::commission::{Commission, CommissionFault, CommissionSetup, CommissionState, Results, Voltage};
 use drive_base::frame::Phases;
+use drive_base::modulation::PwmUpdate;
 use drive_base::motor::{A_PER_WB2, A_PER_WB3};
 use fmu_core::unit::{AMPERE, HENRY, KG_M2, NEWTON_METER, NM_S_PER_RAD, OHM, ONE, SECOND, SPEED, VOLT, WEBER};
 use fmu_core::{Field, Row, Table, table};
@@ -32,11 +33,13 @@ pub struct CommissionParameters {
     pub speed: f64,
     /// Longest time in s, > 0.
     pub t_max: f64,
+    /// When the PWM takes over a voltage reference.
+    pub update: PwmUpdate,
 }
 
 impl Default for CommissionParameters {
     fn default() -> Self {
-        Self { mode: CommissionMode::Off, i: 5.0, speed: 314.0, t_max: 150.0 }
+        Self { mode: CommissionMode::Off, i: 5.0, speed: 314.0, t_max: 150.0, update: PwmUpdate::Single }
     }
 }
 
@@ -57,6 +60,11 @@ pub const COMMISSION: &Table<CommissionParameters> = table![
     })
     .above(0.0),
     P::parameter("t_max", &SECOND, "Longest time of the self-commissioning", |p| &mut p.t_max).above(0.0),
+    P::enumeration_parameter(
+        "update",
+        "Updates of the PWM in a carrier period, of T_s or 2 T_s, whose ripple the self-commissioning takes into account",
+        &Field(|p| &mut p.update),
+    ),
 ];
 
 /// Task of the controller at a sample.

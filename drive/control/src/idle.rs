@@ -77,7 +77,7 @@ pub const ACTS: &[Acts<Par>] = &[
     Acts { names: &["sensor_valid"], when: Par::has_fallback, why: "no effect unless estimator = Sensored and sensor.fallback is another one" },
     Acts { names: &["compensation.i_zero", "compensation.observe"], when: |p| p.compensation.u_dead > 0.0,
         why: "no effect without compensation.u_dead" },
-    Acts { names: &["commission_start", "commission.i", "commission.speed", "commission.t_max"],
+    Acts { names: &["commission_start", "commission.i", "commission.speed", "commission.t_max", "commission.update"],
         when: |p| p.commission.mode != CommissionMode::Off, why: "no effect with commission.mode = Off" },
     Acts { names: &["rasmussen.c_1", "rasmussen.c_2", "rasmussen.w_n", "rasmussen.zeta"], when: |p| is(p, &[Kind::Rasmussen]),
         why: "no effect unless estimator = Rasmussen" },

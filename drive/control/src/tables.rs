@@ -200,6 +200,7 @@ impl ControllerParameters {
             i: self.commission.i,
             speed: f64::from(self.motor.n_p) * self.commission.speed,
             t_max: self.commission.t_max,
+            carrier: self.commission.update.each_period() * self.T_s,
         }
     }
 

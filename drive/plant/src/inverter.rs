@@ -9,7 +9,7 @@
 //! neither paper contains it. u in V, i in A, times in s.
 
 use crate::losses::conduction::{DEVICES, Devices};
-use crate::pwm::{InverterMode, Pwm, PwmUpdate};
+use crate::pwm::{InverterMode, Pwm};
 use fmu_core::unit::{AMPERE, SECOND};
 use fmu_core::{Part, Row, Table, table};
 use serde::{Deserialize, Serialize};
@@ -44,11 +44,7 @@ impl Inverter {
 
     /// Time in s between two instants at which the carrier takes over voltage references; `None` without a carrier.
     pub fn update_period(&self) -> Option<f64> {
-        let period = match self.pwm.update {
-            PwmUpdate::Single => self.T_pwm,
-            PwmUpdate::Double => 0.5 * self.T_pwm,
-        };
-        (self.pwm.mode == InverterMode::Switched).then_some(period)
+        (self.pwm.mode == InverterMode::Switched).then(|| self.T_pwm / self.pwm.update.each_period())
     }
 }
 

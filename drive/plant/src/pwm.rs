@@ -1,5 +1,6 @@
 //! Parameters of the modulator of the switched inverter, and of its faults; [`switched`](crate::switched) has the model.
 
+pub use drive_base::modulation::PwmUpdate;
 use drive_base::overmodulation::{MODULATION, Modulation};
 use fmu_core::unit::SECOND;
 use fmu_core::{Field, Part, Row, Table, enumeration, table};
@@ -11,15 +12,6 @@ enumeration! {
     pub enum InverterMode("InverterMode", "Model of the inverter") {
         1 Average "The mean over a PWM period";
         2 Switched "Six switches with diodes, which a carrier of period inverter.T_pwm switches";
-    }
-}
-
-enumeration! {
-    /// Instants at which the carrier takes over the voltage references; values never change.
-    #[derive(Serialize, Deserialize)]
-    pub enum PwmUpdate("PwmUpdate", "When new voltage references take effect") {
-        1 Single "At the beginning of each carrier period";
-        2 Double "At the beginning and in the middle of each carrier period";
     }
 }
 

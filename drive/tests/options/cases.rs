@@ -2,7 +2,7 @@
 
 use super::{RATED, SLOW, T_S, U_DEAD, command, drive, imposed, off, run, turning};
 use drive::Pair;
-use drive::control::commission::CommissionState;
+use drive::control::commission::{CommissionState, Identified};
 use drive::control::commissioning::CommissionMode;
 use drive::control::position::PositionSensor;
 use drive::control::reference::{max_torque, max_torque_per_ampere};
@@ -14,6 +14,7 @@ use drive::estimator::pulsating::Demodulation;
 use drive::estimator::tracker::TrackerKind;
 use drive::estimator::{Class, Kind};
 use drive::math::wrap;
+use drive::modulation::PwmUpdate;
 use drive::motor::Motor;
 use drive_base::overmodulation::ModulationMode;
 use std::f64::consts::TAU;
@@ -84,6 +85,14 @@ fn commissioned(mut pair: Pair) -> Figures {
     run(&mut pair, 0.01, |_, _| ());
     let out = &pair.controller.out;
     [f64::from(u8::from(out.commission_state != CommissionState::Idle)), f64::from(u8::from(out.enabled))]
+}
+
+/// The found resistance in Ohm, and its half-width as a share.
+fn found_resistance(mut pair: Pair) -> Figures {
+    pair.controller.model.inputs.commission_start = true;
+    run(&mut pair, 20.0, |_, _| ());
+    let Identified { value, u } = pair.controller.model.commissioning_mut().as_ref().unwrap().shown().R_s;
+    [value, u]
 }
 
 /// Whether these figures are yes (1) or no (0) as expected.
@@ -568,6 +577,17 @@ pub(super) const CASES: &[Case] = &[
         ask: |p| p.commission.mode = CommissionMode::Standstill,
         figures: commissioned,
         acts: |_, without, with| are(without, [false, true]) && are(with, [true, false]),
+    },
+    Case {
+        option: "commission.update",
+        on: |kind| {
+            let mut pair = drive(kind);
+            pair.controller.model.parameters.commission.mode = CommissionMode::Standstill;
+            pair
+        },
+        ask: |p| p.commission.update = PwmUpdate::Double,
+        figures: found_resistance,
+        acts: |_, [R, single], [same, double]| R == same && R > 0.0 && double > single,
     },
     Case {
         option: "limit.tau_use",

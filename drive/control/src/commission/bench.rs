@@ -31,8 +31,9 @@ pub(super) enum Part<T> {
 /// Conditions and findings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Bench {
-    /// Sample period in s.
+    /// Sample period, and period of the PWM carrier, in s.
     pub(super) T: f64,
+    pub(super) carrier: f64,
     /// Samples from the command to its action.
     pub(super) delay: f64,
     /// Maximum current in A of the commissioning.

@@ -424,7 +424,7 @@ impl Levels {
                 .sqrt();
         // At w_f the samples differ from the mean current by this at most, in A.
         let late = if ripples { LATE * bench.u_dead / (2.0 * SQRT_3 * bench.U) } else { 0.0 };
-        let sampled = 0.3 * bench.w_r() * psi * bench.T / L_d * (late + bench.R * bench.T / (96.0 * L_d));
+        let sampled = 0.3 * bench.w_r() * psi * bench.carrier / L_d * (late + bench.R * bench.carrier / (96.0 * L_d));
         let K = 1.5 * bench.n_p * psi;
         let w_f = 0.3 * bench.w_r() / bench.n_p;
         let J = self.inertia * bench.n_p * K;

@@ -84,7 +84,7 @@ impl Results {
             let u = if value > 0.0 { half / value } else { 1.0 };
             Identified::within(value, u, limit)
         };
-        let (x, late) = (bench.R * bench.T / bench.L_c, bench.u_dead / (2.0 * SQRT_3 * bench.U));
+        let (x, late) = (bench.R * bench.carrier / bench.L_c, bench.u_dead / (2.0 * SQRT_3 * bench.U));
         let wider = |[R, half]: [f64; 2]| [R, half + bench.R * x * (1.5 * late + x / 96.0)];
         self.R_s = of(wider(a.R), wider(b.R), bench.R, LIMIT_R);
         self.u_dead = of(a.u_dead, b.u_dead, bench.u_dead, LIMIT_DEAD);

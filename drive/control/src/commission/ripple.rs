@@ -39,12 +39,12 @@ impl Ripple {
         let full = phases.span().max(u_dc);
         let d = [a, b, c].map(|u| (u - middle) / full + 0.5);
         let mean = (d[0] + d[1] + d[2]) * (1.0 / 3.0);
-        let late = 0.5 * bench.T / L;
+        let late = 0.5 * bench.carrier / L;
         let r = d.map(|x| {
             let earlier = d.iter().fold(0.0, |sum, y| sum + (y - x).max(0.0));
             u_dc * late * (earlier * (1.0 / 3.0) + (x - mean) * (1.0 - x))
         });
-        Self { r, d, half: bench.u_dead * bench.T / (3.0 * L), late }
+        Self { r, d, half: bench.u_dead * bench.carrier / (3.0 * L), late }
     }
 
     /// Loss in V of a leg without ripple at the current `i` (A), and its slope in Ohm.
@@ -89,7 +89,7 @@ mod tests {
     fn bench() -> Bench {
         let mut curve = Curve::new(7.5);
         (0..POINTS).for_each(|n| curve.set(n, 3.0));
-        Bench { T: 1e-4, u_dead: 3.0, curve, ..Bench::default() }
+        Bench { T: 1e-4, carrier: 1e-4, u_dead: 3.0, curve, ..Bench::default() }
     }
 
     /// The currents of ideal legs in small steps, with the voltage `u` as EMF, from the middle of a zero vector on: what each has

@@ -60,6 +60,7 @@ impl Commission {
     pub fn new(setup: CommissionSetup) -> Self {
         let bench = Bench {
             T: setup.T_s,
+            carrier: setup.carrier,
             delay: f64::from(setup.delay),
             I: setup.i,
             n_p: f64::from(setup.n_p),

@@ -21,6 +21,8 @@ pub struct CommissionSetup {
     pub speed: f64,
     /// Longest time in s, > 0.
     pub t_max: f64,
+    /// Period of the PWM carrier in s: one or two sample periods.
+    pub carrier: f64,
 }
 
 /// Command to the inverter until the next sample.

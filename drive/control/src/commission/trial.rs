@@ -74,7 +74,7 @@ impl Trial {
         }
         self.rest = if turning.ripples { LEFT * off } else { 0.0 } + rest.abs();
         // Where the ripple decays within a period, its part only widens the interval.
-        if 2.0 * bench.R * bench.T > SLOW * (turning.motor.L_d + turning.motor.L_q) {
+        if 2.0 * bench.R * bench.carrier > SLOW * (turning.motor.L_d + turning.motor.L_q) {
             self.rest = UNKNOWN * rest.abs();
             return Verdict::Over;
         }
@@ -91,7 +91,7 @@ impl Trial {
         (self.plain, turning.ripples) = (without, true);
         turning.motor.psi_M = psi.clamp(bench.psi_least(), 1.15 * bench.psi_r);
         // Somewhat more than the ripple at the voltage w psi.
-        let r = 0.5 * bench.T * turning.w * psi / (turning.motor.L_d + turning.motor.L_q);
+        let r = 0.5 * bench.carrier * turning.w * psi / (turning.motor.L_d + turning.motor.L_q);
         Verdict::Again((CLEAR * r).min(STRONG * bench.I))
     }
 }
@@ -107,7 +107,7 @@ mod tests {
     /// The flux linkage without i_d decides, with the ripple or without it.
     #[test]
     fn the_nearer_flux_linkage_is_right() {
-        let bench = Bench { T: 1e-4, I: 10.0, psi_r: 0.2, ..Bench::default() };
+        let bench = Bench { T: 1e-4, carrier: 1e-4, I: 10.0, psi_r: 0.2, ..Bench::default() };
         for (plain, rippled, ripples) in [(0.144, 0.1501, true), (0.1513, 0.155, false)] {
             let (mut trial, mut turning) = (Trial::default(), Turning::default());
             (turning.w, turning.motor.L_d, turning.motor.L_q) = (400.0, 6e-3, 6e-3);

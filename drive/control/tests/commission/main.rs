@@ -22,6 +22,7 @@ fn setup(motor: &Motor) -> CommissionSetup {
         i: motor.I,
         speed: motor.w_rated,
         t_max: 150.0,
+        carrier: motor.T,
     }
 }
 
