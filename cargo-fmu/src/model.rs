@@ -2,7 +2,7 @@
 //! memory or crashes, the process ends, and the build names the model.
 
 use crate::worker::{self, ProcessOptions};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use clap::{Args, Subcommand};
 use fmu_core::Description;
 use fmu_core::description::Dependencies;
@@ -40,6 +40,11 @@ enum Work {
     },
 }
 
+/// Writes a file; an error names it.
+fn put(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).with_context(|| path.display().to_string())
+}
+
 /// The hidden command of both programs.
 const NAME: &str = "model";
 
@@ -51,7 +56,7 @@ pub fn run(args: &ModelWork) -> Result<()> {
     worker::run(NAME, &args.process, false, |_| match &args.work {
         Work::Describe { library, out, resources } => {
             let description = fmu_import::describe(library, resources.as_deref(), Dependencies::Probed)?;
-            Ok(fs::write(out, serde_json::to_vec(&description)?)?)
+            put(out, &serde_json::to_vec(&description)?)
         }
         Work::Reference { archive, description, out, stimuli, parameters } => {
             let description: Description = serde_json::from_slice(&fs::read(description)?)?;
@@ -60,7 +65,7 @@ pub fn run(args: &ModelWork) -> Result<()> {
             for (name, file) in
                 reference::files(archive, &description, stimuli.as_deref().unwrap_or(Path::new("")), parameters)?
             {
-                fs::write(out.join(name.trim_start_matches(reference::FOLDER)), file.bytes)?;
+                put(&out.join(name.trim_start_matches(reference::FOLDER)), &file.bytes)?;
             }
             Ok(())
         }
@@ -104,11 +109,11 @@ pub fn reference(
     }
     let folder = Folder::new()?;
     let (json, out) = (folder.path().join("description.json"), folder.path().join("out"));
-    fs::create_dir(&out)?;
-    fs::write(&json, serde_json::to_vec(description)?)?;
+    fs::create_dir(&out).with_context(|| out.display().to_string())?;
+    put(&json, &serde_json::to_vec(description)?)?;
     let set = parameters.map(|(name, _)| folder.path().join(format!("{name}.ssv")));
     if let (Some(path), Some((_, text))) = (&set, parameters) {
-        fs::write(path, text)?;
+        put(path, text.as_bytes())?;
     }
     let further = [("--stimuli", Some(stimuli).filter(|file| file.is_file())), ("--parameters", set.as_deref())];
     guarded("reference", [archive, &json, &out], &further, options)?;

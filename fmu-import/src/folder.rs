@@ -46,7 +46,7 @@ impl Folder {
             let lock = match File::create_new(&name) {
                 // Another process mistook the empty folder for an abandoned one.
                 Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
-                made => made?,
+                made => made.map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", name.display())))?,
             };
             match lock.try_lock() {
                 // Another thread or process took the new folder for an abandoned one: it removes it, or has removed it.

@@ -587,7 +587,7 @@ pub(super) const CASES: &[Case] = &[
         },
         ask: |p| p.commission.update = PwmUpdate::Double,
         figures: found_resistance,
-        acts: |_, [R, single], [same, double]| R == same && R > 0.0 && double > single,
+        acts: |_, [R, single], [same, double]| R > 0.0 && (R - same).abs() < 1e-12 && double > single,
     },
     Case {
         option: "limit.tau_use",
