@@ -406,10 +406,12 @@ fn the_default_is_small() {
     assert!(with > 20_000 && 10 * without < with, "{with} and {without} bytes");
 }
 
+type Setting = fn(&mut Inverter, &mut ControllerParameters);
+
 /// A self-commissioning that takes the carrier for another than it is, or whose samples contain the ripple.
 #[test]
 fn another_carrier_is_refused_by_name() {
-    let said = |set: fn(&mut Inverter, &mut ControllerParameters)| {
+    let said = |set: Setting| {
         let mut drive = Block::<PmsmDrive>::default();
         let Pair { plant, controller, .. } = &mut drive.model.pair;
         plant.model.parameters.inverter.pwm.mode = InverterMode::Switched;
@@ -426,7 +428,7 @@ fn another_carrier_is_refused_by_name() {
         }),
         Ok(())
     );
-    let refused: [(fn(&mut Inverter, &mut ControllerParameters), _); 6] = [
+    let refused: [(Setting, _); 6] = [
         (
             |inverter, _| (inverter.T_pwm, inverter.pwm.update) = (2e-4, PwmUpdate::Double),
             "plant.inverter.update = 2 (Double)",
