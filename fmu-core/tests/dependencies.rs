@@ -247,3 +247,114 @@ fn behind_eight_options() {
     let found = names(&description, y.initial_dependencies.as_ref()).unwrap();
     assert!(found.contains("level u") && !found.contains("idle"), "{found}");
 }
+
+/// Two levels of a tank, of which each drains through its own part of a wide array: its coefficients are one known.
+#[derive(Clone, Serialize, Deserialize)]
+struct Tanks {
+    upper: f64,
+    lower: f64,
+    drains: Vec<f64>,
+    inflow: f64,
+}
+
+impl Default for Tanks {
+    fn default() -> Self {
+        Self { upper: 1.0, lower: 2.0, drains: vec![0.5; 200], inflow: 0.0 }
+    }
+}
+
+type T = Row<Block<Tanks>>;
+
+impl Model for Tanks {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Tanks", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        T::input("inflow", &ONE, "", |m| &mut m.model.inflow),
+        T::array_input("drains", &ONE, "", 200, |m| &mut m.model.drains),
+        T::output("upper", &ONE, "", |m| &mut m.model.upper),
+        T::output("lower", &ONE, "", |m| &mut m.model.lower),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 2>(self, step, 0.1)
+    }
+}
+
+impl ContinuousTime for Tanks {
+    const STATES: &'static [State<Self>] = &[
+        State::new("upper", &ONE, |m: &mut Self| &mut m.upper),
+        State::new("lower", &ONE, |m: &mut Self| &mut m.lower),
+    ];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = self.inflow;
+        dx[1] = self.drains[170] * self.upper;
+        Ok(())
+    }
+}
+
+struct Wide;
+
+impl Exported for Wide {
+    type Model = Tanks;
+    const CAN: Capabilities<Tanks> = Capabilities::NONE.ContinuousTime();
+}
+
+/// The derivatives follow the wide array among the positions of the probe.
+#[test]
+fn derivatives_beside_a_wide_array() {
+    let description = Description::exported::<Wide>().unwrap();
+    for (name, wanted) in [("der(upper)", "inflow"), ("der(lower)", "upper drains"), ("upper", "upper")] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
+    }
+}
+
+/// A counter on a clock: its output is on the clock too.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Counter {
+    by: f64,
+    sum: f64,
+}
+
+type C = Row<Block<Counter>>;
+
+impl Model for Counter {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Counter", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        C::clock("tick", "", Clock::constant(0.5)),
+        C::discrete_input("by", &ONE, "", |m| &mut m.model.by).on("tick"),
+        C::discrete_output("sum", &ONE, "", |m| &mut m.model.sum).on("tick"),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+impl Clocked for Counter {
+    const FEEDTHROUGH: bool = true;
+    fn tick(&mut self, _: usize, _: Elapsed) -> Result<(), Fault> {
+        self.sum += self.by;
+        Ok(())
+    }
+}
+
+struct OnTicks;
+
+impl Exported for OnTicks {
+    type Model = Counter;
+    const CAN: Capabilities<Counter> = Capabilities::NONE.Clocked();
+}
+
+#[test]
+fn on_a_clock() {
+    let description = Description::exported::<OnTicks>().unwrap();
+    for (name, clocks, wanted) in [("tick", "", None), ("by", "tick", None), ("sum", "tick", Some("tick by"))] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, Some(&variable.clocks)).as_deref(), Some(clocks), "{name}");
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), wanted, "{name}");
+    }
+}

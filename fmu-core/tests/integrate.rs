@@ -4,6 +4,7 @@
 use fmu_core::unit::{ONE, Quantity, Unit};
 use fmu_core::*;
 use serde::{Deserialize, Serialize};
+use std::cell::Cell;
 
 const RATE: Quantity = Quantity::new("TestRate", Unit::si("1/s", unit::Exponents::mechanical(0, 0, -1, 0)));
 
@@ -157,6 +158,56 @@ fn events_without_end_are_refused() {
     let fault = run(&mut ball, 1, 3.0, |m, step| integrate::hybrid::<_, 2>(m, step, 10e-3)).unwrap_err();
     assert!(fault.message().contains("events follow each other"), "{fault}");
     assert!(ball.height > -1e-9, "{} m", ball.height);
+}
+
+/// Falls at 1 m/s from 1 m; counts how often its indicator is computed.
+#[derive(Clone, Serialize, Deserialize)]
+struct Lift {
+    height: f64,
+    landed: Option<f64>,
+    looks: Cell<u32>,
+}
+
+model!(Lift);
+
+impl Default for Lift {
+    fn default() -> Self {
+        Self { height: 1.0, landed: None, looks: Cell::new(0) }
+    }
+}
+
+impl ContinuousTime for Lift {
+    const STATES: &'static [State<Self>] = &[State::new("h", &RATE, |m| &mut m.height)];
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = -1.0;
+        Ok(())
+    }
+}
+
+impl Events for Lift {
+    const INDICATORS: &'static [Indicator] = &[Indicator { name: "z", description: "Height" }];
+    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
+        self.looks.set(self.looks.get() + 1);
+        z[0] = self.height;
+    }
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        if self.height <= 0.0 && self.landed.is_none() {
+            self.landed = Some(now.seconds());
+        }
+        Ok(Outcome::default())
+    }
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+/// Bisection alone needs 30 evaluations to find a crossing within 1e-9 of the step.
+#[test]
+fn a_straight_crossing_is_found_along_the_line() {
+    let mut lift = Lift::default();
+    run(&mut lift, 1, 1.3, |m, step| integrate::hybrid::<_, 1>(m, step, 2.0)).unwrap();
+    assert!((lift.landed.unwrap() - 1.0).abs() < 1e-8, "{:?} s", lift.landed);
+    assert!(lift.looks.get() < 15, "{} evaluations", lift.looks.get());
 }
 
 /// Switches the sign of its state's derivative at given times; or at k `period`, if that is not 0.
