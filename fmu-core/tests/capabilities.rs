@@ -225,8 +225,20 @@ fn every_capability_has_its_own_function_and_token() {
     let clocked = base().Clocked().clocked.unwrap();
     assert!(clocked.feedthrough && (clocked.interval)(&whole, 0, Elapsed::ZERO) == Some(0.5));
     assert!((base().Intermediate().intermediate.unwrap())(&whole) <= 0.125);
-    let copy = Can::stored().saved.unwrap().model(&whole);
+    let (saving, storing) = (Can::stored().saved.unwrap(), Can::stored().stored.unwrap());
+    let mut copy = saving.model(&whole);
     assert_eq!((copy.n, copy.x.len(), copy.accounts), (2, 2, 1));
+    whole.accounts = 7;
+    saving.overwrite(&mut copy, &whole);
+    assert_eq!((copy.n, copy.accounts), (2, 7));
+    let mut bytes = [0; 64];
+    let n = (storing.write)(&whole, &mut bytes).unwrap();
+    assert_eq!((storing.size)(&whole).unwrap(), n);
+    let (read, rest) = (storing.read)(&bytes).unwrap();
+    assert_eq!((read.n, read.x, read.accounts, rest.len()), (2, vec![0.0; 2], 7, 64 - n));
+    assert!((storing.read)(&bytes[..n - 1]).err().unwrap().message().starts_with("content: "));
+    let short = (storing.write)(&whole, &mut bytes[..n - 1]).unwrap_err();
+    assert!(short.message().starts_with("the state cannot be serialized: "), "{short}");
 }
 
 /// An integer row.
