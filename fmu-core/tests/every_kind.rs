@@ -13,12 +13,6 @@ enumeration! {
     }
 }
 
-impl Default for Gear {
-    fn default() -> Self {
-        Self::High
-    }
-}
-
 #[derive(Clone, Serialize, Deserialize)]
 struct All {
     real: f64,
