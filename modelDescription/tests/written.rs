@@ -333,6 +333,31 @@ fn fmi_2_says_what_it_can() {
     assert_eq!(of("table[2]").value_reference, 7);
 }
 
+/// FMI 2.0 has an array of variable size as elements: named by its first alone, it is a whole, whose elements are not listed.
+#[test]
+fn a_dependency_on_a_whole_array_is_not_listed_in_fmi_2() {
+    let listed = |elements: usize, references: &[u32]| {
+        let mut rare = rare_sample();
+        rare.variables.retain(|v| ["n", "table", "kept"].contains(&&*v.name));
+        (rare.model_exchange, rare.terminals) = (None, Vec::new());
+        for v in &mut rare.variables {
+            match &*v.name {
+                "table" => (v.shape, v.start) = (vec![elements], Some(vec![Value::Real(1.0); elements])),
+                "kept" => (v.exact, v.start, v.initial_dependencies) = (false, None, Some(references.to_vec())),
+                _ => {}
+            }
+        }
+        VERSIONS.map(|version| {
+            let md = read(write(&rare, version, &generation())).unwrap();
+            md.initial_unknowns[0].dependencies.clone()
+        })
+    };
+    // The constant, the elements, and the output by their indices; in FMI 3.0 the value reference of the array.
+    assert_eq!(listed(2, &[6]), [None, Some(vec![6])]);
+    assert_eq!(listed(2, &[6, 7]), [Some(vec![2, 3]), Some(vec![6])]);
+    assert_eq!(listed(1, &[6]), [Some(vec![2]), Some(vec![6])]);
+}
+
 #[test]
 fn a_model_without_outputs_has_no_empty_list() {
     let bare = Description { variables: Vec::new(), ..sample() };
