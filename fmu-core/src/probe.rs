@@ -235,7 +235,7 @@ impl<'a, M: Model> Points<'a, M> {
         }
         let draw = &mut self.draw;
         let block = match self.fruitful.len() {
-            n if n > 0 && self.count.is_multiple_of(2) => {
+            n if n > 0 && !self.settable.is_empty() && self.count.is_multiple_of(2) => {
                 let mut block = self.saving.block(&self.fruitful[draw.below(u32::try_from(n).unwrap_or(u32::MAX))]);
                 for _ in 0..=draw.below(4) {
                     let i = draw.below(u32::try_from(self.settable.len()).unwrap_or(u32::MAX));

@@ -403,3 +403,49 @@ fn behind_integers_far_from_the_start() {
         assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
     }
 }
+
+/// Nothing can be set: x' = y, y' = -x.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Alone {
+    x: f64,
+    y: f64,
+}
+
+type A = Row<Block<Alone>>;
+
+impl Model for Alone {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Alone", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> =
+        table![A::output("x", &ONE, "", |m| &mut m.model.x), A::state("y", &ONE, "", |m| &mut m.model.y)];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 2>(self, step, 0.1)
+    }
+}
+
+impl ContinuousTime for Alone {
+    const STATES: &'static [State<Self>] =
+        &[State::new("x", &ONE, |m: &mut Self| &mut m.x), State::new("y", &ONE, |m: &mut Self| &mut m.y)];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        (dx[0], dx[1]) = (self.y, -self.x);
+        Ok(())
+    }
+}
+
+struct Oscillator;
+
+impl Exported for Oscillator {
+    type Model = Alone;
+    const CAN: Capabilities<Alone> = Capabilities::NONE.ContinuousTime();
+}
+
+#[test]
+fn a_model_without_inputs_and_parameters() {
+    let description = Description::exported::<Oscillator>().unwrap();
+    for (name, wanted) in [("der(x)", "y"), ("der(y)", "x"), ("x", "x")] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
+    }
+}
