@@ -218,7 +218,7 @@ fn reference(
     let archive = dir.path().join("reference.fmu");
     let mut files = archive::contents(description, &model.own, &model.licenses, version, moment, Platform::host())?;
     files.extend(model.resources.clone());
-    archive::write(&archive, &archive::archive(&files, moment)?)?;
+    archive::write(&archive, &archive::temporary(&files, moment)?)?;
     model::reference(&archive, description, stimuli, example, process).map_err(|why| {
         let text = format!(
             "{}: the default experiment fails: {why:#}; correct the model, its DefaultExperiment or {}, or build with --no-reference",

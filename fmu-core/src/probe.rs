@@ -6,6 +6,7 @@
 //! earlier one that showed something new, as a fuzzer does: what acts only behind several options is reached step by step.
 
 use crate::capability::Capabilities;
+use crate::kinds::Kinds;
 use crate::model::{Block, Model};
 use crate::row::Slot;
 use crate::saved::Saving;
@@ -60,7 +61,7 @@ fn all_dependencies<M: Model>(can: &Capabilities<M>, states: &[usize]) -> [Depen
 /// Checks that an exact variable keeps the start value set by the importer.
 pub(crate) fn keeps_starts<M: Model>(can: &Capabilities<M>, fresh: &Block<M>, states: &[usize]) -> Result<(), Fault> {
     let Some(saving) = &can.saved else { return Ok(()) };
-    let mut draw = Draw(3);
+    let mut draw = Draw::new(3);
     for (index, meta) in metas::<M>().into_iter().enumerate().filter(|(_, meta)| meta.exact) {
         let index = wide::<M>().index(index);
         let mut block = saving.block(fresh);
@@ -207,7 +208,17 @@ impl<'a, M: Model> Points<'a, M> {
     /// Number of points for a model that runs `runs` times at each.
     fn new(saving: &'a Saving<M>, fresh: &'a Block<M>, settable: &'a [usize], runs: usize, seed: u64) -> Self {
         let most = (RUNS / runs.max(1)).clamp(POINTS.0, POINTS.1);
-        Self { saving, fresh, settable, draw: Draw(seed), fruitful: Vec::new(), last: None, count: 0, most, known: 0 }
+        Self {
+            saving,
+            fresh,
+            settable,
+            draw: Draw::new(seed),
+            fruitful: Vec::new(),
+            last: None,
+            count: 0,
+            most,
+            known: 0,
+        }
     }
 
     fn next(&mut self, can: &Capabilities<M>, states: &[usize], found: &Found) -> Option<Block<M>> {
@@ -216,12 +227,15 @@ impl<'a, M: Model> Points<'a, M> {
             self.fruitful.extend(self.last.take());
             self.known = known;
         }
-        if self.count >= self.most || self.settable.is_empty() && self.count >= POINTS.0 {
+        // The limit of an integer may be far from its start value: more points for a model that has some.
+        self.draw.far = self.count >= self.most;
+        let far = if const { M::TABLE.kinds().meets(Kinds::INTEGERS) } { self.most / 8 } else { 0 };
+        if self.count >= self.most + far || self.settable.is_empty() && self.count >= POINTS.0 {
             return None;
         }
         let draw = &mut self.draw;
         let block = match self.fruitful.len() {
-            n if n > 0 && self.count.is_multiple_of(2) => {
+            n if n > 0 && !self.settable.is_empty() && self.count.is_multiple_of(2) => {
                 let mut block = self.saving.block(&self.fruitful[draw.below(u32::try_from(n).unwrap_or(u32::MAX))]);
                 for _ in 0..=draw.below(4) {
                     let i = draw.below(u32::try_from(self.settable.len()).unwrap_or(u32::MAX));
@@ -423,7 +437,14 @@ fn change_one<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[u
         Slot::Integer(x) => {
             let Kind::Integer(of) = meta.kind else { return };
             let value = x.get();
-            let others = [value + 1, value - 1, value + 2].into_iter().filter(|&v| of.allows(v, &meta.range));
+            let others = if draw.far {
+                let scale = if value == 0 { [1, 10, 100, 1000][draw.below(4)] } else { 2 * value.abs() };
+                let far = ((i128::from(draw.next()) * (2 * scale + 1)) >> 32) - scale;
+                [far, -far, far / 8]
+            } else {
+                [value + 1, value - 1, value + 2]
+            };
+            let others = others.into_iter().filter(|&v| v != value && of.allows(v, &meta.range));
             if let Some(other) = others.collect::<Vec<_>>().get(draw.below(2)) {
                 x.set(*other);
             }
@@ -441,12 +462,20 @@ fn change_one<M: Model>(can: &Capabilities<M>, block: &mut Block<M>, states: &[u
 }
 
 /// A deterministic stream of numbers (Knuth's 64-bit congruential generator).
-struct Draw(u64);
+struct Draw {
+    state: u64,
+    /// Integers change to values far from their own, also on the other side of 0.
+    far: bool,
+}
 
 impl Draw {
+    fn new(seed: u64) -> Self {
+        Self { state: seed, far: false }
+    }
+
     fn next(&mut self) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        u32::try_from(self.0 >> 32).unwrap_or_default()
+        self.state = self.state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        u32::try_from(self.state >> 32).unwrap_or_default()
     }
 
     fn between(&mut self, low: f64, high: f64) -> f64 {

@@ -99,6 +99,148 @@ fn another_interface_is_another_token() {
     assert_eq!(NONE.hash().guid().as_str(), Both::HASH.guid().as_str());
 }
 
+/// A model that can do everything.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Whole {
+    n: u64,
+    x: Vec<f64>,
+    accounts: u32,
+}
+
+type W = Row<Block<Whole>>;
+
+impl Model for Whole {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Whole", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        W::structural("n", "", |m| &mut m.model.n).at_most(2.0),
+        W::array_output("x", &ONE, "", 2, |m| &mut m.model.x).sized(&["n"]),
+        W::clock("tick", "", Clock::countdown()),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+impl ContinuousTime for Whole {
+    const STATES: &'static [State<Self>] = &[State::array("x", &PER_SECOND, 2, |m: &mut Self| &mut m.x)];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx.fill(1.0);
+        Ok(())
+    }
+}
+
+impl Differentiable for Whole {
+    fn tangent(&self, _: Elapsed, _: &Self, dx: &mut [f64], (): &mut ()) -> Result<(), Fault> {
+        dx.fill(0.0);
+        Ok(())
+    }
+}
+
+impl Events for Whole {
+    const INDICATORS: &'static [Indicator] = &[Indicator { name: "z", description: "" }];
+    fn event(&mut self, _: Elapsed) -> Result<Outcome, Fault> {
+        Ok(Outcome::default())
+    }
+    fn next(&self, _: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+impl EventMode for Whole {
+    fn to_event(&mut self, step: &Step) -> Result<Stop, Fault> {
+        Ok(Stop { at: step.end(), event: true, settles: false })
+    }
+}
+
+impl CompletedSteps for Whole {
+    fn complete(&mut self, _: Elapsed) -> Result<(), Fault> {
+        self.accounts += 1;
+        Ok(())
+    }
+    fn account(&mut self, _: Account) {}
+}
+
+impl Clocked for Whole {
+    const FEEDTHROUGH: bool = true;
+    fn tick(&mut self, _: usize, _: Elapsed) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn interval(&self, _: usize, _: Elapsed) -> Option<f64> {
+        Some(0.5)
+    }
+}
+
+impl Resizable for Whole {
+    fn resize(&mut self) -> Result<(), Fault> {
+        self.x.resize(usize::try_from(self.n).unwrap(), 0.0);
+        Ok(())
+    }
+}
+
+impl Intermediate for Whole {
+    fn longest(&self) -> f64 {
+        0.125
+    }
+}
+
+/// Each addition to an interface changes what an importer sees of it, and its token.
+#[test]
+fn every_capability_has_its_own_function_and_token() {
+    type Can = Capabilities<Whole>;
+    let base = || Can::stored().ContinuousTime().Events();
+    let all = [
+        Can::stored(),
+        Can::unstored(),
+        Can::unsaved(),
+        Can::stored().ContinuousTime(),
+        base(),
+        Can::unstored().ContinuousTime().Events(),
+        base().EventMode(),
+        base().ModelExchangeOnly(),
+        base().CompletedSteps(),
+        base().Clocked(),
+        base().Clocked().ScheduledExecution(),
+    ];
+    for (i, can) in all.iter().enumerate() {
+        let same = |other: &Can| other.hash().guid().as_str() == can.hash().guid().as_str();
+        assert_eq!(all.iter().position(same), Some(i));
+    }
+    let keeps = [0, 1, 2].map(|i: usize| all[i].keeps());
+    assert_eq!(keeps, [Keeps::Stored, Keeps::Saved, Keeps::Nothing]);
+    // These change no token: the importer calls nothing else, or is told by the description.
+    for can in [base().Differentiable(), base().Resizable(), base().Intermediate()] {
+        assert_eq!(can.hash().guid().as_str(), base().hash().guid().as_str());
+    }
+    assert!(!base().event_mode() && base().EventMode().event_mode() && base().Clocked().event_mode());
+
+    let (mut whole, step) = (Whole { n: 2, ..Whole::default() }, Step { start: Elapsed::ZERO, h: 0.5 });
+    (base().Resizable().resizable.unwrap())(&mut whole).unwrap();
+    assert_eq!(whole.x.len(), 2);
+    assert!((base().EventMode().to_event.unwrap())(&mut whole, &step).unwrap().event);
+    (base().CompletedSteps().complete.unwrap().complete)(&mut whole, Elapsed::ZERO).unwrap();
+    assert_eq!(whole.accounts, 1);
+    let clocked = base().Clocked().clocked.unwrap();
+    assert!(clocked.feedthrough && (clocked.interval)(&whole, 0, Elapsed::ZERO) == Some(0.5));
+    assert!((base().Intermediate().intermediate.unwrap())(&whole) <= 0.125);
+    let (saving, storing) = (Can::stored().saved.unwrap(), Can::stored().stored.unwrap());
+    let mut copy = saving.model(&whole);
+    assert_eq!((copy.n, copy.x.len(), copy.accounts), (2, 2, 1));
+    whole.accounts = 7;
+    saving.overwrite(&mut copy, &whole);
+    assert_eq!((copy.n, copy.accounts), (2, 7));
+    let mut bytes = [0; 64];
+    let n = (storing.write)(&whole, &mut bytes).unwrap();
+    assert_eq!((storing.size)(&whole).unwrap(), n);
+    let (read, rest) = (storing.read)(&bytes).unwrap();
+    assert_eq!((read.n, read.x, read.accounts, rest.len()), (2, vec![0.0; 2], 7, 64 - n));
+    assert!((storing.read)(&bytes[..n - 1]).err().unwrap().message().starts_with("content: "));
+    let short = (storing.write)(&whole, &mut bytes[..n - 1]).unwrap_err();
+    assert!(short.message().starts_with("the state cannot be serialized: "), "{short}");
+}
+
 /// An integer row.
 const WRONG: &[State<Both>] = &[State::new("n", &PER_SECOND, |m: &mut Both| &mut m.x)];
 

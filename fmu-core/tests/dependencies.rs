@@ -247,3 +247,205 @@ fn behind_eight_options() {
     let found = names(&description, y.initial_dependencies.as_ref()).unwrap();
     assert!(found.contains("level u") && !found.contains("idle"), "{found}");
 }
+
+/// Two levels of a tank, of which each drains through its own part of a wide array: its coefficients are one known.
+#[derive(Clone, Serialize, Deserialize)]
+struct Tanks {
+    upper: f64,
+    lower: f64,
+    drains: Vec<f64>,
+    inflow: f64,
+}
+
+impl Default for Tanks {
+    fn default() -> Self {
+        Self { upper: 1.0, lower: 2.0, drains: vec![0.5; 200], inflow: 0.0 }
+    }
+}
+
+type T = Row<Block<Tanks>>;
+
+impl Model for Tanks {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Tanks", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        T::input("inflow", &ONE, "", |m| &mut m.model.inflow),
+        T::array_input("drains", &ONE, "", 200, |m| &mut m.model.drains),
+        T::output("upper", &ONE, "", |m| &mut m.model.upper),
+        T::output("lower", &ONE, "", |m| &mut m.model.lower),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 2>(self, step, 0.1)
+    }
+}
+
+impl ContinuousTime for Tanks {
+    const STATES: &'static [State<Self>] = &[
+        State::new("upper", &ONE, |m: &mut Self| &mut m.upper),
+        State::new("lower", &ONE, |m: &mut Self| &mut m.lower),
+    ];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = self.inflow;
+        dx[1] = self.drains[170] * self.upper;
+        Ok(())
+    }
+}
+
+struct Wide;
+
+impl Exported for Wide {
+    type Model = Tanks;
+    const CAN: Capabilities<Tanks> = Capabilities::NONE.ContinuousTime();
+}
+
+/// The derivatives follow the wide array among the positions of the probe.
+#[test]
+fn derivatives_beside_a_wide_array() {
+    let description = Description::exported::<Wide>().unwrap();
+    for (name, wanted) in [("der(upper)", "inflow"), ("der(lower)", "upper drains"), ("upper", "upper")] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
+    }
+}
+
+/// A counter on a clock: its output is on the clock too.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Counter {
+    by: f64,
+    sum: f64,
+}
+
+type C = Row<Block<Counter>>;
+
+impl Model for Counter {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Counter", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        C::clock("tick", "", Clock::constant(0.5)),
+        C::discrete_input("by", &ONE, "", |m| &mut m.model.by).on("tick"),
+        C::discrete_output("sum", &ONE, "", |m| &mut m.model.sum).on("tick"),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+impl Clocked for Counter {
+    const FEEDTHROUGH: bool = true;
+    fn tick(&mut self, _: usize, _: Elapsed) -> Result<(), Fault> {
+        self.sum += self.by;
+        Ok(())
+    }
+}
+
+struct OnTicks;
+
+impl Exported for OnTicks {
+    type Model = Counter;
+    const CAN: Capabilities<Counter> = Capabilities::NONE.Clocked();
+}
+
+#[test]
+fn on_a_clock() {
+    let description = Description::exported::<OnTicks>().unwrap();
+    for (name, clocks, wanted) in [("tick", "", None), ("by", "tick", None), ("sum", "tick", Some("tick by"))] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, Some(&variable.clocks)).as_deref(), Some(clocks), "{name}");
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), wanted, "{name}");
+    }
+}
+
+/// Outputs that switch at integers far from the start values.
+#[derive(Clone, Serialize, Deserialize)]
+struct Limits {
+    parameter: i64,
+    input: i32,
+    bounded: u8,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self { parameter: 86, input: 0, bounded: 90 }
+    }
+}
+
+type L = Row<Block<Limits>>;
+
+impl Model for Limits {
+    type Outputs = [bool; 3];
+    const INFO: Info = Info { name: "Limits", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> = table![
+        L::int64_parameter("parameter", "", |m| &mut m.model.parameter),
+        L::integer_input("input", "", |m| &mut m.model.input),
+        L::uint8_input("bounded", "", |m| &mut m.model.bounded).at_most(100.0),
+        L::boolean_output("small", "", |m| &mut m.out[0]),
+        L::boolean_output("great", "", |m| &mut m.out[1]),
+        L::boolean_output("few", "", |m| &mut m.out[2]),
+    ];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, out: &mut [bool; 3]) {
+        *out = [self.parameter * self.parameter < 80, self.input > 300, self.bounded < 8];
+    }
+    fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+        Ok(())
+    }
+}
+
+#[test]
+fn behind_integers_far_from_the_start() {
+    let description = Description::of::<Limits>().unwrap();
+    for (name, wanted) in [("small", "parameter"), ("great", "input"), ("few", "bounded")] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
+    }
+}
+
+/// Nothing can be set: x' = y, y' = -x.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Alone {
+    x: f64,
+    y: f64,
+}
+
+type A = Row<Block<Alone>>;
+
+impl Model for Alone {
+    type Outputs = ();
+    const INFO: Info = Info { name: "Alone", ..Info::DEFAULT };
+    const TABLE: &'static Table<Block<Self>> =
+        table![A::output("x", &ONE, "", |m| &mut m.model.x), A::state("y", &ONE, "", |m| &mut m.model.y)];
+    fn initialize(&mut self) {}
+    fn output(&self, _: Elapsed, (): &mut ()) {}
+    fn advance(&mut self, step: &Step) -> Result<(), Fault> {
+        integrate::smooth::<Self, 2>(self, step, 0.1)
+    }
+}
+
+impl ContinuousTime for Alone {
+    const STATES: &'static [State<Self>] =
+        &[State::new("x", &ONE, |m: &mut Self| &mut m.x), State::new("y", &ONE, |m: &mut Self| &mut m.y)];
+    fn derivatives(&self, _: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        (dx[0], dx[1]) = (self.y, -self.x);
+        Ok(())
+    }
+}
+
+struct Oscillator;
+
+impl Exported for Oscillator {
+    type Model = Alone;
+    const CAN: Capabilities<Alone> = Capabilities::NONE.ContinuousTime();
+}
+
+#[test]
+fn a_model_without_inputs_and_parameters() {
+    let description = Description::exported::<Oscillator>().unwrap();
+    for (name, wanted) in [("der(x)", "y"), ("der(y)", "x"), ("x", "x")] {
+        let variable = description.variable(name).unwrap();
+        assert_eq!(names(&description, variable.dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
+    }
+}

@@ -4,6 +4,7 @@
 use fmu_core::unit::{ONE, Quantity, Unit};
 use fmu_core::*;
 use serde::{Deserialize, Serialize};
+use std::cell::Cell;
 
 const RATE: Quantity = Quantity::new("TestRate", Unit::si("1/s", unit::Exponents::mechanical(0, 0, -1, 0)));
 
@@ -159,6 +160,56 @@ fn events_without_end_are_refused() {
     assert!(ball.height > -1e-9, "{} m", ball.height);
 }
 
+/// Falls at 1 m/s from 1 m; counts how often its indicator is computed.
+#[derive(Clone, Serialize, Deserialize)]
+struct Lift {
+    height: f64,
+    landed: Option<f64>,
+    looks: Cell<u32>,
+}
+
+model!(Lift);
+
+impl Default for Lift {
+    fn default() -> Self {
+        Self { height: 1.0, landed: None, looks: Cell::new(0) }
+    }
+}
+
+impl ContinuousTime for Lift {
+    const STATES: &'static [State<Self>] = &[State::new("h", &RATE, |m| &mut m.height)];
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = -1.0;
+        Ok(())
+    }
+}
+
+impl Events for Lift {
+    const INDICATORS: &'static [Indicator] = &[Indicator { name: "z", description: "Height" }];
+    fn indicators(&self, _now: Elapsed, z: &mut [f64]) {
+        self.looks.set(self.looks.get() + 1);
+        z[0] = self.height;
+    }
+    fn event(&mut self, now: Elapsed) -> Result<Outcome, Fault> {
+        if self.height <= 0.0 && self.landed.is_none() {
+            self.landed = Some(now.seconds());
+        }
+        Ok(Outcome::default())
+    }
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+/// Bisection alone needs 30 evaluations to find a crossing within 1e-9 of the step.
+#[test]
+fn a_straight_crossing_is_found_along_the_line() {
+    let mut lift = Lift::default();
+    run(&mut lift, 1, 1.3, |m, step| integrate::hybrid::<_, 1>(m, step, 2.0)).unwrap();
+    assert!((lift.landed.unwrap() - 1.0).abs() < 1e-8, "{:?} s", lift.landed);
+    assert!(lift.looks.get() < 15, "{} evaluations", lift.looks.get());
+}
+
 /// Switches the sign of its state's derivative at given times; or at k `period`, if that is not 0.
 #[derive(Clone, Default, Serialize, Deserialize)]
 struct Switch {
@@ -242,4 +293,113 @@ fn an_event_that_does_not_go_away_is_refused() {
     let mut switch = Switch { broken: true, ..Switch::default() };
     let fault = run(&mut switch, 1, 1.0, |m, step| integrate::hybrid::<_, 1>(m, step, 1e-3)).unwrap_err();
     assert!(fault.message().contains("events follow each other without time between them"), "{fault}");
+}
+
+/// An event that wants another update each time.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Restless {
+    x: f64,
+}
+
+model!(Restless);
+
+impl ContinuousTime for Restless {
+    const STATES: &'static [State<Self>] = &[State::new("x", &RATE, |m| &mut m.x)];
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        dx[0] = 0.0;
+        Ok(())
+    }
+}
+
+impl Events for Restless {
+    fn event(&mut self, _now: Elapsed) -> Result<Outcome, Fault> {
+        Ok(Outcome { again: true, ..Outcome::default() })
+    }
+    fn next(&self, _now: Elapsed) -> Next {
+        Next::Never
+    }
+}
+
+#[test]
+fn an_event_that_never_settles_is_refused() {
+    let fault = run(&mut Restless::default(), 1, 0.5, integrate_by_hybrid).unwrap_err();
+    assert_eq!(fault.message(), "the event at 0 s after the start does not settle");
+}
+
+fn integrate_by_hybrid(m: &mut Restless, step: &Step) -> Result<(), Fault> {
+    integrate::hybrid::<_, 1>(m, step, 0.1)
+}
+
+/// Columns of water that drain into a tank: x' = -x, and the tank fills by their sum.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Columns {
+    x: Vec<f64>,
+    tank: f64,
+}
+
+model!(Columns);
+
+impl ContinuousTime for Columns {
+    const STATES: &'static [State<Self>] =
+        &[State::array("x", &RATE, 4, |m: &mut Self| &mut m.x), State::new("tank", &RATE, |m| &mut m.tank)];
+    fn derivatives(&self, _now: Elapsed, dx: &mut [f64]) -> Result<(), Fault> {
+        for (dx, x) in dx.iter_mut().zip(&self.x) {
+            *dx = -x;
+        }
+        dx[self.x.len()] = self.x.iter().sum();
+        Ok(())
+    }
+}
+
+#[test]
+fn arrays_of_states_are_integrated_at_their_present_length() {
+    for n in [2, 4] {
+        let mut columns = Columns { x: (1..=n).map(f64::from).collect(), tank: 0.0 };
+        run(&mut columns, 10, 0.1, |m, step| integrate::smooth::<_, { Columns::SCALARS }>(m, step, 0.01)).unwrap();
+        let (left, all) = ((-1.0_f64).exp(), f64::from(n * (n + 1) / 2));
+        for (x, start) in columns.x.iter().zip(1..=n) {
+            assert!((x - left * f64::from(start)).abs() < 1e-9, "{x}");
+        }
+        assert!((columns.tank - all * (1.0 - left)).abs() < 1e-9, "{}", columns.tank);
+    }
+}
+
+/// Counts its samples, one each 0.5 s; shows the last count at the next.
+#[derive(Clone, Default, Serialize, Deserialize)]
+struct Sampler {
+    samples: u64,
+    shown: u64,
+}
+
+model!(Sampler);
+
+impl Sampled for Sampler {
+    fn period(&self) -> f64 {
+        0.5
+    }
+    fn samples(&self) -> u64 {
+        self.samples
+    }
+    fn show(&mut self) {
+        self.shown = self.samples;
+    }
+    fn sample(&mut self) -> Result<(), Fault> {
+        self.samples += 1;
+        Ok(())
+    }
+}
+
+/// A sample at the end of a step belongs to the next step; its instant shows the last one.
+#[test]
+fn samples_inside_a_step_are_taken() {
+    let mut sampler = Sampler::default();
+    let mut step = |start: f64, h| {
+        integrate::sampled(&mut sampler, &Step { start: Elapsed::ZERO.plus(start), h }).unwrap();
+        (sampler.samples, sampler.shown)
+    };
+    // 0 s; 0.5 s shows it and, inside the next step, is taken; 1 s shows that.
+    assert_eq!([step(0.0, 0.25), step(0.25, 0.25), step(0.5, 0.5)], [(1, 0), (1, 1), (2, 2)]);
+    assert_eq!(step(1.0, 1.75), (6, 5));
+    let fault = integrate::sampled(&mut sampler, &Step { start: Elapsed::ZERO, h: 1e8 }).unwrap_err();
+    assert!(fault.message().contains("at most 10000000 sample periods of 0.5 s"), "{fault}");
 }

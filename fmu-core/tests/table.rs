@@ -217,3 +217,78 @@ fn an_enum_takes_no_value_that_does_not_exist() {
     assert!(!mode.set(2) && mode.get() == 3, "a refused value changes nothing");
     assert_eq!(block.model.load.mode, Mode::Odd);
 }
+
+/// A map on a grid (FMI-LS-STRUCT): its axes, its tables, and where they are read and looked up.
+mod maps {
+    use super::*;
+
+    #[derive(Clone, Default, Serialize, Deserialize)]
+    struct Maps {
+        r: [f64; 6],
+        n: [i32; 2],
+        u: f64,
+        k: i32,
+    }
+
+    macro_rules! with_map {
+        ($name:ident, [$($member:expr),*]) => {
+            #[derive(Clone, Default, Serialize, Deserialize)]
+            struct $name(Maps);
+            impl Model for $name {
+                type Outputs = f64;
+                const INFO: Info = Small::INFO;
+                const TABLE: &'static Table<Block<Self>> = {
+                    type V = Row<Block<$name>>;
+                    table![
+                        V::array_parameter("axis", &VOLT, "", 2, |m| &mut m.model.0.r[..2]),
+                        V::array_parameter("long", &VOLT, "", 3, |m| &mut m.model.0.r[..3]),
+                        V::array_parameter("values", &AMPERE, "", 2, |m| &mut m.model.0.r[..2]),
+                        V::array_parameter("plane", &AMPERE, "", 6, |m| &mut m.model.0.r).shape(&[2, 3]),
+                        V::array_input("moving", &AMPERE, "", 2, |m| &mut m.model.0.r[..2]),
+                        V::parameter("one", &AMPERE, "", |m| &mut m.model.0.u),
+                        V::input("u", &VOLT, "", |m| &mut m.model.0.u),
+                        V::integer_input("k", "", |m| &mut m.model.0.k),
+                        V::output("i", &AMPERE, "", |m| &mut m.out),
+                    ]
+                };
+                const TERMINALS: &'static [Terminal] =
+                    &[Terminal::map("map", "", const { &[$($member),*] })];
+                fn initialize(&mut self) {}
+                fn output(&self, _: Elapsed, _: &mut f64) {}
+                fn advance(&mut self, _: &Step) -> Result<(), Fault> {
+                    Ok(())
+                }
+            }
+        };
+    }
+
+    with_map!(
+        Curve,
+        [Member::domain("axis"), Member::domain_input("u"), Member::codomain("values"), Member::codomain_output("i")]
+    );
+    with_map!(Plane, [Member::domain("axis"), Member::domain("long"), Member::codomain("plane")]);
+    with_map!(Moving, [Member::domain("moving"), Member::codomain("values")]);
+    with_map!(Scalar, [Member::domain("one"), Member::codomain("values")]);
+    with_map!(Short, [Member::domain("long"), Member::codomain("values")]);
+    with_map!(Fixed, [Member::domain("axis"), Member::domain_input("one"), Member::codomain("values")]);
+    with_map!(Type, [Member::domain("axis"), Member::domain_input("k"), Member::codomain("values")]);
+    with_map!(Output, [Member::domain("axis"), Member::codomain("values"), Member::codomain_output("u")]);
+
+    #[test]
+    fn fit_their_axes() {
+        fn why<M: Stored>() -> String {
+            Description::of::<M>().map_or_else(|fault| fault.to_string(), |_| String::new())
+        }
+        assert_eq!([why::<Curve>(), why::<Plane>()], ["", ""]);
+        let one = "expected a parameter or a constant with one extent";
+        assert_eq!(why::<Moving>(), format!("the terminal map has the domain moving: {one}"));
+        assert_eq!(why::<Scalar>(), format!("the terminal map has the domain one: {one}"));
+        let extents = "its extents are not the lengths of long";
+        assert_eq!(why::<Short>(), format!("the terminal map has the codomain values: {extents}"));
+        let shape = "expected an input, an output or a local variable of one shape";
+        assert_eq!(why::<Fixed>(), format!("the terminal map has the input one of a domain: {shape}"));
+        assert_eq!(why::<Type>(), "the terminal map has k of another type than axis");
+        let output = "has the output u of a codomain, which is an input or a parameter";
+        assert_eq!(why::<Output>(), format!("the terminal map {output}"));
+    }
+}

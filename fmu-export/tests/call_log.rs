@@ -78,6 +78,12 @@ fn scenarios() {
             fmu.step(0.0, 0.1);
         }
         "reentrant" => reentrant(),
+        "taken" => {
+            let folder = std::env::var_os("FMU_CALL_LOG").unwrap();
+            std::fs::write(Path::new(&folder).join(format!("Probe-{}-1.calls", std::process::id())), "another")
+                .unwrap();
+            Fmu::started(3);
+        }
         "warned" => {
             let fmu = Fmu::started(3);
             println!("{:?}", fmu.journal.0.borrow());
@@ -212,6 +218,14 @@ fn each_instance_has_a_file_with_all_its_calls() {
         assert_eq!(calls.len(), count, "{log}");
         assert!(calls.iter().all(|call| call.ended.is_some() && call.inside.is_empty()));
     }
+}
+
+/// Of an earlier process with the same number, or of another binary in this one.
+#[test]
+fn a_file_that_exists_is_kept() {
+    let [taken, own] = &logs("taken")[..] else { panic!("two files") };
+    assert_eq!(taken, "another");
+    assert_eq!(calls(own)[0].name, "fmi3InstantiateCoSimulation");
 }
 
 #[test]

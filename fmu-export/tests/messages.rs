@@ -113,6 +113,7 @@ fn categories_are_switched() {
             (false, &[], false),
             (true, &[c"logStatusError", c"logStatusFatal"], false),
             (true, &[c"logEvents"], true),
+            (true, &[c"logEvents"], true),
             (false, &[c"logStatusError"], true),
             (false, &[c"logEvents"], false),
             (true, &[], true),

@@ -181,11 +181,24 @@ pub fn resources(folder: &Path) -> Result<BTreeMap<String, PackedFile>> {
 /// # Errors
 /// A file is larger than 4 GiB.
 pub fn archive(files: &BTreeMap<String, PackedFile>, moment: GenerationTime) -> Result<Vec<u8>> {
+    zipped(files, moment, CompressionMethod::Deflated)
+}
+
+/// An archive that this program reads itself and then removes: not compressed, because that takes longer than all else.
+///
+/// # Errors
+/// A file is larger than 4 GiB.
+pub fn temporary(files: &BTreeMap<String, PackedFile>, moment: GenerationTime) -> Result<Vec<u8>> {
+    zipped(files, moment, CompressionMethod::Stored)
+}
+
+fn zipped(files: &BTreeMap<String, PackedFile>, moment: GenerationTime, method: CompressionMethod) -> Result<Vec<u8>> {
+    let level = (method == CompressionMethod::Deflated).then_some(9);
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, PackedFile { bytes, executable }) in files {
         let options = SimpleFileOptions::default()
-            .compression_method(CompressionMethod::Deflated)
-            .compression_level(Some(9))
+            .compression_method(method)
+            .compression_level(level)
             .last_modified_time(moment.of_files())
             .unix_permissions(if *executable { 0o755 } else { 0o644 });
         zip.start_file(name.as_str(), options).with_context(|| name.clone())?;

@@ -33,6 +33,7 @@ fn sizes_and_elements() {
     assert_eq!(md.shape(m), Some(vec![3, 2]));
     assert_eq!(md.shape_with(m, |reference| (reference == 2).then_some(5)), Some(vec![5, 2]));
     assert_eq!(md.shape(md.variable("t").unwrap()), Some(vec![]), "a scalar");
+    assert!(m.is_array() && !md.variable("t").unwrap().is_array());
     let at = |found: Option<(_, usize)>| {
         found.map(|(v, number): (&model_description::ModelVariable, _)| (v.value_reference, number))
     };

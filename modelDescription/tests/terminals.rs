@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::{AWKWARD, sample};
+use common::{AWKWARD, rare_sample, sample};
 use fmu_core::Description;
 use model_description::FmiVersion::V3;
 use model_description::{Area, CoordinateSystem, read_terminals, write_terminals};
@@ -35,6 +35,19 @@ fn what_is_written_reads_back() {
     assert_eq!((picture.icon.as_str(), picture.color), ("dc", Some([255, 0, 7])));
     let all = read.terminal("all").unwrap();
     assert_eq!((all.matching_rule.as_str(), &*all.members[0].kind, &all.picture), ("bus", "signal", &None));
+}
+
+/// FMI-LS-STRUCT and FMI-LS-BUS.
+#[test]
+fn a_map_and_a_bus_have_their_layered_standards() {
+    let read = read_terminals(write_terminals(&rare_sample(), V3).unwrap()).unwrap();
+    let [map, can] = ["map", "can"].map(|name| read.terminal(name).unwrap());
+    let of_map = "org.fmi-standard.fmi-ls-struct.map";
+    assert_eq!((map.matching_rule.as_str(), map.kind.clone()), (of_map, Some(format!("{of_map}.rectilinearGrid"))));
+    let kinds: Vec<_> = map.members.iter().map(|m| m.kind.strip_prefix(of_map).unwrap()).collect();
+    assert_eq!(kinds, [".domain", ".domainInput", ".codomain", ".codomainOutput"]);
+    assert_eq!(can.matching_rule, "org.fmi-ls-bus.transceiver");
+    assert_eq!(can.kind.as_deref(), Some("org.fmi-ls-bus.network-terminal"));
 }
 
 #[test]

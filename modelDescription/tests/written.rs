@@ -2,11 +2,12 @@
 
 mod common;
 
-use common::{AWKWARD, VERSIONS, exchange_sample, generation, sample, sampled_sample, xml};
+use common::{AWKWARD, VERSIONS, exchange_sample, generation, rare_sample, sample, sampled_sample, xml};
 use fmu_core::description::{Value, VariableKind};
 use fmu_core::{Description, IntegerType, Keeps};
 use model_description::{
-    BaseType, Causality, Dimension, FmiVersion, Initial, ModelDescription, Unknown, Variability, fits, read, write,
+    BaseType, Causality, Dimension, FmiVersion, Initial, IntervalVariability, ModelDescription, Unknown, Variability,
+    fits, read, write,
 };
 
 fn sample_read(version: FmiVersion) -> ModelDescription {
@@ -16,17 +17,19 @@ fn sample_read(version: FmiVersion) -> ModelDescription {
 /// The whole text, so that any change is noticed. `UPDATE_GOLDEN=1 cargo test -p model-description` accepts a change.
 #[test]
 fn golden_files() {
-    for (name, of) in [("sample", sample()), ("exchange", exchange_sample()), ("sampled", sampled_sample())] {
-        for version in VERSIONS {
-            let path = format!("{}/tests/golden/{name}-{version}.xml", env!("CARGO_MANIFEST_DIR"));
-            let written = write(&of, version, &generation());
-            if std::env::var_os("UPDATE_GOLDEN").is_some() {
-                std::fs::write(&path, &written).unwrap();
-            }
-            let golden = std::fs::read_to_string(&path).unwrap();
-            assert!(written == golden, "{path} differs from what is written now:\n{written}");
-            assert_eq!(written, write(&of, version, &generation()), "not deterministic");
+    let both = [("sample", sample()), ("exchange", exchange_sample()), ("sampled", sampled_sample())];
+    let mut all: Vec<_> =
+        both.into_iter().flat_map(|(name, of)| VERSIONS.map(|version| (name, of.clone(), version))).collect();
+    all.push(("rare", rare_sample(), FmiVersion::V3));
+    for (name, of, version) in all {
+        let path = format!("{}/tests/golden/{name}-{version}.xml", env!("CARGO_MANIFEST_DIR"));
+        let written = write(&of, version, &generation());
+        if std::env::var_os("UPDATE_GOLDEN").is_some() {
+            std::fs::write(&path, &written).unwrap();
         }
+        let golden = std::fs::read_to_string(&path).unwrap();
+        assert!(written == golden, "{path} differs from what is written now:\n{written}");
+        assert_eq!(written, write(&of, version, &generation()), "not deterministic");
     }
 }
 
@@ -281,6 +284,78 @@ fn wide_integers_and_matrices() {
     assert_eq!(three.variable("motor.n_p").unwrap().base, BaseType::UInt64);
     assert_eq!(three.variable("filter.b").unwrap().dimensions, [Dimension::Fixed(1), Dimension::Fixed(3)]);
     assert_eq!(two.variable("filter.b[1,3]").unwrap().start.as_deref(), Some("2"));
+}
+
+#[test]
+fn what_only_fmi_3_has_comes_back() {
+    let rare = rare_sample();
+    let refusal = fits(&rare, FmiVersion::V2).unwrap_err();
+    assert_eq!(refusal, "frame is binary, and FMI 2.0 has no bytes: build for FMI 3.0 only");
+    let md = read(write(&rare, FmiVersion::V3, &generation())).unwrap();
+    let of = |name: &str| md.variable(name).unwrap();
+    let clocks: Vec<_> = ["tick", "fixed", "tunable", "changing", "countdown", "triggered"]
+        .into_iter()
+        .map(|name| of(name).timing.as_ref().unwrap())
+        .map(|timing| (timing.ticks, timing.interval, timing.shift.to_bits(), timing.priority))
+        .collect();
+    let (none, quarter) = (0f64.to_bits(), 0.25f64.to_bits());
+    let expected = [
+        (IntervalVariability::Constant, Some(0.5), quarter, Some(3)),
+        (IntervalVariability::Fixed, Some(0.125), none, None),
+        (IntervalVariability::Tunable, Some(0.75), none, None),
+        (IntervalVariability::Changing, None, none, None),
+        (IntervalVariability::Countdown, None, none, None),
+        (IntervalVariability::Triggered, None, none, None),
+    ];
+    assert_eq!(clocks, expected);
+    assert_eq!((of("tick").causality, of("triggered").causality), (Causality::Input, Causality::Output));
+    assert_eq!((&of("frame").clocks[..], of("frame").start.as_deref()), (&[15, 16][..], Some("00ff")));
+    assert_eq!((of("n").causality, of("n").start.as_deref()), (Causality::StructuralParameter, Some("2")));
+    assert_eq!(of("axis").dimensions, [Dimension::Variable(1)]);
+    assert_eq!((of("single").base, of("single").start.as_deref()), (BaseType::Float32, Some("0.1")));
+    assert_eq!((of("constant").variability, of("constant").initial), (Variability::Constant, Some(Initial::Exact)));
+    assert_eq!((of("kept").initial, of("kept").intermediate), (Some(Initial::Exact), true));
+    assert_eq!(md.scheduled_execution.unwrap().model_identifier, "Rare");
+}
+
+/// In FMI 2.0 a structural parameter is a constant, a text is a String, and the derivative of an array has its elements.
+#[test]
+fn fmi_2_says_what_it_can() {
+    let mut rare = rare_sample();
+    rare.variables.retain(|v| !matches!(v.kind, VariableKind::Clock(_) | VariableKind::Binary { .. }));
+    (rare.model_exchange, rare.terminals) = (None, Vec::new());
+    let md = read(write(&rare, FmiVersion::V2, &generation())).unwrap();
+    let of = |name: &str| md.variable(name).unwrap();
+    assert_eq!((of("n").causality, of("n").variability), (Causality::Local, Variability::Constant));
+    assert_eq!((of("texts[1]").base, of("texts[1]").start.as_deref()), (BaseType::String, Some("a <b>")));
+    assert_eq!(of("single").start.as_deref().unwrap().parse(), Ok(f64::from(0.1_f32)));
+    assert_eq!((of("kept").causality, of("kept").initial), (Causality::Output, Some(Initial::Exact)));
+    assert_eq!(of("table[2]").value_reference, 7);
+}
+
+/// FMI 2.0 has an array of variable size as elements: named by its first alone, it is a whole, whose elements are not listed.
+#[test]
+fn a_dependency_on_a_whole_array_is_not_listed_in_fmi_2() {
+    let listed = |elements: usize, references: &[u32]| {
+        let mut rare = rare_sample();
+        rare.variables.retain(|v| ["n", "table", "kept"].contains(&&*v.name));
+        (rare.model_exchange, rare.terminals) = (None, Vec::new());
+        for v in &mut rare.variables {
+            match &*v.name {
+                "table" => (v.shape, v.start) = (vec![elements], Some(vec![Value::Real(1.0); elements])),
+                "kept" => (v.exact, v.start, v.initial_dependencies) = (false, None, Some(references.to_vec())),
+                _ => {}
+            }
+        }
+        VERSIONS.map(|version| {
+            let md = read(write(&rare, version, &generation())).unwrap();
+            md.initial_unknowns[0].dependencies.clone()
+        })
+    };
+    // The constant, the elements, and the output by their indices; in FMI 3.0 the value reference of the array.
+    assert_eq!(listed(2, &[6]), [None, Some(vec![6])]);
+    assert_eq!(listed(2, &[6, 7]), [Some(vec![2, 3]), Some(vec![6])]);
+    assert_eq!(listed(1, &[6]), [Some(vec![2]), Some(vec![6])]);
 }
 
 #[test]

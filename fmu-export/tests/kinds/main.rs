@@ -18,6 +18,7 @@ use fmu_core::{Block, Bytes, Elapsed, Exported, Fault, Info, Items, Model, Row, 
 use fmu_export::abi::types::*;
 use serde::{Deserialize, Serialize};
 use std::ffi::{CStr, CString};
+use std::process::Command;
 use std::ptr::{NonNull, null, null_mut};
 
 enumeration! {
@@ -295,6 +296,39 @@ fn bytes_are_copied() {
     let it = started();
     assert_eq!((set_bytes(it, RX, &[0; 4]), step(it, 0.0), bytes(it, TX)), (OK, OK, Err(ERROR)));
     unsafe { fmi3FreeInstance(it) };
+}
+
+/// The log of `FMU_CALL_LOG` has the values of every type, as other tests pass them in a process of their own.
+#[test]
+fn a_call_log_shows_every_type() {
+    let folder = std::env::temp_dir().join(format!("fmu-call-log-kinds-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let tests = ["lists_of_every_type_cross_the_interface", "texts_are_inputs_and_lists", "bytes_are_copied"];
+    let mut command = Command::new(std::env::current_exe().unwrap());
+    command.arg("--exact").args(tests).args(["fmi_2_has_the_elements"]).env("FMU_CALL_LOG", &folder);
+    assert!(command.output().unwrap().status.success());
+    let files = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path());
+    let log: String = files.map(|file| std::fs::read_to_string(file).unwrap()).collect();
+    std::fs::remove_dir_all(&folder).unwrap();
+    for call in [
+        "fmi3SetInt8(vr=[24], n=1, values=[-128, 127], m=2) -> OK",
+        "fmi3SetUInt8(vr=[5], n=1, values=[0, 255], m=2) -> OK",
+        "fmi3SetInt16(vr=[26], n=1, values=[-32768, 32767], m=2) -> OK",
+        "fmi3SetUInt16(vr=[28], n=1, values=[0, 65535], m=2) -> OK",
+        "fmi3SetInt32(vr=[2], n=1, values=[-9, 0, 2147483647], m=3) -> OK",
+        "fmi3SetUInt32(vr=[30], n=1, values=[0, 4294967295], m=2) -> OK",
+        "fmi3SetInt64(vr=[32], n=1, values=[-9223372036854775808, 9223372036854775807], m=2) -> OK",
+        "fmi3SetUInt64(vr=[7], n=1, values=[1, 18446744073709551615], m=2) -> OK",
+        "fmi3SetFloat32(vr=[13], n=1, values=[0.1, -3.5], m=2) -> OK",
+        "fmi3SetBoolean(vr=[9], n=1, values=[1, 0], m=2) -> OK",
+        "fmi3SetString(vr=[15], n=1, values=[\"one\", \"\u{3c8}\"], m=2) -> OK",
+        "fmi3SetString(vr=[15], n=1, values=[\"kept?\", NULL], m=2) -> Error",
+        "fmi3GetBinary(vr=[17], n=1, sizes=?1, values=?1, m=1) -> OK sizes=[3] values=[0x010203]",
+        "fmi3SetBinary(vr=[17], n=1, sizes=[0], values=[NULL], m=1) -> OK",
+        "fmi2GetString(vr=[16], n=1, values=?1) -> OK values=[\"second\"]",
+    ] {
+        assert!(log.contains(call), "{call} is not in\n{log:.4000}");
+    }
 }
 
 /// Sizes are checked before pointers: a page is neither read nor copied, and all values stay.

@@ -126,6 +126,13 @@ pub fn superposition_and_adjoint(exactness: Exactness) {
             let error = (sum[k] - (2.0 * ja[k] - jb[k])).abs();
             assert!(error <= exactness.linear * scale(&sum), "{error}");
         }
+        // However long the direction is.
+        for factor in [1e-9, 1e9] {
+            let scaled = along(fmu, &a.map(|x| factor * x));
+            for (long, short) in scaled.into_iter().zip(ja) {
+                assert!((long / factor - short).abs() <= exactness.linear * scale(&ja), "{factor}: {long} {short}");
+            }
+        }
         let w: [f64; 6] = std::array::from_fn(|_| draw.around(1.0));
         let mut back = [f64::NAN; 3];
         assert_eq!(fmu.adjoint(&UNKNOWNS, &KNOWNS, &w, &mut back), OK);

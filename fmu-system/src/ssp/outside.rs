@@ -128,3 +128,26 @@ impl Connectors {
         Ok(Outlet { port: inlet.port, name: name.into(), transformation: back, unit: inlet.unit, items: Vec::new() })
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::float_cmp)] // Products that nothing rounds.
+mod tests {
+    use super::*;
+
+    /// From km to m; with a transformation to the double of it.
+    fn inlet(only_units: bool) -> Inlet {
+        let conversion = Conversion { factor: if only_units { 1e3 } else { 2e3 }, offset: 0.0 };
+        Inlet { transformation: Some(Transformation::Linear(conversion)), only_units, ..Inlet::default() }
+    }
+
+    #[test]
+    fn numbers_over_time_are_converted_unless_they_have_a_unit() {
+        let [plain, united] = ["0:1~1:3", "0:1~1:3 m"].map(|text| Schedule::parse(text).unwrap());
+        assert!(!plain.has_units() && united.has_units());
+        let at_end = |only_units, of: &Schedule| inlet(only_units).schedule(of.clone()).map(|s| s.at(1.0));
+        assert_eq!(at_end(true, &plain).unwrap(), 3e3);
+        assert_eq!(at_end(false, &plain).unwrap(), 6e3);
+        assert_eq!(at_end(true, &united).unwrap(), 3.0, "the system converts it");
+        assert!(at_end(false, &united).unwrap_err().to_string().contains("write numbers without a unit"));
+    }
+}

@@ -325,6 +325,31 @@ fn algebraic_loops_are_solved_or_named() {
     }
 }
 
+/// An array that is passed on as well, and that stays as it is, is no part of the loop.
+#[test]
+fn a_loop_beside_an_array_is_solved() {
+    let workshop = Workshop::new();
+    let array = |xml: String| {
+        let of = |xml: String, name: &str| {
+            let at = xml.find(&format!("<Float64 name='{name}'")).unwrap();
+            let end = at + xml[at..].find("/>").unwrap();
+            format!("{}><Dimension start='1'/></Float64>{}", &xml[..end], &xml[end + 2..])
+        };
+        of(of(xml, "i"), "y")
+    };
+    let plant = workshop.fmu("plant", 3, &[], array);
+    let mut system = System::new(exchange(SOLVERS[1]));
+    for name in ["a", "b"] {
+        system.add(name, &plant, false).unwrap();
+    }
+    for (from, to) in [("a.z", "b.u"), ("b.z", "a.u"), ("a.y", "b.i")] {
+        system.connect(from, to).unwrap();
+    }
+    system.record("a.u").unwrap();
+    let recording = run(&mut system, &settings(1.0, 0.1));
+    assert!(recording.columns[0].values.iter().skip(1).all(|u| (u - 1.0 / 3.0).abs() < 1e-9), "{recording:?}");
+}
+
 /// The integrated plant and a sampler that steps itself, and the other way round.
 #[test]
 fn some_step_themselves() {

@@ -171,6 +171,18 @@ fn an_inner_system_passes_values_through() {
     near(&last(&mut loaded, &["x", "a.u", "b.u"]), &[3.0, 3000.0, 6.0]);
 }
 
+/// A pattern stands for all names of its form, in the order of the system.
+#[test]
+fn a_pattern_records_all_names_of_its_form() {
+    let folder = ssp(&description("", "", ""), &[]);
+    let mut loaded = open(&folder).unwrap();
+    loaded.record("?.z").unwrap();
+    let names: Vec<&str> = loaded.system.columns().iter().map(|column| column.name.as_str()).collect();
+    assert_eq!(names, ["a.z", "b.z"]);
+    let error = loaded.record("c.*").unwrap_err().to_string();
+    assert_eq!(error, "c.*: no variable has a name of this form");
+}
+
 /// Every connection converts from the unit of one connector to that of the next, and then transforms; a value for a connector
 /// is in the connector's unit.
 #[test]

@@ -3,11 +3,12 @@
 #![allow(dead_code)] // each test file uses its own part
 
 use fmu_core::description::{
-    MemberDescription, ModelExchange, TerminalDescription, TerminalPicture, Value, Variable, VariableKind,
+    AliasDescription, MemberDescription, ModelExchange, TerminalDescription, TerminalPicture, Value, Variable,
+    VariableKind,
 };
 use fmu_core::terminal::{MatchingRule, MemberKind};
 use fmu_core::unit::{ONE, Quantity, RAD_PER_S, SPEED, Unit, VOLT};
-use fmu_core::{Causality, Description, Experiment, IntegerType, Variability};
+use fmu_core::{Causality, Description, Experiment, IntegerType, Ticks, Timing, Variability};
 use model_description::{FmiVersion, Generation, write};
 
 /// Both standards.
@@ -208,6 +209,135 @@ pub(crate) fn sampled_sample() -> Description {
         v.dependencies = Some(Vec::new());
     }
     Description { name: "Sampled".into(), model_exchange: Some(exchange), ..description }
+}
+
+/// A voltage in single precision.
+fn single() -> VariableKind {
+    let mut kind = real(&VOLT);
+    if let VariableKind::Real { quantity, single, .. } = &mut kind {
+        (*quantity, *single) = ("Voltage32".into(), true);
+    }
+    kind
+}
+
+/// A clock of every kind.
+fn clocks() -> [Variable; 6] {
+    let input = (Causality::Input, Variability::Discrete);
+    let clock = |name: &str, reference, ticks, interval: Option<f64>| {
+        let timing = Timing { ticks, interval, fraction: None, shift: 0.0, priority: None };
+        variable(name, reference, input, VariableKind::Clock(timing))
+    };
+    let exact =
+        Timing { ticks: Ticks::Constant, interval: Some(0.5), fraction: Some((1, 2)), shift: 0.25, priority: Some(3) };
+    [
+        variable("tick", 15, input, VariableKind::Clock(exact)),
+        Variable { start: Some(vec![Value::Real(0.125)]), ..clock("fixed", 16, Ticks::Fixed, None) },
+        Variable { start: Some(vec![Value::Real(0.75)]), ..clock("tunable", 17, Ticks::Tunable, None) },
+        clock("changing", 18, Ticks::Changing, None),
+        clock("countdown", 19, Ticks::Countdown, None),
+        Variable { causality: Causality::Output, ..clock("triggered", 20, Ticks::Triggered, None) },
+    ]
+}
+
+/// What only FMI 3.0 has: clocks of every kind, bytes, sizes, texts, single precision, other names, constants, a bus and a map.
+pub(crate) fn rare_sample() -> Description {
+    let (parameter, input) = ((Causality::Parameter, Variability::Fixed), (Causality::Input, Variability::Discrete));
+    let text = |text: &str| Value::Text(text.into());
+    let frame = VariableKind::Binary { mime_type: "application/octet-stream".into(), most: 8 };
+    let alias = |name: &str, display: Option<(&str, f64, f64)>| AliasDescription {
+        name: name.into(),
+        description: AWKWARD.into(),
+        display: display.map(|(name, factor, offset)| (name.into(), factor, offset)),
+    };
+    let mut variables = vec![
+        Variable {
+            start: Some(vec![Value::Integer(2)]),
+            max: Some(4.0),
+            ..variable(
+                "n",
+                1,
+                (Causality::StructuralParameter, Variability::Fixed),
+                VariableKind::Integer(IntegerType::UInt64),
+            )
+        },
+        Variable {
+            start: Some(vec![Value::Real(1.0), Value::Real(2.0)]),
+            shape: vec![2],
+            sized: vec![1],
+            ..variable("axis", 2, parameter, real(&VOLT))
+        },
+        Variable {
+            start: Some(vec![Value::Real(3.0), Value::Real(4.0)]),
+            shape: vec![2],
+            sized: vec![1],
+            aliases: vec![alias("other", None), alias("shown", Some(("kV", 1e-3, 0.0)))],
+            ..variable("table", 6, parameter, real(&VOLT))
+        },
+        Variable {
+            start: Some(vec![text("a <b>"), text("")]),
+            shape: vec![2],
+            ..variable("texts", 10, parameter, VariableKind::Text)
+        },
+        Variable {
+            start: Some(vec![Value::Real(0.1_f32.into())]),
+            ..variable("single", 12, (Causality::Input, Variability::Continuous), single())
+        },
+        Variable {
+            start: Some(vec![Value::Binary(vec![0, 255])]),
+            clocks: vec![15, 16],
+            ..variable("frame", 13, input, frame)
+        },
+        Variable {
+            start: Some(vec![Value::Integer(-5)]),
+            ..variable(
+                "constant",
+                14,
+                (Causality::Local, Variability::Constant),
+                VariableKind::Integer(IntegerType::Int8),
+            )
+        },
+        Variable {
+            start: Some(vec![Value::Real(7.0)]),
+            exact: true,
+            intermediate: true,
+            ..variable("kept", 21, (Causality::Output, Variability::Continuous), real(&VOLT))
+        },
+    ];
+    variables.extend(clocks());
+    let terminal = |name: &str, rule, members: &[(&str, MemberKind)]| TerminalDescription {
+        name: name.into(),
+        description: String::new(),
+        rule,
+        members: members
+            .iter()
+            .map(|(name, kind)| MemberDescription { name: (*name).into(), variable: (*name).into(), kind: *kind })
+            .collect(),
+        picture: None,
+    };
+    let map = [
+        ("axis", MemberKind::Domain),
+        ("single", MemberKind::DomainInput),
+        ("table", MemberKind::Codomain),
+        ("kept", MemberKind::CodomainOutput),
+    ];
+    let bus = [("frame", MemberKind::Signal), ("tick", MemberKind::Signal)];
+    let exchange = ModelExchange {
+        states: Vec::new(),
+        derivatives: Vec::new(),
+        indicators: Vec::new(),
+        event_mode: true,
+        completed_steps: false,
+        scheduled: true,
+        only: false,
+    };
+    Description {
+        name: "Rare".into(),
+        variables,
+        terminals: vec![terminal("map", MatchingRule::Map, &map), terminal("can", MatchingRule::Transceiver, &bus)],
+        icon: None,
+        model_exchange: Some(exchange),
+        ..sample()
+    }
 }
 
 /// An empty picture.
