@@ -26,13 +26,16 @@ const OUTPUT: &str = "output";
 /// Time between two checks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(100);
 
+/// Shortest time limit: the process is looked at in parts of it.
+const SHORTEST: Duration = Duration::from_millis(10);
+
 /// File there whose existence ends the run of the worker.
 const INTERRUPT: &str = "interrupt";
 
 /// The process of the FMUs.
 #[derive(Debug, Default, Args)]
 pub struct ProcessOptions {
-    /// Maximum time in s for loading, for initialization, and between two communication points; 0 for no limit
+    /// Maximum time in s for loading, for initialization, and between two communication points, at least 0.01; 0 for no limit
     #[arg(long, value_name = "S", default_value_t = 300.0)]
     pub timeout: f64,
     /// Address space of the process of the FMUs, in GiB; 0 for no limit
@@ -143,6 +146,9 @@ enum Worker {
 /// Runs the command as a worker.
 fn once(name: &str, arguments: &[OsString], args: &ProcessOptions) -> Result<Worker> {
     let timeout = Duration::try_from_secs_f64(args.timeout).map_err(|e| anyhow!("--timeout {}: {e}", args.timeout))?;
+    if !timeout.is_zero() && timeout < SHORTEST {
+        bail!("--timeout {}: at least {} s, or 0 for no limit", args.timeout, SHORTEST.as_secs_f64());
+    }
     let allowance = Allowance { memory: args.memory << 30, sandbox: args.sandbox, ..Allowance::default() };
     let program = std::env::current_exe().context("the path of this program")?;
     let mut command = guard::command(&program, allowance);
