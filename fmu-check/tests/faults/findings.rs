@@ -19,7 +19,7 @@ pub fn check_within(path: &Path, only: &[&str], seconds: u64) -> Report {
         only: only.iter().map(ToString::to_string).collect(),
         patience: Some(Duration::from_secs(seconds)),
         timeout: None,
-        program: Some(Path::new(&*super::PROGRAM).into()),
+        program: Some(super::PROGRAM.to_owned().into()),
         ..Options::default()
     };
     let report = fmu_check::run(path, &options).unwrap_or_else(|e| panic!("{e}"));
