@@ -210,7 +210,7 @@ fn every_capability_has_its_own_function_and_token() {
     }
     let keeps = [0, 1, 2].map(|i: usize| all[i].keeps());
     assert_eq!(keeps, [Keeps::Stored, Keeps::Saved, Keeps::Nothing]);
-    // These change no token: the importer calls nothing else, or is told by the description.
+    // These do not change the token: the importer makes the same calls, or reads the capability in the description.
     for can in [base().Differentiable(), base().Resizable(), base().Intermediate()] {
         assert_eq!(can.hash().guid().as_str(), base().hash().guid().as_str());
     }

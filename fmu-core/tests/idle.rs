@@ -1,4 +1,4 @@
-//! Values that a user has set and that have no effect: each is told once, with its reason.
+//! Values that the user set without effect: each is reported once, with the reason.
 #![allow(missing_docs)]
 
 use fmu_core::idle::Watch;
@@ -61,7 +61,7 @@ fn what_was_set_in_vain_is_told_once() {
     block.model.u = 3.0;
     assert_eq!(told(&mut watch, &mut block), ["u = 3 V: mode 0 has no input"]);
     (block.model.u, block.model.gain) = (4.0, 5.0);
-    assert_eq!(told(&mut watch, &mut block), [""; 0], "parameters are looked at once, and u was told");
+    assert_eq!(told(&mut watch, &mut block), [""; 0], "parameters are checked once, and u was reported before");
 }
 
 #[test]

@@ -89,7 +89,7 @@ mod tests {
     fn bench() -> Bench {
         let mut curve = Curve::new(7.5);
         (0..POINTS).for_each(|n| curve.set(n, 3.0));
-        Bench { T: 1e-4, carrier: 1e-4, u_dead: 3.0, curve, ..Bench::default() }
+        Bench { T: 5e-5, carrier: 1e-4, u_dead: 3.0, curve, ..Bench::default() }
     }
 
     /// The currents of ideal legs in small steps, with the voltage `u` as EMF, from the middle of a zero vector on: what each has
@@ -119,7 +119,7 @@ mod tests {
         for (angle, size) in [(0.0_f64, 60.0), (0.4, 60.0), (1.9, 150.0), (4.0, 20.0)] {
             let u = AlphaBeta::new(size * angle.cos(), size * angle.sin());
             let ripple = Ripple::new(&bench, u, u_dc, L);
-            let expected = fallen(Phases::from_stator(u), u_dc, bench.T, L);
+            let expected = fallen(Phases::from_stator(u), u_dc, bench.carrier, L);
             for (r, expected) in ripple.r.iter().zip(expected) {
                 assert!((r - expected).abs() < 1e-4, "{:?}, not {expected:?}", ripple.r);
             }
@@ -141,7 +141,7 @@ mod tests {
         assert!((loss - AlphaBeta::new(4.0, 0.0)).magnitude() < 1e-12 && slope == 0.0, "{loss:?}");
         // The current falls by u / L until a pulse that comes t_d / 2 late: t_d = T u_dead / u_dc.
         let late = ripple.late(&bench.curve, beyond);
-        let expected = u * (0.5 * bench.T * 3.0 / 325.0 / 6e-3);
+        let expected = u * (0.5 * bench.carrier * 3.0 / 325.0 / 6e-3);
         assert!((late - expected).magnitude() < 1e-9, "{late:?}, not {expected:?}");
     }
 }
