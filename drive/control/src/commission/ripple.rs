@@ -144,4 +144,16 @@ mod tests {
         let expected = u * (0.5 * bench.carrier * 3.0 / 325.0 / 6e-3);
         assert!((late - expected).magnitude() < 1e-9, "{late:?}, not {expected:?}");
     }
+
+    /// Without ripple, a current that ends within the dead time loses its share of the loss at W / 2 = u_dead T / (3 L).
+    #[test]
+    fn small_currents_end_within_the_dead_time() {
+        let (bench, L) = (bench(), 6e-4);
+        let i = 0.5 * 3.0 * 1e-4 / (3.0 * L);
+        let ripple = Ripple::new(&bench, AlphaBeta::ZERO, 325.0, L);
+        let expected = 0.5 * bench.curve.leg(2.0 * i).0;
+        assert!(bench.curve.leg(i).0 > 1.2 * expected, "{} V without the dead time's end", bench.curve.leg(i).0);
+        let (loss, _) = ripple.loss_and_slope(&bench.curve, AlphaBeta::new(i, 0.0));
+        assert!((loss - AlphaBeta::new(expected, 0.0)).magnitude() < 1e-12, "{loss:?}, not {expected} V");
+    }
 }
