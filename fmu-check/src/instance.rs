@@ -4,12 +4,14 @@ use crate::encoding::show;
 use crate::level::Level;
 use crate::session::{ENDED, NotDetermined, Session};
 use fmu_import::Status;
-use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Simple, StepStatus};
+use fmu_import::raw::{Arguments, Buffer, Handle, Interface, Raw, SavedState, Simple, StepStatus, width};
 use model_description::{FmiVersion, ModelVariable};
 use std::cell::Cell;
 
-/// Number of variables from which on a snapshot is one entry of the journal.
-const MANY: usize = 100;
+/// Number of variables from which on their calls are one entry of the journal.
+pub(super) const MANY: usize = 100;
+/// Number of variables that one call reads.
+const TOGETHER: usize = 1000;
 
 /// An instance. Dropping it does not free it: a separate probe checks freeing.
 pub(super) struct Instance<'b> {
@@ -299,12 +301,58 @@ impl Instance<'_> {
 
     /// The values of several variables; those that cannot be read are left out. Many are one entry of the journal.
     pub(super) fn snapshot(&self, variables: &[&ModelVariable]) -> Result<Vec<Vec<u64>>, NotDetermined> {
-        let one = |v: &&ModelVariable| self.get(v).map(|(status, bits)| if status.is_ok() { bits } else { Vec::new() });
-        let read = || variables.iter().map(one).collect();
-        if variables.len() < MANY || self.session.silent.get() {
+        let silent = &self.session.silent;
+        let read = || {
+            // A script repeats each call.
+            if variables.len() >= MANY && silent.get() {
+                return self.together(variables);
+            }
+            variables.iter().map(|v| self.readable(v)).collect()
+        };
+        if variables.len() < MANY || silent.get() {
             return read();
         }
-        self.session.record_calls(&format!("getting {} variables, one by one", variables.len()), read)
+        self.session.record_calls(&format!("getting {} variables", variables.len()), read)
+    }
+
+    /// The values of a variable; none if it cannot be read.
+    fn readable(&self, v: &ModelVariable) -> Result<Vec<u64>, NotDetermined> {
+        self.get(v).map(|(status, bits)| if status.is_ok() { bits } else { Vec::new() })
+    }
+
+    /// The values of many variables: scalars of one type that follow each other with one call, and each alone if that fails.
+    fn together(&self, variables: &[&ModelVariable]) -> Result<Vec<Vec<u64>>, NotDetermined> {
+        let version = self.session.description.version;
+        let mut values = vec![None; variables.len()];
+        // A narrow value may have the bits of the pattern that shows what was not written.
+        let fits = |k: usize, base| {
+            let v = variables[k];
+            v.base == base && !v.is_array() && width(base, version) >= 4
+        };
+        let mut from = 0;
+        while let Some(first) = variables.get(from) {
+            let (base, end) = (first.base, variables.len().min(from + TOGETHER));
+            let to = (from..end).find(|k| !fits(*k, base)).unwrap_or(end).max(from + 1);
+            let part = from..to;
+            from = to;
+            if !fits(part.start, base) {
+                continue;
+            }
+            let references: Vec<u32> = variables[part.clone()].iter().map(|v| v.value_reference).collect();
+            let n = references.len();
+            let mut buffer = Buffer::room(base, version, n);
+            let status =
+                self.call("Get", |raw| raw.get(self.handle, base, Some(&references), n, Some(&mut buffer), n))?;
+            if !buffer.intact() {
+                return Err(NotDetermined(format!("getting {n} variables of the type {base} wrote past their values")));
+            }
+            if status.is_ok() && !buffer.is_unwritten() {
+                for (value, bits) in values[part].iter_mut().zip(buffer.bits()) {
+                    *value = Some(vec![bits]);
+                }
+            }
+        }
+        variables.iter().zip(values).map(|(v, found)| found.map_or_else(|| self.readable(v), Ok)).collect()
     }
 
     /// The values of scalars of the type Float64; NaN for those that cannot be read.

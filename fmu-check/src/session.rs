@@ -37,6 +37,8 @@ pub(super) struct Session {
     pub(super) description: ModelDescription,
     /// Which variables are further names of a value.
     pub(super) aliases: Vec<bool>,
+    /// Some variable is a clock.
+    clocks: bool,
     /// Path of the binary.
     pub(super) binary: PathBuf,
     /// Folder that the FMU was unpacked to.
@@ -148,6 +150,7 @@ impl Session {
         Self {
             raw,
             aliases: aliases(&description),
+            clocks: description.variables.iter().any(|v| v.base == BaseType::Clock),
             description,
             binary,
             dir,
@@ -413,7 +416,6 @@ impl Session {
             FmiVersion::V3 => format!("{}{}", resources.display(), std::path::MAIN_SEPARATOR),
         };
         self.instances_made.set(self.instances_made.get() + 1);
-        let clocks = self.description.variables.iter().any(|v| v.base == BaseType::Clock);
         Arguments {
             name: Some(text(name)),
             token: Some(text(&self.description.token)),
@@ -428,7 +430,7 @@ impl Session {
             memory: true,
             lasting: true,
             logging: false,
-            event_mode: clocks,
+            event_mode: self.clocks,
             early_return: false,
             environment: self.environment(),
             intermediate: None,

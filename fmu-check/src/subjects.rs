@@ -31,7 +31,7 @@ impl Session {
 
     /// Number of elements of a variable.
     pub(super) fn elements(&self, v: &ModelVariable) -> usize {
-        self.description.shape(v).unwrap_or_default().iter().product()
+        if v.is_array() { self.description.shape(v).unwrap_or_default().iter().product() } else { 1 }
     }
 
     /// Number of values that references stand for; one that does not exist counts as one value.

@@ -2,7 +2,7 @@
 
 use crate::checks::life::shared::values::is_rounded;
 use crate::encoding::{bits, quoted, same, show};
-use crate::instance::Instance;
+use crate::instance::{Instance, MANY};
 use crate::session::{NotDetermined, Session};
 use crate::settable::settable;
 use fmu_import::Status;
@@ -183,14 +183,18 @@ pub(crate) fn finite(session: &Session) -> Result<(), NotDetermined> {
         return session.not_applicable("there is no floating-point output");
     }
     let _ = take_events();
+    let number = |v: &ModelVariable, b: &u64| match v.base {
+        BaseType::Float32 => f64::from(f32::from_bits(u32::try_from(b & 0xffff_ffff).unwrap_or(0))),
+        _ => f64::from_bits(*b),
+    };
+    let fits = |v: &ModelVariable, found: &[u64]| found.iter().all(|b| number(v, b).is_finite());
     look_at(session, &mut |instance, k| {
+        if outputs.len() >= MANY && outputs.iter().zip(instance.snapshot(&outputs)?).all(|(v, found)| fits(v, &found)) {
+            return Ok(false);
+        }
         for v in &outputs {
             let (status, found) = instance.get(v)?;
-            let number = |b: &u64| match v.base {
-                BaseType::Float32 => f64::from(f32::from_bits(u32::try_from(b & 0xffff_ffff).unwrap_or(0))),
-                _ => f64::from_bits(*b),
-            };
-            if status.is_ok() && found.iter().any(|b| !number(b).is_finite()) && take_events().is_empty() {
+            if status.is_ok() && !fits(v, &found) && take_events().is_empty() {
                 let text = show(v, session.description.version, &found);
                 session.violated(format!("line {}: {} is {text} after {k} steps, without a message", v.line, v.name));
                 return Ok(true);
@@ -361,7 +365,16 @@ pub(crate) fn texts(instance: &Instance<'_>) -> Result<Vec<(String, Option<Strin
 /// Sets all settable numbers and texts to other values.
 pub(crate) fn set_all(instance: &Instance<'_>, scale: f64) -> Result<(), NotDetermined> {
     let session = instance.session;
-    for v in session.description.variables.iter().filter(|v| settable(v)) {
+    let all: Vec<_> = session.description.variables.iter().filter(|v| settable(v)).collect();
+    if all.len() < MANY {
+        return set_each(instance, &all, scale);
+    }
+    session.record_calls(&format!("setting {} variables, one by one", all.len()), || set_each(instance, &all, scale))
+}
+
+fn set_each(instance: &Instance<'_>, all: &[&ModelVariable], scale: f64) -> Result<(), NotDetermined> {
+    let session = instance.session;
+    for v in all {
         if v.base == BaseType::String && !v.is_array() {
             // Longer than a fixed buffer of an FMU may be, and different for each scale.
             let text = CString::new(format!("another text {scale} ").repeat(6)).unwrap_or_default();
