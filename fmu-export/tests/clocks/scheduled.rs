@@ -213,7 +213,8 @@ pub(crate) mod preemption {
         let shared = started(&mut it, false);
         let (good, n) = (threads(shared), ticks(shared));
         println!("{good} of {} calls succeed", 2 * ROUNDS);
-        assert!(good > 0 && (good..=good + 1).contains(&n), "{good} calls succeed, {n} ticks");
+        // No call succeeds if the other thread's first one comes during the callback of the first tick: both fail.
+        assert!(n > 0 && (good..=good + 1).contains(&n), "{good} calls succeed, {n} ticks");
         unsafe { fmi3FreeInstance(it) };
     }
 }
