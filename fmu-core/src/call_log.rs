@@ -483,6 +483,12 @@ mod tests {
         assert_eq!(calls[0].ended.as_ref().unwrap().status, "Error");
     }
 
+    #[test]
+    fn a_status_has_the_name_of_the_standards() {
+        let names = [0, 1, 2, 3, 4, 5, -1].map(status);
+        assert_eq!(names, ["OK", "Warning", "Discard", "Error", "Fatal", "5", "-1"]);
+    }
+
     /// Wherever the file of a host that was killed ends, its whole calls are read.
     #[test]
     fn a_file_may_end_anywhere() {
@@ -509,11 +515,19 @@ mod tests {
             ("0.0 f(a=[[1]]) -> OK\n", "line 7: column 10: an array in an array"),
             (&"0.0 f() {\n".repeat(99), "line 23: more than 16 calls in one another"),
             ("0.0 f() -> OK }\n", "line 7: column 16: \"=\" is expected"),
+            ("0.0 f() [\n0.0 g() -> OK\n", "line 7: after the call: \" [\""),
+            ("0.0 f() -> OK {\n", "line 7: column 16: \"=\" is expected"),
+            ("0.0 f() {\n} -> OK a=1]\n", "line 8: after the end of a call: \"]\""),
+            ("0.0 f() {\n} -> OK a=x\n", "line 8: column 6: \"x\" is not a value"),
+            ("0.0 f(a=\"\\t\") -> OK\n", "line 7: column 11: an unknown escape"),
+            ("0.0 f(a=\"\\x4g\") -> OK\n", "line 7: column 12: \\x has two hexadecimal digits"),
         ] {
             assert_eq!(read(text).unwrap_err(), said, "{text}");
         }
         assert!(LogReader::new("time,x\n").unwrap_err().starts_with("line 1: not a call log"));
         assert!(LogReader::new("FMU call log: 9\n").unwrap_err().contains("format \"9\""));
         assert!(LogReader::new("FMU call log: 1\nFMI: 3.0\n").unwrap_err().starts_with("line 3"));
+        let headless = format!("{}0.0 f() -> OK\n", head().to_string().trim_end_matches('\n').to_owned() + "\n");
+        assert_eq!(LogReader::new(&headless).unwrap_err(), "line 6: an empty line ends the head");
     }
 }

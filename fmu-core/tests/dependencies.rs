@@ -365,30 +365,34 @@ struct Limits {
     parameter: i64,
     input: i32,
     bounded: u8,
+    lowest: i32,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { parameter: 86, input: 0, bounded: 90 }
+        Self { parameter: 86, input: 0, bounded: 90, lowest: 1000 }
     }
 }
 
 type L = Row<Block<Limits>>;
 
 impl Model for Limits {
-    type Outputs = [bool; 3];
+    type Outputs = ([bool; 3], i32);
     const INFO: Info = Info { name: "Limits", ..Info::DEFAULT };
     const TABLE: &'static Table<Block<Self>> = table![
         L::int64_parameter("parameter", "", |m| &mut m.model.parameter),
         L::integer_input("input", "", |m| &mut m.model.input),
         L::uint8_input("bounded", "", |m| &mut m.model.bounded).at_most(100.0),
-        L::boolean_output("small", "", |m| &mut m.out[0]),
-        L::boolean_output("great", "", |m| &mut m.out[1]),
-        L::boolean_output("few", "", |m| &mut m.out[2]),
+        L::integer_input("lowest", "", |m| &mut m.model.lowest).at_least(1000.0).at_most(1002.0),
+        L::boolean_output("small", "", |m| &mut m.out.0[0]),
+        L::boolean_output("great", "", |m| &mut m.out.0[1]),
+        L::boolean_output("few", "", |m| &mut m.out.0[2]),
+        L::integer_output("negative", "", |m| &mut m.out.1),
     ];
     fn initialize(&mut self) {}
-    fn output(&self, _: Elapsed, out: &mut [bool; 3]) {
-        *out = [self.parameter * self.parameter < 80, self.input > 300, self.bounded < 8];
+    fn output(&self, _: Elapsed, out: &mut ([bool; 3], i32)) {
+        out.0 = [self.parameter * self.parameter < 80, self.input > 300, self.bounded < 8];
+        out.1 = self.lowest - 2000;
     }
     fn advance(&mut self, _: &Step) -> Result<(), Fault> {
         Ok(())
@@ -398,7 +402,8 @@ impl Model for Limits {
 #[test]
 fn behind_integers_far_from_the_start() {
     let description = Description::of::<Limits>().unwrap();
-    for (name, wanted) in [("small", "parameter"), ("great", "input"), ("few", "bounded")] {
+    let known = [("small", "parameter"), ("great", "input"), ("few", "bounded"), ("negative", "lowest")];
+    for (name, wanted) in known {
         let variable = description.variable(name).unwrap();
         assert_eq!(names(&description, variable.initial_dependencies.as_ref()).as_deref(), Some(wanted), "{name}");
     }

@@ -7,53 +7,18 @@
 )]
 
 mod common;
+#[path = "common/played.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod played;
 
 use common::model::*;
 use common::*;
 use fmu_core::call_log::{LogReader, LoggedCall};
 use fmu_export::abi::types::*;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use played::{folder, logs, play};
+use std::path::Path;
 use std::ptr::{null, null_mut};
-use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering};
-
-/// Name of the scenario that a process of a test plays.
-const SCENARIO: &str = "FMU_EXPORT_TEST_SCENARIO";
-
-/// Plays a scenario in a process whose variable is `folder`; returns its output.
-fn play(scenario: &str, folder: Option<&Path>) -> String {
-    let mut command = Command::new(std::env::current_exe().unwrap());
-    command.args(["--exact", "scenarios", "--nocapture"]).env(SCENARIO, scenario).env_remove("FMU_CALL_LOG");
-    if let Some(folder) = folder {
-        command.env("FMU_CALL_LOG", folder);
-    }
-    let output = command.output().unwrap();
-    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
-}
-
-fn folder() -> PathBuf {
-    static NEXT: AtomicUsize = AtomicUsize::new(0);
-    let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    let folder = std::env::temp_dir().join(format!("fmu-call-log-{}-{number}", std::process::id()));
-    let _ = std::fs::remove_dir_all(&folder);
-    std::fs::create_dir(&folder).unwrap();
-    folder
-}
-
-/// The files of a scenario in the order of their instances, without head.
-fn logs(scenario: &str) -> Vec<String> {
-    let folder = folder();
-    play(scenario, Some(&folder));
-    let mut files: Vec<_> = std::fs::read_dir(&folder).unwrap().map(|entry| entry.unwrap().path()).collect();
-    files.sort();
-    for (i, file) in files.iter().enumerate() {
-        let name = file.file_name().unwrap().to_str().unwrap();
-        assert!(name.starts_with("Probe-") && name.ends_with(&format!("-{}.calls", i + 1)), "{name}");
-    }
-    let texts = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
-    std::fs::remove_dir_all(&folder).unwrap();
-    texts
-}
+use std::sync::atomic::{AtomicPtr, Ordering};
 
 fn calls(log: &str) -> Vec<LoggedCall> {
     let (head, reader) = LogReader::new(log).unwrap();
@@ -68,7 +33,7 @@ fn calls(log: &str) -> Vec<LoggedCall> {
 /// Plays the scenario that the environment names; without one, nothing.
 #[test]
 fn scenarios() {
-    let Ok(name) = std::env::var(SCENARIO) else { return };
+    let Some(name) = played::scenario() else { return };
     match name.as_str() {
         "run2" => run(2),
         "run3" => run(3),

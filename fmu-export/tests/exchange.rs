@@ -526,3 +526,29 @@ fn a_value_without_effect_is_said_once() {
         assert!((50..=51).contains(k) && text.contains("u = 99 ") && text.contains("that much lift"), "{k}: {text}");
     }
 }
+
+/// What the standards forbid and does no harm is done, with a warning at its first time.
+#[test]
+fn a_habit_of_an_importer_is_one_warning() {
+    let habits: [Trial; 5] = [
+        ("the importer sets the continuous states outside Continuous-Time Mode", |f| f.set_states(&f.states::<2>())),
+        ("the importer sets the time in Event Mode", |f| f.set_time(0.1)),
+        ("the importer enters Event Mode in Event Mode", Fmu::event),
+        ("the importer sets variables that cannot change now", |f| f.set(&[M], &[START[0]])),
+        ("the importer sets a time before the last completed step", |f| {
+            let all = [f.leave(), f.set_time(0.2), f.completed(), f.set_time(0.15), f.event()];
+            all.into_iter().max().unwrap()
+        }),
+    ];
+    for (why, habit) in habits {
+        let fmu = Fmu::with(Kind::Me3, true, true);
+        assert_eq!((fmu.enter(0.0, None), fmu.exit()), (OK, OK));
+        fmu.settle();
+        fmu.messages();
+        assert_eq!((habit(&fmu), habit(&fmu)), (OK, OK), "{why}: {:?}", fmu.messages());
+        let messages = fmu.messages();
+        let warned: Vec<_> =
+            messages.iter().filter(|m| m.category == "logStatusWarning" && m.text.contains("importer")).collect();
+        assert!(warned.len() == 1 && warned[0].text.contains(why), "{why}: {messages:?}");
+    }
+}

@@ -224,3 +224,10 @@ fn wishes_of_fmi3_that_are_refused() {
         assert!(fmi3InstantiateModelExchange(null(), null(), null(), no, no, null_mut(), None).is_null());
     }
 }
+
+#[test]
+fn the_binary_tells_the_versions_of_the_standards() {
+    let said = |text: Text| unsafe { CStr::from_ptr(text) };
+    let versions = [fmi2GetVersion(), fmi2GetTypesPlatform(), fmi3GetVersion()].map(said);
+    assert_eq!(versions, [c"2.0", c"default", c"3.0"]);
+}

@@ -265,6 +265,11 @@ fn a_time_that_no_simulation_came_to_is_noticed() {
         let said = answer(from, to);
         assert!(said.contains("s of simulation from"), "{from} {to}: {said}");
     }
+    // Before the first step, the time is the start time.
+    let fmu = Fmu::new(3);
+    assert_eq!(fmu.enter(start, None), OK);
+    assert_eq!(fmu.deserialize(&forged(&fmu, start, start + 1.0), &mut null_mut()), ERROR);
+    assert!(fmu.error().contains("time 2 after 0 s of simulation from 3"));
 }
 
 #[test]

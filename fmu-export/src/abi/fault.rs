@@ -25,7 +25,10 @@ pub(super) fn keep(info: &PanicHookInfo<'_>) {
     if cfg!(panic = "unwind") {
         return;
     }
-    let text = panicked(info.payload()).to_string();
+    keep_text(&panicked(info.payload()).to_string());
+}
+
+fn keep_text(text: &str) {
     if let Ok(mut kept) = TEXT.try_lock() {
         *kept = CString::new(text.replace('\0', " ")).ok();
     }
@@ -48,6 +51,7 @@ pub(super) fn text() -> Text {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::ffi::CStr;
     use std::panic::{catch_unwind, set_hook, take_hook};
 
     #[test]
@@ -61,5 +65,14 @@ mod tests {
         let wanted = "a fault in the model's code (panic): no more than 5 A";
         assert!(said.starts_with(wanted) && said.ends_with(&format!("abi/fault.rs:{line})")), "{said}");
         assert_eq!(panicked(payload.as_ref()).to_string(), wanted);
+    }
+    #[test]
+    #[expect(clippy::undocumented_unsafe_blocks, reason = "a host reads the text")]
+    fn a_host_reads_the_last_text() {
+        assert!(text().is_null());
+        for (kept, read) in [("no more than 5 A", c"no more than 5 A"), ("a\0b", c"a b"), ("", c"")] {
+            keep_text(kept);
+            assert_eq!(unsafe { CStr::from_ptr(text()) }, read);
+        }
     }
 }

@@ -12,6 +12,9 @@ mod journal;
 #[path = "../common/oracle.rs"]
 #[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
 mod oracle;
+#[path = "../common/played.rs"]
+#[allow(dead_code, unreachable_pub, reason = "a module of several test programs, each of which uses a part")]
+mod played;
 mod random;
 mod scheduled;
 mod ticks;
@@ -75,6 +78,8 @@ const Y: u32 = 11;
 const TICKS: u32 = 12;
 const FREE: u32 = 13;
 const PANICS: u32 = 15;
+/// With this input, the clock `changing` has no interval; with a greater one of the other sign, a negative interval.
+const BROKEN: f64 = 1e3;
 const CLOCKS: [u32; 8] = [CONSTANT, FRACTION, FIXED, TUNABLE, CHANGING, COUNTDOWN, TRIGGERED, TRIP];
 
 impl Model for Kinds {
@@ -146,6 +151,8 @@ impl Clocked for Kinds {
 
     fn interval(&self, clock: usize, now: Elapsed) -> Option<f64> {
         match clock {
+            4 if self.x == BROKEN => None,
+            4 if self.x < -BROKEN => Some(self.x),
             4 => Some(0.1 * f64::from(self.counts[4] + 1)),
             _ => self.due.map(|due| (due - now.seconds()).max(0.0)),
         }
@@ -357,4 +364,45 @@ fn the_description_has_the_clocks() {
     assert_eq!(description.variable("u").unwrap().clocks, [FIXED, TRIGGERED]);
     assert!(description.variable("T_fixed").unwrap().initial_dependencies.is_some());
     assert!(description.model_exchange.unwrap().scheduled);
+}
+
+/// Plays the scenario that the environment names; without one, nothing.
+#[test]
+fn scenarios() {
+    if let Some(name) = played::scenario() {
+        assert_eq!(name, "scheduled");
+        scheduled::preemption::logged();
+    }
+}
+
+#[test]
+fn an_interval_that_no_clock_has_is_an_error_of_the_model() {
+    for kind in [Kind::Cs, Kind::Me, Kind::Se] {
+        for (x, why) in [
+            (BROKEN, "changing has no interval"),
+            (-2e3, "the interval of changing = -2000 is not allowed: finite and not negative"),
+        ] {
+            let host = Host::entered(kind);
+            assert_eq!((host.set(X, x), host.exit()), (OK, ERROR));
+            let errors = host.errors();
+            assert!(errors[0].contains(why), "{errors:?}");
+        }
+    }
+}
+
+#[test]
+fn shifts_are_times_of_clocks_that_can_be_shifted() {
+    for (vr, shift, why) in [
+        (FIXED, -0.1, "the shift of fixed = -0.1 is not allowed: finite and not negative"),
+        (TUNABLE, f64::NAN, "the shift of tunable = NaN is not allowed: finite and not negative"),
+        (CONSTANT, 0.1, "constant has a constant shift"),
+        (TRIGGERED, 0.1, "triggered has no period, so no shift"),
+    ] {
+        let host = Host::entered(Kind::Se);
+        assert_eq!(
+            unsafe { fmi3SetShiftDecimal(host.it.get(), [FIXED, vr].as_ptr(), 2, [0.05, shift].as_ptr()) },
+            ERROR
+        );
+        assert!(host.errors()[0].contains(why), "{why}");
+    }
 }

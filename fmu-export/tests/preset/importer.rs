@@ -212,3 +212,4 @@ pub(crate) const WEIGHTS: u32 = 10;
 pub(crate) const DOUBLED: u32 = 14;
 pub(crate) const Y: u32 = 15;
 pub(crate) const SEEN: u32 = 16;
+pub(crate) const KEY: u32 = 18;

@@ -19,12 +19,12 @@ use importer::*;
 use model::All;
 use std::ffi::CString;
 use std::fs;
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 
 fmu_export::export!(All: Events);
 
 /// A value of every type.
-const ALL: [(&str, &str); 9] = [
+const ALL: [(&str, &str); 10] = [
     ("u", "-7.5"),
     ("real", "0.30000000000000004"),
     ("single", "0.2"),
@@ -34,6 +34,7 @@ const ALL: [(&str, &str); 9] = [
     ("on", "true"),
     ("fan", "2"),
     ("label", "two\nlines \u{3c8}"),
+    ("key", "00ff1A"),
 ];
 
 #[test]
@@ -58,6 +59,9 @@ fn every_type_starts_with_its_value_before_load_and_after_a_reset() {
         if !is_two(way) {
             let mut large = 0;
             assert_eq!((unsafe { fmi3GetUInt64(it, &LARGE, 1, &mut large, 1) }, large), (0, u64::MAX));
+            let (mut size, mut key) = (0, null());
+            assert_eq!(unsafe { fmi3GetBinary(it, &KEY, 1, &mut size, &mut key, 1) }, 0);
+            assert_eq!(unsafe { std::slice::from_raw_parts(key, size) }, [0, 255, 26]);
         }
         set(way, it, REAL, 9.0);
         set(way, it, U, 8.0);
@@ -180,6 +184,8 @@ fn names_and_values_that_are_not_allowed_are_refused_when_they_are_read() {
         ("on", "1", "on = 1 is not allowed: true or false"),
         ("fan", "3", "fan = 3 is not allowed: 1 (Off), 2 (On)"),
         ("fan", "On", "fan = On is not allowed: 1 (Off), 2 (On)"),
+        ("key", "0ff", "key = 0ff is not allowed: pairs of hexadecimal digits"),
+        ("key", "000102030405060708", "key = 000102030405060708 is not allowed: at most 8 bytes"),
     ] {
         for way in WAYS {
             let said = with(way, &[(name, value)]).unwrap_err();
@@ -268,6 +274,48 @@ fn the_log_tells_what_differs_from_the_preset() {
         entered(Way::Three, it);
         assert_eq!(exit(Way::Three, it), 0);
         assert!(SAID.take().iter().any(|line| line.contains("initialized") && line.ends_with(expected)));
+        free(Way::Three, it);
+    }
+}
+
+/// An Integer of FMI 2.0 has 32 bits; a Real is also for variables in single precision.
+#[test]
+fn fmi_2_reads_what_fits_its_types() {
+    for way in [Way::Two, Way::TwoExchange] {
+        let it = entered(way, with(way, &[("large", "4294967296")]).unwrap());
+        set(way, it, SINGLE, 0.25);
+        assert_eq!(real(way, it, SINGLE), 0.25);
+        unsafe {
+            let mut large = Fmi2Integer(7);
+            assert_eq!((fmi2GetInteger(it, &LARGE, 1, &mut large), large.0), (3, 7));
+            let why = "large = 4294967296 does not fit a 32-bit FMI 2.0 Integer; in FMI 3.0 it is UInt64";
+            assert!(SAID.take().last().unwrap().contains(why));
+            reset(way, it);
+            assert_eq!(fmi2SetReal(it, &SINGLE, 1, &0.31), 3);
+            assert!(SAID.take().last().unwrap().contains("single = 0.31 is not allowed: at most 0.3"));
+        }
+        free(way, it);
+    }
+}
+
+#[test]
+fn a_variable_of_another_type_is_named_with_its_type() {
+    for (reference, name) in [
+        (U, "u is a real number"),
+        (SINGLE, "single is a Float32"),
+        (N, "n is an integer"),
+        (SMALL, "small is an integer of the type UInt8"),
+        (FAN, "fan is an enumeration"),
+        (LABEL, "label is a text"),
+        (KEY, "key is bytes"),
+    ] {
+        let it = entered(Way::Three, open(Way::Three, &plain(), None).unwrap());
+        assert_eq!(unsafe { fmi3GetBoolean(it, &reference, 1, &mut Fmi3Boolean(0), 1) }, 3);
+        let said = SAID.take().pop().unwrap();
+        assert_eq!(said, format!("fmi3GetBoolean: {name}, and this function takes a truth value"));
+        reset(Way::Three, it);
+        assert_eq!(unsafe { fmi3SetBoolean(it, &reference, 1, &Fmi3Boolean(0), 1) }, 3);
+        assert!(SAID.take().pop().unwrap().contains(name));
         free(Way::Three, it);
     }
 }

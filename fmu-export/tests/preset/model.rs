@@ -2,7 +2,8 @@
 
 use fmu_core::unit::VOLT;
 use fmu_core::{
-    Block, Elapsed, Events, Fault, Field, Info, Model, Next, Outcome, Resource, Row, Step, Table, enumeration, table,
+    Block, Bytes, Elapsed, Events, Fault, Field, Info, Model, Next, Outcome, Resource, Row, Step, Table, enumeration,
+    table,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -30,6 +31,7 @@ pub(crate) struct All {
     /// The preset in `load`.
     seen: Resource<f64>,
     doubled: f64,
+    key: Bytes,
 }
 
 impl Default for All {
@@ -47,6 +49,7 @@ impl Default for All {
             weights: [1.0, 2.0, 3.0, 4.0],
             seen: Resource::default(),
             doubled: 0.0,
+            key: Bytes::default(),
         }
     }
 }
@@ -77,6 +80,7 @@ impl Model for All {
         V::output("y", &VOLT, "", |m| &mut m.out.y),
         V::output("seen", &VOLT, "", |m| &mut m.out.seen),
         V::text_constant("made", "", "here"),
+        V::binary_parameter("key", "", "application/octet-stream", 8, |m| &mut m.model.key),
     ];
 
     fn load(&mut self, _: Option<&Path>) -> Result<(), Fault> {
