@@ -38,6 +38,27 @@ fn noise_in_model_exchange_is_one_finding() {
     }
 }
 
+/// Many variables are read with one call, and each alone where a getter discards one of them or leaves one unwritten.
+#[test]
+fn one_unreadable_variable_of_many_hides_no_fault_of_the_others() {
+    let dir = tempfile::tempdir().unwrap();
+    let y = r#"<ScalarVariable name="y" valueReference="3" causality="output" variability="continuous" initial="calculated"><Real/>"#;
+    let xml = include_str!("fmu.xml");
+    let (first, rest) = xml.split_once(y).unwrap();
+    let wide = |range: std::ops::Range<u32>| {
+        let one = |k| y.replace(r#""y""#, &format!("\"wide.y{k}\"")).replace(r#""3""#, &format!("\"{k}\""));
+        range.map(one).collect::<Vec<_>>().join("</ScalarVariable>")
+    };
+    for range in [100..300, 100..250] {
+        let many = wide(range.clone());
+        let structure = rest.find("<ModelStructure>").unwrap();
+        let xml = format!("{first}{many}{}<ModelStructure/></fmiModelDescription>", &rest[..structure]);
+        let Some(binary) = compile(2, "WIDE L04f") else { return };
+        let report = check(&pack_with(dir.path(), &format!("wide-{}", range.len()), &xml, &binary), &["L04a"]);
+        assert!(listed(&report).contains("freed: wide.y"), "{range:?}: {}", listed(&report));
+    }
+}
+
 /// A fault in another variable is found despite the noise.
 #[test]
 fn noise_hides_no_fault_of_another_variable() {
