@@ -101,7 +101,7 @@ impl Values {
         let items = definition.map(|d| d.items.iter().map(|i| (i.name.clone(), i.value)).collect::<Vec<_>>());
         if variable.base.is_float()
             && !variable.is_array()
-            && text.split_once(',').is_some_and(|(a, b)| [a, b].iter().all(|x| x.parse::<f64>().is_ok()))
+            && text.split_once(',').is_some_and(|(a, b)| a.parse::<f64>().is_ok() && quantity::split(b).is_some())
         {
             return Err(format!("{} = {text} is not a number: write a decimal point", variable.name));
         }
