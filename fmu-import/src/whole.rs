@@ -3,14 +3,15 @@
 use crate::Error;
 use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A name that is not finished: this, and `RANDOM` letters and digits.
 const PREFIX: &str = ".fmu-part-";
 const RANDOM: usize = 12;
 
 /// Writes a file under a temporary name beside it, syncs it to the disk, and then renames it. Missing folders are created. A process that
-/// is killed leaves the temporary file; the next one that writes into the folder removes it.
+/// is killed leaves the temporary file; the next one that writes into the folder removes it. A file that exists keeps its permissions, a
+/// link stays and leads to the new file, and a device or a pipe is written directly.
 ///
 /// # Errors
 /// Names the file; it is then as before.
@@ -23,17 +24,19 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 /// # Errors
 /// Those of [`write()`] and of the function.
 pub fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), Error> {
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let whole = || {
+        if is_stream(path) {
+            let mut stream = File::options().write(true).truncate(true).open(path)?;
+            return content(&mut stream).and_then(|()| stream.flush());
+        }
+        let path = &if path.is_symlink() { behind(path)? } else { path.to_owned() };
+        let folder = folder(path);
         fs::create_dir_all(folder)?;
         remove_abandoned(folder);
         let mut file = begun(folder)?;
         content(file.as_file_mut())?;
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // Temporary files are private, but these must be readable by everyone.
-            file.as_file().set_permissions(fs::Permissions::from_mode(0o644))?;
+        if let Ok(old) = fs::metadata(path) {
+            file.as_file().set_permissions(old.permissions())?;
         }
         // Some file systems find out here that the disk is full.
         file.as_file().sync_all()?;
@@ -42,10 +45,31 @@ pub fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>
     whole().map_err(|e: io::Error| Error::file_from(path, "", e))
 }
 
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether the path is a device, a pipe or a socket, which a renamed file would replace, or a name of an open file: `/dev/stdout`.
+fn is_stream(path: &Path) -> bool {
+    fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) || (path.starts_with("/dev") && path.is_symlink())
+}
+
+/// The file that a link leads to, which need not exist.
+fn behind(link: &Path) -> io::Result<PathBuf> {
+    fs::canonicalize(link).or_else(|_| Ok(folder(link).join(fs::read_link(link)?)))
+}
+
 /// A temporary file, locked as long as this process writes it.
 fn begun(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
     loop {
-        let file = tempfile::Builder::new().prefix(PREFIX).rand_bytes(RANDOM).tempfile_in(folder)?;
+        let mut name = tempfile::Builder::new();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            // Temporary files are private, but these are readable by whom the umask of the process lets.
+            name.permissions(fs::Permissions::from_mode(0o666));
+        }
+        let file = name.prefix(PREFIX).rand_bytes(RANDOM).tempfile_in(folder)?;
         match file.as_file().try_lock() {
             // Another process took the new file for an abandoned one: it removes it, or has removed it.
             Err(TryLockError::WouldBlock) => {}
@@ -100,6 +124,39 @@ mod tests {
         );
         write(&path, b"two").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"two");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_pipe_and_a_link_stay_what_they_are() {
+        use std::io::Read;
+        use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = at("pipe");
+            move || File::open(pipe).and_then(|mut pipe| pipe.read_to_end(&mut Vec::new()))
+        });
+        write(&at("pipe"), b"three").unwrap();
+        assert!(fs::metadata(at("pipe")).unwrap().file_type().is_fifo());
+        assert_eq!(reader.join().unwrap().unwrap(), 5);
+
+        fs::create_dir(at("data")).unwrap();
+        symlink("data/run.csv", at("run.csv")).unwrap();
+        for text in ["new", "again"] {
+            write(&at("run.csv"), text.as_bytes()).unwrap();
+            assert!(at("run.csv").is_symlink(), "{text}");
+            assert_eq!(fs::read_to_string(at("data/run.csv")).unwrap(), text);
+        }
+        symlink("run.csv", at("second.csv")).unwrap();
+        write(&at("second.csv"), b"by two links").unwrap();
+        assert!(at("run.csv").is_symlink() && at("second.csv").is_symlink());
+        // A private file stays private.
+        fs::set_permissions(at("data/run.csv"), fs::Permissions::from_mode(0o600)).unwrap();
+        write(&at("run.csv"), b"private").unwrap();
+        assert_eq!(fs::metadata(at("data/run.csv")).unwrap().permissions().mode() & 0o777, 0o600);
+        assert_eq!(names(&at("data")), ["run.csv"]);
     }
 
     #[test]
