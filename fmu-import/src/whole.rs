@@ -11,7 +11,7 @@ const RANDOM: usize = 12;
 
 /// Writes a file under a temporary name beside it, syncs it to the disk, and then renames it. Missing folders are created. A process that
 /// is killed leaves the temporary file; the next one that writes into the folder removes it. A file that exists keeps its permissions, a
-/// link stays and leads to the new file, and a device or a pipe is written directly.
+/// link stays and leads to the new file, and a device or a pipe is written directly; `/dev/stdout` is refused.
 ///
 /// # Errors
 /// Names the file; it is then as before.
@@ -25,8 +25,13 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 /// Those of [`write()`] and of the function.
 pub fn write_with(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> Result<(), Error> {
     let whole = || {
+        if is_open_file(path) {
+            // In the process that runs the FMUs, /dev/stdout is another stream than the user's.
+            let why = "the name of an open file; write - for the standard output where a command takes it";
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, why));
+        }
         if is_stream(path) {
-            let mut stream = File::options().write(true).truncate(true).open(path)?;
+            let mut stream = File::options().write(true).open(path)?;
             return content(&mut stream).and_then(|()| stream.flush());
         }
         let path = &if path.is_symlink() { behind(path)? } else { path.to_owned() };
@@ -49,9 +54,14 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether the path is a device, a pipe or a socket, which a renamed file would replace, or a name of an open file: `/dev/stdout`.
+/// Whether the path is a device, a pipe or a socket, which a renamed file would replace.
 fn is_stream(path: &Path) -> bool {
-    fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir()) || (path.starts_with("/dev") && path.is_symlink())
+    fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
+}
+
+/// Whether the path is a link of the system to a file that the process has open: `/dev/stdout`.
+fn is_open_file(path: &Path) -> bool {
+    path.starts_with("/dev") && path.is_symlink()
 }
 
 /// The file that a link leads to, which need not exist.
@@ -133,6 +143,9 @@ mod tests {
         use std::os::unix::fs::{FileTypeExt, PermissionsExt, symlink};
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name);
+        // Only looked at: nothing here may alter /dev.
+        assert!(!is_open_file(Path::new("/dev/null")) && !is_open_file(&at("pipe")));
+        assert!(cfg!(not(target_os = "linux")) || is_open_file(Path::new("/dev/stdout")));
         assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
         let reader = std::thread::spawn({
             let pipe = at("pipe");
