@@ -1,6 +1,7 @@
 //! A small element tree: names, attributes, children. Neither standard uses text content, so it is not stored.
 
 mod element;
+mod names;
 mod parse;
 mod print;
 

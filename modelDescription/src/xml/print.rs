@@ -1,6 +1,7 @@
 //! Prints an element tree: declaration, one element per line, two blanks per level.
 
 use super::element::Element;
+use super::names::is_legal;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, BytesEnd, BytesStart, Event};
 
@@ -42,10 +43,7 @@ fn collect<'a>(element: &'a Element, events: &mut Vec<Event<'a>>) {
 
 /// Replaces characters that XML 1.0 cannot represent, not even by reference, with the replacement character.
 fn legal(c: char) -> char {
-    match c {
-        '\t' | '\n' | '\r' | ' '..='\u{d7ff}' | '\u{e000}'..='\u{fffd}' | '\u{10000}'..='\u{10ffff}' => c,
-        _ => '\u{fffd}',
-    }
+    if is_legal(c) { c } else { '\u{fffd}' }
 }
 
 #[cfg(test)]
