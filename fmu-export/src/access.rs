@@ -313,7 +313,7 @@ impl<E: Exported> Instance<E> {
             let held = (keeps(meta, state)
                 || meta.causality == Causality::Input
                     && !matches!(state, State::Configuration | State::Reconfiguration))
-                && T::read(meta, &slot, self.standard) == Some(value);
+                && value.is_held(meta, &slot, self.standard);
             possible = value.judge(meta, self.standard);
             if possible == Some(true) && (self.opens(meta, state) || held || self.sets_state(index)) {
                 return Ok(());

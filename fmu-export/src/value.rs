@@ -32,6 +32,11 @@ pub trait CValue: Copy + Display + PartialEq {
     /// Whether the variable may take this value, `None` if it has another base type.
     fn judge(self, meta: &Meta, standard: Standard) -> Option<bool>;
 
+    /// Whether the variable in `slot` has this value, as far as its type can represent it.
+    fn is_held(self, meta: &Meta, slot: &Slot<'_>, standard: Standard) -> bool {
+        Self::read(meta, slot, standard) == Some(self)
+    }
+
     /// Quickly reads scalars of exactly this type, up to the first reference of another kind; returns their number.
     #[inline]
     fn read_reals<M: Model>(_block: &mut Block<M>, _references: &[u32], _out: &mut [MaybeUninit<Self>]) -> usize {
@@ -90,6 +95,14 @@ impl CValue for f64 {
             #[expect(clippy::cast_possible_truncation, reason = "rounds")]
             Slot::Float32(_) => (self as f32).write(slot),
             _ => {}
+        }
+    }
+
+    fn is_held(self, meta: &Meta, slot: &Slot<'_>, standard: Standard) -> bool {
+        match slot {
+            #[expect(clippy::cast_possible_truncation, reason = "rounds, as `write` does")]
+            Slot::Float32(x) if standard == Standard::Fmi2 => **x == self as f32,
+            _ => Self::read(meta, slot, standard) == Some(self),
         }
     }
 
@@ -262,9 +275,17 @@ impl CValue for Fmi2Integer {
 macro_rules! truth_values {
     ($($(#[$doc:meta])* $name:ident $number:ident;)*) => { $(
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[derive(Clone, Copy, Debug)]
         #[repr(transparent)]
         pub struct $name(pub $number);
+
+        impl PartialEq for $name {
+            fn eq(&self, other: &Self) -> bool {
+                (self.0 != 0) == (other.0 != 0)
+            }
+        }
+
+        impl Eq for $name {}
 
         impl From<bool> for $name {
             fn from(value: bool) -> Self {

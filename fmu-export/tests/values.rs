@@ -112,6 +112,14 @@ fn any_byte_is_a_truth_value() {
         }
         assert_eq!(value.0, expected);
     }
+    // A fixed parameter that keeps its value in Step Mode.
+    for raw in [1, 2, 255] {
+        let fmu = Fmu::entered(2);
+        assert_eq!(unsafe { fmi2SetBoolean(fmu.it, &FLAG, 1, &Fmi2Boolean(1)) }, OK);
+        assert_eq!(fmu.exit(), OK);
+        assert_eq!(unsafe { fmi2SetBoolean(fmu.it, &FLAG, 1, &Fmi2Boolean(raw)) }, OK, "{raw}");
+        assert_eq!(unsafe { fmi2SetBoolean(fmu.it, &FLAG, 1, &Fmi2Boolean(0)) }, ERROR);
+    }
 }
 
 #[test]
