@@ -6,7 +6,7 @@ use super::setting::{LEVELS, Setting, Value, given, real};
 use crate::error::{Result, bail};
 use drive::estimator::Kind;
 
-/// Current below which the voltage of dead time and thresholds falls to zero where the file gives none, over the maximum current: about the middle of
+/// Current below which the dead-time voltage falls to zero where the file gives none, over the maximum current: about the middle of
 /// the 0.5 % to 4 % from which the machines of `tests/population` are drawn; there is no external source.
 const ZERO: f64 = 0.02;
 
@@ -91,16 +91,12 @@ fn slow_emf(motor: &MotorFile) -> f64 {
     LEVELS[0] * f64::from(machine.n_p) * motor.data.rating.speed.get_ref() * machine.psi_M
 }
 
-/// The setting `name` of the current below which the voltage of dead time and thresholds falls to zero: as given, or by rule where the
-/// file has such a voltage. The start value of 0.1 A is 2 % of small machines: at the light load of a large one, the plant would follow
-/// the current through it many times in each sample.
+/// The setting `name` of the current below which the dead-time voltage falls to zero: as given, or by rule where the file has a
+/// dead-time voltage alone.
 fn zero(name: &'static str, motor: &MotorFile) -> Option<Setting> {
-    let Inverter { u_dead, u_transistor, u_diode, i_zero, .. } = motor.data.inverter.as_ref()?;
-    if let Some(i_zero) = i_zero {
-        return Some(given(name, i_zero));
-    }
-    let lost = [u_dead, u_transistor, u_diode].into_iter().any(Option::is_some);
-    lost.then(|| real(name, ZERO * motor.data.rating.current.get_ref(), "0.02 rating.current"))
+    let Inverter { u_dead, i_zero, .. } = motor.data.inverter.as_ref()?;
+    let by_rule = || real(name, ZERO * motor.data.rating.current.get_ref(), "0.02 rating.current");
+    i_zero.as_ref().map(|x| given(name, x)).or_else(|| u_dead.as_ref().map(|_| by_rule()))
 }
 
 #[cfg(test)]
@@ -125,14 +121,11 @@ mod tests {
         };
         let u_dead = |x| ("compensation.u_dead", super::super::setting::Value::Real(x));
         let both = "u_transistor = 0.5\nu_diode = 0.7";
-        assert_eq!(
-            of(both, Kind::Rasmussen),
-            [u_dead(0.6), ("compensation.i_zero", super::super::setting::Value::Real(0.3))]
-        );
+        assert_eq!(of(both, Kind::Rasmussen), [u_dead(0.6)]);
         assert_eq!(of(&format!("{both}\nu_dead = 5.4"), Kind::Rasmussen)[0], u_dead(6.0));
         assert!(of(both, Kind::ExtendedEmf).is_empty() && of("r_diode = 0.1", Kind::Rasmussen).is_empty());
         assert!(of("u_diode = 5.0", Kind::ExtendedEmf).is_empty());
-        assert_eq!(of("u_diode = 5.4", Kind::ExtendedEmf)[0], u_dead(2.7));
+        assert_eq!(of("u_diode = 5.4", Kind::ExtendedEmf), [u_dead(2.7)]);
     }
 
     #[test]
@@ -142,10 +135,8 @@ mod tests {
         assert_eq!(of("[temperature]\nmagnet = -1.1e-3").unwrap(), [("magnet.alpha", Real(-1.1e-3))]);
         let period = ("inverter.T_pwm", Real(5e-5));
         assert_eq!(of("[inverter]\nr_diode = 0.1").unwrap(), [("inverter.r_diode", Real(0.1)), period.clone()]);
-        for voltage in ["u_dead", "u_transistor", "u_diode"] {
-            let lossy = of(&format!("[inverter]\n{voltage} = 0.8")).unwrap();
-            assert!(lossy.contains(&("inverter.i_zero", Real(0.02 * 15.0))), "{voltage}: {lossy:?}");
-        }
+        let dead = of("[inverter]\nu_dead = 5.4").unwrap();
+        assert_eq!(dead[0], ("inverter.i_zero", Real(0.02 * 15.0)));
         let dead = of("[inverter]\nu_dead = 5.4\ni_zero = 0.2").unwrap();
         assert_eq!(dead, [("inverter.i_zero", Real(0.2)), ("inverter.dead_time", Real(5.4 * 5e-5 / 540.0)), period]);
         assert_eq!(of("[inverter]\nf_sw = 8000.0").unwrap(), [("inverter.T_pwm", Real(1.25e-4))]);
