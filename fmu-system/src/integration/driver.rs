@@ -10,6 +10,10 @@ use std::ops::ControlFlow;
 
 /// Maximum number of events at one instant.
 const EVENTS: u32 = 100;
+/// Number of steps after which the progress towards the target is compared with the limit on them.
+const STEPS_COMPARED: u32 = 100_000;
+/// Maximum number of steps towards a target, expected from the progress so far: a quarter of an hour and more.
+const MOST_STEPS: f64 = 1e9;
 /// Width of the interval in which a state event is located, relative to the step.
 const WIDTH: f64 = 1e-10;
 
@@ -78,6 +82,16 @@ pub struct Driver {
     events: u32,
     last_event: f64,
     stability: Stability,
+    pace: Pace,
+}
+
+/// The steps towards a target.
+struct Pace {
+    /// Target in s.
+    until: f64,
+    /// Where they began, in s.
+    from: f64,
+    steps: u32,
 }
 
 impl Driver {
@@ -104,6 +118,7 @@ impl Driver {
             events: 0,
             last_event: f64::NEG_INFINITY,
             stability: Stability::default(),
+            pace: Pace { until: f64::NAN, from: t, steps: 0 },
         };
         driver.step.t = t;
         let flow = driver.event(system)?;
@@ -169,6 +184,7 @@ impl Driver {
                 _ => (until, false),
             };
             if target - self.step.t > near {
+                self.count_a_step(until)?;
                 if let Some(stop) = self.advance(system, target)? {
                     return Ok(stop);
                 }
@@ -187,6 +203,28 @@ impl Driver {
     /// The system cannot handle the event.
     pub fn interrupt(&mut self, system: &mut impl HybridSystem) -> Result<ControlFlow<()>, Error> {
         self.event(system)
+    }
+
+    /// Counts a step towards the time `until` (s).
+    ///
+    /// # Errors
+    /// The target is out of reach at this pace.
+    fn count_a_step(&mut self, until: f64) -> Result<(), Error> {
+        let t = self.step.t;
+        if self.pace.until != until {
+            self.pace = Pace { until, from: t, steps: 0 };
+        }
+        self.pace.steps = self.pace.steps.saturating_add(1);
+        let Pace { from, steps, .. } = self.pace;
+        if steps % STEPS_COMPARED != 0 || f64::from(steps) * (until - from) <= MOST_STEPS * (t - from) {
+            return Ok(());
+        }
+        let mean = (t - from) / f64::from(steps);
+        let why = "the derivatives change too fast, or too often at events";
+        Err(Error::usage(
+            "integration",
+            format!("{steps} steps, of {mean:.1e} s, lead from t = {from} s to {t} s alone: {why}"),
+        ))
     }
 
     /// One step towards `target`, to its end or to the first state event in it, with the event there.
