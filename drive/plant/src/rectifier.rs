@@ -284,3 +284,24 @@ impl PmsmPlant {
         i + self.by_iron_at(state, &Path { u: AlphaBeta::ZERO, dissipation, drops: switches })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The machine on a resistance: r i_d = w L_q i_q and r i_q = -w (L_d i_d + psi_M), in either direction.
+    #[test]
+    fn the_fundamental_is_a_machine_on_a_resistance() {
+        let motor = Motor { n_p: 4, R_s: 0.5, L_d: 2e-3, L_q: 3e-3, psi_M: 0.1 };
+        let (U, r_diode) = (50.0, 0.01);
+        for w in [800.0, 2000.0, -2000.0] {
+            let psi = fundamental(&motor, w, U, r_diode).unwrap();
+            let i = Dq::new((psi.d() - motor.psi_M) / motor.L_d, psi.q() / motor.L_q);
+            let r = motor.R_s + r_diode + U / i.magnitude();
+            let rest = [r * i.d() - w * psi.q(), r * i.q() + w * psi.d()];
+            assert!(rest.iter().all(|rest| rest.abs() < 1e-9 * U) && i.magnitude() > 1.0, "{w}: {rest:?}");
+        }
+        // The EMF is below the voltage.
+        assert!(fundamental(&motor, 400.0, U, r_diode).is_none());
+    }
+}

@@ -39,6 +39,18 @@ pub const MEAN_OF_MAGNITUDES: f64 = 3.0 * std::f64::consts::FRAC_2_PI;
 mod tests {
     use super::*;
     use drive_base::frame::AlphaBeta;
+    use fmu_core::Dual;
+
+    #[test]
+    fn the_derivative_is_that_of_the_power_law() {
+        let devices = |k_sw| Devices { E_sw: 25e-3, i_sw: 300.0, u_sw: 400.0, k_sw, ..Devices::default() };
+        let loss = |k_sw, u_dc| per_ampere(&devices(k_sw), 1e-4, Dual::new(u_dc, 1.0)).change;
+        let full = 25e-3 / 1e-4 / 300.0;
+        let (got, wanted) = (loss(1.3, 360.0), full * 1.3 * 0.9_f64.powf(0.3) / 400.0);
+        assert!((got / wanted - 1.0).abs() < 1e-14, "{got}, not {wanted}");
+        // Without a voltage: that of a straight line, 0 of a steeper curve.
+        assert_eq!((loss(1.0, 0.0), loss(1.3, 0.0)), (full / 400.0, 0.0));
+    }
 
     #[test]
     fn over_a_period_it_is_the_closed_form() {

@@ -166,6 +166,18 @@ mod tests {
     }
 
     #[test]
+    fn an_instant_is_located_in_its_half_of_the_period() {
+        let (inverter, half, u) = (Inverter::default(), 5e-5, Phases { a: 0.0, b: 90.0, c: -90.0 });
+        let mut carrier = Carrier::default();
+        let mut at = |t: f64| carrier.locate(&inverter, Elapsed::ZERO.plus(t), u, 300.0);
+        // At an extreme exactly, between two, and in another half of the period.
+        assert_eq!((at(0.0), at(half), at(half * (1.0 - 1e-15))), (half, half, half));
+        for (t, wanted) in [(1.2 * half, 0.2 * half), (1.9 * half, 0.9 * half), (7.3 * half, 0.3 * half)] {
+            assert!((at(t) - wanted).abs() < 1e-15, "{t} s: {} s, not {wanted} s", at(t));
+        }
+    }
+
+    #[test]
     fn the_upper_switch_is_on_around_the_middle() {
         let (inverter, half) = (Inverter::default(), 5e-5);
         let mut carrier = Carrier::default();
