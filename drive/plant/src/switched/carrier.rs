@@ -170,11 +170,13 @@ mod tests {
         let (inverter, half, u) = (Inverter::default(), 5e-5, Phases { a: 0.0, b: 90.0, c: -90.0 });
         let mut carrier = Carrier::default();
         let mut at = |t: f64| carrier.locate(&inverter, Elapsed::ZERO.plus(t), u, 300.0);
-        // At an extreme exactly, between two, and in another half of the period.
-        assert_eq!((at(0.0), at(half), at(half * (1.0 - 1e-15))), (half, half, half));
-        for (t, wanted) in [(1.2 * half, 0.2 * half), (1.9 * half, 0.9 * half), (7.3 * half, 0.3 * half)] {
-            assert!((at(t) - wanted).abs() < 1e-15, "{t} s: {} s, not {wanted} s", at(t));
+        // Between two extremes, also in another half of the period.
+        for (t, wanted) in [(0.5, 0.5), (1.2, 0.2), (1.9, 0.9), (7.3, 0.3), (0.3, 0.3)] {
+            assert!((at(t * half) - wanted * half).abs() < 1e-15, "{t}: {} s, not {wanted}", at(t * half));
         }
+        // At its ends exactly, despite rounding.
+        assert!([1.0, 1.0 - 1e-15, 1.0 + 1e-15].iter().all(|t| at(t * half).to_bits() == half.to_bits()));
+        assert!(at(0.0) == 0.0 && at(-1e-15 * half) == 0.0);
     }
 
     #[test]
