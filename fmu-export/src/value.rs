@@ -100,7 +100,11 @@ impl CValue for f64 {
 
     fn is_held(self, meta: &Meta, slot: &Slot<'_>, standard: Standard) -> bool {
         match slot {
-            #[expect(clippy::cast_possible_truncation, reason = "rounds, as `write` does")]
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::float_cmp,
+                reason = "the same value, rounded as by `write`"
+            )]
             Slot::Float32(x) if standard == Standard::Fmi2 => **x == self as f32,
             _ => Self::read(meta, slot, standard) == Some(self),
         }

@@ -100,15 +100,18 @@ fn experiments_that_make_no_sense() {
 /// Names with control sequences are escaped: `runs` looks for control characters.
 #[test]
 fn names_are_escaped() {
-    let place = with("name=\"y\"", "name=\"y&#27;[2J&#27;]0;title&#7;&#x202e;\" description=\"&#27;[31m\"");
+    // XML has no escape character; those of eight bits are allowed.
+    let refused = "line 5: not well-formed XML: the attribute name has the character U+001B, which XML does not allow";
+    with("name=\"y\"", "name=\"y&#27;[2J\"").is_refused("escape", 1, refused);
+    let place = with("name=\"y\"", "name=\"y&#x9b;2J&#x9d;0;title&#x9c;&#x202e;\" description=\"&#x9b;31m\"");
     if library().is_some() {
         let ended = place.runs("simulate", &[]);
-        assert!(ended.status == 0 && ended.out.contains("\\u{1b}[2J") && ended.out.contains("\\u{202e}"), "{ended:?}");
+        assert!(ended.status == 0 && ended.out.contains("\\u{9b}2J") && ended.out.contains("\\u{202e}"), "{ended:?}");
         let ended = place.runs("simulate", &["--set", "x.y=1", "--record", "x.y\u{1b}"]);
         assert_eq!(ended.status, 2);
         // Also in the header of a recording.
         let ended = place.runs("simulate", &["--csv", "-"]);
-        let header = "time,y\\u{1b}[2J\\u{1b}]0;title\\u{7}\\u{202e}\n0,1\n";
+        let header = "time,y\\u{9b}2J\\u{9d}0;title\\u{9c}\\u{202e}\n0,1\n";
         assert!(ended.status == 0 && ended.out.starts_with(header), "{ended:?}");
         // A name from the command line, on standard error.
         let named = format!("\u{1b}[2J={}", place.fmu().display());

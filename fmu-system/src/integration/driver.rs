@@ -211,12 +211,12 @@ impl Driver {
     /// The target is out of reach at this pace.
     fn count_a_step(&mut self, until: f64) -> Result<(), Error> {
         let t = self.step.t;
-        if self.pace.until != until {
+        if self.pace.until.to_bits() != until.to_bits() {
             self.pace = Pace { until, from: t, steps: 0 };
         }
         self.pace.steps = self.pace.steps.saturating_add(1);
         let Pace { from, steps, .. } = self.pace;
-        if steps % STEPS_COMPARED != 0 || f64::from(steps) * (until - from) <= MOST_STEPS * (t - from) {
+        if !steps.is_multiple_of(STEPS_COMPARED) || f64::from(steps) * (until - from) <= MOST_STEPS * (t - from) {
             return Ok(());
         }
         let mean = (t - from) / f64::from(steps);
