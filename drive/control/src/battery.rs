@@ -143,6 +143,15 @@ mod tests {
         tau * speed + 1.5 * motor.R_s * (i_d * i_d + i_q * i_q)
     }
 
+    /// At standstill, i_d = i_q = i_0 heat the winding with the power of the maximum current.
+    #[test]
+    fn the_current_of_the_low_speed_law_takes_the_power_of_the_limit() {
+        let (motor, par) = (Motor::IPMSM_2_2_KW, DcLimits { used: true, max: 2.0, min: -1.0 });
+        let i_0 = par.i_0(&motor, 540.0);
+        let p = power(&motor, motor.torque(i_0, i_0), 0.0, i_0);
+        assert!((p / 1080.0 - 1.0).abs() < 1e-12 && i_0 > 1.5, "{i_0} A, {p} W");
+    }
+
     #[test]
     fn the_limits_take_the_power_of_the_limits() {
         let motor = Motor::IPMSM_2_2_KW;

@@ -316,3 +316,23 @@ pub(crate) fn lowered_i_0(par: &ControllerParameters, u_dc: f64) -> String {
         par.motor.torque_constant() * most
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The current of a short circuit of one sample, u_dc T_s / (sqrt(3) L), is compared with 1.1 times the limit.
+    #[test]
+    fn a_flying_start_needs_short_samples() {
+        let mut par = ControllerParameters::default();
+        par.start.catch = true;
+        let longest = 1.1 * par.limit.i * 3.0_f64.sqrt() * par.motor.L_d.min(par.motor.L_q) / 325.0;
+        par.T_s = 0.999 * longest;
+        assert!(catch(&par, 325.0).is_ok() && catch(&par, 330.0).is_err());
+        par.T_s = 1.001 * longest;
+        let refused = catch(&par, 325.0).unwrap_err().to_string();
+        assert!(refused.contains("start.catch") && refused.contains("shorten T_s"), "{refused}");
+        par.start.catch = false;
+        assert!(catch(&par, 325.0).is_ok());
+    }
+}
