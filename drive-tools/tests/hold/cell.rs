@@ -1,6 +1,7 @@
 //! A cell of the table: the error of the drive, its task, and the results of a run.
 
 use drive::Pair;
+use drive::control::start::StartState;
 use drive::math::wrap;
 use drive_tools::tune::pace::{Begin, Pace};
 use drive_tools::tune::setting::{Tuned, Value};
@@ -275,7 +276,8 @@ fn follow(tuned: &Tuned, cell: &Cell, sensor: bool) -> (End, Option<(Loss, f64)>
         let lock = locks.last_mut().expect("a part");
         *lock = lock.max(controller.lock_lost);
         alarm |= t > ready + 1.0 && controller.lock_lost >= 1.0;
-        if t > ready {
+        // Before, theta_est is that of the start or 0.
+        if t > ready && controller.start_state == StartState::Running {
             slip += wrap(error - before);
             span = (span.0.min(slip), span.1.max(slip));
             if span.1 - span.0 >= TAU {
