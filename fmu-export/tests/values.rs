@@ -119,6 +119,10 @@ fn any_byte_is_a_truth_value() {
         assert_eq!(fmu.exit(), OK);
         assert_eq!(unsafe { fmi2SetBoolean(fmu.it, &FLAG, 1, &Fmi2Boolean(raw)) }, OK, "{raw}");
         assert_eq!(unsafe { fmi2SetBoolean(fmu.it, &FLAG, 1, &Fmi2Boolean(0)) }, ERROR);
+        let fmu = Fmu::entered(3);
+        let set = |raw| unsafe { fmi3SetBoolean(fmu.it, &FLAG, 1, &Fmi3Boolean(raw), 1) };
+        assert_eq!((set(1), fmu.exit()), (OK, OK));
+        assert_eq!((set(u8::try_from(raw).unwrap()), set(0)), (OK, ERROR), "{raw}");
     }
 }
 

@@ -10,9 +10,9 @@ use std::ops::ControlFlow;
 
 /// Maximum number of events at one instant.
 const EVENTS: u32 = 100;
-/// Number of steps after which the progress towards the target is compared with the limit on them.
-const STEPS_COMPARED: u32 = 100_000;
-/// Maximum number of steps towards a target, expected from the progress so far: a quarter of an hour and more.
+/// Number of steps between two checks of the progress towards the target.
+const STEPS_CHECKED: u32 = 100_000;
+/// Maximum number of steps towards a target, extrapolated from the progress so far. A billion takes a quarter of an hour or more.
 const MOST_STEPS: f64 = 1e9;
 /// Width of the interval in which a state event is located, relative to the step.
 const WIDTH: f64 = 1e-10;
@@ -216,14 +216,13 @@ impl Driver {
         }
         self.pace.steps = self.pace.steps.saturating_add(1);
         let Pace { from, steps, .. } = self.pace;
-        if !steps.is_multiple_of(STEPS_COMPARED) || f64::from(steps) * (until - from) <= MOST_STEPS * (t - from) {
+        if !steps.is_multiple_of(STEPS_CHECKED) || f64::from(steps) * (until - from) <= MOST_STEPS * (t - from) {
             return Ok(());
         }
-        let mean = (t - from) / f64::from(steps);
-        let why = "the derivatives change too fast, or too often at events";
+        let (passed, why) = (t - from, "the derivatives change too fast, or events follow each other too closely");
         Err(Error::usage(
             "integration",
-            format!("{steps} steps, of {mean:.1e} s, lead from t = {from} s to {t} s alone: {why}"),
+            format!("{steps} steps from t = {from} s on lead only {passed:.1e} s further: {why}"),
         ))
     }
 

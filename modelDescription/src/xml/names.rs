@@ -7,7 +7,7 @@ pub(super) fn is_legal(c: char) -> bool {
 
 /// Whether this is the name of an element or attribute, with or without a namespace prefix.
 pub(super) fn is_name(text: &str) -> bool {
-    // Other than ASCII at once, the names of the standards.
+    // The names of the FMI standards are ASCII; only others need the tables below.
     let ascii = |c: char| c.is_ascii_alphabetic() || matches!(c, ':' | '_');
     let start = |c: char| ascii(c) || !c.is_ascii() && starts(c);
     let inner = |c: char| start(c) || c.is_ascii_digit() || matches!(c, '-' | '.') || continues(c);
