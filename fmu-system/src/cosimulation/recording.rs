@@ -201,9 +201,13 @@ mod tests {
         let items = vec![(1, "Off".into()), (2, "Network".into())];
         let mode = Column { name: "p.mode".into(), items, values: vec![1.0, 2.0], ..Column::default() };
         recording.columns.push(mode);
+        let mut count = Column { name: "p.count".into(), ..Column::default() };
+        count.push(Number::Integer(0));
+        count.push(Number::Integer(123_456_789));
+        recording.columns.push(count);
         assert_eq!(
             recording.last_values(),
-            "time           0.0001 s\np.speed        104.72 rad/s  = 1000 rpm\np.mode        Network"
+            "time           0.0001 s\np.speed        104.72 rad/s  = 1000 rpm\np.mode        Network\np.count     123456789"
         );
     }
 }

@@ -263,5 +263,6 @@ mod tests {
         let columns = csv("time_ms,known[mm],other [mm]\n0,1,2\n500,3,4\n").unwrap();
         let of = |k: usize| (columns[k].0.as_str(), columns[k].1.unit.as_str(), columns[k].1.end());
         assert_eq!((of(0), of(1)), (("known[mm]", "", 0.5), ("other", "mm", 0.5)));
+        assert_eq!([0, 1].map(|k| columns[k].1.has_unit()), [false, true]);
     }
 }

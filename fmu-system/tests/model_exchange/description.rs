@@ -1,8 +1,8 @@
 //! What a description says of an FMU, and what the importer does with it.
 
-use crate::workshop::Workshop;
+use crate::workshop::{Workshop, array};
 use fmu_import::Fmu;
-use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, System};
+use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, System, Units};
 use fmu_system::ssp::load::Loaded;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -173,12 +173,45 @@ fn an_fmu_of_one_instance_in_a_process_is_named() {
 #[test]
 fn the_numeric_outputs_of_all_instances_have_their_names() {
     let workshop = Workshop::new();
-    let (plant, sampler) = (workshop.plain("plant", 3), workshop.plain("sampler", 3));
+    let plant = workshop.fmu("plant", 3, &[], |xml| array(array(xml, "i"), "y"));
+    let sampler = workshop.plain("sampler", 3);
     let mut system = System::default();
     system.add("a", &plant, false).unwrap();
     system.add("b", &sampler, false).unwrap();
     let outputs = system.outputs();
+    assert_eq!(["a.y", "b.y"].map(|name| outputs.iter().any(|output| output == name)), [false, true], "an array");
     assert!(["a.x", "b.x"].iter().all(|name| outputs.iter().any(|output| output == name)), "{outputs:?}");
     assert!(!outputs.iter().any(|output| ["a.u", "b.u"].contains(&output.as_str())), "{outputs:?}");
     assert!(!system.is_size("a.u").unwrap(), "an input is no size");
+}
+
+/// z = 1 - 2 u in m feeds u in km, converted or as it is.
+#[test]
+fn a_connection_converts_units_where_the_system_does() {
+    let workshop = Workshop::new();
+    for version in [2, 3] {
+        let unit = |xml: String, name: &str, unit: &str| match version {
+            2 => {
+                let at = xml.find(&format!("<ScalarVariable name='{name}'")).unwrap();
+                format!("{}{}", &xml[..at], xml[at..].replacen("<Real ", &format!("<Real unit='{unit}' "), 1))
+            }
+            _ => xml.replace(&format!("<Float64 name='{name}'"), &format!("<Float64 unit='{unit}' name='{name}'")),
+        };
+        let fmu = workshop.fmu("plant", version, &[], |xml| {
+            let units = "<UnitDefinitions><Unit name='m'><BaseUnit m='1'/></Unit><Unit name='km'>\
+                <BaseUnit m='1' factor='1000'/></Unit></UnitDefinitions><DefaultExperiment ";
+            unit(unit(xml, "z", "m"), "u", "km").replace("<DefaultExperiment ", units)
+        });
+        for (units, expected) in [(Units::Convert, 1e-3), (Units::PassOn, 1.0)] {
+            let mut system = System::default().with_units(units);
+            system.add("a", &fmu, false).unwrap();
+            system.add("b", &fmu, false).unwrap();
+            system.connect("a.z", "b.u").unwrap();
+            system.record("b.u").unwrap();
+            let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
+            let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+            let u = recording.columns[0].values[1];
+            assert!((u - expected).abs() < 1e-15, "FMI {version}, {units:?}: {u}");
+        }
+    }
 }

@@ -8,11 +8,13 @@ mod ssp;
 mod workshop;
 
 use fmu_import::{Fmu, Kind};
-use fmu_system::cosimulation::{Integration, Method, Recording, Schedule, Settings, Solver, System};
+use fmu_system::cosimulation::{
+    CommunicationPoint, Integration, Method, Recording, Schedule, Settings, Solver, System,
+};
 use model_description::FmiVersion;
 use std::f64::consts::LN_2;
 use std::ops::ControlFlow;
-use workshop::Workshop;
+use workshop::{Workshop, array};
 
 /// Sample period of the sampler in s, unless a test sets another.
 const T: f64 = 0.1;
@@ -195,6 +197,25 @@ fn events_of_cosimulation_come_at_their_time() {
     );
 }
 
+/// Without a sample after the first, the hook at the last point sees the inputs of the last step.
+#[test]
+fn no_input_is_set_at_the_end() {
+    let workshop = Workshop::new();
+    let sampler = workshop.plain("sampler", 3);
+    for (event_mode, early_return) in [(false, false), (true, false), (false, true)] {
+        let mut system = single(&sampler, Method::CoSimulation { event_mode, early_return }, &[]);
+        system.set("p.T", "2").unwrap();
+        system.input("p.u", Schedule::parse("0:0~1:1").unwrap()).unwrap();
+        let mut last = f64::NAN;
+        let hook = |point: &mut CommunicationPoint<'_>| {
+            last = point.instance("p").unwrap().get("u").unwrap().number().unwrap();
+            Ok(ControlFlow::Continue(()))
+        };
+        system.run(&settings(1.0, 0.25), hook).unwrap();
+        assert_eq!(last, 0.75, "{event_mode} {early_return}");
+    }
+}
+
 #[test]
 fn a_loop_with_events_has_its_solution_at_any_step() {
     let workshop = Workshop::new();
@@ -278,15 +299,21 @@ fn faults_are_named() {
         assert!(times[5] > times[4] && times[5] <= 0.5, "{times:?}");
 
         // Outputs that change with every update of the other FMU: connected to each other, they never settle.
-        let mut system = System::new(exchange(Solver::Rk4));
-        for name in ["a", "b"] {
-            system.add(name, &sampler, false).unwrap();
-            system.set(&format!("{name}.fault"), "9").unwrap();
+        let restless = |sampler: &Fmu| {
+            let mut system = System::new(exchange(Solver::Rk4));
+            for name in ["a", "b"] {
+                system.add(name, sampler, false).unwrap();
+                system.set(&format!("{name}.fault"), "9").unwrap();
+            }
+            system.connect("a.y", "b.i").unwrap();
+            system.connect("b.y", "a.i").unwrap();
+            let error = refused(&mut system, &settings(1.0, 0.1));
+            assert!(error.contains("discrete inputs still change after 100 updates at t = 0 s"), "{error}");
+        };
+        restless(&sampler);
+        if version == 3 {
+            restless(&workshop.fmu("sampler", 3, &[], |xml| array(array(xml, "i"), "y")));
         }
-        system.connect("a.y", "b.i").unwrap();
-        system.connect("b.y", "a.i").unwrap();
-        let error = refused(&mut system, &settings(1.0, 0.1));
-        assert!(error.contains("discrete inputs still change after 100 updates at t = 0 s"), "{error}");
     }
 
     // Co-Simulation with event mode: the next event is always now.
@@ -329,15 +356,7 @@ fn algebraic_loops_are_solved_or_named() {
 #[test]
 fn a_loop_beside_an_array_is_solved() {
     let workshop = Workshop::new();
-    let array = |xml: String| {
-        let of = |xml: String, name: &str| {
-            let at = xml.find(&format!("<Float64 name='{name}'")).unwrap();
-            let end = at + xml[at..].find("/>").unwrap();
-            format!("{}><Dimension start='1'/></Float64>{}", &xml[..end], &xml[end + 2..])
-        };
-        of(of(xml, "i"), "y")
-    };
-    let plant = workshop.fmu("plant", 3, &[], array);
+    let plant = workshop.fmu("plant", 3, &[], |xml| array(array(xml, "i"), "y"));
     let mut system = System::new(exchange(SOLVERS[1]));
     for name in ["a", "b"] {
         system.add(name, &plant, false).unwrap();
