@@ -124,4 +124,28 @@ mod tests {
         let missing = unstated(ACTS, SensorlessController::TABLE);
         assert!(missing.is_empty(), "{missing:?} must be in ACTS once");
     }
+
+    /// Which of these the drive uses.
+    fn acting(par: &Par) -> [bool; 4] {
+        ["sensor.counts", "sensor.hall_b", "sensor.bits", "sensor.bandwidth"]
+            .map(|name| ACTS.iter().any(|acts| acts.names.contains(&name) && (acts.when)(par)))
+    }
+
+    #[test]
+    fn each_position_sensor_has_its_parameters() {
+        use PositionSensor::{Encoder, Hall, Ideal, Resolver};
+        let mut par = Par::default();
+        for (kind, own) in [
+            (Ideal, [false; 4]),
+            (Encoder, [true, false, false, true]),
+            (Hall, [false, true, false, false]),
+            (Resolver, [false, false, true, true]),
+        ] {
+            par.position.kind = kind;
+            par.estimator = Kind::Sensored;
+            assert_eq!(acting(&par), own, "{kind:?}");
+            par.estimator = Kind::FluxObserver;
+            assert_eq!(acting(&par), [false; 4], "{kind:?} without a sensor in use");
+        }
+    }
 }

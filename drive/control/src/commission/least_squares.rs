@@ -111,6 +111,17 @@ mod tests {
     }
 
     #[test]
+    fn damping_divides_separate_unknowns() {
+        let mut normal = Normal::<3>::default();
+        normal.add(&[2.0, 0.0, 0.0], 6.0);
+        normal.add(&[0.0, 5.0, 0.0], 5.0);
+        for (damping, expected) in [(0.0, [3.0, 1.0, 0.0]), (0.5, [2.0, 1.0 / 1.5, 0.0])] {
+            let x = normal.solve(damping).unwrap().x;
+            assert!(x.iter().zip(expected).all(|(x, expected)| (x - expected).abs() < 1e-12), "{damping}: {x:?}");
+        }
+    }
+
+    #[test]
     fn columns_that_are_not_separable_have_no_solution() {
         let mut normal = Normal::<2>::default();
         for k in 0..9 {

@@ -153,3 +153,40 @@ impl Probe {
         if self.direction < 6 { wait } else { Probed::Done(self.L_c, Tensor::through(self.y)) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The end of the probe of an inductance L (H) without resistance.
+    fn probed(L: f64) -> (Probe, Result<(f64, Tensor), Fault>) {
+        let bench = Bench { T: 1e-4, delay: 1.0, I: 10.0, U: 170.0, ..Bench::default() };
+        let (mut probe, mut sample) = (Probe::default(), Sample { u_dc: 300.0, ..Sample::default() });
+        let mut command = AlphaBeta::ZERO;
+        for _ in 0..20_000 {
+            sample.u = command;
+            match probe.update(&bench, &sample) {
+                Probed::Voltage(u) => command = u,
+                Probed::Done(L_c, tensor) => return (probe, Ok((L_c, tensor))),
+                Probed::Refused(fault) => return (probe, Err(fault)),
+            }
+            sample.i_last = sample.i;
+            sample.i = sample.i + sample.u * (bench.T / L);
+        }
+        panic!("no end");
+    }
+
+    #[test]
+    fn a_linear_inductance_comes_back() {
+        let (L_c, tensor) = probed(5e-3).1.unwrap();
+        assert!((L_c / 5e-3 - 1.0).abs() < 1e-9, "{L_c}");
+        assert!((tensor.inductance(0.3) / 5e-3 - 1.0).abs() < 1e-9, "{tensor:?}");
+    }
+
+    /// The voltage grows to its limit, then the pulse to 64 samples.
+    #[test]
+    fn a_machine_that_takes_no_current_is_refused_after_the_longest_pulse() {
+        let (Probe { V, n, .. }, end) = probed(1e3);
+        assert_eq!((end, V, n), (Err(Fault::Inductance), 85.0, 64.0));
+    }
+}

@@ -356,6 +356,27 @@ fn a_rotor_that_is_held_or_loaded_gives_no_wrong_value() {
     }
 }
 
+/// A rotor that is held in its first start does not follow: the gates go off until it rests, and the next start succeeds.
+#[test]
+fn a_start_that_fails_coasts_and_is_tried_again() {
+    let motor = Motor::draw(1, 7);
+    let (mut commission, mut bench) = (Commission::new(setup(&motor)), Bench::new(motor.clone(), 1));
+    let mut off = 0.0;
+    while !is_over(&commission) {
+        let starts = commission.state() == State::Start;
+        bench.motor.blocked = starts && off == 0.0;
+        if bench.motor.blocked {
+            bench.w = 0.0;
+        }
+        let out = commission.update(bench.measure(), motor.u_dc);
+        off += if starts && !out.gates { motor.T } else { 0.0 };
+        bench.tick(out.u, out.gates);
+    }
+    assert!(off > 0.499, "the gates are off for {off} s");
+    assert_eq!(commission.state(), State::Done, "{:?}", commission.fault());
+    check(commission.results(), &motor, &[]);
+}
+
 /// Above psi_M / (L_q - L_d) = 12.5 A the rotor rests with its magnet at an angle to the current, far above it with the q-axis
 /// along the current.
 #[test]
