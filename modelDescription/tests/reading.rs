@@ -209,6 +209,17 @@ fn errors_say_where_and_what() {
         assert_eq!(read(&text).map_err(|e| e.to_string()), Err(message.to_owned()), "{text}");
     }
     assert_eq!(read(b"<a>\n\xff</a>").unwrap_err().to_string(), "line 2: not well-formed XML: not UTF-8");
+    for (bytes, encoding) in [
+        (&b"\xff\xfe\0\0<\0\0\0"[..], "UTF-32"),
+        (b"\0\0\xfe\xff\0\0\0<", "UTF-32"),
+        (b"\xff\xfe<\0a\0", "UTF-16"),
+        (b"\xfe\xff\0<\0a", "UTF-16"),
+        (b"<\0a\0", "UTF-16"),
+        (b"\0<\0a", "UTF-16"),
+    ] {
+        let expected = format!("line 1: not well-formed XML: the encoding is {encoding}, expected UTF-8");
+        assert_eq!(read(bytes).unwrap_err().to_string(), expected);
+    }
 }
 
 /// No panic, regardless of the bytes: every prefix of a file, and every byte of it replaced.

@@ -49,6 +49,22 @@ fn blocked_diodes_leave_the_voltage_to_the_switches() {
     assert!((d.hypot(q) - 40.0).abs() < 1.0, "{d} V, {q} V");
 }
 
+#[test]
+fn the_diodes_end_a_current_that_is_small_enough() {
+    for (i, ends) in [(1e-3, true), (1.0, false)] {
+        let mut block = Block::<PmsmPlant>::default();
+        block.model.inputs.enable = true;
+        block.initialize();
+        *PmsmPlant::STATES[0].at(&mut block.model) += i * block.model.parameters.motor.L_d;
+        block.model.inputs.enable = false;
+        let ([before, _], _) = electrical(&mut block, Elapsed::ZERO);
+        assert!((before / i - 1.0).abs() < 1e-9, "{before} A");
+        let changed = block.model.event(Elapsed::ZERO).unwrap().states_changed;
+        let ([after, _], _) = electrical(&mut block, Elapsed::ZERO);
+        assert_eq!((changed, after), (ends, if ends { 0.0 } else { before }), "{i} A");
+    }
+}
+
 /// On the switched inverter, an event that ends no current leaves all of them.
 #[test]
 fn an_event_of_the_switches_leaves_the_currents() {

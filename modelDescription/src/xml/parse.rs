@@ -169,7 +169,7 @@ mod tests {
     #[test]
     fn lines_and_references() {
         let tree =
-            parse("\u{feff}<?xml version='1.0' standalone='no'?>\n<!-- -->\n<a\n  x='&#x41;&lt;'>\n <b/> text <![CDATA[<]]>\n</a>\n")
+            parse("\u{feff}<?xml version='1.0' standalone='no'?>\n<!-- -->\n<a\n  x='&#x41;&lt;'>\n <b/> text &gt; <![CDATA[<]]>\n</a>\n")
                 .unwrap();
         assert_eq!((tree.line, tree.get("x"), tree.children[0].line), (3, Some("A<"), 5));
     }
