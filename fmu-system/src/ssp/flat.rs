@@ -293,3 +293,31 @@ fn connector<'a>(all: &'a [Connector], name: &str, of: &str) -> Result<&'a Conne
     let names = || all.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
     all.iter().find(|c| c.name == name).ok_or_else(|| format!("{of} has no connector {name}; it has {}", names()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The kinds of a component's connectors to which a value may pass.
+    fn targets(from_component: bool, from: &str) -> Vec<&str> {
+        let kinds = ["structuralParameter", "parameter", "input", "inout", "output", "local", "constant"];
+        kinds.into_iter().filter(|to| allowed([(from_component, from), (true, to)])).collect()
+    }
+
+    #[test]
+    fn values_pass_to_what_is_set_as_late() {
+        let (any, fixed, inputs) = (
+            ["structuralParameter", "parameter", "input", "inout"],
+            ["parameter", "input", "inout"],
+            ["input", "inout"],
+        );
+        assert_eq!(targets(false, "structuralParameter"), any);
+        assert_eq!(targets(true, "constant"), any);
+        assert_eq!(targets(false, "parameter"), fixed);
+        assert_eq!(targets(true, "calculatedParameter"), fixed);
+        assert_eq!(targets(true, "output"), inputs);
+        assert_eq!(targets(false, "input"), inputs);
+        assert_eq!(targets(true, "inout"), ["input"]);
+        assert_eq!(targets(true, "parameter"), [""; 0]);
+    }
+}

@@ -183,6 +183,8 @@ fn the_numeric_outputs_of_all_instances_have_their_names() {
     assert!(["a.x", "b.x"].iter().all(|name| outputs.iter().any(|output| output == name)), "{outputs:?}");
     assert!(!outputs.iter().any(|output| ["a.u", "b.u"].contains(&output.as_str())), "{outputs:?}");
     assert!(!system.is_size("a.u").unwrap(), "an input is no size");
+    let error = system.configure([("a.u", "2")]).unwrap_err().to_string();
+    assert_eq!(error, "a.u: is not a structural parameter");
 }
 
 /// z = 1 - 2 u in m feeds u in km, converted or as it is.

@@ -197,6 +197,21 @@ fn events_of_cosimulation_come_at_their_time() {
     );
 }
 
+#[test]
+fn the_hook_ends_a_run() {
+    let workshop = Workshop::new();
+    let sampler = workshop.plain("sampler", 3);
+    let stepping = |event_mode, early_return| Method::CoSimulation { event_mode, early_return };
+    for method in [stepping(false, false), stepping(true, false), stepping(false, true), exchange(SOLVERS[0])] {
+        let mut system = single(&sampler, method.clone(), &["p.y"]);
+        let hook = |point: &mut CommunicationPoint<'_>| {
+            Ok(if point.index < 2 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) })
+        };
+        let recording = system.run(&settings(1.0, 0.25), hook).unwrap();
+        assert_eq!(recording.time, [0.0, 0.25, 0.5], "{method:?}");
+    }
+}
+
 /// Without a sample after the first, the hook at the last point sees the inputs of the last step.
 #[test]
 fn no_input_is_set_at_the_end() {

@@ -1,7 +1,7 @@
 //! Systems from SSP files: inner systems, units, transformations, mappings, signals, and content refused or ignored with a note.
 
 use crate::workshop::Workshop;
-use fmu_system::cosimulation::{Integration, Method, Settings, System};
+use fmu_system::cosimulation::{Integration, Method, Settings, Solver, System};
 use fmu_system::ssp::load::Loaded;
 use std::io::Write;
 use std::ops::ControlFlow;
@@ -71,6 +71,16 @@ fn an_ssp_with_inner_systems_mappings_and_transformations() {
     // z = 1 - 2 u.
     let expected = [6.0, -11.0, -4.5, 10.0, 0.2, 0.6];
     assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{last:?}");
+
+    // In Model Exchange the system has its state: x' = u - x from 1.
+    let solver = Integration { solver: Solver::Dopri { rtol: 1e-9 }, ..Integration::default() };
+    let exchange = |_: &[_]| System::new(Method::ModelExchange(solver));
+    let mut loaded = Loaded::open_files_with(&["nested.ssp".to_owned()], folder.path(), false, exchange).unwrap();
+    assert!(matches!(loaded.system.method(), Method::ModelExchange(_)));
+    loaded.record("a.x").unwrap();
+    let recording = loaded.system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let x = recording.columns[0].values[2];
+    assert!((x - (6.0 - 5.0 * f64::exp(-0.2))).abs() < 1e-8, "{x}");
 
     // Another variant, and missing parts.
     packed(&path, &[("B.ssd", NESTED.as_bytes()), ("A.ssd", NESTED.as_bytes()), entries[1], entries[2], entries[3]]);
