@@ -104,6 +104,17 @@ mod tests {
     }
 
     #[test]
+    fn cleared_bytes_keep_their_room() {
+        let mut bytes = Bytes::from([1, 2]);
+        bytes.reserve(100);
+        let place = bytes.as_ptr();
+        bytes.clear();
+        assert!(bytes.is_empty());
+        bytes.extend(&[3; 100]);
+        assert_eq!((bytes.as_ptr(), bytes.len()), (place, 100));
+    }
+
+    #[test]
     fn digits_come_in_pairs() {
         let all: Vec<u8> = (0..=255).collect();
         assert_eq!(Bytes::from_hex(&Bytes::from(&all).to_string()), Some(Bytes::from(&all)));

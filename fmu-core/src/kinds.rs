@@ -61,3 +61,15 @@ impl Kinds {
 
 /// The bit of the first integer type.
 const INTEGER: u16 = 8;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_kind_counts_once() {
+        let both = Kinds::REAL.and(Kinds::TEXT);
+        assert_eq!((both.and(Kinds::TEXT), both.and(both), both.and(Kinds::NONE)), (both, both, both));
+        assert!(both.meets(Kinds::TEXT) && !both.meets(Kinds::BOOLEAN) && !both.meets(Kinds::NONE));
+    }
+}

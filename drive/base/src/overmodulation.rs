@@ -76,6 +76,7 @@ impl ModulationMode {
     }
 
     /// The point of the edge for `v` (V) beyond it.
+    #[inline(never)]
     fn on_the_edge<S: Scalar>(self, v: Vector<Stator, S>, u_dc: S) -> Vector<Stator, S> {
         let Phases { a, b, c } = Phases::from_stator(v);
         let mut legs = [(0, a), (1, b), (2, c)];
@@ -135,7 +136,7 @@ pub struct Applied {
 
 impl ModulationMode {
     /// The voltage for the request `u` (V), whose fundamental it has up to the maximum, on a link of `u_dc` (V).
-    #[inline]
+    #[inline(always)]
     pub fn apply(self, u: AlphaBeta, u_dc: f64) -> Applied {
         if self == Self::Linear {
             let (u, limited) = within_hexagon(u, u_dc);
@@ -144,6 +145,7 @@ impl ModulationMode {
         self.overmodulated(u, u_dc)
     }
 
+    #[inline(never)]
     fn overmodulated(self, u: AlphaBeta, u_dc: f64) -> Applied {
         let (magnitude, edge) = (u.magnitude(), u_dc * INVERSE_SQRT_3);
         if magnitude <= edge {

@@ -108,7 +108,7 @@ pub struct CurrentController {
 
 impl CurrentController {
     /// Voltage command (V) for the current error at the electrical speed `w` (rad/s), before limiting.
-    #[inline]
+    #[inline(always)]
     pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
         let error = i_ref - i;
         let forward = if gains.reference_feed_forward { i_ref } else { i };

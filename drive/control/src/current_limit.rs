@@ -68,7 +68,7 @@ pub(super) struct Fresh {
 impl Fresh {
     /// Takes the measured currents `i` (A) and the voltage `u` (V) of the interval before; returns whether they and those of the last
     /// sample were new. A current that stays under a voltage that stays is settled, not old.
-    #[inline]
+    #[inline(always)]
     pub(super) fn update(&mut self, i: Phases, u: AlphaBeta) -> bool {
         let change = u - self.u;
         let new = self.i != i || change.dot(change) <= SETTLED * u.dot(u);

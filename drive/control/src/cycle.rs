@@ -38,6 +38,16 @@ struct Frame {
     injection: Injection,
 }
 
+/// What the controller does in a sample, beside its estimate.
+struct Phase {
+    mode: Mode,
+    start: StartState,
+    /// Parameters have changed.
+    tuned: bool,
+    /// Estimated stator resistance in Ohm.
+    R_s_est: f64,
+}
+
 /// The result of the modulation.
 struct Modulated {
     /// Voltage references in V.
@@ -58,10 +68,21 @@ impl SensorlessController {
         let follows = !inputs.modes.brake && !inputs.modes.coast && state.follows == Follows::Reference;
         let steady = state.k > state.rise && !*tuned && follows && matches!(state.leader, Leader::Estimator);
         if steady && matches!(state.estimator, Estimator::Rasmussen(_)) && !self.measures_resistance() {
-            self.state.computed = self.cycle(true);
-        } else {
-            self.any_cycle();
+            let sample = self.measure();
+            let Self { parameters: par, in_use, state, .. } = self;
+            // Here the compiler knows estimator and mode, and omits all others from what follows.
+            if let Estimator::Rasmussen(observer) = &mut state.estimator {
+                let estimate = observer.update(&context(par, &in_use.estimators, &in_use.motor), &sample);
+                let R_s_est = observer.resistance(&context(par, &in_use.estimators, &par.motor));
+                self.state.computed = self.act(
+                    &sample,
+                    estimate,
+                    Phase { mode: Mode::ClosedLoop, start: StartState::Running, tuned: false, R_s_est },
+                );
+                return;
+            }
         }
+        self.any_cycle();
     }
 
     /// Whether a drive that starts at rest still measures its resistance: until then, it rests on i_0 and follows no reference.
@@ -103,7 +124,7 @@ impl SensorlessController {
         if measures {
             (self.inputs.speed_ref, self.inputs.tau_ref, self.parameters.zero_speed.release) = (0.0, 0.0, false);
         }
-        self.state.computed = self.cycle(false);
+        self.state.computed = self.cycle();
         if measures {
             self.state.computed.start_state = StartState::Aligning;
         }
@@ -144,17 +165,35 @@ impl SensorlessController {
         }
     }
 
-    /// One sample, compiled twice: for any state of the controller, and without calls for the `steady` state of the default
-    /// (its estimator supplies the angle, the start is over, nothing has been tuned).
+    /// One sample in any state of the controller. Changed parameters act on the estimator from the next sample on.
     #[inline(always)]
-    fn cycle(&mut self, steady: bool) -> ControllerOutputs {
-        let first = !steady && self.state.k == 0;
-        let tuned = !steady && std::mem::take(&mut self.tuned) && !first;
+    fn cycle(&mut self) -> ControllerOutputs {
+        let first = self.state.k == 0;
+        let tuned = std::mem::take(&mut self.tuned) && !first;
         if first {
             self.begin();
         }
         let sample = self.measure();
-        let (frame, mode) = self.estimate(&sample, tuned, steady);
+        let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
+        let (estimate, mode) = state.estimate(gains, par, in_use, inputs, &sample);
+        if tuned {
+            let new = context(par, &par.estimators, &par.motor);
+            state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
+            in_use.take_up(par);
+        }
+        let R_s_est = state.estimator.resistance(&context(par, &in_use.estimators, &par.motor));
+        let start = state.leader.start_state();
+        self.act(&sample, estimate, Phase { mode, start, tuned, R_s_est })
+    }
+
+    /// What follows from an estimate: the loops, the modulation and the outputs. Compiled twice: for any state, and without calls for
+    /// that of the default (its estimator supplies the angle, the start is over, nothing has been tuned).
+    #[inline(always)]
+    fn act(&mut self, sample: &Sample, estimate: Estimate, phase: Phase) -> ControllerOutputs {
+        let Phase { mode, start, tuned, R_s_est } = phase;
+        let Estimate { theta, axis, w, half, i, injection } = estimate;
+        let half = half.unwrap_or_else(|| Turn::new(0.5 * self.parameters.T_s * w));
+        let frame = Frame { axis, theta, w, half, i: axis.from_stator(i), injection };
         let speed = frame.w * (1.0 / f64::from(self.parameters.motor.n_p));
         let References { i: i_ref, limited: current_limited, tau: (low, high), weakens } =
             self.reference(mode, speed, frame.injection, tuned);
@@ -164,14 +203,9 @@ impl SensorlessController {
             let limited = current_limited && mode == Mode::ClosedLoop;
             self.state.overload.update(self.parameters.T_s, limited, self.state.w_ref, [speed; 2]);
         }
-        let Modulated { u, voltage_limited, cut, u_share } = self.modulate(mode, &frame, &sample, i_ref, tuned);
-        let R_s_est = self.state.estimator.resistance(&context(
-            &self.parameters,
-            &self.in_use.estimators,
-            &self.parameters.motor,
-        ));
-        let lock_lost = self.lock(mode, &frame, &sample, R_s_est, at_most(low, high));
-        self.keep(mode, &sample, i_ref, frame.i);
+        let Modulated { u, voltage_limited, cut, u_share } = self.modulate(mode, &frame, sample, i_ref, tuned);
+        let lock_lost = self.lock(mode, &frame, sample, R_s_est, at_most(low, high));
+        self.keep(mode, sample, i_ref, frame.i);
 
         ControllerOutputs {
             u,
@@ -191,7 +225,7 @@ impl SensorlessController {
             u_share,
             weakens,
             R_s_est,
-            start_state: if steady { StartState::Running } else { self.state.leader.start_state() },
+            start_state: start,
             ..ControllerOutputs::default()
         }
     }
@@ -248,27 +282,6 @@ impl SensorlessController {
             u_dc: inputs.u_dc,
             speed_ref: (!par.speed_loop.torque_mode).then_some(inputs.speed_ref),
         }
-    }
-
-    /// The estimated frame and the action of the loops in it. Changed parameters (`tuned`) act on the estimator from the next
-    /// sample on.
-    #[inline(always)]
-    fn estimate(&mut self, sample: &Sample, tuned: bool, steady: bool) -> (Frame, Mode) {
-        let Self { inputs, parameters: par, gains, in_use, state, .. } = self;
-        let (estimate, mode) = match &mut state.estimator {
-            Estimator::Rasmussen(observer) if steady => {
-                (observer.update(&context(par, &in_use.estimators, &in_use.motor), sample), Mode::ClosedLoop)
-            }
-            _ => state.estimate(gains, par, in_use, inputs, sample),
-        };
-        if tuned {
-            let new = context(par, &par.estimators, &par.motor);
-            state.estimator.retune(&context(par, &in_use.estimators, &in_use.motor), &new);
-            in_use.take_up(par);
-        }
-        let Estimate { theta, axis, w, half, i, injection } = estimate;
-        let half = half.unwrap_or_else(|| Turn::new(0.5 * par.T_s * w));
-        (Frame { axis, theta, w, half, i: axis.from_stator(i), injection }, mode)
     }
 
     /// The references at the estimated mechanical `speed` (rad/s) in addition to an `injection`.

@@ -33,12 +33,18 @@ pub struct Overload {
 impl Overload {
     /// After an interval of `h` (s) from the speed `before` to `speed`, in which a torque limit acted (`limited`) against the
     /// error of the speed.
-    pub fn update(&mut self, h: f64, limited: bool, speed_ref: f64, [before, speed]: [f64; 2]) {
-        let below = speed_ref > speed;
-        if !limited {
+    #[inline(always)]
+    pub fn update(&mut self, h: f64, limited: bool, speed_ref: f64, speeds: [f64; 2]) {
+        if limited {
+            self.at_limit(h, speed_ref, speeds);
+        } else if self.acts {
             *self = Self::default();
-            return;
         }
+    }
+
+    #[inline(never)]
+    fn at_limit(&mut self, h: f64, speed_ref: f64, [before, speed]: [f64; 2]) {
+        let below = speed_ref > speed;
         if !self.acts || below != self.below {
             (self.acts, self.from, self.below, self.farthest, self.time) = (true, before, below, 0.0, 0.0);
         }

@@ -59,7 +59,7 @@ impl<S: Scalar> PlantInputs<S> {
     }
 
     /// Voltage (V) of the legs before any drop, of a modulator in this `mode`.
-    #[inline]
+    #[inline(always)]
     pub fn voltage(&self, mode: ModulationMode) -> Vector<Stator, S> {
         match self.gates() {
             Gates::Switch => mode.limit(self.u, self.u_dc),

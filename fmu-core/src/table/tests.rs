@@ -91,3 +91,11 @@ fn a_table_has_thousands_of_rows() {
     }
     assert_eq!(PART.locate(index).map(|(name, ..)| name), Some("last".into()));
 }
+
+/// References of arrays would change with the limit.
+#[test]
+fn an_array_of_more_than_128_elements_is_wide() {
+    const DENSE: &Table<[f64; 128]> = table![Row::array_parameter("x", &VOLT, "", 128, |m: &mut [f64; 128]| m)];
+    const WIDE: &Table<[f64; 129]> = table![Row::array_parameter("x", &VOLT, "", 129, |m: &mut [f64; 129]| m)];
+    assert_eq!([(DENSE.len(), DENSE.wide()), (WIDE.len(), WIDE.wide())], [(128, 0), (0, 129)]);
+}
