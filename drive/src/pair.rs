@@ -3,8 +3,14 @@
 
 use drive_control::model::SensorlessController;
 use drive_plant::PmsmPlant;
+use drive_plant::pwm::InverterMode;
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 use serde::{Deserialize, Serialize};
+
+/// `inverter.i_zero` as a share of the current limit below which it is that of another drive: a tenth of the rule of `fmu tune`.
+const NARROW: f64 = 0.002;
+/// Ratio of the inverter's zone and the controller's beyond which they are those of different inverters.
+const APART: f64 = 2.0;
 
 /// The closed loop of plant and controller.
 #[derive(Clone, Default, Serialize, Deserialize)]
@@ -53,6 +59,31 @@ impl Pair {
              {T_s} s (controller.T_s), so commands are lost; set plant.inverter.T_pwm to at most {} s",
             T_pwm / period * T_s
         ))
+    }
+
+    /// Why the zone of the dead time in [`InverterMode::Average`] is wrong: that of a much smaller drive, or not the one that the
+    /// controller compensates.
+    pub(crate) fn wrong_zone(&self) -> Option<String> {
+        let (inverter, par) = (&self.plant.model.parameters.inverter, &self.controller.model.parameters);
+        let (i_zero, limit, compensated) = (inverter.i_zero, par.limit.i, par.compensation.i_zero);
+        if inverter.pwm.mode != InverterMode::Average || inverter.dead_time == 0.0 || i_zero == 0.0 {
+            return None;
+        }
+        if i_zero < NARROW * limit {
+            let (share, proposed) = (100.0 * i_zero / limit, 0.02 * limit);
+            return Some(format!(
+                "plant.inverter.i_zero = {i_zero} A is {share:.2} % of controller.limit.i = {limit} A: at light load the dead time costs more \
+                 voltage than on a real inverter, and the simulation is slow; set it and controller.compensation.i_zero to about \
+                 {proposed} A (2 %), or it to 0 for the zone of the ripple"
+            ));
+        }
+        let differs = compensated < i_zero / APART || compensated > i_zero * APART;
+        (par.compensation.u_dead > 0.0 && differs).then(|| {
+            format!(
+                "controller.compensation.i_zero = {compensated} A and plant.inverter.i_zero = {i_zero} A: the controller compensates the \
+                 dead time of another inverter, and at light load the current oscillates or an estimated speed is wrong; set both alike"
+            )
+        })
     }
 
     /// One communication step of `h` (s): exchanges values, then advances both.

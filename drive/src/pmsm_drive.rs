@@ -405,10 +405,12 @@ impl Warns for PmsmDrive {
         if self.unsettled && self.pair.now.seconds() <= 1.0 {
             log.warn("initial.steady", || self.unsettled_message());
         }
-        if self.pair.now.seconds() <= 1.0
-            && let Some(message) = self.pair.skips_commands()
-        {
-            log.warn("T_pwm", || message.clone());
+        if self.pair.now.seconds() <= 1.0 {
+            for (key, message) in [("T_pwm", self.pair.skips_commands()), ("i_zero", self.pair.wrong_zone())] {
+                if let Some(message) = message {
+                    log.warn(key, || message.clone());
+                }
+            }
         }
         plant.warn(log);
         let controller = &self.pair.controller.model;

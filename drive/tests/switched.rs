@@ -1,6 +1,7 @@
 //! The switched inverter against closed forms, against the average inverter, and against an independent switched plant.
 #![allow(missing_docs, non_snake_case)]
 
+use drive::control::tables::ControllerParameters;
 use drive::frame::{AlphaBeta, Phases, SQRT_3};
 use drive::math::wrap;
 use drive::plant::PmsmPlant;
@@ -589,6 +590,44 @@ fn what_is_not_modelled_is_refused_by_name() {
     let block = plant(0.0, |inverter| inverter.pwm.carrier_delay = 6e-5);
     let error = message(block.model.validate());
     assert!(error.contains("inverter.carrier_delay = 0.00006 s") && error.contains("T_pwm"), "{error}");
+}
+
+/// With a dead time, the zone of a much smaller drive, or another one than the controller compensates.
+#[test]
+fn a_wrong_zone_of_the_dead_time_is_reported() {
+    let said = |set: fn(&mut Inverter, &mut ControllerParameters)| {
+        let mut drive = Block::<PmsmDrive>::default();
+        let (plant, par) =
+            (&mut drive.model.pair.plant.model.parameters, &mut drive.model.pair.controller.model.parameters);
+        (par.limit.i, plant.inverter.dead_time, plant.inverter.i_zero) = (240.0, 2e-6, 4.8);
+        set(&mut plant.inverter, par);
+        drive.initialize();
+        let mut logged = Vec::new();
+        let mut sink = |(_, key, text): fmu_core::log::Said<'_>| logged.push((key, text()));
+        drive.model.warn(&mut Warnings::to(&mut sink));
+        logged.retain(|(key, _)| *key == "i_zero");
+        logged.into_iter().map(|(_, text)| text).collect::<Vec<_>>()
+    };
+    let narrow = "plant.inverter.i_zero = 0.1 A is 0.04 % of controller.limit.i = 240 A: at light load the dead time costs more voltage \
+                  than on a real inverter, and the simulation is slow; set it and controller.compensation.i_zero to about 4.8 A (2 %), \
+                  or it to 0 for the zone of the ripple";
+    assert_eq!(said(|inverter, _| inverter.i_zero = 0.1), [narrow]);
+    let differs = "controller.compensation.i_zero = 0.1 A and plant.inverter.i_zero = 4.8 A: the controller compensates the dead time of \
+                   another inverter, and at light load the current oscillates or an estimated speed is wrong; set both alike";
+    assert_eq!(said(|_, par| par.compensation.u_dead = 8.0), [differs]);
+    assert!(said(|_, par| (par.compensation.u_dead, par.compensation.i_zero) = (8.0, 10.0)).len() == 1);
+    let right: [fn(&mut Inverter, &mut ControllerParameters); 7] = [
+        |_, _| {},
+        |inverter, _| (inverter.dead_time, inverter.i_zero) = (0.0, 0.1),
+        |inverter, _| inverter.i_zero = 0.0,
+        |inverter, par| (inverter.i_zero, par.limit.i) = (0.1, 15.0),
+        |inverter, _| (inverter.i_zero, inverter.pwm.mode) = (0.1, InverterMode::Switched),
+        |_, par| (par.compensation.u_dead, par.compensation.i_zero) = (8.0, 2.4),
+        |_, par| (par.compensation.u_dead, par.compensation.i_zero) = (8.0, 9.6),
+    ];
+    for (k, set) in right.into_iter().enumerate() {
+        assert_eq!(said(set), [""; 0], "{k}");
+    }
 }
 
 /// A carrier that takes over fewer commands than the controller gives loses some: the first second says so.
