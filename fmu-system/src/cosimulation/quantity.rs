@@ -86,4 +86,34 @@ mod tests {
         assert_eq!(of_base("1/min", &base([0, 0, -1, 0, 0, 0, 0, 1])), Some("Angular velocity"));
         assert_eq!(of_base("X", &base([3, 0, 0, 0, 0, 0, 0, 0])), None);
     }
+
+    #[test]
+    fn the_exponents_follow_from_each_other() {
+        let of = |name: &str| QUANTITIES.iter().find(|(_, other)| *other == name).unwrap().0;
+        for (product, one, other) in [
+            ("Area", "Length", "Length"),
+            ("Volume", "Area", "Length"),
+            ("Length", "Velocity", "Time"),
+            ("Velocity", "Acceleration", "Time"),
+            ("Angle", "Angular velocity", "Time"),
+            ("Angular velocity", "Angular acceleration", "Time"),
+            ("Angular acceleration", "Angular velocity", "Frequency"),
+            ("Mass", "Mass flow", "Time"),
+            ("Volume", "Volume flow", "Time"),
+            ("Mass", "Density", "Volume"),
+            ("Force", "Mass", "Acceleration"),
+            ("Force", "Pressure", "Area"),
+            ("Energy", "Force", "Length"),
+            ("Energy", "Power", "Time"),
+            ("Charge", "Current", "Time"),
+            ("Power", "Voltage", "Current"),
+            ("Magnetic flux", "Voltage", "Time"),
+            ("Voltage", "Resistance", "Current"),
+            ("Magnetic flux", "Inductance", "Current"),
+        ] {
+            let sum: [i32; 8] = std::array::from_fn(|k| of(one)[k] + of(other)[k]);
+            assert_eq!(of(product), sum, "{product} = {one} times {other}");
+        }
+        assert_eq!(of("Temperature"), [0, 0, 0, 0, 1, 0, 0, 0]);
+    }
 }

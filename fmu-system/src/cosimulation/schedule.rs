@@ -198,6 +198,8 @@ mod tests {
     #[test]
     fn steps_hold_and_lines_connect() {
         let steps = Schedule::parse("0:0, 0.1:52.36").unwrap();
+        assert_eq!(steps.to_string(), "0:0,0.1:52.36");
+        assert_eq!(Schedule::parse("0:0~1:2").unwrap().to_string(), "0:0~1:2");
         let values = [-1.0, 0.0, 0.099, 0.1, 0.1 - 1e-12, 9.0].map(|t| steps.at(t));
         assert_eq!(values, [0.0, 0.0, 0.0, 52.36, 52.36, 52.36]);
         let lines = Schedule::parse("1:0~2:10~3:10").unwrap();

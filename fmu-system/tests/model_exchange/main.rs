@@ -197,6 +197,24 @@ fn events_of_cosimulation_come_at_their_time() {
     );
 }
 
+/// In event mode, an input that jumps between two communication points is met as an event, once.
+#[test]
+fn inputs_jump_at_their_time_in_event_mode() {
+    let workshop = Workshop::new();
+    let sampler = workshop.plain("sampler", 3);
+    let method = Method::CoSimulation { event_mode: true, early_return: false };
+    let mut system = single(&sampler, method, &["p.y", "p.u"]);
+    system.set("p.T", "0.5").unwrap();
+    system.input("p.u", Schedule::parse("0:1,0.3:2,0.6:3").unwrap()).unwrap();
+    let mut seen = Vec::new();
+    let hook = |point: &mut CommunicationPoint<'_>| {
+        seen.push(point.instance("p").unwrap().get("u").unwrap().number().unwrap());
+        Ok(ControlFlow::Continue(()))
+    };
+    system.run(&settings(1.0, 0.25), hook).unwrap();
+    assert_eq!(seen, [1.0, 1.0, 2.0, 3.0, 3.0]);
+}
+
 #[test]
 fn the_hook_ends_a_run() {
     let workshop = Workshop::new();
@@ -398,6 +416,13 @@ fn some_step_themselves() {
             for (a, b) in found.columns[0].values.iter().zip(&both.columns[0].values) {
                 assert!((a - b).abs() < 1e-8, "{stepping} steps itself: {a}, both do: {b}");
             }
+            // The last step of 0.05 s from 1 s on: x goes towards the output of the sampler.
+            let integration = Integration { stepping: vec![stepping.into()], ..Integration::default() };
+            let method = Method::ModelExchange(Integration { solver: SOLVERS[1], ..integration });
+            let short = run(&mut pair(&plant, &sampler, method), &settings(1.05, T));
+            let [x, y] = [0, 1].map(|column| short.columns[column].values[10]);
+            let (end, expected) = (short.columns[0].values[11], y + (x - y) * f64::exp(-0.05));
+            assert!((end - expected).abs() < 1e-8, "{stepping} steps itself: {end}, expected {expected}");
         }
     }
 }

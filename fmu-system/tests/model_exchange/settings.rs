@@ -1,8 +1,11 @@
 //! Settings of a run: tolerance, steps, jumps of inputs, results before an error.
 
-use crate::workshop::Workshop;
+use crate::workshop::{Workshop, array};
 use fmu_import::Fmu;
-use fmu_system::cosimulation::{Crossing, Integration, Method, Schedule, Settings, Solver, System, Transformation};
+use fmu_system::cosimulation::{
+    CoarseSteps, Crossing, Integration, Method, Schedule, Sequence, Settings, Sine, Solver, System, Transformation,
+    Units,
+};
 use model_description::Conversion;
 use std::ops::ControlFlow;
 
@@ -156,14 +159,14 @@ fn what_was_recorded_before_an_error_is_kept() {
     assert_eq!((recording.time.len(), recording.columns[0].values.len()), (4, 4));
 }
 
-/// z = 1 - 2 u in a loop with a connection that transmits 4 z + 3: a = 1 - 2 b, b = 7 - 8 a, so a = 13/15 and b = 1/15. The
-/// derivatives of the FMU count with the factor of the connection.
+/// z = 1 - 2 u in a loop with a connection that transmits 4 z + c: a = 1 - 2 b, b = 4 + c - 8 a, so a = (7 + 2 c) / 15. The derivatives
+/// of the FMU count with the factor of the connection, and the residual relative to the inputs.
 #[test]
 fn a_loop_through_a_conversion_is_solved() {
     let workshop = Workshop::new();
     for version in [2, 3] {
         let name = if version == 2 { "providesDirectionalDerivative" } else { "providesDirectionalDerivatives" };
-        for flag in [String::new(), format!("{name}='true' ")] {
+        for (flag, offset) in [(String::new(), 3.0), (format!("{name}='true' "), 3.0), (String::new(), 3e6)] {
             let xml = |xml: String| xml.replace("<ModelExchange ", &format!("<ModelExchange {flag}"));
             let fmu = workshop.fmu("plant", version, &[], xml);
             let mut system = System::new(Method::ModelExchange(Integration::default()));
@@ -171,14 +174,82 @@ fn a_loop_through_a_conversion_is_solved() {
                 system.add(name, &fmu, false).unwrap();
                 system.record(&format!("{name}.u")).unwrap();
             }
-            let transformation = Some(Transformation::Linear(Conversion { factor: 4.0, offset: 3.0 }));
+            let transformation = Some(Transformation::Linear(Conversion { factor: 4.0, offset }));
             system.connect_by("a.z", "b.u", &Crossing { transformation, ..Crossing::default() }).unwrap();
             system.connect("b.z", "a.u").unwrap();
             let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
             let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
             let last: Vec<f64> = recording.columns.iter().map(|column| *column.values.last().unwrap()).collect();
-            let expected = [13.0 / 15.0, 1.0 / 15.0];
-            assert!(last.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-9), "FMI {version}, {flag}: {last:?}");
+            let a = (7.0 + 2.0 * offset) / 15.0;
+            let near = |(x, y): (&f64, f64)| (x - y).abs() < 1e-9 * offset;
+            assert!(last.iter().zip([a, 0.5 - 0.5 * a]).all(near), "FMI {version}, {flag}: {last:?}");
         }
     }
+}
+
+/// Whether the FMUs of a plan follow another communication step, and take any.
+#[test]
+fn a_plan_knows_the_steps_that_its_fmus_take() {
+    let workshop = Workshop::new();
+    let can = "canHandleVariableCommunicationStepSize='true'";
+    for (flags, expected) in [
+        (can, (true, true)),
+        ("", (false, true)),
+        ("canHandleVariableCommunicationStepSize='true' fixedInternalStepSize='0.1'", (true, false)),
+    ] {
+        let mut system = System::default();
+        system.add("p", &workshop.plain("plant", 3), false).unwrap();
+        system.add("q", &workshop.fmu("plant", 3, &[], |xml| xml.replace(can, flags)), false).unwrap();
+        let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+        assert_eq!(system.into_plan(&settings).unwrap().varies_steps(), expected, "{flags}");
+    }
+}
+
+#[test]
+fn only_real_inputs_and_tunable_parameters_follow_a_sine() {
+    let workshop = Workshop::new();
+    let tunable = |xml: String| {
+        xml.replace(
+            "name='level' valueReference='7' causality='parameter' variability='fixed'",
+            "name='level' valueReference='7' causality='parameter' variability='tunable'",
+        )
+    };
+    let mut system = System::default();
+    system.add("p", &workshop.fmu("plant", 3, &[], tunable), false).unwrap();
+    let settings = Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false };
+    let plan = system.into_plan(&settings).unwrap();
+    let sine = Sine { amplitude: 1.0, frequency: 1.0, zero: 0.0 };
+    let excited = |name: &str| plan.excited(name, sine, &settings, CoarseSteps::default()).map(drop);
+    assert!(["p.u", "p.i", "p.level"].into_iter().all(|name| excited(name).is_ok()));
+    for name in ["p.x", "p.T"] {
+        let error = excited(name).unwrap_err().to_string();
+        assert_eq!(error, format!("{name}: cannot follow a sine: it is not a real input or tunable parameter"));
+    }
+}
+
+/// Texts over time are lines for a real input; an array is recorded as a text, a number is not.
+#[test]
+fn texts_are_lines_and_arrays_are_texts() {
+    let workshop = Workshop::new();
+    let mut system = System::default();
+    system.add("p", &workshop.fmu("plant", 3, &[], |xml| array(xml, "y")), false).unwrap();
+    let texts = Sequence::parse("0:1,0.5:2").unwrap();
+    let lines = system.lines("p.u", &texts).unwrap().unwrap();
+    assert_eq!([lines.at(0.25), lines.at(0.5)], [1.5, 2.0]);
+    system.sequence("p.u", &texts).unwrap();
+    system.record("p.u").unwrap();
+    system.record_text_as("p.y", "array").unwrap();
+    let error = system.record_text_as("p.x", "number").unwrap_err().to_string();
+    assert_eq!(error, "p.x: is one number, or a clock");
+    let settings = Settings { start: 0.0, stop: 0.5, step: 0.25, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    assert_eq!((&recording.columns[0].values[..2], recording.texts[0].values[0].as_str()), (&[1.0, 1.5][..], "0"));
+}
+
+#[test]
+fn a_system_knows_what_its_connections_do_with_units() {
+    assert_eq!(
+        [System::default().units(), System::default().with_units(Units::PassOn).units()],
+        [Units::Convert, Units::PassOn]
+    );
 }
