@@ -1,11 +1,12 @@
 //! What a description says of an FMU, and what the importer does with it.
 
 use crate::workshop::{Workshop, array};
-use fmu_import::Fmu;
-use fmu_system::cosimulation::{Integration, Method, Schedule, Settings, System, Units};
+use fmu_import::{Fmu, Number};
+use fmu_system::cosimulation::{Integration, Method, Outlet, Schedule, Settings, System, Units};
 use fmu_system::ssp::load::Loaded;
 use std::ops::ControlFlow;
 use std::path::Path;
+use std::sync::Arc;
 
 /// The last values of variables after 1 s in steps of 0.1 s.
 fn last(fmu: &Fmu, method: Method, set: &[(&str, &str)], variables: &[&str]) -> Vec<f64> {
@@ -216,4 +217,89 @@ fn a_connection_converts_units_where_the_system_does() {
             assert!((u - expected).abs() < 1e-15, "FMI {version}, {units:?}: {u}");
         }
     }
+}
+
+/// Terminals connect their members from output to input, whichever is written first.
+#[test]
+fn terminals_connect_their_members() {
+    let terminal = |name: &str, variable: &str| {
+        format!(
+            "<Terminal name='{name}' matchingRule='plug'><TerminalMemberVariable variableName='{variable}' memberName='v' \
+             variableKind='signal'/></Terminal>"
+        )
+    };
+    let file = format!(
+        "<fmiTerminalsAndIcons fmiVersion='3.0'><Terminals>{}{}</Terminals></fmiTerminalsAndIcons>",
+        terminal("out", "z"),
+        terminal("in", "u")
+    );
+    let workshop = Workshop::new();
+    let fmu = workshop.fmu_with("plant", &[("terminalsAndIcons/terminalsAndIcons.xml", &file)]);
+    for pair in [["a.out", "b.in"], ["b.in", "a.out"]] {
+        let mut system = System::default();
+        system.add("a", &fmu, false).unwrap();
+        system.add("b", &fmu, false).unwrap();
+        let made = system.connect_terminals(pair[0], pair[1]).unwrap();
+        assert_eq!(made, [("a.z".to_owned(), "b.u".to_owned())]);
+        assert!(system.is_fed("b.u").unwrap() && !system.is_fed("a.u").unwrap());
+        let error = system.connect_terminals("a.in", "b.in").unwrap_err().to_string();
+        assert!(error.contains("member v is input a.u here and input b.u there"), "{error}");
+    }
+}
+
+/// An input that is set, or fed, is not untouched.
+#[test]
+fn inputs_that_nobody_sets_are_untouched() {
+    let workshop = Workshop::new();
+    let mut system = System::default();
+    system.add("p", &workshop.plain("plant", 3), false).unwrap();
+    let names = |system: &System| system.untouched(0).iter().map(|v| v.name.to_string()).collect::<Vec<_>>();
+    assert_eq!(names(&system), ["u", "i"]);
+    system.set("p.u", "1").unwrap();
+    assert_eq!(names(&system), ["i"]);
+    system.input("p.i", Schedule::parse("0:1").unwrap()).unwrap();
+    assert_eq!(names(&system), [""; 0]);
+}
+
+/// A unit that is stated of a recorded variable replaces its own, with the display unit.
+#[test]
+fn a_stated_unit_replaces_the_display_unit() {
+    let workshop = Workshop::new();
+    let fmu = workshop.fmu("plant", 3, &[], |xml| {
+        let units = "<UnitDefinitions><Unit name='m'><BaseUnit m='1'/><DisplayUnit name='mm' factor='1000'/></Unit></UnitDefinitions>\
+            <DefaultExperiment ";
+        let x = "<Float64 unit='m' displayUnit='mm' name='x'";
+        xml.replace("<Float64 name='x'", x).replace("<DefaultExperiment ", units)
+    });
+    let mut system = System::default();
+    system.add("p", &fmu, false).unwrap();
+    for unit in [None, Some("m"), Some("pu")] {
+        let (port, name, unit) = ("p.x".to_owned(), format!("{unit:?}"), unit.map(str::to_owned));
+        system.record_through(&Outlet { port, name, unit, ..Outlet::default() }).unwrap();
+    }
+    let settings = Settings { start: 0.0, stop: 0.2, step: 0.1, sequential: false };
+    let recording = system.run(&settings, |_| Ok(ControlFlow::Continue(()))).unwrap();
+    let shown = recording.columns.iter().map(|c| (c.unit.as_str(), c.display.as_ref().map(|d| d.name.as_str())));
+    assert_eq!(shown.collect::<Vec<_>>(), [("m", Some("mm")), ("m", Some("mm")), ("pu", None)]);
+}
+
+/// A plan with its copy runs both, and a target of the copy changes the copy alone.
+#[test]
+fn a_plan_runs_beside_its_copy() {
+    let workshop = Workshop::new();
+    let mut system = System::default();
+    for name in ["a", "b"] {
+        system.add(name, &workshop.plain("plant", 3), false).unwrap();
+    }
+    system.connect("a.z", "b.u").unwrap();
+    system.set("a.u", "1").unwrap();
+    system.record("b.x").unwrap();
+    let plan = system.into_plan(&Settings { start: 0.0, stop: 1.0, step: 0.1, sequential: false }).unwrap();
+    let target = plan.target("a.u").unwrap();
+    let (copy, both) = (plan.in_copy(&target), Arc::new(plan.with_copy()));
+    let recording = both.worker().unwrap().record([(&copy, Number::Real(2.0))]).unwrap();
+    // b.u = 1 - 2 a.u, and b.x goes towards it from 1.
+    let expected = [1.0, 2.0].map(|u| (1.0 - 2.0 * u) + 2.0 * u * f64::exp(-1.0));
+    let found = [0, 1].map(|column: usize| *recording.columns[column].values.last().unwrap());
+    assert!(found.iter().zip(expected).all(|(x, y)| (x - y).abs() < 1e-12), "{found:?}, expected {expected:?}");
 }

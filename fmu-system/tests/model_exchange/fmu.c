@@ -15,7 +15,7 @@
 
 enum { U = 1, X, DER_X, I, Y, T, LEVEL, COUNT, FAULT, Z, TOLERANCE, PRIOR, N };
 enum { OK, WARNING, DISCARD, ERROR, FATAL, PENDING };
-enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL, NO_SOLUTION };
+enum { RESTLESS = 1, NAN_DERIVATIVE, DISCARDS, ZERO_NOMINAL, SAME_EVENT, FAILS, STEP_EVENTS, TERMINATES, FLIPS, NAN_STATE, NEW_NOMINAL, NO_SOLUTION, BEFORE };
 
 typedef void (*Log3)(void *, int, const char *, const char *);
 typedef struct {
@@ -137,6 +137,7 @@ static int step(M *m, double t, double h, bool *event, bool *early, double *last
         if (!m->events && instant(m) <= end + width) m->v[Y] = m->computed;
     }
     m->t = *last = end;
+    if (fault(m, BEFORE)) *early = true, *last = t - h;
     return OK;
 }
 

@@ -349,6 +349,13 @@ fn faults_are_named() {
         }
     }
 
+    // An early return before the step began.
+    let sampler = workshop.plain("sampler", 3);
+    let mut system = single(&sampler, Method::CoSimulation { event_mode: false, early_return: true }, &["p.y"]);
+    system.set("p.fault", "13").unwrap();
+    let error = refused(&mut system, &settings(1.0, 0.25));
+    assert!(error.contains("a step from 0 s returned early at -0.25 s, before its beginning"), "{error}");
+
     // Co-Simulation with event mode: the next event is always now.
     let sampler = workshop.plain("sampler", 3);
     let mut system = single(&sampler, Method::CoSimulation { event_mode: true, early_return: false }, &["p.y"]);

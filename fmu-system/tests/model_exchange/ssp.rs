@@ -452,6 +452,20 @@ fn the_rest_is_refused_or_noted() {
             "line 1: a.z is not Boolean but Float64, which counts",
         ),
         (
+            changed(&z, &z.replace("/>", "><c:String/></s:Connector>"), ""),
+            "line 1: a.z is not String but Float64, which counts",
+        ),
+        (
+            changed(&z, &z.replace("/>", "><c:Binary/></s:Connector>"), ""),
+            "line 1: a.z is not Binary but Float64, which counts",
+        ),
+        (
+            changed(&z, &z.replace("/>", "><c:Integer/></s:Connector>"), ""),
+            "line 1: a.z is not Integer but Float64, which counts",
+        ),
+        (changed(&z, &z.replace("/>", "><c:Real/></s:Connector>"), ""), ""),
+        (changed(&z, &kind("z", "constant"), ""), "line 1: a.z is output and not constant: correct kind"),
+        (
             changed(&z, &z.replace("/>", "><c:Real/><c:Dimension size='3'/></s:Connector>"), ""),
             "line 1: a.z has the extents \"\" and not 3: correct Dimension",
         ),

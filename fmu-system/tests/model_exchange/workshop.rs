@@ -22,6 +22,19 @@ impl Workshop {
         self.fmu(name, version, &[], |xml| xml)
     }
 
+    /// An FMU of FMI 3.0 with further files.
+    pub(crate) fn fmu_with(&self, name: &str, files: &[(&str, &str)]) -> Fmu {
+        let path = self.archive(name, 3, &[], |xml| xml);
+        let file = std::fs::File::options().read(true).write(true).open(&path).unwrap();
+        let mut zip = zip::ZipWriter::new_append(file).unwrap();
+        for (entry, text) in files {
+            zip.start_file(*entry, zip::write::SimpleFileOptions::default()).unwrap();
+            zip.write_all(text.as_bytes()).unwrap();
+        }
+        zip.finish().unwrap();
+        Fmu::open(path).unwrap()
+    }
+
     pub(crate) fn archive(
         &self,
         name: &str,
