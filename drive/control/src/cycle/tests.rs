@@ -212,7 +212,7 @@ fn the_next_sample_reads_references_and_output() {
 fn the_outputs_are_for_the_next_sample() {
     let (mut controller, _) = turning(0.0, |c| c.parameters.estimator = crate::estimator::Kind::Sensored);
     (controller.inputs.theta_meas, controller.inputs.speed_meas) = (0.4, 100.0);
-    let out = controller.cycle(false);
+    let out = controller.cycle();
     assert!((out.theta_est - 0.4 - 1e-4 * 300.0).abs() < 1e-12 && (out.speed_est - 100.0).abs() < 1e-12, "{out:?}");
     let most = controller.gains.k * controller.parameters.limit.i_q;
     assert!((out.tau_max - most).abs() < 1e-12 && (out.tau_min + most).abs() < 1e-12, "{out:?}");
