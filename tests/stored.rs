@@ -1,6 +1,6 @@
 //! Stored states of our models with random damage under a checksum that is right: refused, or a state that can be run.
 //!
-//! 1e5 trials; `FMU_BLOBS=1000000 cargo test --release --test stored` for more, `FMU_SEED=n` for others.
+//! 5e4 trials; `FMU_BLOBS=1000000 cargo test --release --test stored` for more, `FMU_SEED=n` for others.
 #![allow(missing_docs)]
 
 #[path = "stored/trial.rs"]
@@ -124,7 +124,7 @@ fn damage<M: Stored>(seeds: &[Vec<u8>], trials: u64) {
 /// The number of trials for one model.
 fn trials() -> u64 {
     quiet();
-    asked("FMU_BLOBS", 100_000).div_ceil(3)
+    asked("FMU_BLOBS", 50_000).div_ceil(3)
 }
 
 #[test]

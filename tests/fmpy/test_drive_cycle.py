@@ -78,8 +78,8 @@ def heated(loss, held_for=0.1):
     return COOLANT + above
 
 
-@STANDARDS
-def test_cycle(archives, standard):
+def test_cycle(archives):
+    """In FMI 3.0 alone: the bits of both standards are equal, as the hash of their default runs shows."""
     t = np.arange(round(TIME[-1] / H) + 1) * H
     v = np.interp(t, TIME, SPEED / 3.6)
     a = np.append(np.diff(v) / H, 0.0)
@@ -88,7 +88,7 @@ def test_cycle(archives, standard):
     torque = force * WHEEL / GEAR + J_ROTOR * a * GEAR / WHEEL
     temperatures = ["T_winding", "T_stator", "T_magnet"]
     names = ["tau_shaft", "p_in", *LOSSES, "energy_in", "energy_mech", "energy_loss", "u_share", *temperatures]
-    result = run(archives / f"fmi{standard}" / "PmsmDrive.fmu", speed, torque, names, correct=True)
+    result = run(archives / "fmi3" / "PmsmDrive.fmu", speed, torque, names, correct=True)
 
     assert speed.max() > 3.3 * 3075.0 * RPM  # base speed
     assert result["u_share"].max() < 0.96

@@ -136,6 +136,7 @@ pub struct Applied {
 
 impl ModulationMode {
     /// The voltage for the request `u` (V), whose fundamental it has up to the maximum, on a link of `u_dc` (V).
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
     pub fn apply(self, u: AlphaBeta, u_dc: f64) -> Applied {
         if self == Self::Linear {

@@ -108,6 +108,7 @@ pub struct CurrentController {
 
 impl CurrentController {
     /// Voltage command (V) for the current error at the electrical speed `w` (rad/s), before limiting.
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
     pub fn command(&self, gains: &CurrentGains, motor: &Motor, i_ref: DqHat, i: DqHat, w: f64) -> DqHat {
         let error = i_ref - i;

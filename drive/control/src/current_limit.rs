@@ -68,6 +68,7 @@ pub(super) struct Fresh {
 impl Fresh {
     /// Takes the measured currents `i` (A) and the voltage `u` (V) of the interval before; returns whether they and those of the last
     /// sample were new. A current that stays under a voltage that stays is settled, not old.
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
     pub(super) fn update(&mut self, i: Phases, u: AlphaBeta) -> bool {
         let change = u - self.u;

@@ -39,6 +39,7 @@ struct Frame {
 }
 
 /// What the controller does in a sample, beside its estimate.
+#[derive(Clone, Copy)]
 struct Phase {
     mode: Mode,
     start: StartState,

@@ -33,6 +33,7 @@ pub struct Overload {
 impl Overload {
     /// After an interval of `h` (s) from the speed `before` to `speed`, in which a torque limit acted (`limited`) against the
     /// error of the speed.
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
     pub fn update(&mut self, h: f64, limited: bool, speed_ref: f64, speeds: [f64; 2]) {
         if limited {

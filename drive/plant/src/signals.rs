@@ -59,6 +59,7 @@ impl<S: Scalar> PlantInputs<S> {
     }
 
     /// Voltage (V) of the legs before any drop, of a modulator in this `mode`.
+    #[expect(clippy::inline_always, reason = "the compiler would call it")]
     #[inline(always)]
     pub fn voltage(&self, mode: ModulationMode) -> Vector<Stator, S> {
         match self.gates() {

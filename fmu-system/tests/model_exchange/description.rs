@@ -174,7 +174,7 @@ fn an_fmu_of_one_instance_in_a_process_is_named() {
 #[test]
 fn the_numeric_outputs_of_all_instances_have_their_names() {
     let workshop = Workshop::new();
-    let plant = workshop.fmu("plant", 3, &[], |xml| array(array(xml, "i"), "y"));
+    let plant = workshop.fmu("plant", 3, &[], |xml| array(&array(&xml, "i"), "y"));
     let sampler = workshop.plain("sampler", 3);
     let mut system = System::default();
     system.add("a", &plant, false).unwrap();
@@ -253,7 +253,7 @@ fn inputs_that_nobody_sets_are_untouched() {
     let workshop = Workshop::new();
     let mut system = System::default();
     system.add("p", &workshop.plain("plant", 3), false).unwrap();
-    let names = |system: &System| system.untouched(0).iter().map(|v| v.name.to_string()).collect::<Vec<_>>();
+    let names = |system: &System| system.untouched(0).iter().map(|v| v.name.clone()).collect::<Vec<_>>();
     assert_eq!(names(&system), ["u", "i"]);
     system.set("p.u", "1").unwrap();
     assert_eq!(names(&system), ["i"]);

@@ -345,7 +345,7 @@ fn faults_are_named() {
         };
         restless(&sampler);
         if version == 3 {
-            restless(&workshop.fmu("sampler", 3, &[], |xml| array(array(xml, "i"), "y")));
+            restless(&workshop.fmu("sampler", 3, &[], |xml| array(&array(&xml, "i"), "y")));
         }
     }
 
@@ -396,7 +396,7 @@ fn algebraic_loops_are_solved_or_named() {
 #[test]
 fn a_loop_beside_an_array_is_solved() {
     let workshop = Workshop::new();
-    let plant = workshop.fmu("plant", 3, &[], |xml| array(array(xml, "i"), "y"));
+    let plant = workshop.fmu("plant", 3, &[], |xml| array(&array(&xml, "i"), "y"));
     let mut system = System::new(exchange(SOLVERS[1]));
     for name in ["a", "b"] {
         system.add(name, &plant, false).unwrap();

@@ -232,7 +232,7 @@ fn only_real_inputs_and_tunable_parameters_follow_a_sine() {
 fn texts_are_lines_and_arrays_are_texts() {
     let workshop = Workshop::new();
     let mut system = System::default();
-    system.add("p", &workshop.fmu("plant", 3, &[], |xml| array(xml, "y")), false).unwrap();
+    system.add("p", &workshop.fmu("plant", 3, &[], |xml| array(&xml, "y")), false).unwrap();
     let texts = Sequence::parse("0:1,0.5:2").unwrap();
     let lines = system.lines("p.u", &texts).unwrap().unwrap();
     assert_eq!([lines.at(0.25), lines.at(0.5)], [1.5, 2.0]);

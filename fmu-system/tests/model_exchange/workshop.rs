@@ -64,7 +64,7 @@ impl Workshop {
 }
 
 /// The description, of FMI 3.0, with a variable as an array of one element.
-pub(crate) fn array(xml: String, name: &str) -> String {
+pub(crate) fn array(xml: &str, name: &str) -> String {
     let at = xml.find(&format!("<Float64 name='{name}'")).unwrap();
     let end = at + xml[at..].find("/>").unwrap();
     format!("{}><Dimension start='1'/></Float64>{}", &xml[..end], &xml[end + 2..])

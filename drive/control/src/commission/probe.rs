@@ -171,7 +171,7 @@ mod tests {
                 Probed::Refused(fault) => return (probe, Err(fault)),
             }
             sample.i_last = sample.i;
-            sample.i = sample.i + sample.u * (bench.T / L);
+            sample.i += sample.u * (bench.T / L);
         }
         panic!("no end");
     }
