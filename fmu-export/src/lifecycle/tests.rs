@@ -147,3 +147,11 @@ fn a_missing_capability_is_refused_between_calls() {
     assert_eq!(States::of(&[]).to_string(), "no state");
     assert_eq!(States::of(&[State::Error, State::Step]).to_string(), "Step Mode, Error");
 }
+
+/// A call that an interface has in no state is refused in other words.
+#[test]
+fn a_set_knows_whether_it_is_empty() {
+    let (none, one) = (States::of(&[]), States::of(&[State::Step]));
+    assert!(none.is_empty() && !one.is_empty());
+    assert_eq!([none, one].map(|states| states.to_string()), ["no state", "Step Mode"]);
+}
