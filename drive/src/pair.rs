@@ -72,16 +72,17 @@ impl Pair {
         if i_zero < NARROW * limit {
             let (share, proposed) = (100.0 * i_zero / limit, 0.02 * limit);
             return Some(format!(
-                "plant.inverter.i_zero = {i_zero} A is {share:.2} % of controller.limit.i = {limit} A: at light load the dead time costs more \
-                 voltage than on a real inverter, and the simulation is slow; set it and controller.compensation.i_zero to about \
-                 {proposed} A (2 %), or it to 0 for the zone of the ripple"
+                "plant.inverter.i_zero = {i_zero} A is {share:.2} % of controller.limit.i = {limit} A: at light load, the dead time costs more \
+                 voltage than on a real inverter, and the simulation is slow; set plant.inverter.i_zero and \
+                 controller.compensation.i_zero to about {proposed} A (2 %), or plant.inverter.i_zero to 0 for the zone of the ripple"
             ));
         }
         let differs = compensated < i_zero / APART || compensated > i_zero * APART;
         (par.compensation.u_dead > 0.0 && differs).then(|| {
             format!(
-                "controller.compensation.i_zero = {compensated} A and plant.inverter.i_zero = {i_zero} A: the controller compensates the \
-                 dead time of another inverter, and at light load the current oscillates or an estimated speed is wrong; set both alike"
+                "controller.compensation.i_zero = {compensated} A differs from plant.inverter.i_zero = {i_zero} A: the controller compensates \
+                 for a different inverter, and at light load the current oscillates or the estimated speed is wrong; set both to the \
+                 same value"
             )
         })
     }

@@ -608,12 +608,13 @@ fn a_wrong_zone_of_the_dead_time_is_reported() {
         logged.retain(|(key, _)| *key == "i_zero");
         logged.into_iter().map(|(_, text)| text).collect::<Vec<_>>()
     };
-    let narrow = "plant.inverter.i_zero = 0.1 A is 0.04 % of controller.limit.i = 240 A: at light load the dead time costs more voltage \
-                  than on a real inverter, and the simulation is slow; set it and controller.compensation.i_zero to about 4.8 A (2 %), \
-                  or it to 0 for the zone of the ripple";
+    let narrow = "plant.inverter.i_zero = 0.1 A is 0.04 % of controller.limit.i = 240 A: at light load, the dead time costs more voltage \
+                  than on a real inverter, and the simulation is slow; set plant.inverter.i_zero and controller.compensation.i_zero to \
+                  about 4.8 A (2 %), or plant.inverter.i_zero to 0 for the zone of the ripple";
     assert_eq!(said(|inverter, _| inverter.i_zero = 0.1), [narrow]);
-    let differs = "controller.compensation.i_zero = 0.1 A and plant.inverter.i_zero = 4.8 A: the controller compensates the dead time of \
-                   another inverter, and at light load the current oscillates or an estimated speed is wrong; set both alike";
+    let differs = "controller.compensation.i_zero = 0.1 A differs from plant.inverter.i_zero = 4.8 A: the controller compensates for a \
+                   different inverter, and at light load the current oscillates or the estimated speed is wrong; set both to the same \
+                   value";
     assert_eq!(said(|_, par| par.compensation.u_dead = 8.0), [differs]);
     assert!(said(|_, par| (par.compensation.u_dead, par.compensation.i_zero) = (8.0, 10.0)).len() == 1);
     let right: [fn(&mut Inverter, &mut ControllerParameters); 7] = [
