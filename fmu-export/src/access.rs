@@ -445,3 +445,6 @@ impl<E: Exported> Instance<E> {
         E::CAN.reference(table::<E>().len() + number)
     }
 }
+
+#[cfg(test)]
+mod tests;
