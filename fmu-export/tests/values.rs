@@ -144,6 +144,18 @@ fn types_do_not_mix() {
     }
 }
 
+/// As many values as scalars.
+#[test]
+fn scalars_have_one_value_each() {
+    for (vr, values) in [(&[U][..], &[4.0, 5.0][..]), (&[U, K], &[4.0]), (&[U], &[]), (&[], &[4.0])] {
+        let fmu = Fmu::entered(3);
+        assert_eq!(fmu.set(vr, values), ERROR, "{vr:?} {values:?}");
+        let expected = format!("nValues = {} is not allowed: {} for these value references", values.len(), vr.len());
+        assert!(fmu.error().ends_with(&expected), "{}", fmu.error());
+        assert_eq!([fmu.get(U), fmu.get(K)], [1.0, 0.0]);
+    }
+}
+
 #[test]
 fn a_vector_is_set_whole_or_not_at_all() {
     for version in [2, 3] {

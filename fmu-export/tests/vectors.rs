@@ -83,3 +83,38 @@ fn the_first_getter_finds_all_elements() {
     }
     assert_eq!(voltages, [1.0, 2.0, 3.0]);
 }
+
+/// The model has no Booleans: no reference can be read or set as one, but a list without references can.
+#[test]
+fn a_type_that_the_model_lacks_is_refused() {
+    let token = CString::new(This::TOKEN.as_str()).unwrap();
+    let (no, no2) = (Fmi3Boolean(0), Fmi2Boolean(0));
+    unsafe {
+        let two = || {
+            let it = fmi2Instantiate(c"late".as_ptr(), 1, token.as_ptr(), null(), null(), no2, no2);
+            assert_eq!(fmi2SetupExperiment(it, no2, 0.0, 0.0, no2, 0.0), 0);
+            it
+        };
+        let three = || {
+            let (name, token) = (c"late".as_ptr(), token.as_ptr());
+            fmi3InstantiateCoSimulation(name, token, null(), no, no, no, no, null(), 0, null_mut(), None, None)
+        };
+        for reference in [1, 4, 99] {
+            let it = three();
+            assert_eq!(fmi3SetBoolean(it, &reference, 1, &Fmi3Boolean(1), 1), 3, "set {reference}");
+            fmi3FreeInstance(it);
+            let (it, mut value) = (three(), Fmi3Boolean(0));
+            assert_eq!(fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0), 0);
+            assert_eq!(fmi3GetBoolean(it, &reference, 1, &mut value, 1), 3, "get {reference}");
+            fmi3FreeInstance(it);
+            let it = two();
+            assert_eq!(fmi2SetBoolean(it, &reference, 1, &Fmi2Boolean(1)), 3, "set {reference}, FMI 2.0");
+            fmi2FreeInstance(it);
+        }
+        let it = three();
+        assert_eq!(fmi3SetBoolean(it, null(), 0, null(), 0), 0, "nothing to set");
+        assert_eq!(fmi3EnterInitializationMode(it, no, 0.0, 0.0, no, 0.0), 0);
+        assert_eq!(fmi3GetBoolean(it, null(), 0, null_mut(), 0), 0, "nothing to get");
+        fmi3FreeInstance(it);
+    }
+}
