@@ -253,3 +253,16 @@ fn a_system_knows_what_its_connections_do_with_units() {
         [Units::Convert, Units::PassOn]
     );
 }
+
+#[test]
+fn a_table_of_values_is_not_for_real_numbers() {
+    let workshop = Workshop::new();
+    let mut system = System::default();
+    for name in ["a", "b"] {
+        system.add(name, &workshop.plain("plant", 3), false).unwrap();
+    }
+    let transformation = Some(Transformation::Table([("1".into(), "2".into())].into()));
+    let error = system.connect_by("a.z", "b.u", &Crossing { transformation, ..Crossing::default() }).unwrap_err();
+    let expected = "a.z: is a real number: a table of values needs an integer, a Boolean or an item";
+    assert_eq!(error.to_string(), expected);
+}
