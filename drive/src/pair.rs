@@ -7,9 +7,9 @@ use drive_plant::pwm::InverterMode;
 use fmu_core::{Block, Elapsed, Fault, Model, Step};
 use serde::{Deserialize, Serialize};
 
-/// `inverter.i_zero` as a share of the current limit below which it is that of another drive: a tenth of the rule of `fmu tune`.
+/// Smallest plausible `inverter.i_zero`, as a share of the current limit: a tenth of the rule of `fmu tune`.
 const NARROW: f64 = 0.002;
-/// Ratio of the inverter's zone and the controller's beyond which they are those of different inverters.
+/// Largest plausible ratio between the zones of the inverter and of the controller.
 const APART: f64 = 2.0;
 
 /// The closed loop of plant and controller.
@@ -61,7 +61,7 @@ impl Pair {
         ))
     }
 
-    /// Why the zone of the dead time in [`InverterMode::Average`] is wrong: that of a much smaller drive, or not the one that the
+    /// Why `inverter.i_zero` is wrong in [`InverterMode::Average`]: too small for the drive, or different from the zone that the
     /// controller compensates.
     pub(crate) fn wrong_zone(&self) -> Option<String> {
         let (inverter, par) = (&self.plant.model.parameters.inverter, &self.controller.model.parameters);

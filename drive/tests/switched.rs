@@ -592,7 +592,7 @@ fn what_is_not_modelled_is_refused_by_name() {
     assert!(error.contains("inverter.carrier_delay = 0.00006 s") && error.contains("T_pwm"), "{error}");
 }
 
-/// With a dead time, the zone of a much smaller drive, or another one than the controller compensates.
+/// With a dead time in Average, `PmsmDrive` reports a zone that is too narrow or differs from the one that the controller compensates.
 #[test]
 fn a_wrong_zone_of_the_dead_time_is_reported() {
     let said = |set: fn(&mut Inverter, &mut ControllerParameters)| {

@@ -52,7 +52,7 @@ pub enum State {
 }
 
 impl State {
-    const ALL: [Self; 13] = [
+    pub(crate) const ALL: [Self; 13] = [
         Self::Instantiated,
         Self::Initialization,
         Self::Step,

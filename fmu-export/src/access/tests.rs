@@ -23,23 +23,11 @@ const TABLE: &Table<M> = table![
     Row::output("z", &VOLT, "", |m: &mut M| &mut m.x).exact(),
 ];
 
-/// The states in which importers set variables.
-const STATES: [State; 10] = [
-    Instantiated,
-    Configuration,
-    Initialization,
-    Step,
-    Event,
-    Continuous,
-    Reconfiguration,
-    Intermediate,
-    Activation,
-    ClockUpdate,
-];
-
 fn of(index: usize, rule: fn(&Meta, State) -> bool) -> Vec<State> {
     let meta = TABLE.entry(&mut M::default(), index).unwrap().0;
-    STATES.into_iter().filter(|state| rule(meta, *state)).collect()
+    // Those in which an importer may set variables at all.
+    let states = State::ALL.into_iter().filter(|state| !matches!(state, Ended | Terminated | Error));
+    states.filter(|state| rule(meta, *state)).collect()
 }
 
 #[test]
